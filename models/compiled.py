@@ -1,0 +1,118 @@
+"""From the expressions of a network to functions and matrices: the only place where laws become code."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import lru_cache
+from typing import Any
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from models.errors import InputError
+from models.laws import NumericLaw, Signals, compile_function, function_source, symbol
+from models.network import BASE_SIGNALS, ThermalNetwork
+from models.runtime import Laws
+from models.types import Array
+
+FUNCTIONS = ("boundary", "exchange", "heat", "fixed")
+_compiled: WeakKeyDictionary[ThermalNetwork, dict[bool, Laws]] = WeakKeyDictionary()
+
+
+def compile_laws(network: ThermalNetwork, *, vector: bool) -> Laws:
+    """The laws of `network` on arrays (`vector`) or on plain numbers; kept for the next call with the same network."""
+    kept = _compiled.setdefault(network, {})
+    if vector not in kept:
+        functions = {name: _function(source, name) for name, source in law_source(network, vector=vector).items()}
+        kept[vector] = laws_of(network, functions)
+    return kept[vector]
+
+
+@lru_cache(maxsize=256)
+def _function(source: str, name: str) -> Callable[..., tuple[Any, ...]]:
+    return compile_function(source, name)
+
+
+def laws_of(network: ThermalNetwork, functions: Mapping[str, Callable[..., tuple[Any, ...]]]) -> Laws:
+    """Everything the runtime needs of `network`, with its law functions by name."""
+    laplacian, to_boundary, injection = structure(network)
+    return Laws(
+        **functions,
+        parts=tuple(part.name for part in network.parts),
+        boundaries=tuple(node.name for node in network.nodes if node.temperature is not None),
+        components=network.components,
+        sources=tuple(source.name for source in network.sources),
+        losses_of_sources=tuple(source.is_loss for source in network.sources),
+        inputs=("speed", "torque", *network.inputs),
+        parameters=tuple(parameter.name for parameter in network.parameters),
+        states=tuple(state.name for state in network.states),
+        varying=tuple(index for index, varies in enumerate(_varying(network)) if varies),
+        laplacian=laplacian,
+        to_boundary=to_boundary,
+        injection=injection,
+        updates=any(state.update is not None for state in network.states),
+        numeric=tuple(_on_signals(law) for law in network.numeric_laws.values()),
+    )
+
+
+def law_source(network: ThermalNetwork, *, vector: bool) -> dict[str, str]:
+    """Python source of the functions of :class:`~models.runtime.Laws` by name; the FMU carries the plain-number form.
+
+    Raises
+    ------
+    InputError
+        If a heat capacity is missing or depends on more than parameters.
+    """
+    boundary = {symbol(f"T_{node.name}"): node.temperature for node in network.nodes if node.temperature is not None}
+    parameters = [parameter.name for parameter in network.parameters]
+    parts = [f"T_{part.name}" for part in network.parts]
+    common = [*BASE_SIGNALS, *network.inputs, *parts, *parameters, *(state.name for state in network.states)]
+    with_numeric = [*common, *network.numeric_laws]
+    losses = [f"P_{name}" for name in network.components]
+    varies = _varying(network)
+    conductances = [link.conductance.xreplace(boundary) for link in network.links]
+    capacities = []
+    for part in network.parts:
+        if part.capacity is None or {s.name for s in part.capacity.free_symbols} - set(parameters):
+            raise InputError(f"node {part.name!r} needs a heat capacity that depends on parameters only")
+        capacities.append(part.capacity)
+    memory = [state.rate for state in network.states]
+    memory += [symbol(state.name) if state.update is None else state.update for state in network.states]
+    heats = [expression.xreplace(boundary) for expression in [*(source.heat for source in network.sources), *memory]]
+    moving = [c for c, varying in zip(conductances, varies, strict=True) if varying]
+    constant = [c for c, varying in zip(conductances, varies, strict=True) if not varying]
+    return {
+        "boundary": function_source("boundary", common, list(boundary.values()), vector=vector),
+        "exchange": function_source("exchange", with_numeric, moving, vector=vector),
+        "heat": function_source("heat", [*with_numeric, *losses], heats, vector=vector),
+        "fixed": function_source("fixed", parameters, [*constant, *capacities], vector=vector),
+    }
+
+
+def structure(network: ThermalNetwork) -> tuple[Array, Array, Array]:
+    """Matrices of a network; see :class:`~models.runtime.Laws` for `laplacian`, `to_boundary` and `injection`."""
+    part = {node.name: index for index, node in enumerate(network.parts)}
+    boundaries = [node.name for node in network.nodes if node.temperature is not None]
+    laplacian = np.zeros((len(network.links), len(part), len(part)))
+    to_boundary = np.zeros((len(network.links), len(part), len(boundaries)))
+    for index, link in enumerate(network.links):
+        for here, there in (link.nodes, link.nodes[::-1]):
+            if here in part:
+                laplacian[index, part[here], part[here]] += 1.0
+                if there in part:
+                    laplacian[index, part[here], part[there]] -= 1.0
+                else:
+                    to_boundary[index, part[here], boundaries.index(there)] += 1.0
+    injection = np.zeros((len(network.sources), len(part)))
+    for index, source in enumerate(network.sources):
+        injection[index, part[source.node]] = 1.0
+    return laplacian, to_boundary, injection
+
+
+def _varying(network: ThermalNetwork) -> list[bool]:
+    parameters = {parameter.name for parameter in network.parameters}
+    return [bool({s.name for s in link.conductance.free_symbols} - parameters) for link in network.links]
+
+
+def _on_signals(law: NumericLaw) -> Callable[[Mapping[str, Any]], Any]:
+    return lambda by_name: law.function(Signals(by_name))

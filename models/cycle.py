@@ -1,0 +1,116 @@
+"""A cycle: the inputs of a gearbox over time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from models.errors import InputError
+from models.types import Array
+
+# signal -> (column of a file, plausible range, what a value outside it usually is)
+COLUMNS: dict[str, tuple[str, float, float, str]] = {
+    "speed": ("speed_rpm", -2.0e5, 2.0e5, "1/min"),
+    "torque": ("torque_Nm", -1.0e7, 1.0e7, "N m"),
+    "T_ambient": ("T_ambient_degC", -90.0, 200.0, "degC; kelvin are not meant"),
+    "air_speed": ("air_speed_m_s", 0.0, 200.0, "m/s"),
+}
+REQUIRED = ("speed", "torque")
+
+
+@dataclass(frozen=True)
+class Cycle:
+    """Inputs over time, taken as straight lines between the rows.
+
+    Attributes
+    ----------
+    time : Array, shape (N,)
+        [s], strictly increasing
+    inputs : mapping of signal name to Array, shape (N,)
+        ``speed`` [1/min], ``torque`` [N m], ``T_ambient`` [degC], ``air_speed`` [m/s] and further named inputs
+    """
+
+    time: Array
+    inputs: Mapping[str, Array]
+
+    @classmethod
+    def from_columns(cls, columns: Mapping[str, ArrayLike], *, name: str = "cycle", extra: tuple[str, ...] = ()) -> Cycle:
+        """Read a cycle from named columns (a dict, a pandas data frame).
+
+        Parameters
+        ----------
+        columns : mapping of column name to ArrayLike, shape (N,)
+            ``time_s``, ``speed_rpm``, ``torque_Nm`` and, where known, ``T_ambient_degC`` and ``air_speed_m_s``
+        name : str
+            What messages call it, e.g. the file
+        extra : tuple of str
+            Further columns that the network has as inputs, read under their own name
+
+        Raises
+        ------
+        InputError
+            All faults at once: missing columns, no rows, values that are not finite or not plausible, time that does
+            not increase; with the row numbers (the first row of data is 1).
+
+        Examples
+        --------
+        >>> Cycle.from_columns({"time_s": [0, 1, 1], "speed_rpm": [0, 1, 2]}, name="run.csv")
+        Traceback (most recent call last):
+        models.errors.InputError: run.csv: column torque_Nm is missing; it has: speed_rpm, time_s
+        run.csv: time_s goes from 1 to 1 at row 3; it must increase from row to row
+        """
+        faults: list[str] = []
+        have = {str(key) for key in columns}
+        needed = ["time_s", *(COLUMNS[signal][0] for signal in REQUIRED)]
+        for column in needed:
+            if column not in have:
+                faults.append(f"column {column} is missing; it has: {', '.join(sorted(have))}")
+        arrays: dict[str, Array] = {}
+        wanted = {"time": "time_s"} | {signal: spec[0] for signal, spec in COLUMNS.items()} | {c: c for c in extra}
+        for signal, column in wanted.items():
+            if column in have:
+                values = _numbers(columns[column], column, faults)
+                if values is not None:
+                    arrays[signal] = values
+        time = arrays.pop("time", np.zeros(0))
+        if "time_s" in have and len(time) == 0 and not any("time_s" in fault for fault in faults):
+            faults.append("it has no rows")
+        back = np.flatnonzero(np.diff(time) <= 0.0)
+        if len(back):
+            row = int(back[0])
+            faults.append(
+                f"time_s goes from {time[row]:g} to {time[row + 1]:g} at row {row + 2}; it must increase from row to row"
+            )
+        for signal, values in arrays.items():
+            if signal in COLUMNS and len(values):
+                column, low, high, unit = COLUMNS[signal]
+                wrong = np.flatnonzero((values < low) | (values > high))
+                if len(wrong):
+                    faults.append(
+                        f"{column} is {values[wrong[0]]:g} at row {wrong[0] + 1}; {low:g} ... {high:g} is possible ({unit})"
+                    )
+        if faults:
+            raise InputError("\n".join(f"{name}: {fault}" for fault in faults))
+        return cls(time, arrays)
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+
+def _numbers(values: ArrayLike, column: str, faults: list[str]) -> Array | None:
+    try:
+        numbers = np.asarray(values, dtype=float)
+    except (TypeError, ValueError) as error:
+        faults.append(f"{column} holds something that is not a number ({error})")
+        return None
+    if numbers.ndim != 1:
+        faults.append(f"{column} has shape {numbers.shape}; one value per row is needed")
+        return None
+    wrong = np.flatnonzero(~np.isfinite(numbers))
+    if len(wrong):
+        faults.append(f"{column} is {numbers[wrong[0]]} at row {wrong[0] + 1}; {len(wrong)} rows are not finite numbers")
+        return None
+    return numbers

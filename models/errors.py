@@ -1,0 +1,28 @@
+"""The one exception for faulty input, and the helpers that make its text useful."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from difflib import get_close_matches
+
+
+class InputError(ValueError):
+    """What the user gave cannot be used; the message says what, where, which limit, and what to do.
+
+    The command line prints the message and exits with status 2.
+    """
+
+
+def did_you_mean(name: str, known: Iterable[str]) -> str:
+    """Return ``"; did you mean 'x'?"`` for the nearest known name, or a list of what is known.
+
+    Examples
+    --------
+    >>> did_you_mean("facewidth_mm", ["face_width_mm", "module_mm"])
+    "; did you mean 'face_width_mm'?"
+    >>> did_you_mean("qqq", ["b", "a"])
+    '; known are: a, b'
+    """
+    names = sorted(known)
+    close = get_close_matches(name, names, n=1)
+    return f"; did you mean '{close[0]}'?" if close else f"; known are: {', '.join(names)}"

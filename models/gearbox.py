@@ -1,0 +1,357 @@
+"""Gearboxes and oils by name or from a file: TOML in, one validated :class:`Gearbox` out, all faults at once.
+
+The keys of a file are the classes of :mod:`models.definition`.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
+
+from models.annotated import Annotations, join, strip
+from models.consistency import consistency_faults, factor_names
+from models.definition import SCHEMA, Ambient, Bearing, Definition, Housing, Node, Oil, Seal, Shaft, Stage, Training
+from models.errors import InputError, did_you_mean
+from models.faults import shown, validated
+from models.named_oils import lubricant, read_oil
+from models.oil import Oil as Lubricant
+from models.toml_file import known_names, packaged, parse, read_text
+
+if TYPE_CHECKING:
+    from models.losses import LossModel
+    from models.network import ThermalNetwork
+
+T = TypeVar("T")
+
+FOLDER = "gearboxes"
+DEFAULT_SOURCE = f"default of schema {SCHEMA}"
+CHANGED_SOURCE = "changed after reading (with_values)"
+# Giving one of these in a gearbox file also replaces the other in the named oil.
+ALTERNATIVES = {"viscosity_points": "d341", "d341": "viscosity_points"}
+
+
+@dataclass(frozen=True, eq=False)
+class Gearbox:
+    """A validated gearbox definition; :func:`load_gearbox` makes one.
+
+    The tables of the file are attributes (``gearbox.stage[0].face_width_mm``), lists of tables are tuples. Two gearboxes
+    are the same when their ``hash`` is.
+
+    Attributes
+    ----------
+    definition : Definition
+        All values, defaults included
+    notes : Annotations
+        Sources and standard deviations by dotted path
+    given : frozenset of str
+        Paths that the file (or its named oil) gives; the others are defaults
+    file : str
+        Name of the file, for messages
+    """
+
+    definition: Definition
+    notes: Annotations
+    given: frozenset[str]
+    file: str
+
+    @property
+    def name(self) -> str:
+        """What the gearbox is called."""
+        return self.definition.name
+
+    @property
+    def ambient(self) -> Ambient:
+        """``[ambient]``."""
+        return self.definition.ambient
+
+    @property
+    def oil(self) -> Oil:
+        """``[oil]``, with the values of the named oil."""
+        return self.definition.oil
+
+    @property
+    def shaft(self) -> tuple[Shaft, ...]:
+        """``[[shaft]]``."""
+        return self.definition.shaft
+
+    @property
+    def stage(self) -> tuple[Stage, ...]:
+        """``[[stage]]``; exactly one for now."""
+        return self.definition.stage
+
+    @property
+    def bearing(self) -> tuple[Bearing, ...]:
+        """``[[bearing]]``."""
+        return self.definition.bearing
+
+    @property
+    def seal(self) -> tuple[Seal, ...]:
+        """``[[seal]]``."""
+        return self.definition.seal
+
+    @property
+    def housing(self) -> Housing:
+        """``[housing]``."""
+        return self.definition.housing
+
+    @property
+    def node(self) -> tuple[Node, ...]:
+        """``[[node]]``: overridden heat capacities."""
+        return self.definition.node
+
+    @property
+    def training(self) -> Training:
+        """``[training]``."""
+        return self.definition.training
+
+    @cached_property
+    def factors(self) -> Mapping[str, float]:
+        """Every tunable factor of the thermal network by name; 1 where the file names none."""
+        return {
+            name: self.definition.factors.get(name, 1.0)
+            for name in factor_names(tuple(part.name for part in self.housing.part))
+        }
+
+    @property
+    def sources(self) -> Mapping[str, str]:
+        """Sources by dotted path, as written; :meth:`source_of` answers for every value."""
+        return self.notes.sources
+
+    @property
+    def priors(self) -> Mapping[str, float]:
+        """Standard deviation of every single uncertain number by dotted path, in the unit of the key."""
+        return self.notes.priors
+
+    @cached_property
+    def values(self) -> Mapping[str, Any]:
+        """All values as plain tables, defaults included, absent ones left out."""
+        return self.definition.model_dump(by_alias=True, exclude_none=True)
+
+    @cached_property
+    def leaves(self) -> Mapping[str, Any]:
+        """Every single value by dotted path.
+
+        Examples
+        --------
+        >>> load_gearbox("fzg").leaves["stage.0.z.1"]
+        24
+        """
+        return dict(_leaves(self.values))
+
+    @cached_property
+    def hash(self) -> str:
+        """SHA-256 of the values as canonical JSON; comments, sources, priors and key order do not change it."""
+        text = json.dumps(self.values, sort_keys=True, separators=(",", ":"), allow_nan=False)
+        return hashlib.sha256(text.encode()).hexdigest()
+
+    @property
+    def speed_ratio(self) -> Mapping[str, float]:
+        """Speed of every shaft over the speed of the input shaft, by shaft name, [-]."""
+        stage = self.stage[0]
+        return {stage.driver: 1.0, stage.driven: stage.z[0] / stage.z[1]}
+
+    def source_of(self, path: str) -> str:
+        """Return where a value comes from.
+
+        Raises
+        ------
+        InputError
+            If the gearbox has no value of that path.
+
+        Examples
+        --------
+        >>> load_gearbox("fzg").source_of("stage.0.center_distance_mm")
+        'Table 1 of the paper'
+        """
+        if path in self.given:
+            return self.notes.source_of(path)
+        if path in self.leaves:
+            return DEFAULT_SOURCE
+        raise InputError(f"{self.file}: {path} is not a value of this gearbox{did_you_mean(path, self.leaves)}")
+
+    def with_values(self, changes: Mapping[str, Any]) -> Gearbox:
+        """Return a new, validated gearbox with some values changed; sources and priors stay.
+
+        Parameters
+        ----------
+        changes : Mapping of str to value
+            New values by dotted path, in the unit of the key
+
+        Raises
+        ------
+        InputError
+            If a path does not exist or the changed gearbox is not valid.
+
+        Examples
+        --------
+        >>> gearbox = load_gearbox("fzg").with_values({"stage.0.friction.mu_solid": 0.07, "factors.h_air": 1.1})
+        >>> gearbox.stage[0].friction.mu_solid, gearbox.factors["h_air"]
+        (0.07, 1.1)
+        """
+        values: Any = self.values
+        faults: list[str] = []
+        for path, value in changes.items():
+            try:
+                values = _replaced(values, path.split("."), _plain(value))
+            except LookupError:
+                faults.append(f"{path} is not a value of this gearbox{did_you_mean(path, self.leaves)}")
+        faults += consistency_faults(values)
+        definition = validated(Definition, values, file=self.file, faults=faults)
+        changed = dict.fromkeys(changes, CHANGED_SOURCE)
+        notes = Annotations(sources={**self.sources, **changed}, priors=dict(self.priors))
+        given = {leaf for leaf, _ in _leaves(values) if any(f"{leaf}.".startswith(f"{path}.") for path in changes)}
+        return Gearbox(definition, notes, self.given | given, self.file)
+
+    def lubricant(self) -> Lubricant:
+        """Return the oil as the loss formulas use it."""
+        return lubricant(self.oil)
+
+    def losses(self) -> LossModel:
+        """Return the full power-loss model of this gearbox."""
+        from models.losses import LossModel
+
+        return LossModel.from_gearbox(self)
+
+    def network(self) -> ThermalNetwork:
+        """Return the thermal network of this gearbox."""
+        from models.gearbox_network import build_network
+
+        return build_network(self)
+
+
+def known_gearboxes() -> tuple[str, ...]:
+    """Return the names of the gearboxes that come with the package.
+
+    Examples
+    --------
+    >>> "fzg" in known_gearboxes()
+    True
+    """
+    return known_names(FOLDER)
+
+
+def load_gearbox(name_or_path: str | Path) -> Gearbox:
+    """Read a gearbox definition.
+
+    Parameters
+    ----------
+    name_or_path : str or Path
+        Name of a gearbox that comes with the package (``"fzg"``), or a TOML file
+
+    Raises
+    ------
+    InputError
+        With every fault of the file, one per line.
+
+    Examples
+    --------
+    >>> gearbox = load_gearbox("fzg")
+    >>> gearbox.stage[0].face_width_mm, gearbox.stage[0].face_width
+    (14.0, 0.014)
+    """
+    path = Path(name_or_path)
+    if not isinstance(name_or_path, str) or path.name != name_or_path or path.suffix:
+        return read_gearbox(read_text(path), file=path.name)
+    if name_or_path not in known_gearboxes():
+        hint = did_you_mean(name_or_path, known_gearboxes())
+        raise InputError(f"there is no gearbox named '{name_or_path}'{hint} (a file is named with its ending, .toml)")
+    source = packaged(FOLDER, name_or_path)
+    return read_gearbox(read_text(source), file=source.name)
+
+
+def read_gearbox(text: str, *, file: str) -> Gearbox:
+    """Read a gearbox definition from its text; `file` is the name that messages show.
+
+    Raises
+    ------
+    InputError
+        With every fault of the text, one per line.
+    """
+    document = parse(text, file=file)
+    number = document.get("schema", SCHEMA)
+    if number != SCHEMA or isinstance(number, bool):
+        raise InputError(f"{file}: schema = {shown(number)} is not known; this version reads schema = {SCHEMA}")
+    notes = Annotations()
+    try:
+        values = strip(document, notes)
+    except RecursionError as error:
+        raise InputError(f"{file}: its tables are nested too deeply") from error
+    if "source" not in document:
+        notes.faults.append("source is missing; say where the values come from")
+    if isinstance(values.get("oil"), dict) and "named" in values["oil"]:
+        values = values | {"oil": _with_named_oil(values["oil"], notes)}
+    faults = [*notes.faults, *consistency_faults(values)]
+    definition = validated(Definition, values, file=file, faults=faults)
+    gearbox = Gearbox(definition, notes, frozenset(path for path, _ in _leaves(values)), file)
+    whole = [path for path in notes.priors if isinstance(gearbox.leaves[path], int)]
+    if whole:
+        raise InputError("\n".join(f"{file}: {path} is a whole number and cannot have an sd" for path in whole))
+    return gearbox
+
+
+def _with_named_oil(own: dict[str, Any], notes: Annotations) -> dict[str, Any]:
+    """Fill an ``[oil]`` table up from its named oil, value by value, sources and standard deviations included."""
+    name = own["named"]
+    if not isinstance(name, str):
+        return own  # the validation says so
+    try:
+        values, oil_notes = read_oil(name)
+    except InputError as error:
+        notes.faults.append(f"oil.named: {error}")
+        return own
+    notes.faults.extend(oil_notes.faults)
+    open_keys = [key for key in values if key not in own and ALTERNATIVES.get(key) not in own]
+    notes.sources.update({f"oil.{key}": oil_notes.source_of(key) for key in open_keys})
+    notes.sources.update(_moved(oil_notes.sources, open_keys))
+    notes.priors.update(_moved(oil_notes.priors, open_keys))
+    return own | {key: values[key] for key in open_keys}
+
+
+def _moved(recorded: Mapping[str, T], keys: Sequence[str]) -> dict[str, T]:
+    """Return what is recorded at or below some keys of an oil, by the paths of the gearbox."""
+    return {f"oil.{path}": item for path, item in recorded.items() if path.partition(".")[0] in keys}
+
+
+def _leaves(values: Any, path: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield every single value of nested tables and lists with its dotted path."""
+    if isinstance(values, Mapping):
+        for key, item in values.items():
+            yield from _leaves(item, join(path, key))
+    elif isinstance(values, tuple):
+        for index, item in enumerate(values):
+            yield from _leaves(item, join(path, index))
+    else:
+        yield path, values
+
+
+def _replaced(values: Any, keys: Sequence[str], new: Any) -> Any:
+    """Return nested tables and lists with one value exchanged, or with one more key in an existing table.
+
+    Raises
+    ------
+    LookupError
+        If there is no such place.
+    """
+    if not keys:
+        return new
+    key, *below = keys
+    if isinstance(values, Mapping) and (key in values or not below):
+        return {**values, key: _replaced(values.get(key), below, new)}
+    if isinstance(values, tuple) and key.isdecimal() and int(key) < len(values):
+        index = int(key)
+        return (*values[:index], _replaced(values[index], below, new), *values[index + 1 :])
+    raise LookupError(key)
+
+
+def _plain(value: Any) -> Any:
+    """Return a value as TOML would have given it: numpy scalars as numbers, arrays and lists as tuples."""
+    if isinstance(value, np.generic | np.ndarray):
+        value = value.tolist()
+    return tuple(_plain(item) for item in value) if isinstance(value, list | tuple) else value

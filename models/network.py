@@ -1,0 +1,356 @@
+"""The thermal network: nodes, links and sources, each with a law.
+
+A network is data. :meth:`ThermalNetwork.with_source`, :meth:`~ThermalNetwork.with_link` and their like give a new network
+with one more term; a base term, a mechanism of the catalogue and a user's own are the same kind of thing.
+``m c dT/dt = sources - sum of conductance * difference`` at every node; what leaves one node enters another, so heat is
+conserved whatever the laws say.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from difflib import get_close_matches
+from functools import cached_property
+from typing import Any, Protocol
+
+import sympy as sp
+from numpy.typing import ArrayLike
+
+from models.cycle import Cycle
+from models.errors import InputError, did_you_mean
+from models.laws import LawLike, NumericLaw, Parameter, Signals, symbol, trace
+from models.types import Array
+
+
+class Losses(Protocol):
+    """What a network needs of a loss model: the full one (F-PL) and a surrogate (ROM-PL) both have it."""
+
+    @property
+    def components(self) -> tuple[str, ...]:
+        """Names of the losses."""
+        ...
+
+    @property
+    def temperature_nodes(self) -> tuple[str, ...]:
+        """Nodes whose temperatures are read."""
+        ...
+
+    def power(self, speed: ArrayLike, torque: ArrayLike, temperatures: ArrayLike) -> Array:
+        """Losses [W], shape (..., components), at speed [1/min], torque [N m] and temperatures [degC]."""
+        ...
+
+    def domain_distance(self, speed: ArrayLike, torque: ArrayLike, temperatures: ArrayLike) -> Array:
+        """How far outside its domain the model is asked, as a fraction of the domain's range; 0 inside. Shape (...)."""
+        ...
+
+
+@dataclass(frozen=True, kw_only=True)
+class Node:
+    """An isothermal part of the gearbox, or a boundary of known temperature.
+
+    Attributes
+    ----------
+    name : str
+    capacity : sympy.Expr or None
+        Heat capacity, [J/K]; None for a boundary
+    temperature : sympy.Expr or None
+        Temperature of a boundary, [degC]; None for a part of the gearbox
+    """
+
+    name: str
+    capacity: sp.Expr | None = None
+    temperature: sp.Expr | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Link:
+    """A heat path between two nodes; `conductance` in [W/K]."""
+
+    name: str
+    nodes: tuple[str, str]
+    conductance: sp.Expr
+
+
+@dataclass(frozen=True, kw_only=True)
+class Source:
+    """A heat source in a node; `heat` in [W]. `is_loss`: the heat is mechanical power lost, and counts as such."""
+
+    name: str
+    node: str
+    heat: sp.Expr
+    is_loss: bool
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExtraState:
+    """A memory of the network beside its temperatures.
+
+    Attributes
+    ----------
+    name : str
+    start : float
+    rate : sympy.Expr
+        Time derivative, [1/s]; 0 for a state that only switches
+    update : sympy.Expr or None
+        Its value after each accepted step of the solver, e.g. a thermostat's hysteresis
+    """
+
+    name: str
+    start: float
+    rate: sp.Expr
+    update: sp.Expr | None
+
+
+BASE_SIGNALS = ("time", "speed", "torque")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ThermalNetwork:
+    """Nodes, links and sources of one gearbox.
+
+    Attributes
+    ----------
+    nodes, links, sources : tuple
+    parameters : tuple of Parameter
+    components : tuple of str
+        Losses that the sources may use as the signal ``P_<component>``
+    inputs : mapping of str to float
+        Further inputs and the value each has where a cycle does not give it
+    groups : mapping of str to tuple of str
+        Names for several nodes together, e.g. ``housing``
+    states : tuple of ExtraState
+    numeric_laws : mapping of str to NumericLaw
+        Laws that could not be traced, by the symbol that stands for them
+    """
+
+    nodes: tuple[Node, ...]
+    links: tuple[Link, ...] = ()
+    sources: tuple[Source, ...] = ()
+    parameters: tuple[Parameter, ...] = ()
+    components: tuple[str, ...] = ()
+    inputs: Mapping[str, float] = field(default_factory=dict)
+    groups: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    states: tuple[ExtraState, ...] = ()
+    numeric_laws: Mapping[str, NumericLaw] = field(default_factory=dict)
+
+    @cached_property
+    def node_names(self) -> tuple[str, ...]:
+        """All nodes, in order."""
+        return tuple(node.name for node in self.nodes)
+
+    @cached_property
+    def parts(self) -> tuple[Node, ...]:
+        """Nodes whose temperature is a state."""
+        return tuple(node for node in self.nodes if node.temperature is None)
+
+    @cached_property
+    def signals(self) -> tuple[str, ...]:
+        """Every name that a law may use."""
+        return (
+            *BASE_SIGNALS,
+            *self.inputs,
+            *(f"T_{name}" for name in self.node_names),
+            *(f"P_{name}" for name in self.components),
+            *(parameter.name for parameter in self.parameters),
+            *(state.name for state in self.states),
+        )
+
+    def symbols(self) -> Signals:
+        """All signals and parameters as symbols, for writing laws."""
+        return Signals({name: symbol(name) for name in self.signals})
+
+    # ------------------------------------------------------------------ extension
+
+    def with_node(self, name: str, heat_capacity: LawLike) -> ThermalNetwork:
+        """A network with one more part of `heat_capacity` [J/K]; link it with :meth:`with_link`."""
+        self._new_name(name, self.node_names, "node")
+        capacity, numeric = trace(heat_capacity, [p.name for p in self.parameters], f"heat_capacity_{name}")
+        if numeric is not None:
+            raise InputError(f"the heat capacity of node {name!r} must be a number or a function of parameters")
+        return replace(self, nodes=(*self.nodes, Node(name=name, capacity=capacity)))
+
+    def with_boundary(self, name: str, temperature: LawLike) -> ThermalNetwork:
+        """A network with one more boundary node of known `temperature` [degC], a law of time, inputs and parameters."""
+        self._new_name(name, self.node_names, "node")
+        allowed = (*BASE_SIGNALS, *self.inputs, *(p.name for p in self.parameters))
+        expression, numeric = trace(temperature, allowed, f"temperature_{name}")
+        if numeric is not None:
+            raise InputError(f"the temperature of boundary {name!r} must be an expression; no branches or numpy calls")
+        return replace(self, nodes=(*self.nodes, Node(name=name, temperature=expression)))
+
+    def with_input(self, name: str, default: float) -> ThermalNetwork:
+        """A network with one more input signal, e.g. a measured column, that laws may use."""
+        self._new_name(name, self.signals, "signal")
+        return replace(self, inputs={**self.inputs, name: default})
+
+    def with_parameter(self, parameter: Parameter) -> ThermalNetwork:
+        """A network with one more tunable parameter that laws may use by its name."""
+        self._new_name(parameter.name, self.signals, "signal")
+        return replace(self, parameters=(*self.parameters, parameter))
+
+    def with_state(
+        self, name: str, *, start: float, rate: LawLike = 0.0, update: LawLike | None = None
+    ) -> ThermalNetwork:
+        """A network with a memory.
+
+        Parameters
+        ----------
+        name : str
+            Name of the state; laws use it like a signal
+        start : float
+            Its value at the start
+        rate : law
+            Its time derivative, [1/s]
+        update : law or None
+            Its value after each accepted step of the solver
+        """
+        self._new_name(name, self.signals, "signal")
+        names = [*self.signals, name]
+        rate_expression, numeric = trace(rate, names, f"rate_{name}")
+        update_expression = None
+        if update is not None:
+            update_expression, numeric_update = trace(update, names, f"update_{name}")
+            numeric = numeric or numeric_update
+        if numeric is not None:
+            raise InputError(f"the laws of state {name!r} must be expressions; write branches with sympy.Piecewise")
+        state = ExtraState(name=name, start=start, rate=rate_expression, update=update_expression)
+        return replace(self, states=(*self.states, state))
+
+    def with_source(self, node: str, law: LawLike, *, name: str, is_loss: bool = False) -> ThermalNetwork:
+        """A network with one more heat source.
+
+        Parameters
+        ----------
+        node : str
+            A node, or a group whose nodes share the heat evenly
+        law : callable of :class:`~models.laws.Signals`, sympy expression, or number
+            Heat, [W]; positive warms the node
+        name : str
+            Name of the source
+        is_loss : bool
+            Whether the heat is mechanical power lost in the gearbox: it then counts in ``P_loss_W`` and gets a column
+
+        Raises
+        ------
+        InputError
+            If the node or a signal is unknown, the node is a boundary, or the name is taken.
+
+        Examples
+        --------
+        >>> from models.gearbox import load_gearbox
+        >>> network = load_gearbox("fzg").network()
+        >>> extra = network.with_source("oil", lambda s: 8.0 * (s.speed / 3000.0) ** 3, name="extra")
+        >>> extra.sources[-1].heat
+        2.96296296296296e-10*speed**3
+        """
+        members = self._members(node)
+        for member in members:
+            if member not in {part.name for part in self.parts}:
+                raise InputError(f"node {member!r} has a given temperature; a source there has no effect")
+        self._new_name(name, [source.name for source in self.sources], "source")
+        expression, numeric_laws = self._traced(law, f"source_{name}")
+        several = len(members) > 1
+        added = tuple(
+            Source(name=f"{name}_{m}" if several else name, node=m, heat=expression / len(members), is_loss=is_loss)
+            for m in members
+        )
+        return replace(self, sources=(*self.sources, *added), numeric_laws=numeric_laws)
+
+    def with_link(
+        self, node_a: str, node_b: str, law: LawLike, *, name: str | None = None, temperature: LawLike | None = None
+    ) -> ThermalNetwork:
+        """A network with one more heat path.
+
+        Parameters
+        ----------
+        node_a : str
+            A node, or a group whose nodes share the conductance evenly
+        node_b : str
+            A node; a name that the network does not have becomes a new boundary node
+        law : callable of :class:`~models.laws.Signals`, sympy expression, or number
+            Conductance, [W/K], >= 0
+        name : str or None
+            Name of the link, by default ``<node_a>-<node_b>``
+        temperature : law or None
+            Temperature of a new boundary node, [degC]; ambient by default
+
+        Raises
+        ------
+        InputError
+            If a node or signal is unknown, both nodes are the same, or the name is taken. An unknown `node_b` that is
+            close to a known name is taken for a slip unless `temperature` is given.
+        """
+        members = self._members(node_a)
+        if node_b not in self.node_names:
+            close = get_close_matches(node_b, self.node_names, n=1, cutoff=0.8)
+            if close and temperature is None:
+                raise InputError(
+                    f"node {node_b!r} is unknown; did you mean {close[0]!r}? "
+                    "Give a temperature to make it a new boundary node"
+                )
+            boundary = "T_ambient" if temperature is None else temperature
+            law_b: LawLike = (lambda s: s[boundary]) if isinstance(boundary, str) else boundary
+            return self.with_boundary(node_b, law_b).with_link(node_a, node_b, law, name=name)
+        if temperature is not None:
+            raise InputError(f"node {node_b!r} exists; a temperature can be given to a new boundary node only")
+        if node_b in members:
+            raise InputError(f"a link joins two different nodes; {node_a!r} and {node_b!r} were given")
+        name = name or f"{node_a}-{node_b}"
+        self._new_name(name, [link.name for link in self.links], "link")
+        expression, numeric_laws = self._traced(law, f"link_{name}")
+        several = len(members) > 1
+        added = tuple(
+            Link(name=f"{name}_{m}" if several else name, nodes=(m, node_b), conductance=expression / len(members))
+            for m in members
+        )
+        return replace(self, links=(*self.links, *added), numeric_laws=numeric_laws)
+
+    # ------------------------------------------------------------------ use
+
+    def simulate(
+        self,
+        cycle: Cycle | Mapping[str, ArrayLike],
+        *,
+        losses: Losses,
+        initial: float | Mapping[str, float] | None = None,
+        parameters: Mapping[str, ArrayLike] | None = None,
+        progress: Callable[[int, int], None] | None = None,
+    ) -> Any:
+        """Temperatures and losses over a cycle; see :func:`models.simulation.simulate`."""
+        from models.simulation import simulate
+
+        return simulate(self, cycle, losses=losses, initial=initial, parameters=parameters, progress=progress)
+
+    def steady_state(
+        self,
+        *,
+        losses: Losses,
+        speed: ArrayLike,
+        torque: ArrayLike,
+        inputs: Mapping[str, ArrayLike] | None = None,
+        parameters: Mapping[str, ArrayLike] | None = None,
+    ) -> Any:
+        """Temperatures and losses at rest with constant inputs; see :func:`models.simulation.steady_state`."""
+        from models.simulation import steady_state
+
+        return steady_state(self, losses=losses, speed=speed, torque=torque, inputs=inputs, parameters=parameters)
+
+    # ------------------------------------------------------------------ checks
+
+    def _members(self, node: str) -> tuple[str, ...]:
+        if node in self.groups:
+            return self.groups[node]
+        if node not in self.node_names:
+            raise InputError(f"node {node!r} is unknown{did_you_mean(node, [*self.node_names, *self.groups])}")
+        return (node,)
+
+    def _traced(self, law: LawLike, label: str) -> tuple[sp.Expr, Mapping[str, NumericLaw]]:
+        label = "".join(c if c.isalnum() else "_" for c in label)
+        expression, numeric = trace(law, self.signals, label)
+        return expression, self.numeric_laws if numeric is None else {**self.numeric_laws, label: numeric}
+
+    @staticmethod
+    def _new_name(name: str, taken: Iterable[str], kind: str) -> None:
+        if name in taken:
+            raise InputError(f"the network has a {kind} {name!r} already; choose another name")
