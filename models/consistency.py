@@ -105,7 +105,7 @@ def _duplicate_names(values: Mapping[str, Any]) -> Iterator[str]:
     reserved = (*BOUNDARY_NODES, "oil", "mesh", *COMPONENTS)
     for name, count in Counter(own).items():
         if count > 1:
-            yield f"name '{name}' is given {count} times; every shaft, gear, bearing, seal and housing part needs its own"
+            yield f"name '{name}' is given {count} times; every part and component needs its own"
         if name in reserved:
             yield f"name '{name}' is taken by the model itself; choose another"
     for name, count in Counter(_names(values, "node")).items():

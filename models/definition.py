@@ -56,9 +56,10 @@ class D341(Section):
 
 
 class Modulus(Section):
-    """Constants of the modulus equation ``eta = eta_0 exp[p / (A + B p)]``, ``A = a1 + a2 T``, ``B = b1 + b2 T``, T in K.
+    """Constants of the modulus equation ``eta = eta_0 exp[p / (A + B p)]``.
 
-    ``nu_40_mm2_s`` is the viscosity of the oil on which they were measured.
+    ``A = a1 + a2 T`` and ``B = b1 + b2 T`` with T in K; ``nu_40_mm2_s`` is the viscosity of the oil on which they were
+    measured.
     """
 
     a1_Pa: Annotated[float, between(-1e9, 1e9)]
@@ -317,7 +318,7 @@ class Bearing(Section):
 
 
 class Seal(Section):
-    """``[[seal]]``: one radial shaft seal; ``nu_40_mm2_s`` is the viscosity grade of the oil (default: its viscosity)."""
+    """``[[seal]]``: one radial shaft seal; ``nu_40_mm2_s`` is the grade of the oil (default: its viscosity)."""
 
     name: Name
     shaft: Name

@@ -41,8 +41,8 @@ ALTERNATIVES = {"viscosity_points": "d341", "d341": "viscosity_points"}
 class Gearbox:
     """A validated gearbox definition; :func:`load_gearbox` makes one.
 
-    The tables of the file are attributes (``gearbox.stage[0].face_width_mm``), lists of tables are tuples. Two gearboxes
-    are the same when their ``hash`` is.
+    The tables of the file are attributes (``gearbox.stage[0].face_width_mm``), lists of tables are tuples. Two
+    gearboxes are the same when their ``hash`` is.
 
     Attributes
     ----------

@@ -12,10 +12,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-try:
-    from models.solver import Balance
-except ImportError:  # inside an FMU the files lie side by side under unique names
-    from solver import Balance  # type: ignore[import-not-found,no-redef]
+from .solver import Balance  # relative: inside an FMU these files form a package of another, unique name
 
 Array = NDArray[np.float64]
 RPM = np.pi / 30.0

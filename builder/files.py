@@ -1,0 +1,135 @@
+"""Tables in and out: cycles and results as CSV, CSV.gz or Parquet. Files appear whole or not at all."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import tempfile
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+import pandas as pd
+from numpy.typing import ArrayLike
+
+from models.cycle import Cycle
+from models.errors import InputError
+
+KINDS = (".csv", ".csv.gz", ".parquet")
+DECIMALS = 6  # of results: a millionth of a kelvin or a watt
+
+
+def read_table(path: Path) -> pd.DataFrame:
+    """Read a CSV, CSV.gz or Parquet file.
+
+    Raises
+    ------
+    InputError
+        If the file is missing, empty, of another kind, or its content cannot be read.
+    """
+    if not path.exists():
+        raise InputError(f"{path}: no such file")
+    if not path.is_file():
+        raise InputError(f"{path}: is not a file")
+    kind = _kind(path)
+    try:
+        if kind == ".parquet":
+            return pd.read_parquet(path)
+        return pd.read_csv(path, comment="#", skipinitialspace=True)
+    except ImportError as error:
+        raise InputError(f"{path}: reading Parquet needs pyarrow; install gearbox-thermal-twin[parquet]") from error
+    except pd.errors.EmptyDataError as error:
+        raise InputError(f"{path}: is empty; a header line with column names and rows are needed") from error
+    except (ValueError, OSError, EOFError) as error:
+        first_line = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
+        raise InputError(f"{path}: cannot be read as {kind.removeprefix('.')}: {first_line}") from error
+
+
+def read_cycle(path: Path, extra: tuple[str, ...] = ()) -> Cycle:
+    """Read a cycle; see :meth:`models.cycle.Cycle.from_columns`."""
+    table = read_table(path)
+    repeated = sorted({str(c).rpartition(".")[0] for c in table.columns if str(c).rpartition(".")[2].isdigit()})
+    for name in repeated:  # pandas renames a second 'speed_rpm' to 'speed_rpm.1'
+        if name in table.columns:
+            raise InputError(f"{path}: column {name} is there twice; remove one")
+    return Cycle.from_columns({str(c): table[c].to_numpy() for c in table.columns}, name=str(path), extra=extra)
+
+
+def read_initial(value: str) -> float | dict[str, float]:
+    """Initial temperatures: a number in degC, or a file whose ``T_<node>_degC`` columns end with them.
+
+    The last row counts, so that a result can be continued.
+
+    Raises
+    ------
+    InputError
+        If it is neither.
+
+    Examples
+    --------
+    >>> read_initial("20")
+    20.0
+    """
+    with contextlib.suppress(ValueError):
+        return float(value)
+    path = Path(value)
+    table = read_table(path)
+    columns = [str(c) for c in table.columns if str(c).startswith("T_") and str(c).endswith("_degC")]
+    temperatures = {c[2:-5]: float(table[c].iloc[-1]) for c in columns if c != "T_ambient_degC" and len(table)}
+    if not temperatures:
+        raise InputError(f"{path}: has no T_<node>_degC columns with values to start from")
+    return temperatures
+
+
+def write_table(path: Path, columns: Mapping[str, ArrayLike]) -> None:
+    """Write columns as CSV, CSV.gz or Parquet by the file's ending.
+
+    Raises
+    ------
+    InputError
+        If the ending is another one or the folder cannot be written to.
+    """
+    kind = _kind(path)
+    table = pd.DataFrame({name: values for name, values in columns.items()})
+    with appearing_whole(path) as partial:
+        if kind == ".parquet":
+            try:
+                table.to_parquet(partial)
+            except ImportError as error:
+                raise InputError(f"{path}: writing Parquet needs pyarrow; install gearbox-thermal-twin[parquet]") from error
+        else:
+            compression = {"method": "gzip", "mtime": 0} if kind == ".csv.gz" else None
+            table.round(DECIMALS).to_csv(partial, index=False, compression=compression)
+
+
+@contextlib.contextmanager
+def appearing_whole(path: Path) -> Iterator[Path]:
+    """A temporary name beside `path` that becomes `path` when the block ends well, and vanishes otherwise.
+
+    Raises
+    ------
+    InputError
+        If the folder cannot be made or written to.
+    """
+    folder = path.parent
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=folder)
+        os.close(handle)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written ({error.strerror}); choose another output") from error
+    partial = Path(name)
+    try:
+        yield partial
+        if path.is_dir():
+            raise InputError(f"{path}: is a folder; name a file")
+        partial.chmod(0o644)
+        partial.replace(path)
+    finally:
+        partial.unlink(missing_ok=True)
+
+
+def _kind(path: Path) -> str:
+    for kind in KINDS:
+        if path.name.lower().endswith(kind):
+            return kind
+    raise InputError(f"{path}: the ending says nothing; use one of {', '.join(KINDS)}")

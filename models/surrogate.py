@@ -1,0 +1,467 @@
+r"""The reduced loss model (ROM-PL): trained networks in place of the full model, behind the same interface.
+
+A :class:`Network` is the plain description of one trained network: bounds, features, weights. :class:`SurrogateLosses`
+puts operating points into the networks' input rows, and their outputs back onto the loss components. It reads |speed| and
+|torque|; below the lowest trained speed all losses, and below the lowest trained torque the sliding loss, go linearly to
+zero, as in the full model (:mod:`models.losses`); otherwise inputs are held at the bounds of training.
+
+Numpy only: this file also runs where neither scikit-learn nor onnxruntime is installed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, Literal, Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from models.errors import InputError
+from models.types import Array
+
+FORMAT = 1
+KELVIN = 273.15
+LN10 = float(np.log(10.0))
+
+Feature = Literal["value", "log", "log_kelvin", "viscosity"]
+FEATURES: tuple[Feature, ...] = ("value", "log", "log_kelvin", "viscosity")
+Evaluator = Callable[[Array], Array]
+"""Rows of one network's inputs, shape (N, inputs), to its outputs, shape (N, outputs)."""
+
+
+def feature_values(kind: Feature, x: Array, viscosity: tuple[float, float]) -> Array:
+    r"""Return one kind of feature of physical inputs.
+
+    Parameters
+    ----------
+    kind : {"value", "log", "log_kelvin", "viscosity"}
+        The input itself; its natural logarithm; :math:`\ln\Theta` of a temperature in degC; :math:`\ln(\nu + 0.7)` of the
+        oil at that temperature after ASTM D341, that is :math:`\ln 10 \cdot 10^{m - n \lg\Theta}`
+    x : Array, shape (...)
+        Input in its physical unit
+    viscosity : (m, n)
+        Constants of ASTM D341, [-]
+
+    Returns
+    -------
+    Array, shape (...)
+
+    References
+    ----------
+    ASTM D341; :func:`models.oil.kinematic_viscosity_d341`.
+
+    Examples
+    --------
+    >>> ln_nu = feature_values("viscosity", np.array([40.0, 100.0]), (9.5468, 3.7520))
+    >>> (np.exp(ln_nu) - 0.7).round(1).tolist()
+    [32.6, 5.4]
+    """
+    if kind == "value":
+        return x
+    if kind == "log":
+        return np.log(x)
+    ln_theta = np.log(x + KELVIN)
+    if kind == "log_kelvin":
+        return ln_theta
+    m, n = viscosity
+    return np.asarray(LN10 * np.exp(LN10 * m - n * ln_theta))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Network:
+    """One trained network with its scaling folded into the weights: physical inputs to losses in W.
+
+    Outputs are ``exp(net + passed)`` where `log_output`, else ``max(net + passed, 0)``; ``net`` is the network of two
+    sigmoid layers, ``passed`` a linear part straight from the features (the powers of speed and torque that the targets
+    were reduced by).
+
+    Attributes
+    ----------
+    name : str
+    inputs, outputs : tuple of str
+        Names with units (``"speed_rpm"``, ``"mesh_sliding_W"``)
+    lower, upper : tuple of float
+        Bounds of training per input; inputs are held there
+    features : tuple of (Feature, int)
+        Kind and input of every feature, see :func:`feature_values`
+    viscosity : (float, float)
+        Constants m, n of ASTM D341 of the oil, [-]
+    weights : three Arrays, shape (features, H1), (H1, H2), (H2, outputs)
+    biases : three Arrays, shape (H1,), (H2,), (outputs,)
+    passed : Array, shape (features, outputs)
+    log_output : bool
+    """
+
+    name: str
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    lower: tuple[float, ...]
+    upper: tuple[float, ...]
+    features: tuple[tuple[Feature, int], ...]
+    viscosity: tuple[float, float]
+    weights: tuple[Array, Array, Array]
+    biases: tuple[Array, Array, Array]
+    passed: Array
+    log_output: bool
+
+    def __post_init__(self) -> None:
+        """Refuse a network that does not fit together."""
+        n_in, n_feature, n_out = len(self.inputs), len(self.features), len(self.outputs)
+        h_1, h_2 = (len(b) for b in self.biases[:2])
+        shapes = [w.shape for w in self.weights] + [b.shape for b in self.biases] + [self.passed.shape]
+        wanted = [(n_feature, h_1), (h_1, h_2), (h_2, n_out), (h_1,), (h_2,), (n_out,), (n_feature, n_out)]
+        if shapes != wanted or len(self.lower) != n_in or len(self.upper) != n_in:
+            raise InputError(f"network {self.name}: shapes {shapes} do not fit, {wanted} are needed; build it again")
+        if not all(kind in FEATURES and 0 <= column < n_in for kind, column in self.features):
+            raise InputError(f"network {self.name}: features {self.features} are not known; build it again")
+        if not all(np.isfinite(a).all() for a in (*self.weights, *self.biases, self.passed, self.lower, self.upper)):
+            raise InputError(f"network {self.name}: a weight or bound is not a finite number; build it again")
+
+    def __call__(self, rows: Array) -> Array:
+        """Outputs [W], shape (N, outputs), at inputs of shape (N, inputs), held at the bounds."""
+        x = np.clip(rows, self.lower, self.upper)
+        columns = [feature_values(kind, x[:, column], self.viscosity) for kind, column in self.features]
+        features = np.stack(columns, axis=-1)
+        activation = features
+        for weights, bias in zip(self.weights[:2], self.biases[:2], strict=True):
+            activation = 0.5 + 0.5 * np.tanh(0.5 * (activation @ weights + bias))
+        net = activation @ self.weights[2] + self.biases[2] + features @ self.passed
+        return np.asarray(np.exp(net) if self.log_output else np.maximum(net, 0.0))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the network as plain lists, numbers and strings (JSON)."""
+        return {
+            "name": self.name,
+            "inputs": list(self.inputs),
+            "outputs": list(self.outputs),
+            "lower": list(self.lower),
+            "upper": list(self.upper),
+            "features": [list(feature) for feature in self.features],
+            "viscosity": list(self.viscosity),
+            "weights": [w.tolist() for w in self.weights],
+            "biases": [b.tolist() for b in self.biases],
+            "passed": self.passed.tolist(),
+            "log_output": self.log_output,
+        }
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> Self:
+        """Return the network of :meth:`to_dict`.
+
+        Raises
+        ------
+        InputError
+            If something is missing or does not fit.
+        """
+        try:
+            w_1, w_2, w_3 = (np.array(w, dtype=float) for w in data["weights"])
+            b_1, b_2, b_3 = (np.array(b, dtype=float) for b in data["biases"])
+            m, n = data["viscosity"]
+            return cls(
+                name=data["name"],
+                inputs=tuple(data["inputs"]),
+                outputs=tuple(data["outputs"]),
+                lower=tuple(map(float, data["lower"])),
+                upper=tuple(map(float, data["upper"])),
+                features=tuple((kind, int(column)) for kind, column in data["features"]),
+                viscosity=(float(m), float(n)),
+                weights=(w_1, w_2, w_3),
+                biases=(b_1, b_2, b_3),
+                passed=np.array(data["passed"], dtype=float),
+                log_output=bool(data["log_output"]),
+            )
+        except (KeyError, TypeError, ValueError) as error:
+            if isinstance(error, InputError):
+                raise
+            raise InputError(f"not a network of this version ({error!r}); build the surrogate again") from error
+
+
+@dataclass(frozen=True)
+class Use:
+    """One use of a network: where its inputs come from and where its outputs go.
+
+    Attributes
+    ----------
+    network : str
+        Name of the network; bearings that are alike share one
+    sources : tuple of str
+        ``"speed"``, ``"torque"`` or the name of a temperature node, one per input of the network
+    factors : tuple of float
+        Input = factor * source: 1, the speed ratio of a bearing's shaft [-], its radial load per torque [N/(N m)]
+    components : tuple of str
+        Loss components, one per output of the network
+    """
+
+    network: str
+    sources: tuple[str, ...]
+    factors: tuple[float, ...]
+    components: tuple[str, ...]
+
+
+class _Stack:
+    """All uses of all networks as one block-diagonal network: a dozen array operations per call, whatever their number.
+
+    Takes the input rows of all uses side by side, gives their outputs side by side. Sigmoids are written as tanh, with the
+    factors of ``sigmoid(z) = (1 + tanh(z/2))/2`` folded into the weights.
+    """
+
+    def __init__(self, networks: Sequence[Network]) -> None:
+        starts = np.cumsum([0, *(len(n.inputs) for n in networks)])
+        listed = [(kind, int(s) + c, n.viscosity) for n, s in zip(networks, starts, strict=False) for kind, c in n.features]
+        # Features of one kind (and one oil) are computed together, so they are regrouped, and the weights' rows with them.
+        groups = sorted({(kind, oil) for kind, _, oil in listed})
+        order = [i for group in groups for i, (kind, _, oil) in enumerate(listed) if (kind, oil) == group]
+        self._features = [
+            (kind, np.array([c for k, c, o in listed if (k, o) == (kind, oil)]), oil) for kind, oil in groups
+        ]
+        self._lower = np.concatenate([n.lower for n in networks])
+        self._upper = np.concatenate([n.upper for n in networks])
+        w_1, w_2, w_3 = (_block_diagonal([n.weights[depth] for n in networks]) for depth in range(3))
+        b_1, b_2, b_3 = (np.concatenate([n.biases[depth] for n in networks]) for depth in range(3))
+        self._w_1, self._b_1 = 0.5 * w_1[order], 0.5 * b_1
+        self._w_2, self._b_2 = 0.25 * w_2, 0.5 * (b_2 + 0.5 * w_2.sum(axis=0))
+        self._w_3, self._b_3 = 0.5 * w_3, b_3 + 0.5 * w_3.sum(axis=0)
+        self._passed = _block_diagonal([n.passed for n in networks])[order]
+        self._log = np.concatenate([np.full(len(n.outputs), n.log_output) for n in networks])
+        self._all_log = bool(self._log.all())
+
+    def __call__(self, rows: Array) -> Array:
+        x = np.minimum(np.maximum(rows, self._lower), self._upper)
+        features = np.concatenate(
+            [feature_values(kind, x.take(columns, axis=-1), oil) for kind, columns, oil in self._features], axis=-1
+        )
+        hidden = features @ self._w_1
+        hidden += self._b_1
+        hidden = np.tanh(hidden, out=hidden) @ self._w_2
+        hidden += self._b_2
+        net = np.tanh(hidden, out=hidden) @ self._w_3
+        net += features @ self._passed
+        net += self._b_3
+        if self._all_log:
+            return np.exp(net, out=net)
+        return np.where(self._log, np.exp(np.where(self._log, net, 0.0)), np.maximum(net, 0.0))
+
+
+def _block_diagonal(blocks: Sequence[Array]) -> Array:
+    matrix = np.zeros(np.sum([block.shape for block in blocks], axis=0))
+    row = column = 0
+    for block in blocks:
+        matrix[row : row + block.shape[0], column : column + block.shape[1]] = block
+        row, column = row + block.shape[0], column + block.shape[1]
+    return matrix
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SurrogateLosses:
+    """Reduced loss model, interchangeable with :class:`models.losses.LossModel`.
+
+    Attributes
+    ----------
+    components, temperature_nodes : tuple of str
+        As in the full model
+    networks : tuple of Network
+    uses : tuple of Use
+    speed_bounds, torque_bounds, temperature_bounds : (float, float)
+        Range of training of the input shaft's speed [1/min] and torque [N m], and of all temperatures [degC]
+    torque_driven : tuple of str
+        Components that go linearly to zero below the lowest trained torque (sliding)
+    evaluators : mapping of network name to Evaluator, optional
+        What computes the networks, for example onnxruntime sessions; by default numpy does, all in one
+    """
+
+    components: tuple[str, ...]
+    temperature_nodes: tuple[str, ...]
+    networks: tuple[Network, ...]
+    uses: tuple[Use, ...]
+    speed_bounds: tuple[float, float]
+    torque_bounds: tuple[float, float]
+    temperature_bounds: tuple[float, float]
+    torque_driven: tuple[str, ...] = ("mesh_sliding",)
+    evaluators: Mapping[str, Evaluator] | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse networks and uses that do not fit together."""
+        by_name = {network.name: network for network in self.networks}
+        known = {"speed", "torque", *self.temperature_nodes}
+        served = [component for use in self.uses for component in use.components]
+        faults = [
+            f"use of network {use.network!r} does not fit it"
+            for use in self.uses
+            if use.network not in by_name
+            or not len(use.sources) == len(use.factors) == len(by_name[use.network].inputs)
+            or len(use.components) != len(by_name[use.network].outputs)
+            or not known.issuperset(use.sources)
+        ]
+        if sorted(served) != sorted(self.components):
+            faults.append(f"the networks give {', '.join(served)}, but {', '.join(self.components)} are needed")
+        if self.evaluators is not None and not set(by_name).issubset(self.evaluators):
+            faults.append(f"no evaluator for {', '.join(sorted(set(by_name).difference(self.evaluators)))}")
+        if faults:
+            raise InputError("surrogate: " + "; ".join(faults) + "; build it again")
+
+    def with_evaluators(self, evaluators: Mapping[str, Evaluator]) -> SurrogateLosses:
+        """Return the same surrogate, its networks computed by `evaluators` (one per network name)."""
+        return replace(self, evaluators=evaluators)
+
+    @cached_property
+    def _used_networks(self) -> tuple[Network, ...]:
+        by_name = {network.name: network for network in self.networks}
+        return tuple(by_name[use.network] for use in self.uses)
+
+    @cached_property
+    def _gather(self) -> tuple[Array, Array]:
+        """Column of (speed, torque, temperatures...) and factor for every input of every use, side by side."""
+        columns = {name: i for i, name in enumerate(("speed", "torque", *self.temperature_nodes))}
+        index = [columns[source] for use in self.uses for source in use.sources]
+        return np.array(index), np.array([factor for use in self.uses for factor in use.factors])
+
+    @cached_property
+    def _scatter(self) -> tuple[Array, Array]:
+        """Output column of every component, and 1 where it goes to zero with the torque."""
+        served = [component for use in self.uses for component in use.components]
+        driven = [float(name in self.torque_driven) for name in self.components]
+        return np.array([served.index(name) for name in self.components]), np.array(driven)
+
+    @cached_property
+    def _evaluate(self) -> Evaluator:
+        return _Stack(self._used_networks) if self.evaluators is None else self._evaluate_each
+
+    def _evaluate_each(self, rows: Array) -> Array:
+        """Outputs of all uses side by side; the uses of one network go to its evaluator as one batch of rows."""
+        assert self.evaluators is not None
+        flat = rows.reshape(-1, rows.shape[-1])
+        inputs = np.cumsum([0, *(len(n.inputs) for n in self._used_networks)])
+        outputs = np.cumsum([0, *(len(n.outputs) for n in self._used_networks)])
+        result = np.empty((len(flat), outputs[-1]))
+        for network in self.networks:
+            mine = [i for i, used in enumerate(self._used_networks) if used is network]
+            stacked = np.concatenate([flat[:, inputs[i] : inputs[i + 1]] for i in mine])
+            parts = np.split(np.asarray(self.evaluators[network.name](stacked), dtype=float), len(mine))
+            for i, part in zip(mine, parts, strict=True):
+                result[:, outputs[i] : outputs[i + 1]] = part
+        return result.reshape(*rows.shape[:-1], -1)
+
+    def power(self, speed: ArrayLike, torque: ArrayLike, temperatures: ArrayLike) -> Array:
+        """Loss of every component.
+
+        Parameters
+        ----------
+        speed : ArrayLike, shape (...)
+            Speed of the input shaft, [1/min], signed
+        torque : ArrayLike, shape (...)
+            Torque of the input shaft, [N m], signed
+        temperatures : ArrayLike, shape (..., len(temperature_nodes))
+            [degC]
+
+        Returns
+        -------
+        Array, shape (..., len(components))
+            [W], >= 0
+        """
+        n, moment, T = np.abs(speed), np.abs(torque), np.asarray(temperatures, dtype=float)
+        shape = T.shape[:-1]
+        if not n.shape == moment.shape == shape:
+            shape = np.broadcast_shapes(n.shape, moment.shape, shape)
+        point = np.empty((*shape, 2 + T.shape[-1]))
+        point[..., 0], point[..., 1], point[..., 2:] = n, moment, T
+        index, factors = self._gather
+        rows = point.take(index, axis=-1)
+        rows *= factors
+        order, driven = self._scatter
+        losses = self._evaluate(rows).take(order, axis=-1)
+        # Both factors differ from 1 only below the lowest trained speed and torque.
+        slow = np.minimum(point[..., :1] / self.speed_bounds[0], 1.0)
+        light = np.minimum(point[..., 1:2] / self.torque_bounds[0], 1.0)
+        losses *= slow * (1.0 + driven * (light - 1.0))
+        return losses
+
+    def domain_distance(self, speed: ArrayLike, torque: ArrayLike, temperatures: ArrayLike) -> Array:
+        """How far an operating point lies outside the range of training.
+
+        Below the lowest speed and torque counts as inside: there the loss is known to go to zero.
+
+        Parameters
+        ----------
+        speed, torque : ArrayLike, shape (...)
+            As in :meth:`power`
+        temperatures : ArrayLike, shape (..., len(temperature_nodes))
+            [degC]
+
+        Returns
+        -------
+        Array, shape (...)
+            0 inside, else the largest excess of an input as a fraction of that input's trained range, [-]
+        """
+        T = np.asarray(temperatures, dtype=float)
+        (n_low, n_high), (t_low, t_high), (T_low, T_high) = (
+            self.speed_bounds,
+            self.torque_bounds,
+            self.temperature_bounds,
+        )
+        fast = (np.abs(speed) - n_high) / (n_high - n_low)
+        heavy = (np.abs(torque) - t_high) / (t_high - t_low)
+        off = np.maximum(T - T_high, T_low - T).max(axis=-1) / (T_high - T_low)
+        return np.asarray(np.maximum(np.maximum(np.maximum(fast, heavy), off), 0.0))
+
+    def in_domain(self, speed: ArrayLike, torque: ArrayLike, temperatures: ArrayLike) -> Any:
+        """Return whether operating points lie inside the range of training, bool, shape (...)."""
+        return self.domain_distance(speed, torque, temperatures) == 0.0
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the surrogate as plain lists, numbers and strings (JSON); evaluators are not part of it."""
+        return {
+            "format": FORMAT,
+            "components": list(self.components),
+            "temperature_nodes": list(self.temperature_nodes),
+            "speed_rpm": list(self.speed_bounds),
+            "torque_Nm": list(self.torque_bounds),
+            "temperature_degC": list(self.temperature_bounds),
+            "torque_driven": list(self.torque_driven),
+            "uses": [
+                {
+                    "network": use.network,
+                    "sources": list(use.sources),
+                    "factors": list(use.factors),
+                    "components": list(use.components),
+                }
+                for use in self.uses
+            ],
+            "networks": [network.to_dict() for network in self.networks],
+        }
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> SurrogateLosses:
+        """Return the surrogate of :meth:`to_dict`.
+
+        Raises
+        ------
+        InputError
+            If the format is another one, or something is missing or does not fit.
+        """
+        if not isinstance(data, Mapping) or data.get("format") != FORMAT:
+            raise InputError(f"not a surrogate of format {FORMAT}; build it again with this version")
+        try:
+            return cls(
+                components=tuple(data["components"]),
+                temperature_nodes=tuple(data["temperature_nodes"]),
+                networks=tuple(Network.from_dict(network) for network in data["networks"]),
+                uses=tuple(
+                    Use(u["network"], tuple(u["sources"]), tuple(map(float, u["factors"])), tuple(u["components"]))
+                    for u in data["uses"]
+                ),
+                speed_bounds=_pair(data["speed_rpm"]),
+                torque_bounds=_pair(data["torque_Nm"]),
+                temperature_bounds=_pair(data["temperature_degC"]),
+                torque_driven=tuple(data["torque_driven"]),
+            )
+        except (KeyError, TypeError, ValueError) as error:
+            if isinstance(error, InputError):
+                raise
+            raise InputError(f"not a surrogate of this version ({error!r}); build it again") from error
+
+
+def _pair(values: Iterable[float]) -> tuple[float, float]:
+    low, high = map(float, values)
+    return low, high
