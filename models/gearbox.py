@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 
 FOLDER = "gearboxes"
+LIKE_KEYS = ("bearing", "seal")  # tables that may say ``like = "<name of an earlier one>"`` and name what differs only
 DEFAULT_SOURCE = f"default of schema {SCHEMA}"
 CHANGED_SOURCE = "changed after reading (with_values)"
 # Giving one of these in a gearbox file also replaces the other in the named oil.
@@ -279,6 +280,8 @@ def read_gearbox(text: str, *, file: str) -> Gearbox:
     if number != SCHEMA or isinstance(number, bool):
         raise InputError(f"{file}: schema = {shown(number)} is not known; this version reads schema = {SCHEMA}")
     notes = Annotations()
+    for key in LIKE_KEYS:
+        document = document | {key: _alike(document.get(key), key, notes)} if key in document else document
     try:
         values = strip(document, notes)
     except RecursionError as error:
@@ -294,6 +297,23 @@ def read_gearbox(text: str, *, file: str) -> Gearbox:
     if whole:
         raise InputError("\n".join(f"{file}: {path} is a whole number and cannot have an sd" for path in whole))
     return gearbox
+
+
+def _alike(tables: Any, key: str, notes: Annotations) -> Any:
+    """Fill tables that say ``like = "<name>"`` up from the earlier table of that name, annotations included."""
+    if not isinstance(tables, list):
+        return tables  # the validation says so
+    filled: list[Any] = []
+    for index, own in enumerate(tables):
+        if isinstance(own, dict) and "like" in own:
+            earlier = {t["name"]: t for t in filled if isinstance(t, dict) and isinstance(t.get("name"), str)}
+            model = earlier.get(own["like"]) if isinstance(own["like"], str) else None
+            if model is None:
+                hint = did_you_mean(str(own["like"]), earlier) if earlier else "; there is none before it"
+                notes.faults.append(f"{key}.{index}.like: {shown(own['like'])} is no earlier {key}{hint}")
+            own = {**(model or {}), **{k: v for k, v in own.items() if k != "like"}}
+        filled.append(own)
+    return filled
 
 
 def _with_named_oil(own: dict[str, Any], notes: Annotations) -> dict[str, Any]:

@@ -214,7 +214,7 @@ ONE_FAULT = [
     (("value = 0.45,", "value = 0.4,"), "housing: the area_fraction of its parts sum to 0.95, not to 1"),
     (
         ("load_share = { value = 0.5,", "load_share = { value = 0.4,"),
-        "bearing: load_share of the bearings on 'shaft_1' sum to 0.9, not to 1",
+        "bearing: load_share of the bearings on 'shaft_1' sum to 0.8, not to 1",
     ),
     (
         ("[[bearing]]", '[[shaft]]\nname = "shaft_3"\nlength_mm = 90.0\ndiameter_mm = 20.0\n[[bearing]]'),
@@ -383,3 +383,21 @@ def test_any_value_anywhere_is_refused_or_read(data: st.DataObject) -> None:
 def test_absurd_documents_are_refused(text: str) -> None:
     with pytest.raises(InputError, match=r"x\.toml: "):
         read_gearbox(text, file="x.toml")
+
+
+def test_a_table_like_an_earlier_one_takes_its_values_and_annotations() -> None:
+    gearbox = load_gearbox("fzg")
+    assert gearbox.bearing[3].R1 == gearbox.bearing[0].R1
+    assert gearbox.bearing[3].shaft == "shaft_2"
+    assert gearbox.priors["bearing.3.mu_bl"] == gearbox.priors["bearing.0.mu_bl"]
+    assert gearbox.source_of("bearing.3.K_rs") == gearbox.source_of("bearing.0.K_rs")
+
+
+@pytest.mark.parametrize(
+    ("like", "hint"), [("bearing_l", "did you mean 'bearing_1'?"), ("bearing_2", "did you mean 'bearing_1'?")]
+)
+def test_like_names_an_earlier_table(like: str, hint: str) -> None:
+    text = FZG.replace('name = "bearing_2"\nlike = "bearing_1"', f'name = "bearing_2"\nlike = "{like}"')
+    with pytest.raises(InputError) as caught:
+        read_gearbox(text, file="fzg.toml")
+    assert f"bearing.1.like: '{like}' is no earlier bearing; {hint}" in str(caught.value)
