@@ -158,16 +158,18 @@ class SkfRollerBearing:
     def _drag_moment(self, n: Array, nu: Array) -> Array:
         d_m, d, D = self.d_m, self.d, self.D
         H = min(max(self.H, 0.0), 1.2 * d_m)
-        if H == 0.0:
+        t = 2.0 * np.arccos(np.clip((0.6 * d_m - H) / (0.6 * d_m), -1.0, 1.0))
+        if t == 0.0:
             return np.zeros(np.broadcast_shapes(n.shape, nu.shape))
         V_M = float(np.interp(H / d_m, V_M_LEVEL, V_M_ROLLER))
         K_roll = self.K_L * self.K_Z * (d + D) / (D - d) * 1e-12
+        if self.drag == "2008":  # one term only; the churning of the rollers came with a later edition
+            return np.asarray(10.0 * V_M * K_roll * self.B * d_m**4 * n**2 + 0.0 * nu)
         l_D = 5.0 * self.K_L * self.B / d_m
         C_w = 2.789e-10 * l_D**3 - 2.786e-4 * l_D**2 + 0.0195 * l_D + 0.6439
-        t = 2.0 * np.arccos(np.clip((0.6 * d_m - H) / (0.6 * d_m), -1.0, 1.0))
         f_t = np.sin(0.5 * t) if t <= np.pi else 1.0
         R_s = 0.36 * d_m**2 * (t - np.sin(t)) * 0.05 * self.K_Z * (D + d) / (D - d)
-        roll = 4.0 * V_M * K_roll * C_w * self.B * d_m**4 if self.drag == "2016" else 10.0 * V_M * K_roll * self.B * d_m**4
+        roll = 4.0 * V_M * K_roll * C_w * self.B * d_m**4
         churn = 1.093e-7 * d_m**3 * R_s * (n * d_m**2 * f_t / nu) ** -1.379
         return np.asarray((roll + churn) * n**2)
 

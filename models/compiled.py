@@ -115,4 +115,17 @@ def _varying(network: ThermalNetwork) -> list[bool]:
 
 
 def _on_signals(law: NumericLaw) -> Callable[[Mapping[str, Any]], Any]:
-    return lambda by_name: law.function(Signals(by_name))
+    """A numeric law as a function of all signals by name, whether it can work on arrays or branches on one number."""
+
+    def value(by_name: Mapping[str, Any]) -> Any:
+        try:
+            return law.function(Signals(by_name))
+        except (TypeError, ValueError):
+            if all(np.ndim(signal) == 0 for signal in by_name.values()):
+                raise
+        names, columns = list(by_name), np.broadcast_arrays(*by_name.values())
+        rows = zip(*(column.reshape(-1).tolist() for column in columns), strict=True)
+        values = [float(law.function(Signals(dict(zip(names, row, strict=True))))) for row in rows]
+        return np.reshape(values, columns[0].shape)
+
+    return value

@@ -37,7 +37,9 @@ class Cycle:
     inputs: Mapping[str, Array]
 
     @classmethod
-    def from_columns(cls, columns: Mapping[str, ArrayLike], *, name: str = "cycle", extra: tuple[str, ...] = ()) -> Cycle:
+    def from_columns(
+        cls, columns: Mapping[str, ArrayLike], *, name: str = "cycle", extra: tuple[str, ...] = ()
+    ) -> Cycle:
         """Read a cycle from named columns (a dict, a pandas data frame).
 
         Parameters
@@ -52,8 +54,8 @@ class Cycle:
         Raises
         ------
         InputError
-            All faults at once: missing columns, no rows, values that are not finite or not plausible, time that does
-            not increase; with the row numbers (the first row of data is 1).
+            All faults at once: missing columns, no rows, columns of different lengths, values that are not finite or
+            not plausible, time that does not increase; with the row numbers (the first row of data is 1).
 
         Examples
         --------
@@ -75,24 +77,14 @@ class Cycle:
                 values = _numbers(columns[column], column, faults)
                 if values is not None:
                     arrays[signal] = values
-        time = arrays.pop("time", np.zeros(0))
-        if "time_s" in have and len(time) == 0 and not any("time_s" in fault for fault in faults):
-            faults.append("it has no rows")
-        back = np.flatnonzero(np.diff(time) <= 0.0)
-        if len(back):
-            row = int(back[0])
-            faults.append(
-                f"time_s goes from {time[row]:g} to {time[row + 1]:g} at row {row + 2}; it must increase from row to row"
-            )
-        for signal, values in arrays.items():
-            if signal in COLUMNS and len(values):
-                column, low, high, unit = COLUMNS[signal]
-                wrong = np.flatnonzero((values < low) | (values > high))
-                if len(wrong):
-                    faults.append(
-                        f"{column} is {values[wrong[0]]:g} at row {wrong[0] + 1}; {low:g} ... {high:g} is possible ({unit})"
-                    )
-        if faults:
+        time = arrays.pop("time", None)
+        if time is not None:
+            faults += _time_faults(time)
+            for signal, values in arrays.items():
+                if len(values) != len(time):
+                    faults.append(f"{wanted[signal]} has {len(values)} rows, but time_s has {len(time)}")
+        faults += [fault for signal, values in arrays.items() if signal in COLUMNS for fault in _range_faults(signal, values)]
+        if faults or time is None:
             raise InputError("\n".join(f"{name}: {fault}" for fault in faults))
         return cls(time, arrays)
 
@@ -100,9 +92,28 @@ class Cycle:
         return len(self.time)
 
 
+def _time_faults(time: Array) -> list[str]:
+    if len(time) == 0:
+        return ["it has no rows"]
+    back = np.flatnonzero(np.diff(time) <= 0.0)
+    if not len(back):
+        return []
+    row = int(back[0])
+    return [f"time_s goes from {time[row]:g} to {time[row + 1]:g} at row {row + 2}; it must increase from row to row"]
+
+
+def _range_faults(signal: str, values: Array) -> list[str]:
+    column, low, high, unit = COLUMNS[signal]
+    wrong = np.flatnonzero((values < low) | (values > high))
+    if not len(wrong):
+        return []
+    row = int(wrong[0])
+    return [f"{column} is {values[row]:g} at row {row + 1}; {low:g} ... {high:g} is possible ({unit})"]
+
+
 def _numbers(values: ArrayLike, column: str, faults: list[str]) -> Array | None:
     try:
-        numbers = np.asarray(values, dtype=float)
+        numbers = np.asarray(values, dtype=np.float64)
     except (TypeError, ValueError) as error:
         faults.append(f"{column} holds something that is not a number ({error})")
         return None
@@ -111,6 +122,7 @@ def _numbers(values: ArrayLike, column: str, faults: list[str]) -> Array | None:
         return None
     wrong = np.flatnonzero(~np.isfinite(numbers))
     if len(wrong):
-        faults.append(f"{column} is {numbers[wrong[0]]} at row {wrong[0] + 1}; {len(wrong)} rows are not finite numbers")
+        row = int(wrong[0])
+        faults.append(f"{column} is {numbers[row]} at row {row + 1}; {len(wrong)} rows are not finite numbers")
         return None
     return numbers

@@ -1,4 +1,4 @@
-"""Sliding and rolling loss of one gear mesh: Arana's partial-EHL friction point by point, or Schlenk's mean friction."""
+"""Sliding and rolling loss of one gear mesh: Arana's partial-EHL friction point by point, or Schlenk's mean one."""
 
 from __future__ import annotations
 
@@ -208,9 +208,10 @@ class MeshContact:
         T_film = decreasing_root(
             lambda T: T_in + rise * friction(T) - T, T_in, highest, f_tol=FILM_TEMPERATURE_TOL
         )
+        mu = friction(T_film)
         return ContactState(
             F=F, p_H=p_H, V_s=V_s, V_r=2.0 * V_e, h=h, phi_T=phi_T, asperity_share=xi, T_in=T_in, T_film=T_film,
-            residual=T_in + rise * friction(T_film) - T_film, mu=friction(T_film),
+            residual=T_in + rise * mu - T_film, mu=mu,
         )  # fmt: skip
 
     def loss(self, *, omega_1: Array, torque: Array, T_1: Array, T_2: Array) -> tuple[Array, Array]:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 import sympy as sp
@@ -18,6 +18,7 @@ from sympy.printing.numpy import NumPyPrinter
 from sympy.printing.pycode import PythonCodePrinter
 
 from models.errors import InputError, did_you_mean
+from models.types import Array
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -87,7 +88,7 @@ class NumericLaw:
     stand_in: sp.Symbol
 
 
-LawLike = Callable[[Signals], Any] | sp.Expr | float
+LawLike: TypeAlias = Callable[[Signals], Any] | sp.Expr | float
 
 
 def trace(law: LawLike, names: Iterable[str], stand_in: str) -> tuple[sp.Expr, NumericLaw | None]:
@@ -124,19 +125,19 @@ def trace(law: LawLike, names: Iterable[str], stand_in: str) -> tuple[sp.Expr, N
         value = law(Signals(known))
     except InputError:
         raise
-    except Exception:
-        value = None  # what fails on symbols may well do on numbers
+    except Exception:  # noqa: BLE001 - whatever fails on symbols may well do on numbers
+        value = None
     expression = None
     if value is not None:
         try:
             expression = sp.sympify(value)
         except (sp.SympifyError, TypeError, ValueError):
             expression = None
-    if isinstance(expression, sp.Expr):
+    if isinstance(expression, sp.Expr) and _agrees(expression, law, known):
         return _checked(expression, known, stand_in), None
     numeric = NumericLaw(law, symbol(stand_in))
     try:
-        sample = np.asarray(law(Signals(dict.fromkeys(known, 1.0))), dtype=float)
+        sample: Array = np.asarray(law(Signals(dict.fromkeys(known, 1.0))), dtype=np.float64)
     except InputError:
         raise
     except Exception as error:
@@ -146,18 +147,37 @@ def trace(law: LawLike, names: Iterable[str], stand_in: str) -> tuple[sp.Expr, N
     return numeric.stand_in, numeric
 
 
+def _agrees(expression: sp.Expr, law: Callable[[Signals], Any], known: Mapping[str, sp.Symbol]) -> bool:
+    """Whether a traced law gives on numbers what its callable gives.
+
+    ``1.0 if s.valve else 0.0`` does not fail on symbols, which all count as true: the trace would lose a branch.
+    """
+    for sample in (0.0, 1.0):
+        try:
+            value = float(law(Signals(dict.fromkeys(known, sample))))
+            traced = float(expression.xreplace({known[name]: sp.Float(sample) for name in known}))
+        except Exception:  # noqa: BLE001 - no number at this sample (a division by zero, a name not known): no evidence
+            continue
+        if np.isfinite(value) and not np.isclose(value, traced, rtol=1e-9, atol=1e-12):
+            return False
+    return True
+
+
 def _checked(expression: sp.Expr, known: Mapping[str, sp.Symbol], name: str) -> sp.Expr:
     # A sympy expression may come with plain symbols; they mean the signals of the same name.
     expression = expression.subs({s: known[s.name] for s in expression.free_symbols if s.name in known})
     for free in sorted(s.name for s in expression.free_symbols - set(known.values())):
         raise InputError(f"the law of {name!r} uses {free!r}, not a signal of this network{did_you_mean(free, known)}")
+    for piecewise in expression.atoms(sp.Piecewise):
+        if piecewise.args[-1].cond != True:  # noqa: E712 - a sympy condition, not a bool
+            raise InputError(f"the law of {name!r} has a Piecewise without a last case; end it with (value, True)")
     if expression.has(sp.I, sp.nan, sp.zoo, sp.oo):
         raise InputError(f"the law of {name!r} is {expression}, not a real finite expression")
     return expression
 
 
 class _VectorPrinter(NumPyPrinter):  # type: ignore[misc]
-    """numpy code whose Max, Min and Piecewise broadcast (sympy's own need arguments of one shape)."""
+    """numpy code whose Max, Min, And, Or and Piecewise broadcast (sympy's own need arguments of one shape)."""
 
     def _nested(self, function: str, args: Sequence[sp.Expr]) -> str:
         code: str = self._print(args[0])
@@ -170,6 +190,12 @@ class _VectorPrinter(NumPyPrinter):  # type: ignore[misc]
 
     def _print_Min(self, expr: sp.Min) -> str:
         return self._nested("numpy.minimum", expr.args)
+
+    def _print_And(self, expr: sp.And) -> str:
+        return self._nested("numpy.logical_and", expr.args)
+
+    def _print_Or(self, expr: sp.Or) -> str:
+        return self._nested("numpy.logical_or", expr.args)
 
     def _print_Piecewise(self, expr: sp.Piecewise) -> str:
         code: str = self._print(expr.args[-1].expr)

@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from functools import cached_property
+from keyword import iskeyword
 from typing import Any, Protocol
 
 import sympy as sp
@@ -164,7 +165,7 @@ class ThermalNetwork:
 
     def with_node(self, name: str, heat_capacity: LawLike) -> ThermalNetwork:
         """A network with one more part of `heat_capacity` [J/K]; link it with :meth:`with_link`."""
-        self._new_name(name, self.node_names, "node")
+        self._new_node(name)
         capacity, numeric = trace(heat_capacity, [p.name for p in self.parameters], f"heat_capacity_{name}")
         if numeric is not None:
             raise InputError(f"the heat capacity of node {name!r} must be a number or a function of parameters")
@@ -172,7 +173,7 @@ class ThermalNetwork:
 
     def with_boundary(self, name: str, temperature: LawLike) -> ThermalNetwork:
         """A network with one more boundary node of known `temperature` [degC], a law of time, inputs and parameters."""
-        self._new_name(name, self.node_names, "node")
+        self._new_node(name)
         allowed = (*BASE_SIGNALS, *self.inputs, *(p.name for p in self.parameters))
         expression, numeric = trace(temperature, allowed, f"temperature_{name}")
         if numeric is not None:
@@ -248,12 +249,13 @@ class ThermalNetwork:
         for member in members:
             if member not in {part.name for part in self.parts}:
                 raise InputError(f"node {member!r} has a given temperature; a source there has no effect")
-        self._new_name(name, [source.name for source in self.sources], "source")
+        names = [f"{name}_{member}" if len(members) > 1 else name for member in members]
+        for new in names:
+            self._new_name(new, [source.name for source in self.sources], "source")
         expression, numeric_laws = self._traced(law, f"source_{name}")
-        several = len(members) > 1
         added = tuple(
-            Source(name=f"{name}_{m}" if several else name, node=m, heat=expression / len(members), is_loss=is_loss)
-            for m in members
+            Source(name=new, node=member, heat=expression / len(members), is_loss=is_loss)
+            for new, member in zip(names, members, strict=True)
         )
         return replace(self, sources=(*self.sources, *added), numeric_laws=numeric_laws)
 
@@ -297,12 +299,19 @@ class ThermalNetwork:
         if node_b in members:
             raise InputError(f"a link joins two different nodes; {node_a!r} and {node_b!r} were given")
         name = name or f"{node_a}-{node_b}"
-        self._new_name(name, [link.name for link in self.links], "link")
+        names = [f"{name}_{member}" if len(members) > 1 else name for member in members]
+        for new in names:
+            self._new_name(new, [link.name for link in self.links], "link")
         expression, numeric_laws = self._traced(law, f"link_{name}")
-        several = len(members) > 1
+        losses = {symbol(f"P_{component}") for component in self.components} & expression.free_symbols
+        if losses:
+            raise InputError(
+                f"the conductance of link {name!r} depends on the loss {min(s.name for s in losses)!r}; "
+                "a conductance may depend on inputs, temperatures, parameters and states only"
+            )
         added = tuple(
-            Link(name=f"{name}_{m}" if several else name, nodes=(m, node_b), conductance=expression / len(members))
-            for m in members
+            Link(name=new, nodes=(member, node_b), conductance=expression / len(members))
+            for new, member in zip(names, members, strict=True)
         )
         return replace(self, links=(*self.links, *added), numeric_laws=numeric_laws)
 
@@ -345,6 +354,10 @@ class ThermalNetwork:
             raise InputError(f"node {node!r} is unknown{did_you_mean(node, [*self.node_names, *self.groups])}")
         return (node,)
 
+    def _new_node(self, name: str) -> None:
+        self._new_name(name, [*self.node_names, *self.groups], "node")
+        self._new_name(f"T_{name}", self.signals, "signal")
+
     def _traced(self, law: LawLike, label: str) -> tuple[sp.Expr, Mapping[str, NumericLaw]]:
         label = "".join(c if c.isalnum() else "_" for c in label)
         expression, numeric = trace(law, self.signals, label)
@@ -354,3 +367,5 @@ class ThermalNetwork:
     def _new_name(name: str, taken: Iterable[str], kind: str) -> None:
         if name in taken:
             raise InputError(f"the network has a {kind} {name!r} already; choose another name")
+        if kind == "signal" and (not name.isidentifier() or iskeyword(name) or name.startswith("_")):
+            raise InputError(f"{name!r} cannot be a signal: a name needs letters, digits and _, and starts with a letter")

@@ -411,4 +411,5 @@ def modulus_scale(nu_40_measured: float, nu_40: float) -> float:
 
 
 def _held(T: Numeric) -> Array:
-    return np.minimum(np.maximum(np.asarray(T, dtype=float), T_LOWEST), T_HIGHEST)
+    held: Array = np.minimum(np.maximum(np.asarray(T, dtype=np.float64), T_LOWEST), T_HIGHEST)
+    return held

@@ -1,9 +1,9 @@
 r"""The reduced loss model (ROM-PL): trained networks in place of the full model, behind the same interface.
 
 A :class:`Network` is the plain description of one trained network: bounds, features, weights. :class:`SurrogateLosses`
-puts operating points into the networks' input rows, and their outputs back onto the loss components. It reads |speed| and
-|torque|; below the lowest trained speed all losses, and below the lowest trained torque the sliding loss, go linearly to
-zero, as in the full model (:mod:`models.losses`); otherwise inputs are held at the bounds of training.
+puts operating points into the networks' input rows, and their outputs back onto the loss components. It reads |speed|
+and |torque|; below the lowest trained speed all losses, and below the lowest trained torque the sliding loss, go linearly
+to zero, as in the full model (:mod:`models.losses`); otherwise inputs are held at the bounds of training.
 
 Numpy only: this file also runs where neither scikit-learn nor onnxruntime is installed.
 """
@@ -16,7 +16,7 @@ from functools import cached_property
 from typing import Any, Literal, Self
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from models.errors import InputError
 from models.types import Array
@@ -37,8 +37,8 @@ def feature_values(kind: Feature, x: Array, viscosity: tuple[float, float]) -> A
     Parameters
     ----------
     kind : {"value", "log", "log_kelvin", "viscosity"}
-        The input itself; its natural logarithm; :math:`\ln\Theta` of a temperature in degC; :math:`\ln(\nu + 0.7)` of the
-        oil at that temperature after ASTM D341, that is :math:`\ln 10 \cdot 10^{m - n \lg\Theta}`
+        The input itself; its natural logarithm; :math:`\ln\Theta` of a temperature in degC; :math:`\ln(\nu + 0.7)` of
+        the oil at that temperature after ASTM D341, that is :math:`\ln 10 \cdot 10^{m - n \lg\Theta}`
     x : Array, shape (...)
         Input in its physical unit
     viscosity : (m, n)
@@ -56,7 +56,7 @@ def feature_values(kind: Feature, x: Array, viscosity: tuple[float, float]) -> A
     --------
     >>> ln_nu = feature_values("viscosity", np.array([40.0, 100.0]), (9.5468, 3.7520))
     >>> (np.exp(ln_nu) - 0.7).round(1).tolist()
-    [32.6, 5.4]
+    [32.7, 5.5]
     """
     if kind == "value":
         return x
@@ -203,8 +203,8 @@ class Use:
 class _Stack:
     """All uses of all networks as one block-diagonal network: a dozen array operations per call, whatever their number.
 
-    Takes the input rows of all uses side by side, gives their outputs side by side. Sigmoids are written as tanh, with the
-    factors of ``sigmoid(z) = (1 + tanh(z/2))/2`` folded into the weights.
+    Takes the input rows of all uses side by side, gives their outputs side by side. Sigmoids are written as tanh, with
+    the factors of ``sigmoid(z) = (1 + tanh(z/2))/2`` folded into the weights.
     """
 
     def __init__(self, networks: Sequence[Network]) -> None:
@@ -311,14 +311,14 @@ class SurrogateLosses:
         return tuple(by_name[use.network] for use in self.uses)
 
     @cached_property
-    def _gather(self) -> tuple[Array, Array]:
+    def _gather(self) -> tuple[NDArray[np.intp], Array]:
         """Column of (speed, torque, temperatures...) and factor for every input of every use, side by side."""
         columns = {name: i for i, name in enumerate(("speed", "torque", *self.temperature_nodes))}
         index = [columns[source] for use in self.uses for source in use.sources]
         return np.array(index), np.array([factor for use in self.uses for factor in use.factors])
 
     @cached_property
-    def _scatter(self) -> tuple[Array, Array]:
+    def _scatter(self) -> tuple[NDArray[np.intp], Array]:
         """Output column of every component, and 1 where it goes to zero with the torque."""
         served = [component for use in self.uses for component in use.components]
         driven = [float(name in self.torque_driven) for name in self.components]

@@ -1,0 +1,161 @@
+"""Design of experiments: operating points for training and for judging, and their losses from the full model.
+
+Points depend on their seed only, losses on the points only: the work is cut into the same blocks whoever does it, one
+process, several (``jobs``) or a dask cluster (``dask_address``).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, nullcontext
+
+import numpy as np
+from joblib import Parallel, delayed, parallel_config
+from numpy.typing import ArrayLike
+from scipy.stats import qmc
+from threadpoolctl import threadpool_limits
+
+from models.errors import InputError
+from models.surrogate import Feature, feature_values
+from models.types import Array
+
+Losses = Callable[[Array], Array]
+"""Input rows, shape (N, inputs), to losses, shape (N, outputs); must be picklable for several processes."""
+
+BLOCK_ROWS = 256  # operating points per task, fixed: the blocks must not depend on the number of processes
+GRID = 4001  # support points of the inverse of a spacing
+
+
+def latin_hypercube(count: int, lower: ArrayLike, upper: ArrayLike, *, seed: int) -> Array:
+    """Latin hypercube [1]_, uniform between the bounds.
+
+    Parameters
+    ----------
+    count : int
+        Number of points
+    lower, upper : ArrayLike, shape (inputs,)
+        Bounds, each in its own unit
+    seed : int
+
+    Returns
+    -------
+    Array, shape (count, inputs)
+
+    References
+    ----------
+    .. [1] M. D. McKay, R. J. Beckman, W. J. Conover, Technometrics 21 (1979) 239-245; section 4 of the paper.
+
+    Examples
+    --------
+    >>> points = latin_hypercube(400, [50.0, 1.0], [6500.0, 350.0], seed=0)
+    >>> sorted(((points[:, 1] - 1.0) / 349.0 * 400).astype(int)) == list(range(400))
+    True
+    """
+    low, high = np.asarray(lower, dtype=float), np.asarray(upper, dtype=float)
+    return np.asarray(low + _unit_hypercube(count, len(low), seed) * (high - low))
+
+
+def mixed_hypercube(
+    count: int,
+    lower: Sequence[float],
+    upper: Sequence[float],
+    *,
+    dense: Sequence[Feature],
+    viscosity: tuple[float, float],
+    seed: int,
+) -> Array:
+    """Latin hypercube of four equal parts: loads and speeds, and temperatures, each uniform or denser at their low end.
+
+    Uniform points alone leave the slow, light, cold corner empty, where every cold start begins; dense points alone leave
+    the largest losses thin. Temperatures are mixed independently of speed and load, so that cold and fast is met too.
+
+    Parameters
+    ----------
+    count : int
+        Number of points
+    lower, upper : sequence of float, shape (inputs,)
+        Bounds, each in its own unit
+    dense : sequence of Feature, shape (inputs,)
+        In which feature the dense half is uniform: ``"log"`` for speeds and loads, ``"viscosity"`` for temperatures
+    viscosity : (float, float)
+        ASTM D341 constants m, n of the oil
+    seed : int
+
+    Returns
+    -------
+    Array, shape (count, inputs)
+    """
+    unit = _unit_hypercube(count, len(lower), seed)
+    part = np.arange(count) % 4
+    points = np.empty_like(unit)
+    for column, (kind, low, high) in enumerate(zip(dense, lower, upper, strict=True)):
+        is_dense = part % 2 == 0 if kind == "log" else part // 2 == 0
+        uniform = low + unit[:, column] * (high - low)
+        points[:, column] = np.where(is_dense, _spaced(kind, unit[:, column], low, high, viscosity), uniform)
+    return points
+
+
+def random_points(count: int, lower: ArrayLike, upper: ArrayLike, *, seed: int) -> Array:
+    """Independent, uniformly distributed points for judging, shape (count, inputs)."""
+    low, high = np.asarray(lower, dtype=float), np.asarray(upper, dtype=float)
+    return np.random.default_rng([seed, 1]).uniform(low, high, (count, len(low)))
+
+
+def sample_losses(losses: Losses, points: Array, *, jobs: int = 1, dask_address: str | None = None) -> Array:
+    """Losses at many points, in blocks that may be computed by several processes or machines.
+
+    Parameters
+    ----------
+    losses : callable, (N, inputs) -> (N, outputs)
+        For example one of :mod:`builder.networks`; picklable
+    points : Array, shape (N, inputs)
+    jobs : int
+        Processes on this machine; -1 for all cores
+    dask_address : str, optional
+        Address of a dask scheduler (``"tcp://host:8786"``) that does the work instead
+
+    Returns
+    -------
+    Array, shape (N, outputs)
+        The same numbers whatever computed them
+
+    Raises
+    ------
+    InputError
+        If dask is not installed or the scheduler cannot be reached.
+    """
+    blocks = [points[start : start + BLOCK_ROWS] for start in range(0, len(points), BLOCK_ROWS)]
+    with _dask(dask_address) if dask_address else nullcontext():
+        parts = Parallel(n_jobs=None if dask_address else jobs)(delayed(_one_thread)(losses, block) for block in blocks)
+    return np.concatenate(list(parts))
+
+
+def _one_thread(losses: Losses, block: Array) -> Array:
+    with threadpool_limits(1):
+        return losses(block)
+
+
+@contextmanager
+def _dask(address: str) -> Iterator[None]:
+    try:
+        from distributed import Client
+    except ImportError as error:
+        raise InputError("a dask address is given but dask is not installed; install the extra 'dask'") from error
+    try:
+        client = Client(address, timeout=10)
+    except (OSError, ValueError) as error:  # a TimeoutError is an OSError
+        raise InputError(f"no dask scheduler answers at {address} ({error}); is it running, is the port open?") from error
+    with client, parallel_config(backend="dask", client=client):
+        yield
+
+
+def _unit_hypercube(count: int, inputs: int, seed: int) -> Array:
+    return np.asarray(qmc.LatinHypercube(inputs, rng=np.random.default_rng([seed, 0])).random(count))
+
+
+def _spaced(kind: Feature, unit: Array, low: float, high: float, viscosity: tuple[float, float]) -> Array:
+    """Points between the bounds that are uniform in a feature that is monotonous there."""
+    grid = np.linspace(low, high, GRID) if kind != "log" else np.geomspace(low, high, GRID)
+    value = feature_values(kind, grid, viscosity)
+    share = (value - value[0]) / (value[-1] - value[0])
+    return np.interp(unit, share, grid)

@@ -1,0 +1,256 @@
+"""Which networks a gearbox gets: inputs, outputs, bounds, the full model's losses to learn, and the presets of training.
+
+One network for the mesh, one for the losses without load, and one for every kind of bearing, used once per bearing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from models.bearing import STANDARD_GRAVITY
+from models.errors import InputError, did_you_mean
+from models.losses import SPEED_FLOOR_RPM, TORQUE_FLOOR_NM, LossModel
+from models.surrogate import Feature, Use
+from models.types import Array
+
+Bounds = tuple[float, float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Preset:
+    """How the networks are trained.
+
+    Attributes
+    ----------
+    name : str
+    samples : int
+        Points per network; of these 80 % train, 10 % validate, 10 % test
+    judged : int
+        Further, independent random points that the report is made on
+    transforms : bool
+        Logarithms of speed, load and reduced losses, viscosity in place of temperature, and points denser at the low ends;
+        without, min-max scaling and uniform points, as in the paper
+    hidden : mapping of network kind (mesh, no_load, bearing) to (int, int)
+        Units of the hidden layers
+    max_iter, starts, start_iterations, patience, tolerance
+        See :class:`builder.levenberg_marquardt.LevenbergMarquardtRegressor`
+    speed_rpm, torque_Nm, temperature_degC : (float, float), optional
+        Bounds; those of the gearbox's ``[training]`` where absent
+    """
+
+    name: str
+    samples: int
+    judged: int
+    transforms: bool
+    hidden: Mapping[str, tuple[int, int]] = field(hash=False)
+    max_iter: int
+    starts: int
+    start_iterations: int
+    patience: int
+    tolerance: float
+    speed_rpm: Bounds | None = None
+    torque_Nm: Bounds | None = None
+    temperature_degC: Bounds | None = None
+
+
+PRESETS: Mapping[str, Preset] = {
+    "default": Preset(
+        name="default",
+        samples=4800,
+        judged=2000,
+        transforms=True,
+        hidden={"mesh": (20, 10), "no_load": (6, 6), "bearing": (14, 10)},
+        max_iter=300,
+        starts=2,
+        start_iterations=25,
+        patience=60,
+        tolerance=0.02,
+    ),
+    # Tables 3 and 4 of the paper. Levenberg-Marquardt is a full-batch method, so its batch size of 64 has no counterpart.
+    "paper": Preset(
+        name="paper",
+        samples=400,
+        judged=400,
+        transforms=False,
+        hidden={"mesh": (5, 5), "no_load": (5, 5), "bearing": (5, 5)},
+        max_iter=1000,
+        starts=6,
+        start_iterations=100,
+        patience=1000,
+        tolerance=0.0,
+        speed_rpm=(50.0, 6500.0),
+        torque_Nm=(1.0, 350.0),
+        temperature_degC=(20.0, 120.0),
+    ),
+}
+
+
+def preset_named(name: str) -> Preset:
+    """Return a preset.
+
+    Raises
+    ------
+    InputError
+        If there is none of that name.
+    """
+    if name not in PRESETS:
+        raise InputError(f"there is no training preset {name!r}{did_you_mean(name, PRESETS)}")
+    return PRESETS[name]
+
+
+@dataclass(frozen=True)
+class MeshLosses:
+    """Rows (speed [1/min], torque [N m], both gears' temperatures [degC]) to sliding and rolling loss [W]."""
+
+    model: LossModel
+
+    def __call__(self, rows: Array) -> Array:
+        return self.model.mesh_power(rows[:, 0], rows[:, 1], rows[:, 2:4])
+
+
+@dataclass(frozen=True)
+class NoLoadLosses:
+    """Rows (speed [1/min], oil temperature [degC]) to churning and seal losses [W]."""
+
+    model: LossModel
+
+    def __call__(self, rows: Array) -> Array:
+        return self.model.no_load_power(rows[:, 0], rows[:, 1])
+
+
+@dataclass(frozen=True)
+class BearingLosses:
+    """Rows (speed of the bearing's shaft [1/min], radial load [N], oil and bearing temperature [degC]) to its loss [W]."""
+
+    model: LossModel
+    index: int
+
+    def __call__(self, rows: Array) -> Array:
+        speed = rows[:, 0] / self.model.bearing_speed_ratio[self.index]
+        torque = rows[:, 1] / load_per_torque(self.model, self.index)
+        return self.model.bearing_power(self.index, speed, torque, rows[:, 2], rows[:, 3])[:, None]
+
+
+def load_per_torque(model: LossModel, index: int) -> float:
+    """Radial load of one bearing per input torque, [N/(N m)]."""
+    return float(model.bearing_radial_load(index, np.array([1.0]))[0])
+
+
+@dataclass(frozen=True, kw_only=True)
+class NetworkSpec:
+    """One network to train.
+
+    Attributes
+    ----------
+    name, kind : str
+        Kind is mesh, no_load or bearing
+    inputs, outputs : tuple of str
+        Names with units
+    lower, upper : tuple of float
+        Bounds of the inputs
+    powers : tuple of tuple of float, shape (outputs, inputs)
+        Powers of the inputs that the losses are divided by before their logarithm is taken
+    losses : callable, (N, inputs) -> (N, outputs)
+        The full model
+    uses : tuple of Use
+    """
+
+    name: str
+    kind: str
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    lower: tuple[float, ...]
+    upper: tuple[float, ...]
+    powers: tuple[tuple[float, ...], ...]
+    losses: MeshLosses | NoLoadLosses | BearingLosses
+    uses: tuple[Use, ...]
+
+    @property
+    def dense(self) -> tuple[Feature, ...]:
+        """Feature of each input in which half of the points are uniform."""
+        return tuple("viscosity" if name.endswith("_degC") else "log" for name in self.inputs)
+
+    def features(self, *, transforms: bool) -> tuple[tuple[Feature, int], ...]:
+        """Features of the network, those of a kind side by side."""
+        if not transforms:
+            return tuple(("value", column) for column in range(len(self.inputs)))
+        logs: list[tuple[Feature, int]] = [("log", i) for i, kind in enumerate(self.dense) if kind == "log"]
+        hot = [i for i, kind in enumerate(self.dense) if kind == "viscosity"]
+        return (*logs, *(("viscosity", i) for i in hot), *(("log_kelvin", i) for i in hot))
+
+
+def with_bounds(preset: Preset, *, speed_rpm: Bounds, torque_Nm: Bounds, temperature_degC: Bounds) -> Preset:
+    """Return the preset with all bounds given; its own ones win.
+
+    Speed and torque start at the full model's floors at least: below, its losses are linear and need no network.
+    """
+    speed, torque = preset.speed_rpm or speed_rpm, preset.torque_Nm or torque_Nm
+    speed = (max(speed[0], SPEED_FLOOR_RPM), speed[1])
+    torque = (max(torque[0], TORQUE_FLOOR_NM), torque[1])
+    temperature = preset.temperature_degC or temperature_degC
+    for name, (low, high) in {"speed_rpm": speed, "torque_Nm": torque, "temperature_degC": temperature}.items():
+        if not low < high:
+            raise InputError(f"training.{name}: the upper bound {high:g} must be above {low:g}; widen it")
+    return replace(preset, speed_rpm=speed, torque_Nm=torque, temperature_degC=temperature)
+
+
+def network_specs(model: LossModel, preset: Preset) -> tuple[NetworkSpec, ...]:
+    """Return the networks of a gearbox, the most laborious first; `preset` has its bounds, see :func:`with_bounds`."""
+    assert preset.speed_rpm and preset.torque_Nm and preset.temperature_degC
+    speed, torque, temperature = preset.speed_rpm, preset.torque_Nm, preset.temperature_degC
+    bearings = len(model.bearing_speed_ratio)
+    no_load = model.components[2 : len(model.components) - bearings]
+    bearing_components, bearing_nodes = model.components[-bearings:], model.temperature_nodes[-bearings:]
+    gears = model.temperature_nodes[1:3]
+
+    mesh = NetworkSpec(
+        name="mesh",
+        kind="mesh",
+        inputs=("speed_rpm", "torque_Nm", *(f"T_{gear}_degC" for gear in gears)),
+        outputs=("mesh_sliding_W", "mesh_rolling_W"),
+        lower=(speed[0], torque[0], temperature[0], temperature[0]),
+        upper=(speed[1], torque[1], temperature[1], temperature[1]),
+        # Rolling goes with film thickness times speed, n^0.67 n.
+        powers=((1.0, 1.0, 0.0, 0.0), (1.67, 0.0, 0.0, 0.0)),
+        losses=MeshLosses(model),
+        uses=(Use("mesh", ("speed", "torque", *gears), (1.0,) * 4, model.components[:2]),),
+    )
+    unloaded = NetworkSpec(
+        name="no_load",
+        kind="no_load",
+        inputs=("speed_rpm", "T_oil_degC"),
+        outputs=tuple(f"{name}_W" for name in no_load),
+        lower=(speed[0], temperature[0]),
+        upper=(speed[1], temperature[1]),
+        powers=((1.5, 0.0), *(((1.0, 0.0),) * (len(no_load) - 1))),
+        losses=NoLoadLosses(model),
+        uses=(Use("no_load", ("speed", "oil"), (1.0, 1.0), no_load),),
+    )
+    kinds = []
+    for number, group in enumerate(model.bearing_groups, start=1):
+        name = f"bearings_{number}"
+        ratio = [model.bearing_speed_ratio[i] for i in group]
+        load = [load_per_torque(model, i) for i in group]
+        # Below its own weight the load does not matter.
+        lightest = 2.0 * model.bearings[group[0]].mass * STANDARD_GRAVITY
+        kinds.append(
+            NetworkSpec(
+                name=name,
+                kind="bearing",
+                inputs=("speed_rpm", "radial_load_N", "T_oil_degC", "T_bearing_degC"),
+                outputs=("bearing_W",),
+                lower=(min(ratio) * speed[0], lightest, temperature[0], temperature[0]),
+                upper=(max(ratio) * speed[1], max(max(load) * torque[1], 2.0 * lightest), temperature[1], temperature[1]),
+                powers=((1.0, 0.0, 0.0, 0.0),),
+                # The slowest shaft's bearing stays above the full model's lowest speed over all of the range.
+                losses=BearingLosses(model, group[int(np.argmin(ratio))]),
+                uses=tuple(
+                    Use(name, ("speed", "torque", "oil", bearing_nodes[i]), (r, f, 1.0, 1.0), (bearing_components[i],))
+                    for i, r, f in zip(group, ratio, load, strict=True)
+                ),
+            )
+        )
+    return (mesh, *kinds, unloaded)
