@@ -10,6 +10,7 @@ import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,7 @@ from builder.drive_cycle import COLD_START, reference_cycle
 from builder.files import write_table
 from builder.fmu import build_python_fmu
 from builder.fmu_drive import drive_fmu
-from builder.onnx_export import export_networks
+from builder.onnx_export import export_onnx
 from builder.plots import plot_cycle
 from builder.train import TrainingResult, train_surrogate
 from models.errors import InputError
@@ -28,6 +29,7 @@ from models.gearbox import Gearbox
 from models.types import Array
 
 ALL_CORES = -1
+VERSION = version("gearbox-thermal-twin")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -144,7 +146,7 @@ def build(
             )  # fmt: skip
         with _timed("export and package", seconds), _spoken() as tell:
             tell("packaging the FMU")
-            networks = export_networks(training, stage / "networks")
+            networks = export_onnx(training, stage / "networks", version=VERSION)
             fmu = build_python_fmu(gearbox, training, networks, stage / f"{name}.fmu")
         cycle = reference_cycle(gearbox)
         network = gearbox.network()

@@ -57,8 +57,8 @@ def latin_hypercube(count: int, lower: ArrayLike, upper: ArrayLike, *, seed: int
 
 def mixed_hypercube(
     count: int,
-    lower: Sequence[float],
-    upper: Sequence[float],
+    lower: ArrayLike,
+    upper: ArrayLike,
     *,
     dense: Sequence[Feature],
     viscosity: tuple[float, float],
@@ -66,14 +66,14 @@ def mixed_hypercube(
 ) -> Array:
     """Latin hypercube of four equal parts: loads and speeds, and temperatures, each uniform or denser at their low end.
 
-    Uniform points alone leave the slow, light, cold corner empty, where every cold start begins; dense points alone leave
-    the largest losses thin. Temperatures are mixed independently of speed and load, so that cold and fast is met too.
+    Uniform points alone leave the slow, light, cold corner empty, where every cold start begins; dense points alone
+    leave the largest losses thin. Temperatures are mixed independently of speed and load: cold and fast is met too.
 
     Parameters
     ----------
     count : int
         Number of points
-    lower, upper : sequence of float, shape (inputs,)
+    lower, upper : ArrayLike, shape (inputs,)
         Bounds, each in its own unit
     dense : sequence of Feature, shape (inputs,)
         In which feature the dense half is uniform: ``"log"`` for speeds and loads, ``"viscosity"`` for temperatures
@@ -85,10 +85,11 @@ def mixed_hypercube(
     -------
     Array, shape (count, inputs)
     """
-    unit = _unit_hypercube(count, len(lower), seed)
+    low_high = np.stack([np.asarray(lower, dtype=float), np.asarray(upper, dtype=float)], axis=-1)
+    unit = _unit_hypercube(count, len(low_high), seed)
     part = np.arange(count) % 4
     points = np.empty_like(unit)
-    for column, (kind, low, high) in enumerate(zip(dense, lower, upper, strict=True)):
+    for column, (kind, (low, high)) in enumerate(zip(dense, low_high, strict=True)):
         is_dense = part % 2 == 0 if kind == "log" else part // 2 == 0
         uniform = low + unit[:, column] * (high - low)
         points[:, column] = np.where(is_dense, _spaced(kind, unit[:, column], low, high, viscosity), uniform)
@@ -144,7 +145,9 @@ def _dask(address: str) -> Iterator[None]:
     try:
         client = Client(address, timeout=10)
     except (OSError, ValueError) as error:  # a TimeoutError is an OSError
-        raise InputError(f"no dask scheduler answers at {address} ({error}); is it running, is the port open?") from error
+        raise InputError(
+            f"no dask scheduler answers at {address} ({error}); is it running, is the port open?"
+        ) from error
     with client, parallel_config(backend="dask", client=client):
         yield
 

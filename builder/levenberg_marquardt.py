@@ -15,13 +15,13 @@ import numpy as np
 from scipy.linalg import LinAlgError, blas, cho_factor, cho_solve
 from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.model_selection import train_test_split
-from sklearn.utils.validation import check_is_fitted, validate_data
+from sklearn.utils.validation import check_array, check_is_fitted, check_X_y
 from threadpoolctl import threadpool_limits
 
 from models.types import Array
 
-# Rows per block of the Jacobian: 200 parameters x 512 rows are 0.8 MB and stay in the second-level cache. Fixed, because
-# the order of summation decides the last bits.
+# Rows per block of the Jacobian: 200 parameters x 512 rows are 0.8 MB and stay in the second-level cache. Fixed,
+# because the order of summation decides the last bits.
 BLOCK_ROWS = 512
 DAMPING_START, DAMPING_LOWEST, DAMPING_HIGHEST = 1e-3, 1e-15, 1e10
 
@@ -54,12 +54,12 @@ class LayerShapes:
         return layers
 
     def initial(self, random: np.random.Generator) -> Array:
-        """Random start after Nguyen and Widrow [1]_: the units' active regions cover the inputs' range of about [-1, 1].
+        """Random start after Nguyen and Widrow [1]_: the units' active regions cover inputs of about [-1, 1].
 
         References
         ----------
-        .. [1] D. Nguyen, B. Widrow, "Improving the learning speed of 2-layer neural networks by choosing initial values of
-           the adaptive weights", IJCNN 1990.
+        .. [1] D. Nguyen, B. Widrow, "Improving the learning speed of 2-layer neural networks by choosing initial values
+           of the adaptive weights", IJCNN 1990.
         """
         parameters = np.empty(self.count)
         layers = self.unpack(parameters)
@@ -252,8 +252,9 @@ class LevenbergMarquardtRegressor(RegressorMixin, BaseEstimator):  # type: ignor
 
     def fit(self, X: Any, y: Any) -> Self:
         """Train on `X`, shape (N, inputs), and `y`, shape (N,) or (N, outputs), both scaled to the order of 1."""
-        X, y = validate_data(self, X, y, dtype=np.float64, multi_output=True, y_numeric=True)
+        X, y = check_X_y(X, y, dtype=np.float64, multi_output=True, y_numeric=True)
         y = np.asarray(y, dtype=np.float64)
+        self.n_features_in_ = X.shape[1]
         self.single_output_ = y.ndim == 1
         targets = y.reshape(len(y), -1)
         split = (X, X, targets, targets)
@@ -278,7 +279,11 @@ class LevenbergMarquardtRegressor(RegressorMixin, BaseEstimator):  # type: ignor
     def predict(self, X: Any) -> Array:
         """Outputs, shape (N,) or (N, outputs) as the targets were, for `X` of shape (N, inputs)."""
         check_is_fitted(self, "coefs_")
-        activation = validate_data(self, X, dtype=np.float64, reset=False)
+        activation = check_array(X, dtype=np.float64)
+        if activation.shape[1] != self.n_features_in_:
+            raise ValueError(
+                f"X has {activation.shape[1]} columns, but the network was fitted on {self.n_features_in_}"
+            )
         for weights, bias in zip(self.coefs_[:-1], self.intercepts_[:-1], strict=True):
             activation = _sigmoid(activation @ weights + bias)
         outputs = np.asarray(activation @ self.coefs_[-1] + self.intercepts_[-1])

@@ -1,4 +1,4 @@
-"""Which networks a gearbox gets: inputs, outputs, bounds, the full model's losses to learn, and the presets of training.
+"""Which networks a gearbox gets: inputs, outputs, bounds, the losses to learn, and the presets of training.
 
 One network for the mesh, one for the losses without load, and one for every kind of bearing, used once per bearing.
 """
@@ -6,7 +6,7 @@ One network for the mesh, one for the losses without load, and one for every kin
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -17,6 +17,38 @@ from models.surrogate import Feature, Use
 from models.types import Array
 
 Bounds = tuple[float, float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Domain:
+    """Range of training.
+
+    Attributes
+    ----------
+    speed_rpm, torque_Nm : (float, float)
+        Bounds of the input shaft's speed [1/min] and torque [N m]
+    temperature_degC : (float, float)
+        Bounds of all temperatures, [degC]
+    """
+
+    speed_rpm: Bounds
+    torque_Nm: Bounds
+    temperature_degC: Bounds
+
+    def above_floors(self) -> Domain:
+        """Return the range above the full model's lowest speed and torque: below, losses are linear.
+
+        Raises
+        ------
+        InputError
+            If nothing is left.
+        """
+        speed = (max(self.speed_rpm[0], SPEED_FLOOR_RPM), self.speed_rpm[1])
+        torque = (max(self.torque_Nm[0], TORQUE_FLOOR_NM), self.torque_Nm[1])
+        for name, (low, high) in {"speed_rpm": speed, "torque_Nm": torque}.items():
+            if not low < high:
+                raise InputError(f"training.{name}: the upper bound {high:g} must be above {low:g}; widen it")
+        return Domain(speed_rpm=speed, torque_Nm=torque, temperature_degC=self.temperature_degC)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,14 +63,14 @@ class Preset:
     judged : int
         Further, independent random points that the report is made on
     transforms : bool
-        Logarithms of speed, load and reduced losses, viscosity in place of temperature, and points denser at the low ends;
-        without, min-max scaling and uniform points, as in the paper
+        Logarithms of speed, load and reduced losses, viscosity in place of temperature, and points denser at the low
+        ends; without, min-max scaling and uniform points, as in the paper
     hidden : mapping of network kind (mesh, no_load, bearing) to (int, int)
         Units of the hidden layers
     max_iter, starts, start_iterations, patience, tolerance
         See :class:`builder.levenberg_marquardt.LevenbergMarquardtRegressor`
-    speed_rpm, torque_Nm, temperature_degC : (float, float), optional
-        Bounds; those of the gearbox's ``[training]`` where absent
+    domain : Domain, optional
+        Range of training; that of the gearbox's ``[training]`` where absent
     """
 
     name: str
@@ -51,9 +83,7 @@ class Preset:
     start_iterations: int
     patience: int
     tolerance: float
-    speed_rpm: Bounds | None = None
-    torque_Nm: Bounds | None = None
-    temperature_degC: Bounds | None = None
+    domain: Domain | None = None
 
 
 PRESETS: Mapping[str, Preset] = {
@@ -69,7 +99,7 @@ PRESETS: Mapping[str, Preset] = {
         patience=60,
         tolerance=0.02,
     ),
-    # Tables 3 and 4 of the paper. Levenberg-Marquardt is a full-batch method, so its batch size of 64 has no counterpart.
+    # Tables 3 and 4 of the paper. Levenberg-Marquardt is a full-batch method: a batch size of 64 has no counterpart.
     "paper": Preset(
         name="paper",
         samples=400,
@@ -81,9 +111,7 @@ PRESETS: Mapping[str, Preset] = {
         start_iterations=100,
         patience=1000,
         tolerance=0.0,
-        speed_rpm=(50.0, 6500.0),
-        torque_Nm=(1.0, 350.0),
-        temperature_degC=(20.0, 120.0),
+        domain=Domain(speed_rpm=(50.0, 6500.0), torque_Nm=(1.0, 350.0), temperature_degC=(20.0, 120.0)),
     ),
 }
 
@@ -108,6 +136,7 @@ class MeshLosses:
     model: LossModel
 
     def __call__(self, rows: Array) -> Array:
+        """Evaluate the full model."""
         return self.model.mesh_power(rows[:, 0], rows[:, 1], rows[:, 2:4])
 
 
@@ -118,17 +147,19 @@ class NoLoadLosses:
     model: LossModel
 
     def __call__(self, rows: Array) -> Array:
+        """Evaluate the full model."""
         return self.model.no_load_power(rows[:, 0], rows[:, 1])
 
 
 @dataclass(frozen=True)
 class BearingLosses:
-    """Rows (speed of the bearing's shaft [1/min], radial load [N], oil and bearing temperature [degC]) to its loss [W]."""
+    """Rows (speed of its shaft [1/min], radial load [N], oil and bearing temperature [degC]) to a bearing's loss [W]."""
 
     model: LossModel
     index: int
 
     def __call__(self, rows: Array) -> Array:
+        """Evaluate the full model."""
         speed = rows[:, 0] / self.model.bearing_speed_ratio[self.index]
         torque = rows[:, 1] / load_per_torque(self.model, self.index)
         return self.model.bearing_power(self.index, speed, torque, rows[:, 2], rows[:, 3])[:, None]
@@ -182,25 +213,9 @@ class NetworkSpec:
         return (*logs, *(("viscosity", i) for i in hot), *(("log_kelvin", i) for i in hot))
 
 
-def with_bounds(preset: Preset, *, speed_rpm: Bounds, torque_Nm: Bounds, temperature_degC: Bounds) -> Preset:
-    """Return the preset with all bounds given; its own ones win.
-
-    Speed and torque start at the full model's floors at least: below, its losses are linear and need no network.
-    """
-    speed, torque = preset.speed_rpm or speed_rpm, preset.torque_Nm or torque_Nm
-    speed = (max(speed[0], SPEED_FLOOR_RPM), speed[1])
-    torque = (max(torque[0], TORQUE_FLOOR_NM), torque[1])
-    temperature = preset.temperature_degC or temperature_degC
-    for name, (low, high) in {"speed_rpm": speed, "torque_Nm": torque, "temperature_degC": temperature}.items():
-        if not low < high:
-            raise InputError(f"training.{name}: the upper bound {high:g} must be above {low:g}; widen it")
-    return replace(preset, speed_rpm=speed, torque_Nm=torque, temperature_degC=temperature)
-
-
-def network_specs(model: LossModel, preset: Preset) -> tuple[NetworkSpec, ...]:
-    """Return the networks of a gearbox, the most laborious first; `preset` has its bounds, see :func:`with_bounds`."""
-    assert preset.speed_rpm and preset.torque_Nm and preset.temperature_degC
-    speed, torque, temperature = preset.speed_rpm, preset.torque_Nm, preset.temperature_degC
+def network_specs(model: LossModel, domain: Domain) -> tuple[NetworkSpec, ...]:
+    """Return the networks of a gearbox, the most laborious first."""
+    speed, torque, temperature = domain.speed_rpm, domain.torque_Nm, domain.temperature_degC
     bearings = len(model.bearing_speed_ratio)
     no_load = model.components[2 : len(model.components) - bearings]
     bearing_components, bearing_nodes = model.components[-bearings:], model.temperature_nodes[-bearings:]
@@ -234,8 +249,9 @@ def network_specs(model: LossModel, preset: Preset) -> tuple[NetworkSpec, ...]:
         name = f"bearings_{number}"
         ratio = [model.bearing_speed_ratio[i] for i in group]
         load = [load_per_torque(model, i) for i in group]
-        # Below its own weight the load does not matter.
+        # Below the bearing's own weight the load does not matter.
         lightest = 2.0 * model.bearings[group[0]].mass * STANDARD_GRAVITY
+        heaviest = max(max(load) * torque[1], 2.0 * lightest)
         kinds.append(
             NetworkSpec(
                 name=name,
@@ -243,7 +259,7 @@ def network_specs(model: LossModel, preset: Preset) -> tuple[NetworkSpec, ...]:
                 inputs=("speed_rpm", "radial_load_N", "T_oil_degC", "T_bearing_degC"),
                 outputs=("bearing_W",),
                 lower=(min(ratio) * speed[0], lightest, temperature[0], temperature[0]),
-                upper=(max(ratio) * speed[1], max(max(load) * torque[1], 2.0 * lightest), temperature[1], temperature[1]),
+                upper=(max(ratio) * speed[1], heaviest, temperature[1], temperature[1]),
                 powers=((1.0, 0.0, 0.0, 0.0),),
                 # The slowest shaft's bearing stays above the full model's lowest speed over all of the range.
                 losses=BearingLosses(model, group[int(np.argmin(ratio))]),

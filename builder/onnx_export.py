@@ -1,7 +1,7 @@
-"""Networks as ONNX files: raw physical inputs to losses in W, scaling and transforms inside the graph, double precision.
+"""Networks as ONNX files: raw physical inputs to losses in W, scaling and transforms inside, double precision.
 
-One input ``X`` of shape (N, inputs), one output ``Y`` of shape (N, outputs). The file's metadata say what the columns are,
-which gearbox definition, preset and seed the weights come from, and carry a digest of the graph.
+One input ``X`` of shape (N, inputs), one output ``Y`` of shape (N, outputs). The file's metadata say what the columns
+are, which gearbox definition, preset and seed the weights come from, and carry a digest of the graph.
 """
 
 from __future__ import annotations
@@ -129,7 +129,9 @@ def export_onnx(result: TrainingResult, folder: str | Path, *, version: str) -> 
         path.write_bytes(onnx_model(network, metadata).SerializeToString(deterministic=True))
         deviation = largest_deviation(load_onnx(path), network)
         if not deviation <= TOLERANCE:
-            raise ArithmeticError(f"{path.name}: onnxruntime departs from numpy by {deviation:.1e}, more than {TOLERANCE}")
+            raise ArithmeticError(
+                f"{path.name}: onnxruntime departs from numpy by {deviation:.1e}, more than {TOLERANCE}"
+            )
         paths.append(path)
     return tuple(paths)
 
@@ -148,6 +150,7 @@ class OnnxNetwork:
     metadata: Mapping[str, str]
 
     def __call__(self, rows: Array) -> Array:
+        """Run the session."""
         return np.asarray(self.session.run(["Y"], {"X": np.ascontiguousarray(rows, dtype=float)})[0])
 
 
@@ -182,7 +185,9 @@ def load_onnx(path: str | Path, *, network: Network | None = None, definition_ha
     if metadata.get("format") != FORMAT:
         raise InputError(f"{path.name}: not a network of this version (no metadata 'format = {FORMAT}'); {again}")
     if metadata.get("graph_sha256") != _digest(model.graph):
-        raise InputError(f"{path.name}: the graph does not match its digest, so the file was damaged or edited; {again}")
+        raise InputError(
+            f"{path.name}: the graph does not match its digest, so the file was damaged or edited; {again}"
+        )
     if network is not None and columns != _columns(network):
         raise InputError(
             f"{path.name}: holds network {metadata.get('network')!r} with columns {columns}; "
@@ -212,9 +217,7 @@ def load_evaluators(surrogate: SurrogateLosses, folder: str | Path, *, definitio
         If a file is missing, damaged or does not match.
     """
     return {
-        network.name: load_onnx(
-            Path(folder) / f"{network.name}.onnx", network=network, definition_hash=definition_hash
-        )
+        network.name: load_onnx(Path(folder) / f"{network.name}.onnx", network=network, definition_hash=definition_hash)
         for network in surrogate.networks
     }
 
@@ -239,7 +242,7 @@ class _Graph:
         self.constants: list[onnx.TensorProto] = []
 
     def constant(self, values: Any, dtype: type = np.float64) -> str:
-        array = np.ascontiguousarray(values, dtype=dtype)
+        array: Any = np.ascontiguousarray(values, dtype=dtype)
         if array.ndim == 1 and dtype is np.float64:
             array = array[None]
         name = f"c{len(self.constants)}"

@@ -36,7 +36,7 @@ class PhysicalFeatures(TransformerMixin, BaseEstimator):  # type: ignore[misc]
         self.features = features
         self.viscosity = viscosity
 
-    def fit(self, X: Any, y: Any = None) -> Self:
+    def fit(self, X: Any, y: Any = None) -> Self:  # noqa: ARG002  (scikit-learn's signature)
         """Nothing to learn."""
         return self
 
@@ -53,8 +53,8 @@ class PhysicalFeatures(TransformerMixin, BaseEstimator):  # type: ignore[misc]
 class ReducedTargetRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
     """Fits the logarithm of reduced losses, ``ln(P / prod(x_i ** power_i))``, by another regressor.
 
-    Reduced so (sliding by speed and torque, the others by a power of speed), losses stay bounded as speed and torque go to
-    zero, and a square error is a relative one.
+    Reduced so (sliding by speed and torque, the others by a power of speed), losses stay bounded as speed and torque go
+    to zero, and a square error is a relative one.
 
     Parameters
     ----------

@@ -13,7 +13,7 @@ from sklearn.model_selection import train_test_split
 
 from builder.doe import latin_hypercube, mixed_hypercube, random_points, sample_losses
 from builder.levenberg_marquardt import LevenbergMarquardtRegressor
-from builder.networks import NetworkSpec, Preset, network_specs, preset_named, with_bounds
+from builder.networks import Domain, NetworkSpec, Preset, network_specs, preset_named
 from builder.pipeline import plain_network, surrogate_pipeline
 from models.errors import InputError
 from models.losses import LossModel
@@ -27,6 +27,7 @@ TEST_SHARE = 0.1
 VALIDATION_SHARE = 0.1
 CORNER = 0.1  # the cold, slow, light corner: the lowest tenth of every input's range
 LEAST_SAMPLES = 50
+MARGIN = 0.03  # of an input's range
 NO_LOSS_W = 1e-9  # a smaller loss is none: errors are not related to it
 
 
@@ -145,18 +146,21 @@ def train_surrogate(
         If the preset is not known, there are too few samples, or the scheduler cannot be reached.
     """
     begin = time.perf_counter()
-    tell = progress or (lambda line: None)
+    tell = progress or (lambda _: None)
     chosen = preset_named(preset) if isinstance(preset, str) else preset
     chosen = replace(chosen, samples=chosen.samples if samples is None else samples)
     if chosen.samples < LEAST_SAMPLES:
         raise InputError(f"{chosen.samples} samples per network are too few; give at least {LEAST_SAMPLES}")
     bounds = gearbox.training
-    chosen = with_bounds(
-        chosen, speed_rpm=bounds.speed_rpm, torque_Nm=bounds.torque_Nm, temperature_degC=bounds.temperature_degC
+    domain = (
+        chosen.domain
+        or Domain(
+            speed_rpm=bounds.speed_rpm, torque_Nm=bounds.torque_Nm, temperature_degC=bounds.temperature_degC
+        ).above_floors()
     )
     model = gearbox.losses()
     viscosity = (model.mesh.oil.m, model.mesh.oil.n)
-    specs = network_specs(model, chosen)
+    specs = network_specs(model, domain)
 
     tell(f"full model: {chosen.samples} points for each of {len(specs)} networks")
     tables = []
@@ -170,15 +174,14 @@ def train_surrogate(
             delayed(_train)(spec, chosen, viscosity, *table, seed) for spec, table in zip(specs, tables, strict=True)
         )
     )
-    assert chosen.speed_rpm and chosen.torque_Nm and chosen.temperature_degC
     losses = SurrogateLosses(
         components=model.components,
         temperature_nodes=model.temperature_nodes,
         networks=tuple(one.network for one in trained),
         uses=tuple(use for spec in specs for use in spec.uses),
-        speed_bounds=chosen.speed_rpm,
-        torque_bounds=chosen.torque_Nm,
-        temperature_bounds=chosen.temperature_degC,
+        speed_bounds=domain.speed_rpm,
+        torque_bounds=domain.torque_Nm,
+        temperature_bounds=domain.temperature_degC,
         torque_driven=("mesh_sliding",),
     )
     tell(f"judging on {chosen.judged} random points")
@@ -240,9 +243,11 @@ def r_squared(y: Array, y_hat: Array) -> Array:
 def _training_points(spec: NetworkSpec, preset: Preset, viscosity: tuple[float, float], seed: int) -> Array:
     if not preset.transforms:
         return latin_hypercube(preset.samples, spec.lower, spec.upper, seed=seed)
-    return mixed_hypercube(
-        preset.samples, spec.lower, spec.upper, dense=spec.dense, viscosity=viscosity, seed=seed
-    )
+    # Reaching a little beyond the bounds, no point of the range is an extrapolation. Not below the lowest speed and load:
+    # there the full model changes its law.
+    margin = MARGIN * (np.array(spec.upper) - np.array(spec.lower))
+    lower = spec.lower - np.where([kind == "log" for kind in spec.dense], 0.0, margin)
+    return mixed_hypercube(preset.samples, lower, spec.upper + margin, dense=spec.dense, viscosity=viscosity, seed=seed)
 
 
 def _train(

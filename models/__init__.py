@@ -1,0 +1,1 @@
+"""Physics: what a gearbox is, what it loses, how its heat flows."""

@@ -60,8 +60,9 @@ def churning_niemann_printed(*, e: float, b: float, v_t: Numeric, omega: Numeric
 def churning_mauz(*, e: tuple[float, float], b: float, v_t: Numeric, omega_2: Numeric, C_Sp: float = 1.0) -> Array:
     r"""Churning loss of a gear pair after Mauz (ISO/TR 14179-2).
 
-    .. math:: T_H = C_{Sp} C_1 e^{C_2 v_t / v_0},\quad C_1 = 0.063\frac{e_1+e_2}{e_0} + 0.0128\left(\frac{b}{b_0}\right)^3,
-              \quad C_2 = \frac{e_1+e_2}{80 e_0} + 0.2
+    .. math:: T_H = C_{Sp} C_1 e^{C_2 v_t / v_0},\quad
+              C_1 = 0.063\frac{e_1+e_2}{e_0} + 0.0128\left(\frac{b}{b_0}\right)^3,\quad
+              C_2 = \frac{e_1+e_2}{80 e_0} + 0.2
 
     Parameters
     ----------

@@ -67,9 +67,7 @@ class Cycle:
         faults: list[str] = []
         have = {str(key) for key in columns}
         needed = ["time_s", *(COLUMNS[signal][0] for signal in REQUIRED)]
-        for column in needed:
-            if column not in have:
-                faults.append(f"column {column} is missing; it has: {', '.join(sorted(have))}")
+        faults += [f"column {c} is missing; it has: {', '.join(sorted(have))}" for c in needed if c not in have]
         arrays: dict[str, Array] = {}
         wanted = {"time": "time_s"} | {signal: spec[0] for signal, spec in COLUMNS.items()} | {c: c for c in extra}
         for signal, column in wanted.items():
@@ -80,10 +78,13 @@ class Cycle:
         time = arrays.pop("time", None)
         if time is not None:
             faults += _time_faults(time)
-            for signal, values in arrays.items():
-                if len(values) != len(time):
-                    faults.append(f"{wanted[signal]} has {len(values)} rows, but time_s has {len(time)}")
-        faults += [fault for signal, values in arrays.items() if signal in COLUMNS for fault in _range_faults(signal, values)]
+            faults += [
+                f"{wanted[signal]} has {len(values)} rows, but time_s has {len(time)}"
+                for signal, values in arrays.items()
+                if len(values) != len(time)
+            ]
+        for signal in [s for s in COLUMNS if s in arrays]:
+            faults += _range_faults(signal, arrays[signal])
         if faults or time is None:
             raise InputError("\n".join(f"{name}: {fault}" for fault in faults))
         return cls(time, arrays)

@@ -181,7 +181,7 @@ def thermal_loading(*, eta: Numeric, beta: Numeric, V_e: Numeric, k_oil: Numeric
 
 
 def asperity_share_doleschel(h: Numeric, Ra_mean: float) -> Array:
-    r"""Share of the load that asperities carry after Doleschel, :math:`\xi = (1 - \lambda/2)^2` for :math:`\lambda < 2`.
+    r"""Load share of the asperities after Doleschel, :math:`\xi = (1 - \lambda/2)^2` for :math:`\lambda < 2`.
 
     Parameters
     ----------
@@ -282,7 +282,7 @@ def fluid_friction(
 
 
 def heat_partition(u_1: Numeric, u_2: Numeric) -> Array:
-    """Share of the frictional heat that enters body 1 of two bodies of the same steel, ``sqrt u1 / (sqrt u1 + sqrt u2)``.
+    """Share of the frictional heat that enters body 1 of two of the same steel, ``sqrt u1 / (sqrt u1 + sqrt u2)``.
 
     Parameters
     ----------

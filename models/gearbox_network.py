@@ -1,8 +1,8 @@
 """From a gearbox definition to its thermal network: which nodes there are, what links them, where the losses go.
 
-Boundaries: air and frame (ambient temperature). Parts, in order: housing parts, oil, bearings, shafts, gears, mesh. The
-structure is the 14-element network of Durand de Gevigney et al. that the paper follows (section 5, fig. 9); the laws are
-those of :mod:`models.heat_transfer`, with the numbers of the definition and the tunable factors as parameters.
+Boundaries: air and frame (ambient temperature). Parts, in order: housing parts, oil, bearings, shafts, gears, mesh.
+The structure is the 14-element network of Durand de Gevigney et al. that the paper follows (section 5, fig. 9); the
+laws are those of :mod:`models.heat_transfer`, with the numbers of the definition and the tunable factors as parameters.
 """
 
 from __future__ import annotations

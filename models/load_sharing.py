@@ -22,7 +22,7 @@ _ROUNDING = 1e-9  # in base pitches: a pair this close outside A ... E still cou
 
 
 class ContactPoints(NamedTuple):
-    """Quadrature on the path of contact: the integral of f over A ... E is ``sum(f(t) * dx)``. Unpacks as ``t, dx, share``.
+    """Quadrature on the path of contact: the integral of f over A ... E is ``sum(f(t) * dx)``; ``t, dx, share``.
 
     Attributes
     ----------

@@ -1,8 +1,8 @@
 """The full power-loss model (F-PL): operating points in, one loss per component out.
 
-Every loss source (mesh, rolling elements, splashing gears, seals) gives its component or components; :class:`LossModel`
-puts them side by side. Speed and torque are the input shaft's, signed; losses depend on their magnitudes only, are never
-negative, and go to zero with speed.
+Every loss source (mesh, rolling elements, splashing gears, seals) gives its component or components;
+:class:`LossModel` puts them side by side. Speed and torque are the input shaft's, signed; losses depend on their
+magnitudes only, are never negative, and go to zero with speed.
 
 Two floors keep real drive cycles finite and continuous: below 1 N m the contact is evaluated at 1 N m and the sliding
 loss scaled linearly with torque (eqs. 3-4 of the paper are singular without load); below 1 rpm all losses are evaluated
@@ -73,9 +73,17 @@ class ChurningLoss:
             nu, rho = self.oil.kinematic_viscosity(T_oil), self.oil.density(T_oil)
             per_gear = [
                 churning.churning_changenet_velex(
-                    h=self.immersion[i], r_p=pair.r[i], b=pair.b, z=pair.z[i], tooth_height=pair.r_a[i] - pair.r_f[i],
-                    alpha=pair.alpha_n, V_oil=self.oil_volume, omega=omega[i], nu=nu, rho=rho,
-                )  # fmt: skip
+                    h=self.immersion[i],
+                    r_p=pair.r[i],
+                    b=pair.b,
+                    z=pair.z[i],
+                    tooth_height=pair.r_a[i] - pair.r_f[i],
+                    alpha=pair.alpha_n,
+                    V_oil=self.oil_volume,
+                    omega=omega[i],
+                    nu=nu,
+                    rho=rho,
+                )
                 for i in (0, 1)
             ]
         return np.asarray(sum(per_gear))
@@ -247,14 +255,15 @@ class LossModel:
             If an input is not finite or a temperature below absolute zero.
         """
         T = np.asarray(temperatures, dtype=float)
-        n, torque, T0 = np.broadcast_arrays(np.asarray(speed, dtype=float), np.asarray(torque, dtype=float), T[..., 0])
+        n, torque, _ = np.broadcast_arrays(np.asarray(speed, dtype=float), np.asarray(torque, dtype=float), T[..., 0])
         shape = n.shape
         T = np.broadcast_to(T, (*shape, T.shape[-1])).reshape(-1, T.shape[-1])
         n, torque = n.reshape(-1), torque.reshape(-1)
         _refuse_unphysical(n, torque, T, self.temperature_nodes)
         if len(n) <= BATCH:
             return self._power(n, torque, T).reshape(*shape, -1)
-        parts = [self._power(n[i : i + BATCH], torque[i : i + BATCH], T[i : i + BATCH]) for i in range(0, len(n), BATCH)]
+        rows = [slice(i, i + BATCH) for i in range(0, len(n), BATCH)]
+        parts = [self._power(n[part], torque[part], T[part]) for part in rows]
         return np.concatenate(parts).reshape(*shape, -1)
 
     def breakdown(
@@ -290,9 +299,8 @@ class LossModel:
             temperatures = dict.fromkeys(self.temperature_nodes, temperatures)
         unknown = [name for name in temperatures if name not in self.temperature_nodes]
         if unknown:
-            raise InputError(
-                f"{unknown[0]!r} is not a temperature of the loss model{did_you_mean(unknown[0], self.temperature_nodes)}"
-            )
+            hint = did_you_mean(unknown[0], self.temperature_nodes)
+            raise InputError(f"{unknown[0]!r} is not a temperature of the loss model{hint}")
         missing = [name for name in self.temperature_nodes if name not in temperatures]
         if missing:
             raise InputError(f"the temperatures of {', '.join(missing)} are missing; give them in degC")
@@ -305,7 +313,7 @@ class LossModel:
         return np.zeros(np.broadcast_shapes(np.shape(speed), np.shape(torque), np.shape(temperatures)[:-1]))
 
     def mesh_power(self, speed: Array, torque: Array, T_gears: Array) -> Array:
-        """Sliding and rolling loss [W], shape (N, 2), at input speed, torque, shape (N,), and gear bulk, shape (N, 2)."""
+        """Sliding and rolling loss [W], shape (N, 2), at input speed, torque, shape (N,), and gears' bulk, (N, 2)."""
         n, slow, moment = self._floored(speed, torque)
         sliding, rolling = self.mesh.loss(omega_1=n * RPM, torque=moment, T_1=T_gears[:, 0], T_2=T_gears[:, 1])
         light = np.minimum(np.abs(torque) / TORQUE_FLOOR_NM, 1.0)
@@ -371,5 +379,6 @@ def _refuse_unphysical(n: Array, torque: Array, T: Array, nodes: tuple[str, ...]
     if not (np.isfinite(T).all() and T.min(initial=0.0) > -273.15):
         row, column = np.argwhere(~(np.isfinite(T) & (T > -273.15)))[0]
         raise InputError(
-            f"T_{nodes[column]} is {T[row, column]} degC at operating point {row}; finite numbers above -273.15 are needed"
+            f"T_{nodes[column]} is {T[row, column]} degC at operating point {row}; "
+            "finite numbers above -273.15 are needed"
         )

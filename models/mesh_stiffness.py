@@ -187,7 +187,8 @@ def foundation_compliance(
 
 
 def sainsot_coefficients(h: float, theta_f: float) -> tuple[float, float, float, float]:
-    r"""Factors L*, M*, P*, Q* of :func:`foundation_compliance`, :math:`A/\theta^2 + Bh^2 + Ch/\theta + D/\theta + Eh + F`.
+    r"""Factors L*, M*, P*, Q* of :func:`foundation_compliance`, each
+    :math:`A/\theta^2 + Bh^2 + Ch/\theta + D/\theta + Eh + F`.
 
     Parameters
     ----------

@@ -69,7 +69,7 @@ def lubricant(fluid: Fluid) -> Oil:
     if fluid.d341 is not None:
         m, n = fluid.d341.m, fluid.d341.n
     else:
-        assert fluid.viscosity_points is not None  # Fluid has exactly one of the two
+        assert fluid.viscosity_points is not None  # noqa: S101 - Fluid has exactly one of the two
         (T_1, nu_1), (T_2, nu_2) = fluid.viscosity_points
         m, n = d341_constants(T_1, nu_1, T_2, nu_2)
     oil = Oil(

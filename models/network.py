@@ -1,7 +1,7 @@
 """The thermal network: nodes, links and sources, each with a law.
 
-A network is data. :meth:`ThermalNetwork.with_source`, :meth:`~ThermalNetwork.with_link` and their like give a new network
-with one more term; a base term, a mechanism of the catalogue and a user's own are the same kind of thing.
+A network is data. :meth:`ThermalNetwork.with_source`, :meth:`~ThermalNetwork.with_link` and their like give a new
+network with one more term; a base term, a mechanism of the catalogue and a user's own are the same kind of thing.
 ``m c dT/dt = sources - sum of conductance * difference`` at every node; what leaves one node enters another, so heat is
 conserved whatever the laws say.
 """
@@ -368,4 +368,4 @@ class ThermalNetwork:
         if name in taken:
             raise InputError(f"the network has a {kind} {name!r} already; choose another name")
         if kind == "signal" and (not name.isidentifier() or iskeyword(name) or name.startswith("_")):
-            raise InputError(f"{name!r} cannot be a signal: a name needs letters, digits and _, and starts with a letter")
+            raise InputError(f"{name!r} cannot be a signal; a name starts with a letter and has letters, digits and _")

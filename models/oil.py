@@ -346,7 +346,7 @@ class Oil:
         return np.asarray(np.where(ratio > 1e-9, exponent / np.maximum(p, 1.0), alpha_0))
 
     def film_pressure_viscosity_coefficient(self, T: Numeric) -> Array:
-        r"""Reciprocal asymptotic isoviscous pressure coefficient :math:`\alpha^* = [\int_0^\infty \eta_0/\eta\,dp]^{-1}`.
+        r"""Reciprocal asymptotic isoviscous pressure, :math:`\alpha^* = [\int_0^\infty \eta_0/\eta\,dp]^{-1}`.
 
         The coefficient that a film-thickness formula wants. Modulus equation: the series
         ``1 / (A (1 + 2 B + 6 B^2))`` of the integral; Roelands: ``alpha_0 / (1 + (1 - Z) / (alpha_0 p_R))``.

@@ -80,9 +80,13 @@ class LossSource(Protocol):
     """The losses as the runtime needs them; see :class:`models.network.Losses`."""
 
     @property
-    def temperature_nodes(self) -> tuple[str, ...]: ...
+    def temperature_nodes(self) -> tuple[str, ...]:
+        """Nodes whose temperatures are read."""
+        ...
 
-    def power(self, speed: Any, torque: Any, temperatures: Any) -> Array: ...
+    def power(self, speed: Any, torque: Any, temperatures: Any) -> Array:
+        """Losses [W], shape (..., components)."""
+        ...
 
 
 class NetworkSystem:
@@ -131,7 +135,7 @@ class NetworkSystem:
         return self._stacked(self.laws.boundary(*self._common(time, inputs, states)), states.shape[:-1])
 
     def flows(self, time: Any, inputs: Array, states: Array) -> tuple[Array, Array]:
-        """Heats of the sources [W], shape (..., sources), and rates and updates of the extra states, (..., 2 states)."""
+        """Heats of the sources [W], shape (..., sources); rates and updates of the extra states, (..., 2 states)."""
         power = self.power(inputs, states)
         return self._flows(self._signals(time, inputs, states, power), power, states.shape[:-1])
 

@@ -72,7 +72,8 @@ def initial_states(network: ThermalNetwork, initial: float | Mapping[str, float]
     if isinstance(initial, Mapping):
         for name in initial:
             if name not in network.node_names:
-                raise InputError(f"initial temperature of unknown node {name!r}{did_you_mean(name, network.node_names)}")
+                hint = did_you_mean(name, network.node_names)
+                raise InputError(f"initial temperature of unknown node {name!r}{hint}")
         missing = [name for name in part_names if name not in initial]
         if missing:
             raise InputError(f"initial temperatures are missing for: {', '.join(missing)}")
@@ -328,4 +329,6 @@ def steady_state(
         # Longer steps while it settles, shorter ones where losses that rise with temperature make it overshoot.
         step = min(step * 3.0, 100.0 * LARGE_PSEUDO_STEP_S) if moved < previous else max(step / 2.0, 100.0)
         previous = moved
-    raise ArithmeticError(f"no steady state found (a node still moves by {moved:.3g} K): is there a node without cooling?")
+    raise ArithmeticError(
+        f"no steady state found (a node still moves by {moved:.3g} K): is there a node without cooling?"
+    )

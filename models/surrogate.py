@@ -2,8 +2,8 @@ r"""The reduced loss model (ROM-PL): trained networks in place of the full model
 
 A :class:`Network` is the plain description of one trained network: bounds, features, weights. :class:`SurrogateLosses`
 puts operating points into the networks' input rows, and their outputs back onto the loss components. It reads |speed|
-and |torque|; below the lowest trained speed all losses, and below the lowest trained torque the sliding loss, go linearly
-to zero, as in the full model (:mod:`models.losses`); otherwise inputs are held at the bounds of training.
+and |torque|; below the lowest trained speed all losses, and below the lowest trained torque the sliding loss, go
+linearly to zero, as in the full model (:mod:`models.losses`); otherwise inputs are held at the bounds of training.
 
 Numpy only: this file also runs where neither scikit-learn nor onnxruntime is installed.
 """
@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, Literal, Self
 
 import numpy as np
@@ -209,8 +209,10 @@ class _Stack:
 
     def __init__(self, networks: Sequence[Network]) -> None:
         starts = np.cumsum([0, *(len(n.inputs) for n in networks)])
-        listed = [(kind, int(s) + c, n.viscosity) for n, s in zip(networks, starts, strict=False) for kind, c in n.features]
-        # Features of one kind (and one oil) are computed together, so they are regrouped, and the weights' rows with them.
+        listed = [
+            (kind, int(s) + c, n.viscosity) for n, s in zip(networks, starts, strict=False) for kind, c in n.features
+        ]
+        # Features of one kind (and one oil) are computed together: they are regrouped, and the weights' rows with them.
         groups = sorted({(kind, oil) for kind, _, oil in listed})
         order = [i for group in groups for i, (kind, _, oil) in enumerate(listed) if (kind, oil) == group]
         self._features = [
@@ -326,11 +328,12 @@ class SurrogateLosses:
 
     @cached_property
     def _evaluate(self) -> Evaluator:
-        return _Stack(self._used_networks) if self.evaluators is None else self._evaluate_each
+        if self.evaluators is None:
+            return _Stack(self._used_networks)
+        return partial(self._evaluate_each, self.evaluators)
 
-    def _evaluate_each(self, rows: Array) -> Array:
+    def _evaluate_each(self, evaluators: Mapping[str, Evaluator], rows: Array) -> Array:
         """Outputs of all uses side by side; the uses of one network go to its evaluator as one batch of rows."""
-        assert self.evaluators is not None
         flat = rows.reshape(-1, rows.shape[-1])
         inputs = np.cumsum([0, *(len(n.inputs) for n in self._used_networks)])
         outputs = np.cumsum([0, *(len(n.outputs) for n in self._used_networks)])
@@ -338,7 +341,7 @@ class SurrogateLosses:
         for network in self.networks:
             mine = [i for i, used in enumerate(self._used_networks) if used is network]
             stacked = np.concatenate([flat[:, inputs[i] : inputs[i + 1]] for i in mine])
-            parts = np.split(np.asarray(self.evaluators[network.name](stacked), dtype=float), len(mine))
+            parts = np.split(np.asarray(evaluators[network.name](stacked), dtype=float), len(mine))
             for i, part in zip(mine, parts, strict=True):
                 result[:, outputs[i] : outputs[i + 1]] = part
         return result.reshape(*rows.shape[:-1], -1)
