@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import gzip
 import os
 import tempfile
 from collections.abc import Iterator, Mapping
@@ -97,8 +98,9 @@ def write_table(path: Path, columns: Mapping[str, ArrayLike]) -> None:
             except ImportError as error:
                 raise InputError(f"{path}: writing Parquet needs pyarrow; install gearbox-thermal-twin[parquet]") from error
         else:
-            compression = {"method": "gzip", "mtime": 0} if kind == ".csv.gz" else None
-            table.round(DECIMALS).to_csv(partial, index=False, compression=compression)
+            text = table.round(DECIMALS).to_csv(index=False, lineterminator="\n").encode()
+            # Neither name nor time go into the archive, so that the same table gives the same bytes.
+            partial.write_bytes(gzip.compress(text, mtime=0) if kind == ".csv.gz" else text)
 
 
 @contextlib.contextmanager

@@ -92,7 +92,7 @@ PRESETS: Mapping[str, Preset] = {
         samples=4800,
         judged=2000,
         transforms=True,
-        hidden={"mesh": (20, 10), "no_load": (6, 6), "bearing": (14, 10)},
+        hidden={"mesh": (20, 10), "no_load": (10, 10), "bearing": (16, 12)},
         max_iter=300,
         starts=2,
         start_iterations=25,
@@ -153,7 +153,7 @@ class NoLoadLosses:
 
 @dataclass(frozen=True)
 class BearingLosses:
-    """Rows (speed of its shaft [1/min], radial load [N], oil and bearing temperature [degC]) to a bearing's loss [W]."""
+    """Rows (own speed [1/min], radial load [N], oil and bearing temperature [degC]) to the loss [W] of a bearing."""
 
     model: LossModel
     index: int

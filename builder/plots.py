@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import matplotlib as mpl
 from matplotlib.axes import Axes
@@ -13,8 +14,13 @@ from builder.files import appearing_whole
 from models.types import Array
 
 # Okabe and Ito's palette: told apart by people with any colour vision, and in grey by order of lightness.
-PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#F0E442")
+PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#6B6B6B")
 LINES = ("-", "--", "-.", ":")
+TOTAL = "total"
+DOTS: dict[str, Any] = {
+    "linestyle": "none", "marker": "o", "markersize": 3.5, "markerfacecolor": "white", "markeredgecolor": "black",
+    "markeredgewidth": 0.8,
+}  # fmt: skip
 STYLE = {
     "font.size": 9.0,
     "axes.grid": True,
@@ -47,7 +53,7 @@ def plot_cycle(
     groups : mapping of str to tuple of str
         Nodes that are drawn together, e.g. ``bearings``; of each group the first and the last are drawn
     reference : mapping of column name to Array, or None
-        A second result, drawn as thin black dots
+        A second result, drawn as small circles
     reference_name : str
     """
     with mpl.rc_context(STYLE):
@@ -65,7 +71,7 @@ def plot_cycle(
         temperatures.set_xlabel(f"Time in {unit}")
         temperatures.set_xlim(time[0], time[-1])
         if reference is not None:
-            losses.plot([], [], color="black", linestyle="none", marker=".", markersize=3, label=reference_name)
+            losses.plot([], [], **DOTS, label=reference_name)
             losses.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
         kind = path.suffix.removeprefix(".").lower() or "png"
         with appearing_whole(path) as partial:
@@ -90,7 +96,7 @@ def _inputs(axes: Axes, time: Array, columns: Mapping[str, Array]) -> None:
 def _loss_curves(columns: Mapping[str, Array]) -> dict[str, tuple[Array, tuple[str, ...]]]:
     """Curves by label: values, and the columns that they are the sum of."""
     parts = [name for name in columns if name.startswith("P_loss_") and name != "P_loss_W"]
-    gathered: dict[str, tuple[str, ...]] = {"total": ("P_loss_W",)}
+    gathered: dict[str, tuple[str, ...]] = {TOTAL: ("P_loss_W",)}
     for name in parts:
         # Numbered twins (bearing_1, bearing_2 ...) make one curve.
         component = name.removeprefix("P_loss_").removesuffix("_W")
@@ -117,10 +123,13 @@ def _curves(
     scale: float,
 ) -> None:
     for index, (label, (values, names)) in enumerate(curves.items()):
-        colour, line = PALETTE[index % 7], LINES[index // 7 % len(LINES)]
-        axes.plot(time, values, color=colour, linestyle=line, linewidth=1.4, label=label.replace("_", " "))
+        colour, line = PALETTE[index % len(PALETTE)], LINES[index // len(PALETTE) % len(LINES)]
+        width = 1.4
+        if label == TOTAL:
+            colour, width = "black", 2.0
+        axes.plot(time, values, color=colour, linestyle=line, linewidth=width, label=label.replace("_", " "))
         if reference is not None:
             times, dots = reference["time_s"] * scale, sum(reference[name] for name in names)
             every = max(1, len(times) // 30)
-            axes.plot(times[::every], dots[::every], "k.", markersize=3)  # type: ignore[index]
+            axes.plot(times[::every], dots[::every], **DOTS)  # type: ignore[index]
     axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))

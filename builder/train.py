@@ -243,8 +243,8 @@ def r_squared(y: Array, y_hat: Array) -> Array:
 def _training_points(spec: NetworkSpec, preset: Preset, viscosity: tuple[float, float], seed: int) -> Array:
     if not preset.transforms:
         return latin_hypercube(preset.samples, spec.lower, spec.upper, seed=seed)
-    # Reaching a little beyond the bounds, no point of the range is an extrapolation. Not below the lowest speed and load:
-    # there the full model changes its law.
+    # Reaching a little beyond the bounds, no point of the range is an extrapolation. Not below the lowest speed and
+    # load: there the full model changes its law.
     margin = MARGIN * (np.array(spec.upper) - np.array(spec.lower))
     lower = spec.lower - np.where([kind == "log" for kind in spec.dense], 0.0, margin)
     return mixed_hypercube(preset.samples, lower, spec.upper + margin, dense=spec.dense, viscosity=viscosity, seed=seed)

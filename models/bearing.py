@@ -21,6 +21,8 @@ V_M_LEVEL = np.array([0, .0126, .0272, .0456, .0611, .0756, .0918, .110, .133, .
 V_M_ROLLER = np.array([0, 7.3e-6, 1.8e-5, 3.45e-5, 5.33e-5, 7.38e-5, 1.02e-4, 1.36e-4, 1.88e-4, 2.42e-4, 2.97e-4,
                        3.1e-4, 3.78e-4, 4.7e-4, 5.83e-4, 6.72e-4, 7.33e-4, 8.46e-4, 9.42e-4, 1.08e-3, 1.24e-3,
                        1.434e-3])  # fmt: skip
+# SKF gives the drag formula up to these viscosities (mm^2/s): bearing at most half in oil, and deeper.
+DRAG_NU_HALF, DRAG_NU_DEEP = 500.0, 250.0
 OIL_FLOW_HEAT = 27.0  # W/K per l/min, SKF; rho c_p of a mineral oil at 60 degC gives 28.5
 TEMPERATURE_TOL = 5e-3  # K
 STANDARD_GRAVITY = 9.80665
@@ -135,7 +137,8 @@ class SkfRollerBearing:
         References
         ----------
         SKF "Rolling bearings", 2016, pp. 104-106: inlet-shear starvation, kinematic replenishment, mixed friction and
-        oil-bath drag. K_roll is 1e-12 of the catalogue's digits, by its worked magnitudes.
+        oil-bath drag. The viscosity in the drag moment is held at 500 mm^2/s, where the formula ends (250 for a bearing
+        more than half in oil; limits from memory). K_roll is 1e-12 of the catalogue's digits, by its worked magnitudes.
 
         Examples
         --------
@@ -158,6 +161,8 @@ class SkfRollerBearing:
     def _drag_moment(self, n: Array, nu: Array) -> Array:
         d_m, d, D = self.d_m, self.d, self.D
         H = min(max(self.H, 0.0), 1.2 * d_m)
+        # Its power of nu is a fit; cold oil beyond the limits would brake a NU 406 with kilowatts.
+        nu = np.minimum(nu, DRAG_NU_HALF if 2.0 * self.H <= D else DRAG_NU_DEEP)
         t = 2.0 * np.arccos(np.clip((0.6 * d_m - H) / (0.6 * d_m), -1.0, 1.0))
         if t == 0.0:
             return np.zeros(np.broadcast_shapes(n.shape, nu.shape))

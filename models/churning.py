@@ -108,7 +108,7 @@ def churning_changenet_velex(
     Parameters
     ----------
     h : float
-        Immersion depth, [m]; no loss where not positive
+        Immersion depth of the pitch circle, [m]; no loss where not positive
     r_p : float
         Pitch radius, [m]
     b : float

@@ -73,8 +73,9 @@ class ChurningLoss:
             nu, rho = self.oil.kinematic_viscosity(T_oil), self.oil.density(T_oil)
             per_gear = [
                 churning.churning_changenet_velex(
-                    h=self.immersion[i],
-                    r_p=pair.r[i],
+                    # Measured at the pitch circle, as theta and D are; the teeth come as flanks of their own.
+                    h=pair.r_w[i] - self.level_below_axis,
+                    r_p=pair.r_w[i],
                     b=pair.b,
                     z=pair.z[i],
                     tooth_height=pair.r_a[i] - pair.r_f[i],
@@ -327,15 +328,7 @@ class LossModel:
 
     def bearing_power(self, index: int, speed: Array, torque: Array, T_oil: Array, T_bearing: Array) -> Array:
         """Loss [W] of one bearing at input speed and torque, oil and bearing temperature, all of shape (N,)."""
-        n, slow, _ = self._floored(speed, torque)
-        loss = self.bearings[index].loss(
-            n_rpm=n * self.bearing_speed_ratio[index],
-            F_r=self.bearing_radial_load(index, torque),
-            T_oil=T_oil,
-            T_bearing=T_bearing,
-            oil=self.mesh.oil,
-        )
-        return loss * slow
+        return self._group_power((index,), speed, torque, T_oil, T_bearing[:, None])[:, 0]
 
     def bearing_radial_load(self, index: int, torque: Array) -> Array:
         """Radial load [N] of one bearing at input torque [N m], shape (N,); no own weight."""
@@ -347,19 +340,22 @@ class LossModel:
         first_bearing = 3 + len(self.seals)
         power[:, 2:first_bearing] = self.no_load_power(n, T[:, 0])
         for group in self.bearing_groups:
-            # All bearings of a kind in one call: they differ in speed, load and temperature only.
-            stacked = np.concatenate
-            loss = self.bearings[group[0]].loss(
-                n_rpm=stacked([np.maximum(np.abs(n), SPEED_FLOOR_RPM) * self.bearing_speed_ratio[i] for i in group]),
-                F_r=stacked([self.bearing_radial_load(i, torque) for i in group]),
-                T_oil=np.tile(T[:, 0], len(group)),
-                T_bearing=stacked([T[:, 3 + i] for i in group]),
-                oil=self.mesh.oil,
-            )
-            slow = np.minimum(np.abs(n) / SPEED_FLOOR_RPM, 1.0)
-            for i, part in zip(group, np.split(loss, len(group)), strict=True):
-                power[:, first_bearing + i] = part * slow
+            columns = [first_bearing + index for index in group]
+            T_bearings = T[:, [3 + index for index in group]]
+            power[:, columns] = self._group_power(group, n, torque, T[:, 0], T_bearings)
         return power
+
+    def _group_power(self, group: tuple[int, ...], n: Array, torque: Array, T_oil: Array, T_bearings: Array) -> Array:
+        """Losses [W] of bearings that are alike, shape (N, group), in one call: they differ in speed and load only."""
+        speed, slow, _ = self._floored(n, torque)
+        loss = self.bearings[group[0]].loss(
+            n_rpm=np.stack([speed * self.bearing_speed_ratio[index] for index in group], axis=-1),
+            F_r=np.stack([self.bearing_radial_load(index, torque) for index in group], axis=-1),
+            T_oil=T_oil[:, None],
+            T_bearing=T_bearings,
+            oil=self.mesh.oil,
+        )
+        return loss * slow[:, None]
 
     @staticmethod
     def _floored(speed: Array, torque: Array) -> tuple[Array, Array, Array]:

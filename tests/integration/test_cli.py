@@ -1,0 +1,133 @@
+"""The command line as users meet it: exit status, one message without a traceback, and the files that come out."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from builder.__main__ import main
+
+CYCLE = "time_s,speed_rpm,torque_Nm,T_ambient_degC\n0,0,0,20\n20,1500,80,20\n60,1500,-20,20\n"
+
+
+def run(*arguments: object) -> int:
+    """Run the command line in this process and return its exit status."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys, "argv", ["builder", *map(str, arguments)])
+        try:
+            main()
+        except SystemExit as end:
+            return int(end.code or 0)
+    return 0
+
+
+@pytest.fixture
+def cycle(tmp_path: Path) -> Path:
+    path = tmp_path / "cycle.csv"
+    path.write_text(CYCLE)
+    return path
+
+
+def test_simulate_with_the_full_model(cycle: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out, plot = tmp_path / "result.csv", tmp_path / "plot.png"
+    assert run("simulate", "--gearbox", "fzg", cycle, "--output", out, "--plot", plot) == 0
+    table = pd.read_csv(out)
+    assert list(table.columns[:5]) == ["time_s", "speed_rpm", "torque_Nm", "T_ambient_degC", "air_speed_m_s"]
+    assert list(table.columns[-3:]) == ["torque_loss_Nm", "efficiency", "in_domain"]
+    assert table["T_oil_degC"].iloc[0] == 20.0 < table["T_oil_degC"].iloc[-1]
+    losses = [c for c in table if c.startswith("P_loss_") and c != "P_loss_W"]
+    np.testing.assert_allclose(table[losses].sum(axis=1), table["P_loss_W"], atol=1e-5)
+    assert plot.read_bytes().startswith(b"\x89PNG")
+    assert str(out) in capsys.readouterr().out
+
+
+def test_a_result_can_be_continued(cycle: Path, tmp_path: Path) -> None:
+    first, second = tmp_path / "first.parquet", tmp_path / "second.csv"
+    assert run("simulate", "--gearbox", "fzg", cycle, "--output", first, "--initial", "55") == 0
+    assert run("simulate", "--gearbox", "fzg", cycle, "--output", second, "--initial", first) == 0
+    end, begin = pd.read_parquet(first).iloc[-1], pd.read_csv(second).iloc[0]
+    for node in ("oil", "pinion", "mesh", "housing_upper"):
+        assert begin[f"T_{node}_degC"] == pytest.approx(end[f"T_{node}_degC"], abs=1e-5)
+
+
+def test_simulate_with_an_fmu_gives_the_same_columns(cycle: Path, tmp_path: Path, fzg_fmu: Path) -> None:
+    full, driven = tmp_path / "full.csv", tmp_path / "fmu.csv"
+    assert run("simulate", "--gearbox", "fzg", cycle, "--output", full) == 0
+    assert run("simulate", fzg_fmu, cycle, "--output", driven, "--initial", "20", "--plot", tmp_path / "p.svg") == 0
+    assert list(pd.read_csv(driven).columns) == list(pd.read_csv(full).columns)
+    assert (tmp_path / "p.svg").read_text().startswith("<?xml")
+
+
+FAULTY = [
+    (["simulate", "--gearbox", "fgz", "CYCLE", "--output", "r.csv"], "no gearbox named 'fgz'; did you mean 'fzg'?"),
+    (["simulate", "--gearbox", "missing.toml", "CYCLE", "--output", "r.csv"], "missing.toml"),
+    (["simulate", "--gearbox", "fzg", "missing.csv", "--output", "r.csv"], "missing.csv: no such file"),
+    (["simulate", "--gearbox", "fzg", "CYCLE", "--output", "r.xls"], "r.xls: the ending says nothing"),
+    (["simulate", "--gearbox", "fzg", "CYCLE", "--output", "r.csv", "--initial", "-300"], "above -273.15"),
+    (["simulate", "--gearbox", "fzg", "CYCLE", "--output", "r.csv", "--initial", "nan"], "must be finite"),
+    (["simulate", "--gearbox", "fzg", "CYCLE", "--output", "r.csv", "--plot", "p.txt"], "p.txt: plots are written"),
+    (["simulate", "CYCLE", "--output", "r.csv"], "simulate takes FMU CYCLE"),
+    (["simulate", "CYCLE", "CYCLE", "--output", "r.csv"], "cycle.csv"),
+    (["simulate", "missing.fmu", "CYCLE", "--output", "r.csv"], "missing.fmu"),
+    (["build-fmu", "--gearbox", "fgz"], "did you mean 'fzg'?"),
+    (["build-fmu", "--jobs", "2", "--dask", "tcp://127.0.0.1:1"], "exclude each other"),
+    (["build-fmu", "--samples", "10"], "10 is not in the range"),
+    (["build-fmu", "--output", "CYCLE/inside"], "cannot be written"),
+    (["fly"], "No such command 'fly'"),
+]
+
+
+@pytest.mark.parametrize(("arguments", "message"), FAULTY, ids=[message for _, message in FAULTY])
+def test_faulty_input_ends_with_status_2_and_one_message(
+    arguments: list[str], message: str, cycle: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    monkeypatch.chdir(tmp_path)
+    before = sorted(tmp_path.rglob("*"))
+    assert run(*(a.replace("CYCLE", str(cycle)) for a in arguments)) == 2
+    shown = capsys.readouterr()
+    assert message in " ".join(shown.err.split())
+    assert "Traceback" not in shown.err
+    assert sorted(tmp_path.rglob("*")) == before, "nothing may be left behind"
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupted_build_leaves_nothing(number: signal.Signals, tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "builder", "build-fmu", "--output", str(tmp_path / "out"), "--jobs", "1"]
+    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, env=environment)  # noqa: S603
+    for _ in range(600):  # until the build has begun
+        if list(tmp_path.glob("out/.unfinished-*")):
+            break
+        time.sleep(0.1)
+    else:
+        process.kill()
+        pytest.fail("the build did not begin within a minute")
+    time.sleep(1.0)
+    process.send_signal(number)
+    _, message = process.communicate(timeout=60)
+    assert process.returncode != 0
+    assert list((tmp_path / "out").iterdir()) == []
+    assert b"Traceback" not in message
+
+
+def test_build_fmu_from_a_definition(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "box"
+    assert run("build-fmu", "--gearbox", "conveyor", "--output", out, "--samples", "300", "--jobs", "1", "--seed", "3") == 0
+    report = json.loads((out / "report.json").read_text())
+    assert report["seed"] == 3
+    assert report["samples_per_network"] == 300
+    assert {p.name for p in out.iterdir()} == {"conveyor.fmu", "networks", "drive_cycle.csv", "drive_cycle.png", "report.json"}
+    shown = capsys.readouterr().out
+    for row in ("mesh_sliding", "worst node", "conveyor.fmu"):
+        assert row in shown

@@ -1,0 +1,104 @@
+"""Tables in and out: what round-trips, what is refused, and that nothing half-written is left."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from builder.files import appearing_whole, read_cycle, read_initial, read_table, write_table
+from models.errors import InputError
+
+COLUMNS = {"time_s": np.array([0.0, 1.0, 2.5]), "T_oil_degC": np.array([20.0, 20.125, 21.0]), "in_domain": np.array([True, True, False])}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ["a.csv", "a.csv.gz", "a.parquet", "späte Läufe/a b.csv"])
+def test_tables_round_trip(tmp_path: Path, name: str) -> None:
+    path = tmp_path / name
+    write_table(path, COLUMNS)
+    table = read_table(path)
+    assert list(table.columns) == list(COLUMNS)
+    for column, values in COLUMNS.items():
+        assert (table[column].to_numpy() == values).all()
+    assert [p.name for p in path.parent.iterdir()] == [path.name]
+
+
+def test_the_same_table_gives_the_same_bytes(tmp_path: Path) -> None:
+    for name in ("a.csv", "a.csv.gz"):
+        write_table(tmp_path / name, COLUMNS)
+        first = (tmp_path / name).read_bytes()
+        write_table(tmp_path / name, COLUMNS)
+        assert (tmp_path / name).read_bytes() == first
+
+
+def test_a_failure_leaves_the_old_file_and_nothing_else(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("old")
+
+    def interrupted() -> None:
+        with appearing_whole(path) as partial:
+            partial.write_text("half")
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        interrupted()
+    assert path.read_text() == "old"
+    assert [p.name for p in tmp_path.iterdir()] == ["a.csv"]
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (None, "no such file"),
+        (b"", "is empty"),
+        (b"\x00\xff\xfe\x9c", "cannot be read as csv"),
+        (b"time_s,speed_rpm\n1,2\n3,4,5\n", "cannot be read as csv"),
+        (b"time_s,speed_rpm,torque_Nm\n", "has no rows"),
+        (b"time_s,speed_rpm\n0,1\n", "column torque_Nm is missing"),
+        (b"time_s,speed_rpm,torque_Nm\n0,1,2\n1,,2\n", "speed_rpm is nan at row 2"),
+        (b"time_s,speed_rpm,torque_Nm\n0,1,inf\n", "torque_Nm is inf at row 1"),
+        (b"time_s,speed_rpm,torque_Nm\n0,1,x\n", "torque_Nm holds something that is not a number"),
+        (b"time_s,speed_rpm,torque_Nm\n5,1,1\n4,1,1\n", "time_s goes from 5 to 4 at row 2"),
+        (b"time_s,speed_rpm,torque_Nm,T_ambient_degC\n0,1,1,293\n", "T_ambient_degC is 293 at row 1"),
+        (b"time_s,speed_rpm,torque_Nm,speed_rpm\n0,1,1,2\n", "column speed_rpm is there twice"),
+    ],
+)
+def test_a_faulty_cycle_is_refused(tmp_path: Path, content: bytes | None, message: str) -> None:
+    path = tmp_path / "run.csv"
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(InputError, match="run.csv") as caught:
+        read_cycle(path)
+    assert message in str(caught.value)
+
+
+def test_all_faults_of_a_cycle_come_at_once(tmp_path: Path) -> None:
+    path = tmp_path / "run.csv"
+    path.write_text("time_s,speed_rpm\n3,nan\n2,1\n")
+    with pytest.raises(InputError) as caught:
+        read_cycle(path)
+    assert len(str(caught.value).splitlines()) == 3
+
+
+@pytest.mark.parametrize("name", ["a.csv.gz", "a.parquet"])
+def test_a_truncated_file_is_refused(tmp_path: Path, name: str) -> None:
+    path = tmp_path / name
+    write_table(path, {"time_s": np.arange(1000.0)})
+    path.write_bytes(path.read_bytes()[:-200])
+    with pytest.raises(InputError, match="cannot be read"):
+        read_table(path)
+
+
+def test_other_endings_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="the ending says nothing"):
+        write_table(tmp_path / "a.xls", COLUMNS)
+
+
+def test_initial_temperatures_from_the_last_row_of_a_result(tmp_path: Path) -> None:
+    path = tmp_path / "result.csv"
+    write_table(path, {"time_s": [0.0, 1.0], "T_oil_degC": [20.0, 30.5], "T_ambient_degC": [1.0, 1.0]})
+    assert read_initial(str(path)) == {"oil": 30.5}
+    write_table(path, {"time_s": [0.0]})
+    with pytest.raises(InputError, match="no T_<node>_degC columns"):
+        read_initial(str(path))
