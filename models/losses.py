@@ -262,10 +262,10 @@ class LossModel:
         n, torque = n.reshape(-1), torque.reshape(-1)
         _refuse_unphysical(n, torque, T, self.temperature_nodes)
         if len(n) <= BATCH:
-            return self._power(n, torque, T).reshape(*shape, -1)
+            return self._power(n, torque, T).reshape(*shape, len(self.components))
         rows = [slice(i, i + BATCH) for i in range(0, len(n), BATCH)]
         parts = [self._power(n[part], torque[part], T[part]) for part in rows]
-        return np.concatenate(parts).reshape(*shape, -1)
+        return np.concatenate(parts).reshape(*shape, len(self.components))
 
     def breakdown(
         self, *, speed: ArrayLike, torque: ArrayLike, temperatures: Mapping[str, ArrayLike] | float

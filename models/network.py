@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from functools import cached_property
 from keyword import iskeyword
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import sympy as sp
 from numpy.typing import ArrayLike
@@ -22,6 +22,9 @@ from models.cycle import Cycle
 from models.errors import InputError, did_you_mean
 from models.laws import LawLike, NumericLaw, Parameter, Signals, symbol, trace
 from models.types import Array
+
+if TYPE_CHECKING:
+    from models.simulation import Result
 
 
 class Losses(Protocol):
@@ -325,7 +328,7 @@ class ThermalNetwork:
         initial: float | Mapping[str, float] | None = None,
         parameters: Mapping[str, ArrayLike] | None = None,
         progress: Callable[[int, int], None] | None = None,
-    ) -> Any:
+    ) -> Result:
         """Temperatures and losses over a cycle; see :func:`models.simulation.simulate`."""
         from models.simulation import simulate
 
@@ -339,7 +342,7 @@ class ThermalNetwork:
         torque: ArrayLike,
         inputs: Mapping[str, ArrayLike] | None = None,
         parameters: Mapping[str, ArrayLike] | None = None,
-    ) -> Any:
+    ) -> Result:
         """Temperatures and losses at rest with constant inputs; see :func:`models.simulation.steady_state`."""
         from models.simulation import steady_state
 

@@ -113,16 +113,22 @@ class NetworkSystem:
         self.parameters = list(parameters)
         self.n_parts, self.n_states, self.n_boundaries = len(laws.parts), len(laws.states), len(laws.boundaries)
         n_links = laws.laplacian.shape[0]
-        self._laplacian = laws.laplacian.reshape(n_links, -1)
-        self._to_boundary = laws.to_boundary.reshape(n_links, -1)
+        n, m = self.n_parts, self.n_boundaries
+        # One product of the conductances gives three things side by side: the heat that leaves the parts per part
+        # temperature, what comes from the boundaries per boundary temperature, and the sum of that per part.
+        to_boundary = laws.to_boundary
+        blocks = (laws.laplacian.reshape(n_links, -1), to_boundary.reshape(n_links, -1), to_boundary.sum(axis=-1))
+        self._structure = np.concatenate(blocks, axis=1)
+        self._leaving, self._coupling, self._slope = slice(0, n * n), slice(n * n, n * (n + m)), slice(n * (n + m), None)
         self._loss_nodes = np.array([laws.parts.index(name) for name in losses.temperature_nodes])
-        self._varying = list(laws.varying)
+        self._varying = np.array(laws.varying, dtype=int)
         constant = [index for index in range(n_links) if index not in laws.varying]
         batch = np.broadcast_shapes(*(np.shape(value) for value in parameters)) if vector else ()
         fixed = self._stacked(laws.fixed(*self.parameters), batch)
         self.capacities = fixed[..., len(constant) :]
         if not (np.isfinite(fixed).all() and (self.capacities > 0.0).all()):
             raise ValueError("heat capacities must be positive and conductances finite; check the parameters")
+        self._per_capacity = 1.0 / self.capacities
         self._conductances = np.zeros((*batch, n_links))
         self._conductances[..., constant] = fixed[..., : len(constant)]
 
@@ -137,23 +143,30 @@ class NetworkSystem:
     def flows(self, time: Any, inputs: Array, states: Array) -> tuple[Array, Array]:
         """Heats of the sources [W], shape (..., sources); rates and updates of the extra states, (..., 2 states)."""
         power = self.power(inputs, states)
-        return self._flows(self._signals(time, inputs, states, power), power, states.shape[:-1])
+        signals = self._with_numeric(self._common(time, inputs, states), power)
+        return self._flows(signals, power, states.shape[:-1])
 
     def balance(self, time: float, inputs: Array, states: Array) -> Balance:
         """Heat balance; see :class:`models.solver.System`."""
         n, m, shape = self.n_parts, self.n_boundaries, states.shape[:-1]
         power = self.power(inputs, states)
-        signals = self._signals(time, inputs, states, power)
-        conductances = np.array(np.broadcast_to(self._conductances, (*shape, self._conductances.shape[-1])))
+        common = self._common(time, inputs, states)
+        signals = self._with_numeric(common, power)
+        if self.vector:
+            conductances = np.array(np.broadcast_to(self._conductances, (*shape, self._conductances.shape[-1])))
+        else:
+            conductances = self._conductances.copy()
         conductances[..., self._varying] = self._stacked(self.laws.exchange(*signals), shape)
-        leaving = (conductances @ self._laplacian).reshape(*shape, n, n)
-        coupling = (conductances @ self._to_boundary).reshape(*shape, n, m)
+        exchanged = conductances @ self._structure
+        leaving = exchanged[..., self._leaving].reshape(*shape, n, n)
+        coupling = exchanged[..., self._coupling].reshape(*shape, n, m)
+        slope = exchanged[..., self._slope]
         heats, memory = self._flows(signals, power, shape)
-        T, T_boundary = states[..., :n], self.boundary_temperatures(time, inputs, states)
-        from_boundary = (coupling @ T_boundary[..., None])[..., 0]
-        slope = coupling.sum(axis=-1)
-        rate = (heats @ self.laws.injection + from_boundary - (leaving @ T[..., None])[..., 0]) / self.capacities
-        matrix = -leaving / self.capacities[..., None]
+        T, T_boundary = states[..., :n], self._stacked(self.laws.boundary(*common), shape)
+        from_boundary = _times(coupling, T_boundary)
+        rate = (heats @ self.laws.injection + from_boundary - _times(leaving, T)) * self._per_capacity
+        matrix = leaving * -self._per_capacity[..., None]
+        heat_out = slope * T - from_boundary
         if self.n_states:
             rate = np.concatenate((rate, memory[..., : self.n_states]), axis=-1)
             matrix = np.pad(matrix, [(0, 0)] * len(shape) + [(0, self.n_states)] * 2)
@@ -162,7 +175,7 @@ class NetworkSystem:
             derivative=rate,
             matrix=matrix,
             heat_in=heats.sum(axis=-1),
-            heat_out=(slope[..., :n] * T).sum(axis=-1) - from_boundary.sum(axis=-1),
+            heat_out=heat_out.sum(axis=-1),
             heat_out_slope=slope,
         )
 
@@ -186,8 +199,7 @@ class NetworkSystem:
             given, columns = inputs.tolist(), states.tolist()
         return [time, *given, *columns[: self.n_parts], *self.parameters, *columns[self.n_parts :]]
 
-    def _signals(self, time: Any, inputs: Array, states: Array, power: Array) -> list[Any]:
-        common = self._common(time, inputs, states)
+    def _with_numeric(self, common: list[Any], power: Array) -> list[Any]:
         if not self.laws.numeric:
             return common
         laws = self.laws
@@ -203,6 +215,10 @@ class NetworkSystem:
         if not values:
             return np.zeros((*shape, 0))
         return np.stack([np.broadcast_to(np.asarray(value, dtype=float), shape) for value in values], axis=-1)
+
+
+def _times(matrix: Array, vector: Array) -> Array:
+    return np.asarray(matrix @ vector if vector.ndim == 1 else (matrix @ vector[..., None])[..., 0])
 
 
 def torque_loss(loss: Any, speed: Any) -> Array:

@@ -12,7 +12,7 @@ temperatures, so that stored = brought in - given off to rounding.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -149,8 +149,7 @@ def advance(system: System, state: State, time: float, duration: float, inputs: 
 
 
 def _times(matrix: Array, vector: Array) -> Array:
-    product: Any = (matrix @ vector[..., None])[..., 0]
-    return np.asarray(product)
+    return np.asarray(matrix @ vector if vector.ndim == 1 else (matrix @ vector[..., None])[..., 0])
 
 
 def _dot(a: Array, b: Array) -> Array:
