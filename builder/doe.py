@@ -23,6 +23,7 @@ Losses = Callable[[Array], Array]
 """Input rows, shape (N, inputs), to losses, shape (N, outputs); must be picklable for several processes."""
 
 BLOCK_ROWS = 256  # operating points per task, fixed: the blocks must not depend on the number of processes
+EDGE = 0.03  # share of the dense points that is moved up to the lower edge
 GRID = 4001  # support points of the inverse of a spacing
 
 
@@ -64,10 +65,12 @@ def mixed_hypercube(
     viscosity: tuple[float, float],
     seed: int,
 ) -> Array:
-    """Latin hypercube of four equal parts: loads and speeds, and temperatures, each uniform or denser at their low end.
+    """Latin hypercube of equal parts: speed, load and temperatures are each uniform, or denser at the low end.
 
     Uniform points alone leave the slow, light, cold corner empty, where every cold start begins; dense points alone
-    leave the largest losses thin. Temperatures are mixed independently of speed and load: cold and fast is met too.
+    leave the largest losses thin. All combinations are met alike: slow and cold, fast and cold, fast and unloaded.
+    Temperatures are dense together. Dense points reach a little below the lowest speed and load and are moved up to it,
+    so that this edge, which everything below is held at, is well known.
 
     Parameters
     ----------
@@ -87,12 +90,15 @@ def mixed_hypercube(
     """
     low_high = np.stack([np.asarray(lower, dtype=float), np.asarray(upper, dtype=float)], axis=-1)
     unit = _unit_hypercube(count, len(low_high), seed)
-    part = np.arange(count) % 4
+    part = np.arange(count)
+    switches = [column for column, kind in enumerate(dense) if kind == "log"]
     points = np.empty_like(unit)
     for column, (kind, (low, high)) in enumerate(zip(dense, low_high, strict=True)):
-        is_dense = part % 2 == 0 if kind == "log" else part // 2 == 0
+        switch = switches.index(column) if kind == "log" else len(switches)
+        below = low * (low / high) ** EDGE if kind == "log" else low
+        spaced = np.maximum(_spaced(kind, unit[:, column], below, high, viscosity), low)
         uniform = low + unit[:, column] * (high - low)
-        points[:, column] = np.where(is_dense, _spaced(kind, unit[:, column], low, high, viscosity), uniform)
+        points[:, column] = np.where(part >> switch & 1 == 0, spaced, uniform)
     return points
 
 

@@ -1,112 +1,36 @@
 """The table of signals: everything that an FMU takes and shows, said once.
 
-From this table come the model description of every kind of FMU, the value references inside it, the columns that driving
-one gives, and the nomenclature in the documentation. Signals are in SI units at the FMI interface; the network and all
-files work in the units of the file columns (1/min, degC), and :data:`UNITS` converts.
+From this table come the model description of every kind of FMU, the value references inside it, the columns that
+driving one gives, and the nomenclature in the documentation. Signals are in SI units at the FMI interface; the network
+and all files work in the units of the file columns (1/min, degC), and :data:`builder.units.UNITS` converts.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
-from math import inf, pi
+from math import inf
 from typing import Literal
 
 import sympy as sp
 
+from builder.units import SAME_UNIT, TYPES, UNITS
 from models.cycle import COLUMNS
 from models.errors import InputError, did_you_mean
 from models.gearbox import Gearbox
 from models.network import ThermalNetwork
 
-KELVIN = 273.15
 START_TEMPERATURE = 293.15  # K
+INITIAL = ("initial.uniform", "initial.T")
+HEADER = ("signal", "kind", "unit", "shown in", "column of files", "start", "range", "trained on", "meaning")
+LOWEST_START, HIGHEST_START = 173.15, 773.15  # K; what lies outside is most likely degC
 
 Role = Literal[
     "input", "temperature", "total_loss", "loss", "heat", "torque_loss", "efficiency", "in_domain", "domain_distance",
     "initial_uniform", "initial_temperature", "start_temperature", "factor", "state",
 ]  # fmt: skip
-
-
-@dataclass(frozen=True, kw_only=True)
-class Unit:
-    """A unit of the FMI interface.
-
-    Attributes
-    ----------
-    base : mapping of SI base unit to exponent
-        As in the attributes of an FMI ``BaseUnit``
-    factor, offset : float
-        Value in base units = factor * value + offset
-    display : (str, float, float) or None
-        Unit to show, and factor and offset to it
-    column : (str, float, float)
-        Unit of file columns and of the network, and factor and offset to it
-    """
-
-    base: Mapping[str, int] = field(default_factory=dict)
-    factor: float = 1.0
-    offset: float = 0.0
-    display: tuple[str, float, float] | None = None
-    column: tuple[str, float, float] = ("", 1.0, 0.0)
-
-    def to_column(self, value: float) -> float:
-        """A value of the FMI interface in the unit of file columns.
-
-        Examples
-        --------
-        >>> UNITS["K"].to_column(293.15)
-        20.0
-        """
-        return value * self.column[1] + self.column[2]
-
-    def from_column(self, value: float) -> float:
-        """A value of a file column in the unit of the FMI interface."""
-        return (value - self.column[2]) / self.column[1]
-
-
-UNITS: Mapping[str, Unit] = {
-    "rad/s": Unit(base={"rad": 1, "s": -1}, display=("rpm", 30.0 / pi, 0.0), column=("1/min", 30.0 / pi, 0.0)),
-    "N.m": Unit(base={"kg": 1, "m": 2, "s": -2}, column=("N m", 1.0, 0.0)),
-    "K": Unit(base={"K": 1}, display=("degC", 1.0, -KELVIN), column=("degC", 1.0, -KELVIN)),
-    "m/s": Unit(base={"m": 1, "s": -1}, column=("m/s", 1.0, 0.0)),
-    "W": Unit(base={"kg": 1, "m": 2, "s": -3}, display=("kW", 1e-3, 0.0), column=("W", 1.0, 0.0)),
-    "1": Unit(column=("1", 1.0, 0.0)),
-    # Units of parameters, which stay as the law has them.
-    "s": Unit(base={"s": 1}),
-    "1/s": Unit(base={"s": -1}),
-    "W/K": Unit(base={"kg": 1, "m": 2, "s": -3, "K": -1}),
-    "J/K": Unit(base={"kg": 1, "m": 2, "s": -2, "K": -1}),
-    "1/K": Unit(base={"K": -1}),
-    "degC": Unit(base={"K": 1}, offset=KELVIN),
-    "1/min": Unit(base={"rad": 1, "s": -1}, factor=pi / 30.0),
-}
-SAME_UNIT = {"N m": "N.m", "Nm": "N.m", "rpm": "1/min", "-": "1", "": "1", "W K^-1": "W/K"}
-
-
-@dataclass(frozen=True, kw_only=True)
-class Quantity:
-    """A declared type: quantity, unit, the unit to show, and what is common to all its signals."""
-
-    quantity: str
-    unit: str
-    display: str | None = None
-    nominal: float = 1.0
-    description: str
-
-
-TYPES: Mapping[str, Quantity] = {
-    "Speed": Quantity(quantity="AngularVelocity", unit="rad/s", display="rpm", nominal=100.0, description="Speed of a shaft"),
-    "Torque": Quantity(quantity="Torque", unit="N.m", nominal=100.0, description="Torque in a shaft"),
-    "Temperature": Quantity(
-        quantity="ThermodynamicTemperature", unit="K", display="degC", nominal=300.0, description="Temperature"
-    ),
-    "AirSpeed": Quantity(quantity="Velocity", unit="m/s", description="Speed of air"),
-    "Power": Quantity(quantity="Power", unit="W", nominal=100.0, description="Power or heat flow"),
-    "Ratio": Quantity(quantity="Ratio", unit="1", description="Number without unit"),
-}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -121,9 +45,9 @@ class Signal:
         What it is, and `of` the name that the network has for it (a node, a loss, a parameter)
     description : str
     type : str or None
-        Key of :data:`TYPES`; None for a Boolean and for a Real of `unit`
+        Key of :data:`builder.units.TYPES`; None for a Boolean and for a Real of `unit`
     unit : str or None
-        Key of :data:`UNITS`; None for a Boolean, and where the network does not say
+        Key of :data:`builder.units.UNITS`; None for a Boolean, and where the network does not say
     causality, variability, initial : str
         As FMI 2.0 defines them; `initial` is "" where FMI gives it
     start : float, bool or None
@@ -212,10 +136,9 @@ class SignalTable:
         Examples
         --------
         >>> from models.gearbox import load_gearbox
-        >>> print("\\n".join(signal_table(load_gearbox("fzg")).markdown().splitlines()[:3]))
-        | signal | kind | unit | shown in | column of files | start | range | trained on | meaning |
-        |---|---|---|---|---|---|---|---|---|
-        | `speed` | input | rad/s | rpm | `speed_rpm` | 0 | -20944 ... 20944 | 0.10472 ... 680.68 | Speed of the input shaft; its sign does not change the losses |
+        >>> lines = signal_table(load_gearbox("fzg")).markdown().splitlines()
+        >>> lines[2][:72]
+        '| `speed` | input | rad/s | rpm | `speed_rpm` | 0 | -20944 ... 20944 | 0'
         """
         header, *rows = nomenclature(self)
         lines = ["| " + " | ".join(header) + " |", "|" + "---|" * len(header)]
@@ -227,7 +150,7 @@ class SignalTable:
 
 def nomenclature(table: SignalTable) -> list[tuple[str, ...]]:
     """The table for people: a header and one row of texts per signal."""
-    rows = [("signal", "kind", "unit", "shown in", "column of files", "start", "range", "trained on", "meaning")]
+    rows: list[tuple[str, ...]] = [HEADER]
     for signal in table:
         kind = f"{signal.variability} {signal.causality}" if signal.causality == "parameter" else signal.causality
         bounds = ("" if abs(bound) == inf else f"{bound:.5g}" for bound in (signal.minimum, signal.maximum))
@@ -318,7 +241,6 @@ class _Table:
         self.inputs = ("speed", "torque", *network.inputs)
         self.parameters = {parameter.name: self._parameter_name(parameter.name) for parameter in network.parameters}
         self.boundaries = {node.name: node.temperature for node in network.nodes if node.temperature is not None}
-        self.initial = ("initial.uniform", "initial.T")
         self.loss_nodes = gearbox.losses().temperature_nodes
 
     def signals(self) -> Iterator[Signal]:
@@ -369,14 +291,13 @@ class _Table:
                 minimum: float = -inf, maximum: float = inf, domain: tuple[float, float] | None = None,
                 needs_state: bool = True) -> Signal:  # fmt: skip
         inputs, parameters = self._direct(expression)
-        starts = tuple(f"{fmi_name(part.name)}.T_start" for part in self.network.parts)
-        if role == "temperature":
-            starts = (f"{fmi_name(of)}.T_start",)
+        nodes = [of] if role == "temperature" else [part.name for part in self.network.parts]
+        starts = (*INITIAL, *(f"{fmi_name(node)}.T_start" for node in nodes)) if needs_state else ()
         return Signal(
             name=name, role=role, of=of, description=description, type=kind, unit=TYPES[kind].unit if kind else None,
             causality="output", variability="continuous" if kind else "discrete", initial="calculated", minimum=minimum,
             maximum=maximum, nominal=TYPES[kind].nominal if kind else None, domain=domain, column=result_column(name),
-            depends=inputs, depends_initially=(*inputs, *parameters, *((*self.initial, *starts) if needs_state else ())),
+            depends=inputs, depends_initially=(*inputs, *parameters, *starts),
         )  # fmt: skip
 
     def _direct(self, expression: sp.Expr) -> tuple[tuple[str, ...], tuple[str, ...]]:
@@ -419,8 +340,10 @@ class _Table:
 
     def _quality(self) -> Iterator[Signal]:
         point = sp.Symbol("speed") + sp.Symbol("torque")
-        yield self._output(name="in_domain", role="in_domain", kind=None, expression=point,
-                           description="Whether the operating point is inside the range that the networks were trained on")  # fmt: skip
+        yield self._output(
+            name="in_domain", role="in_domain", kind=None, expression=point,
+            description="Whether the operating point is inside the range that the networks were trained on",
+        )  # fmt: skip
         yield self._output(
             name="domain_distance", role="domain_distance", kind="Ratio", minimum=0.0, expression=point,
             description="How far outside the trained range, as a fraction of it; 0 inside",
@@ -428,13 +351,15 @@ class _Table:
 
     def _initial(self) -> Iterator[Signal]:
         def fixed(name: str, role: Role, text: str, of: str = "") -> Signal:
-            return Signal(name=name, role=role, of=of, description=text, type="Temperature", unit="K", start=START_TEMPERATURE,
-                          causality="parameter", variability="fixed", initial="exact", minimum=0.0, maximum=1000.0,
-                          nominal=TYPES["Temperature"].nominal)  # fmt: skip
+            return Signal(
+                name=name, role=role, of=of, description=text, type="Temperature", unit="K", start=START_TEMPERATURE,
+                causality="parameter", variability="fixed", initial="exact", minimum=LOWEST_START, maximum=HIGHEST_START,
+                nominal=TYPES["Temperature"].nominal,
+            )  # fmt: skip
 
         yield Signal(name="initial.uniform", role="initial_uniform", causality="parameter", variability="fixed",
                      initial="exact", start=True,
-                     description="Whether all nodes start at initial.T; otherwise each starts at its own T_start")  # fmt: skip
+                     description="Whether all nodes start at initial.T; else each at its own T_start")  # fmt: skip
         yield fixed("initial.T", "initial_temperature", "Temperature of all nodes at the start, if initial.uniform")
         for part in self.network.parts:
             text = f"Temperature of {part.name.replace('_', ' ')} at the start, unless initial.uniform"
@@ -448,8 +373,9 @@ class _Table:
             unit = SAME_UNIT.get(parameter.unit, parameter.unit)
             text = parameter.description or parameter.name
             yield Signal(
-                name=self.parameters[parameter.name], role="factor", of=parameter.name, unit=unit if unit in UNITS else None,
-                type="Ratio" if unit == "1" else None, causality="parameter", variability="tunable", initial="exact",
+                name=self.parameters[parameter.name], role="factor", of=parameter.name,
+                unit=unit if unit in UNITS else None, type="Ratio" if unit == "1" else None,
+                causality="parameter", variability="tunable", initial="exact",
                 start=parameter.start, minimum=min(parameter.lower, parameter.start),
                 maximum=max(parameter.upper, parameter.start), nominal=abs(parameter.start) or 1.0,
                 description=(text[0].upper() + text[1:]) + ("" if unit in UNITS else f" [{parameter.unit}]"),

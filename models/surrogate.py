@@ -320,6 +320,17 @@ class SurrogateLosses:
         return np.array(index), np.array([factor for use in self.uses for factor in use.factors])
 
     @cached_property
+    def _held(self) -> tuple[Array, Array]:
+        """Bounds that operating points are held at. Each network knows its own lowest load."""
+        bounds = [
+            self.speed_bounds,
+            (0.0, self.torque_bounds[1]),
+            *[self.temperature_bounds] * len(self.temperature_nodes),
+        ]
+        lowest, highest = np.array(bounds).T
+        return lowest, highest
+
+    @cached_property
     def _scatter(self) -> tuple[NDArray[np.intp], Array]:
         """Output column of every component, and 1 where it goes to zero with the torque."""
         served = [component for use in self.uses for component in use.components]
@@ -370,14 +381,15 @@ class SurrogateLosses:
         point = np.empty((*shape, 2 + T.shape[-1]))
         point[..., 0], point[..., 1], point[..., 2:] = n, moment, T
         index, factors = self._gather
-        rows = point.take(index, axis=-1)
+        lowest, highest = self._held
+        rows = np.minimum(np.maximum(point, lowest), highest).take(index, axis=-1)
         rows *= factors
         order, driven = self._scatter
         losses = self._evaluate(rows).take(order, axis=-1)
         # Both factors differ from 1 only below the lowest trained speed and torque.
         slow = np.minimum(point[..., :1] / self.speed_bounds[0], 1.0)
         light = np.minimum(point[..., 1:2] / self.torque_bounds[0], 1.0)
-        losses *= slow * (1.0 + driven * (light - 1.0))
+        losses *= slow * (driven * light + (1.0 - driven))
         return losses
 
     def domain_distance(self, speed: ArrayLike, torque: ArrayLike, temperatures: ArrayLike) -> Array:

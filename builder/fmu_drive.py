@@ -1,0 +1,336 @@
+"""Driving an FMU through a cycle with FMPy, from file columns to file columns.
+
+A cycle is straight between its rows, an FMU holds its inputs over a step. So a row in which an input changes is cut in
+pieces, and every input value is held half a piece before and half a piece after its moment. The mean over the row is
+right, so slow nodes are followed to second order in the piece, and fast ones have settled to the inputs of the moment
+at which they are read.
+"""
+
+from __future__ import annotations
+
+import logging
+import tempfile
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from ctypes import byref, c_double, c_int, c_uint
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote
+
+import fmpy
+import numpy as np
+from fmpy import fmi2
+from fmpy.fmi1 import FMICallException
+
+from builder.signals import input_column, result_column
+from builder.units import UNITS
+from models.cycle import Cycle
+from models.errors import InputError, did_you_mean
+from models.types import Array
+
+logger = logging.getLogger(__name__)
+
+LONGEST_HELD_S = 0.5  # a piece in which an input changes
+LARGEST_CHANGE = {"speed": 25.0, "torque": 5.0}  # [1/min], [N m]: a slower ramp is held longer
+NEEDED = {"speed": "input", "torque": "input", "T_ambient": "input", "loss.total": "output", "initial.T": "parameter"}
+WARNING, DISCARD = 1, 2
+PROGRESS_ROWS = 50
+
+
+def drive_fmu(
+    path: Path,
+    cycle: Cycle,
+    *,
+    initial: float | Mapping[str, float] | None = None,
+    parameters: Mapping[str, float] | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> dict[str, Array]:
+    """Drive an FMU through a cycle.
+
+    Parameters
+    ----------
+    path : Path
+        An FMU of this project, of any kind
+    cycle : Cycle
+        Inputs in the units of file columns; straight lines between the rows
+    initial : float, mapping of node name to float, or None
+        Temperatures at the first row, [degC]; by default the first ambient temperature
+    parameters : mapping of name to float, or None
+        Tunable factors, by their name in the network or at the FMI interface
+    progress : callable or None
+        Called with (rows done, rows in all) now and then
+
+    Returns
+    -------
+    dict of column name to Array, shape (N,)
+        The columns of :meth:`models.simulation.Result.columns`. The FMU's warnings go to the log of this module.
+
+    Raises
+    ------
+    InputError
+        If the file is not such an FMU or damaged, it has no binary for this machine, or it refuses a value or a step.
+    """
+    with loaded(path) as fmu:
+        table = _input_table(fmu, cycle)
+        fmu.set_parameters(parameters or {})
+        fmu.set_initial(float(table[0, fmu.inputs.index("T_ambient")]) if initial is None else initial)
+        return _driven(fmu, cycle.time, table, progress)
+
+
+def fmu_inputs(path: Path) -> tuple[str, ...]:
+    """Columns of a cycle that an FMU takes beside the usual ones (for :func:`builder.files.read_cycle`).
+
+    Raises
+    ------
+    InputError
+        If the file is not an FMU of this project.
+    """
+    inputs = [v.name for v in _description(Path(path)).modelVariables if v.causality == "input"]
+    return tuple(input_column(name) for name in inputs if input_column(name) == name.strip("'"))
+
+
+@dataclass
+class LoadedFmu:
+    """An FMU that is instantiated, its variables by their meaning, and what it has said."""
+
+    path: Path
+    description: Any
+    slave: Any = None
+    messages: list[tuple[int, str]] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        """Find the variables."""
+        variables = self.description.modelVariables
+        self.variables = {v.name: v for v in variables}
+        self._inputs = [v for v in variables if v.causality == "input"]
+        self.inputs = [v.name.strip("'") for v in self._inputs]
+        self._outputs = [v for v in variables if v.causality == "output" and result_column(v.name) is not None]
+        self._reals = [v for v in self._outputs if v.type == "Real"]
+        self._booleans = [v for v in self._outputs if v.type == "Boolean"]
+        self._input_buffer = (c_uint * len(self._inputs))(*(v.valueReference for v in self._inputs))
+        self._real_buffer = (c_uint * len(self._reals))(*(v.valueReference for v in self._reals))
+        self._boolean_buffer = (c_uint * len(self._booleans))(*(v.valueReference for v in self._booleans))
+        self._to_si = [UNITS[v.unit].column[1:] if v.unit in UNITS else (1.0, 0.0) for v in self._inputs]
+
+    @property
+    def output_columns(self) -> list[str]:
+        """Columns of the outputs, in order."""
+        return [str(result_column(v.name)) for v in self._outputs]
+
+    def defaults(self) -> list[float]:
+        """Start values of the inputs in the units of file columns."""
+        return [_to_column(v, float(v.start)) for v in self._inputs]
+
+    def set_inputs(self, values: Sequence[float]) -> None:
+        """Set all inputs, given in the units of file columns."""
+        count = len(values)
+        si = (c_double * count)(*((v - b) / a for v, (a, b) in zip(values, self._to_si, strict=True)))
+        self.slave.fmi2SetReal(self.slave.component, self._input_buffer, count, si)
+
+    def outputs(self) -> tuple[list[float], list[int]]:
+        """Reals in the FMU's own units, and Booleans."""
+        reals, booleans = (c_double * len(self._reals))(), (c_int * len(self._booleans))()
+        self.slave.fmi2GetReal(self.slave.component, self._real_buffer, len(reals), reals)
+        self.slave.fmi2GetBoolean(self.slave.component, self._boolean_buffer, len(booleans), booleans)
+        return list(reals), list(booleans)
+
+    def columns(self, reals: Array, booleans: Array) -> dict[str, Array]:
+        """Output columns of rows of :meth:`outputs`, in the order of the FMU."""
+        table: dict[str, Array] = {v.name: _to_column(v, reals[:, i]) for i, v in enumerate(self._reals)}
+        table |= {v.name: booleans[:, i].astype(bool) for i, v in enumerate(self._booleans)}
+        return {str(result_column(v.name)): table[v.name] for v in self._outputs}
+
+    def set_parameters(self, parameters: Mapping[str, float]) -> None:
+        """Set tunable factors."""
+        known = {name: v for name, v in self.variables.items() if v.variability == "tunable"}
+        for name, value in parameters.items():
+            variable = known.get(name) or known.get(f"factor.{name}")
+            if variable is None:
+                hint = did_you_mean(name, known)
+                raise InputError(f"{self.path}: {name!r} is not a tunable parameter of this FMU{hint}")
+            self.slave.setReal([variable.valueReference], [float(value)])
+
+    def set_initial(self, initial: float | Mapping[str, float]) -> None:
+        """Set start temperatures, [degC]: one for all nodes, or all parts by name."""
+        starts = {n.removesuffix(".T_start").strip("'"): v for n, v in self.variables.items() if n.endswith(".T_start")}
+        if not isinstance(initial, Mapping):
+            self._set_real(self.variables["initial.T"], initial)
+            return
+        nodes = {name.removesuffix(".T").strip("'") for name in self.variables if name.endswith(".T")}
+        unknown = [name for name in initial if name not in nodes]
+        faults = [f"{name!r} is not a node of this FMU{did_you_mean(name, nodes)}" for name in unknown]
+        missing = [name for name in starts if name not in initial]
+        if missing:
+            faults.append(f"initial temperatures are missing for: {', '.join(missing)}")
+        if faults:
+            raise InputError("\n".join(f"{self.path}: {fault}" for fault in faults))
+        self.slave.setBoolean([self.variables["initial.uniform"].valueReference], [False])
+        for name, variable in starts.items():
+            self._set_real(variable, initial[name])
+
+    def _set_real(self, variable: Any, value: float) -> None:
+        scale, offset = UNITS[variable.unit].column[1:]
+        self.slave.setReal([variable.valueReference], [(float(value) - offset) / scale])
+
+    def hear(self, when: str) -> None:
+        """Pass the FMU's warnings on.
+
+        Raises
+        ------
+        InputError
+            If it has said that something is wrong.
+        """
+        heard, self.messages[:] = list(self.messages), []
+        faults = [text for status, text in heard if status > WARNING]
+        if faults:
+            raise InputError(f"{self.path}: {when}: " + "; ".join(faults))
+        for status, text in heard:
+            if status == WARNING:
+                logger.warning("%s: %s", self.path, text)
+
+
+@contextmanager
+def loaded(path: Path) -> Iterator[LoadedFmu]:
+    """An FMU of this project, extracted to a folder of its own and instantiated; both are gone at the end.
+
+    Raises
+    ------
+    InputError
+        If the file is not such an FMU, is damaged, or has no binary for this machine; and, from the block, if the FMU
+        refuses a call.
+    """
+    path = Path(path)
+    fmu = LoadedFmu(path, _description(path))
+    with tempfile.TemporaryDirectory(prefix="twin-fmu-") as folder:
+        _extract(path, Path(folder))
+        identifier = fmu.description.coSimulation.modelIdentifier
+        binary = Path(folder, "binaries", fmpy.platform, identifier + fmpy.sharedLibraryExtension)
+        if not binary.is_file():
+            raise InputError(f"{path}: has no binary for {fmpy.platform}; build the FMU for this machine")
+        callbacks = _callbacks(fmu.messages)
+        try:
+            fmu.slave = fmi2.FMU2Slave(
+                guid=fmu.description.guid, modelIdentifier=identifier, unzipDirectory=folder, instanceName=path.stem,
+                libraryPath=str(binary),
+            )  # fmt: skip
+        except Exception as error:  # fmpy raises plain Exception
+            raise InputError(f"{path}: its binary cannot be loaded: {error}") from error
+        fmu.slave.component = fmu.slave.fmi2Instantiate(
+            path.stem.encode(), fmi2.fmi2CoSimulation, fmu.description.guid.encode(), _uri(Path(folder, "resources")),
+            byref(callbacks), False, True,
+        )  # fmt: skip
+        if not fmu.slave.component:
+            fmu.slave.freeLibrary()
+            fmu.hear("it cannot be instantiated")
+            raise InputError(f"{path}: it cannot be instantiated, and does not say why; build the FMU again")
+        dead = False
+        try:
+            yield fmu
+        except FMICallException as error:
+            dead = error.status > DISCARD + 1
+            fmu.hear(error.function)
+            raise InputError(f"{path}: {error}") from error
+        finally:
+            if not dead:
+                with suppress(FMICallException):
+                    fmu.slave.terminate()
+                fmu.slave.freeInstance()
+
+
+def _driven(fmu: LoadedFmu, time: Array, table: Array, progress: Callable[[int, int], None] | None) -> dict[str, Array]:
+    slave, n_rows = fmu.slave, len(time)
+    slave.setupExperiment(startTime=float(time[0]))
+    slave.enterInitializationMode()
+    fmu.set_inputs(table[0].tolist())
+    slave.exitInitializationMode()
+    fmu.hear("its start values")
+    outputs = [fmu.outputs()]
+    fmu.hear(f"at {time[0]:g} s")
+    component, do_step = slave.component, slave.fmi2DoStep
+    for row in range(n_rows - 1):
+        begin, end = float(time[row]), float(time[row + 1])
+        pieces = _pieces(fmu.inputs, end - begin, table[row], table[row + 1])
+        if pieces == 0:
+            do_step(component, begin, end - begin, 1)
+        else:
+            half = (end - begin) / (2 * pieces)
+            do_step(component, begin, half, 1)
+            for piece in range(1, pieces):
+                share = piece / pieces
+                fmu.set_inputs(((1.0 - share) * table[row] + share * table[row + 1]).tolist())
+                do_step(component, begin + (2 * piece - 1) * half, 2.0 * half, 1)
+            fmu.set_inputs(table[row + 1].tolist())
+            do_step(component, end - half, half, 1)
+        outputs.append(fmu.outputs())
+        if fmu.messages:
+            fmu.hear(f"at {end:g} s")
+        if progress is not None and (row % PROGRESS_ROWS == PROGRESS_ROWS - 1 or row == n_rows - 2):
+            progress(row + 1, n_rows - 1)
+    columns = {"time_s": time} | {input_column(name): table[:, i] for i, name in enumerate(fmu.inputs)}
+    reals, booleans = (np.array([row[i] for row in outputs]) for i in (0, 1))
+    return columns | fmu.columns(reals, booleans)
+
+
+def _pieces(names: Sequence[str], duration: float, begin: Array, end: Array) -> int:
+    """Into how many pieces a row is cut: of 0.5 s where an input ramps, longer where it changes little; 0 at rest."""
+    change = max(abs(b - a) / LARGEST_CHANGE.get(n, 1.0) for n, a, b in zip(names, begin, end, strict=True))
+    return min(int(np.ceil(duration / LONGEST_HELD_S)), int(np.ceil(change)))
+
+
+def _input_table(fmu: LoadedFmu, cycle: Cycle) -> Array:
+    """Inputs in the FMU's order, start values where the cycle has none, shape (N, inputs)."""
+    starts = zip(fmu.inputs, fmu.defaults(), strict=True)
+    return np.stack([cycle.inputs.get(name, np.full(len(cycle), start)) for name, start in starts], axis=-1)
+
+
+def _description(path: Path) -> Any:
+    """The model description of an FMU of this project."""
+    if not path.is_file():
+        raise InputError(f"{path}: no such file")
+    try:
+        description = fmpy.read_model_description(str(path), validate=False)
+    except Exception as error:  # whatever zipfile, lxml or fmpy find, it is not an FMU
+        first = next(iter(str(error).splitlines()), type(error).__name__)
+        raise InputError(f"{path}: is not an FMU, or is damaged ({first}); build it again with build-fmu") from error
+    if description.fmiVersion != "2.0" or description.coSimulation is None:
+        raise InputError(
+            f"{path}: is an FMU of FMI {description.fmiVersion}; FMI 2.0 for co-simulation, as of build-fmu, is needed"
+        )
+    names = {v.name: v.causality for v in description.modelVariables}
+    missing = [name for name, causality in NEEDED.items() if names.get(name) != causality]
+    if missing:
+        raise InputError(
+            f"{path}: is an FMU of another model: it has no {', '.join(missing)}; give one that build-fmu made"
+        )
+    return description
+
+
+def _extract(path: Path, folder: Path) -> None:
+    try:
+        fmpy.extract(str(path), str(folder))
+    except Exception as error:  # fmpy raises plain Exception for unsafe paths, zipfile and zlib their own
+        raise InputError(f"{path}: is damaged ({error}); build it again with build-fmu") from error
+
+
+def _uri(resources: Path) -> bytes:
+    """URI of the resources of an FMU; pythonfmu crashes on an encoded one, as it decodes nothing but blanks."""
+    uri = resources.resolve().as_uri()
+    return (unquote(uri) if (resources / "slavemodule.txt").is_file() else uri).encode()
+
+
+def _callbacks(messages: list[tuple[int, str]]) -> Any:
+    def log(environment: Any, instance: bytes, status: int, category: bytes, message: bytes) -> None:  # noqa: ARG001
+        messages.append((status, message.decode("utf-8", "replace").strip()))
+
+    callbacks = fmi2.fmi2CallbackFunctions()
+    callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(log)
+    callbacks.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(fmpy.calloc)
+    callbacks.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(fmpy.free)
+    fmi2.addLoggerProxy(byref(callbacks))
+    return callbacks
+
+
+def _to_column(variable: Any, value: Any) -> Any:
+    scale, offset = UNITS[variable.unit].column[1:] if variable.unit in UNITS else (1.0, 0.0)
+    return value * scale + offset

@@ -1,0 +1,52 @@
+"""What many tests share: the default gearbox and one FMU of it, built once per session with quickly trained networks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from builder.fmu import build_python_fmu
+from builder.networks import PRESETS
+from builder.onnx_export import export_onnx
+from builder.train import TrainingResult, train_surrogate
+from models.gearbox import Gearbox, load_gearbox
+from models.network import ThermalNetwork
+
+QUICK = replace(PRESETS["default"], samples=400, max_iter=60, starts=1, judged=200)
+
+
+@pytest.fixture(scope="session")
+def fzg() -> Gearbox:
+    return load_gearbox("fzg")
+
+
+@pytest.fixture(scope="session")
+def fzg_training(fzg: Gearbox) -> TrainingResult:
+    """Networks of about 1 % error, trained in half a second."""
+    return train_surrogate(fzg, preset=QUICK, seed=0)
+
+
+@pytest.fixture(scope="session")
+def fzg_networks(fzg_training: TrainingResult, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, ...]:
+    return export_onnx(fzg_training, tmp_path_factory.mktemp("networks"), version="0")
+
+
+FmuBuilder = Callable[..., Path]
+
+
+@pytest.fixture(scope="session")
+def build_fmu(fzg: Gearbox, fzg_training: TrainingResult, fzg_networks: tuple[Path, ...]) -> FmuBuilder:
+    """Builds an FMU at a path, of the default network or of another one."""
+
+    def build(path: Path, network: ThermalNetwork | None = None) -> Path:
+        return build_python_fmu(fzg, fzg_training, fzg_networks, path, network=network)
+
+    return build
+
+
+@pytest.fixture(scope="session")
+def fzg_fmu(build_fmu: FmuBuilder, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return build_fmu(tmp_path_factory.mktemp("fmu") / "fzg.fmu")

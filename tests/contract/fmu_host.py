@@ -1,0 +1,87 @@
+"""A host for contract tests: variables by name, SI units, one FMI call per method, statuses as raised by FMPy."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+from fmpy.fmi1 import FMICallException
+
+from builder.fmu_drive import LoadedFmu, loaded
+
+DISCARD = 2
+LOADED = {"speed": 300.0, "torque": 150.0, "T_ambient": 293.15, "air_speed": 2.0}
+
+
+class Host:
+    """One instance in a simulation."""
+
+    def __init__(self, fmu: LoadedFmu) -> None:
+        self.fmu, self.slave, self.time = fmu, fmu.slave, 0.0
+
+    def _split(self, names: list[str]) -> tuple[list[str], list[str]]:
+        booleans = [n for n in names if self.fmu.variables[n].type == "Boolean"]
+        return [n for n in names if n not in booleans], booleans
+
+    def _references(self, names: list[str]) -> list[int]:
+        return [self.fmu.variables[n].valueReference for n in names]
+
+    def set(self, **values: float) -> None:
+        self.set_all(values)
+
+    def set_all(self, values: dict[str, float]) -> None:
+        reals, booleans = self._split(list(values))
+        if reals:
+            self.slave.setReal(self._references(reals), [values[n] for n in reals])
+        if booleans:
+            self.slave.setBoolean(self._references(booleans), [bool(values[n]) for n in booleans])
+
+    def get(self, *names: str) -> list[float]:
+        reals, booleans = self._split(list(names))
+        found: dict[str, float] = dict(zip(reals, self.slave.getReal(self._references(reals)), strict=True))
+        found |= dict(zip(booleans, self.slave.getBoolean(self._references(booleans)), strict=True))
+        return [found[n] for n in names]
+
+    def outputs(self) -> dict[str, float]:
+        names = [v.name for v in self.fmu.variables.values() if v.causality == "output"]
+        return dict(zip(names, self.get(*names), strict=True))
+
+    def start(self, values: dict[str, float] | None = None, *, time: float = 0.0) -> None:
+        self.time = time
+        self.slave.setupExperiment(startTime=time)
+        self.slave.enterInitializationMode()
+        self.set_all(LOADED | (values or {}))
+        self.slave.exitInitializationMode()
+
+    def step(self, duration: float, *, count: int = 1) -> None:
+        for _ in range(count):
+            self.slave.doStep(self.time, duration)
+            self.time += duration
+
+    def refused(self, duration: float = 1.0, *, time: float | None = None) -> str:
+        """The FMU's messages on a step that it must discard."""
+        self.fmu.messages.clear()
+        with pytest.raises(FMICallException) as raised:
+            self.slave.doStep(self.time if time is None else time, duration)
+        assert raised.value.status == DISCARD
+        texts = [text for _, text in self.fmu.messages]
+        self.fmu.messages.clear()
+        assert texts
+        return "\n".join(texts)
+
+    @property
+    def said(self) -> list[tuple[int, str]]:
+        heard, self.fmu.messages[:] = list(self.fmu.messages), []
+        return heard
+
+
+@contextmanager
+def hosted(path: Path, values: dict[str, float] | None = None, *, start: bool = True, **options: Any) -> Iterator[Host]:
+    with loaded(path) as fmu:
+        host = Host(fmu)
+        if start:
+            host.start(values, **options)
+        yield host

@@ -1,0 +1,357 @@
+"""What every FMU of this project must do, whatever kind it is."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from fmpy import read_model_description
+from fmpy.validation import validate_fmu
+
+from builder.signals import signal_table
+from models.gearbox import Gearbox
+from tests.contract.fmu_host import LOADED, Host, hosted
+
+WARNING, ERROR = 1, 3
+T_OUT = ("oil.T", "pinion.T", "mesh.T", "housing_lower.T")
+
+
+@pytest.fixture(params=["python"])
+def path(request: pytest.FixtureRequest, fzg_fmu: Path) -> Path:
+    return {"python": fzg_fmu}[request.param]
+
+
+@pytest.fixture
+def host(path: Path):
+    with hosted(path) as running:
+        yield running
+
+
+# ---------------------------------------------------------------------- what it says about itself
+
+
+def test_fmpy_finds_no_problem(path: Path) -> None:
+    assert validate_fmu(str(path)) == []
+
+
+def test_variables_are_those_of_the_table(path: Path, fzg: Gearbox) -> None:
+    description = read_model_description(str(path))
+    table = signal_table(fzg)
+    assert [v.name for v in description.modelVariables] == [s.name for s in table]
+    for variable, signal in zip(description.modelVariables, table, strict=True):
+        assert variable.valueReference == signal.reference
+        assert variable.unit == signal.unit
+        assert variable.description
+
+
+def test_start_values_of_the_description_are_those_of_the_binary(path: Path) -> None:
+    description = read_model_description(str(path))
+    started = {v.name: v.start for v in description.modelVariables if v.start is not None}
+    with hosted(path, start=False) as host:
+        values = host.get(*started)
+    for (name, start), value in zip(started.items(), values, strict=True):
+        expected = {"true": 1.0, "false": 0.0}[start] if start in ("true", "false") else float(start)
+        assert value == expected, name
+
+
+def test_every_input_and_parameter_is_set_under_its_own_reference(path: Path) -> None:
+    with hosted(path, start=False) as host:
+        settable = [v for v in host.fmu.variables.values() if v.causality in ("input", "parameter") and v.type == "Real"]
+        wanted = {v.name: float(v.start) + 0.001 * (i + 1) for i, v in enumerate(settable)}
+        host.set_all(wanted)
+        assert host.get(*wanted) == list(wanted.values())
+
+
+def test_flags_are_truthful(path: Path) -> None:
+    flags = read_model_description(str(path)).coSimulation
+    assert flags.canGetAndSetFMUstate
+    assert flags.canSerializeFMUstate
+    assert flags.canHandleVariableCommunicationStepSize
+    assert not flags.canInterpolateInputs
+    assert not flags.providesDirectionalDerivative
+
+
+# ---------------------------------------------------------------------- initialization
+
+
+def test_outputs_are_valid_in_initialization_mode(path: Path) -> None:
+    with hosted(path, start=False) as host:
+        host.slave.setupExperiment(startTime=0.0)
+        host.slave.enterInitializationMode()
+        host.set_all(LOADED | {"initial.T": 350.0})
+        assert host.get("oil.T", "mesh.T", "air.T") == pytest.approx([350.0, 350.0, 293.15], abs=1e-9)
+        outputs = host.outputs()
+        losses = [value for name, value in outputs.items() if name.startswith("loss.") and name != "loss.total"]
+        assert outputs["loss.total"] == pytest.approx(sum(losses), rel=1e-12)
+        assert outputs["loss.total"] > 100.0
+        assert outputs["torque_loss"] == pytest.approx(outputs["loss.total"] / 300.0, rel=1e-12)
+        assert outputs["efficiency"] == pytest.approx(1.0 - outputs["loss.total"] / (300.0 * 150.0), rel=1e-12)
+        assert outputs["in_domain"] == 1
+        assert outputs["domain_distance"] == 0.0
+
+
+def test_nodes_start_at_their_own_temperatures_where_not_uniform(path: Path) -> None:
+    with hosted(path, {"initial.uniform": 0.0, "oil.T_start": 340.0, "initial.T": 400.0}) as host:
+        assert host.get("oil.T", "pinion.T") == pytest.approx([340.0, 293.15], abs=1e-9)
+
+
+def test_start_temperature_in_degC_is_refused_and_can_be_corrected(path: Path) -> None:
+    with hosted(path, {"initial.T": 20.0}) as host:
+        said = host.said
+        assert said
+        assert all(status == ERROR for status, _ in said)
+        assert "degC" in said[0][1]
+        assert math.isnan(host.get("oil.T")[0])
+        assert "initial.T" in host.refused()
+        host.set_all({"initial.T": 293.15})
+        host.step(1.0)
+        assert 293.15 < host.get("oil.T")[0] < 300.0
+
+
+def test_simulation_may_start_at_any_time(path: Path, host: Host) -> None:
+    host.step(10.0)
+    with hosted(path, time=86400.0) as late:
+        late.step(10.0)
+        assert late.outputs() == host.outputs()
+
+
+# ---------------------------------------------------------------------- stepping
+
+
+@pytest.mark.parametrize("duration", [0.1, 1.0, 10.0])
+def test_communication_step_does_not_matter(path: Path, duration: float) -> None:
+    speeds = [100.0, 400.0, 50.0, 300.0]
+    with hosted(path) as fine, hosted(path) as coarse:
+        for speed in speeds:
+            fine.set(speed=speed)
+            coarse.set(speed=speed)
+            fine.step(duration, count=round(60.0 / duration))
+            coarse.step(60.0)
+            fine.time = coarse.time
+            assert fine.get(*T_OUT) == pytest.approx(coarse.get(*T_OUT), abs=0.05)
+
+
+def test_steps_of_any_length(host: Host) -> None:
+    host.step(1e-9, count=3)
+    host.step(1e-3)
+    host.time = 3e-9 + 1e-3
+    host.step(3e7)
+    year = host.get("oil.T")[0]
+    host.step(1e4)
+    assert host.get("oil.T")[0] == pytest.approx(year, abs=0.01)
+    assert 300.0 < year < 500.0
+
+
+@pytest.mark.parametrize("duration", [0.0, -1.0, math.nan, math.inf, 1e300])
+def test_impossible_step_is_discarded_and_nothing_changes(path: Path, host: Host, duration: float) -> None:
+    host.step(5.0)
+    before = host.outputs()
+    assert "step" in host.refused(duration)
+    assert host.outputs() == before
+    host.step(5.0)
+    with hosted(path) as calm:
+        calm.step(5.0, count=2)
+        assert calm.outputs() == host.outputs()
+
+
+def test_step_from_another_time_is_discarded(host: Host) -> None:
+    host.step(5.0)
+    assert "ended at 5 s" in host.refused(time=3.0)
+
+
+def test_step_before_initialization_is_discarded(path: Path) -> None:
+    with hosted(path, start=False) as host:
+        assert "initialized" in host.refused()
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "hint"),
+    [
+        ("speed", math.nan, "finite"),
+        ("torque", math.inf, "finite"),
+        ("speed", 1e6, "rad/s"),
+        ("air_speed", -1.0, "0 to 200 m/s"),
+        ("T_ambient", 20.0, "if 20 degC is meant, set 293.15"),
+        ("T_ambient", 500.0, "possible"),
+        ("factor.bearing", math.nan, "finite"),
+        ("factor.bearing", -1.0, "0.05 to 20"),
+        ("factor.C_oil", 0.0, "0.05 to 20"),
+    ],
+)
+def test_impossible_value_is_discarded_with_a_message_and_nothing_changes(
+    path: Path, host: Host, name: str, value: float, hint: str
+) -> None:
+    host.step(5.0)
+    good = host.get(name)[0]
+    before = host.outputs()
+    host.set_all({name: value})
+    assert math.isnan(host.get("loss.total")[0])
+    assert [status for status, _ in host.said] == [ERROR]
+    text = host.refused()
+    assert name in text
+    assert hint in text
+    host.set_all({name: good})
+    assert host.outputs() == before
+    host.step(5.0)
+    with hosted(path) as calm:
+        calm.step(5.0, count=2)
+        assert calm.outputs() == host.outputs()
+
+
+def test_calculated_variables_cannot_be_set(host: Host) -> None:
+    before = host.outputs()
+    host.set_all({"oil.T": 400.0})
+    (said,) = host.said
+    assert said[0] == ERROR
+    assert "oil.T" in said[1]
+    assert host.outputs() == before
+
+
+def test_fixed_parameters_cannot_be_set_after_the_start(host: Host) -> None:
+    host.set_all({"initial.T": 400.0})
+    (said,) = host.said
+    assert said[0] == ERROR
+    assert host.get("oil.T")[0] == pytest.approx(293.15)
+
+
+def test_factors_can_be_tuned_at_any_time(path: Path, host: Host) -> None:
+    with hosted(path) as other:
+        host.step(60.0)
+        other.step(60.0)
+        mesh = host.get("loss.mesh_sliding")[0]
+        host.set_all({"factor.mesh": 2.0})
+        assert host.get("loss.mesh_sliding")[0] == pytest.approx(2.0 * mesh, rel=1e-9)
+        host.step(60.0)
+        other.step(60.0)
+        assert host.get("oil.T")[0] > other.get("oil.T")[0] + 0.05
+
+
+def test_outputs_follow_the_inputs_without_a_step(host: Host) -> None:
+    host.step(10.0)
+    driven = host.get("loss.total", "oil.T")
+    host.set(speed=0.0, torque=0.0)
+    rest = host.get("loss.total", "efficiency", "torque_loss", "oil.T")
+    assert rest[:3] == [0.0, 0.0, 0.0]
+    assert rest[3] == driven[1]
+    host.set(speed=-LOADED["speed"], torque=LOADED["torque"])
+    assert host.get("loss.total")[0] == driven[0]
+    assert host.get("torque_loss")[0] < 0.0
+
+
+# ---------------------------------------------------------------------- range of training
+
+
+def test_one_warning_per_excursion(host: Host) -> None:
+    def warnings() -> list[str]:
+        return [text for status, text in host.said if status == WARNING]
+
+    host.step(1.0, count=3)
+    assert warnings() == []
+    assert host.get("in_domain", "domain_distance") == [1, 0.0]
+    for _ in range(2):
+        host.set(speed=1000.0)
+        host.step(1.0, count=3)
+        (text,) = warnings()
+        assert "speed" in text
+        assert host.get("in_domain")[0] == 0
+        assert host.get("domain_distance")[0] == pytest.approx((1000.0 * 30.0 / np.pi - 6500.0) / 6499.0, rel=1e-9)
+        host.set(speed=LOADED["speed"])
+        host.step(1.0, count=3)
+        assert warnings() == []
+        assert host.get("in_domain")[0] == 1
+
+
+# ---------------------------------------------------------------------- the whole state
+
+
+def run(host: Host) -> list[dict[str, float]]:
+    outputs = []
+    for speed in (500.0, 20.0, 1000.0, 300.0):
+        host.set(speed=speed)
+        host.step(3.7, count=2)
+        outputs.append(host.outputs())
+    return outputs
+
+
+def test_replay_from_a_saved_state_is_exact(host: Host) -> None:
+    host.set(speed=1000.0)  # outside the range of training: that it has warned is part of the state
+    host.set_all({"factor.bearing": 1.5})
+    host.step(12.3)
+    assert len(host.said) == 1
+    state, time = host.slave.getFMUstate(), host.time
+    first, messages = run(host), len(host.said)
+    host.set_all({"factor.bearing": 0.5})
+    host.step(100.0)
+    host.said  # noqa: B018
+    host.slave.setFMUstate(state)
+    host.time = time
+    assert host.get("factor.bearing") == [1.5]
+    assert run(host) == first
+    assert len(host.said) == messages
+    host.slave.freeFMUstate(state)
+
+
+def test_serialized_state_continues_in_another_instance(path: Path, host: Host) -> None:
+    host.step(12.3)
+    state = host.slave.getFMUstate()
+    content = host.slave.serializeFMUstate(state)
+    host.slave.freeFMUstate(state)
+    time, first = host.time, run(host)
+    with hosted(path) as other:
+        restored = other.slave.deSerializeFMUstate(content)
+        other.slave.setFMUstate(restored)
+        other.time = time
+        assert run(other) == first
+
+
+def test_state_saved_in_initialization_can_be_restored(path: Path) -> None:
+    with hosted(path, start=False) as host:
+        host.slave.setupExperiment(startTime=0.0)
+        host.slave.enterInitializationMode()
+        host.set_all(LOADED | {"initial.T": 310.0})
+        state = host.slave.getFMUstate()
+        host.set_all({"initial.T": 350.0})
+        host.slave.exitInitializationMode()
+        host.step(10.0)
+        host.slave.setFMUstate(state)
+        host.time = 0.0
+        host.slave.exitInitializationMode()
+        assert host.get("oil.T")[0] == pytest.approx(310.0)
+
+
+def test_reset_begins_anew(host: Host) -> None:
+    first = run(host)
+    host.slave.terminate()
+    host.slave.reset()
+    host.start()
+    assert run(host) == first
+
+
+# ---------------------------------------------------------------------- several in one process
+
+
+def test_instances_do_not_touch_each_other(path: Path) -> None:
+    with hosted(path) as alone:
+        expected = run(alone)
+    with hosted(path) as first, hosted(path, {"initial.T": 350.0}) as second:
+        outputs = []
+        for speed in (500.0, 20.0, 1000.0, 300.0):
+            for host in (first, second):
+                host.set(speed=speed)
+                host.step(3.7, count=2)
+            outputs.append(first.outputs())
+        assert outputs == expected
+        assert second.outputs()["oil.T"] > first.outputs()["oil.T"] + 10.0
+
+
+def test_many_instances_after_each_other(path: Path) -> None:
+    found = set()
+    for _ in range(25):
+        with hosted(path) as host:
+            host.step(1.0)
+            found.add(tuple(host.get(*T_OUT)))
+    assert len(found) == 1
+
+

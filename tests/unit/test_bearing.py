@@ -1,0 +1,122 @@
+"""SKF's friction model: the worked NU 406, its parts by hand, its limits, and the oil temperature of eq. (8)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from models.bearing import OIL_FLOW_HEAT, SkfRollerBearing, heat_dissipation_reference, oil_flow_max
+from models.gearbox import load_gearbox
+
+GEARBOX = load_gearbox("fzg")
+OIL = GEARBOX.lubricant()
+NU_406 = GEARBOX.losses().bearings[0]
+
+
+def watts(bearing: SkfRollerBearing, n: float, F_r: float, T_oil: float, T_bearing: float) -> float:
+    one = np.ones(1)
+    loss = bearing.loss(n_rpm=n * one, F_r=F_r * one, T_oil=T_oil * one, T_bearing=T_bearing * one, oil=OIL)
+    return float(loss[0])
+
+
+@pytest.mark.parametrize(
+    ("n", "moments", "power", "half_digit"),
+    [
+        (2165.7, (127.1, 9.4, 12.0), 33.7, 0.05),
+        (5214.0, (193.5, 8.0, 64.0), 145.0, 0.5),
+        (261.0, (37.8, 41.8, 0.5), 2.2, 0.05),
+    ],
+)
+def test_worked_case(n: float, moments: tuple[float, float, float], power: float, half_digit: float) -> None:
+    """NU 406, 4463 N, 15.41 mm^2/s, oil 17 mm above the lowest raceway contact; independent evaluation."""
+    ours = NU_406.friction_moments(n_rpm=n, F_r=4463.0, nu=15.41)
+    assert [float(M) for M in ours] == pytest.approx(moments, abs=0.051)
+    assert sum(float(M) for M in ours) * n * np.pi / 30e3 == pytest.approx(power, abs=half_digit)
+
+
+def test_rolling_and_sliding_moment_by_hand() -> None:
+    n, F_r, nu = 1000.0, 2000.0, 30.0
+    starvation = 1 / (1 + 1.84e-9 * (n * 60) ** 1.28 * nu**0.64)
+    replenishment = np.exp(-3e-8 * nu * n * 120 * np.sqrt(5.1 / 120))
+    mixed = np.exp(-2.6e-8 * (n * nu) ** 1.4 * 60)
+    M_rr, M_sl, _ = NU_406.friction_moments(n_rpm=n, F_r=F_r, nu=nu)
+    assert M_rr == pytest.approx(starvation * replenishment * 1e-6 * 60**2.41 * F_r**0.31 * (nu * n) ** 0.6, rel=1e-12)
+    assert M_sl == pytest.approx(0.0015 * 60 * F_r * (0.12 * mixed + 0.02 * (1 - mixed)), rel=1e-12)
+
+
+def test_sliding_friction_goes_from_boundary_to_full_film() -> None:
+    slow = NU_406.friction_moments(n_rpm=1e-3, F_r=1000.0, nu=15.0)[1]
+    fast = NU_406.friction_moments(n_rpm=1e5, F_r=1000.0, nu=15.0)[1]
+    assert slow == pytest.approx(0.0015 * 60 * 1000 * 0.12, rel=1e-4)
+    assert fast == pytest.approx(0.0015 * 60 * 1000 * 0.02, rel=1e-9)
+
+
+def drag(bearing: SkfRollerBearing, n: float = 2000.0, nu: float = 15.0) -> float:
+    return float(bearing.friction_moments(n_rpm=n, F_r=1000.0, nu=nu)[2])
+
+
+def test_drag_grows_with_the_oil_level_to_its_cap() -> None:
+    levels = [0.0, 1e-12, 1e-3, 1.0, 10.0, 17.0, 30.0, 36.0, 50.0, 72.0]
+    moments = [drag(replace(NU_406, H=H), nu=15.0) for H in levels]
+    assert moments[0] == 0.0
+    assert np.all(np.isfinite(moments))
+    assert np.all(np.diff(moments) >= 0.0)
+    assert drag(replace(NU_406, H=500.0)) == drag(replace(NU_406, H=72.0))
+    assert drag(replace(NU_406, H=-5.0)) == 0.0
+
+
+def test_drag_of_the_older_edition_is_its_one_term() -> None:
+    """``10 V_M K_roll B d_m^4 n^2`` with V_M = 4.29e-4 and K_roll = 6.63e-12; no viscosity."""
+    old = replace(NU_406, drag="2008")
+    assert drag(old, 2165.7) == pytest.approx(10 * 4.29e-4 * 6.63e-12 * 23 * 60**4 * 2165.7**2, rel=2e-3)
+    assert drag(old, nu=15.0) == drag(old, nu=150.0)
+
+
+def test_drag_viscosity_is_held_where_the_formula_ends() -> None:
+    assert drag(NU_406, nu=500.0) > drag(NU_406, nu=400.0)
+    assert drag(NU_406, nu=5000.0) == drag(NU_406, nu=500.0)
+    deep = replace(NU_406, H=50.0)
+    assert drag(deep, nu=5000.0) == drag(deep, nu=250.0)
+
+
+def test_own_weight_is_the_least_load() -> None:
+    assert watts(NU_406, 1000.0, 0.0, 60.0, 60.0) == watts(NU_406, 1000.0, 2 * 0.75 * 9.80665, 60.0, 60.0) > 0.0
+
+
+def test_mean_temperature_mode_reads_the_mean() -> None:
+    assert watts(NU_406, 1000.0, 3000.0, 40.0, 80.0) == pytest.approx(watts(NU_406, 1000.0, 3000.0, 60.0, 60.0))
+
+
+OUTLET = replace(NU_406, temperature="skf_outlet")
+
+
+@pytest.mark.parametrize(
+    ("n", "T_oil", "T_bearing"), [(2166.0, 40.0, 45.0), (5214.0, 60.0, 65.0), (5214.0, 90.0, 80.0)]
+)
+def test_outlet_mode_solves_the_printed_equation(n: float, T_oil: float, T_bearing: float) -> None:
+    """Eq. (8): the oil leaves by what the bearing heats it, and the mean of in and out gives the viscosity."""
+    loss = watts(OUTLET, n, 4463.0, T_oil, T_bearing)
+    outlet = T_oil + (loss - 2.775 * (T_bearing - 27.0)) / (OIL_FLOW_HEAT * oil_flow_max(90.0, 23.0))
+    T_mean = 0.5 * (T_oil + outlet)
+    assert min(T_oil, T_bearing) - 10.0 < outlet < max(T_oil, T_bearing) + 60.0  # not held
+    assert loss == pytest.approx(watts(NU_406, n, 4463.0, T_mean, T_mean), rel=5e-4)
+
+
+def test_outlet_mode_is_held_off_equilibrium() -> None:
+    """A bearing of 120 degC in oil of 20 degC: the print gives -14 degC out and 111 W; held at 10 degC out."""
+    held = watts(OUTLET, 2166.0, 4463.0, 20.0, 120.0)
+    assert held == pytest.approx(watts(NU_406, 2166.0, 4463.0, 15.0, 15.0), rel=1e-3)
+
+
+def test_outlet_mode_is_finite_everywhere() -> None:
+    T_oil, T_bearing, n, F = (a.ravel() for a in np.meshgrid([-60, 0, 100, 300], [-60, 50, 300], [1, 6500], [0, 5e3]))
+    loss = OUTLET.loss(n_rpm=n, F_r=F, T_oil=T_oil, T_bearing=T_bearing, oil=OIL)
+    assert np.all(np.isfinite(loss))
+    assert np.all(loss > 0.0)
+
+
+def test_reference_quantities() -> None:
+    assert oil_flow_max(90.0, 23.0) == pytest.approx(0.1656, abs=5e-5)
+    assert heat_dissipation_reference(30.0, 90.0, 23.0) == pytest.approx(2.775, abs=5e-4)

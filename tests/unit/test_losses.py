@@ -1,0 +1,119 @@
+"""The loss model as a whole: names, order, floors, mapping of nodes, errors."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from models.errors import InputError
+from models.gearbox import load_gearbox
+from models.losses import BATCH
+
+GEARBOX = load_gearbox("fzg")
+LOSSES = GEARBOX.losses()
+T = dict.fromkeys(LOSSES.temperature_nodes, 60.0)
+
+
+def test_names_and_order() -> None:
+    bearings = tuple(f"bearing_{i}" for i in (1, 2, 3, 4))
+    assert LOSSES.components == ("mesh_sliding", "mesh_rolling", "churning", "seal_1", "seal_2", *bearings)
+    assert LOSSES.temperature_nodes == ("oil", "pinion", "wheel", *bearings)
+
+
+READS = {
+    "mesh_sliding": {"pinion", "wheel"},
+    "mesh_rolling": {"pinion", "wheel"},
+    "churning": {"oil"},
+    "seal_1": {"oil"},
+    "seal_2": {"oil"},
+    **{f"bearing_{i}": {"oil", f"bearing_{i}"} for i in (1, 2, 3, 4)},
+}
+
+
+@pytest.mark.parametrize("node", LOSSES.temperature_nodes)
+def test_each_loss_reads_its_own_nodes(node: str) -> None:
+    gearbox = GEARBOX.with_values({"stage.0.churning.model": "changenet_velex"})
+    losses = gearbox.losses()
+    before = losses.breakdown(speed=2000.0, torque=100.0, temperatures=T)
+    after = losses.breakdown(speed=2000.0, torque=100.0, temperatures={**T, node: 75.0})
+    moved = {name for name in losses.components if before[name] != after[name]}
+    assert moved == {name for name, nodes in READS.items() if node in nodes}
+
+
+def test_bearings_run_at_the_speed_of_their_shafts() -> None:
+    loss = LOSSES.breakdown(speed=1500.0, torque=0.0, temperatures=60.0)
+    slower = LOSSES.breakdown(speed=1000.0, torque=0.0, temperatures=60.0)
+    assert loss["bearing_1"] == loss["bearing_2"]
+    assert loss["bearing_3"] == pytest.approx(slower["bearing_1"], rel=1e-12)
+
+
+def test_bearing_load_is_half_the_tooth_force() -> None:
+    assert LOSSES.bearing_radial_load(0, np.array([302.0])) == pytest.approx(4463.0, abs=1.0)
+
+
+def test_parts_for_the_surrogate_are_the_columns_of_the_whole() -> None:
+    rng = np.random.default_rng(3)
+    n, torque, temperatures = rng.uniform(-6500, 6500, 50), rng.uniform(-350, 350, 50), rng.uniform(-20, 200, (50, 7))
+    whole = LOSSES.power(n, torque, temperatures)
+    assert LOSSES.mesh_power(n, torque, temperatures[:, 1:3]) == pytest.approx(whole[:, :2], rel=1e-12)
+    assert LOSSES.no_load_power(n, temperatures[:, 0]) == pytest.approx(whole[:, 2:5], rel=1e-12)
+    for i in range(4):
+        one = LOSSES.bearing_power(i, n, torque, temperatures[:, 0], temperatures[:, 3 + i])
+        assert one == pytest.approx(whole[:, 5 + i], rel=1e-12)
+
+
+def test_like_bearings_share_a_group() -> None:
+    assert LOSSES.bearing_groups == ((0, 1, 2, 3),)
+    other = GEARBOX.with_values({"bearing.1.mu_bl": 0.1}).losses()
+    assert other.bearing_groups == ((0, 2, 3), (1,))
+
+
+def test_floors_are_linear() -> None:
+    full = LOSSES.breakdown(speed=1.0, torque=1.0, temperatures=60.0)
+    half_speed = LOSSES.breakdown(speed=0.5, torque=1.0, temperatures=60.0)
+    half_torque = LOSSES.breakdown(speed=1.0, torque=0.5, temperatures=60.0)
+    for name in LOSSES.components:
+        assert half_speed[name] == pytest.approx(0.5 * full[name], rel=1e-12)
+    assert half_torque["mesh_sliding"] == pytest.approx(0.5 * full["mesh_sliding"], rel=1e-12)
+    assert half_torque["mesh_rolling"] == pytest.approx(full["mesh_rolling"], rel=1e-12)
+
+
+def test_many_points_are_the_same_in_parts() -> None:
+    n = np.linspace(0.0, 6000.0, BATCH + 7)
+    temperatures = np.full((len(n), 7), 50.0)
+    whole = LOSSES.power(n, 50.0, temperatures)
+    assert whole[-20:] == pytest.approx(LOSSES.power(n[-20:], 50.0, temperatures[-20:]), rel=1e-12)
+
+
+def test_no_points_at_all() -> None:
+    assert LOSSES.power(np.zeros(0), np.zeros(0), np.zeros((0, 7))).shape == (0, 9)
+
+
+def test_breakdown_total() -> None:
+    loss = LOSSES.breakdown(speed=[1000.0, 2000.0], torque=50.0, temperatures=T)
+    assert loss["total"] == pytest.approx(sum(loss[name] for name in LOSSES.components))
+
+
+def test_full_model_has_no_domain() -> None:
+    assert LOSSES.domain_distance(np.ones((3, 1)), 1.0, np.ones((4, 7))).shape == (3, 4)
+
+
+@pytest.mark.parametrize(
+    ("speed", "torque", "temperature", "says"),
+    [
+        (np.nan, 1.0, 60.0, "speed is nan 1/min at operating point 0"),
+        (1.0, np.inf, 60.0, "torque is inf N m at operating point 0"),
+        (1.0, 1.0, np.nan, "T_oil is nan degC at operating point 0"),
+        (1.0, 1.0, -300.0, "T_oil is -300.0 degC at operating point 0; finite numbers above -273.15"),
+    ],
+)
+def test_unphysical_input_is_refused(speed: float, torque: float, temperature: float, says: str) -> None:
+    with pytest.raises(InputError, match=says):
+        LOSSES.power(speed, torque, np.full(7, temperature))
+
+
+def test_wrong_temperatures_by_name() -> None:
+    with pytest.raises(InputError, match="'wheeel' is not a temperature of the loss model; did you mean 'wheel'"):
+        LOSSES.breakdown(speed=1.0, torque=1.0, temperatures={**T, "wheeel": 60.0})
+    with pytest.raises(InputError, match="the temperatures of oil, wheel are missing"):
+        LOSSES.breakdown(speed=1.0, torque=1.0, temperatures={k: v for k, v in T.items() if k not in ("oil", "wheel")})

@@ -1,0 +1,124 @@
+"""Networks as data: extension, names, groups, and every refusal."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+import sympy as sp
+
+from models.compiled import law_source, structure
+from models.errors import InputError
+from models.gearbox import load_gearbox
+from models.laws import Parameter, symbol
+from models.network import Link, Node, ThermalNetwork
+
+GEARBOX = load_gearbox("fzg")
+NETWORK = GEARBOX.network()
+
+
+def test_nodes_of_the_rig() -> None:
+    assert NETWORK.node_names == (
+        "air", "frame", "housing_lower", "housing_upper", "oil", "bearing_1", "bearing_2", "bearing_3", "bearing_4",
+        "shaft_1", "shaft_2", "pinion", "wheel", "mesh",
+    )  # fmt: skip
+    assert len(NETWORK.parts) == 12
+    assert NETWORK.groups["housing"] == ("housing_lower", "housing_upper")
+
+
+def test_capacities_of_the_rig() -> None:
+    """Printed by an independent evaluation to 1 J/K; its oil is taken at 80 degC, ours at 60."""
+    ones = {symbol(parameter.name): 1.0 for parameter in NETWORK.parameters}
+    capacity = {part.name: float(sp.sympify(part.capacity).subs(ones)) for part in NETWORK.parts}
+    printed = {"housing_lower": 7057, "housing_upper": 8625, "bearing_1": 349, "shaft_1": 367, "shaft_2": 779,
+               "pinion": 184, "wheel": 346}  # fmt: skip
+    for node, value in printed.items():
+        assert capacity[node] == pytest.approx(value, abs=0.55)
+    assert capacity["oil"] == pytest.approx(1568, rel=0.02)
+
+
+def test_extending_leaves_the_original_alone() -> None:
+    sources, links = len(NETWORK.sources), len(NETWORK.links)
+    NETWORK.with_source("oil", 1.0, name="x").with_link("oil", "frame", 1.0).with_node("tank", 100.0)
+    assert (len(NETWORK.sources), len(NETWORK.links)) == (sources, links)
+
+
+def test_groups_share_evenly() -> None:
+    network = NETWORK.with_source("housing", 10.0, name="sun").with_link("housing", "frame", lambda s: 3.0)
+    assert [(s.name, s.node, s.heat) for s in network.sources[-2:]] == [
+        ("sun_housing_lower", "housing_lower", 5.0),
+        ("sun_housing_upper", "housing_upper", 5.0),
+    ]
+    assert [link.conductance for link in network.links[-2:]] == [1.5, 1.5]
+
+
+def test_new_boundary_by_naming_it() -> None:
+    ambient = NETWORK.with_link("oil", "cooler", 5.0)
+    assert ambient.nodes[-1] == Node(name="cooler", temperature=symbol("T_ambient"))
+    warm = NETWORK.with_link("oil", "cooler", 5.0, temperature=lambda s: 40.0 + 0.01 * s.time)
+    assert warm.nodes[-1].temperature == 40.0 + 0.01 * symbol("time")
+
+
+def test_symbols_serve_for_laws() -> None:
+    s = NETWORK.symbols()
+    assert NETWORK.with_source("oil", 2.0 * s.T_oil, name="x").sources[-1].heat == 2.0 * symbol("T_oil")
+
+
+EXTENSIONS: list[tuple[Callable[[], object], str]] = [
+    (lambda: NETWORK.with_source("oill", 1.0, name="x"), "node 'oill' is unknown; did you mean 'oil'"),
+    (lambda: NETWORK.with_source("air", 1.0, name="x"), "node 'air' has a given temperature"),
+    (lambda: NETWORK.with_source("oil", 1.0, name="churning"), "has a source 'churning' already"),
+    (lambda: NETWORK.with_source("oil", lambda s: s.sped, name="x"), "did you mean 'speed'"),
+    (
+        lambda: NETWORK.with_source("housing", 1.0, name="x").with_source("housing", 2.0, name="x"),
+        "has a source 'x_housing_lower' already",
+    ),
+    (lambda: NETWORK.with_link("pinionn", "oil", 1.0), "node 'pinionn' is unknown; did you mean 'pinion'"),
+    (lambda: NETWORK.with_link("oil", "pinionn", 1.0), "node 'pinionn' is unknown; did you mean 'pinion'"),
+    (lambda: NETWORK.with_link("oil", "oil", 1.0), "joins two different nodes"),
+    (lambda: NETWORK.with_link("housing", "housing_lower", 1.0), "joins two different nodes"),
+    (lambda: NETWORK.with_link("pinion", "oil", 1.0), "has a link 'pinion-oil' already"),
+    (lambda: NETWORK.with_link("oil", "frame", 1.0, temperature=3.0), "node 'frame' exists"),
+    (lambda: NETWORK.with_link("oil", "frame", lambda s: s.P_churning), "depends on the loss 'P_churning'"),
+    (lambda: NETWORK.with_node("oil", 1.0), "has a node 'oil' already"),
+    (lambda: NETWORK.with_node("housing", 1.0), "has a node 'housing' already"),
+    (lambda: NETWORK.with_node("ambient", 1.0), "has a signal 'T_ambient' already"),
+    (lambda: NETWORK.with_node("big tank", 1.0), "'T_big tank' cannot be a signal"),
+    (lambda: NETWORK.with_node("tank", lambda s: float(s.C_oil)), "must be a number or a function of parameters"),
+    (lambda: NETWORK.with_node("tank", lambda s: s.T_oil), "'T_oil' is not a signal"),
+    (lambda: NETWORK.with_boundary("air", 1.0), "has a node 'air' already"),
+    (lambda: NETWORK.with_boundary("sea", lambda s: s.T_oil), "'T_oil' is not a signal"),
+    (lambda: NETWORK.with_boundary("sea", lambda s: float(s.time)), "must be an expression"),
+    (lambda: NETWORK.with_input("speed", 1.0), "has a signal 'speed' already"),
+    (lambda: NETWORK.with_input("lambda", 1.0), "'lambda' cannot be a signal"),
+    (lambda: NETWORK.with_parameter(Parameter(name="h_air")), "has a signal 'h_air' already"),
+    (lambda: NETWORK.with_state("time", start=0.0), "has a signal 'time' already"),
+    (lambda: NETWORK.with_state("on", start=0.0, update=lambda s: 1.0 if s.T_oil > 80 else 0.0), "sympy.Piecewise"),
+]
+
+
+@pytest.mark.parametrize(("extend", "says"), EXTENSIONS)
+def test_refusals(extend: Callable[[], object], says: str) -> None:
+    with pytest.raises(InputError, match=says):
+        extend()
+
+
+def test_structure_conserves_heat_for_any_conductances() -> None:
+    """Every column of a link's matrix between two parts sums to zero: what leaves one enters the other."""
+    laplacian, to_boundary, injection = structure(NETWORK)
+    for index, link in enumerate(NETWORK.links):
+        both = not ({"air", "frame"} & set(link.nodes))
+        assert laplacian[index].sum() == (0.0 if both else 1.0)
+        assert to_boundary[index].sum() == (0.0 if both else 1.0)
+        assert np.array_equal(laplacian[index].T, laplacian[index])
+    assert (injection.sum(axis=1) == 1.0).all()
+
+
+def test_a_capacity_must_not_move() -> None:
+    moving = ThermalNetwork(
+        nodes=(Node(name="a", capacity=symbol("speed")), Node(name="b", temperature=sp.Float(20.0))),
+        links=(Link(name="a-b", nodes=("a", "b"), conductance=sp.Float(1.0)),),
+    )
+    with pytest.raises(InputError, match="node 'a' needs a heat capacity that depends on parameters only"):
+        law_source(moving, vector=False)

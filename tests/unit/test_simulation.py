@@ -1,0 +1,140 @@
+"""Running networks: start, inputs, columns, errors; the physics of it is in ``tests/property``."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from models.cycle import Cycle
+from models.errors import InputError
+from models.gearbox import load_gearbox
+from models.network import Node, ThermalNetwork
+from models.runtime import efficiency, torque_loss
+from models.simulation import initial_states, input_table, network_system
+
+GEARBOX = load_gearbox("fzg")
+NETWORK, LOSSES = GEARBOX.network(), GEARBOX.losses()
+CYCLE: dict[str, Any] = {
+    "time_s": [0.0, 30.0, 60.0],
+    "speed_rpm": [500.0, 2000.0, -500.0],
+    "torque_Nm": [0.0, 100.0, 50.0],
+}
+
+
+def test_starts_at_ambient_unless_told() -> None:
+    result = NETWORK.simulate({**CYCLE, "T_ambient_degC": [14.0, 15.0, 16.0]}, losses=LOSSES)
+    assert {float(T[0]) for T in result.temperatures.values()} == {14.0}
+    assert result.temperatures["air"].tolist() == [14.0, 15.0, 16.0]
+    by_name = {part.name: 30.0 + i for i, part in enumerate(NETWORK.parts)}
+    told = NETWORK.simulate(CYCLE, losses=LOSSES, initial=by_name)
+    assert {name: float(told.temperatures[name][0]) for name in by_name} == by_name
+    assert float(told.temperatures["air"][0]) == 27.0  # the definition's ambient
+
+
+def test_columns_follow_the_file_contract() -> None:
+    result = NETWORK.simulate(CYCLE, losses=LOSSES, initial=20.0)
+    columns = list(result.columns())
+    assert columns[:5] == ["time_s", "speed_rpm", "torque_Nm", "T_ambient_degC", "air_speed_m_s"]
+    assert columns[5:19] == [f"T_{name}_degC" for name in NETWORK.node_names]
+    assert columns[19] == "P_loss_W"
+    assert columns[20:29] == [f"P_loss_{name}_W" for name in LOSSES.components]
+    assert columns[29:] == ["torque_loss_Nm", "efficiency", "in_domain"]
+    table = result.columns()
+    assert all(np.shape(values) == (3,) for values in table.values())
+    assert table["P_loss_W"] == pytest.approx(sum(table[f"P_loss_{name}_W"] for name in LOSSES.components))
+    assert table["in_domain"].all()
+
+
+def test_losses_in_the_result_are_those_of_the_model_times_their_factors() -> None:
+    result = NETWORK.simulate(CYCLE, losses=LOSSES, initial=20.0, parameters={"churning": 3.0})
+    T = {name: result.temperatures[name] for name in LOSSES.temperature_nodes}
+    nominal = LOSSES.breakdown(speed=CYCLE["speed_rpm"], torque=CYCLE["torque_Nm"], temperatures=T)
+    for name in LOSSES.components:
+        assert result.losses[name] == pytest.approx(nominal[name] * (3.0 if name == "churning" else 1.0), rel=1e-12)
+
+
+def test_heat_that_is_no_loss_stands_apart() -> None:
+    network = NETWORK.with_source("oil", 25.0, name="heater").with_source("oil", 5.0, name="pump", is_loss=True)
+    result = network.simulate(CYCLE, losses=LOSSES, initial=20.0)
+    assert result.extra_heat["heater"].tolist() == [25.0] * 3
+    assert result.losses["pump"].tolist() == [5.0] * 3
+    assert result.loss == pytest.approx(sum(result.losses.values()))
+
+
+def test_one_row() -> None:
+    result = NETWORK.simulate({name: values[:1] for name, values in CYCLE.items()}, losses=LOSSES, initial=33.0)
+    assert result.temperatures["oil"].tolist() == [33.0]
+    assert result.heat_in.tolist() == [0.0]
+
+
+def test_progress_ends_with_all_rows() -> None:
+    seen: list[tuple[int, int]] = []
+    time = np.arange(0.0, 60.5, 0.5)
+    NETWORK.simulate(
+        {"time_s": time, "speed_rpm": 0 * time + 100, "torque_Nm": 0 * time},
+        losses=LOSSES,
+        progress=lambda done, of: seen.append((done, of)),
+    )
+    assert seen == [(50, 120), (100, 120), (120, 120)]
+
+
+def test_input_table_fills_defaults() -> None:
+    cycle = Cycle.from_columns(CYCLE)
+    table = input_table(NETWORK, cycle)
+    assert table[:, 2:].tolist() == [[27.0, 2.0]] * 3
+
+
+def test_torque_loss_and_efficiency() -> None:
+    speed, torque = np.array([1500.0, -1500.0, 1500.0, 0.0]), np.array([100.0, -100.0, -100.0, 100.0])
+    loss = np.full(4, 500.0)
+    P = 1500.0 * np.pi / 30.0 * 100.0
+    assert torque_loss(loss, speed) == pytest.approx([500 * 100 / P, -500 * 100 / P, 500 * 100 / P, 0.0])
+    assert efficiency(loss, speed, torque) == pytest.approx([1 - 500 / P, 1 - 500 / P, P / (P + 500), 0.0])
+    assert efficiency(1e9, 1500.0, 1.0) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        ({"parameters": {"h_aire": 1.0}}, "'h_aire' is not a parameter of this network; did you mean 'h_air'"),
+        ({"parameters": {"C_oil": 0.0}}, "heat capacities must be positive"),
+        ({"parameters": {"C_oil": np.array([1.0, -1.0])}}, "heat capacities must be positive"),
+        ({"initial": {"oil": 20.0}}, "initial temperatures are missing for: housing_lower"),
+        ({"initial": {"oill": 20.0}}, "unknown node 'oill'; did you mean 'oil'"),
+        ({"initial": np.nan}, "must be finite and above -273.15"),
+        ({"initial": -300.0}, "must be finite and above -273.15"),
+        ({"losses": load_gearbox("conveyor").losses()}, "the losses belong to another gearbox"),
+    ],
+)
+def test_refusals(arguments: dict[str, Any], says: str) -> None:
+    with pytest.raises(InputError, match=says):
+        NETWORK.simulate(CYCLE, **{"losses": LOSSES, "initial": 20.0, **arguments})
+
+
+def test_losses_need_their_nodes() -> None:
+    small = ThermalNetwork(
+        nodes=(NETWORK.nodes[0], Node(name="oil", capacity=NETWORK.nodes[-1].capacity)),
+        components=LOSSES.components,
+        inputs=NETWORK.inputs,
+    )
+    with pytest.raises(InputError, match="the losses need the temperature of 'pinion'"):
+        network_system(small, LOSSES)
+
+
+def test_steady_state_refusals() -> None:
+    with pytest.raises(InputError, match="'T_ambiente' is not an input of this network; did you mean 'T_ambient'"):
+        NETWORK.steady_state(losses=LOSSES, speed=1.0, torque=1.0, inputs={"T_ambiente": 3.0})
+    with pytest.raises(InputError, match="one axis at most"):
+        NETWORK.steady_state(losses=LOSSES, speed=np.ones((2, 2)), torque=1.0)
+    with pytest.raises(InputError, match="have a memory has no steady state"):
+        NETWORK.with_state("age", start=0.0, rate=1.0).steady_state(losses=LOSSES, speed=1.0, torque=1.0)
+    lonely = NETWORK.with_node("tank", 100.0).with_source("tank", 5.0, name="heater")
+    with pytest.raises((ArithmeticError, np.linalg.LinAlgError)):
+        lonely.steady_state(losses=LOSSES, speed=1000.0, torque=1.0)
+
+
+def test_memories_start_where_they_are_told() -> None:
+    network = NETWORK.with_state("age", start=4.0, rate=1.0)
+    assert initial_states(network, 20.0)[-1] == 4.0

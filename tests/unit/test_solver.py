@@ -1,0 +1,126 @@
+"""The time integrator on systems whose solution is known: order, stiffness, conservation, updates, failure."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from models import solver
+from models.solver import Balance, State
+from models.types import Array
+
+
+@dataclass
+class Linear:
+    """``dT/dt = input - rate * T`` per state; heat in is the input, heat out ``rate * T`` (unit capacities)."""
+
+    rates: Array
+    update: Callable[[Array], Array] | None = None
+    jacobian: float = 1.0
+    calls: int = 0
+
+    def balance(self, time: float, inputs: Array, states: Array) -> Balance:
+        self.calls += 1
+        n = states.shape[-1]
+        return Balance(
+            derivative=inputs[0] - self.rates * states,
+            matrix=np.broadcast_to(-self.jacobian * np.diag(self.rates), (*states.shape, n)),
+            heat_in=np.full(states.shape[:-1], n * inputs[0]),
+            heat_out=(self.rates * states).sum(axis=-1),
+            heat_out_slope=np.broadcast_to(self.jacobian * self.rates, states.shape),
+        )
+
+    def updated(self, time: float, inputs: Array, states: Array) -> Array:
+        return states if self.update is None else self.update(states)
+
+
+def run(system: Linear, duration: float, start: Array, first: float = 0.0, last: float = 0.0) -> State:
+    return solver.advance(system, solver.start(start), 0.0, duration, np.array([first]), np.array([last]))
+
+
+def with_steps(system: Linear, h: float, count: int, monkeypatch: pytest.MonkeyPatch) -> Array:
+    """Steps of one size: the tolerance is put out of reach, and every step asked for by itself."""
+    monkeypatch.setattr(solver, "TOLERANCE_K", 1e12)
+    state = solver.start(np.array([1.0]))
+    for i in range(count):
+        state = State(state.states, 1e9, state.heat_in, state.heat_out)
+        state = solver.advance(system, state, i * h, h, np.array([i * h]), np.array([(i + 1) * h]))
+    return state.states
+
+
+@pytest.mark.parametrize("jacobian", [1.0, 0.5, 0.0])
+def test_second_order_whatever_the_jacobian(jacobian: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """``dT/dt = t - T`` from 1: ``T = t - 1 + 2 exp(-t)``; half the step, a quarter of the error."""
+    exact = 1.0 - 1.0 + 2.0 * np.exp(-1.0)
+    errors = [
+        abs(float(with_steps(Linear(np.ones(1), jacobian=jacobian), 1.0 / n, n, monkeypatch)[0]) - exact)
+        for n in (20, 40, 80)
+    ]
+    assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.15)
+    assert errors[1] / errors[2] == pytest.approx(4.0, rel=0.1)
+
+
+def test_stiff_and_slow_states_together() -> None:
+    rates = np.array([1e3, 1.0, 1e-3])
+    system = Linear(rates)
+    state = run(system, 100.0, np.full(3, 50.0), 2.0, 2.0)
+    exact = 2.0 / rates + (50.0 - 2.0 / rates) * np.exp(-rates * 100.0)
+    assert state.states == pytest.approx(exact, abs=0.05)
+    assert system.calls < 300  # an explicit scheme would need 50 000
+
+
+def test_heat_is_conserved_to_rounding() -> None:
+    start = np.array([50.0, -10.0])
+    state = run(Linear(np.array([5.0, 0.01]), jacobian=0.7), 40.0, start, 1.0, 9.0)
+    stored = (state.states - start).sum()
+    assert stored == pytest.approx(float(state.heat_in - state.heat_out), abs=1e-9)
+    assert state.heat_in == pytest.approx(2 * 40.0 * 5.0, rel=1e-12)  # a ramp is integrated exactly
+
+
+def test_variants_side_by_side() -> None:
+    start = np.array([[50.0], [20.0], [0.0]])
+    state = run(Linear(np.array([0.1])), 10.0, start, 1.0, 1.0)
+    assert state.heat_in.shape == (3,)
+    assert state.states[:, 0] == pytest.approx(10.0 + (start[:, 0] - 10.0) * np.exp(-1.0), abs=0.01)
+
+
+def test_updates_follow_accepted_steps_only() -> None:
+    seen: list[float] = []
+
+    def update(states: Array) -> Array:
+        seen.append(float(states[0]))
+        return states
+
+    run(Linear(np.array([1.0]), update=update), 5.0, np.array([100.0]))
+    assert seen == sorted(seen, reverse=True)
+    assert len(seen) > 5
+
+
+def test_no_duration_changes_nothing() -> None:
+    state = run(Linear(np.ones(1)), 0.0, np.array([7.0]))
+    assert state.states.tolist() == [7.0]
+    assert state.heat_in == 0.0
+
+
+def test_step_size_outlives_a_short_communication_step() -> None:
+    system, state = Linear(np.array([1e-3])), solver.start(np.array([10.0]))
+    u = np.zeros(1)
+    state = solver.advance(system, state, 0.0, 600.0, u, u)
+    grown = state.step
+    for i in range(20):
+        state = solver.advance(system, state, 600.0 + 0.1 * i, 0.1, u, u)
+    assert state.step >= grown
+
+
+def test_not_finite_is_an_error() -> None:
+    with pytest.raises(ArithmeticError, match="not finite at 0 s"):
+        run(Linear(np.ones(1)), 1.0, np.array([np.nan]))
+
+
+def test_an_impossible_tolerance_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(solver, "TOLERANCE_K", 1e-30)
+    with pytest.raises(ArithmeticError, match="step size fell below 1e-06 s"):
+        run(Linear(np.ones(1)), 1.0, np.array([1.0]), 1.0, 5.0)
