@@ -353,8 +353,8 @@ class _Table:
         def fixed(name: str, role: Role, text: str, of: str = "") -> Signal:
             return Signal(
                 name=name, role=role, of=of, description=text, type="Temperature", unit="K", start=START_TEMPERATURE,
-                causality="parameter", variability="fixed", initial="exact", minimum=LOWEST_START, maximum=HIGHEST_START,
-                nominal=TYPES["Temperature"].nominal,
+                causality="parameter", variability="fixed", initial="exact", minimum=LOWEST_START,
+                maximum=HIGHEST_START, nominal=TYPES["Temperature"].nominal,
             )  # fmt: skip
 
         yield Signal(name="initial.uniform", role="initial_uniform", causality="parameter", variability="fixed",

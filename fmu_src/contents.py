@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +13,7 @@ import onnxruntime
 
 from fmu_src.onnx_losses import OnnxLosses
 from fmu_src.twin import Twin
-from models.surrogate import SurrogateLosses
-from models.types import Array
+from models.surrogate import Evaluator
 
 DATA = "twin.json"
 ERRORS_ONLY = 3
@@ -43,9 +42,9 @@ def load_twin(resources: Path, digests: Mapping[str, str], laws: Mapping[str, An
     """
     files = {name: _checked(resources / name, digest) for name, digest in digests.items()}
     data = json.loads(files[DATA])
-    losses = SurrogateLosses.from_dict(data["losses"])
-    run = {network.name: _session(f"{network.name}.onnx", files) for network in losses.networks}
-    return Twin(data, laws, OnnxLosses(losses, run))
+    losses = OnnxLosses.from_dict(data["losses"])
+    evaluators = {network.name: _session(f"{network.name}.onnx", files) for network in losses.networks}
+    return Twin(data, laws, losses.with_evaluators(evaluators))
 
 
 def _checked(path: Path, digest: str) -> bytes:
@@ -62,7 +61,7 @@ def _checked(path: Path, digest: str) -> bytes:
     return content
 
 
-def _session(name: str, files: Mapping[str, bytes]) -> Callable[[Array], Array]:
+def _session(name: str, files: Mapping[str, bytes]) -> Evaluator:
     options = onnxruntime.SessionOptions()
     # One thread: a few rows are too little for more, and the same bits come out everywhere.
     options.intra_op_num_threads = options.inter_op_num_threads = 1

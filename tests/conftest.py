@@ -1,4 +1,4 @@
-"""What many tests share: the default gearbox and one FMU of it, built once per session with quickly trained networks."""
+"""What many tests share: the default gearbox, and one FMU of it with quickly trained networks."""
 
 from __future__ import annotations
 

@@ -17,6 +17,8 @@ class Verdict(StrEnum):
     SILENT = "cannot be compared"
     SCHEME = "scheme"
     OURS = "not in the paper"
+    MET = "target met"
+    MISSED = "target not met"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,6 +57,13 @@ def judged(
     return Check(
         name=name, statement=statement, found=found, verdict=verdict, why="" if holds else otherwise, numbers=plain
     )
+
+
+def target(name: str, statement: str, found: str, met: bool, *, numbers: Mapping[str, float], otherwise: str) -> Check:
+    """A target of our own that the paper does not have; it leaves the item's verdict alone."""
+    verdict = Verdict.MET if met else Verdict.MISSED
+    plain = {key: float(value) for key, value in numbers.items()}
+    return Check(name=name, statement=statement, found=found, verdict=verdict, why="" if met else otherwise, numbers=plain)
 
 
 def silent(name: str, statement: str, why: str, *, found: str = "", numbers: Mapping[str, float] | None = None) -> Check:

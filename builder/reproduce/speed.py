@@ -11,12 +11,13 @@ import numpy as np
 
 from builder.drive_cycle import COLD_START, reference_cycle
 from builder.fmu_drive import drive_fmu
-from builder.reproduce.item import Check, Item, Table, judged
+from builder.reproduce.item import Check, Item, Table, judged, target
 from builder.reproduce.study import OUTPUT_TORQUE, Study
 
 PAPER = {("600 s", "F-PL"): 6410.0, ("600 s", "ROM-PL"): 3.8, ("18 h", "ROM-PL"): 110.0}  # s
 FULL, REDUCED, FMU = "F-PL", "ROM-PL", "ROM-PL, FMU in FMPy"
 BATCH = 400
+WARM_UP_S = 5.0  # a longer first run counts: what it compiles is small beside it
 LIMIT_18_H = 1.0  # s, for our networks in Python
 
 
@@ -29,14 +30,13 @@ class Timing:
 
 
 def measured(work: Callable[[], object], *, runs: int, longest_s: float) -> Timing:
-    """Time some work; after one run that does not count, as often as asked and as the time allows."""
-    begin = time.perf_counter()
-    work()
-    if time.perf_counter() - begin > longest_s:  # its own first run: too long to be repeated
-        return Timing(time.perf_counter() - begin, 1)
+    """Time some work as often as asked and as the time allows; a short first run, which compiles, does not count."""
     seconds: list[float] = []
-    begin = time.perf_counter()
-    while len(seconds) < runs and (not seconds or time.perf_counter() - begin + seconds[-1] < longest_s):
+    begin = start = time.perf_counter()
+    work()
+    if (first := time.perf_counter() - start) > WARM_UP_S:
+        seconds.append(first)
+    while not seconds or (len(seconds) < runs and time.perf_counter() - begin + seconds[-1] < longest_s):
         start = time.perf_counter()
         work()
         seconds.append(time.perf_counter() - start)
@@ -128,9 +128,9 @@ def hours_in_minutes(timings: dict[tuple[str, str], Timing]) -> Check:
 def eighteen_hours_within_a_second(timings: dict[tuple[str, str], Timing]) -> Check:
     """Our own target."""
     seconds = timings["18 h", REDUCED].median
-    return judged(
+    return target(
         "eighteen_hours_within_a_second",
-        "(Our own target: 18 h with the networks in Python within 1 s.)",
+        f"Our target: 18 h with the networks in Python within {LIMIT_18_H:g} s.",
         f"{seconds:.2f} s.",
         seconds <= LIMIT_18_H,
         numbers={"rom_s": seconds},
@@ -154,9 +154,9 @@ def what_the_surrogate_buys(study: Study, timings: dict[tuple[str, str], Timing]
     saved = timings["600 s", FULL].median - timings["600 s", REDUCED].median
     pays = study.ours.seconds / saved if saved > 0.0 else float("inf")
     ratio = single[FULL] / single[REDUCED]
-    return judged(
+    return target(
         "what_the_surrogate_buys",
-        "Simulation speed is the purpose of the reduced model.",
+        "What the surrogate buys, given a full model that is vectorised.",
         f"One operating point: {single[FULL] * 1e3:.2f} ms with the full model, {single[REDUCED] * 1e3:.3f} ms with the networks "
         f"({ratio:.0f} times); in arrays of {BATCH}: {batch[FULL] * 1e6:.0f} and {batch[REDUCED] * 1e6:.1f} µs per point "
         f"({batch[FULL] / batch[REDUCED]:.0f} times). Sampling and training took {study.ours.seconds:.0f} s: as many as "

@@ -57,10 +57,10 @@ class Settings:
     samples: int | None = None
     judged: int = 400
     runs: int = 5
-    longest_s: float = 30.0
+    longest_s: float = 25.0
     step_s: float = 10.0
     fine_step_s: float = 1.0
-    trajectories: int = 12
+    trajectories: int = 10
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -58,7 +58,9 @@ def test_start_values_of_the_description_are_those_of_the_binary(path: Path) -> 
 
 def test_every_input_and_parameter_is_set_under_its_own_reference(path: Path) -> None:
     with hosted(path, start=False) as host:
-        settable = [v for v in host.fmu.variables.values() if v.causality in ("input", "parameter") and v.type == "Real"]
+        settable = [
+            v for v in host.fmu.variables.values() if v.causality in ("input", "parameter") and v.type == "Real"
+        ]
         wanted = {v.name: float(v.start) + 0.001 * (i + 1) for i, v in enumerate(settable)}
         host.set_all(wanted)
         assert host.get(*wanted) == list(wanted.values())
@@ -353,5 +355,3 @@ def test_many_instances_after_each_other(path: Path) -> None:
             host.step(1.0)
             found.add(tuple(host.get(*T_OUT)))
     assert len(found) == 1
-
-

@@ -1,8 +1,9 @@
-"""What is special to the FMU that runs in Python: packaging, damaged files, other networks, a process without the house."""
+"""What is special to the FMU that runs in Python: packaging, damaged files, other networks, its needs."""
 
 from __future__ import annotations
 
 import hashlib
+import importlib
 import os
 import pickle
 import subprocess
@@ -10,6 +11,7 @@ import sys
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -79,7 +81,7 @@ def test_same_definition_gives_the_same_bytes_in_any_process(
         "build_python_fmu(load_gearbox('fzg'), training, networks, Path(sys.argv[2]))"
     )
     again = tmp_path / "fzg.fmu"
-    subprocess.run(
+    subprocess.run(  # noqa: S603 - our own script
         [sys.executable, "-c", script, str(tmp_path / "training"), str(again)],
         check=True,
         cwd=Path(__file__).parents[2],
@@ -138,13 +140,15 @@ def test_needs_only_numpy_and_onnxruntime(fzg_fmu: Path, tmp_path: Path) -> None
     script = f"""
 import sys
 from fmpy import simulate_fmu
-result = simulate_fmu({str(fzg_fmu)!r}, stop_time=2.0, output_interval=1.0, start_values={{"speed": 300.0, "torque": 150.0}})
+start_values = {{"speed": 300.0, "torque": 150.0}}
+result = simulate_fmu({str(fzg_fmu)!r}, stop_time=2.0, output_interval=1.0, start_values=start_values)
 assert result["oil.T"][-1] > 293.15
 heavy = {{"scipy", "sympy", "pydantic", "sklearn", "onnx", "pandas", "models", "builder", "fmu_src"}} & set(sys.modules)
 assert not heavy, heavy
 assert not [entry for entry in sys.path if "resources" in entry], sys.path
 """
-    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, cwd=tmp_path,
+    done = subprocess.run(  # noqa: S603 - our own script
+        [sys.executable, "-c", script], capture_output=True, text=True, cwd=tmp_path,
                           env={k: v for k, v in os.environ.items() if k != "PYTHONPATH"})  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert done.stderr == ""
@@ -160,7 +164,11 @@ assert not [entry for entry in sys.path if "resources" in entry], sys.path
     ],
 )
 def test_damaged_network_stops_the_instantiation(
-    fzg_fmu: Path, tmp_path: Path, damage: Callable[[bytes], bytes | None], named: str, capfd: pytest.CaptureFixture[str]
+    fzg_fmu: Path,
+    tmp_path: Path,
+    damage: Callable[[bytes], bytes | None],
+    named: str,
+    capfd: pytest.CaptureFixture[str],
 ) -> None:
     with zipfile.ZipFile(fzg_fmu) as archive:
         content = damage(archive.read("resources/mesh.onnx"))
@@ -176,9 +184,7 @@ def test_damaged_data_stops_the_instantiation(fzg_fmu: Path, tmp_path: Path) -> 
         pass
 
 
-def test_paths_with_blanks_and_other_letters(
-    fzg_fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_paths_with_blanks_and_other_letters(fzg_fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     folder = tmp_path / "Prüfstand Ω 齿轮 100%"
     (folder / "tmp ü").mkdir(parents=True)
     monkeypatch.setattr("tempfile.tempdir", str(folder / "tmp ü"))
@@ -192,11 +198,15 @@ def test_paths_with_blanks_and_other_letters(
 # ---------------------------------------------------------------------- other networks
 
 
+def thermostat(s: Any) -> sp.Expr:
+    return sp.Piecewise((0.0, s.T_oil > 29.0), (1.0, s.T_oil < 28.0), (s.heater_on, True))
+
+
 def extended(network: ThermalNetwork) -> ThermalNetwork:
     """A network with a heater that a thermostat switches, an input of its own, and a boundary."""
     return (
         network.with_input("pump_flow", 1.0)
-        .with_state("heater_on", start=1.0, update=lambda s: sp.Piecewise((0.0, s.T_oil > 29.0), (1.0, s.T_oil < 28.0), (s.heater_on, True)))
+        .with_state("heater_on", start=1.0, update=thermostat)
         .with_source("oil", lambda s: 4000.0 * s.heater_on, name="heater (electric)")
         .with_source("oil", lambda s: 3.0 * s.pump_flow, name="pump", is_loss=True)
         .with_link("housing", "cellar", lambda s: 3.0, temperature=lambda s: 0.0 * s.T_ambient + 10.0)
@@ -249,3 +259,14 @@ def test_different_fmus_do_not_touch_each_other(build_fmu: Build, fzg: Gearbox, 
             first.step(1.0)
             second.step(1.0)
         assert (first.get(*OUTPUTS), second.get(*OUTPUTS)) == expected
+
+
+def test_messages_are_safe_as_printf_formats(fzg_fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with zipfile.ZipFile(fzg_fmu) as archive:
+        archive.extractall(tmp_path)
+    resources = str(tmp_path / "resources")
+    monkeypatch.syspath_prepend(resources)
+    module = importlib.import_module((tmp_path / "resources/slavemodule.txt").read_text())
+    slave = module.Slave(instance_name="a", resources=resources)
+    slave.log("at 100 %s")
+    assert slave.log_queue[-1].msg == "at 100 %%s"

@@ -1,7 +1,7 @@
 """Our own numbers, kept to see any change: losses of the full model, and one cycle of the rig.
 
-``python -m tests.golden.regenerate`` writes the file anew. Do that when the physics changes on purpose, and say so in the
-changelog; never to turn a red test green.
+``python -m tests.golden.regenerate`` writes the file anew. Do that when the physics changes on purpose, and say so in
+the changelog; never to turn a red test green.
 """
 
 from __future__ import annotations

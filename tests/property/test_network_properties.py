@@ -23,8 +23,8 @@ from models.simulation import Result, network_system
 GEARBOX = load_gearbox("fzg")
 NETWORK, LOSSES = GEARBOX.network(), GEARBOX.losses()
 PARTS = [part.name for part in NETWORK.parts]
-KNOTS = np.arange(0.0, 181.0, 60.0)
-RAMPS = {"speed": [300.0, 3000.0, 4000.0, 500.0], "torque": [10.0, 60.0, 300.0, -40.0]}
+KNOTS = np.arange(0.0, 121.0, 60.0)
+RAMPS = {"speed": [500.0, 3000.0, 1500.0], "torque": [20.0, 200.0, 60.0]}
 
 
 def ramps(dt: float) -> dict[str, Any]:
@@ -34,17 +34,17 @@ def ramps(dt: float) -> dict[str, Any]:
         "time_s": time,
         "speed_rpm": np.interp(time, KNOTS, RAMPS["speed"]),
         "torque_Nm": np.interp(time, KNOTS, RAMPS["torque"]),
-        "T_ambient_degC": np.interp(time, KNOTS, [20.0, 24.0, 26.0, 20.0]),
+        "T_ambient_degC": np.interp(time, KNOTS, [20.0, 26.0, 22.0]),
     }
 
 
-def waves(dt: float, end: float = 160.0) -> dict[str, Any]:
+def waves(dt: float, end: float = 120.0) -> dict[str, Any]:
     """A smooth cycle; between rows it is the polygon through its samples, so another `dt` is another cycle."""
     time = np.arange(round(end / dt) + 1) * dt
     return {
         "time_s": time,
         "speed_rpm": 2000.0 + 1500.0 * np.sin(2 * np.pi * time / 150.0),
-        "torque_Nm": 100.0 + 120.0 * np.sin(2 * np.pi * time / 97.0),
+        "torque_Nm": 140.0 + 100.0 * np.sin(2 * np.pi * time / 97.0),
     }
 
 
@@ -61,7 +61,7 @@ def closed(result: Result) -> float:
 # ------------------------------------------------------------------------------------------------- heat is conserved
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=6, deadline=None)
 @given(
     speed=st.lists(st.floats(-6500.0, 6500.0), min_size=4, max_size=4),
     torque=st.lists(st.floats(-350.0, 350.0), min_size=4, max_size=4),
@@ -137,7 +137,7 @@ def test_communication_step_does_not_matter() -> None:
 @pytest.fixture
 def exact_film_temperature(monkeypatch: pytest.MonkeyPatch) -> None:
     """A right-hand side without the film temperature's tolerance, which a small error estimate would run into."""
-    monkeypatch.setattr(friction, "FILM_TEMPERATURE_TOL", 1e-7)
+    monkeypatch.setattr(friction, "FILM_TEMPERATURE_TOL", 1e-6)
 
 
 @pytest.mark.usefixtures("exact_film_temperature")
@@ -165,7 +165,7 @@ def test_agrees_with_an_independent_integrator(cycle: dict[str, Any]) -> None:
         def jacobian(t: float, T: np.ndarray, row: int = row) -> np.ndarray:
             return system.balance(t, table[row], T).matrix
 
-        solution = solve_ivp(rate, (t_0, t_1), T, method="Radau", rtol=1e-8, atol=1e-6, jac=jacobian)
+        solution = solve_ivp(rate, (t_0, t_1), T, method="Radau", rtol=1e-7, atol=1e-5, jac=jacobian)
         assert solution.success
         T = solution.y[:, -1]
         worst = np.maximum(worst, np.abs(T - stack(result)[row + 1]))
@@ -210,6 +210,9 @@ def test_steady_variants_are_separate_runs() -> None:
         assert both.temperatures["oil"][i] == pytest.approx(one.temperatures["oil"][0], abs=1e-6)
 
 
+SHORT = {name: values[:9] for name, values in ramps(10.0).items()}
+
+
 def branching(s: Any) -> float:
     return 40.0 if s.T_oil > 22.0 else 10.0 * s.T_oil / 22.0
 
@@ -221,7 +224,7 @@ def test_numeric_law_equals_its_expression() -> None:
     assert not traced.numeric_laws
     assert numeric.numeric_laws
     for parameters in (None, {"h_air": np.array([1.0, 2.0])}):
-        runs = [n.simulate(ramps(10.0), losses=LOSSES, initial=20.0, parameters=parameters) for n in (traced, numeric)]
+        runs = [n.simulate(SHORT, losses=LOSSES, initial=20.0, parameters=parameters) for n in (traced, numeric)]
         assert np.abs(stack(runs[0]) - stack(runs[1])).max() < 1e-9
         assert runs[0].extra_heat["extra"] == pytest.approx(runs[1].extra_heat["extra"], rel=1e-12)
 
@@ -232,9 +235,7 @@ def test_branching_law_equals_its_piecewise() -> None:
     )
     branched = NETWORK.with_source("oil", branching, name="extra")
     for parameters in (None, {"h_air": np.array([1.0, 2.0])}):
-        runs = [
-            n.simulate(ramps(10.0), losses=LOSSES, initial=20.0, parameters=parameters) for n in (written, branched)
-        ]
+        runs = [n.simulate(SHORT, losses=LOSSES, initial=20.0, parameters=parameters) for n in (written, branched)]
         assert np.abs(stack(runs[0]) - stack(runs[1])).max() < 1e-9
     steady = [n.steady_state(losses=LOSSES, speed=1500.0, torque=50.0) for n in (written, branched)]
     assert stack(steady[0]) == pytest.approx(stack(steady[1]), abs=1e-6)
@@ -243,7 +244,7 @@ def test_branching_law_equals_its_piecewise() -> None:
 def test_numeric_conductance() -> None:
     written = NETWORK.with_link("oil", "frame", lambda s: sp.Max(s.speed, 0.0) / 1000.0, name="x")
     numeric = NETWORK.with_link("oil", "frame", lambda s: max(s.speed, 0.0) / 1000.0, name="x")
-    runs = [n.simulate(ramps(10.0), losses=LOSSES, initial=20.0) for n in (written, numeric)]
+    runs = [n.simulate(SHORT, losses=LOSSES, initial=20.0) for n in (written, numeric)]
     assert np.abs(stack(runs[0]) - stack(runs[1])).max() < 1e-9
     assert closed(runs[1]) < 1e-6
 
@@ -251,20 +252,16 @@ def test_numeric_conductance() -> None:
 # ------------------------------------------------------------------------------------------------- extension
 
 
-def long_run(
-    network: ThermalNetwork, *, speed: float = 3000.0, torque: float = 200.0, end: float = 7200.0, dt: float = 60.0
-) -> Result:
+def long_run(network: ThermalNetwork, *, end: float, dt: float = 60.0, initial: float = 27.0) -> Result:
+    """The rig at 3000 rpm, 200 N m."""
     time = np.arange(0.0, end + 1.0, dt)
-    return network.simulate(
-        {"time_s": time, "speed_rpm": np.full(len(time), speed), "torque_Nm": np.full(len(time), torque)},
-        losses=LOSSES,
-        initial=27.0,
-    )
+    cycle = {"time_s": time, "speed_rpm": np.full(len(time), 3000.0), "torque_Nm": np.full(len(time), 200.0)}
+    return network.simulate(cycle, losses=LOSSES, initial=initial)
 
 
 def test_example_of_the_design() -> None:
     """Users extend the model without editing the package."""
-    gearbox, cycle = GEARBOX, ramps(10.0) | {"T_ambient_degC": np.full(19, 20.0)}
+    gearbox, cycle = GEARBOX, ramps(10.0) | {"T_ambient_degC": np.full(13, 20.0)}
     network = gearbox.network()
     network = network.with_source("oil", lambda s: 8.0 * (s.speed / 3000.0) ** 3, name="extra")
     network = network.with_link("housing", "frame", lambda s: 3.0)
@@ -309,7 +306,7 @@ def test_thermostat_with_hysteresis() -> None:
         start=0.0,
         update=lambda s: sp.Piecewise((1.0, s.T_oil > 80.0), (0.0, s.T_oil < 70.0), (s.valve, True)),
     ).with_link("oil", "cooler", lambda s: 25.0 * s.valve, temperature=20.0)
-    result = long_run(network, end=14400.0, dt=20.0)
+    result = long_run(network, end=4800.0, dt=20.0, initial=60.0)
     oil = result.temperatures["oil"]
     assert closed(result) < 1e-6
     inside = oil[np.argmax(oil > 80.0) :]
@@ -318,8 +315,7 @@ def test_thermostat_with_hysteresis() -> None:
     turns = np.flatnonzero(np.diff(np.sign(np.diff(inside))) != 0)
     assert len(turns) >= 4  # a limit cycle between both thresholds
     assert set(np.round(inside[turns + 1][:4] / 10.0)) == {7.0, 8.0}
-    free = long_run(NETWORK, end=14400.0).temperatures["oil"]
-    assert free[-1] > 100.0
+    assert long_run(NETWORK, end=4800.0, initial=60.0).temperatures["oil"][-1] > 100.0
 
 
 def test_state_that_decays() -> None:

@@ -73,6 +73,14 @@ def test_gupta_by_hand() -> None:
     assert phi == pytest.approx((1 - 0.066 * 0.5**0.42) / (1 + 0.213 * (1 + 2.23 * 0.4**0.83) * 0.5**0.64), rel=1e-12)
 
 
+def test_other_reductions_and_band_source_by_hand() -> None:
+    simple = ehl.thermal_reduction_gupta_simple(L=0.5, slide_roll_ratio=0.4)
+    assert simple == pytest.approx(1 / (1 + 0.1 * (1 + 14.8 * 0.4**0.83) * 0.5**0.64), rel=1e-12)
+    assert ehl.thermal_reduction_murch_wilson(L=0.5) == pytest.approx(3.94 / (3.94 + 0.5**0.62), rel=1e-12)
+    exact = 4.0 / 3.0 * np.sqrt(2.0 / np.pi) / 46.0 * np.sqrt(1.263e-5 * 2e-4 / 3.0)  # Blok; 1.06 rounds 1.0638
+    assert ehl.band_source_resistance(b_H=2e-4, u=3.0, k=46.0, chi=1.263e-5) == pytest.approx(exact, rel=4e-3)
+
+
 def test_gupta_numerator_is_held() -> None:
     phi = ehl.thermal_reduction_gupta(p_H=2e9, E_red=E_RED, L=1e4, slide_roll_ratio=0.0)
     assert phi == pytest.approx(0.1 / (1.0 + 0.213 * 1e4**0.64), rel=1e-12)

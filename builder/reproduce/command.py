@@ -1,0 +1,46 @@
+"""The verb ``reproduce``."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import click
+
+from builder import console
+
+
+@click.command("reproduce")
+@click.option("--output", type=click.Path(path_type=Path, file_okay=False), default=Path("out/paper"), show_default=True,
+              metavar="DIR", help="Folder for the report, its figures and the FMU.")  # fmt: skip
+@click.option("--seed", type=click.IntRange(min=0, max=2**32 - 1), default=0, show_default=True, metavar="N",
+              help="Seed of samples and starts.")  # fmt: skip
+@click.option("--jobs", type=click.IntRange(min=1), default=None, metavar="N",
+              help="Processes on this machine.  [default: all cores]")  # fmt: skip
+def reproduce(output: Path, seed: int, jobs: int | None) -> None:
+    """Recompute every table and figure of the paper, ours beside what it prints, into one report."""
+    from builder.reproduce.report import FIGURES, NUMBERS, PAGE, verdict_rows  # imports plotly, scikit-learn and onnx
+    from builder.reproduce.reproduce import reproduce as run
+    from builder.reproduce.study import Settings
+
+    begin = time.perf_counter()
+    with _stages() as tell:
+        report = run(output, settings=Settings(seed=seed, jobs=-1 if jobs is None else jobs), progress=tell)
+    console.table("The paper, reproduced", ["item", "what", "verdict"], verdict_rows(report.items))
+    counted = ", ".join(f"{number} {verdict.value}" for verdict, number in report.count.items())
+    console.out.print(f"{len(report.items)} items: {counted}; {time.perf_counter() - begin:.0f} s")
+    for name in (PAGE, NUMBERS, f"{FIGURES}/", "fzg.fmu"):
+        console.out.print(f"wrote {output / name}")
+
+
+@contextmanager
+def _stages() -> Iterator[console.Report]:
+    """Stages of the work with the time they have taken, as lines that stay on a terminal; nothing in a pipe."""
+    if not console.err.is_terminal:
+        yield lambda line: None  # type: ignore[misc]
+        return
+    begin = time.perf_counter()
+    with console.err.status("starting") as status:
+        yield lambda line: status.update(f"{line}  ({time.perf_counter() - begin:.0f} s so far)")  # type: ignore[misc]

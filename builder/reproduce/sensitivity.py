@@ -1,0 +1,195 @@
+"""Which uncertain numbers of the definition the final oil temperature of Table 6 hangs on (Morris)."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from joblib import Parallel, delayed
+from SALib.analyze import morris as morris_analyze
+from SALib.sample import morris as morris_sample
+from threadpoolctl import threadpool_limits
+
+from builder.reproduce.figure import Curve, Figure, Plot
+from builder.reproduce.item import Item, Table, Verdict
+from builder.reproduce.study import OUTPUT_TORQUE, Study
+from models.cycle import COLUMNS
+from models.gearbox import Gearbox
+from models.losses import LossModel
+from models.network import ThermalNetwork
+from models.types import Array
+
+LEVELS = 4
+REACH = 2.0  # standard deviations to either side
+SHOWN = 12
+LONG_S = 2e5  # 60 time constants of the housing
+WITHOUT_EFFECT = ("factors.C_",)  # heat capacities: nothing in a steady state
+INPUTS = {"ambient.temperature_degC": "T_ambient", "ambient.air_speed_m_s": "air_speed"}
+FACTOR = "factors."
+
+
+@dataclass(frozen=True)
+class Group:
+    """Numbers of the definition that move together: equal ones of several bearings, shafts or flanks."""
+
+    name: str
+    paths: tuple[str, ...]
+
+
+def uncertain_groups(gearbox: Gearbox) -> tuple[Group, ...]:
+    """Everything with a prior, numbered twins together.
+
+    Examples
+    --------
+    >>> from models.gearbox import load_gearbox
+    >>> [group.paths for group in uncertain_groups(load_gearbox("fzg")) if group.name == "bearing.mu_bl"]
+    [('bearing.0.mu_bl', 'bearing.1.mu_bl', 'bearing.2.mu_bl', 'bearing.3.mu_bl')]
+    """
+    groups: dict[str, list[str]] = {}
+    for path, sd in gearbox.priors.items():
+        if sd > 0.0 and not path.startswith(WITHOUT_EFFECT):
+            groups.setdefault(re.sub(r"\.\d+", "", path), []).append(path)
+    return tuple(Group(name, tuple(paths)) for name, paths in groups.items())
+
+
+def sensitivity(study: Study, progress: Callable[[str], None]) -> Item:
+    """Morris study of the steady oil temperature at 20 m/s and the three torques of Table 6."""
+    groups = uncertain_groups(study.gearbox)
+    problem = {"num_vars": len(groups), "names": [g.name for g in groups], "bounds": [[-REACH, REACH]] * len(groups)}
+    z = morris_sample.sample(problem, study.settings.trajectories, num_levels=LEVELS, seed=study.settings.seed)
+    progress(f"sensitivity: {len(z)} variants of the definition")
+    oil = final_oil(study, groups, z)
+    indices = [
+        morris_analyze.analyze(problem, z, oil[:, i], num_levels=LEVELS, seed=study.settings.seed)
+        for i in range(len(OUTPUT_TORQUE))
+    ]
+    # An elementary effect is a change over the whole reach; told per standard deviation.
+    per_sd = np.array([np.asarray(one["mu_star"], dtype=float) for one in indices]) / (2.0 * REACH)
+    bent = np.array([np.asarray(one["sigma"], dtype=float) for one in indices]) / (2.0 * REACH)
+    sign = np.sign([np.asarray(one["mu"], dtype=float) for one in indices])
+    order = np.argsort(-per_sd.max(axis=0))[:SHOWN]
+    order = order[np.argsort(-per_sd[1, order])]
+    labels = tuple(_label(groups[i].name) for i in order)
+    curves = tuple(
+        Curve(label=f"T₂ = {torque:g} N m", kind="bars", x=per_sd[k, order], y=np.arange(float(len(order))), names=labels)
+        for k, torque in enumerate(OUTPUT_TORQUE)
+    )
+    rows = tuple(
+        (_label(groups[i].name), *(f"{'+' if sign[k, i] >= 0 else '-'}{per_sd[k, i]:.2f} ({bent[k, i]:.2f})"
+                                   for k in range(len(OUTPUT_TORQUE))))
+        for i in order
+    )  # fmt: skip
+    rest = per_sd[:, np.argsort(-per_sd.max(axis=0))[SHOWN:]]
+    first = [_label(groups[int(np.argmax(row))].name) for row in per_sd]
+    return Item(
+        key="Sensitivity",
+        title="What the final oil temperature hangs on",
+        reading=f"Morris' elementary effects (SALib), {study.settings.trajectories} trajectories over the {len(groups)} groups "
+        f"of uncertain numbers of the definition, {REACH:g} standard deviations of their priors to either side; steady state "
+        "at 20 m/s with the full model. Equal numbers of the bearings, the shafts and the flanks move together. Largest: "
+        + "; ".join(f"{name} at {torque:g} N m" for name, torque in zip(first, OUTPUT_TORQUE, strict=True)) + ".",
+        tables=(Table(
+            title="Change of the oil temperature in K per standard deviation (spread of the effects)",
+            header=("number of the definition", *(f"T₂ = {torque:g} N m" for torque in OUTPUT_TORQUE)), rows=rows,
+            note=f"The other {rest.shape[1]} are below {rest.max(initial=0.0):.1f} K. A spread as large as the effect tells of "
+            "curvature or of interplay with others.",
+        ),),
+        figures=(Figure(
+            name="sensitivity", title="What the final oil temperature hangs on", caption="Mean absolute elementary effect.",
+            panels=(Plot(title="Effect on the oil at 20 m/s", x_label="Change in K per standard deviation of the prior",
+                         y_label="", curves=curves),)),),
+        without_checks=Verdict.OURS,
+    )  # fmt: skip
+
+
+def final_oil(study: Study, groups: tuple[Group, ...], z: Array) -> Array:
+    """Steady oil temperature of variants [degC], shape (variants, 3 torques); `z` in standard deviations."""
+    varied = [_variant(study.gearbox, groups, row) for row in z]
+    # Variants that share the definition and differ in factors or inputs only are solved at once.
+    shared: dict[tuple[tuple[str, float], ...], list[int]] = {}
+    for index, (definition, _, _) in enumerate(varied):
+        shared.setdefault(tuple(definition.items()), []).append(index)
+    parts = Parallel(n_jobs=study.settings.jobs)(
+        delayed(_settled)(
+            study.gearbox, dict(definition), [varied[i][1] for i in rows], [varied[i][2] for i in rows],
+            float(study.pinion_speed[-1]), study.pinion_torque,
+        )
+        for definition, rows in shared.items()
+    )  # fmt: skip
+    oil = np.empty((len(z), len(OUTPUT_TORQUE)))
+    for rows, part in zip(shared.values(), parts, strict=True):
+        oil[rows] = part
+    return oil
+
+
+def _variant(
+    gearbox: Gearbox, groups: tuple[Group, ...], z: Array
+) -> tuple[dict[str, float], dict[str, float], dict[str, float]]:
+    """Values of the definition, factors of the network, and inputs of one variant."""
+    definition, factors, inputs = {}, {}, {}
+    for group, deviation in zip(groups, z.tolist(), strict=True):
+        for path in group.paths:
+            value, sd = float(gearbox.leaves[path]), gearbox.priors[path]
+            if path.startswith(FACTOR):
+                factors[path.removeprefix(FACTOR)] = value * float(np.exp(deviation * sd))
+            elif path in INPUTS:
+                inputs[INPUTS[path]] = value + deviation * sd
+            else:
+                definition[path] = max(value + deviation * sd, 0.0)
+    return definition, factors, inputs
+
+
+def _settled(
+    gearbox: Gearbox,
+    definition: Mapping[str, float],
+    factors: list[dict[str, float]],
+    inputs: list[dict[str, float]],
+    speed: float,
+    torque: Array,
+) -> Array:
+    """Oil temperature, shape (variants, torques)."""
+    changed = gearbox.with_values(definition)
+    network, losses, count = changed.network(), changed.losses(), len(torque)
+
+    def columns(rows: list[dict[str, float]]) -> dict[str, Any]:
+        return {name: np.repeat([row[name] for row in rows], count) for name in rows[0]}
+
+    with threadpool_limits(1):
+        try:
+            result = network.steady_state(
+                losses=losses, speed=speed, torque=np.tile(torque, len(factors)), inputs=columns(inputs),
+                parameters=columns(factors),
+            )  # fmt: skip
+            return np.asarray(result.temperatures["oil"][:, 0].reshape(len(factors), count))
+        except ArithmeticError:
+            # Far from the nominal definition the iteration to the steady state may not end; time always does.
+            return np.array([
+                [_after_long(network, losses, speed, T1, given, factor) for T1 in torque.tolist()]
+                for factor, given in zip(factors, inputs, strict=True)
+            ])  # fmt: skip
+
+
+def _after_long(
+    network: ThermalNetwork,
+    losses: LossModel,
+    speed: float,
+    torque: float,
+    inputs: Mapping[str, float],
+    factors: Mapping[str, float],
+) -> float:
+    """Oil temperature after a time that is long for everything, [degC]."""
+    cycle = {"time_s": (0.0, LONG_S), "speed_rpm": (speed,) * 2, "torque_Nm": (torque,) * 2}
+    cycle |= {COLUMNS[name][0]: (value,) * 2 for name, value in inputs.items()}
+    result = network.simulate(cycle, losses=losses, parameters=factors)  # type: ignore[arg-type]
+    return float(result.temperatures["oil"][-1])
+
+
+def _label(name: str) -> str:
+    """Path of the definition as words."""
+    words = name.replace("stage.", "").replace("factors.", "factor of ").replace("_", " ").replace(".", ", ")
+    for unit, shown in (("W m2K", "W/(m² K)"), ("W mK", "W/(m K)"), ("W K", "W/K"), ("m2", "m²"), ("m s", "m/s")):
+        words = re.sub(rf" {unit}$", f" in {shown}", words)
+    return re.sub(r" (mm|m|degC|l|kg)$", r" in \1", words).replace("degC", "°C")

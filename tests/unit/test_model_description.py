@@ -1,0 +1,100 @@
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+import pytest
+from fmpy.validation import validate_fmu
+
+from builder.model_description import Identity, model_description
+from builder.signals import SignalTable, signal_table
+from models.gearbox import Gearbox
+
+IDENTITY = Identity(
+    model_name="a < b & c",
+    model_identifier="box",
+    description="Überlast",
+    version="1",
+    author="me",
+    license="x",
+    copyright="y",
+    generation_tool="z",
+    flags={"needsExecutionTool": True, "canGetAndSetFMUstate": False},
+)
+
+
+def parsed(xml: bytes) -> ET.Element:
+    return ET.fromstring(xml)  # noqa: S314 - our own
+
+
+@pytest.fixture(scope="module")
+def table(fzg: Gearbox) -> SignalTable:
+    return signal_table(fzg)
+
+
+@pytest.fixture(scope="module")
+def root(table: SignalTable) -> ET.Element:
+    return parsed(model_description(table, IDENTITY))
+
+
+def test_same_arguments_same_bytes(table: SignalTable) -> None:
+    assert model_description(table, IDENTITY) == model_description(table, IDENTITY)
+    assert b"generationDateAndTime" not in model_description(table, IDENTITY)
+
+
+def test_guid_depends_on_description_and_content(table: SignalTable) -> None:
+    guids = {
+        parsed(xml).get("guid")
+        for xml in (
+            model_description(table, IDENTITY),
+            model_description(table, IDENTITY, content=b"x"),
+            model_description(table, replace(IDENTITY, version="2")),
+            model_description(SignalTable(list(table)[:-1]), IDENTITY),
+        )
+    }
+    assert len(guids) == 4
+
+
+def test_texts_are_escaped(root: ET.Element) -> None:
+    assert root.get("modelName") == "a < b & c"
+    assert root.get("description") == "Überlast"
+
+
+def test_flags_and_sources_are_the_callers(table: SignalTable, root: ET.Element) -> None:
+    simulation = root.find("CoSimulation")
+    assert simulation is not None
+    assert simulation.get("needsExecutionTool") == "true"
+    assert simulation.get("canGetAndSetFMUstate") == "false"
+    native = parsed(model_description(table, replace(IDENTITY, source_files=("a.c", "b.c"))))
+    assert [f.get("name") for f in native.iterfind("CoSimulation/SourceFiles/File")] == ["a.c", "b.c"]
+
+
+def test_units_have_base_units_and_display_units(root: ET.Element) -> None:
+    units = {unit.get("name"): unit for unit in root.iterfind("UnitDefinitions/Unit")}
+    assert set(units) == {"rad/s", "N.m", "K", "m/s", "W", "1"}
+    watt, kelvin, speed = (units[name] for name in ("W", "K", "rad/s"))
+    assert dict(watt[0].attrib) == {"kg": "1", "m": "2", "s": "-3"}
+    assert watt[1].attrib == {"name": "kW", "factor": "0.001"}
+    assert kelvin[1].attrib == {"name": "degC", "offset": "-273.15"}
+    assert speed[1].get("name") == "rpm"
+    assert float(speed[1].get("factor", "")) == pytest.approx(9.549296585513721)
+
+
+def test_indices_of_the_structure_are_one_based_places(root: ET.Element, table: SignalTable) -> None:
+    names = [v.get("name") for v in root.iterfind("ModelVariables/ScalarVariable")]
+    unknowns = {names[int(u.get("index", "")) - 1]: u for u in root.iterfind("ModelStructure/InitialUnknowns/Unknown")}
+    assert set(unknowns) == {signal.name for signal in table if signal.causality == "output"}
+    depends = [names[int(i) - 1] for i in unknowns["oil.T"].get("dependencies", "").split()]
+    assert depends == ["initial.uniform", "initial.T", "oil.T_start"]
+
+
+def test_only_what_must_have_a_start_value_has_one(root: ET.Element) -> None:
+    for variable in root.iterfind("ModelVariables/ScalarVariable"):
+        has = variable[0].get("start") is not None
+        assert has == (variable.get("causality") in ("input", "parameter")), variable.get("name")
+
+
+def test_fmpy_finds_no_problem(table: SignalTable, tmp_path: Path) -> None:
+    (tmp_path / "modelDescription.xml").write_bytes(model_description(table, IDENTITY))
+    assert validate_fmu(str(tmp_path)) == []
