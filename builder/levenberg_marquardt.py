@@ -7,12 +7,14 @@ blocks of rows that stay in the cache, so that one iteration costs milliseconds.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any, Self
 
 import numpy as np
-from scipy.linalg import LinAlgError, blas, cho_factor, cho_solve
+from scipy.linalg import LinAlgError, cho_factor, cho_solve
 from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.model_selection import train_test_split
 from sklearn.utils.validation import check_array, check_is_fitted, check_X_y
@@ -131,16 +133,24 @@ def jacobian_transposed(shapes: LayerShapes, parameters: Array, rows: Array) -> 
     return outputs, jacobian
 
 
-def _normal_equations(shapes: LayerShapes, parameters: Array, rows: Array, targets: Array) -> tuple[Array, Array]:
-    """Upper triangle of J^T J, shape (P, P), and J^T r, shape (P,), for r = outputs - targets."""
-    hessian = np.zeros((shapes.count, shapes.count), order="F")
-    gradient = np.zeros(shapes.count)
-    for start in range(0, len(rows), BLOCK_ROWS):
+def _normal_equations(
+    shapes: LayerShapes, parameters: Array, rows: Array, targets: Array, pool: ThreadPoolExecutor
+) -> tuple[Array, Array]:
+    """J^T J, shape (P, P), and J^T r, shape (P,), for r = outputs - targets.
+
+    Blocks of rows are spread over threads and summed in their own order: the same bits however many threads there are.
+    """
+
+    def block(start: int) -> tuple[Array, Array]:
         outputs, jacobian = jacobian_transposed(shapes, parameters, rows[start : start + BLOCK_ROWS])
         residual = (outputs - targets[start : start + BLOCK_ROWS].T).ravel()
         flat = jacobian.reshape(shapes.count, -1)
-        hessian = blas.dsyrk(1.0, flat.T, beta=1.0, c=hessian, trans=1, overwrite_c=1)
-        gradient += flat @ residual
+        return flat @ flat.T, flat @ residual  # numpy recognises the product as symmetric, and releases the lock
+
+    hessian, gradient = np.zeros((shapes.count, shapes.count)), np.zeros(shapes.count)
+    for hessian_part, gradient_part in pool.map(block, range(0, len(rows), BLOCK_ROWS)):
+        hessian += hessian_part
+        gradient += gradient_part
     return hessian, gradient
 
 
@@ -152,7 +162,9 @@ class Step:
     loss: float  # mean square residual of the training rows
 
 
-def minimise(shapes: LayerShapes, parameters: Array, rows: Array, targets: Array) -> Iterator[Step]:
+def minimise(
+    shapes: LayerShapes, parameters: Array, rows: Array, targets: Array, pool: ThreadPoolExecutor
+) -> Iterator[Step]:
     """Levenberg-Marquardt with Nielsen's damping [1]_: yields the state after each step; ends where none improves it.
 
     References
@@ -166,7 +178,7 @@ def minimise(shapes: LayerShapes, parameters: Array, rows: Array, targets: Array
     damping, growth = DAMPING_START, 2.0
     loss = square(parameters)
     while True:
-        hessian, gradient = _normal_equations(shapes, parameters, rows, targets)
+        hessian, gradient = _normal_equations(shapes, parameters, rows, targets, pool)
         hessian /= targets.size
         gradient /= targets.size
         diagonal = hessian.diagonal().copy()
@@ -261,9 +273,9 @@ class LevenbergMarquardtRegressor(RegressorMixin, BaseEstimator):  # type: ignor
         if self.validation_fraction > 0.0:
             split = train_test_split(X, targets, test_size=self.validation_fraction, random_state=self.random_state)
         shapes = LayerShapes((X.shape[1], *self.hidden_layer_sizes, targets.shape[1]))
-        # One thread: the same sums in the same order whoever runs this, alone or beside other networks.
-        with threadpool_limits(1):
-            runs = [_Run(shapes, self.random_state, start, split) for start in range(max(self.starts, 1))]
+        # One thread of BLAS: the same sums in the same order whoever runs this, alone or beside other networks.
+        with threadpool_limits(1), ThreadPoolExecutor(os.cpu_count()) as pool:
+            runs = [_Run(shapes, self.random_state, start, split, pool) for start in range(max(self.starts, 1))]
             if len(runs) > 1:
                 for run in runs:
                     run.advance(min(self.start_iterations, self.max_iter), self.patience, self.tolerance)
@@ -293,11 +305,13 @@ class LevenbergMarquardtRegressor(RegressorMixin, BaseEstimator):  # type: ignor
 class _Run:
     """One start: its steps so far, and the weights that were best on the validation rows."""
 
-    def __init__(self, shapes: LayerShapes, seed: int, start: int, split: Sequence[Array]) -> None:
+    def __init__(
+        self, shapes: LayerShapes, seed: int, start: int, split: Sequence[Array], pool: ThreadPoolExecutor
+    ) -> None:
         rows, self._held_rows, targets, self._held_targets = split
         self._shapes = shapes
         self.best = shapes.initial(np.random.default_rng([seed, start]))
-        self._steps = minimise(shapes, self.best, rows, targets)
+        self._steps = minimise(shapes, self.best, rows, targets, pool)
         self.best_error = np.inf
         self.losses: list[float] = []
         self.errors: list[float] = []

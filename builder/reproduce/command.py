@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -13,12 +13,29 @@ from builder import console
 
 
 @click.command("reproduce")
-@click.option("--output", type=click.Path(path_type=Path, file_okay=False), default=Path("out/paper"), show_default=True,
-              metavar="DIR", help="Folder for the report, its figures and the FMU.")  # fmt: skip
-@click.option("--seed", type=click.IntRange(min=0, max=2**32 - 1), default=0, show_default=True, metavar="N",
-              help="Seed of samples and starts.")  # fmt: skip
-@click.option("--jobs", type=click.IntRange(min=1), default=None, metavar="N",
-              help="Processes on this machine.  [default: all cores]")  # fmt: skip
+@click.option(
+    "--output",
+    type=click.Path(path_type=Path, file_okay=False),
+    default=Path("out/paper"),
+    show_default=True,
+    metavar="DIR",
+    help="Folder for the report, its figures and the FMU.",
+)
+@click.option(
+    "--seed",
+    type=click.IntRange(min=0, max=2**32 - 1),
+    default=0,
+    show_default=True,
+    metavar="N",
+    help="Seed of samples and starts.",
+)
+@click.option(
+    "--jobs",
+    type=click.IntRange(min=1),
+    default=None,
+    metavar="N",
+    help="Processes on this machine.  [default: all cores]",
+)
 def reproduce(output: Path, seed: int, jobs: int | None) -> None:
     """Recompute every table and figure of the paper, ours beside what it prints, into one report."""
     from builder.reproduce.report import FIGURES, NUMBERS, PAGE, verdict_rows  # imports plotly, scikit-learn and onnx
@@ -36,11 +53,11 @@ def reproduce(output: Path, seed: int, jobs: int | None) -> None:
 
 
 @contextmanager
-def _stages() -> Iterator[console.Report]:
+def _stages() -> Iterator[Callable[[str], None]]:
     """Stages of the work with the time they have taken, as lines that stay on a terminal; nothing in a pipe."""
     if not console.err.is_terminal:
-        yield lambda line: None  # type: ignore[misc]
+        yield lambda _: None
         return
     begin = time.perf_counter()
     with console.err.status("starting") as status:
-        yield lambda line: status.update(f"{line}  ({time.perf_counter() - begin:.0f} s so far)")  # type: ignore[misc]
+        yield lambda line: status.update(f"{line}  ({time.perf_counter() - begin:.0f} s so far)")

@@ -47,7 +47,7 @@ class Curve:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Plot:
-    """Axes with curves; labels carry the unit."""
+    """Axes with curves; labels carry the unit. The y axis starts at zero unless told otherwise."""
 
     title: str
     x_label: str
@@ -56,6 +56,7 @@ class Plot:
     x_log: bool = False
     y_log: bool = False
     square: bool = False
+    from_zero: bool = True
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -145,8 +146,16 @@ class Figure:
                     add(panel.title, f"{a} - {b}", tells, "", None, "", None, None)
             elif isinstance(panel, Map):
                 for (i, j), z in np.ndenumerate(panel.z):
-                    add(panel.title, panel.z_label, float(z), panel.x_label, float(panel.x[j]), panel.y_label,
-                        float(panel.y[i]), None)  # fmt: skip
+                    add(
+                        panel.title,
+                        panel.z_label,
+                        float(z),
+                        panel.x_label,
+                        float(panel.x[j]),
+                        panel.y_label,
+                        float(panel.y[i]),
+                        None,
+                    )
             else:
                 for curve in panel.curves:
                     names = curve.names or ("",) * len(curve.x)

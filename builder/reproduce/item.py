@@ -63,10 +63,14 @@ def target(name: str, statement: str, found: str, met: bool, *, numbers: Mapping
     """A target of our own that the paper does not have; it leaves the item's verdict alone."""
     verdict = Verdict.MET if met else Verdict.MISSED
     plain = {key: float(value) for key, value in numbers.items()}
-    return Check(name=name, statement=statement, found=found, verdict=verdict, why="" if met else otherwise, numbers=plain)
+    return Check(
+        name=name, statement=statement, found=found, verdict=verdict, why="" if met else otherwise, numbers=plain
+    )
 
 
-def silent(name: str, statement: str, why: str, *, found: str = "", numbers: Mapping[str, float] | None = None) -> Check:
+def silent(
+    name: str, statement: str, why: str, *, found: str = "", numbers: Mapping[str, float] | None = None
+) -> Check:
     """A statement that nothing can be held against."""
     return Check(name=name, statement=statement, found=found, verdict=Verdict.SILENT, why=why, numbers=numbers or {})
 

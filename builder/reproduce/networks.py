@@ -1,4 +1,4 @@
-"""Section 4: the networks as printed and ours, against the full model on separate points (tables 3 and 4, figs. 5-8)."""
+"""Section 4: the networks as printed and ours, against the full model on separate points."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from builder.reproduce.figure import BLACK, Curve, Figure, Plot
 from builder.reproduce.item import Check, Item, Table, Verdict, judged, target
 from builder.reproduce.study import Study
 from builder.train import NO_LOSS_W, TrainingResult, r_squared
+from models.network import Losses
 from models.surrogate import SurrogateLosses
 from models.types import Array
 
@@ -56,9 +57,7 @@ class Judgement:
 
     def errors(self, *, corner: bool) -> Array:
         """Relative errors, shape (points, components)."""
-        y, y_hat = (
-            (self.corner_calculated, self.corner_predicted) if corner else (self.calculated, self.predicted)
-        )
+        y, y_hat = (self.corner_calculated, self.corner_predicted) if corner else (self.calculated, self.predicted)
         return np.abs(y_hat - y) / np.maximum(y, NO_LOSS_W)
 
 
@@ -71,8 +70,8 @@ def judge_networks(study: Study) -> dict[str, Judgement]:
     box = random_points(study.settings.judged, low, high, seed=study.settings.seed + 100)
     corner = random_points(study.settings.judged, low, low + CORNER * (high - low), seed=study.settings.seed + 101)
 
-    def power(losses: object, x: Array) -> Array:
-        return np.asarray(losses.power(x[:, 0], x[:, 1], x[:, 2:]))  # type: ignore[attr-defined]
+    def power(losses: Losses, x: Array) -> Array:
+        return losses.power(x[:, 0], x[:, 1], x[:, 2:])
 
     return {
         name: Judgement(
@@ -88,7 +87,13 @@ def judge_networks(study: Study) -> dict[str, Judgement]:
 def predictors(study: Study) -> list[Item]:
     """Tables 3 and 4, figs. 5 to 8, and the corner that R^2 hides."""
     judgements = judge_networks(study)
-    return [hyperparameters(study), bounds(study), layout(study), predictions(study, judgements), corner(study, judgements)]
+    return [
+        hyperparameters(study),
+        bounds(study),
+        layout(study),
+        predictions(study, judgements),
+        corner(study, judgements),
+    ]
 
 
 def hyperparameters(study: Study) -> Item:
@@ -104,7 +109,15 @@ def hyperparameters(study: Study) -> Item:
         "Levenberg-Marquardt",
         str(study.printed.preset.samples),
     )
-    own = ("2", widths, "all (full batch)", f"{ours.max_iter} at most", "sigmoid", "Levenberg-Marquardt", str(ours.samples))
+    own = (
+        "2",
+        widths,
+        "all (full batch)",
+        f"{ours.max_iter} at most",
+        "sigmoid",
+        "Levenberg-Marquardt",
+        str(ours.samples),
+    )
     differing = [what for (what, printed), value in zip(TABLE_3, run, strict=True) if printed != value]
     check = judged(
         "printed_set_up_is_run_as_printed",
@@ -117,12 +130,20 @@ def hyperparameters(study: Study) -> Item:
     return Item(
         key="Table 3",
         title="Hyperparameters of the networks",
-        reading="'As printed' starts from 6 random starts and keeps the best on the validation points. Ours sees logarithms "
-        "of speed, load and loss, the viscosity in place of the temperature, and points that are denser at low values.",
+        reading=(
+            "'As printed' starts from 6 random starts and keeps the best on the validation points. Ours sees logarithms"
+            " of speed, load and loss, the viscosity in place of the temperature, and points that are denser at low"
+            " values."
+        ),
         checks=(check,),
-        tables=(Table(title="Hyperparameters", header=("", "printed", "run as printed", "ours"),
-                      rows=tuple((what, p, r, o) for (what, p), r, o in zip(TABLE_3, run, own, strict=True))),),
-    )  # fmt: skip
+        tables=(
+            Table(
+                title="Hyperparameters",
+                header=("", "printed", "run as printed", "ours"),
+                rows=tuple((what, p, r, o) for (what, p), r, o in zip(TABLE_3, run, own, strict=True)),
+            ),
+        ),
+    )
 
 
 def bounds(study: Study) -> Item:
@@ -142,11 +163,17 @@ def bounds(study: Study) -> Item:
         title="Bounds of the design of experiment",
         reading="Ours reach to where a start begins and to the temperatures that Table 6 leads to.",
         checks=(
-            judged("bounds_as_printed", "Bounds of 9 inputs.", "The run as printed has the printed bounds; ours are wider.",
-                   same, numbers={"equal": float(same)}, otherwise="The preset departs from Table 4."),
+            judged(
+                "bounds_as_printed",
+                "Bounds of 9 inputs.",
+                "The run as printed has the printed bounds; ours are wider.",
+                same,
+                numbers={"equal": float(same)},
+                otherwise="The preset departs from Table 4.",
+            ),
         ),
         tables=(Table(title="Bounds", header=("input", "printed", "run as printed", "ours"), rows=rows),),
-    )  # fmt: skip
+    )
 
 
 def layout(study: Study) -> Item:
@@ -166,39 +193,53 @@ def layout(study: Study) -> Item:
         key="Fig. 5",
         title="Scheme of the reduced model: three networks",
         reading="NN_ZP is ours 'mesh', NN_Z0 'no load', NN_B 'bearings', which serves all bearings of one kind.",
-        tables=(Table(title="Our networks", header=("network", "inputs", "outputs", "hidden", "used", "trained in s"), rows=rows),),
+        tables=(
+            Table(
+                title="Our networks",
+                header=("network", "inputs", "outputs", "hidden", "used", "trained in s"),
+                rows=rows,
+            ),
+        ),
         without_checks=Verdict.SCHEME,
-    )  # fmt: skip
+    )
 
 
 def predictions(study: Study, judgements: Mapping[str, Judgement]) -> Item:
     """Figs. 6 to 8: calculated against predicted, normalised, for every output."""
-    groups = {"fig_06": [], "fig_07": [], "fig_08": []}  # type: dict[str, list[int]]
+    groups: dict[str, list[int]] = {"fig_06": [], "fig_07": [], "fig_08": []}
     for i, name in enumerate(study.full.components):
         seals = {seal.name for seal in study.gearbox.seal}
-        groups["fig_06" if name.startswith("mesh") else "fig_07" if name == "churning" or name in seals else "fig_08"].append(i)
+        groups[
+            "fig_06" if name.startswith("mesh") else "fig_07" if name == "churning" or name in seals else "fig_08"
+        ].append(i)
     titles = {
         "fig_06": "Fig. 6: sliding and rolling",
         "fig_07": "Fig. 7: churning and seals",
         "fig_08": "Fig. 8: bearings",
     }
     figures = tuple(
-        Figure(name=name, title=f"{titles[name]}, normalised", panels=tuple(_scatter(study, judgements, i) for i in columns),
-               caption=f"{study.settings.judged} points that no network was trained on; min-max normalised by the "
-               "calculated losses. R² in the titles: as printed / ours.")
+        Figure(
+            name=name,
+            title=f"{titles[name]}, normalised",
+            panels=tuple(_scatter(study, judgements, i) for i in columns),
+            caption=(
+                f"{study.settings.judged} points that no network was trained on; min-max normalised by the "
+                "calculated losses. R² in the titles: as printed / ours."
+            ),
+        )
         for name, columns in groups.items()
-    )  # fmt: skip
+    )
     return Item(
         key="Figs. 6-8",
         title="Calculated against predicted losses",
-        reading=f"{study.settings.judged} random points within Table 4, separate from the training; both sets of networks on "
-        "the same points.",
-        checks=(
-            *(high_r_squared(name, judgement) for name, judgement in judgements.items()),
+        reading=(
+            f"{study.settings.judged} random points within Table 4, separate from the training; both sets of networks"
+            " on the same points."
         ),
+        checks=(*(high_r_squared(name, judgement) for name, judgement in judgements.items()),),
         tables=(_errors_table("Over the bounds of Table 4", study, judgements, corner=False),),
         figures=figures,
-    )  # fmt: skip
+    )
 
 
 def high_r_squared(name: str, judgement: Judgement) -> Check:
@@ -227,19 +268,32 @@ def corner(study: Study, judgements: Mapping[str, Judgement]) -> Item:
                 Curve(label=name, x=100.0 * np.maximum(errors[shown], 1e-6), y=share[shown], colour=COLOUR[name])
             )
         panels.append(
-            Plot(title=title, x_label="Relative error in %", y_label="Share of points with less in %", x_log=True,
-                 curves=tuple(curves))
-        )  # fmt: skip
+            Plot(
+                title=title,
+                x_label="Relative error in %",
+                y_label="Share of points with less in %",
+                x_log=True,
+                curves=tuple(curves),
+            )
+        )
     return Item(
         key="Cold-start corner",
         title="What R² hides: the cold, slow, light corner",
-        reading=f"{study.settings.judged} random points in the lowest tenth of speed, torque and every temperature, where each "
-        "cold start begins. R² over the whole box hardly sees them, since the losses there are small.",
+        reading=(
+            f"{study.settings.judged} random points in the lowest tenth of speed, torque and every temperature, where"
+            " each cold start begins. R² over the whole box hardly sees them, since the losses there are small."
+        ),
         checks=(weak_at_the_lower_limits(judgements[PRINTED]), ours_is_not_weak(study.ours, judgements[OURS])),
         tables=(_errors_table("In the corner", study, judgements, corner=True),),
-        figures=(Figure(name="corner_errors", title="Relative errors of all outputs", panels=tuple(panels),
-                        caption="Cumulative: further left is better."),),
-    )  # fmt: skip
+        figures=(
+            Figure(
+                name="corner_errors",
+                title="Relative errors of all outputs",
+                panels=tuple(panels),
+                caption="Cumulative: further left is better.",
+            ),
+        ),
+    )
 
 
 def weak_at_the_lower_limits(judgement: Judgement) -> Check:
@@ -249,8 +303,8 @@ def weak_at_the_lower_limits(judgement: Judgement) -> Check:
     return judged(
         "printed_set_up_is_weak_at_the_lower_limits",
         "Around the lower limit of all parameters the networks agree less well (section 6, start of the cycle).",
-        f"As printed, the worst output's median error is {median.max():.0%} there, and 5 % of the points are off by more "
-        f"than {quantile.max():.0%}.",
+        f"As printed, the worst output's median error is {median.max():.0%} there, and 5 % of the points are off by"
+        f" more than {quantile.max():.0%}.",
         float(quantile.max()) > LARGE_ERROR,
         numbers={"worst_median": median.max(), "worst_95": quantile.max()},
         otherwise="The printed set-up is not weak there.",
@@ -263,8 +317,8 @@ def ours_is_not_weak(trained: TrainingResult, judgement: Judgement) -> Check:
     return target(
         "our_networks_are_not_weak_there",
         "Our target: not weak there.",
-        f"Ours: 95 % of the points are within {quantile.max():.1%} for the worst output ({trained.preset.samples} points per "
-        "network).",
+        f"Ours: 95 % of the points are within {quantile.max():.1%} for the worst output ({trained.preset.samples}"
+        " points per network).",
         float(quantile.max()) < SMALL_ERROR,
         numbers={"worst_95": quantile.max()},
         otherwise=f"More than 5 % of the points of an output are off by over {SMALL_ERROR:.0%}.",
@@ -280,8 +334,13 @@ def _scatter(study: Study, judgements: Mapping[str, Judgement], column: int) -> 
         curves.append(Curve(label=name, x=x, y=y, kind="points", colour=COLOUR[name]))
     score = " / ".join(f"{judgement.r_squared[column]:.5f}" for judgement in judgements.values())
     component = study.full.components[column].replace("_", " ")
-    return Plot(title=f"{component}, R² {score}", x_label="Calculated, normalised", y_label="Predicted, normalised",
-                curves=tuple(curves), square=True)  # fmt: skip
+    return Plot(
+        title=f"{component}, R² {score}",
+        x_label="Calculated, normalised",
+        y_label="Predicted, normalised",
+        curves=tuple(curves),
+        square=True,
+    )
 
 
 def _errors_table(title: str, study: Study, judgements: Mapping[str, Judgement], *, corner: bool) -> Table:

@@ -88,23 +88,32 @@ def published(study: Study) -> Item:
     return Item(
         key="Published numbers",
         title="Validation against numbers that are published",
-        reading="The paper prints no results that could be compared one by one; these sources do. tests/validation holds them "
-        "as tests. Tolerances are those of the sources: half a unit of the last printed digit unless the table says more.",
+        reading=(
+            "The paper prints no results that could be compared one by one; these sources do. tests/validation holds"
+            " them as tests. Tolerances are those of the sources: half a unit of the last printed digit unless the"
+            " table says more."
+        ),
         checks=(ours_are_the_published_numbers(rows, missed),),
         tables=(
             Table(
                 title="Published and ours",
                 header=("quantity", "source", "published", "ours", "tolerance", "within"),
                 rows=tuple(
-                    (row.what, row.source, f"{row.published:.{row.decimals}f}", f"{row.ours:.{row.decimals + 1}f}",
-                     f"{row.tolerance:.2g}", "yes" if row.met else "no")
+                    (
+                        row.what,
+                        row.source,
+                        f"{row.published:.{row.decimals}f}",
+                        f"{row.ours:.{row.decimals + 1}f}",
+                        f"{row.tolerance:.2g}",
+                        "yes" if row.met else "no",
+                    )
                     for row in rows
                 ),
             ),
             _bearings(study),
         ),
         without_checks=Verdict.OURS,
-    )  # fmt: skip
+    )
 
 
 def ours_are_the_published_numbers(rows: list[Comparison], missed: list[Comparison]) -> Check:
@@ -129,10 +138,13 @@ def _stages(study: Study) -> Iterator[Comparison]:
 
 def _gearpie(gearbox: Gearbox) -> Iterator[Comparison]:
     for case in CASES:
-        changed = gearbox.with_values({
-            "stage.0.face_width_mm": case.b_mm, "stage.0.profile_shift": (0.1817, 0.1715),
-            "stage.0.tip_shortening": case.tip_shortening,
-        })  # fmt: skip
+        changed = gearbox.with_values(
+            {
+                "stage.0.face_width_mm": case.b_mm,
+                "stage.0.profile_shift": (0.1817, 0.1715),
+                "stage.0.tip_shortening": case.tip_shortening,
+            }
+        )
         stage = changed.stage[0]
         pair = stage.pair()
         if case.name == "C14":
@@ -145,15 +157,25 @@ def _gearpie(gearbox: Gearbox) -> Iterator[Comparison]:
             yield Comparison("C14, Hertz pressure at C in MPa", "GEARpie", 1347.3, float(p_H) / 1e6, 0.3, 1)
             yield Comparison("C14, contact half-width in µm", "GEARpie", 199.6, float(b_H) * 1e6, 0.1, 1)
             points = contact_points(pair, model="potential_energy", r_bore=stage.bore_radius)
-            yield Comparison("C14, H_VL (load sharing)", "GEARpie", case.HVL, load_sharing_loss_factor(pair, points), 5.1e-5, 4)
-        mu = float(friction_schlenk(
-            F_bt_per_b=case.T_1 / pair.r_b[0] / pair.b, v_sum_C=2.0 * case.n_1 * RPM * pair.T1C,
-            rho_red_C=pair.rho_red_C, eta_oil=case.eta_mPas * 1e-3, Ra=0.5e-6 * sum(case.Ra_um), X_L=case.X_L,
-        ))  # fmt: skip
+            yield Comparison(
+                "C14, H_VL (load sharing)", "GEARpie", case.HVL, load_sharing_loss_factor(pair, points), 5.1e-5, 4
+            )
+        mu = float(
+            friction_schlenk(
+                F_bt_per_b=case.T_1 / pair.r_b[0] / pair.b,
+                v_sum_C=2.0 * case.n_1 * RPM * pair.T1C,
+                rho_red_C=pair.rho_red_C,
+                eta_oil=case.eta_mPas * 1e-3,
+                Ra=0.5e-6 * sum(case.Ra_um),
+                X_L=case.X_L,
+            )
+        )
         loss = case.T_1 * case.n_1 * RPM * case.HVL * mu
         yield Comparison(f"{case.name}, friction (Schlenk)", "GEARpie", case.mu, mu, 5.1e-5, 4)
         # Half a unit of the printed loss factor.
-        yield Comparison(f"{case.name}, mesh loss in W", "GEARpie", case.P_VZP, loss, case.P_VZP * (5e-5 / case.HVL + 5e-4), 1)
+        yield Comparison(
+            f"{case.name}, mesh loss in W", "GEARpie", case.P_VZP, loss, case.P_VZP * (5e-5 / case.HVL + 5e-4), 1
+        )
     pair = gearbox.stage[0].pair()
     for name, radius, diameter in (("pinion", pair.r_a[0], 82.46), ("wheel", pair.r_a[1], 118.36)):
         # The shifts are rounded: 0.012 mm.
@@ -188,7 +210,9 @@ def _bearings(study: Study) -> Table:
         header=("coefficients", *(f"T₂ = {t:g} N m" for t in torque)),
         rows=(
             (f"SKF 2016: μ_bl {own.mu_bl:g}, μ_EHL {own.mu_EHL:g} (ours)", *loss(study.gearbox)),
-            (f"Porto, mineral gear oil: μ_bl {PORTO_BEARINGS['mu_bl']:g}, μ_EHL {PORTO_BEARINGS['mu_EHL']:g}",
-             *loss(study.gearbox.with_values(changes))),
+            (
+                f"Porto, mineral gear oil: μ_bl {PORTO_BEARINGS['mu_bl']:g}, μ_EHL {PORTO_BEARINGS['mu_EHL']:g}",
+                *loss(study.gearbox.with_values(changes)),
+            ),
         ),
-    )  # fmt: skip
+    )

@@ -1,4 +1,4 @@
-"""Figures as plotly describes them: one drawing per panel, so that a page can set them side by side or one below another."""
+"""Figures as plotly describes them: one drawing per panel, so that a page can set them as its width allows."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def _drawing(panel: Panel, colours: dict[str, str]) -> dict[str, Any]:
     elif panel.square:
         layout["yaxis"] |= {"scaleanchor": "x", "constrain": "domain"}
         layout["xaxis"] |= {"constrain": "domain"}
-    elif not panel.y_log and min(float(np.min(curve.y)) for curve in panel.curves) >= 0.0:
+    elif panel.from_zero and not panel.y_log:
         layout["yaxis"] |= {"rangemode": "tozero"}
     data = [trace for curve in panel.curves for trace in _traces(curve, panel, colours[curve.label])]
     return {"data": data, "layout": layout}
@@ -76,14 +76,25 @@ def _traces(curve: Curve, panel: Plot, colour: str) -> list[dict[str, Any]]:
     hover = f"{panel.x_label}: %{{x}}<br>{panel.y_label}: %{{y}}{told}<extra>{curve.label}</extra>"
     if curve.kind == "bars":
         hover = f"{panel.x_label}: %{{x:.3g}}<extra>%{{y}}, {curve.label}</extra>"
-        return [common | {"type": "bar", "orientation": "h", "x": x, "y": list(curve.names), "marker": {"color": colour},
-                          "hovertemplate": hover}]  # fmt: skip
+        return [
+            common
+            | {
+                "type": "bar",
+                "orientation": "h",
+                "x": x,
+                "y": list(curve.names),
+                "marker": {"color": colour},
+                "hovertemplate": hover,
+            }
+        ]
     trace = common | names | {"type": "scatter", "x": x, "y": y, "hovertemplate": hover}
     if curve.kind == "points":
         marker = {"color": colour, "size": 5, "opacity": 0.75}
         return [trace | {"type": "scattergl" if len(x) > 2000 else "scatter", "mode": "markers", "marker": marker}]
     if curve.kind == "area":
-        return [trace | {"mode": "lines", "stackgroup": "all", "fillcolor": colour, "line": {"width": 0.5, "color": colour}}]
+        return [
+            trace | {"mode": "lines", "stackgroup": "all", "fillcolor": colour, "line": {"width": 0.5, "color": colour}}
+        ]
     if curve.kind == "band":
         low = curve.low if curve.low is not None else np.zeros_like(curve.y)
         edge = common | {"type": "scatter", "mode": "lines", "line": {"width": 0}, "hoverinfo": "skip", "x": x}
@@ -112,8 +123,9 @@ def _map(panel: Map) -> dict[str, Any]:
             "ticktext": [f"{level:g}" for level in panel.levels],
             "thickness": 14,
         },
-        "hovertemplate": f"{panel.x_label}: %{{x}}<br>{panel.y_label}: %{{y}}<br>{panel.z_label}: "
-        "%{customdata:.4g}<extra></extra>",
+        "hovertemplate": (
+            f"{panel.x_label}: %{{x}}<br>{panel.y_label}: %{{y}}<br>{panel.z_label}: %{{customdata:.4g}}<extra></extra>"
+        ),
     }
 
 
@@ -124,20 +136,35 @@ def _graph(panel: Graph, colours: dict[str, str]) -> list[dict[str, Any]]:
         (x_1, y_1), (x_2, y_2) = place[a], place[b]
         # Points along the line, so that the whole of it answers to hovering.
         share = np.linspace(0.0, 1.0, 15)
-        traces.append({
-            "type": "scatter", "mode": "lines", "x": _short(x_1 + share * (x_2 - x_1)),
-            "y": _short(y_1 + share * (y_2 - y_1)), "line": {"color": "#9A9A9A", "width": 1.0 + 6.0 * width},
-            "hovertemplate": f"{a} - {b}<br>{tells}<extra></extra>", "name": "link",
-        })  # fmt: skip
+        traces.append(
+            {
+                "type": "scatter",
+                "mode": "lines",
+                "x": _short(x_1 + share * (x_2 - x_1)),
+                "y": _short(y_1 + share * (y_2 - y_1)),
+                "line": {"color": "#9A9A9A", "width": 1.0 + 6.0 * width},
+                "hovertemplate": f"{a} - {b}<br>{tells}<extra></extra>",
+                "name": "link",
+            }
+        )
     for group in dict.fromkeys(knot.group for knot in panel.knots):
         knots = [knot for knot in panel.knots if knot.group == group]
-        traces.append({
-            "type": "scatter", "mode": "markers+text", "x": [k.x for k in knots], "y": [k.y for k in knots],
-            "text": [k.name.replace("_", " ") for k in knots], "customdata": [k.tells for k in knots],
-            "textposition": "top center", "textfont": {"size": 12}, "cliponaxis": False, "name": group,
-            "marker": {"size": 20, "color": colours[group], "line": {"color": "white", "width": 2}},
-            "hovertemplate": "%{text}<br>%{customdata}<extra></extra>",
-        })  # fmt: skip
+        traces.append(
+            {
+                "type": "scatter",
+                "mode": "markers+text",
+                "x": [k.x for k in knots],
+                "y": [k.y for k in knots],
+                "text": [k.name.replace("_", " ") for k in knots],
+                "customdata": [k.tells for k in knots],
+                "textposition": "top center",
+                "textfont": {"size": 12},
+                "cliponaxis": False,
+                "name": group,
+                "marker": {"size": 20, "color": colours[group], "line": {"color": "white", "width": 2}},
+                "hovertemplate": "%{text}<br>%{customdata}<extra></extra>",
+            }
+        )
     return traces
 
 

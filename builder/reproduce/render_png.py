@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -14,11 +15,13 @@ from matplotlib.patches import Patch
 
 from builder.plots import STYLE
 from builder.reproduce.figure import Curve, Figure, Graph, Map, Plot
+from models.types import Array
 
 WIDTH, HEIGHT, COLUMNS = 4.6, 3.6, 2  # inches per panel
 BAR_INCHES = 0.26
 COLOURS = "cividis"  # told apart with any colour vision
 BAR_THICKNESS = 0.8
+FEW = 12  # points that get a mark each
 
 
 def write_png(figure: Figure, path: Path) -> None:
@@ -27,7 +30,8 @@ def write_png(figure: Figure, path: Path) -> None:
     rows = -(-len(figure.panels) // columns)
     height = max(HEIGHT, *(_bar_height(panel) for panel in figure.panels))
     colours = figure.colours()
-    with mpl.rc_context({**STYLE, "font.size": 9.0}):
+    style: Any = STYLE
+    with mpl.rc_context(style):
         legend_rows = -(-len(colours) // (3 if columns == 1 else 4))
         size = (WIDTH * max(columns, 1.4), height * rows + 0.25 * legend_rows + 0.5)
         canvas = Canvas(figsize=size, layout="constrained")
@@ -46,7 +50,9 @@ def write_png(figure: Figure, path: Path) -> None:
                 _plot(ax, panel, colours, handles)
         if len(handles) > 1:
             canvas.legend(
-                handles=list(handles.values()), loc="outside lower center", ncols=min(len(handles), 3 if columns == 1 else 4)
+                handles=list(handles.values()),
+                loc="outside lower center",
+                ncols=min(len(handles), 3 if columns == 1 else 4),
             )
         canvas.savefig(path, format="png", dpi=150, metadata={"Software": None})
 
@@ -68,33 +74,45 @@ def _plot(ax: Axes, panel: Plot, colours: dict[str, str], handles: dict[str, Lin
         ax.set_xscale("log")
     if panel.y_log:
         ax.set_yscale("log")
-    base: np.ndarray | float = 0.0
     bars = [curve for curve in panel.curves if curve.kind == "bars"]
+    top: Array | float = 0.0  # of the areas so far
     for curve in panel.curves:
         colour = colours[curve.label]
         if curve.kind == "area":
-            top = base + curve.y
-            ax.fill_between(curve.x, base, top, color=colour, linewidth=0.0)
-            base = top
-        elif curve.kind == "band":
-            ax.fill_between(curve.x, curve.low if curve.low is not None else 0.0, curve.y, color=colour, linewidth=0.0)
+            ax.fill_between(curve.x, top, top + curve.y, color=colour, linewidth=0.0)
+            top = top + curve.y
         elif curve.kind == "bars":
             _bars(ax, curve, colour, bars.index(curve), len(bars))
-        elif curve.kind == "points":
-            ax.plot(curve.x, curve.y, linestyle="none", marker="o", markersize=2.6, markerfacecolor=colour,
-                    markeredgecolor="white", markeredgewidth=0.25)  # fmt: skip
         else:
-            mark = "o" if len(curve.x) <= 12 else ""
-            ax.plot(curve.x, curve.y, color=colour, linestyle="--" if curve.dashed else "-", linewidth=1.4, marker=mark,
-                    markersize=3.5)  # fmt: skip
+            _curve(ax, curve, colour)
         handles.setdefault(curve.label, _handle(curve, colour))
-    if not panel.y_log and not bars and min(float(np.min(c.y)) for c in panel.curves) >= 0.0 and not panel.square:
+    if panel.from_zero and not (panel.y_log or bars or panel.square):
         ax.set_ylim(bottom=0.0)
-    if any(curve.kind == "area" for curve in panel.curves):
+    if np.max(top) > 0.0:
         ax.margins(x=0.0)
-        ax.set_ylim(0.0, float(np.max(base)))
+        ax.set_ylim(0.0, float(np.max(top)))
     if panel.square:
         ax.set_aspect("equal", adjustable="box")
+
+
+def _curve(ax: Axes, curve: Curve, colour: str) -> None:
+    if curve.kind == "band":
+        ax.fill_between(curve.x, 0.0 if curve.low is None else curve.low, curve.y, color=colour, linewidth=0.0)
+    elif curve.kind == "points":
+        ax.plot(
+            curve.x,
+            curve.y,
+            linestyle="none",
+            marker="o",
+            markersize=2.6,
+            markerfacecolor=colour,
+            markeredgecolor="white",
+            markeredgewidth=0.25,
+        )
+    else:
+        mark = "o" if len(curve.x) <= FEW else ""
+        line = "--" if curve.dashed else "-"
+        ax.plot(curve.x, curve.y, color=colour, linestyle=line, linewidth=1.4, marker=mark, markersize=3.5)
 
 
 def _bars(ax: Axes, curve: Curve, colour: str, index: int, count: int) -> None:
@@ -131,8 +149,17 @@ def _graph(ax: Axes, panel: Graph, colours: dict[str, str], handles: dict[str, L
         (x_1, y_1), (x_2, y_2) = place[a], place[b]
         ax.plot([x_1, x_2], [y_1, y_2], color="#8A8A8A", linewidth=0.5 + 4.0 * width, zorder=1, solid_capstyle="round")
     for knot in panel.knots:
-        ax.text(knot.x, knot.y, knot.name.replace("_", " "), ha="center", va="center", fontsize=8, color="white", zorder=2,
-                bbox={"boxstyle": "round,pad=0.45", "facecolor": colours[knot.group], "edgecolor": "none"})  # fmt: skip
+        ax.text(
+            knot.x,
+            knot.y,
+            knot.name.replace("_", " "),
+            ha="center",
+            va="center",
+            fontsize=8,
+            color="white",
+            zorder=2,
+            bbox={"boxstyle": "round,pad=0.45", "facecolor": colours[knot.group], "edgecolor": "none"},
+        )
         handles.setdefault(knot.group, Patch(color=colours[knot.group], label=knot.group))
     ax.set_axis_off()
     ax.margins(0.1)

@@ -88,7 +88,7 @@ def page(report: Report) -> str:
         report=report,
         Verdict=Verdict,
         plotly=Markup(get_plotlyjs()),  # noqa: S704 - the library itself
-        drawings=Markup(_json({figure.name: render_html.drawings(figure) for figure in figures})),  # noqa: S704 - escaped
+        drawings=Markup(_json({figure.name: render_html.drawings(figure) for figure in figures})),
         legends={figure.name: render_html.legend(figure) for figure in figures},
         folder=FIGURES,
         wide=_wide,

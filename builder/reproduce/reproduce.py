@@ -40,8 +40,8 @@ def reproduce(
     Parameters
     ----------
     folder : Path
-        Where ``report.html``, ``report.json``, ``figures/`` and the FMU go; they appear together when all is done, files
-        of an earlier report are replaced, others left alone
+        Where ``report.html``, ``report.json``, ``figures/``, the FMU and its networks go; they appear together when all
+        is done, files of an earlier report are replaced, others left alone
     settings : Settings or None
     progress : callable
         Called with a line of text at every stage
@@ -97,6 +97,16 @@ def recompute(study: Study, progress: Callable[[str], None]) -> list[Item]:
     section_6 = [*drive_cycle(study), timing, pitch_velocities_are_the_wheels(study)]
     fig_13, boundaries = long_run(study, progress)
     return [
-        fig_1, fig_2, *section_3, *section_4, corner, *section_5, *section_6, fig_13, boundaries,
-        sensitivity(study, progress), published(study), loss_map(study),
-    ]  # fmt: skip
+        fig_1,
+        fig_2,
+        *section_3,
+        *section_4,
+        corner,
+        *section_5,
+        *section_6,
+        fig_13,
+        boundaries,
+        sensitivity(study, progress),
+        published(study),
+        loss_map(study),
+    ]

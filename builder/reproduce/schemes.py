@@ -17,7 +17,10 @@ WIDEST = 100.0  # W/K, drawn as the widest line
 def schemes(study: Study) -> list[Item]:
     """Figs. 1 and 2."""
     steps = (
-        ("full model on sampled points", f"{study.ours.preset.samples} points for each of {len(study.ours.networks)} networks"),
+        (
+            "full model on sampled points",
+            f"{study.ours.preset.samples} points for each of {len(study.ours.networks)} networks",
+        ),
         ("training, validation, test", "80 %, 10 %, 10 %"),
         ("networks", ", ".join(one.network.name.replace("_", " ") for one in study.ours.networks)),
         ("sampling and training together", f"{study.ours.seconds:.1f} s"),
@@ -71,31 +74,34 @@ def thermal_network(study: Study) -> Item:
     return Item(
         key="Fig. 9",
         title=f"Scheme of the thermal network, {len(network.nodes)} elements",
-        reading=f"Drawn from the definition. Conductances at 8.3 m/s and T₂ = 141 N m in steady state, oil at "
-        f"{temperature['oil']:.1f} °C. The frame is there and not linked: the paper gives no foundation.",
+        reading=(
+            "Drawn from the definition. Conductances at 8.3 m/s and T₂ = 141 N m in steady state, oil at "
+            f"{temperature['oil']:.1f} °C. The frame is there and not linked: the paper gives no foundation."
+        ),
         tables=(Table(title="Conductances", header=("link", "W/K"), rows=rows),),
         figures=(
             Figure(
-                name="fig_09", title="Fig. 9: thermal network of the rig",
+                name="fig_09",
+                title="Fig. 9: thermal network of the rig",
                 panels=(Graph(title="Wider lines conduct more; hover for values", knots=knots, edges=edges),),
                 caption="Heat enters at the mesh (sliding, rolling), the bearings, and the oil (churning, seals).",
             ),
         ),
         without_checks=Verdict.SCHEME,
-    )  # fmt: skip
+    )
 
 
 def _place(study: Study, name: str) -> tuple[float, float]:
-    """Columns from the air on the left to the mesh on the right, the oil below."""
-    columns = [
-        ["frame", "air"],
-        list(study.network.groups["housing"]),
-        list(study.network.groups["bearings"])[::-1],
-        list(study.network.groups["shafts"])[::-1],
-        list(study.network.groups["gears"])[::-1],
-        ["mesh"],
-    ]
-    if name == "oil":
-        return 2.6, -0.75
-    x, column = next((x, column) for x, column in enumerate(columns) if name in column)
-    return float(x), float(np.linspace(0.0, 3.0, len(column) + 2)[1 + column.index(name)])
+    """From the air on the left to the mesh on the right, the oil amid the bearings of both shafts."""
+    gearbox, groups = study.gearbox, study.network.groups
+    if name in ("oil", "mesh"):
+        return (2.7, 1.5) if name == "oil" else (6.4, 1.5)
+    if name in groups["bearings"]:
+        bearing = next(b for b in gearbox.bearing if b.name == name)
+        row = [s.name for s in gearbox.shaft].index(bearing.shaft)
+        along = [b.name for b in gearbox.bearing if b.shaft == bearing.shaft].index(name)
+        return 2.2 + 1.0 * along, (3.0 - 0.5 * along) if row == 0 else 0.5 * along
+    columns = ((0.0, ("air", "frame")), (1.2, groups["housing"][::-1]), (4.2, groups["shafts"]), (5.4, groups["gears"]))
+    x, column = next((x, column) for x, column in columns if name in column)
+    spread = 1.2 if x == columns[2][0] else 0.75
+    return x, float(np.linspace(1.5 + spread, 1.5 - spread, len(column))[list(column).index(name)])

@@ -26,9 +26,27 @@ LEVELS = 4
 REACH = 2.0  # standard deviations to either side
 SHOWN = 12
 LONG_S = 2e5  # 60 time constants of the housing
-WITHOUT_EFFECT = ("factors.C_",)  # heat capacities: nothing in a steady state
+# Heat capacities do nothing in a steady state; the others are read by models that the definition does not choose.
+WITHOUT_EFFECT = ("factors.C_", "housing.density", "housing.specific_heat", "oil.volume", "oil.schlenk")
 INPUTS = {"ambient.temperature_degC": "T_ambient", "ambient.air_speed_m_s": "air_speed"}
 FACTOR = "factors."
+UNITS = {
+    "W m2K": "W/(m² K)",
+    "W mK": "W/(m K)",
+    "W K": "W/K",
+    "J kgK": "J/(kg K)",
+    "kg m3": "kg/m³",
+    "Pa per K": "Pa/K",
+    "per K": "1/K",
+    "1 K": "1/K",
+    "m2": "m²",
+    "m s": "m/s",
+    "degC": "°C",
+    "um": "µm",
+    "mm": "mm",
+    "m": "m",
+    "kg": "kg",
+}
 
 
 @dataclass(frozen=True)
@@ -72,37 +90,64 @@ def sensitivity(study: Study, progress: Callable[[str], None]) -> Item:
     sign = np.sign([np.asarray(one["mu"], dtype=float) for one in indices])
     order = np.argsort(-per_sd.max(axis=0))[:SHOWN]
     order = order[np.argsort(-per_sd[1, order])]
-    labels = tuple(_label(groups[i].name) for i in order)
+    labels = tuple(_label(study, groups[i].name) for i in order)
     curves = tuple(
-        Curve(label=f"T₂ = {torque:g} N m", kind="bars", x=per_sd[k, order], y=np.arange(float(len(order))), names=labels)
+        Curve(
+            label=f"T₂ = {torque:g} N m", kind="bars", x=per_sd[k, order], y=np.arange(float(len(order))), names=labels
+        )
         for k, torque in enumerate(OUTPUT_TORQUE)
     )
     rows = tuple(
-        (_label(groups[i].name), *(f"{'+' if sign[k, i] >= 0 else '-'}{per_sd[k, i]:.2f} ({bent[k, i]:.2f})"
-                                   for k in range(len(OUTPUT_TORQUE))))
+        (
+            _label(study, groups[i].name),
+            *(
+                f"{'+' if sign[k, i] >= 0 else '-'}{per_sd[k, i]:.2f} ({bent[k, i]:.2f})"
+                for k in range(len(OUTPUT_TORQUE))
+            ),
+        )
         for i in order
-    )  # fmt: skip
+    )
     rest = per_sd[:, np.argsort(-per_sd.max(axis=0))[SHOWN:]]
-    first = [_label(groups[int(np.argmax(row))].name) for row in per_sd]
+    first = [_label(study, groups[int(np.argmax(row))].name) for row in per_sd]
     return Item(
         key="Sensitivity",
         title="What the final oil temperature hangs on",
-        reading=f"Morris' elementary effects (SALib), {study.settings.trajectories} trajectories over the {len(groups)} groups "
-        f"of uncertain numbers of the definition, {REACH:g} standard deviations of their priors to either side; steady state "
-        "at 20 m/s with the full model. Equal numbers of the bearings, the shafts and the flanks move together. Largest: "
-        + "; ".join(f"{name} at {torque:g} N m" for name, torque in zip(first, OUTPUT_TORQUE, strict=True)) + ".",
-        tables=(Table(
-            title="Change of the oil temperature in K per standard deviation (spread of the effects)",
-            header=("number of the definition", *(f"T₂ = {torque:g} N m" for torque in OUTPUT_TORQUE)), rows=rows,
-            note=f"The other {rest.shape[1]} are below {rest.max(initial=0.0):.1f} K. A spread as large as the effect tells of "
-            "curvature or of interplay with others.",
-        ),),
-        figures=(Figure(
-            name="sensitivity", title="What the final oil temperature hangs on", caption="Mean absolute elementary effect.",
-            panels=(Plot(title="Effect on the oil at 20 m/s", x_label="Change in K per standard deviation of the prior",
-                         y_label="", curves=curves),)),),
+        reading=(
+            f"Morris' elementary effects (SALib), {study.settings.trajectories} trajectories over the {len(groups)}"
+            f" groups of uncertain numbers of the definition, {REACH:g} standard deviations of their priors to either"
+            " side; steady state at 20 m/s with the full model. Equal numbers of the bearings, the shafts and the"
+            " flanks move together. Largest: "
+        )
+        + "; ".join(f"{name} at {torque:g} N m" for name, torque in zip(first, OUTPUT_TORQUE, strict=True))
+        + ".",
+        tables=(
+            Table(
+                title="Change of the oil temperature in K per standard deviation (spread of the effects)",
+                header=("number of the definition", *(f"T₂ = {torque:g} N m" for torque in OUTPUT_TORQUE)),
+                rows=rows,
+                note=(
+                    f"The other {rest.shape[1]} are below {rest.max(initial=0.0):.1f} K. A spread as large as the"
+                    " effect tells of curvature or of interplay with others."
+                ),
+            ),
+        ),
+        figures=(
+            Figure(
+                name="sensitivity",
+                title="What the final oil temperature hangs on",
+                caption="Mean absolute elementary effect.",
+                panels=(
+                    Plot(
+                        title="Effect on the oil at 20 m/s",
+                        x_label="Change in K per standard deviation of the prior",
+                        y_label="",
+                        curves=curves,
+                    ),
+                ),
+            ),
+        ),
         without_checks=Verdict.OURS,
-    )  # fmt: skip
+    )
 
 
 def final_oil(study: Study, groups: tuple[Group, ...], z: Array) -> Array:
@@ -114,11 +159,15 @@ def final_oil(study: Study, groups: tuple[Group, ...], z: Array) -> Array:
         shared.setdefault(tuple(definition.items()), []).append(index)
     parts = Parallel(n_jobs=study.settings.jobs)(
         delayed(_settled)(
-            study.gearbox, dict(definition), [varied[i][1] for i in rows], [varied[i][2] for i in rows],
-            float(study.pinion_speed[-1]), study.pinion_torque,
+            study.gearbox,
+            dict(definition),
+            [varied[i][1] for i in rows],
+            [varied[i][2] for i in rows],
+            float(study.pinion_speed[-1]),
+            study.pinion_torque,
         )
         for definition, rows in shared.items()
-    )  # fmt: skip
+    )
     oil = np.empty((len(z), len(OUTPUT_TORQUE)))
     for rows, part in zip(shared.values(), parts, strict=True):
         oil[rows] = part
@@ -160,16 +209,21 @@ def _settled(
     with threadpool_limits(1):
         try:
             result = network.steady_state(
-                losses=losses, speed=speed, torque=np.tile(torque, len(factors)), inputs=columns(inputs),
+                losses=losses,
+                speed=speed,
+                torque=np.tile(torque, len(factors)),
+                inputs=columns(inputs),
                 parameters=columns(factors),
-            )  # fmt: skip
+            )
             return np.asarray(result.temperatures["oil"][:, 0].reshape(len(factors), count))
         except ArithmeticError:
             # Far from the nominal definition the iteration to the steady state may not end; time always does.
-            return np.array([
-                [_after_long(network, losses, speed, T1, given, factor) for T1 in torque.tolist()]
-                for factor, given in zip(factors, inputs, strict=True)
-            ])  # fmt: skip
+            return np.array(
+                [
+                    [_after_long(network, losses, speed, T1, given, factor) for T1 in torque.tolist()]
+                    for factor, given in zip(factors, inputs, strict=True)
+                ]
+            )
 
 
 def _after_long(
@@ -183,13 +237,17 @@ def _after_long(
     """Oil temperature after a time that is long for everything, [degC]."""
     cycle = {"time_s": (0.0, LONG_S), "speed_rpm": (speed,) * 2, "torque_Nm": (torque,) * 2}
     cycle |= {COLUMNS[name][0]: (value,) * 2 for name, value in inputs.items()}
-    result = network.simulate(cycle, losses=losses, parameters=factors)  # type: ignore[arg-type]
+    result = network.simulate(cycle, losses=losses, parameters=factors)
     return float(result.temperatures["oil"][-1])
 
 
-def _label(name: str) -> str:
-    """Path of the definition as words."""
-    words = name.replace("stage.", "").replace("factors.", "factor of ").replace("_", " ").replace(".", ", ")
-    for unit, shown in (("W m2K", "W/(m² K)"), ("W mK", "W/(m K)"), ("W K", "W/K"), ("m2", "m²"), ("m s", "m/s")):
-        words = re.sub(rf" {unit}$", f" in {shown}", words)
-    return re.sub(r" (mm|m|degC|l|kg)$", r" in \1", words).replace("degC", "°C")
+def _label(study: Study, name: str) -> str:
+    """Path of the definition in words, its unit apart; a factor by what it stands for."""
+    if name.startswith(FACTOR):
+        texts = {p.name: p.description for p in study.network.parameters}
+        return texts[name.removeprefix(FACTOR)]
+    words = name.removeprefix("stage.").replace("_", " ").replace(".", ", ")
+    for ending, unit in UNITS.items():
+        if words.endswith(f" {ending}"):
+            return f"{words.removesuffix(ending)}in {unit}"
+    return words

@@ -22,6 +22,7 @@ PITCH_VELOCITY = np.array([1.0, 2.0, 5.0, 8.3, 15.0, 20.0])  # m/s
 TABLE_6_RPM = np.array([174.0, 348.0, 870.0, 1444.0, 2609.0, 3476.0])
 OUTPUT_TORQUE = np.array([0.0, 141.0, 453.0])  # N m
 STAGE_S = 3.0 * 3600.0
+CHANGE_S = 1.0  # in which the speed changes
 MIDDLE = 3  # 8.3 m/s, the stage that figures of one speed show
 # Node temperatures above the oil's that losses without a thermal network are evaluated at.
 BEARING_ABOVE_OIL = 5.0  # K
@@ -60,7 +61,7 @@ class Settings:
     longest_s: float = 25.0
     step_s: float = 10.0
     fine_step_s: float = 1.0
-    trajectories: int = 10
+    trajectories: int = 6
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -125,15 +126,19 @@ class Study:
         """
         gears = T_oil + np.interp(output_torque, OUTPUT_TORQUE, GEAR_ABOVE_OIL)
         columns = [
-            np.full_like(gears, T_oil) if node == "oil"
-            else gears if node in self.gearbox.stage[0].names
-            else np.full_like(gears, T_oil + BEARING_ABOVE_OIL)
+            (
+                np.full_like(gears, T_oil)
+                if node == "oil"
+                else gears
+                if node in self.gearbox.stage[0].names
+                else np.full_like(gears, T_oil + BEARING_ABOVE_OIL)
+            )
             for node in self.full.temperature_nodes
-        ]  # fmt: skip
+        ]
         return np.stack(columns, axis=-1)
 
     def staircase(self, output_torque: float, *, step_s: float, speeds: Array | None = None) -> Cycle:
-        """Return the 18 h of Table 6 at one torque: six speeds of 3 h each, changed within one row.
+        """Return the 18 h of Table 6 at one torque: six speeds of 3 h each, changed within a second.
 
         Parameters
         ----------
@@ -145,14 +150,18 @@ class Study:
             Of the pinion, [1/min]; by default Table 6 read as wheel speeds
         """
         speeds = self.pinion_speed if speeds is None else speeds
-        time = np.linspace(0.0, STAGE_S * len(speeds), round(STAGE_S * len(speeds) / step_s) + 1)
+        end = STAGE_S * len(speeds)
+        changes = np.arange(STAGE_S, end, STAGE_S)
+        time = np.union1d(np.linspace(0.0, end, round(end / step_s) + 1), changes + CHANGE_S)
         # The row at a change belongs to the earlier stage, so that every stage ends with its own speed.
         stage = np.clip(np.ceil(time / STAGE_S).astype(int) - 1, 0, len(speeds) - 1)
         ambient = self.gearbox.ambient
-        return Cycle.from_columns({
-            "time_s": time,
-            "speed_rpm": speeds[stage],
-            "torque_Nm": np.full_like(time, output_torque / self.ratio),
-            "T_ambient_degC": np.full_like(time, ambient.temperature_degC),
-            "air_speed_m_s": np.full_like(time, ambient.air_speed_m_s),
-        })  # fmt: skip
+        return Cycle.from_columns(
+            {
+                "time_s": time,
+                "speed_rpm": speeds[stage],
+                "torque_Nm": np.full_like(time, output_torque / self.ratio),
+                "T_ambient_degC": np.full_like(time, ambient.temperature_degC),
+                "air_speed_m_s": np.full_like(time, ambient.air_speed_m_s),
+            }
+        )

@@ -75,7 +75,8 @@ def values_equal_the_print(gearbox: Gearbox, rows: Sequence[Row]) -> Check:
     return judged(
         "values_equal_the_print",
         f"{len(rows)} printed values.",
-        f"{len(rows) - len(wrong)} of them are those of the definition" + (f"; not: {', '.join(wrong)}." if wrong else "."),
+        f"{len(rows) - len(wrong)} of them are those of the definition"
+        + (f"; not: {', '.join(wrong)}." if wrong else "."),
         not wrong,
         numbers={"printed": len(rows), "equal": len(rows) - len(wrong)},
         otherwise="The definition departs from the print; its file says why.",
@@ -94,8 +95,10 @@ def pitch_velocities_are_the_wheels(study: Study) -> Item:
         f"{pinion[0]:.0f} ... {pinion[-1]:.0f} 1/min, {off_pinion:.0%} away from the print.",
         off_pinion < off_wheel,
         numbers={"off_as_wheel_speed": off_wheel, "off_as_pinion_speed": off_pinion},
-        otherwise="The printed speeds are the wheel shaft's, which the rig's motor drives. Our input is the pinion shaft: "
-        "1.5 times the speed and T₂ / 1.5.",
+        otherwise=(
+            "The printed speeds are the wheel shaft's, which the rig's motor drives. Our input is the pinion shaft: "
+            "1.5 times the speed and T₂ / 1.5."
+        ),
     )
     torque = [f"{T2:g} / {T2 / study.ratio:.0f}" for T2 in OUTPUT_TORQUE]
     rows = tuple(
@@ -112,7 +115,14 @@ def pitch_velocities_are_the_wheels(study: Study) -> Item:
         tables=(
             Table(
                 title="Speeds in 1/min",
-                header=("time in h", "v in m/s", "printed, input shaft", "wheel at v", "pinion at v", "pinion, as run here"),
+                header=(
+                    "time in h",
+                    "v in m/s",
+                    "printed, input shaft",
+                    "wheel at v",
+                    "pinion at v",
+                    "pinion, as run here",
+                ),
                 rows=rows,
             ),
         ),
@@ -141,18 +151,21 @@ def equations_as_printed(study: Study) -> Item:
     churning = judged(
         "eq_6_is_below_the_power_transmitted",
         "Eq. (6): P = ω e v^1.5 b / 2.72e-6.",
-        f"Literally, at 8.3 m/s: {literal[0] / 1e3:.0f} kW (pinion) and {literal[1] / 1e3:.0f} kW (wheel) of churning, with "
-        f"{power / 1e3:.0f} kW transmitted at the highest torque. Without ω and with 2.72e-3: {own:.1f} W.",
+        f"Literally, at 8.3 m/s: {literal[0] / 1e3:.0f} kW (pinion) and {literal[1] / 1e3:.0f} kW (wheel) of churning,"
+        f" with {power / 1e3:.0f} kW transmitted at the highest torque. Without ω and with 2.72e-3: {own:.1f} W.",
         sum(literal) < power,
         numbers={"printed_W": sum(literal), "taken_W": own, "transmitted_W": power},
-        otherwise="As printed its dimension is wrong; Niemann's own form has no speed and gives kW from mm. That one is taken.",
+        otherwise=(
+            "As printed its dimension is wrong; Niemann's own form has no speed and gives kW from mm. That one is"
+            " taken."
+        ),
     )
     ratio = seals(1.0, 90.0) / seals(1.6, 90.0)
     sealing = judged(
         "eq_10_is_the_standards",
         "Eq. (10): 145 - ϑ + 350 log log (VG + 0.8).",
-        f"Both seals at 8.3 m/s: as printed {seals(1.0, 60.0):.0f} W at 60 °C and {seals(1.0, 90.0):.0f} W at 90 °C; with "
-        f"1.6 ϑ {seals(1.6, 60.0):.0f} W and {seals(1.6, 90.0):.0f} W.",
+        f"Both seals at 8.3 m/s: as printed {seals(1.0, 60.0):.0f} W at 60 °C and {seals(1.0, 90.0):.0f} W at 90 °C;"
+        f" with 1.6 ϑ {seals(1.6, 60.0):.0f} W and {seals(1.6, 90.0):.0f} W.",
         abs(ratio - 1.0) < 0.05,
         numbers={"printed_90_W": seals(1.0, 90.0), "standard_90_W": seals(1.6, 90.0)},
         otherwise="ISO/TR 14179-2 (Linke) has 1.6 ϑ, which is taken; the printed one is selectable in the definition.",
@@ -166,7 +179,10 @@ def equations_as_printed(study: Study) -> Item:
 
 
 def _item(gearbox: Gearbox, key: str, title: str, rows: Sequence[Row]) -> Item:
-    shown = tuple((what, _text(printed), _text(_ours(gearbox, what, path)), gearbox.source_of(path)) for what, printed, path in rows)
+    shown = tuple(
+        (what, _text(printed), _text(_ours(gearbox, what, path)), gearbox.source_of(path))
+        for what, printed, path in rows
+    )
     return Item(
         key=key,
         title=title,
