@@ -10,7 +10,6 @@ import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -24,12 +23,12 @@ from builder.fmu_drive import drive_fmu
 from builder.onnx_export import export_onnx
 from builder.plots import plot_cycle
 from builder.train import TrainingResult, train_surrogate
+from builder.version import project_version
 from models.errors import InputError
 from models.gearbox import Gearbox
 from models.types import Array
 
 ALL_CORES = -1
-VERSION = version("gearbox-thermal-twin")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -146,7 +145,7 @@ def build(
             )  # fmt: skip
         with _timed("export and package", seconds), _spoken() as tell:
             tell("packaging the FMU")
-            networks = export_onnx(training, stage / "networks", version=VERSION)
+            networks = export_onnx(training, stage / "networks", version=project_version())
             fmu = build_python_fmu(gearbox, training, networks, stage / f"{name}.fmu")
         cycle = reference_cycle(gearbox)
         network = gearbox.network()

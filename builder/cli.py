@@ -122,9 +122,9 @@ def _simulate_gearbox(
 def _simulate_fmu(
     fmu: Path, cycle_file: Path, initial: float | dict[str, float] | None
 ) -> tuple[dict[str, Array], Mapping[str, tuple[str, ...]]]:
-    from builder.fmu_drive import drive_fmu
+    from builder.fmu_drive import drive_fmu, fmu_inputs
 
-    cycle = read_cycle(cycle_file)
+    cycle = read_cycle(cycle_file, extra=fmu_inputs(fmu))
     with console.progress_bar("driving the FMU") as progress:
         columns = drive_fmu(fmu, cycle, initial=initial, progress=progress)
     return columns, {}

@@ -65,8 +65,9 @@ class Preset:
     transforms : bool
         Logarithms of speed, load and reduced losses, viscosity in place of temperature, and points denser at the low
         ends; without, min-max scaling and uniform points, as in the paper
-    hidden : mapping of network kind (mesh, no_load, bearing) to (int, int)
-        Units of the hidden layers
+    hidden : mapping of str to (int, int)
+        Units of the hidden layers by kind of network (mesh, no_load, bearing); where a kind is not named, by output
+        (mesh_sliding ...): every output then has hidden units of its own, which fit it better for the same work
     max_iter, starts, start_iterations, patience, tolerance
         See :class:`builder.levenberg_marquardt.LevenbergMarquardtRegressor`
     domain : Domain, optional
@@ -89,11 +90,11 @@ class Preset:
 PRESETS: Mapping[str, Preset] = {
     "default": Preset(
         name="default",
-        samples=4800,
+        samples=8000,
         judged=2000,
         transforms=True,
-        hidden={"mesh": (20, 10), "no_load": (10, 10), "bearing": (16, 12)},
-        max_iter=300,
+        hidden={"mesh_sliding": (48, 16), "mesh_rolling": (16, 10), "no_load": (10, 10), "bearing": (16, 12)},
+        max_iter=130,
         starts=2,
         start_iterations=25,
         patience=60,

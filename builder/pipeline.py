@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, Self
 
 import numpy as np
+from scipy.linalg import block_diag
 from sklearn.base import BaseEstimator, RegressorMixin, TransformerMixin, clone
 from sklearn.compose import TransformedTargetRegressor
 from sklearn.pipeline import Pipeline
@@ -149,6 +151,27 @@ def plain_network(
         biases=(b_1 + offset @ w_1, b_2, (b_3 - back_offset) / back_slope),
         passed=passed,
         log_output=reduced,
+    )
+
+
+def fitted_network(fitted: Any) -> LevenbergMarquardtRegressor:
+    """Return the network inside a fitted :func:`surrogate_pipeline`."""
+    scaled = fitted.regressor_ if isinstance(fitted, ReducedTargetRegressor) else fitted
+    return scaled.regressor_.named_steps["network"]
+
+
+def side_by_side(networks: Sequence[Network]) -> Network:
+    """Return networks of the same inputs and features as one: their hidden units and outputs side by side."""
+    first = networks[0]
+    if len(networks) == 1:
+        return first
+    depths = [list(layers) for layers in zip(*(network.weights for network in networks), strict=True)]
+    return replace(
+        first,
+        outputs=tuple(name for network in networks for name in network.outputs),
+        weights=(np.hstack(depths[0]), block_diag(*depths[1]), block_diag(*depths[2])),
+        biases=tuple(np.concatenate(parts) for parts in zip(*(network.biases for network in networks), strict=True)),
+        passed=np.hstack([network.passed for network in networks]),
     )
 
 

@@ -14,7 +14,7 @@ from sklearn.model_selection import train_test_split
 from builder.doe import latin_hypercube, mixed_hypercube, random_points, sample_losses
 from builder.levenberg_marquardt import LevenbergMarquardtRegressor
 from builder.networks import Domain, NetworkSpec, Preset, network_specs, preset_named
-from builder.pipeline import plain_network, surrogate_pipeline
+from builder.pipeline import fitted_network, plain_network, side_by_side, surrogate_pipeline
 from models.errors import InputError
 from models.losses import LossModel
 from models.surrogate import Network, SurrogateLosses
@@ -55,10 +55,10 @@ class ErrorReport:
 
 @dataclass(frozen=True, kw_only=True)
 class TrainedNetwork:
-    """A network, the scikit-learn estimator that it was folded from, and what its training shows."""
+    """A network, the scikit-learn estimators that it was folded from, and what their training shows."""
 
     network: Network
-    estimator: Any
+    estimators: tuple[Any, ...]
     test_r_squared: tuple[float, ...]
     iterations: int
     seconds: float
@@ -255,30 +255,38 @@ def _train(
 ) -> TrainedNetwork:
     begin = time.perf_counter()
     x, x_test, y, y_test = train_test_split(points, losses, test_size=TEST_SHARE, random_state=seed)
-    regressor = LevenbergMarquardtRegressor(
-        preset.hidden[spec.kind],
-        max_iter=preset.max_iter,
-        starts=preset.starts,
-        start_iterations=preset.start_iterations,
-        validation_fraction=VALIDATION_SHARE / (1.0 - TEST_SHARE),
-        patience=preset.patience,
-        tolerance=preset.tolerance,
-        random_state=seed,
-    )
-    estimator = surrogate_pipeline(
-        features=spec.features(transforms=preset.transforms),
-        viscosity=viscosity,
-        powers=spec.powers if preset.transforms else None,
-        network=regressor,
-    ).fit(x, y)
-    network = plain_network(
-        estimator, name=spec.name, inputs=spec.inputs, outputs=spec.outputs, lower=spec.lower, upper=spec.upper
-    )
-    scaled = estimator.regressor_ if preset.transforms else estimator
+    together = spec.kind in preset.hidden
+    parts = [list(range(len(spec.outputs)))] if together else [[column] for column in range(len(spec.outputs))]
+    estimators, networks = [], []
+    for columns in parts:
+        outputs = tuple(spec.outputs[column] for column in columns)
+        regressor = LevenbergMarquardtRegressor(
+            preset.hidden[spec.kind if together else outputs[0].removesuffix("_W")],
+            max_iter=preset.max_iter,
+            starts=preset.starts,
+            start_iterations=preset.start_iterations,
+            validation_fraction=VALIDATION_SHARE / (1.0 - TEST_SHARE),
+            patience=preset.patience,
+            tolerance=preset.tolerance,
+            random_state=seed,
+        )
+        estimator = surrogate_pipeline(
+            features=spec.features(transforms=preset.transforms),
+            viscosity=viscosity,
+            powers=[spec.powers[column] for column in columns] if preset.transforms else None,
+            network=regressor,
+        ).fit(x, y[:, columns])
+        estimators.append(estimator)
+        networks.append(
+            plain_network(
+                estimator, name=spec.name, inputs=spec.inputs, outputs=outputs, lower=spec.lower, upper=spec.upper
+            )
+        )
+    network = side_by_side(networks)
     return TrainedNetwork(
         network=network,
-        estimator=estimator,
+        estimators=tuple(estimators),
         test_r_squared=tuple(map(float, r_squared(y_test, network(x_test)))),
-        iterations=scaled.regressor_.named_steps["network"].n_iter_,
+        iterations=max(fitted_network(estimator).n_iter_ for estimator in estimators),
         seconds=time.perf_counter() - begin,
     )

@@ -38,7 +38,13 @@ from builder import console
 )
 def reproduce(output: Path, seed: int, jobs: int | None) -> None:
     """Recompute every table and figure of the paper, ours beside what it prints, into one report."""
-    from builder.reproduce.report import FIGURES, NUMBERS, PAGE, verdict_rows  # imports plotly, scikit-learn and onnx
+    from builder.reproduce.report import (
+        FIGURES,
+        NUMBERS,
+        PAGE,
+        SUMMARY,
+        verdict_rows,
+    )  # imports plotly, scikit-learn and onnx
     from builder.reproduce.reproduce import reproduce as run
     from builder.reproduce.study import Settings
 
@@ -48,7 +54,7 @@ def reproduce(output: Path, seed: int, jobs: int | None) -> None:
     console.table("The paper, reproduced", ["item", "what", "verdict"], verdict_rows(report.items))
     counted = ", ".join(f"{number} {verdict.value}" for verdict, number in report.count.items())
     console.out.print(f"{len(report.items)} items: {counted}; {time.perf_counter() - begin:.0f} s")
-    for name in (PAGE, NUMBERS, f"{FIGURES}/", "fzg.fmu"):
+    for name in (PAGE, NUMBERS, SUMMARY, f"{FIGURES}/", "fzg.fmu"):
         console.out.print(f"wrote {output / name}")
 
 

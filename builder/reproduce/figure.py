@@ -11,8 +11,9 @@ import numpy as np
 from builder.plots import PALETTE
 from models.types import Array
 
-Kind = Literal["line", "points", "area", "band", "bars"]
+Kind = Literal["line", "points", "rings", "area", "band", "bars"]
 BLACK = "#000000"
+MARKED = range(3, 13)  # lines of so few points get a mark at each
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -25,7 +26,7 @@ class Curve:
         Its name in the legend; curves of one name have one colour and one entry over all panels of a figure
     x, y : Array, shape (N,)
         Of bars, `x` is their length and `y` their place
-    kind : {"line", "points", "area", "band", "bars"}
+    kind : {"line", "points", "rings", "area", "band", "bars"}
         Areas are stacked in their order; a band goes from `low` to `y`
     low : Array, shape (N,), or None
     names : tuple of str

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
@@ -77,12 +78,13 @@ def silent(
 
 @dataclass(frozen=True, kw_only=True)
 class Table:
-    """A table of texts; the first column is text, numbers follow."""
+    """A table; the first column is text, and numbers follow unless all columns are `texts`."""
 
     title: str
     header: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
     note: str = ""
+    texts: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -120,8 +122,12 @@ class Item:
 
     @property
     def why(self) -> str:
-        """Why it differs, or, where nothing can be compared, why not."""
-        return " ".join(dict.fromkeys(c.why for c in self.checks if c.verdict == self.verdict and c.why))
+        """Why it differs, or why it cannot be compared; else how many statements hold."""
+        told = " ".join(dict.fromkeys(c.why for c in self.checks if c.verdict == self.verdict and c.why))
+        if told or not self.checks:
+            return told
+        count = Counter(check.verdict for check in self.checks)
+        return ", ".join(f"{number} {verdict.value}" for verdict, number in count.items())
 
     @property
     def anchor(self) -> str:

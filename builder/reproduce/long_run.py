@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from joblib import Parallel, delayed
@@ -12,6 +13,7 @@ from threadpoolctl import threadpool_limits
 
 from builder.reproduce.figure import BLACK, Curve, Figure, Plot
 from builder.reproduce.item import Check, Item, Table, judged, silent, target
+from builder.reproduce.steady import steady_oil
 from builder.reproduce.study import OUTPUT_TORQUE, PITCH_VELOCITY, STAGE_S, TABLE_6_RPM, Study
 from models.cycle import Cycle
 from models.gearbox import Gearbox
@@ -317,7 +319,7 @@ def _readings(study: Study, needed: float) -> tuple[Reading, ...]:
     return (
         Reading(name="as printed: 2 m/s, ISO/TR 14179-2", changes={}, pinion_speed=usual),
         Reading(name="2 m/s along a flat plate", changes={"housing.convection": "flat_plate"}, pinion_speed=usual),
-        Reading(name="no fan", changes={"housing.convection": "iso_14179_free"}, pinion_speed=usual),
+        Reading(name="no fan (Churchill-Chu)", changes={"housing.convection": "churchill_chu"}, pinion_speed=usual),
         Reading(
             name=f"foundation {FOUNDATION:g} W/K",
             pinion_speed=usual,
@@ -332,25 +334,23 @@ def _settled_oil(study: Study, reading: Reading) -> Array:
     """Oil temperature of all stages, shape (3 torques, 6 speeds)."""
     gearbox: Gearbox = study.gearbox.with_values(reading.changes)
     n, T1 = np.meshgrid(reading.pinion_speed, study.pinion_torque)
-    result = gearbox.network().steady_state(losses=gearbox.losses(), speed=n.ravel(), torque=T1.ravel())
-    return np.asarray(result.temperatures["oil"][:, 0].reshape(n.shape))
+    oil, _ = steady_oil(gearbox.network(), gearbox.losses(), speed=n.ravel(), torque=T1.ravel())
+    return oil.reshape(n.shape)
 
 
 def _needed(study: Study) -> tuple[float, float]:
     """Factor on the convection, and air speed, that hold the limit at the highest load and speed."""
-    point = {
-        "losses": study.full,
-        "speed": float(study.pinion_speed[-1]),
-        "torque": float(study.pinion_torque[HIGHEST]),
-    }
+    speed, torque = (np.full_like(FACTORS, value) for value in (study.pinion_speed[-1], study.pinion_torque[HIGHEST]))
 
-    def crossing(values: Array, **varied: Mapping[str, Array]) -> float:
-        oil = study.network.steady_state(**point, **varied).temperatures["oil"][:, 0]  # type: ignore[arg-type]
+    def crossing(values: Array, oil: Array) -> float:
         return float(np.exp(np.interp(-LIMIT, -oil, np.log(values))))
 
-    nominal = study.gearbox.ambient.air_speed_m_s
-    factor = crossing(FACTORS, parameters={"h_air": FACTORS})
-    return factor, crossing(nominal * FACTORS, inputs={"air_speed": nominal * FACTORS})
+    point = partial(steady_oil, study.network, study.full, speed=speed, torque=torque)
+    air_speed = study.gearbox.ambient.air_speed_m_s * FACTORS
+    return (
+        crossing(FACTORS, point(parameters={"h_air": FACTORS})[0]),
+        crossing(air_speed, point(inputs={"air_speed": air_speed})[0]),
+    )
 
 
 def _node_curves(study: Study, run: Result) -> tuple[Curve, ...]:

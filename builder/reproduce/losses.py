@@ -9,6 +9,7 @@ import numpy as np
 
 from builder.reproduce.figure import BLACK, Curve, Figure, Map, Plot
 from builder.reproduce.item import Check, Item, Table, Verdict, judged, silent
+from builder.reproduce.steady import steady_oil
 from builder.reproduce.study import (
     BEARING_ABOVE_OIL,
     GEAR_ABOVE_OIL,
@@ -311,8 +312,8 @@ def _sum(parts: Mapping[str, Array]) -> Array:
 def _settled(study: Study) -> tuple[Array, Array]:
     """Total loss [W] and oil temperature [degC] at the network's own steady state, shape (3 torques, 6 speeds)."""
     n, T1 = np.meshgrid(study.pinion_speed, study.pinion_torque)
-    result = study.network.steady_state(losses=study.full, speed=n.ravel(), torque=T1.ravel())
-    return result.loss[:, 0].reshape(n.shape), result.temperatures["oil"][:, 0].reshape(n.shape)
+    oil, loss = steady_oil(study.network, study.full, speed=n.ravel(), torque=T1.ravel())
+    return loss.reshape(n.shape), oil.reshape(n.shape)
 
 
 def _table(study: Study, total: Mapping[str, Array], settled: tuple[Array, Array]) -> Table:

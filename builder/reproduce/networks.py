@@ -139,6 +139,7 @@ def hyperparameters(study: Study) -> Item:
         tables=(
             Table(
                 title="Hyperparameters",
+                texts=True,
                 header=("", "printed", "run as printed", "ours"),
                 rows=tuple((what, p, r, o) for (what, p), r, o in zip(TABLE_3, run, own, strict=True)),
             ),
@@ -172,7 +173,7 @@ def bounds(study: Study) -> Item:
                 otherwise="The preset departs from Table 4.",
             ),
         ),
-        tables=(Table(title="Bounds", header=("input", "printed", "run as printed", "ours"), rows=rows),),
+        tables=(Table(title="Bounds", texts=True, header=("input", "printed", "run as printed", "ours"), rows=rows),),
     )
 
 
@@ -198,6 +199,7 @@ def layout(study: Study) -> Item:
                 title="Our networks",
                 header=("network", "inputs", "outputs", "hidden", "used", "trained in s"),
                 rows=rows,
+                texts=True,
             ),
         ),
         without_checks=Verdict.SCHEME,
@@ -329,9 +331,10 @@ def _scatter(study: Study, judgements: Mapping[str, Judgement], column: int) -> 
     calculated = judgements[OURS].calculated[:, column]
     low, width = calculated.min(), np.ptp(calculated)
     curves = [Curve(label="equal", x=np.array([0.0, 1.0]), y=np.array([0.0, 1.0]), colour=BLACK)]
-    for name, judgement in judgements.items():
+    # Rings below points: neither hides the other.
+    for name, judgement in reversed([*judgements.items()]):
         x, y = ((values[:, column] - low) / width for values in (judgement.calculated, judgement.predicted))
-        curves.append(Curve(label=name, x=x, y=y, kind="points", colour=COLOUR[name]))
+        curves.append(Curve(label=name, x=x, y=y, kind="rings" if name == OURS else "points", colour=COLOUR[name]))
     score = " / ".join(f"{judgement.r_squared[column]:.5f}" for judgement in judgements.values())
     component = study.full.components[column].replace("_", " ")
     return Plot(

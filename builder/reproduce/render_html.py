@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import textwrap
 from typing import Any
 
 import numpy as np
 
-from builder.reproduce.figure import Curve, Figure, Graph, Map, Panel, Plot
+from builder.reproduce.figure import MARKED, Curve, Figure, Graph, Map, Panel, Plot
 from models.types import Array
 
 FONT = {"family": "system-ui, sans-serif", "size": 13, "color": "#222222"}
 LINE = "#D8D8D8"
-HEIGHT, BAR_PIXELS, GRAPH_HEIGHT = 340, 24, 460
+HEIGHT, BAR_PIXELS, GRAPH_HEIGHT = 340, 34, 460
+NAME_LENGTH = 24  # characters in a line beside a bar
 SIGNIFICANT = 5  # digits: what is drawn needs no more
 CIVIDIS = "Cividis"
 
@@ -38,13 +40,12 @@ def legend(figure: Figure) -> list[dict[str, str]]:
 def _drawing(panel: Panel, colours: dict[str, str]) -> dict[str, Any]:
     layout: dict[str, Any] = {
         "font": FONT,
-        "margin": {"l": 62, "r": 14, "t": 34, "b": 52},
+        "margin": {"l": 62, "r": 14, "t": 26, "b": 52},
         "paper_bgcolor": "white",
         "plot_bgcolor": "white",
         "height": HEIGHT,
         "showlegend": False,
         "hovermode": "closest",
-        "title": {"text": panel.title, "font": {"size": 14}, "x": 0.02, "xanchor": "left", "y": 0.98, "yanchor": "top"},
     }
     if isinstance(panel, Graph):
         return {"data": _graph(panel, colours), "layout": layout | _no_axes()}
@@ -82,14 +83,16 @@ def _traces(curve: Curve, panel: Plot, colour: str) -> list[dict[str, Any]]:
                 "type": "bar",
                 "orientation": "h",
                 "x": x,
-                "y": list(curve.names),
+                "y": [_wrapped(name) for name in curve.names],
                 "marker": {"color": colour},
                 "hovertemplate": hover,
             }
         ]
     trace = common | names | {"type": "scatter", "x": x, "y": y, "hovertemplate": hover}
-    if curve.kind == "points":
-        marker = {"color": colour, "size": 5, "opacity": 0.75}
+    if curve.kind in ("points", "rings"):
+        marker: dict[str, Any] = {"color": colour, "size": 5}
+        if curve.kind == "rings":
+            marker = {"color": colour, "size": 9, "symbol": "circle-open"}
         return [trace | {"type": "scattergl" if len(x) > 2000 else "scatter", "mode": "markers", "marker": marker}]
     if curve.kind == "area":
         return [
@@ -100,7 +103,7 @@ def _traces(curve: Curve, panel: Plot, colour: str) -> list[dict[str, Any]]:
         edge = common | {"type": "scatter", "mode": "lines", "line": {"width": 0}, "hoverinfo": "skip", "x": x}
         return [edge | {"y": _short(low)}, edge | {"y": y, "fill": "tonexty", "fillcolor": colour}]
     line = {"color": colour, "width": 2, "dash": "dash" if curve.dashed else "solid"}
-    return [trace | {"mode": "lines+markers" if len(x) <= 12 else "lines", "line": line, "marker": {"size": 6}}]
+    return [trace | {"mode": "lines+markers" if len(x) in MARKED else "lines", "line": line, "marker": {"size": 6}}]
 
 
 def _map(panel: Map) -> dict[str, Any]:
@@ -118,7 +121,7 @@ def _map(panel: Map) -> dict[str, Any]:
         "contours": {"start": 0, "end": len(levels) - 1, "size": 1, "coloring": "fill"},
         "line": {"width": 0.6, "color": "white"},
         "colorbar": {
-            "title": {"text": panel.z_label, "side": "right"},
+            "title": {"text": panel.z_label, "side": "right", "font": {"size": 13}},
             "tickvals": ticks,
             "ticktext": [f"{level:g}" for level in panel.levels],
             "thickness": 14,
@@ -155,7 +158,7 @@ def _graph(panel: Graph, colours: dict[str, str]) -> list[dict[str, Any]]:
                 "mode": "markers+text",
                 "x": [k.x for k in knots],
                 "y": [k.y for k in knots],
-                "text": [k.name.replace("_", " ") for k in knots],
+                "text": [k.name.replace("_", "<br>") for k in knots],
                 "customdata": [k.tells for k in knots],
                 "textposition": "top center",
                 "textfont": {"size": 12},
@@ -175,7 +178,7 @@ def _no_axes() -> dict[str, Any]:
 
 def _axis(label: str) -> dict[str, Any]:
     return {
-        "title": {"text": label, "standoff": 8},
+        "title": {"text": label, "standoff": 8, "font": {"size": 13}},
         "gridcolor": LINE,
         "zerolinecolor": LINE,
         "linecolor": "#888888",
@@ -183,6 +186,11 @@ def _axis(label: str) -> dict[str, Any]:
         "ticks": "outside",
         "automargin": True,
     }
+
+
+def _wrapped(name: str) -> str:
+    """Names beside bars in short lines: on a phone they would leave the bars no room."""
+    return "<br>".join(textwrap.wrap(name, NAME_LENGTH))
 
 
 def _short(values: Array) -> list[float]:

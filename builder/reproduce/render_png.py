@@ -14,19 +14,19 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from builder.plots import STYLE
-from builder.reproduce.figure import Curve, Figure, Graph, Map, Plot
+from builder.reproduce.figure import MARKED, Curve, Figure, Graph, Map, Plot
 from models.types import Array
 
-WIDTH, HEIGHT, COLUMNS = 4.6, 3.6, 2  # inches per panel
+WIDTH, HEIGHT = 4.6, 3.6  # inches per panel
 BAR_INCHES = 0.26
 COLOURS = "cividis"  # told apart with any colour vision
 BAR_THICKNESS = 0.8
-FEW = 12  # points that get a mark each
 
 
 def write_png(figure: Figure, path: Path) -> None:
     """Draw a figure into a PNG file."""
-    columns = min(COLUMNS, len(figure.panels)) if not _wide(figure) else 1
+    count = len(figure.panels)
+    columns = 1 if count == 1 or _wide(figure) else 2 if count % 3 else 3
     rows = -(-len(figure.panels) // columns)
     height = max(HEIGHT, *(_bar_height(panel) for panel in figure.panels))
     colours = figure.colours()
@@ -98,6 +98,17 @@ def _plot(ax: Axes, panel: Plot, colours: dict[str, str], handles: dict[str, Lin
 def _curve(ax: Axes, curve: Curve, colour: str) -> None:
     if curve.kind == "band":
         ax.fill_between(curve.x, 0.0 if curve.low is None else curve.low, curve.y, color=colour, linewidth=0.0)
+    elif curve.kind == "rings":
+        ax.plot(
+            curve.x,
+            curve.y,
+            linestyle="none",
+            marker="o",
+            markersize=6.0,
+            fillstyle="none",
+            color=colour,
+            markeredgewidth=0.8,
+        )
     elif curve.kind == "points":
         ax.plot(
             curve.x,
@@ -110,7 +121,7 @@ def _curve(ax: Axes, curve: Curve, colour: str) -> None:
             markeredgewidth=0.25,
         )
     else:
-        mark = "o" if len(curve.x) <= FEW else ""
+        mark = "o" if len(curve.x) in MARKED else ""
         line = "--" if curve.dashed else "-"
         ax.plot(curve.x, curve.y, color=colour, linestyle=line, linewidth=1.4, marker=mark, markersize=3.5)
 
@@ -127,6 +138,10 @@ def _bars(ax: Axes, curve: Curve, colour: str, index: int, count: int) -> None:
 def _handle(curve: Curve, colour: str) -> Line2D | Patch:
     if curve.kind in ("area", "band", "bars"):
         return Patch(color=colour, label=curve.label)
+    if curve.kind == "rings":
+        return Line2D(
+            [], [], linestyle="none", marker="o", markersize=6.0, fillstyle="none", color=colour, label=curve.label
+        )
     if curve.kind == "points":
         return Line2D([], [], linestyle="none", marker="o", markersize=4.0, color=colour, label=curve.label)
     return Line2D([], [], color=colour, linestyle="--" if curve.dashed else "-", label=curve.label)

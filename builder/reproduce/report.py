@@ -20,7 +20,7 @@ from builder.reproduce.figure import Figure
 from builder.reproduce.item import Item, Verdict
 from builder.reproduce.render_png import write_png
 
-PAGE, NUMBERS, FIGURES = "report.html", "report.json", "figures"
+PAGE, NUMBERS, SUMMARY, FIGURES = "report.html", "report.json", "summary.md", "figures"
 PAPER = (
     "A Data-Driven Approach to Estimate the Power Loss and Thermal Behaviour of Cylindrical Gearboxes under Transient "
     "Operating Conditions"
@@ -67,7 +67,7 @@ class Report:
 
 
 def write_report(report: Report, folder: Path, progress: Callable[[str], None]) -> None:
-    """Write ``report.html``, ``report.json`` and ``figures/*.png, *.csv`` into a folder."""
+    """Write ``report.html``, ``report.json``, ``summary.md`` and ``figures/*.png, *.csv`` into a folder."""
     (folder / FIGURES).mkdir(parents=True, exist_ok=True)
     for item in report.items:
         for figure in item.figures:
@@ -75,12 +75,24 @@ def write_report(report: Report, folder: Path, progress: Callable[[str], None]) 
             write_png(figure, folder / FIGURES / f"{figure.name}.png")
             write_table(folder / FIGURES / f"{figure.name}.csv", figure.rows())  # type: ignore[arg-type]
     (folder / NUMBERS).write_text(json.dumps(report.as_dict(), indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+    (folder / SUMMARY).write_text(summary(report), encoding="utf-8")
     (folder / PAGE).write_text(page(report), encoding="utf-8")
+
+
+def summary(report: Report) -> str:
+    """Return the verdicts and the times as Markdown tables."""
+    timing = next(table for item in report.items if item.key == "Speed" for table in item.tables)
+    lines = ["| item | what | verdict |", "|---|---|---|"]
+    lines += [f"| {item.key} | {item.title} | {item.verdict.value} |" for item in report.items]
+    lines += ["", f"| {timing.title} | {' | '.join(timing.header[1:])} |", "|---|" + "---:|" * (len(timing.header) - 1)]
+    lines += [f"| {' | '.join(row)} |" for row in timing.rows]
+    return "\n".join(lines) + "\n"
 
 
 def page(report: Report) -> str:
     """Return the report as one HTML page."""
     figures = [figure for item in report.items for figure in item.figures]
+    drawings = _json({figure.name: render_html.drawings(figure) for figure in figures})
     source = (resources.files("builder.reproduce") / "report.html.j2").read_text(encoding="utf-8")
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     return environment.from_string(source).render(
@@ -88,15 +100,16 @@ def page(report: Report) -> str:
         report=report,
         Verdict=Verdict,
         plotly=Markup(get_plotlyjs()),  # noqa: S704 - the library itself
-        drawings=Markup(_json({figure.name: render_html.drawings(figure) for figure in figures})),
+        drawings=Markup(drawings),  # noqa: S704 - escaped by _json
         legends={figure.name: render_html.legend(figure) for figure in figures},
         folder=FIGURES,
-        wide=_wide,
+        arrangement=_arrangement,
     )
 
 
-def _wide(figure: Figure) -> bool:
-    return len(figure.panels) == 1
+def _arrangement(figure: Figure) -> str:
+    """How the panels stand on a wide screen: so that no row is left with one."""
+    return {1: "one", 2: "pairs", 4: "pairs"}.get(len(figure.panels), "threes")
 
 
 def _json(value: object) -> str:

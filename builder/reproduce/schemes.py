@@ -30,7 +30,7 @@ def schemes(study: Study) -> list[Item]:
             key="Fig. 1",
             title="Scheme: from the design of experiment to the networks",
             reading="The same path here; build-fmu walks it.",
-            tables=(Table(title="Ours", header=("step", "here"), rows=steps),),
+            tables=(Table(title="Ours", header=("step", "here"), rows=steps, texts=True),),
             without_checks=Verdict.SCHEME,
         ),
         Item(
@@ -83,7 +83,7 @@ def thermal_network(study: Study) -> Item:
             Figure(
                 name="fig_09",
                 title="Fig. 9: thermal network of the rig",
-                panels=(Graph(title="Wider lines conduct more; hover for values", knots=knots, edges=edges),),
+                panels=(Graph(title="Wider lines conduct more", knots=knots, edges=edges),),
                 caption="Heat enters at the mesh (sliding, rolling), the bearings, and the oil (churning, seals).",
             ),
         ),

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from joblib import Parallel, delayed
@@ -15,17 +14,15 @@ from threadpoolctl import threadpool_limits
 
 from builder.reproduce.figure import Curve, Figure, Plot
 from builder.reproduce.item import Item, Table, Verdict
+from builder.reproduce.steady import steady_oil
 from builder.reproduce.study import OUTPUT_TORQUE, Study
-from models.cycle import COLUMNS
 from models.gearbox import Gearbox
-from models.losses import LossModel
-from models.network import ThermalNetwork
 from models.types import Array
 
 LEVELS = 4
 REACH = 2.0  # standard deviations to either side
 SHOWN = 12
-LONG_S = 2e5  # 60 time constants of the housing
+SMALLEST = 0.005  # K
 # Heat capacities do nothing in a steady state; the others are read by models that the definition does not choose.
 WITHOUT_EFFECT = ("factors.C_", "housing.density", "housing.specific_heat", "oil.volume", "oil.schlenk")
 INPUTS = {"ambient.temperature_degC": "T_ambient", "ambient.air_speed_m_s": "air_speed"}
@@ -100,10 +97,7 @@ def sensitivity(study: Study, progress: Callable[[str], None]) -> Item:
     rows = tuple(
         (
             _label(study, groups[i].name),
-            *(
-                f"{'+' if sign[k, i] >= 0 else '-'}{per_sd[k, i]:.2f} ({bent[k, i]:.2f})"
-                for k in range(len(OUTPUT_TORQUE))
-            ),
+            *(f"{_signed(sign[k, i], per_sd[k, i])} ({bent[k, i]:.2f})" for k in range(len(OUTPUT_TORQUE))),
         )
         for i in order
     )
@@ -139,7 +133,7 @@ def sensitivity(study: Study, progress: Callable[[str], None]) -> Item:
                 panels=(
                     Plot(
                         title="Effect on the oil at 20 m/s",
-                        x_label="Change in K per standard deviation of the prior",
+                        x_label="K per standard deviation",
                         y_label="",
                         curves=curves,
                     ),
@@ -201,44 +195,25 @@ def _settled(
 ) -> Array:
     """Oil temperature, shape (variants, torques)."""
     changed = gearbox.with_values(definition)
-    network, losses, count = changed.network(), changed.losses(), len(torque)
-
-    def columns(rows: list[dict[str, float]]) -> dict[str, Any]:
-        return {name: np.repeat([row[name] for row in rows], count) for name in rows[0]}
-
+    network, losses = changed.network(), changed.losses()
+    each = np.repeat(np.arange(len(factors)), len(torque))
+    parameters, given = (
+        {name: np.array([row[name] for row in rows])[each] for name in rows[0]} for rows in (factors, inputs)
+    )
     with threadpool_limits(1):
-        try:
-            result = network.steady_state(
-                losses=losses,
-                speed=speed,
-                torque=np.tile(torque, len(factors)),
-                inputs=columns(inputs),
-                parameters=columns(factors),
-            )
-            return np.asarray(result.temperatures["oil"][:, 0].reshape(len(factors), count))
-        except ArithmeticError:
-            # Far from the nominal definition the iteration to the steady state may not end; time always does.
-            return np.array(
-                [
-                    [_after_long(network, losses, speed, T1, given, factor) for T1 in torque.tolist()]
-                    for factor, given in zip(factors, inputs, strict=True)
-                ]
-            )
+        oil, _ = steady_oil(
+            network,
+            losses,
+            speed=np.full(len(each), speed),
+            torque=np.tile(torque, len(factors)),
+            inputs=given,
+            parameters=parameters,
+        )
+    return oil.reshape(len(factors), len(torque))
 
 
-def _after_long(
-    network: ThermalNetwork,
-    losses: LossModel,
-    speed: float,
-    torque: float,
-    inputs: Mapping[str, float],
-    factors: Mapping[str, float],
-) -> float:
-    """Oil temperature after a time that is long for everything, [degC]."""
-    cycle = {"time_s": (0.0, LONG_S), "speed_rpm": (speed,) * 2, "torque_Nm": (torque,) * 2}
-    cycle |= {COLUMNS[name][0]: (value,) * 2 for name, value in inputs.items()}
-    result = network.simulate(cycle, losses=losses, parameters=factors)
-    return float(result.temperatures["oil"][-1])
+def _signed(sign: float, value: float) -> str:
+    return f"{sign * value:+.2f}" if value >= SMALLEST else "0"
 
 
 def _label(study: Study, name: str) -> str:

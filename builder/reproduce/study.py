@@ -58,10 +58,10 @@ class Settings:
     samples: int | None = None
     judged: int = 400
     runs: int = 5
-    longest_s: float = 25.0
+    longest_s: float = 30.0
     step_s: float = 10.0
     fine_step_s: float = 1.0
-    trajectories: int = 6
+    trajectories: int = 8
 
 
 @dataclass(frozen=True, kw_only=True)

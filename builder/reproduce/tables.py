@@ -188,7 +188,9 @@ def _item(gearbox: Gearbox, key: str, title: str, rows: Sequence[Row]) -> Item:
         title=title,
         reading="The definition models/gearboxes/fzg.toml beside the print.",
         checks=(values_equal_the_print(gearbox, rows),),
-        tables=(Table(title=key, header=("quantity", "printed", "ours", "where ours comes from"), rows=shown),),
+        tables=(
+            Table(title=key, header=("quantity", "printed", "ours", "where ours comes from"), rows=shown, texts=True),
+        ),
     )
 
 

@@ -116,7 +116,8 @@ def test_plain_networks_are_what_scikit_learn_fitted(trained):
     for one in trained.networks:
         low, high = np.array(one.network.lower), np.array(one.network.upper)
         rows = np.random.default_rng(2).uniform(low, high, (100, len(low)))
-        fitted = np.maximum(one.estimator.predict(rows).reshape(100, -1), 0.0)
+        parts = [estimator.predict(rows).reshape(100, -1) for estimator in one.estimators]
+        fitted = np.maximum(np.concatenate(parts, axis=1), 0.0)
         np.testing.assert_allclose(one.network(rows), fitted, rtol=1e-9, atol=1e-9)
 
 
