@@ -43,11 +43,27 @@ def main() -> None:
     rows = [
         ("full model, one operating point", median_seconds(lambda: losses.power(*one), 200) * 1e3, "ms"),
         ("full model, per point in a batch of 400", median_seconds(lambda: losses.power(*many), 50) / 400 * 1e6, "us"),
-        ("600 s cycle at 1 s, full model", median_seconds(lambda: network.simulate(cycle, losses=losses, initial=COLD_START)), "s"),
+        (
+            "600 s cycle at 1 s, full model",
+            median_seconds(lambda: network.simulate(cycle, losses=losses, initial=COLD_START)),
+            "s",
+        ),
     ]
     with loaded_fmu(fmu) as loaded:
-        rows.append(("600 s cycle at 1 s, FMU in FMPy, loaded", median_seconds(lambda: loaded.drive(cycle, initial=COLD_START)), "s"))
-    rows.append(("600 s cycle at 1 s, FMU in FMPy, with loading", median_seconds(lambda: drive_fmu(fmu, cycle, initial=COLD_START)), "s"))
+        rows.append(
+            (
+                "600 s cycle at 1 s, FMU in FMPy, loaded",
+                median_seconds(lambda: loaded.drive(cycle, initial=COLD_START)),
+                "s",
+            )
+        )
+    rows.append(
+        (
+            "600 s cycle at 1 s, FMU in FMPy, with loading",
+            median_seconds(lambda: drive_fmu(fmu, cycle, initial=COLD_START)),
+            "s",
+        )
+    )
     width = max(len(row[0]) for row in rows)
     for label, value, unit in rows:
         print(f"{label:{width}s}  {value:8.3f} {unit}")

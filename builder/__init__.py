@@ -1,0 +1,1 @@
+"""From a gearbox definition to an FMU, and the command line."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import shutil
 import tempfile
 import time
@@ -77,9 +76,9 @@ class BuildReport:
             for r in self.training.report
         ]  # fmt: skip
         console.table(
-            f"Networks against the full model on {self.training.preset.judged} separate points; corner: the lowest tenth "
-            "of every input",
-            ["loss", "R²", "median %", "95 % below %", "corner median %", "corner 95 % below %"],
+            f"Networks against the full model on {self.training.preset.judged} separate points: relative errors\n"
+            "(corner: the lowest tenth of every input)",
+            ["loss", "R²", "median %", "p95 %", "corner median %", "corner p95 %"],
             rows,
         )
         worst_node, worst = max(self.cycle.temperature_K.items(), key=lambda item: item[1])
@@ -168,7 +167,9 @@ def build(
 
 def cycle_errors(driven: Mapping[str, Array], reference: Mapping[str, Array]) -> CycleErrors:
     """Compare two results over the same rows, in the columns of the file contract."""
-    nodes = [name for name in reference if name.startswith("T_") and name.endswith("_degC") and name != "T_ambient_degC"]
+    nodes = [
+        name for name in reference if name.startswith("T_") and name.endswith("_degC") and name != "T_ambient_degC"
+    ]
     loss = np.abs(driven["P_loss_W"] - reference["P_loss_W"]) / reference["P_loss_W"]
     return CycleErrors(
         temperature_K={name[2:-5]: float(np.max(np.abs(driven[name] - reference[name]))) for name in nodes},
@@ -200,7 +201,7 @@ def staging(folder: Path) -> Iterator[Path]:
         for path in files:
             goal = folder / path.relative_to(stage)
             goal.parent.mkdir(parents=True, exist_ok=True)
-            os.replace(path, goal)
+            path.replace(goal)
     finally:
         shutil.rmtree(stage, ignore_errors=True)
 
@@ -216,7 +217,7 @@ def _timed(step: str, seconds: dict[str, float]) -> Iterator[None]:
 def _spoken() -> Iterator[Any]:
     """Stages of long work as a changing line on a terminal, nothing in a pipe."""
     if not console.err.is_terminal:
-        yield lambda line: None
+        yield lambda _: None
         return
     with console.err.status("starting") as status:
         yield lambda line: status.update(line)

@@ -12,14 +12,15 @@ import click
 
 from builder import console
 from builder.files import read_cycle, read_initial, write_table
+from builder.reproduce.command import reproduce
 from models.errors import InputError
-from models.gearbox import Gearbox, load_gearbox, known_gearboxes
+from models.gearbox import Gearbox, known_gearboxes, load_gearbox
 from models.types import Array
 
 GEARBOX_HELP = f"Name ({', '.join(known_gearboxes())}) or definition file (TOML)."
 
 
-def _stop(number: int, frame: FrameType | None) -> None:
+def _stop(_number: int, _frame: FrameType | None) -> None:
     """Let a termination unwind like an interrupt, so that unfinished files are removed."""
     raise KeyboardInterrupt
 
@@ -65,9 +66,16 @@ def build_fmu(
     definition = load_gearbox(gearbox)
     folder = output if output is not None else Path("out") / Path(gearbox).stem
     report = build(
-        definition, folder, name=Path(gearbox).stem, target=target, preset=preset, samples=samples, seed=seed, jobs=jobs,
+        definition,
+        folder,
+        name=Path(gearbox).stem,
+        target=target,
+        preset=preset,
+        samples=samples,
+        seed=seed,
+        jobs=jobs,
         dask_address=dask_address,
-    )  # fmt: skip
+    )
     report.show()
 
 
@@ -136,7 +144,11 @@ def _show_cycle(columns: Mapping[str, Array], files: list[Path]) -> None:
     console.table("Temperatures in degC", ["node", "first", "highest", "last"], rows)
     losses = {n: v for n, v in columns.items() if n.startswith("P_loss")}
     rows = [
-        [n.removeprefix("P_loss_").removesuffix("_W") if n != "P_loss_W" else "total", f"{v.mean():.1f}", f"{v.max():.1f}"]
+        [
+            n.removeprefix("P_loss_").removesuffix("_W") if n != "P_loss_W" else "total",
+            f"{v.mean():.1f}",
+            f"{v.max():.1f}",
+        ]
         for n, v in losses.items()
     ]
     console.table("Losses in W", ["loss", "mean of rows", "highest"], rows)
@@ -150,3 +162,6 @@ def _show_cycle(columns: Mapping[str, Array], files: list[Path]) -> None:
     for file in files:
         console.out.print(f"wrote {file}")
     sys.stdout.flush()
+
+
+commands.add_command(reproduce)

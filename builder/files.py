@@ -90,13 +90,15 @@ def write_table(path: Path, columns: Mapping[str, ArrayLike]) -> None:
         If the ending is another one or the folder cannot be written to.
     """
     kind = _kind(path)
-    table = pd.DataFrame({name: values for name, values in columns.items()})
+    table = pd.DataFrame(dict(columns))
     with appearing_whole(path) as partial:
         if kind == ".parquet":
             try:
                 table.to_parquet(partial)
             except ImportError as error:
-                raise InputError(f"{path}: writing Parquet needs pyarrow; install gearbox-thermal-twin[parquet]") from error
+                raise InputError(
+                    f"{path}: writing Parquet needs pyarrow; install gearbox-thermal-twin[parquet]"
+                ) from error
         else:
             text = table.round(DECIMALS).to_csv(index=False, lineterminator="\n").encode()
             # Neither name nor time go into the archive, so that the same table gives the same bytes.

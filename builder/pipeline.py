@@ -157,7 +157,8 @@ def plain_network(
 def fitted_network(fitted: Any) -> LevenbergMarquardtRegressor:
     """Return the network inside a fitted :func:`surrogate_pipeline`."""
     scaled = fitted.regressor_ if isinstance(fitted, ReducedTargetRegressor) else fitted
-    return scaled.regressor_.named_steps["network"]
+    network: LevenbergMarquardtRegressor = scaled.regressor_.named_steps["network"]
+    return network
 
 
 def side_by_side(networks: Sequence[Network]) -> Network:
@@ -166,11 +167,12 @@ def side_by_side(networks: Sequence[Network]) -> Network:
     if len(networks) == 1:
         return first
     depths = [list(layers) for layers in zip(*(network.weights for network in networks), strict=True)]
+    b_1, b_2, b_3 = (np.concatenate(parts) for parts in zip(*(network.biases for network in networks), strict=True))
     return replace(
         first,
         outputs=tuple(name for network in networks for name in network.outputs),
         weights=(np.hstack(depths[0]), block_diag(*depths[1]), block_diag(*depths[2])),
-        biases=tuple(np.concatenate(parts) for parts in zip(*(network.biases for network in networks), strict=True)),
+        biases=(b_1, b_2, b_3),
         passed=np.hstack([network.passed for network in networks]),
     )
 

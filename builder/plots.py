@@ -21,7 +21,7 @@ DOTS: dict[str, Any] = {
     "linestyle": "none", "marker": "o", "markersize": 3.5, "markerfacecolor": "white", "markeredgecolor": "black",
     "markeredgewidth": 0.8,
 }  # fmt: skip
-STYLE = {
+STYLE: dict[Any, Any] = {
     "font.size": 9.0,
     "axes.grid": True,
     "grid.alpha": 0.3,
@@ -109,7 +109,9 @@ def _loss_curves(columns: Mapping[str, Array]) -> dict[str, tuple[Array, tuple[s
 def _temperature_curves(
     columns: Mapping[str, Array], groups: Mapping[str, tuple[str, ...]]
 ) -> dict[str, tuple[Array, tuple[str, ...]]]:
-    nodes = [name[2:-5] for name in columns if name.startswith("T_") and name.endswith("_degC") and name != "T_ambient_degC"]
+    nodes = [
+        name[2:-5] for name in columns if name.startswith("T_") and name.endswith("_degC") and name != "T_ambient_degC"
+    ]
     hidden = {node for group in groups.values() for node in group[1:-1]} | {"air", "frame"}
     shown = [node for node in nodes if node not in hidden]
     return {node: (columns[f"T_{node}_degC"], (f"T_{node}_degC",)) for node in shown}

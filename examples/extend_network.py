@@ -13,9 +13,9 @@ from models.gearbox import load_gearbox
 gearbox = load_gearbox("fzg")
 losses = gearbox.losses()
 nominal = gearbox.network()
-extended = nominal.with_source(
-    "oil", lambda s: 8.0 * (s.speed / 3000.0) ** 3, name="extra", is_loss=True
-).with_link("housing", "frame", lambda s: 3.0, name="foot")
+extended = nominal.with_source("oil", lambda s: 8.0 * (s.speed / 3000.0) ** 3, name="extra", is_loss=True).with_link(
+    "housing", "frame", lambda s: 3.0, name="foot"
+)
 
 cycle = read_cycle(Path(__file__).with_name("drive_cycle_600s.csv"))
 for name, network in (("nominal", nominal), ("extended", extended)):

@@ -162,7 +162,7 @@ class SkfRollerBearing:
         d_m, d, D = self.d_m, self.d, self.D
         H = min(max(self.H, 0.0), 1.2 * d_m)
         # Its power of nu is a fit; cold oil beyond the limits would brake a NU 406 with kilowatts.
-        nu = np.minimum(nu, DRAG_NU_HALF if self.H <= 0.6 * d_m else DRAG_NU_DEEP)
+        nu = np.minimum(nu, DRAG_NU_HALF if 0.6 * d_m >= self.H else DRAG_NU_DEEP)
         t = 2.0 * np.arccos(np.clip((0.6 * d_m - H) / (0.6 * d_m), -1.0, 1.0))
         if t == 0.0:
             return np.zeros(np.broadcast_shapes(n.shape, nu.shape))

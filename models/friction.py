@@ -205,9 +205,7 @@ class MeshContact:
 
         # mu <= xi mu_solid + (1 - xi) limit brackets the root whatever the oil does in between.
         highest = T_in + rise * (xi * self.mu_solid + (1.0 - xi) * limit)
-        T_film = decreasing_root(
-            lambda T: T_in + rise * friction(T) - T, T_in, highest, f_tol=FILM_TEMPERATURE_TOL
-        )
+        T_film = decreasing_root(lambda T: T_in + rise * friction(T) - T, T_in, highest, f_tol=FILM_TEMPERATURE_TOL)
         mu = friction(T_film)
         return ContactState(
             F=F, p_H=p_H, V_s=V_s, V_r=2.0 * V_e, h=h, phi_T=phi_T, asperity_share=xi, T_in=T_in, T_film=T_film,

@@ -290,5 +290,3 @@ class _Builder:
     def _shaft_radius(self, gear: str) -> float:
         shaft = next(s for s in self.gearbox.shaft if s.name == self.shaft_of_gear[gear])
         return 0.5 * shaft.diameter
-
-

@@ -66,9 +66,7 @@ class ChurningLoss:
                 for e, w in zip(self.immersion, omega, strict=True)
             ]
         elif self.model == "mauz":
-            per_gear = [
-                churning.churning_mauz(e=self.immersion, b=pair.b, v_t=v_t, omega_2=omega[1], C_Sp=self.C_Sp)
-            ]
+            per_gear = [churning.churning_mauz(e=self.immersion, b=pair.b, v_t=v_t, omega_2=omega[1], C_Sp=self.C_Sp)]
         else:
             nu, rho = self.oil.kinematic_viscosity(T_oil), self.oil.density(T_oil)
             per_gear = [

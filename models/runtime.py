@@ -119,7 +119,11 @@ class NetworkSystem:
         to_boundary = laws.to_boundary
         blocks = (laws.laplacian.reshape(n_links, -1), to_boundary.reshape(n_links, -1), to_boundary.sum(axis=-1))
         self._structure = np.concatenate(blocks, axis=1)
-        self._leaving, self._coupling, self._slope = slice(0, n * n), slice(n * n, n * (n + m)), slice(n * (n + m), None)
+        self._leaving, self._coupling, self._slope = (
+            slice(0, n * n),
+            slice(n * n, n * (n + m)),
+            slice(n * (n + m), None),
+        )
         self._loss_nodes = np.array([laws.parts.index(name) for name in losses.temperature_nodes])
         self._varying = np.array(laws.varying, dtype=int)
         constant = [index for index in range(n_links) if index not in laws.varying]

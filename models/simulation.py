@@ -16,8 +16,11 @@ from models.network import Losses, ThermalNetwork
 from models.runtime import NetworkSystem, efficiency, torque_loss
 from models.types import Array
 
-STEADY_TOLERANCE_K = 1e-9
-FIRST_PSEUDO_STEP_S, LARGE_PSEUDO_STEP_S = 1e5, 1e8
+STEADY_TOLERANCE_K, STEADY_DISTANCE_K = 1e-9, 1e-6
+FIRST_PSEUDO_STEP_S, LARGEST_PSEUDO_STEP_S, SHORTEST_PSEUDO_STEP_S = 1e5, 1e10, 10.0
+SETTLING = (
+    0.7  # a change this much smaller than the one before; without a margin rounding can keep a cycle of two alive
+)
 RUNAWAY_K = 1e6
 
 
@@ -293,7 +296,7 @@ def steady_state(
     Notes
     -----
     Implicit Euler in pseudo-time with the conductance matrix as Jacobian: an iteration that the stiff network damps by
-    itself. It ends when no node moves by more than 1e-9 K in an infinite step.
+    itself. It ends when no node moves by more than 1e-9 K in a step, and by no more than 1e-6 K in an infinite one.
     """
     if network.states:
         raise InputError("a network with laws that have a memory has no steady state; simulate a long cycle instead")
@@ -321,14 +324,24 @@ def steady_state(
         if not moved < RUNAWAY_K:
             break
         T = T + change
-        if moved <= STEADY_TOLERANCE_K and step >= LARGE_PSEUDO_STEP_S:
+        if moved <= STEADY_TOLERANCE_K and _distance(balance) <= STEADY_DISTANCE_K:
             zero = np.zeros((2, *rows, 1))
             return evaluate(
                 network, losses, wide, time=np.zeros(1), table=table[:, None, :], states=T[:, None, :], heat=zero
             )
         # Longer steps while it settles, shorter ones where losses that rise with temperature make it overshoot.
-        step = min(step * 3.0, 100.0 * LARGE_PSEUDO_STEP_S) if moved < previous else max(step / 2.0, 100.0)
+        settling = moved < SETTLING * previous
+        step = min(step * 3.0, LARGEST_PSEUDO_STEP_S) if settling else max(step / 4.0, SHORTEST_PSEUDO_STEP_S)
         previous = moved
     raise ArithmeticError(
         f"no steady state found (a node still moves by {moved:.3g} K): is there a node without cooling?"
     )
+
+
+def _distance(balance: solver.Balance) -> float:
+    """How far the nodes would move in an infinite step, [K]; infinite where a node has no cooling."""
+    try:
+        move = np.linalg.solve(balance.matrix, balance.derivative[..., None])
+    except np.linalg.LinAlgError:
+        return np.inf
+    return float(np.max(np.abs(move)))

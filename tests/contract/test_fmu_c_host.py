@@ -26,7 +26,7 @@ LIBPYTHON = Path(str(sysconfig.get_config_var("LIBDIR")), str(sysconfig.get_conf
 def test_simulations_in_c_end_well_and_give_the_same(fzg_fmu: Path, tmp_path: Path) -> None:
     host = tmp_path / "host"
     source = Path(__file__).with_name("host.c")
-    subprocess.run([str(COMPILER), "-w", "-o", str(host), str(source), "-ldl"], check=True)  # noqa: S603
+    subprocess.run([str(COMPILER), "-w", "-o", str(host), str(source), "-ldl"], check=True)
     with zipfile.ZipFile(fzg_fmu) as archive:
         archive.extractall(tmp_path / "fmu")
     with hosted(fzg_fmu) as running:
@@ -35,7 +35,7 @@ def test_simulations_in_c_end_well_and_give_the_same(fzg_fmu: Path, tmp_path: Pa
         expected = running.get("oil.T")[0]
     library = tmp_path / "fmu/binaries" / fmpy.platform / f"fzg{fmpy.sharedLibraryExtension}"
     packages = str(Path(np.__file__).parents[1])
-    done = subprocess.run(  # noqa: S603
+    done = subprocess.run(
         [str(host), str(library), guid, (tmp_path / "fmu/resources").as_uri(), str(reference)],
         env={**os.environ, "LD_PRELOAD": str(LIBPYTHON), "PYTHONPATH": packages},
         capture_output=True,

@@ -81,7 +81,7 @@ def test_same_definition_gives_the_same_bytes_in_any_process(
         "build_python_fmu(load_gearbox('fzg'), training, networks, Path(sys.argv[2]))"
     )
     again = tmp_path / "fzg.fmu"
-    subprocess.run(  # noqa: S603 - our own script
+    subprocess.run(
         [sys.executable, "-c", script, str(tmp_path / "training"), str(again)],
         check=True,
         cwd=Path(__file__).parents[2],
@@ -147,7 +147,7 @@ heavy = {{"scipy", "sympy", "pydantic", "sklearn", "onnx", "pandas", "models", "
 assert not heavy, heavy
 assert not [entry for entry in sys.path if "resources" in entry], sys.path
 """
-    done = subprocess.run(  # noqa: S603 - our own script
+    done = subprocess.run(
         [sys.executable, "-c", script], capture_output=True, text=True, cwd=tmp_path,
                           env={k: v for k, v in os.environ.items() if k != "PYTHONPATH"})  # fmt: skip
     assert done.returncode == 0, done.stderr

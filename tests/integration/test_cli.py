@@ -105,7 +105,7 @@ def test_faulty_input_ends_with_status_2_and_one_message(
 def test_an_interrupted_build_leaves_nothing(number: signal.Signals, tmp_path: Path) -> None:
     command = [sys.executable, "-m", "builder", "build-fmu", "--output", str(tmp_path / "out"), "--jobs", "1"]
     environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
-    process = subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, env=environment)  # noqa: S603
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, env=environment)
     for _ in range(600):  # until the build has begun
         if list(tmp_path.glob("out/.unfinished-*")):
             break
@@ -123,11 +123,20 @@ def test_an_interrupted_build_leaves_nothing(number: signal.Signals, tmp_path: P
 
 def test_build_fmu_from_a_definition(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "box"
-    assert run("build-fmu", "--gearbox", "conveyor", "--output", out, "--samples", "300", "--jobs", "1", "--seed", "3") == 0
+    assert (
+        run("build-fmu", "--gearbox", "conveyor", "--output", out, "--samples", "300", "--jobs", "1", "--seed", "3")
+        == 0
+    )
     report = json.loads((out / "report.json").read_text())
     assert report["seed"] == 3
     assert report["samples_per_network"] == 300
-    assert {p.name for p in out.iterdir()} == {"conveyor.fmu", "networks", "drive_cycle.csv", "drive_cycle.png", "report.json"}
+    assert {p.name for p in out.iterdir()} == {
+        "conveyor.fmu",
+        "networks",
+        "drive_cycle.csv",
+        "drive_cycle.png",
+        "report.json",
+    }
     shown = capsys.readouterr().out
     for row in ("mesh_sliding", "worst node", "conveyor.fmu"):
         assert row in shown

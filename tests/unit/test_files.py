@@ -10,7 +10,11 @@ import pytest
 from builder.files import appearing_whole, read_cycle, read_initial, read_table, write_table
 from models.errors import InputError
 
-COLUMNS = {"time_s": np.array([0.0, 1.0, 2.5]), "T_oil_degC": np.array([20.0, 20.125, 21.0]), "in_domain": np.array([True, True, False])}  # fmt: skip
+COLUMNS = {
+    "time_s": np.array([0.0, 1.0, 2.5]),
+    "T_oil_degC": np.array([20.0, 20.125, 21.0]),
+    "in_domain": np.array([True, True, False]),
+}
 
 
 @pytest.mark.parametrize("name", ["a.csv", "a.csv.gz", "a.parquet", "späte Läufe/a b.csv"])
@@ -100,5 +104,5 @@ def test_initial_temperatures_from_the_last_row_of_a_result(tmp_path: Path) -> N
     write_table(path, {"time_s": [0.0, 1.0], "T_oil_degC": [20.0, 30.5], "T_ambient_degC": [1.0, 1.0]})
     assert read_initial(str(path)) == {"oil": 30.5}
     write_table(path, {"time_s": [0.0]})
-    with pytest.raises(InputError, match="no T_<node>_degC columns"):
+    with pytest.raises(InputError, match="has no T_<node>_degC columns"):
         read_initial(str(path))

@@ -43,7 +43,7 @@ def test_ratios_of_type_c(pair: GearPair) -> None:
     assert pair.epsilon_alpha == pytest.approx(1.43716, abs=5e-6)
     assert (pair.epsilon_1, pair.epsilon_2) == pytest.approx((0.7221, 0.7151), abs=5e-5)
     assert pair.k == pytest.approx((-0.02067, -0.02067), abs=5e-6)
-    assert pair.H_V == pytest.approx(0.1949, abs=5e-5)
+    assert pytest.approx(0.1949, abs=5e-5) == pair.H_V
     assert pair.u == 1.5
 
 
@@ -53,7 +53,7 @@ def test_points_on_the_path_of_contact(pair: GearPair) -> None:
     rho_1, rho_2, R = pair.curvature_radii(t)
     assert 1e3 * rho_1 == pytest.approx([4.470, 10.278, 13.970, 17.755, 23.562], abs=6e-4)
     assert 1e3 * rho_2 == pytest.approx([30.455, 24.647, 20.955, 17.170, 11.363], abs=6e-4)
-    assert 1e3 * R == pytest.approx([3.898, 7.253, 8.382, 8.729, 7.666], abs=6e-4)
+    assert pytest.approx([3.898, 7.253, 8.382, 8.729, 7.666], abs=6e-4) == 1e3 * R
     sliding = pair.sliding_speed(t, 100.0) / (100.0 * pair.r_w[0])
     assert sliding == pytest.approx([0.4326, 0.1681, 0.0, 0.1724, 0.4368], abs=6e-5)
 
@@ -85,7 +85,7 @@ def test_tip_shortening_keeps_the_tip_clearance_of_the_rack(pair: GearPair) -> N
 def test_tip_radii_override_tip_shortening() -> None:
     given = gear_pair(**TYPE_C, r_a=(41.0e-3, 59.0e-3))
     assert given.r_a == (41.0e-3, 59.0e-3)
-    assert given.T1E == pytest.approx(math.sqrt(41.0e-3**2 - given.r_b[0] ** 2))
+    assert pytest.approx(math.sqrt(41.0e-3**2 - given.r_b[0] ** 2)) == given.T1E
 
 
 def test_unshifted_pair_is_never_lengthened() -> None:

@@ -126,6 +126,6 @@ def test_coinciding_breakpoints_are_one(high: GearPair) -> None:
     """The tip of gear 1 placed so that the contact ends one base pitch after the pitch point: B is C up to rounding."""
     tip = math.hypot(high.r_b[0], high.T1C + high.p_b)
     pair = gear_pair(z=high.z, m_n=high.m_n, alpha_n=ALPHA, b=high.b, a=high.a, x=high.x, r_a=(tip, 92.0e-3))
-    assert pair.T1B == pytest.approx(pair.T1C, rel=1e-12)
+    assert pytest.approx(pair.T1C, rel=1e-12) == pair.T1B
     assert contact_breakpoints(pair) == pytest.approx([pair.T1A, pair.T1C, pair.T1D, pair.T1E])
     assert np.all(contact_points(pair).dx > 1e-9)

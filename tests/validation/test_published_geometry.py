@@ -31,9 +31,9 @@ def type_c(b_mm: float, *, tip_shortening: bool) -> GearPair:
 def test_gearpie_c14_and_c40(b_mm: float) -> None:
     pair = type_c(b_mm, tip_shortening=False)
     assert 1e3 * pair.p_b == pytest.approx(13.285, abs=5e-4)
-    assert 1e3 * pair.T1T2 == pytest.approx(34.93, abs=5e-3)
+    assert pytest.approx(34.93, abs=5e-3) == 1e3 * pair.T1T2
     assert pair.epsilon_alpha == pytest.approx(1.46, abs=5e-3)
-    assert pair.H_V == pytest.approx(0.1986, abs=5e-5)
+    assert pytest.approx(0.1986, abs=5e-5) == pair.H_V
 
 
 def test_tip_diameters_of_fzg_type_c() -> None:
