@@ -103,7 +103,7 @@ def build_python_fmu(
     network = gearbox.network() if network is None else network
     _refuse_mismatch(network, training.losses, networks)
     with appearing_whole(output) as partial, tempfile.TemporaryDirectory(prefix="twin-fmu-") as scratch:
-        table = signal_table(gearbox, network)
+        table = signal_table(gearbox, network, training.losses)
         version = project_version()
         identity = Identity(
             model_name=gearbox.name,

@@ -21,6 +21,7 @@ from models.cycle import COLUMNS
 from models.errors import InputError, did_you_mean
 from models.gearbox import Gearbox
 from models.network import ThermalNetwork
+from models.surrogate import SurrogateLosses
 
 START_TEMPERATURE = 293.15  # K
 INITIAL = ("initial.uniform", "initial.T")
@@ -209,7 +210,9 @@ def input_column(name: str) -> str:
     return COLUMNS[name][0] if name in COLUMNS else name.strip("'")
 
 
-def signal_table(gearbox: Gearbox, network: ThermalNetwork | None = None) -> SignalTable:
+def signal_table(
+    gearbox: Gearbox, network: ThermalNetwork | None = None, losses: SurrogateLosses | None = None
+) -> SignalTable:
     """The signals of a gearbox.
 
     Parameters
@@ -217,6 +220,8 @@ def signal_table(gearbox: Gearbox, network: ThermalNetwork | None = None) -> Sig
     gearbox : Gearbox
     network : ThermalNetwork or None
         Its network, where it is not the nominal one
+    losses : SurrogateLosses or None
+        The trained losses, whose domain is shown; by default that of the definition's ``[training]``
 
     Raises
     ------
@@ -230,14 +235,20 @@ def signal_table(gearbox: Gearbox, network: ThermalNetwork | None = None) -> Sig
     >>> table["oil.T"].unit, table["oil.T"].column
     ('K', 'T_oil_degC')
     """
-    return SignalTable(list(_Table(gearbox, gearbox.network() if network is None else network).signals()))
+    network = gearbox.network() if network is None else network
+    training = gearbox.training
+    domain = (training.speed_rpm, training.torque_Nm, training.temperature_degC)
+    if losses is not None:
+        domain = (losses.speed_bounds, losses.torque_bounds, losses.temperature_bounds)
+    return SignalTable(list(_Table(gearbox, network, domain).signals()))
 
 
 class _Table:
     """The network at hand while its signals are listed."""
 
-    def __init__(self, gearbox: Gearbox, network: ThermalNetwork) -> None:
-        self.gearbox, self.network = gearbox, network
+    def __init__(self, gearbox: Gearbox, network: ThermalNetwork, domain: tuple[tuple[float, float], ...]) -> None:
+        self.network = network
+        self.domain = dict(zip(("speed", "torque", "temperature"), domain, strict=True))
         self.inputs = ("speed", "torque", *network.inputs)
         self.parameters = {parameter.name: self._parameter_name(parameter.name) for parameter in network.parameters}
         self.boundaries = {node.name: node.temperature for node in network.nodes if node.temperature is not None}
@@ -256,16 +267,11 @@ class _Table:
                          description=f"Memory {state.name} of the thermal network")  # fmt: skip
 
     def _domain(self, signal: str) -> tuple[float, float] | None:
-        training = self.gearbox.training
-        known = {
-            "speed": (training.speed_rpm, "rad/s"),
-            "torque": (training.torque_Nm, "N.m"),
-            "temperature": (training.temperature_degC, "K"),
-        }
-        if signal not in known:
+        if signal not in self.domain:
             return None
-        bounds, unit = known[signal]
-        return UNITS[unit].from_column(bounds[0]), UNITS[unit].from_column(bounds[1])
+        low, high = self.domain[signal]
+        unit = UNITS[{"speed": "rad/s", "torque": "N.m", "temperature": "K"}[signal]]
+        return unit.from_column(low), unit.from_column(high)
 
     def _inputs(self) -> Iterator[Signal]:
         known = {
