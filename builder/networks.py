@@ -10,7 +10,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from models.bearing import STANDARD_GRAVITY
 from models.errors import InputError, did_you_mean
 from models.losses import SPEED_FLOOR_RPM, TORQUE_FLOOR_NM, LossModel
 from models.surrogate import Feature, Use
@@ -251,7 +250,7 @@ def network_specs(model: LossModel, domain: Domain) -> tuple[NetworkSpec, ...]:
         ratio = [model.bearing_speed_ratio[i] for i in group]
         load = [load_per_torque(model, i) for i in group]
         # Below the bearing's own weight the load does not matter.
-        lightest = 2.0 * model.bearings[group[0]].mass * STANDARD_GRAVITY
+        lightest = model.bearings[group[0]].lightest_load
         heaviest = max(max(load) * torque[1], 2.0 * lightest)
         kinds.append(
             NetworkSpec(

@@ -78,8 +78,8 @@ class SkfRollerBearing:
         Oil level above the lowest contact of the outer raceway, [mm]
     mass : float
         [kg]
-    R1, S1, S2 : float
-        Geometry constants of the series, [-]
+    R1, S2 : float
+        Geometry constants of the series, [-]; S1 acts on an axial load, which spur gears do not make
     K_rs, K_Z, K_L : float
         Replenishment, bearing and roller constants, [-]
     mu_bl, mu_EHL : float
@@ -100,7 +100,6 @@ class SkfRollerBearing:
     H: float
     mass: float
     R1: float
-    S1: float
     S2: float
     K_rs: float
     K_Z: float
@@ -116,6 +115,11 @@ class SkfRollerBearing:
     def d_m(self) -> float:
         """Mean diameter, [mm]."""
         return 0.5 * (self.d + self.D)
+
+    @property
+    def lightest_load(self) -> float:
+        """Radial load that rests on it at least, taken as twice its own weight (15 N for an NU 406), [N]."""
+        return 2.0 * self.mass * STANDARD_GRAVITY
 
     def friction_moments(self, *, n_rpm: Numeric, F_r: Numeric, nu: Numeric) -> tuple[Array, Array, Array]:
         """Rolling, sliding and drag moment.
@@ -144,7 +148,7 @@ class SkfRollerBearing:
         --------
         NU 406 at 2165.7 rpm, 4463 N and 15.41 mm^2/s:
 
-        >>> bearing = SkfRollerBearing(d=30, D=90, B=23, H=17, mass=0.75, R1=1e-6, S1=0.16, S2=0.0015, K_rs=3e-8,
+        >>> bearing = SkfRollerBearing(d=30, D=90, B=23, H=17, mass=0.75, R1=1e-6, S2=0.0015, K_rs=3e-8,
         ...                            K_Z=5.1, K_L=0.65, mu_bl=0.12, mu_EHL=0.02)
         >>> [round(float(M), 1) for M in bearing.friction_moments(n_rpm=2165.7, F_r=4463.0, nu=15.41)]
         [127.1, 9.4, 12.0]
@@ -196,7 +200,7 @@ class SkfRollerBearing:
         Array, shape (...)
             [W]
         """
-        F_r = np.maximum(F_r, 2.0 * self.mass * STANDARD_GRAVITY)
+        F_r = np.maximum(F_r, self.lightest_load)
 
         def power(T: Array) -> Array:
             moments = self.friction_moments(n_rpm=n_rpm, F_r=F_r, nu=oil.kinematic_viscosity(T))

@@ -278,7 +278,6 @@ class Bearing(Section):
     mass_kg: Annotated[float, between(0.001, 1000.0)]
     model: Literal["skf"]
     R1: Annotated[float, between(1e-8, 1e-4)]
-    S1: Annotated[float, between(1e-4, 10.0)]
     S2: Annotated[float, between(1e-5, 1.0)]
     K_rs: Annotated[float, between(0.0, 1e-6)] = 3e-8
     K_Z: Annotated[float, between(1.0, 10.0)] = 5.1

@@ -203,7 +203,6 @@ class LossModel:
                     H=b.oil_level(level * 1e3),
                     mass=b.mass_kg,
                     R1=b.R1,
-                    S1=b.S1,
                     S2=b.S2,
                     K_rs=b.K_rs,
                     K_Z=b.K_Z,

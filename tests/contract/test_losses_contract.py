@@ -164,7 +164,6 @@ DESCRIBE = {
     "schema": "version of the file",
     "stage.0.helix_angle_deg": "only 0 is accepted",
     "training.": "range of the surrogate's training points",
-    **{f"bearing.{i}.S1": "acts on an axial load, which spur gears do not make" for i in EVERY_BEARING},
 }
 # Numbers that cannot be moved alone, with the change that is valid.
 TOGETHER: dict[str, Mapping[str, Any]] = {
