@@ -27,11 +27,11 @@ def progress_bar(label: str) -> Iterator[Report]:
         yield lambda done, total: progress.update(task, completed=done, total=total)
 
 
-def table(title: str, header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """Print a table; the first column is text, the others are numbers."""
+def table(title: str, header: Sequence[str], rows: Sequence[Sequence[str]], *, text_columns: int = 1) -> None:
+    """Print a table; the first columns are text, the others numbers."""
     grid = Table(title=title, title_justify="left", title_style="bold", header_style="bold", pad_edge=False, box=None)
     for index, name in enumerate(header):
-        grid.add_column(name, justify="left" if index == 0 else "right", no_wrap=True)
+        grid.add_column(name, justify="left" if index < text_columns else "right", no_wrap=True)
     for row in rows:
         grid.add_row(*row)
     out.print(grid)

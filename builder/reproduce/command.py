@@ -51,7 +51,7 @@ def reproduce(output: Path, seed: int, jobs: int | None) -> None:
     begin = time.perf_counter()
     with _stages() as tell:
         report = run(output, settings=Settings(seed=seed, jobs=-1 if jobs is None else jobs), progress=tell)
-    console.table("The paper, reproduced", ["item", "what", "verdict"], verdict_rows(report.items))
+    console.table("The paper, reproduced", ["item", "what", "verdict"], verdict_rows(report.items), text_columns=3)
     counted = ", ".join(f"{number} {verdict.value}" for verdict, number in report.count.items())
     console.out.print(f"{len(report.items)} items: {counted}; {time.perf_counter() - begin:.0f} s")
     for name in (PAGE, NUMBERS, SUMMARY, f"{FIGURES}/", "fzg.fmu"):
