@@ -7,18 +7,28 @@ from __future__ import annotations
 
 import sys
 
+import click
+
 from builder.cli import commands
 from builder.console import err
 from models.errors import InputError
+
+INTERRUPTED = 130  # what shells give for a program stopped by the keyboard
 
 
 def main() -> None:
     """Run one verb."""
     try:
-        commands(standalone_mode=True)
+        sys.exit(commands(standalone_mode=False) or 0)
     except InputError as error:
         err.print(str(error), style="red", markup=False)
         sys.exit(2)
+    except click.ClickException as error:
+        error.show()
+        sys.exit(error.exit_code)
+    except (click.Abort, KeyboardInterrupt):
+        err.print("interrupted; unfinished files are removed", style="red")
+        sys.exit(INTERRUPTED)
 
 
 if __name__ == "__main__":

@@ -7,7 +7,7 @@ import shutil
 import tempfile
 import time
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -187,6 +187,7 @@ def staging(folder: Path) -> Iterator[Path]:
     InputError
         If `folder` cannot be made or written to, or a file would replace a folder.
     """
+    made = [parent for parent in (folder, *folder.parents) if not parent.exists()]
     try:
         folder.mkdir(parents=True, exist_ok=True)
         stage = Path(tempfile.mkdtemp(prefix=".unfinished-", dir=folder))
@@ -204,6 +205,9 @@ def staging(folder: Path) -> Iterator[Path]:
             path.replace(goal)
     finally:
         shutil.rmtree(stage, ignore_errors=True)
+        for parent in made:  # deepest first; with files in it the folder stays
+            with suppress(OSError):
+                parent.rmdir()
 
 
 @contextmanager

@@ -16,6 +16,7 @@ from models.cycle import Cycle
 from models.errors import InputError
 
 KINDS = (".csv", ".csv.gz", ".parquet")
+HOTTEST_START = 250.0  # degC
 DECIMALS = 6  # of results: a millionth of a kelvin or a watt
 
 
@@ -35,11 +36,16 @@ def read_table(path: Path) -> pd.DataFrame:
     try:
         if kind == ".parquet":
             return pd.read_parquet(path)
-        return pd.read_csv(path, comment="#", skipinitialspace=True)
+        table = pd.read_csv(path, comment="#", skipinitialspace=True, encoding="utf-8-sig")
+        if len(table.columns) == 1 and ";" in str(table.columns[0]):
+            raise InputError(f"{path}: its columns are separated by ';'; write it with ',' and decimal points")
+        return table
     except ImportError as error:
         raise InputError(f"{path}: reading Parquet needs pyarrow; install gearbox-thermal-twin[parquet]") from error
     except pd.errors.EmptyDataError as error:
         raise InputError(f"{path}: is empty; a header line with column names and rows are needed") from error
+    except InputError:
+        raise
     except (ValueError, OSError, EOFError) as error:
         first_line = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
         raise InputError(f"{path}: cannot be read as {kind.removeprefix('.')}: {first_line}") from error
@@ -70,9 +76,19 @@ def read_initial(value: str) -> float | dict[str, float]:
     >>> read_initial("20")
     20.0
     """
-    with contextlib.suppress(ValueError):
-        return float(value)
-    path = Path(value)
+    try:
+        T = float(value)
+    except ValueError:
+        return _last_row(Path(value))
+    if not -273.15 < T <= HOTTEST_START:
+        raise InputError(
+            f"--initial {value}: must be a finite number above -273.15 degC and up to {HOTTEST_START:g} degC"
+            + (f"; if kelvin are meant, give {T - 273.15:g}" if HOTTEST_START < T < 1000.0 else "")
+        )
+    return T
+
+
+def _last_row(path: Path) -> dict[str, float]:
     table = read_table(path)
     columns = [str(c) for c in table.columns if str(c).startswith("T_") and str(c).endswith("_degC")]
     temperatures = {c[2:-5]: float(table[c].iloc[-1]) for c in columns if c != "T_ambient_degC" and len(table)}

@@ -12,6 +12,9 @@ import sys
 import numpy as np
 from fmpy import simulate_fmu
 
+if len(sys.argv) != 2:
+    sys.exit("usage: python examples/drive_cycle.py FMU")
+
 # Start, stop and coast: columns of the FMU's inputs in SI units (rad/s, N m, K, m/s).
 t = np.arange(0.0, 1801.0)
 rpm = np.interp(t, [0, 20, 600, 620, 900, 960, 1800], [0, 1500, 1500, 4000, 4000, 0, 0])

@@ -6,6 +6,7 @@ what can be refused is refused with a message, and exceptions are left to damage
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Mapping
 from pathlib import Path
@@ -91,21 +92,33 @@ class GearboxSlave(Fmi2Slave):  # type: ignore[misc,unused-ignore]
 
     def set_real(self, vrs: list[int], values: list[float]) -> None:
         """Set Reals."""
-        for text in self._twin.set(vrs, values):
-            self.log(text, Fmi2Status.error)
+        self._set(vrs, values)
 
     def set_boolean(self, vrs: list[int], values: list[bool]) -> None:
         """Set Booleans."""
-        for text in self._twin.set(vrs, [float(value) for value in values]):
-            self.log(text, Fmi2Status.error)
+        self._set(vrs, [float(value) for value in values])
 
     def _get(self, vrs: list[int]) -> list[float]:
+        if self._unknown(vrs):
+            return [math.nan] * len(vrs)
         try:
             return self._twin.get(vrs)
         except Refused as refusal:
             self._complain(refusal)
             self._twin.blank()
             return self._twin.get(vrs)
+
+    def _set(self, vrs: list[int], values: list[float]) -> None:
+        if not self._unknown(vrs):
+            for text in self._twin.set(vrs, values):
+                self.log(text, Fmi2Status.error)
+
+    def _unknown(self, vrs: list[int]) -> bool:
+        """Whether a value reference is none of ours: an exception would be fatal, and the next call kill the host."""
+        unknown = [vr for vr in vrs if not 0 <= vr < len(self._twin.slots)]
+        if unknown:
+            self.log(f"there is no variable with value reference {unknown[0]}; the call does nothing", Fmi2Status.error)
+        return bool(unknown)
 
     def _complain(self, refusal: Refused) -> None:
         """Log a fault of values once, not at every get."""

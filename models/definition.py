@@ -115,20 +115,23 @@ class Fluid(Section):
 
     @model_validator(mode="after")
     def _complete(self) -> Fluid:
+        faults = []
         if (self.viscosity_points is None) == (self.d341 is None):
-            raise ValueError("needs either viscosity_points or d341, and not both")
+            faults.append("needs either viscosity_points or d341, and not both")
         needed = "modulus" if self.pressure_viscosity == "modulus" else "gold"
         if getattr(self, needed) is None:
-            raise ValueError(f"pressure_viscosity = '{self.pressure_viscosity}' needs the table '{needed}'")
+            faults.append(f"pressure_viscosity = '{self.pressure_viscosity}' needs the table '{needed}'")
         if self.viscosity_points is not None:
             (cold, nu_cold), (hot, nu_hot) = sorted(self.viscosity_points)
             if cold == hot:
-                raise ValueError(f"viscosity_points are both at {hot:g} degC; two different temperatures are needed")
-            if nu_hot >= nu_cold:
-                raise ValueError(
+                faults.append(f"viscosity_points are both at {hot:g} degC; two different temperatures are needed")
+            elif nu_hot >= nu_cold:
+                faults.append(
                     f"viscosity_points: {nu_hot:g} mm2/s at {hot:g} degC is not below {nu_cold:g} mm2/s at "
                     f"{cold:g} degC; the hotter oil must be the thinner one"
                 )
+        if faults:
+            raise ValueError("; ".join(faults))
         return self
 
 

@@ -29,6 +29,9 @@ EXPECTED = {
 }
 
 
+_FILLED_BY = re.compile(r"^[\w.]+\.(named|like): ")
+
+
 def validated(section: type[S], values: Any, *, file: str, faults: Sequence[str] = ()) -> S:
     """Return the validated table.
 
@@ -52,7 +55,13 @@ def validated(section: type[S], values: Any, *, file: str, faults: Sequence[str]
     try:
         table = section.model_validate(values)
     except ValidationError as error:
-        lines += fault_lines(error, section)
+        # A table that another file or table should have filled lacks the rest as well: one fault, not ten.
+        unfilled = [line.partition(": ")[0].rpartition(".")[0] for line in faults if _FILLED_BY.search(line)]
+        lines += [
+            line
+            for line in fault_lines(error, section)
+            if not (" is missing" in line and any(line.startswith(f"{table}.") for table in unfilled))
+        ]
     if lines:
         raise InputError("\n".join(f"{file}: {line}" for line in dict.fromkeys(lines)))
     return table

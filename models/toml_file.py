@@ -33,7 +33,7 @@ def read_text(source: Path | Traversable) -> str:
         If it cannot be read, or is not UTF-8.
     """
     try:
-        return source.read_text(encoding="utf-8")
+        return source.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as error:
         raise InputError(f"{source}: is not UTF-8 text (byte {error.start}); TOML must be") from error
     except (OSError, ValueError) as error:

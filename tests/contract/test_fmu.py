@@ -357,3 +357,11 @@ def test_many_instances_after_each_other(path: Path) -> None:
             host.step(1.0)
             found.add(tuple(host.get(*T_OUT)))
     assert len(found) == 1
+
+
+def test_an_unknown_value_reference_does_not_kill_the_host(host: Host) -> None:
+    host.slave.setReal([99999], [1.0])
+    assert math.isnan(host.slave.getReal([99999])[0])
+    assert any("value reference 99999" in text for _, text in host.fmu.messages)
+    host.step(1.0)
+    assert math.isfinite(host.slave.getReal([host.fmu.variables["oil.T"].valueReference])[0])

@@ -59,6 +59,7 @@ def test_a_failure_leaves_the_old_file_and_nothing_else(tmp_path: Path) -> None:
         (b"\x00\xff\xfe\x9c", "cannot be read as csv"),
         (b"time_s,speed_rpm\n1,2\n3,4,5\n", "cannot be read as csv"),
         (b"time_s,speed_rpm,torque_Nm\n", "has no rows"),
+        (b"time_s;speed_rpm;torque_Nm\n0;1;2\n", "separated by ';'"),
         (b"time_s,speed_rpm\n0,1\n", "column torque_Nm is missing"),
         (b"time_s,speed_rpm,torque_Nm\n0,1,2\n1,,2\n", "speed_rpm is nan at row 2"),
         (b"time_s,speed_rpm,torque_Nm\n0,1,inf\n", "torque_Nm is inf at row 1"),
