@@ -105,7 +105,12 @@ def test_faulty_input_ends_with_status_2_and_one_message(
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_an_interrupted_build_leaves_nothing(number: signal.Signals, tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "builder", "build-fmu", "--output", str(tmp_path / "out"), "--jobs", "1"]
+    # A test run in the background inherits an ignored SIGINT; a user's terminal does not.
+    start = (
+        "import runpy, signal; signal.signal(signal.SIGINT, signal.default_int_handler); "
+        "runpy.run_module('builder', run_name='__main__')"
+    )
+    command = [sys.executable, "-c", start, "build-fmu", "--output", str(tmp_path / "out"), "--jobs", "1"]
     environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
     process = subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, env=environment)
     for _ in range(600):  # until the build has begun
