@@ -401,3 +401,8 @@ def test_like_names_an_earlier_table(like: str, hint: str) -> None:
     with pytest.raises(InputError) as caught:
         read_gearbox(text, file="fzg.toml")
     assert f"bearing.1.like: '{like}' is no earlier bearing; {hint}" in str(caught.value)
+
+
+def test_a_table_that_could_not_be_filled_is_one_fault() -> None:
+    assert len(faults(('named = "FZG_mineral_32"', 'named = "FZG_mineral_23"'))) == 1
+    assert len(faults(('name = "bearing_2"\nlike = "bearing_1"', 'name = "bearing_2"\nlike = "nobody"'))) == 1

@@ -1,10 +1,12 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import pytest
 
 from builder.signals import SignalTable, fmi_name, input_column, result_column, signal_table
+from builder.train import TrainingResult
 from builder.units import UNITS
 from models.errors import InputError
 from models.gearbox import Gearbox
@@ -116,3 +118,8 @@ def test_nomenclature_has_one_line_per_signal(table: SignalTable) -> None:
     lines = table.markdown().splitlines()
     assert len(lines) == 2 + len(table)
     assert {line.count("|") for line in lines} == {10}
+
+
+def test_the_domain_is_that_of_the_networks(fzg: Gearbox, fzg_training: TrainingResult) -> None:
+    losses = replace(fzg_training.losses, temperature_bounds=(20.0, 120.0))
+    assert signal_table(fzg, losses=losses)["oil.T"].domain == pytest.approx((293.15, 393.15))

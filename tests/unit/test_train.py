@@ -103,3 +103,13 @@ def test_progress_is_told():
     train_surrogate(FZG, preset=replace(PRESETS["default"], **TINY), samples=60, progress=lines.append)
     assert lines[0] == "full model: 60 points for each of 3 networks"
     assert len(lines) == 3
+
+
+def test_outputs_with_hidden_units_of_their_own_make_one_network():
+    hidden = {"mesh_sliding": (4, 3), "mesh_rolling": (3, 2), "no_load": (2, 2), "bearing": (2, 2)}
+    preset = replace(PRESETS["default"], samples=300, judged=20, max_iter=15, starts=1, hidden=hidden)
+    mesh = train_surrogate(load_gearbox("fzg"), preset=preset).networks[0]
+    assert [len(bias) for bias in mesh.network.biases] == [7, 5, 2]
+    rows = np.random.default_rng(0).uniform(mesh.network.lower, mesh.network.upper, (50, 4))
+    apart = np.stack([estimator.predict(rows).ravel() for estimator in mesh.estimators], axis=-1)
+    np.testing.assert_allclose(mesh.network(rows), apart, rtol=1e-9)
