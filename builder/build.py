@@ -8,7 +8,7 @@ import tempfile
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -19,15 +19,19 @@ from builder.drive_cycle import COLD_START, reference_cycle
 from builder.files import write_table
 from builder.fmu import build_python_fmu
 from builder.fmu_drive import drive_fmu
+from builder.native import build_native_fmu
+from builder.native_compile import host_platform, plan_for
 from builder.onnx_export import export_onnx
 from builder.plots import plot_cycle
 from builder.train import TrainingResult, train_surrogate
-from builder.version import project_version
+from models.correction import Correction
 from models.errors import InputError
 from models.gearbox import Gearbox
 from models.types import Array
+from models.version import project_version
 
 ALL_CORES = -1
+SUFFIX = {"python": "", "native": "_native"}  # of the files' names
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,22 +53,41 @@ class CycleErrors:
 
 @dataclass(frozen=True, kw_only=True)
 class BuildReport:
-    """What a build made and how good it is."""
+    """What a build made and how good it is.
+
+    Attributes
+    ----------
+    gearbox : str
+    training : TrainingResult
+    cycles : mapping of FMU file name to CycleErrors
+    seconds : mapping of step to float
+    files : tuple of Path
+    note : str
+        On platforms that were left out, or ``""``
+    correction : mapping or None
+        Of the correction that the FMU carries, see :meth:`models.correction.Correction.summary`
+    """
 
     gearbox: str
     training: TrainingResult
-    cycle: CycleErrors
+    cycles: Mapping[str, CycleErrors]
     seconds: Mapping[str, float]
     files: tuple[Path, ...]
+    note: str = ""
+    correction: Mapping[str, Any] | None = None
 
     def as_dict(self) -> dict[str, Any]:
         """The report without timings, so that the same build gives the same file."""
         return {
             **self.training.as_dict(),
+            "correction": self.correction,
             "reference_cycle": {
-                "largest_temperature_difference_K": dict(self.cycle.temperature_K),
-                "loss_difference_mean": self.cycle.loss_mean,
-                "loss_difference_worst": self.cycle.loss_worst,
+                name: {
+                    "largest_temperature_difference_K": dict(cycle.temperature_K),
+                    "loss_difference_mean": cycle.loss_mean,
+                    "loss_difference_worst": cycle.loss_worst,
+                }
+                for name, cycle in self.cycles.items()
             },
         }
 
@@ -81,20 +104,23 @@ class BuildReport:
             ["loss", "R²", "median %", "p95 %", "corner median %", "corner p95 %"],
             rows,
         )
-        worst_node, worst = max(self.cycle.temperature_K.items(), key=lambda item: item[1])
+        worst = [max(cycle.temperature_K.items(), key=lambda item: item[1]) for cycle in self.cycles.values()]
+        cycles = self.cycles.values()
         console.table(
             "FMU against the full model, 600 s reference cycle from 20 °C",
-            ["quantity", "difference"],
+            ["quantity", *(f"difference, {name}" for name in self.cycles)],
             [
-                [f"temperature, worst node ({worst_node})", f"{worst:.3f} K"],
-                ["temperature, oil", f"{self.cycle.temperature_K['oil']:.3f} K"],
-                ["total loss, mean", f"{100.0 * self.cycle.loss_mean:.2f} %"],
-                ["total loss, worst", f"{100.0 * self.cycle.loss_worst:.2f} %"],
+                ["temperature, worst node", *(f"{value:.3f} K ({node})" for node, value in worst)],
+                ["temperature, oil", *(f"{cycle.temperature_K['oil']:.3f} K" for cycle in cycles)],
+                ["total loss, mean", *(f"{100.0 * cycle.loss_mean:.2f} %" for cycle in cycles)],
+                ["total loss, worst", *(f"{100.0 * cycle.loss_worst:.2f} %" for cycle in cycles)],
             ],
         )
         console.table("Time", ["step", "s"], [[step, f"{value:.2f}"] for step, value in self.seconds.items()])
         for file in self.files:
             console.out.print(f"wrote {file}")
+        if self.note:
+            console.err.print(f"note: native FMU {self.note}", style="yellow", markup=False)
 
 
 def build(
@@ -103,11 +129,13 @@ def build(
     *,
     name: str,
     target: str = "python",
+    platforms: str = "all",
     preset: str = "default",
     samples: int | None = None,
     seed: int = 0,
     jobs: int | None = None,
     dask_address: str | None = None,
+    correction: Correction | None = None,
 ) -> BuildReport:
     """Train the networks of `gearbox`, build its FMU and try it on the reference cycle.
 
@@ -115,14 +143,19 @@ def build(
     ----------
     gearbox : Gearbox
     folder : Path
-        Where the files go: ``<name>.fmu``, ``networks/*.onnx``, ``drive_cycle.csv`` and ``.png``, ``report.json``.
-        They appear together when all is done; files of an earlier build are replaced, others left alone
+        Where the files go: ``<name>.fmu`` (python), ``<name>_native.fmu``, ``networks/*.onnx``, ``drive_cycle.csv``,
+        ``.png`` (``drive_cycle_native`` of the native FMU), ``report.json``. They appear together when all is done;
+        files of an earlier build are replaced, others left alone
     name : str
         Name of the FMU's file
     target : str
-        Kind of FMU: ``python``
+        Kind of FMU: ``python``, ``native`` or ``both``
+    platforms : str
+        Of a native FMU, see :func:`builder.native_compile.plan_for`
     preset, samples, seed, jobs, dask_address
         See :func:`builder.train.train_surrogate`; `jobs` None takes all cores
+    correction : Correction or None
+        What a diagnosis found: the FMU and the full model it is compared with carry it
 
     Returns
     -------
@@ -133,8 +166,11 @@ def build(
     InputError
         If the folder cannot be written to or the options are at fault.
     """
-    if target != "python":
-        raise InputError(f"target {target!r} is not known; 'python' is")
+    kinds = {"python": ("python",), "native": ("native",), "both": ("python", "native")}.get(target)
+    if kinds is None:
+        raise InputError(f"target {target!r} is not known; python, native and both are")
+    note = plan_for(platforms).note if "native" in kinds else ""  # a missing compiler is told before the training
+    network = gearbox.network() if correction is None else correction.network(gearbox)
     seconds: dict[str, float] = {}
     with staging(folder) as stage:
         with _timed("train", seconds), _spoken() as tell:
@@ -142,27 +178,38 @@ def build(
                 gearbox, preset=preset, samples=samples, seed=seed,
                 jobs=ALL_CORES if jobs is None else jobs, dask_address=dask_address, progress=tell,
             )  # fmt: skip
-        with _timed("export and package", seconds), _spoken() as tell:
-            tell("packaging the FMU")
+        fmus = {kind: stage / f"{name}{SUFFIX[kind]}.fmu" for kind in kinds}
+        with _timed("export", seconds):
             networks = export_onnx(training, stage / "networks", version=project_version())
-            fmu = build_python_fmu(gearbox, training, networks, stage / f"{name}.fmu")
-        cycle = reference_cycle(gearbox)
-        network = gearbox.network()
-        losses = gearbox.losses()
+        for kind, path in fmus.items():
+            with _timed(f"package, {kind} FMU", seconds), _spoken() as tell:
+                tell(f"packaging the {kind} FMU")
+                if kind == "python":
+                    build_python_fmu(gearbox, training, networks, path, network=network)
+                else:
+                    build_native_fmu(gearbox, training, networks, path, platforms=platforms, network=network)
+        cycle, losses = reference_cycle(gearbox), gearbox.losses()
         with _timed("reference cycle, full model", seconds), console.progress_bar("full model") as progress:
             full = network.simulate(cycle, losses=losses, initial=COLD_START, progress=progress).columns()
-        with _timed("reference cycle, FMU in FMPy", seconds), console.progress_bar("FMU in FMPy") as progress:
-            driven = drive_fmu(fmu, cycle, initial=COLD_START, progress=progress)
-        errors = cycle_errors(driven, full)
-        write_table(stage / "drive_cycle.csv", driven)
-        title = f"{gearbox.name}\n600 s reference cycle, FMU and full model"
-        plot_cycle(stage / "drive_cycle.png", driven, title=title, groups=network.groups, reference=full)
-        report = BuildReport(gearbox=gearbox.name, training=training, cycle=errors, seconds=seconds, files=())
+        cycles = {}
+        for kind, path in fmus.items():
+            if kind == "native" and (host_platform() or "") not in plan_for(platforms).platforms:
+                continue  # built for other machines: it cannot be tried here
+            label = f"{kind} FMU in FMPy"
+            with _timed(f"reference cycle, {label}", seconds), console.progress_bar(label) as progress:
+                driven = drive_fmu(path, cycle, initial=COLD_START, progress=progress)
+            cycles[path.name] = cycle_errors(driven, full)
+            write_table(stage / f"drive_cycle{SUFFIX[kind]}.csv", driven)
+            title = f"{gearbox.name}\n600 s reference cycle, {kind} FMU and full model"
+            plot = stage / f"drive_cycle{SUFFIX[kind]}.png"
+            plot_cycle(plot, driven, title=title, groups=network.groups, reference=full)
+        report = BuildReport(
+            gearbox=gearbox.name, training=training, cycles=cycles, seconds=seconds, files=(), note=note,
+            correction=None if correction is None else correction.summary(),
+        )  # fmt: skip
         (stage / "report.json").write_text(json.dumps(report.as_dict(), indent=2) + "\n", encoding="utf-8")
-    files = tuple(folder / path for path in
-                  (f"{name}.fmu", *(f"networks/{p.name}" for p in networks), "drive_cycle.csv", "drive_cycle.png",
-                   "report.json"))  # fmt: skip
-    return BuildReport(gearbox=gearbox.name, training=training, cycle=errors, seconds=seconds, files=files)
+        made = sorted(path.relative_to(stage) for path in stage.rglob("*") if path.is_file())
+    return replace(report, files=tuple(folder / path for path in made))
 
 
 def cycle_errors(driven: Mapping[str, Array], reference: Mapping[str, Array]) -> CycleErrors:

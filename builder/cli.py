@@ -11,8 +11,11 @@ from types import FrameType
 import click
 
 from builder import console
+from builder.conceal_command import conceal
+from builder.diagnose_command import diagnose
 from builder.files import read_cycle, read_initial, write_table
 from builder.reproduce.command import reproduce
+from models.correction import read_correction
 from models.errors import InputError
 from models.gearbox import Gearbox, known_gearboxes, load_gearbox
 from models.types import Array
@@ -34,10 +37,15 @@ def commands() -> None:
 
 @commands.command("build-fmu")
 @click.option("--gearbox", default="fzg", show_default=True, metavar="NAME|FILE", help=GEARBOX_HELP)
-@click.option("--target", type=click.Choice(["python"]), default="python", show_default=True,
-              help="Kind of FMU: python (pythonfmu, ONNX networks in onnxruntime).")  # fmt: skip
+@click.option("--target", type=click.Choice(["python", "native", "both"]), default="python", show_default=True,
+              help="Kind of FMU: python (pythonfmu, ONNX networks in onnxruntime), native (C; no Python where it "
+                   "runs), or both.")  # fmt: skip
+@click.option("--platforms", default="all", show_default=True, metavar="all|host|LIST",
+              help="Of a native FMU: all (with ziglang, else this machine's), host, e.g. win64,win32.")  # fmt: skip
 @click.option("--output", type=click.Path(path_type=Path, file_okay=False), default=None, metavar="DIR",
               help="Folder for the FMU and what belongs to it.  [default: out/<gearbox>]")  # fmt: skip
+@click.option("--correction", type=click.Path(path_type=Path, dir_okay=False), default=None, metavar="FILE",
+              help="What diagnose found: the FMU carries it.")  # fmt: skip
 @click.option("--preset", type=click.Choice(["default", "paper"]), default="default", show_default=True,
               help="Networks: default, or as printed in the paper (400 points, 2 x 5).")  # fmt: skip
 @click.option("--samples", type=click.IntRange(min=50, max=1_000_000), default=None, metavar="N",
@@ -51,7 +59,9 @@ def commands() -> None:
 def build_fmu(
     gearbox: str,
     target: str,
+    platforms: str,
     output: Path | None,
+    correction: Path | None,
     preset: str,
     samples: int | None,
     seed: int,
@@ -70,11 +80,13 @@ def build_fmu(
         folder,
         name=Path(gearbox).stem,
         target=target,
+        platforms=platforms,
         preset=preset,
         samples=samples,
         seed=seed,
         jobs=jobs,
         dask_address=dask_address,
+        correction=None if correction is None else read_correction(correction, definition.network()),
     )
     report.show()
 
@@ -87,9 +99,16 @@ def build_fmu(
 @click.option("--initial", default=None, metavar="T|FILE",
               help="Start temperature of all nodes in degC, or a file with T_<node>_degC columns whose last row counts "
                    "(a result to be continued).  [default: first ambient temperature]")  # fmt: skip
+@click.option("--correction", type=click.Path(path_type=Path, dir_okay=False), default=None,
+              metavar="FILE", help="What diagnose found: the full model carries it.")  # fmt: skip
 @click.option("--plot", type=click.Path(path_type=Path), default=None, metavar="FILE", help="Plot: .png, .pdf or .svg.")
 def simulate(
-    files: tuple[Path, ...], gearbox: str | None, output: Path, initial: str | None, plot: Path | None
+    files: tuple[Path, ...],
+    gearbox: str | None,
+    output: Path,
+    initial: str | None,
+    correction: Path | None,
+    plot: Path | None,
 ) -> None:
     """Drive a CYCLE with an FMU, or with the full model of a gearbox (--gearbox).
 
@@ -100,9 +119,13 @@ def simulate(
         raise InputError("simulate takes FMU CYCLE, or --gearbox NAME|FILE and CYCLE")
     if plot is not None and plot.suffix.lower() not in (".png", ".pdf", ".svg"):
         raise InputError(f"{plot}: plots are written as .png, .pdf or .svg")
+    if correction is not None and gearbox is None:
+        raise InputError(
+            "--correction goes with --gearbox; an FMU is built with its correction (build-fmu --correction)"
+        )
     start = None if initial is None else read_initial(initial)
     if gearbox is not None:
-        columns, groups = _simulate_gearbox(load_gearbox(gearbox), files[0], start)
+        columns, groups = _simulate_gearbox(load_gearbox(gearbox), files[0], start, correction)
         title = f"{load_gearbox(gearbox).name}: {files[0].name}, full model"
     else:
         columns, groups = _simulate_fmu(files[0], files[1], start)
@@ -116,9 +139,11 @@ def simulate(
 
 
 def _simulate_gearbox(
-    gearbox: Gearbox, cycle_file: Path, initial: float | dict[str, float] | None
+    gearbox: Gearbox, cycle_file: Path, initial: float | dict[str, float] | None, correction: Path | None
 ) -> tuple[dict[str, Array], Mapping[str, tuple[str, ...]]]:
     network = gearbox.network()
+    if correction is not None:
+        network = read_correction(correction, network).network(gearbox)
     cycle = read_cycle(cycle_file)
     if isinstance(initial, dict):
         initial = {name: T for name, T in initial.items() if name in {part.name for part in network.parts}}
@@ -164,4 +189,6 @@ def _show_cycle(columns: Mapping[str, Array], files: list[Path]) -> None:
     sys.stdout.flush()
 
 
+commands.add_command(diagnose)
 commands.add_command(reproduce)
+commands.add_command(conceal)

@@ -14,50 +14,15 @@ from numpy.typing import ArrayLike
 
 from models.cycle import Cycle
 from models.errors import InputError
+from models.table_file import kind_of, read_table
 
-KINDS = (".csv", ".csv.gz", ".parquet")
 HOTTEST_START = 250.0  # degC
 DECIMALS = 6  # of results: a millionth of a kelvin or a watt
-
-
-def read_table(path: Path) -> pd.DataFrame:
-    """Read a CSV, CSV.gz or Parquet file.
-
-    Raises
-    ------
-    InputError
-        If the file is missing, empty, of another kind, or its content cannot be read.
-    """
-    if not path.exists():
-        raise InputError(f"{path}: no such file")
-    if not path.is_file():
-        raise InputError(f"{path}: is not a file")
-    kind = _kind(path)
-    try:
-        if kind == ".parquet":
-            return pd.read_parquet(path)
-        table = pd.read_csv(path, comment="#", skipinitialspace=True, encoding="utf-8-sig")
-        if len(table.columns) == 1 and ";" in str(table.columns[0]):
-            raise InputError(f"{path}: its columns are separated by ';'; write it with ',' and decimal points")
-        return table
-    except ImportError as error:
-        raise InputError(f"{path}: reading Parquet needs pyarrow; install gearbox-thermal-twin[parquet]") from error
-    except pd.errors.EmptyDataError as error:
-        raise InputError(f"{path}: is empty; a header line with column names and rows are needed") from error
-    except InputError:
-        raise
-    except (ValueError, OSError, EOFError) as error:
-        first_line = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
-        raise InputError(f"{path}: cannot be read as {kind.removeprefix('.')}: {first_line}") from error
 
 
 def read_cycle(path: Path, extra: tuple[str, ...] = ()) -> Cycle:
     """Read a cycle; see :meth:`models.cycle.Cycle.from_columns`."""
     table = read_table(path)
-    repeated = sorted({str(c).rpartition(".")[0] for c in table.columns if str(c).rpartition(".")[2].isdigit()})
-    for name in repeated:  # pandas renames a second 'speed_rpm' to 'speed_rpm.1'
-        if name in table.columns:
-            raise InputError(f"{path}: column {name} is there twice; remove one")
     return Cycle.from_columns({str(c): table[c].to_numpy() for c in table.columns}, name=str(path), extra=extra)
 
 
@@ -105,7 +70,7 @@ def write_table(path: Path, columns: Mapping[str, ArrayLike]) -> None:
     InputError
         If the ending is another one or the folder cannot be written to.
     """
-    kind = _kind(path)
+    kind = kind_of(path)
     table = pd.DataFrame(dict(columns))
     with appearing_whole(path) as partial:
         if kind == ".parquet":
@@ -146,10 +111,3 @@ def appearing_whole(path: Path) -> Iterator[Path]:
         partial.replace(path)
     finally:
         partial.unlink(missing_ok=True)
-
-
-def _kind(path: Path) -> str:
-    for kind in KINDS:
-        if path.name.lower().endswith(kind):
-            return kind
-    raise InputError(f"{path}: the ending says nothing; use one of {', '.join(KINDS)}")

@@ -19,13 +19,12 @@ from typing import Any
 import fmu_src
 import models
 from builder.files import appearing_whole
-from builder.fmu_documentation import documentation
+from builder.fmu_documentation import Kind, documentation
 from builder.fmu_reference import reference_run
 from builder.model_description import Identity, model_description
 from builder.signals import Signal, SignalTable, signal_table
 from builder.train import TrainingResult
 from builder.units import UNITS
-from builder.version import project_version
 from fmu_src.contents import DATA
 from fmu_src.twin import LISTS
 from models.compiled import compile_laws, law_source
@@ -33,6 +32,7 @@ from models.errors import InputError
 from models.gearbox import Gearbox
 from models.network import ThermalNetwork
 from models.surrogate import SurrogateLosses
+from models.version import project_version
 
 AUTHOR = "gearbox-thermal-twin"
 EARLIEST = (1980, 1, 1, 0, 0, 0)  # of a zip file
@@ -101,21 +101,10 @@ def build_python_fmu(
         gearbox's.
     """
     network = gearbox.network() if network is None else network
-    _refuse_mismatch(network, training.losses, networks)
+    refuse_mismatch(network, training.losses, networks)
     with appearing_whole(output) as partial, tempfile.TemporaryDirectory(prefix="twin-fmu-") as scratch:
         table = signal_table(gearbox, network, training.losses)
-        version = project_version()
-        identity = Identity(
-            model_name=gearbox.name,
-            model_identifier=model_identifier(output.stem),
-            description=f"Power loss and temperatures of {gearbox.name}: reduced-order twin of a detailed loss model",
-            version=version,
-            author=AUTHOR,
-            license="MIT; see documentation/licenses",
-            copyright="See documentation/licenses",
-            generation_tool=f"gearbox-thermal-twin {version}",
-            flags=FLAGS,
-        )
+        identity = gearbox_identity(gearbox, output, FLAGS)
         data = twin_data(table, network, training.losses, definition=gearbox.hash)
         files = {DATA: _json(data)} | {path.name: path.read_bytes() for path in networks}
         stage = Path(scratch) / "resources"
@@ -123,11 +112,41 @@ def build_python_fmu(
         xml = model_description(table, identity, content=digest)
         (stage / "modelDescription.xml").write_bytes(xml)
         (stage / "requirements.txt").write_text(REQUIREMENTS, encoding="utf-8")
-        reference = reference_run(gearbox, network, table, data, training.losses)
-        pages = documentation(gearbox, table, identity, training, reference)
+        pages = gearbox_pages(gearbox, network, table, identity, training, kind="python")
         built = _with_pythonfmu(slave, stage, Path(scratch) / f"{identity.model_identifier}.fmu")
         _repack(built, partial, pages | {"modelDescription.xml": xml})
     return output
+
+
+def gearbox_identity(gearbox: Gearbox, output: Path, flags: Mapping[str, bool]) -> Identity:
+    """What an FMU of a gearbox says about itself."""
+    version = project_version()
+    return Identity(
+        model_name=gearbox.name,
+        model_identifier=model_identifier(output.stem),
+        description=f"Power loss and temperatures of {gearbox.name}: reduced-order twin of a detailed loss model",
+        version=version,
+        author=AUTHOR,
+        license="MIT; see documentation/licenses",
+        copyright="See documentation/licenses",
+        generation_tool=f"gearbox-thermal-twin {version}",
+        flags=flags,
+    )
+
+
+def gearbox_pages(
+    gearbox: Gearbox,
+    network: ThermalNetwork,
+    table: SignalTable,
+    identity: Identity,
+    training: TrainingResult,
+    *,
+    kind: Kind,
+) -> dict[str, bytes]:
+    """What an FMU of a gearbox carries for people, by path in the archive."""
+    data = twin_data(table, network, training.losses, definition=gearbox.hash)
+    reference = reference_run(gearbox, network, table, data, training.losses)
+    return documentation(gearbox, table, identity, training, reference, kind=kind)
 
 
 def model_identifier(name: str) -> str:
@@ -188,7 +207,13 @@ def _json(data: Any) -> bytes:
     return json.dumps(data, indent=1, allow_nan=False).encode()
 
 
-def _refuse_mismatch(network: ThermalNetwork, losses: SurrogateLosses, networks: Sequence[Path]) -> None:
+def refuse_mismatch(network: ThermalNetwork, losses: SurrogateLosses, networks: Sequence[Path]) -> None:
+    """Refuse laws that are no expressions, and networks of another gearbox.
+
+    Raises
+    ------
+    InputError
+    """
     if network.numeric_laws:
         raise InputError(
             f"{', '.join(network.numeric_laws)}: this law branches on values or calls numpy, so it simulates but "
@@ -268,9 +293,14 @@ def _unchanged_imports(prefix: str) -> Iterator[None]:
 
 
 def _repack(built: Path, target: Path, changed: Mapping[str, bytes]) -> None:
-    """Write an archive again, some files changed or added: sorted, without times, deflated."""
+    """Write an archive again, some files changed or added."""
     with zipfile.ZipFile(built) as archive:
         content = {name: archive.read(name) for name in archive.namelist()} | dict(changed)
+    write_archive(target, content)
+
+
+def write_archive(target: Path, content: Mapping[str, bytes]) -> None:
+    """Write a zip archive: sorted, without times, deflated, so that the same content gives the same bytes."""
     with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as archive:
         for name in sorted(content):
             entry = zipfile.ZipInfo(name, date_time=EARLIEST)

@@ -7,6 +7,7 @@ import math
 from html import escape
 from importlib.resources import files
 from string import Template
+from typing import Literal
 
 from PIL import Image, ImageDraw
 
@@ -14,31 +15,39 @@ from builder.fmu_reference import STEP_S, ReferenceRun, csv
 from builder.model_description import Identity
 from builder.signals import SignalTable, nomenclature
 from builder.train import TrainingResult
-from builder.version import DISTRIBUTION, license_text
 from models.gearbox import Gearbox
+from models.version import DISTRIBUTION, license_text
 
-ICON_PX, OVERSAMPLED = 128, 4
+ICON_PX, OVERSAMPLED, ICON_COLOURS = 128, 4, 64
 
 TEMPLATE = "documentation.html"
+Kind = Literal["python", "native"]
 
 
 def documentation(
-    gearbox: Gearbox, table: SignalTable, identity: Identity, training: TrainingResult, reference: ReferenceRun
+    gearbox: Gearbox,
+    table: SignalTable,
+    identity: Identity,
+    training: TrainingResult,
+    reference: ReferenceRun,
+    *,
+    kind: Kind,
 ) -> dict[str, bytes]:
-    """All files for people, by their path in the FMU."""
-    page = _index(gearbox, table, identity, training).encode()
+    """All files for people, by their path in an FMU of a kind."""
+    page = _index(gearbox, table, identity, training, kind).encode()
+    inside = {"documentation/licenses/pythonfmu.txt": license_text("pythonfmu").encode()} if kind == "python" else {}
     return {
+        **inside,
         "documentation/index.html": page,
         "documentation/reference_in.csv": csv(reference.inputs),
         "documentation/reference_out.csv": csv(reference.outputs),
         "documentation/licenses/license.txt": license_text().encode(),
         f"documentation/licenses/{DISTRIBUTION}.txt": license_text().encode(),
-        "documentation/licenses/pythonfmu.txt": license_text("pythonfmu").encode(),
         "model.png": icon(),
     }
 
 
-def _index(gearbox: Gearbox, table: SignalTable, identity: Identity, training: TrainingResult) -> str:
+def _index(gearbox: Gearbox, table: SignalTable, identity: Identity, training: TrainingResult, kind: Kind) -> str:
     losses = training.losses
     bounds = {
         "speed of the input shaft": (losses.speed_bounds, "1/min"),
@@ -57,8 +66,11 @@ def _index(gearbox: Gearbox, table: SignalTable, identity: Identity, training: T
         f"Definition {gearbox.hash[:16]}, networks: preset {preset.name}, {preset.samples} samples each, seed "
         f"{training.seed}. Made by {identity.generation_tool}."
     )
-    template = (files("fmu_src") / TEMPLATE).read_text(encoding="utf-8")
+    template, of_kind = ((files("fmu_src") / name).read_text(encoding="utf-8") for name in (TEMPLATE, f"{kind}.html"))
+    stepping, needs = of_kind.replace("$identifier", escape(identity.model_identifier)).split("<!-- needs -->\n")
     return Template(template).substitute(
+        stepping=stepping.rstrip(),
+        needs=needs.rstrip(),
         title=escape(identity.model_name),
         description=escape(identity.description),
         provenance=escape(provenance),
@@ -85,7 +97,8 @@ def icon() -> bytes:
     _gear(draw, centre=(0.30 * size, 0.36 * size), radius=0.20 * size, teeth=12, turn=0.0, colour=(200, 70, 40, 255))
     _gear(draw, centre=(0.66 * size, 0.62 * size), radius=0.27 * size, teeth=18, turn=0.1, colour=(70, 100, 140, 255))
     buffer = io.BytesIO()
-    image.resize((ICON_PX, ICON_PX), Image.Resampling.LANCZOS).save(buffer, "PNG")
+    small = image.resize((ICON_PX, ICON_PX), Image.Resampling.LANCZOS)
+    small.quantize(ICON_COLOURS, method=Image.Quantize.FASTOCTREE).save(buffer, "PNG", optimize=True)
     return buffer.getvalue()
 
 

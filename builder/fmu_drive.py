@@ -3,7 +3,7 @@
 A cycle is straight between its rows, an FMU holds its inputs over a step. So a row in which an input changes is cut in
 pieces, and every input value is held half a piece before and half a piece after its moment. The mean over the row is
 right, so slow nodes are followed to second order in the piece, and fast ones have settled to the inputs of the moment
-at which they are read.
+at which they are read. An FMU that interpolates its inputs (a native one) is given their rates instead.
 """
 
 from __future__ import annotations
@@ -111,6 +111,7 @@ class LoadedFmu:
         self._input_buffer = (c_uint * len(self._inputs))(*(v.valueReference for v in self._inputs))
         self._real_buffer = (c_uint * len(self._reals))(*(v.valueReference for v in self._reals))
         self._boolean_buffer = (c_uint * len(self._booleans))(*(v.valueReference for v in self._booleans))
+        self._orders = (c_int * len(self._inputs))(*(1 for _ in self._inputs))
         self._to_si = [UNITS[v.unit].column[1:] if v.unit in UNITS else (1.0, 0.0) for v in self._inputs]
 
     @property
@@ -127,6 +128,17 @@ class LoadedFmu:
         count = len(values)
         si = (c_double * count)(*((v - b) / a for v, (a, b) in zip(values, self._to_si, strict=True)))
         self.slave.fmi2SetReal(self.slave.component, self._input_buffer, count, si)
+
+    @property
+    def interpolates(self) -> bool:
+        """Whether inputs can go linearly through a step."""
+        return bool(self.description.coSimulation.canInterpolateInputs)
+
+    def set_rates(self, values: Sequence[float]) -> None:
+        """Set the rates of all inputs during the next step, given in the units of file columns per second."""
+        count = len(values)
+        si = (c_double * count)(*(v / a for v, (a, _) in zip(values, self._to_si, strict=True)))
+        self.slave.fmi2SetRealInputDerivatives(self.slave.component, self._input_buffer, count, self._orders, si)
 
     def outputs(self) -> tuple[list[float], list[int]]:
         """Reals in the FMU's own units, and Booleans."""
@@ -205,7 +217,10 @@ def loaded(path: Path) -> Iterator[LoadedFmu]:
     with tempfile.TemporaryDirectory(prefix="twin-fmu-") as folder:
         _extract(path, Path(folder))
         identifier = fmu.description.coSimulation.modelIdentifier
-        binary = Path(folder, "binaries", fmpy.platform, identifier + fmpy.sharedLibraryExtension)
+        # FMI 2.0 names the folders of ARM as FMI 3.0 does; FMPy alone would take those of x86.
+        names = [Path(folder, "binaries", name, identifier + fmpy.sharedLibraryExtension)
+                 for name in (fmpy.platform_tuple, fmpy.platform)]  # fmt: skip
+        binary = next((name for name in names if name.is_file()), names[-1])
         if not binary.is_file():
             raise InputError(f"{path}: has no binary for {fmpy.platform}; build the FMU for this machine")
         callbacks = _callbacks(fmu.messages)
@@ -250,8 +265,14 @@ def _driven(fmu: LoadedFmu, time: Array, table: Array, progress: Callable[[int, 
     component, do_step = slave.component, slave.fmi2DoStep
     for row in range(n_rows - 1):
         begin, end = float(time[row]), float(time[row + 1])
+        change = table[row + 1] - table[row]
         pieces = _pieces(fmu.inputs, end - begin, table[row], table[row + 1])
-        if pieces == 0:
+        if fmu.interpolates:
+            fmu.set_inputs(table[row].tolist())
+            if change.any():
+                fmu.set_rates((change / (end - begin)).tolist())
+            do_step(component, begin, end - begin, 1)
+        elif pieces == 0:
             do_step(component, begin, end - begin, 1)
         else:
             half = (end - begin) / (2 * pieces)

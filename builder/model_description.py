@@ -10,7 +10,7 @@ import hashlib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import isfinite
-from xml.etree.ElementTree import Element, SubElement, indent, tostring
+from xml.etree.ElementTree import Element, SubElement, fromstring, indent, tostring
 
 from builder.signals import Signal, SignalTable
 from builder.units import TYPES, UNITS
@@ -75,6 +75,11 @@ def model_description(table: SignalTable, identity: Identity, *, content: bytes 
     digest = hashlib.sha256(_xml(table, identity, guid="") + content).hexdigest()
     parts = (digest[:8], digest[8:12], digest[12:16], digest[16:20], digest[20:32])
     return _xml(table, identity, guid="{" + "-".join(parts) + "}")
+
+
+def guid_of(xml: bytes) -> str:
+    """The GUID in a model description."""
+    return str(fromstring(xml).attrib["guid"])  # noqa: S314 - our own
 
 
 def _xml(table: SignalTable, identity: Identity, *, guid: str) -> bytes:

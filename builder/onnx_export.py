@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from itertools import groupby
 from pathlib import Path
 from typing import Any
@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import onnx
 import onnxruntime
-from onnx import TensorProto, helper
+from onnx import TensorProto, helper, numpy_helper
 
 from builder.doe import random_points
 from builder.train import TrainingResult
@@ -220,6 +220,38 @@ def load_evaluators(surrogate: SurrogateLosses, folder: str | Path, *, definitio
         network.name: load_onnx(Path(folder) / f"{network.name}.onnx", network=network, definition_hash=definition_hash)
         for network in surrogate.networks
     }
+
+
+def read_network(path: str | Path, network: Network) -> Network:
+    """A network with the bounds, weights and biases that its ONNX file holds.
+
+    Parameters
+    ----------
+    path : path
+    network : Network
+        What it is: name, columns, features
+
+    Raises
+    ------
+    InputError
+        If the file is missing, damaged, or another network's.
+    """
+    evaluator = load_onnx(path, network=network)
+    graph = onnx.load_model(str(path)).graph
+    constants = {tensor.name: numpy_helper.to_array(tensor) for tensor in graph.initializer}
+    products = [node for node in graph.node if node.op_type == "MatMul"]
+    made = {node.output[0] for node in products}
+    given = {node.op_type: constants[node.input[1]].ravel() for node in graph.node if node.op_type in ("Min", "Max")}
+    biases = [constants[n.input[1]].ravel() for n in graph.node
+              if n.op_type == "Add" and n.input[0] in made and n.input[1] in constants]  # fmt: skip
+    *weights, passed = (constants[node.input[1]] for node in products)
+    read = replace(
+        network, lower=tuple(given["Max"].tolist()), upper=tuple(given["Min"].tolist()),
+        weights=(weights[0], weights[1], weights[2]), biases=(biases[0], biases[1], biases[2]), passed=passed,
+    )  # fmt: skip
+    if not largest_deviation(evaluator, read) <= TOLERANCE:
+        raise InputError(f"{Path(path).name}: is not built as this version builds networks; build the FMU again")
+    return read
 
 
 def largest_deviation(evaluator: Evaluator, network: Network, *, count: int = 500) -> float:

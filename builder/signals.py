@@ -30,7 +30,7 @@ LOWEST_START, HIGHEST_START = 173.15, 773.15  # K; what lies outside is most lik
 
 Role = Literal[
     "input", "temperature", "total_loss", "loss", "heat", "torque_loss", "efficiency", "in_domain", "domain_distance",
-    "initial_uniform", "initial_temperature", "start_temperature", "factor", "state",
+    "initial_uniform", "initial_temperature", "start_temperature", "factor", "state", "other",
 ]  # fmt: skip
 
 
@@ -43,7 +43,8 @@ class Signal:
     name : str
         At the FMI interface, structured: ``oil.T``
     role : Role
-        What it is, and `of` the name that the network has for it (a node, a loss, a parameter)
+        What it is, and `of` the name that the network has for it (a node, a loss, a parameter); "other" in the FMU of
+        another model than a gearbox's network
     description : str
     type : str or None
         Key of :data:`builder.units.TYPES`; None for a Boolean and for a Real of `unit`

@@ -63,6 +63,12 @@ UNITS: Mapping[str, Unit] = {
     "m/s": Unit(base={"m": 1, "s": -1}, column=("m/s", 1.0, 0.0)),
     "W": Unit(base={"kg": 1, "m": 2, "s": -3}, display=("kW", 1e-3, 0.0), column=("W", 1.0, 0.0)),
     "1": Unit(column=("1", 1.0, 0.0)),
+    # Of a vehicle.
+    "m": Unit(base={"m": 1}),
+    "m2": Unit(base={"m": 2}),
+    "kg": Unit(base={"kg": 1}),
+    "kg.m2": Unit(base={"kg": 1, "m": 2}),
+    "J": Unit(base={"kg": 1, "m": 2, "s": -2}, display=("kJ", 1e-3, 0.0)),
     # Units of parameters, which stay as the law has them.
     "s": Unit(base={"s": 1}),
     "1/s": Unit(base={"s": -1}),
@@ -95,6 +101,7 @@ TYPES: Mapping[str, Quantity] = {
         quantity="ThermodynamicTemperature", unit="K", display="degC", nominal=300.0, description="Temperature"
     ),
     "AirSpeed": Quantity(quantity="Velocity", unit="m/s", description="Speed of air"),
+    "VehicleSpeed": Quantity(quantity="Velocity", unit="m/s", nominal=10.0, description="Speed of a vehicle"),
     "Power": Quantity(quantity="Power", unit="W", nominal=100.0, description="Power or heat flow"),
     "Ratio": Quantity(quantity="Ratio", unit="1", description="Number without unit"),
 }

@@ -20,7 +20,7 @@ from pythonfmu.enums import Fmi2Status
 from fmu_src.contents import load_twin
 from fmu_src.twin import Refused
 
-LAWS = ("boundary", "exchange", "heat", "fixed")
+LAWS = ("boundary", "exchange", "heat", "fixed", "operating")  # the last only where speed or torque is shifted
 
 
 class GearboxSlave(Fmi2Slave):  # type: ignore[misc,unused-ignore]
@@ -33,7 +33,7 @@ class GearboxSlave(Fmi2Slave):  # type: ignore[misc,unused-ignore]
         self._folder = Path(str(self.resources))
         self.modelName = self.generated.MODEL_IDENTIFIER
         try:
-            laws = {name: getattr(self.generated, name) for name in LAWS}
+            laws = {name: getattr(self.generated, name) for name in LAWS if hasattr(self.generated, name)}
             self._twin = load_twin(self._folder, self.generated.DIGESTS, laws)
         except Exception as error:
             # Without loggingOn the host is told that it failed, but not why.

@@ -260,19 +260,19 @@ class Twin:
         except Exception as error:  # whatever it is, the host gets an answer and keeps its simulation
             raise Refused(f"the heat balance cannot be solved from {time:g} s on: {error}") from error
         self._state, self.time, self._fresh = state, time + duration, False
-        return self._excursion(inputs, state.states)
+        return self._excursion(*system.operating(self.time, inputs, state.states), state.states)
 
-    def _excursion(self, inputs: Array, states: Array) -> str | None:
+    def _excursion(self, speed: Any, torque: Any, states: Array) -> str | None:
         """A warning when the operating point leaves the range of training; none while it stays outside."""
         T = states[self._loss_nodes]
-        outside = float(self._losses.domain_distance(inputs[0], inputs[1], T)) > 0.0
+        outside = float(self._losses.domain_distance(speed, torque, T)) > 0.0
         left, self._outside = outside and not self._outside, outside
         if not left:
             return None
         losses = self._losses
         point = [
-            ("speed", inputs[0], losses.speed_bounds[1], "1/min"),
-            ("torque", inputs[1], losses.torque_bounds[1], "N m"),
+            ("speed", speed, losses.speed_bounds[1], "1/min"),
+            ("torque", torque, losses.torque_bounds[1], "N m"),
         ]
         texts = [f"{name} {value:g} {unit} (to {high:g})" for name, value, high, unit in point if abs(value) > high]
         low, high = losses.temperature_bounds
@@ -330,7 +330,8 @@ class Twin:
             with np.errstate(all="ignore"):
                 heats, _ = system.flows(self.time, inputs, states)
                 boundary = system.boundary_temperatures(self.time, inputs, states)
-                distance = float(self._losses.domain_distance(inputs[0], inputs[1], states[self._loss_nodes]))
+                operating = system.operating(self.time, inputs, states)
+                distance = float(self._losses.domain_distance(*operating, states[self._loss_nodes]))
         except Exception as error:  # as in step
             raise Refused(f"the outputs cannot be calculated at {self.time:g} s: {error}") from error
         n_parts = len(self._part_outputs)

@@ -8,9 +8,10 @@ from typing import Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
+import sympy as sp
 
 from models.errors import InputError
-from models.laws import NumericLaw, Signals, compile_function, function_source, symbol
+from models.laws import NumericLaw, Signals, c_function_source, compile_function, function_source, symbol
 from models.network import BASE_SIGNALS, ThermalNetwork
 from models.runtime import Laws
 from models.types import Array
@@ -63,6 +64,49 @@ def law_source(network: ThermalNetwork, *, vector: bool) -> dict[str, str]:
     InputError
         If a heat capacity is missing or depends on more than parameters.
     """
+    return {
+        name: function_source(name, arguments, expressions, vector=vector)
+        for name, (arguments, expressions) in law_expressions(network).items()
+    }
+
+
+def c_law_source(network: ThermalNetwork, places: Mapping[str, str]) -> dict[str, str]:
+    """C source of the same functions by name, each ``void law_<name>(const double *s, double *y)``.
+
+    Parameters
+    ----------
+    network : ThermalNetwork
+        Without numeric laws
+    places : mapping of str to str
+        C expression of every argument
+
+    Raises
+    ------
+    InputError
+        If a heat capacity is missing or depends on more than parameters, a law uses a function that C lacks, or speed
+        or torque is shifted: the losses of a native FMU read the inputs themselves.
+    """
+    if network.operating:
+        shifted = " and ".join(network.operating)
+        raise InputError(
+            f"a native FMU cannot shift {shifted} for its losses; give it the true one, or build --target python"
+        )
+    return {
+        name: c_function_source(name, {argument: places[argument] for argument in arguments}, expressions)
+        for name, (arguments, expressions) in law_expressions(network).items()
+    }
+
+
+def law_expressions(network: ThermalNetwork) -> dict[str, tuple[list[str], list[sp.Expr]]]:
+    """Arguments, in order, and expressions of the functions of :class:`~models.runtime.Laws` by name.
+
+    ``operating`` is there only where speed or torque is shifted.
+
+    Raises
+    ------
+    InputError
+        If a heat capacity is missing or depends on more than parameters.
+    """
     boundary = {symbol(f"T_{node.name}"): node.temperature for node in network.nodes if node.temperature is not None}
     parameters = [parameter.name for parameter in network.parameters]
     parts = [f"T_{part.name}" for part in network.parts]
@@ -81,12 +125,15 @@ def law_source(network: ThermalNetwork, *, vector: bool) -> dict[str, str]:
     heats = [expression.xreplace(boundary) for expression in [*(source.heat for source in network.sources), *memory]]
     moving = [c for c, varying in zip(conductances, varies, strict=True) if varying]
     constant = [c for c, varying in zip(conductances, varies, strict=True) if not varying]
-    return {
-        "boundary": function_source("boundary", common, list(boundary.values()), vector=vector),
-        "exchange": function_source("exchange", with_numeric, moving, vector=vector),
-        "heat": function_source("heat", [*with_numeric, *losses], heats, vector=vector),
-        "fixed": function_source("fixed", parameters, [*constant, *capacities], vector=vector),
+    functions = {
+        "boundary": (common, list(boundary.values())),
+        "exchange": (with_numeric, moving),
+        "heat": ([*with_numeric, *losses], heats),
+        "fixed": (parameters, [*constant, *capacities]),
     }
+    if network.operating:
+        functions["operating"] = (common, [network.operating.get(name, symbol(name)) for name in ("speed", "torque")])
+    return functions
 
 
 def structure(network: ThermalNetwork) -> tuple[Array, Array, Array]:

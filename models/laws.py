@@ -14,6 +14,8 @@ from typing import Any, TypeAlias
 
 import numpy as np
 import sympy as sp
+from sympy.printing.c import C99CodePrinter
+from sympy.printing.codeprinter import PrintMethodNotImplementedError
 from sympy.printing.numpy import NumPyPrinter
 from sympy.printing.pycode import PythonCodePrinter
 
@@ -37,6 +39,8 @@ class Parameter:
     log : bool
         Whether the prior is log-normal
     description : str
+    grid : tuple of float
+        Values from which a search for it starts, where one start may miss the best; empty: `start` alone
     """
 
     name: str
@@ -47,6 +51,7 @@ class Parameter:
     sd: float = 0.2
     log: bool = True
     description: str = ""
+    grid: tuple[float, ...] = ()
 
 
 def symbol(name: str) -> sp.Symbol:
@@ -238,3 +243,109 @@ def compile_function(source: str, name: str) -> Callable[..., tuple[Any, ...]]:
     exec(compile(source, f"<law {name}>", "exec"), namespace)  # noqa: S102 - our own generated code
     function: Callable[..., tuple[Any, ...]] = namespace[name]
     return function
+
+
+class _CPrinter(C99CodePrinter):  # type: ignore[misc]
+    """C99 on doubles alone: no integer that could be divided as one, no macro that a compiler may lack."""
+
+    def __init__(self, places: Mapping[str, str]) -> None:
+        super().__init__({"allow_unknown_functions": False, "math_macros": {}})
+        self._places = places
+
+    def _print_Symbol(self, expr: sp.Symbol) -> str:
+        return self._places.get(expr.name, str(expr.name))
+
+    def _print_Integer(self, expr: sp.Integer) -> str:
+        return f"{int(expr)}.0"
+
+    def _print_Rational(self, expr: sp.Rational) -> str:
+        return f"({int(expr.p)}.0/{int(expr.q)}.0)"
+
+    def _print_Piecewise(self, expr: sp.Piecewise) -> str:
+        code: str = self._print(expr.args[-1].expr)
+        for arg in reversed(expr.args[:-1]):
+            code = f"({self._print(arg.cond)} ? {self._print(arg.expr)} : {code})"
+        return code
+
+    def _print_Float(self, expr: sp.Float) -> str:
+        return repr(float(expr))
+
+    def _print_NumberSymbol(self, expr: sp.NumberSymbol) -> str:
+        return repr(float(expr))
+
+    def _print_Pow(self, expr: sp.Pow) -> str:
+        base: str = self._print(expr.base)
+        exponent = float(expr.exp) if expr.exp.is_number else math.nan
+        size = abs(exponent)
+        if size == 1.0:
+            power = f"({base})"
+        elif size == 0.5:
+            power = f"sqrt({base})"
+        elif size == 0.25:
+            power = f"sqrt(sqrt({base}))"
+        elif size.is_integer() and size <= LARGEST_PRODUCT:
+            power = f"whole_power({base}, {int(size)})"
+        else:
+            return f"pow({base}, {self._print(expr.exp)})"
+        return power if exponent > 0.0 else f"(1.0/{power})"
+
+    def _chosen(self, relation: str, args: Sequence[sp.Expr]) -> str:
+        code: str = self._print(args[0])
+        for arg in args[1:]:
+            code = f"{relation}({code}, {self._print(arg)})"
+        return code
+
+    def _print_Max(self, expr: sp.Max) -> str:
+        return self._chosen("larger", expr.args)
+
+    def _print_Min(self, expr: sp.Min) -> str:
+        return self._chosen("smaller", expr.args)
+
+    def _print_sign(self, expr: sp.Expr) -> str:
+        return f"sign({self._print(expr.args[0])})"
+
+    def _print_Mod(self, expr: sp.Mod) -> str:
+        return f"modulo({self._print(expr.args[0])}, {self._print(expr.args[1])})"
+
+
+LARGEST_PRODUCT = 16  # exponent up to which a whole power is a product
+
+
+def c_function_source(name: str, arguments: Mapping[str, str], expressions: Sequence[sp.Expr]) -> str:
+    """C99 source of ``void law_<name>(const double *s, double *y)``; needs ``elementary.h`` of the native FMU.
+
+    Parameters
+    ----------
+    name : str
+    arguments : mapping of str to str
+        C expression for every signal or parameter
+    expressions : sequence of sympy.Expr
+        What goes to ``y``, in order
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> print(c_function_source("heat", {"speed": "s[1]"}, [symbol("speed") ** 3 / 2]))
+    void law_heat(const double *restrict s, double *restrict y) {
+        y[0] = ((1.0/2.0))*whole_power(s[1], 3);
+    }
+    <BLANKLINE>
+
+    Raises
+    ------
+    InputError
+        If an expression uses a function that C lacks.
+    """
+    printer = _CPrinter(arguments)
+    common, reduced = sp.cse(list(expressions), symbols=sp.numbered_symbols("x", real=True))
+    try:
+        lines = [f"const double {variable} = {printer.doprint(value)};" for variable, value in common]
+        lines += [f"y[{index}] = {printer.doprint(value)};" for index, value in enumerate(reduced)]
+    except PrintMethodNotImplementedError as error:
+        raise InputError(f"a law of {name!r} cannot be written in C: {error}") from error
+    lines += [f"(void){unused};" for unused in ("s", "y") if not any(f"{unused}[" in line for line in lines)]
+    body = "".join(f"    {line}\n" for line in lines)
+    return f"void law_{name}(const double *restrict s, double *restrict y) {{\n{body}}}\n"

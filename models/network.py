@@ -126,6 +126,8 @@ class ThermalNetwork:
     states : tuple of ExtraState
     numeric_laws : mapping of str to NumericLaw
         Laws that could not be traced, by the symbol that stands for them
+    operating : mapping of str to sympy.Expr
+        ``speed`` or ``torque`` as the losses see it, where that is not the input itself
     """
 
     nodes: tuple[Node, ...]
@@ -137,6 +139,7 @@ class ThermalNetwork:
     groups: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     states: tuple[ExtraState, ...] = ()
     numeric_laws: Mapping[str, NumericLaw] = field(default_factory=dict)
+    operating: Mapping[str, sp.Expr] = field(default_factory=dict)
 
     @cached_property
     def node_names(self) -> tuple[str, ...]:
@@ -306,17 +309,115 @@ class ThermalNetwork:
         for new in names:
             self._new_name(new, [link.name for link in self.links], "link")
         expression, numeric_laws = self._traced(law, f"link_{name}")
-        losses = {symbol(f"P_{component}") for component in self.components} & expression.free_symbols
-        if losses:
-            raise InputError(
-                f"the conductance of link {name!r} depends on the loss {min(s.name for s in losses)!r}; "
-                "a conductance may depend on inputs, temperatures, parameters and states only"
-            )
+        self._refuse_losses(expression, f"the conductance of link {name!r}")
         added = tuple(
             Link(name=new, nodes=(member, node_b), conductance=expression / len(members))
             for new, member in zip(names, members, strict=True)
         )
         return replace(self, links=(*self.links, *added), numeric_laws=numeric_laws)
+
+    def with_loss_factor(self, source: str, law: LawLike) -> ThermalNetwork:
+        """A network in which one heat source is ``1 + law`` times what it was.
+
+        Parameters
+        ----------
+        source : str
+            Name of a source
+        law : callable of :class:`~models.laws.Signals`, sympy expression, or number
+            Relative change, [-]
+
+        Raises
+        ------
+        InputError
+            If the source or a signal is unknown.
+
+        Examples
+        --------
+        >>> from models.gearbox import load_gearbox
+        >>> network = load_gearbox("fzg").network().with_loss_factor("churning", lambda s: 0.1 * s.speed / 3000.0)
+        >>> [source.heat for source in network.sources if source.name == "churning"]
+        [P_churning*churning*(3.33333333333333e-5*speed + 1)]
+        """
+        known = [s.name for s in self.sources]
+        if source not in known:
+            raise InputError(f"the network has no source {source!r}{did_you_mean(source, known)}")
+        factor, numeric_laws = self._traced(law, f"loss_factor_{len(self.numeric_laws)}_{source}")
+        scaled = tuple(replace(s, heat=s.heat * (1 + factor)) if s.name == source else s for s in self.sources)
+        return replace(self, sources=scaled, numeric_laws=numeric_laws)
+
+    def with_link_factor(self, link: str, law: LawLike) -> ThermalNetwork:
+        """A network in which the conductance of one link is ``1 + law`` times what it was.
+
+        Parameters
+        ----------
+        link : str
+            Name of a link
+        law : callable of :class:`~models.laws.Signals`, sympy expression, or number
+            Relative change, [-]
+
+        Raises
+        ------
+        InputError
+            If the link or a signal is unknown, or the law depends on a loss.
+        """
+        known = [s.name for s in self.links]
+        if link not in known:
+            raise InputError(f"the network has no link {link!r}{did_you_mean(link, known)}")
+        factor, numeric_laws = self._traced(law, f"link_factor_{len(self.numeric_laws)}_{link}")
+        self._refuse_losses(factor, f"the factor of link {link!r}")
+        scaled = tuple(
+            replace(s, conductance=s.conductance * (1 + factor)) if s.name == link else s for s in self.links
+        )
+        return replace(self, links=scaled, numeric_laws=numeric_laws)
+
+    def with_signal_shift(self, name: str, law: LawLike) -> ThermalNetwork:
+        """A network that takes one input for ``input + law``: laws, boundaries and losses see the shifted value.
+
+        Parameters
+        ----------
+        name : str
+            ``speed``, ``torque`` or a further input
+        law : callable of :class:`~models.laws.Signals`, sympy expression, or number
+            What is added, in the unit of the input
+
+        Raises
+        ------
+        InputError
+            If the input or a signal is unknown, the law depends on a loss, or a law of the network is no expression.
+
+        Examples
+        --------
+        >>> from models.gearbox import load_gearbox
+        >>> warm = load_gearbox("fzg").network().with_signal_shift("T_ambient", 2.0)
+        >>> warm.nodes[0].temperature
+        T_ambient + 2.0
+        """
+        known = ("speed", "torque", *self.inputs)
+        if name not in known:
+            raise InputError(f"{name!r} is not an input of this network{did_you_mean(name, known)}")
+        shift, numeric = trace(law, self.signals, f"shift_{name}")
+        if numeric is not None or self.numeric_laws:
+            raise InputError(f"the input {name!r} can be shifted only where all laws are expressions, without branches")
+        self._refuse_losses(shift, f"the shift of {name!r}")
+        # A boundary's temperature may itself follow this input: the shift means it as it was.
+        boundary = {symbol(f"T_{node.name}"): node.temperature for node in self.nodes if node.temperature is not None}
+        seen = {symbol(name): symbol(name) + shift.xreplace(boundary)}
+        operating = {key: law.xreplace(seen) for key, law in self.operating.items()}
+        if name in ("speed", "torque"):
+            operating.setdefault(name, seen[symbol(name)])
+        return replace(
+            self,
+            nodes=tuple(n if n.temperature is None else replace(n, temperature=n.temperature.xreplace(seen))
+                        for n in self.nodes),
+            links=tuple(replace(link, conductance=link.conductance.xreplace(seen)) for link in self.links),
+            sources=tuple(replace(source, heat=source.heat.xreplace(seen)) for source in self.sources),
+            states=tuple(
+                replace(state, rate=state.rate.xreplace(seen),
+                        update=None if state.update is None else state.update.xreplace(seen))
+                for state in self.states
+            ),
+            operating=operating,
+        )  # fmt: skip
 
     # ------------------------------------------------------------------ use
 
@@ -365,6 +466,14 @@ class ThermalNetwork:
         label = "".join(c if c.isalnum() else "_" for c in label)
         expression, numeric = trace(law, self.signals, label)
         return expression, self.numeric_laws if numeric is None else {**self.numeric_laws, label: numeric}
+
+    def _refuse_losses(self, expression: sp.Expr, what: str) -> None:
+        losses = {symbol(f"P_{component}") for component in self.components} & expression.free_symbols
+        if losses:
+            raise InputError(
+                f"{what} depends on the loss {min(s.name for s in losses)!r}; "
+                "it may depend on inputs, temperatures, parameters and states only"
+            )
 
     @staticmethod
     def _new_name(name: str, taken: Iterable[str], kind: str) -> None:

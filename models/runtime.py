@@ -49,6 +49,8 @@ class Laws:
         Whether an extra state has a discrete update
     numeric : tuple of callable
         Laws that were not traced: mapping of all signals by name -> number
+    operating : callable or None
+        common signals -> speed [1/min] and torque [N m] as the losses see them; None: the inputs themselves
 
     Notes
     -----
@@ -74,6 +76,7 @@ class Laws:
     injection: Array
     updates: bool = False
     numeric: tuple[Callable[[Mapping[str, Any]], Any], ...] = ()
+    operating: Callable[..., tuple[Any, ...]] | None = None
 
 
 class LossSource(Protocol):
@@ -136,9 +139,17 @@ class NetworkSystem:
         self._conductances = np.zeros((*batch, n_links))
         self._conductances[..., constant] = fixed[..., : len(constant)]
 
-    def power(self, inputs: Array, states: Array) -> Array:
+    def power(self, time: Any, inputs: Array, states: Array) -> Array:
         """Nominal losses [W], shape (..., components)."""
-        return self.losses.power(inputs[..., 0], inputs[..., 1], states[..., self._loss_nodes])
+        speed, torque = self.operating(time, inputs, states)
+        return self.losses.power(speed, torque, states[..., self._loss_nodes])
+
+    def operating(self, time: Any, inputs: Array, states: Array) -> tuple[Array, Array]:
+        """Speed [1/min] and torque [N m] as the losses see them, each of shape (...)."""
+        if self.laws.operating is None:
+            return inputs[..., 0], inputs[..., 1]
+        values = self._stacked(self.laws.operating(*self._common(time, inputs, states)), states.shape[:-1])
+        return values[..., 0], values[..., 1]
 
     def boundary_temperatures(self, time: Any, inputs: Array, states: Array) -> Array:
         """Temperatures of the boundary nodes [degC], shape (..., boundaries)."""
@@ -146,14 +157,14 @@ class NetworkSystem:
 
     def flows(self, time: Any, inputs: Array, states: Array) -> tuple[Array, Array]:
         """Heats of the sources [W], shape (..., sources); rates and updates of the extra states, (..., 2 states)."""
-        power = self.power(inputs, states)
+        power = self.power(time, inputs, states)
         signals = self._with_numeric(self._common(time, inputs, states), power)
         return self._flows(signals, power, states.shape[:-1])
 
     def balance(self, time: float, inputs: Array, states: Array) -> Balance:
         """Heat balance; see :class:`models.solver.System`."""
         n, m, shape = self.n_parts, self.n_boundaries, states.shape[:-1]
-        power = self.power(inputs, states)
+        power = self.power(time, inputs, states)
         common = self._common(time, inputs, states)
         signals = self._with_numeric(common, power)
         if self.vector:

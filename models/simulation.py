@@ -251,7 +251,7 @@ def evaluate(
         temperatures={n.name: next(part) if n.temperature is None else next(given) for n in network.nodes},
         losses={s.name: heats[..., i] for i, s in enumerate(network.sources) if s.is_loss},
         extra_heat={s.name: heats[..., i] for i, s in enumerate(network.sources) if not s.is_loss},
-        domain_distance=losses.domain_distance(wide[..., 0], wide[..., 1], states[..., loss_nodes]),
+        domain_distance=losses.domain_distance(*system.operating(time, wide, states), states[..., loss_nodes]),
         heat_in=heat[0],
         heat_out=heat[1],
         heat_stored=((states - states[..., :1, :])[..., :n_parts] * system.capacities).sum(axis=-1),

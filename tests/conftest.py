@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -9,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from builder.fmu import build_python_fmu
+from builder.native import build_native_fmu
 from builder.networks import PRESETS
 from builder.onnx_export import export_onnx
 from builder.train import TrainingResult, train_surrogate
@@ -48,5 +50,30 @@ def build_fmu(fzg: Gearbox, fzg_training: TrainingResult, fzg_networks: tuple[Pa
 
 
 @pytest.fixture(scope="session")
+def build_native(fzg: Gearbox, fzg_training: TrainingResult, fzg_networks: tuple[Path, ...]) -> FmuBuilder:
+    """Builds a native FMU at a path for this machine, of the default network or of another one."""
+
+    def build(path: Path, network: ThermalNetwork | None = None) -> Path:
+        return build_native_fmu(fzg, fzg_training, fzg_networks, path, network=network, platforms="host").path
+
+    return build
+
+
+@pytest.fixture(scope="session")
+def fzg_native(build_native: FmuBuilder, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return build_native(tmp_path_factory.mktemp("native") / "fzg.fmu")
+
+
+@pytest.fixture(scope="session")
 def fzg_fmu(build_fmu: FmuBuilder, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return build_fmu(tmp_path_factory.mktemp("fmu") / "fzg.fmu")
+
+
+@pytest.fixture(scope="session")
+def recordings_folder() -> Path:
+    """Recordings that are not part of this repository: the folder TWIN_RECORDINGS, by default beside the checkout."""
+    beside = Path(__file__).parents[2] / "shared" / "recordings"
+    folder = Path(os.environ.get("TWIN_RECORDINGS", beside))
+    if not folder.is_dir():
+        pytest.skip(f"no recordings at {folder}; name their folder in TWIN_RECORDINGS")
+    return folder

@@ -26,8 +26,8 @@ from builder.reproduce.speed import speed
 from builder.reproduce.study import Settings, Study
 from builder.reproduce.tables import definition_tables, equations_as_printed, pitch_velocities_are_the_wheels
 from builder.train import train_surrogate
-from builder.version import project_version
 from models.gearbox import load_gearbox
+from models.version import project_version
 
 GEARBOX = "fzg"
 

@@ -49,11 +49,14 @@ class Host:
         names = [v.name for v in self.fmu.variables.values() if v.causality == "output"]
         return dict(zip(names, self.get(*names), strict=True))
 
-    def start(self, values: dict[str, float] | None = None, *, time: float = 0.0) -> None:
+    def enter(self, values: dict[str, float] | None = None, *, time: float = 0.0) -> None:
         self.time = time
         self.slave.setupExperiment(startTime=time)
         self.slave.enterInitializationMode()
         self.set_all(LOADED | (values or {}))
+
+    def start(self, values: dict[str, float] | None = None, *, time: float = 0.0) -> None:
+        self.enter(values, time=time)
         self.slave.exitInitializationMode()
 
     def step(self, duration: float, *, count: int = 1) -> None:
@@ -61,12 +64,12 @@ class Host:
             self.slave.doStep(self.time, duration)
             self.time += duration
 
-    def refused(self, duration: float = 1.0, *, time: float | None = None) -> str:
-        """The FMU's messages on a step that it must discard."""
+    def refused(self, duration: float = 1.0, *, time: float | None = None, status: int = DISCARD) -> str:
+        """The FMU's messages on a step that it must refuse."""
         self.fmu.messages.clear()
         with pytest.raises(FMICallException) as raised:
             self.slave.doStep(self.time if time is None else time, duration)
-        assert raised.value.status == DISCARD
+        assert raised.value.status == status
         texts = [text for _, text in self.fmu.messages]
         self.fmu.messages.clear()
         assert texts

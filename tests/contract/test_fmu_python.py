@@ -11,12 +11,10 @@ import sys
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
-import sympy as sp
 from fmpy import simulate_fmu
 from fmpy.validation import validate_fmu
 
@@ -26,8 +24,8 @@ from builder.train import TrainingResult
 from models.cycle import Cycle
 from models.errors import InputError
 from models.gearbox import Gearbox
-from models.network import ThermalNetwork
 from tests.contract.fmu_host import hosted
+from tests.contract.networks import extended
 
 Build = Callable[..., Path]
 OUTPUTS = ("oil.T", "mesh.T", "loss.total")
@@ -196,21 +194,6 @@ def test_paths_with_blanks_and_other_letters(fzg_fmu: Path, tmp_path: Path, monk
 
 
 # ---------------------------------------------------------------------- other networks
-
-
-def thermostat(s: Any) -> sp.Expr:
-    return sp.Piecewise((0.0, s.T_oil > 29.0), (1.0, s.T_oil < 28.0), (s.heater_on, True))
-
-
-def extended(network: ThermalNetwork) -> ThermalNetwork:
-    """A network with a heater that a thermostat switches, an input of its own, and a boundary."""
-    return (
-        network.with_input("pump_flow", 1.0)
-        .with_state("heater_on", start=1.0, update=thermostat)
-        .with_source("oil", lambda s: 4000.0 * s.heater_on, name="heater (electric)")
-        .with_source("oil", lambda s: 3.0 * s.pump_flow, name="pump", is_loss=True)
-        .with_link("housing", "cellar", lambda s: 3.0, temperature=lambda s: 0.0 * s.T_ambient + 10.0)
-    )  # fmt: skip
 
 
 def test_extended_network_runs_as_in_python(

@@ -84,6 +84,10 @@ FAULTY = [
     (["build-fmu", "--jobs", "2", "--dask", "tcp://127.0.0.1:1"], "exclude each other"),
     (["build-fmu", "--samples", "10"], "10 is not in the range"),
     (["build-fmu", "--output", "CYCLE/inside"], "cannot be written"),
+    (
+        ["build-fmu", "--target", "native", "--platforms", "win46"],
+        "platform 'win46' is not known; did you mean 'win64'?",
+    ),
     (["fly"], "No such command 'fly'"),
 ]
 
@@ -130,20 +134,23 @@ def test_an_interrupted_build_leaves_nothing(number: signal.Signals, tmp_path: P
 
 def test_build_fmu_from_a_definition(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "box"
-    assert (
-        run("build-fmu", "--gearbox", "conveyor", "--output", out, "--samples", "300", "--jobs", "1", "--seed", "3")
-        == 0
-    )
+    arguments = ("--samples", "300", "--jobs", "1", "--seed", "3", "--target", "both", "--platforms", "host")
+    assert run("build-fmu", "--gearbox", "conveyor", "--output", out, *arguments) == 0
     report = json.loads((out / "report.json").read_text())
     assert report["seed"] == 3
     assert report["samples_per_network"] == 300
     assert {p.name for p in out.iterdir()} == {
         "conveyor.fmu",
+        "conveyor_native.fmu",
         "networks",
         "drive_cycle.csv",
         "drive_cycle.png",
+        "drive_cycle_native.csv",
+        "drive_cycle_native.png",
         "report.json",
     }
+    python, native = (report["reference_cycle"][f"conveyor{suffix}.fmu"] for suffix in ("", "_native"))
+    assert native["loss_difference_mean"] == pytest.approx(python["loss_difference_mean"], rel=0.1)
     shown = capsys.readouterr().out
-    for row in ("mesh_sliding", "worst node", "conveyor.fmu"):
+    for row in ("mesh_sliding", "worst node", "conveyor.fmu", "conveyor_native.fmu"):
         assert row in shown

@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from builder.files import appearing_whole, read_cycle, read_initial, read_table, write_table
+from builder.files import appearing_whole, read_cycle, read_initial, write_table
 from models.errors import InputError
+from models.table_file import read_table
 
 COLUMNS = {
     "time_s": np.array([0.0, 1.0, 2.5]),

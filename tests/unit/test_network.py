@@ -65,6 +65,90 @@ def test_symbols_serve_for_laws() -> None:
     assert NETWORK.with_source("oil", 2.0 * s.T_oil, name="x").sources[-1].heat == 2.0 * symbol("T_oil")
 
 
+def warm(network: ThermalNetwork, **inputs: float) -> tuple[np.ndarray, np.ndarray]:
+    """Oil temperature and total loss at rest in a heavy state."""
+    losses = GEARBOX.losses()
+    result = network.steady_state(losses=losses, speed=2165.7, torque=94.1, inputs=inputs)
+    return result.temperatures["oil"], result.loss
+
+
+def test_a_factor_on_a_loss_is_one_on_its_heat() -> None:
+    network = NETWORK.with_loss_factor("mesh_sliding", lambda s: 0.1 * s.torque / 94.1).with_loss_factor(
+        "churning", 1.0
+    )
+    before = {source.name: source for source in NETWORK.sources}
+    at = {symbol("torque"): 94.1}
+    for source in network.sources:
+        ratio = {"mesh_sliding": 1.1, "churning": 2.0}.get(source.name, 1.0)
+        assert float((source.heat / before[source.name].heat).subs(at)) == pytest.approx(ratio)
+    twice = NETWORK.with_loss_factor("churning", 1.0).with_loss_factor("churning", 1.0)
+    assert twice.sources[2].heat == 4.0 * NETWORK.sources[2].heat
+
+
+def test_a_factor_on_a_link_is_one_on_its_conductance() -> None:
+    network = NETWORK
+    for link in NETWORK.links:
+        if set(link.nodes) & {"air"}:
+            network = network.with_link_factor(link.name, -1.0)
+    base = {link.name: link.conductance for link in NETWORK.links}
+    for link in network.links:
+        assert link.conductance == (0 if "air" in link.nodes else base[link.name])
+    half = {link.name: link.conductance for link in NETWORK.with_link_factor("pinion-oil", lambda s: -0.5).links}
+    assert (half["pinion-oil"] / base["pinion-oil"]).equals(0.5)
+
+
+def test_numeric_factors_simulate_as_well() -> None:
+    """Two that branch on numbers, on one source: each keeps its own law."""
+    plain = NETWORK.with_loss_factor("churning", 0.5).with_loss_factor("churning", 1.0)
+    branching = NETWORK.with_loss_factor("churning", lambda s: 0.5 if float(s.T_oil) > -50 else 0.0)
+    branching = branching.with_loss_factor("churning", lambda s: 1.0 if float(s.T_oil) > -50 else 0.0)
+    assert len(branching.numeric_laws) == 2
+    assert warm(branching)[1] == pytest.approx(warm(plain)[1], rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("name", "shift"), [("torque", 20.0), ("speed", -500.0), ("T_ambient", 6.0), ("air_speed", -1.0)]
+)
+def test_a_shifted_input_is_seen_everywhere(name: str, shift: float) -> None:
+    """Losses, laws and boundaries, so that nothing differs from giving the shifted input."""
+    point = {"speed": 2165.7, "torque": 94.1, "T_ambient": 27.0, "air_speed": 2.0}
+    shifted = NETWORK.with_signal_shift(name, lambda s: 0.75 * shift).with_signal_shift(name, lambda s: 0.25 * shift)
+    cycle = {f"{key}{unit}": [point[key]] * 3 for key, unit in UNITS.items()} | {"time_s": [0.0, 600.0, 1800.0]}
+    truth = cycle | {f"{name}{UNITS[name]}": [point[name] + shift] * 3}
+    given = shifted.simulate(cycle, losses=GEARBOX.losses(), initial=40.0)
+    meant = NETWORK.simulate(truth, losses=GEARBOX.losses(), initial=40.0)
+    for node in NETWORK.node_names:
+        np.testing.assert_allclose(given.temperatures[node], meant.temperatures[node], rtol=1e-9)
+    np.testing.assert_allclose(given.loss, meant.loss, rtol=1e-9)
+    np.testing.assert_allclose(given.domain_distance, meant.domain_distance)
+
+
+def test_the_domain_is_that_of_what_the_losses_see() -> None:
+    class Bounded:
+        components, temperature_nodes = NETWORK.components, GEARBOX.losses().temperature_nodes
+
+        def power(self, speed: np.ndarray, torque: np.ndarray, temperatures: np.ndarray) -> np.ndarray:
+            return np.zeros((*np.shape(temperatures)[:-1], len(self.components)))
+
+        def domain_distance(self, speed: np.ndarray, torque: np.ndarray, temperatures: np.ndarray) -> np.ndarray:
+            return np.asarray(torque) / 100.0
+
+    cycle = {"time_s": [0.0, 60.0], "speed_rpm": [500.0, 500.0], "torque_Nm": [100.0, 100.0]}
+    result = NETWORK.with_signal_shift("torque", lambda s: 0.5 * s.torque).simulate(cycle, losses=Bounded())
+    assert result.domain_distance.tolist() == [1.5, 1.5]
+
+
+UNITS = {"speed": "_rpm", "torque": "_Nm", "T_ambient": "_degC", "air_speed": "_m_s"}
+
+
+def test_a_shift_may_follow_a_boundary_that_follows_the_input() -> None:
+    """A probe that the housing warms: the truth is the recorded ambient less a share of the housing's rise above it."""
+    network = NETWORK.with_signal_shift("T_ambient", lambda s: -0.1 * (s.T_housing_lower - s.T_air))
+    recorded, lower = symbol("T_ambient"), symbol("T_housing_lower")
+    assert sp.expand(network.nodes[0].temperature - (recorded - 0.1 * (lower - recorded))) == 0
+    assert warm(network)[0] < warm(NETWORK)[0]
+
+
 EXTENSIONS: list[tuple[Callable[[], object], str]] = [
     (lambda: NETWORK.with_source("oill", 1.0, name="x"), "node 'oill' is unknown; did you mean 'oil'"),
     (lambda: NETWORK.with_source("air", 1.0, name="x"), "node 'air' has a given temperature"),
@@ -81,6 +165,20 @@ EXTENSIONS: list[tuple[Callable[[], object], str]] = [
     (lambda: NETWORK.with_link("pinion", "oil", 1.0), "has a link 'pinion-oil' already"),
     (lambda: NETWORK.with_link("oil", "frame", 1.0, temperature=3.0), "node 'frame' exists"),
     (lambda: NETWORK.with_link("oil", "frame", lambda s: s.P_churning), "depends on the loss 'P_churning'"),
+    (lambda: NETWORK.with_loss_factor("churnin", 1.0), "no source 'churnin'; did you mean 'churning'"),
+    (lambda: NETWORK.with_loss_factor("churning", lambda s: s.sped), "did you mean 'speed'"),
+    (lambda: NETWORK.with_link_factor("pinion-oill", 1.0), "no link 'pinion-oill'; did you mean 'pinion-oil'"),
+    (lambda: NETWORK.with_link_factor("pinion-oil", lambda s: s.P_churning), "depends on the loss 'P_churning'"),
+    (lambda: NETWORK.with_signal_shift("torqe", 1.0), "'torqe' is not an input of this network; did you mean 'torque'"),
+    (lambda: NETWORK.with_signal_shift("time", 1.0), "'time' is not an input"),
+    (lambda: NETWORK.with_signal_shift("torque", lambda s: s.P_churning), "depends on the loss 'P_churning'"),
+    (lambda: NETWORK.with_signal_shift("torque", lambda s: float(s.speed)), "only where all laws are expressions"),
+    (
+        lambda: NETWORK.with_source("oil", lambda s: 1.0 if s.speed > 9 else 0.0, name="x").with_signal_shift(
+            "speed", 1.0
+        ),
+        "only where all laws are expressions",
+    ),
     (lambda: NETWORK.with_node("oil", 1.0), "has a node 'oil' already"),
     (lambda: NETWORK.with_node("housing", 1.0), "has a node 'housing' already"),
     (lambda: NETWORK.with_node("ambient", 1.0), "has a signal 'T_ambient' already"),

@@ -1,0 +1,78 @@
+"""The verb ``conceal``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from builder import console
+from models.errors import InputError
+from models.gearbox import load_gearbox
+
+
+def _list_effects(context: click.Context, _: click.Parameter, asked: bool) -> None:
+    """Show what can be concealed, and end."""
+    if asked:
+        from diagnosis.proof.conceal import EFFECTS
+
+        rows = [[name, "yes" if effect.catalogue else "no", effect.law] for name, effect in sorted(EFFECTS.items())]
+        console.table("Effects that can be concealed", ["name", "in the catalogue", "law"], rows, text_columns=3)
+        context.exit()
+
+
+@click.command("conceal")
+@click.option("--effect", default=None, metavar="NAME", help="What to conceal; --list shows the names.")
+@click.option(
+    "--list", is_flag=True, is_eager=True, expose_value=False, callback=_list_effects, help="Show the effects."
+)
+@click.option("--random", "random", is_flag=True, help="Draw what to conceal; it may be nothing.")
+@click.option("--strength", type=click.FloatRange(min=0.01, max=10.0), default=None, metavar="X",
+              help="Strength of the effect over its usual one.  [default: drawn from 0.25 to 2]")  # fmt: skip
+@click.option("--seed", type=click.IntRange(min=0, max=2**32 - 1), required=True, metavar="N",
+              help="The same seed gives the same bytes.")  # fmt: skip
+@click.option("--output", type=click.Path(path_type=Path, file_okay=False), required=True, metavar="DIR",
+              help="Folder 'recordings' in it gets the recordings, with --cases one folder per case.")  # fmt: skip
+@click.option("--truth", type=click.Path(path_type=Path, file_okay=False), default=None, metavar="DIR",
+              help="Folder for the truth.  [default: 'truth' in --output]")  # fmt: skip
+@click.option("--cases", type=click.IntRange(min=1, max=10_000), default=None, metavar="N", help="How many cases.")
+@click.option(
+    "--gearbox", default="fzg", show_default=True, metavar="NAME|FILE", help="Name or definition file (TOML)."
+)
+def conceal(
+    effect: str | None,
+    random: bool,
+    strength: float | None,
+    seed: int,
+    output: Path,
+    truth: Path | None,
+    cases: int | None,
+    gearbox: str,
+) -> None:
+    """Make recordings of a gearbox that hides an effect; the truth is sealed apart.
+
+    The recordings come from a plant of its own, not from the model: about 22 h to learn from (train_1 to train_3) and
+    6 h to judge by (hold_1, hold_2). seal.json holds the SHA-256 of the truth.
+    """
+    from diagnosis.proof.conceal import Plan, conceal_set, random_plans  # imports scipy.signal
+
+    if (effect is None) == (not random):
+        raise InputError("conceal takes either --effect NAME or --random")
+    if random and strength is not None:
+        raise InputError("--strength goes with --effect; --random draws it")
+    number = 1 if cases is None else cases
+    if effect is None:
+        plans = random_plans(seed, number)
+    else:
+        plans = [Plan(group="single", effects=(effect,), strength=strength)] * number
+    definition = load_gearbox(gearbox)
+    apart = output / "truth" if truth is None else truth
+    with console.progress_bar("concealing") as progress:
+        names = conceal_set(
+            definition, plans, seed=seed, recordings=output / "recordings", truth=apart, flat=cases is None,
+            progress=progress,
+        )  # fmt: skip
+    for name in names:
+        console.out.print(
+            f"wrote {output / 'recordings' / ('' if cases is None else name)}, sealed {apart / name}.json"
+        )

@@ -1,0 +1,387 @@
+"""From what the search found to the result: places, findings, fits, courses, and what to do next."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from diagnosis.case import Case, heat_over_time
+from diagnosis.evidence import Marginal
+from diagnosis.explain import Explanation
+from diagnosis.findings import finding_of, node_of, rivals_of
+from diagnosis.latent import LatentHeat, knots_of, latent_heat
+from diagnosis.observation import LOSS
+from diagnosis.posterior import Problem
+from diagnosis.predict import Prediction, predict, rmse
+from diagnosis.recording import Recording
+from diagnosis.regime import active, regime, windows
+from diagnosis.result import (
+    Calibrated,
+    Course,
+    Diagnosis,
+    Finding,
+    Fits,
+    Location,
+    MissingHeat,
+    Ranked,
+    Unseen,
+    Verdict,
+)  # fmt: skip
+from diagnosis.search import SECOND_GAIN, TEMPER, Search, Stage, at_holdout, heats_of
+from diagnosis.shapes import shape_terms
+from models.mechanisms import Mechanism
+from models.types import Array
+from models.version import project_version
+
+ENOUGH_VISIBLE = 0.2  # of the catalogue, for a "consistent" that means something
+RANKED = 15
+REMAINING_W_SHARE = 0.03  # of the typical loss: a smaller remainder is not worth a word
+UNEXPLAINED_SHARE = 0.25  # of the evidence that is left when the catalogue has done its best
+
+
+def assembled(
+    case: Case, found: Search, catalogue: Mapping[str, Mechanism], train: Sequence[Recording],
+    holdout: Sequence[Recording], *, false_alarm_rate: float,
+) -> Diagnosis:  # fmt: skip
+    """The result of a search.
+
+    Parameters
+    ----------
+    case : Case
+    found : Search
+    catalogue : mapping of str to Mechanism
+    train, holdout : sequence of Recording
+    false_alarm_rate : float
+    """
+    detected = found.stages[0].log_e_value >= found.threshold and found.stages[0].matters
+    findings = tuple(
+        finding_of(case, found.final, h, stage, rivals_of(stage, catalogue))
+        for h, stage in zip(found.final.found, found.stages, strict=False)
+    )
+    remaining = _latents(case, found.final) if detected else ()
+    first = _latents(case, found.calibrated) if detected else ()
+    unseen = _unseen(found.stages[-1], catalogue, found.threshold)
+    verdict = _verdict(found, findings, first, remaining, unseen, detected=detected, catalogue=catalogue)
+    location = _location(case, found, findings, first) if detected else ()
+    shown = _shown(findings, location)
+    missing = _missing_heat(case, found, remaining if findings else first, shown) if detected else ()
+    predictions = _predictions(case, found)
+    unexplained = verdict == "unexplained"
+    remaining_p, note = _remaining(found, remaining, case, detected=detected)
+    return Diagnosis(
+        verdict=verdict,
+        gearbox=case.gearbox.name,
+        log_e_value=found.stages[0].log_e_value,
+        threshold=found.threshold,
+        p_value=float(min(1.0, np.exp(-max(found.stages[0].log_e_value, -50.0)))),
+        false_alarm_rate=false_alarm_rate,
+        location=location,
+        findings=tuple(replace(f, probability=0.5 * f.probability) for f in findings) if unexplained else findings,
+        calibration=_calibration(found.final),
+        train=_fits(case, predictions, "train"),
+        holdout=_fits(case, predictions, "holdout"),
+        noise_K=case.noise_K,
+        floor=f"random heat of {found.floor * 0.5:.1f} % of the typical loss ({case.loss_W:.0f} W) in every part: "
+        + ("assumed" if found.floor == 1.0 else "raised because the remainder asks for it"),
+        remaining_p_value=remaining_p,
+        remaining_note=note,
+        ranking=_ranking(found),
+        unseen=unseen,
+        next_test=_next_test(verdict, findings, unseen, catalogue),
+        missing_heat=missing,
+        courses=_courses(case, predictions),
+        network=case.nominal,
+        shapes=shape_terms(case.nominal, case.scale),
+        inputs={
+            "recordings": {r.name: r.sha256 for r in train},
+            "held_out": {r.name: r.sha256 for r in holdout},
+            "gearbox": case.gearbox.hash,
+            "version": project_version(),
+        },
+        notes=tuple(f"{r.name}: {note}" for r in (*train, *holdout) for note in r.notes),
+    )
+
+
+# ---------------------------------------------------------------------- verdict
+
+
+def _verdict(
+    found: Search, findings: Sequence[Finding], first: Sequence[LatentHeat], remaining: Sequence[LatentHeat],
+    unseen: Sequence[Unseen], *, detected: bool, catalogue: Mapping[str, Mechanism],
+) -> Verdict:  # fmt: skip
+    if not detected:
+        physics = {s.hypothesis.name for s in found.stages[-1].scored if s.hypothesis.name in catalogue}
+        visible = 1.0 - len({u.mechanism for u in unseen}) / max(len(physics), 1)
+        return "insufficient_data" if visible < ENOUGH_VISIBLE else "consistent"
+    if not findings:
+        return "unexplained" if found.stages[0].matters else "consistent"
+    kinds = {f.kind for f in findings}
+    if any(f.family == "open form" for f in findings) or _much_is_left(first, remaining):
+        return "unexplained"
+    if kinds <= {"sensor"}:
+        return "sensor_fault"
+    if kinds <= {"parameter", "sensor"}:
+        return "parameter_error"
+    return "missing_physics"
+
+
+def _much_is_left(first: Sequence[LatentHeat], remaining: Sequence[LatentHeat]) -> bool:
+    """Whether an unknown heat explains the remainder about as well as it explained the whole."""
+    before = max((h.log_bayes for h in first), default=0.0)
+    after = max((h.log_bayes for h in remaining), default=0.0)
+    return after > SECOND_GAIN and after > UNEXPLAINED_SHARE * before
+
+
+def _remaining(found: Search, remaining: Sequence[LatentHeat], case: Case, *, detected: bool) -> tuple[float, str]:
+    log_e = found.stages[-1].log_e_value if found.stages[-1].accepted is None else 0.0
+    p_value = float(min(1.0, np.exp(-max(log_e, 0.0))))
+    if not detected:
+        return p_value, ""
+    best = max(remaining, key=lambda h: h.log_bayes)
+    size = float(np.sqrt(np.mean(np.concatenate(best.mean) ** 2)))
+    if best.log_bayes < SECOND_GAIN or size < REMAINING_W_SHARE * case.loss_W:
+        return p_value, "nothing that stands out of noise and structural floor"
+    return p_value, f"an unknown heat of about {size:.0f} W (rms) in {best.node} would still help"
+
+
+# ---------------------------------------------------------------------- where
+
+
+def _latents(case: Case, explanation: Explanation) -> tuple[LatentHeat, ...]:
+    """Unknown heat in every part, as mechanical loss (where the loss is measured) and not."""
+    marginal, knots = Marginal(explanation.fit), knots_of(explanation.problem.pieces)
+    kinds = (True, False) if LOSS in case.channels else (False,)
+    return tuple(
+        latent_heat(explanation.problem.model, explanation.fit, marginal, part.name, loss_W=case.loss_W,
+                    is_loss=is_loss, knots=knots)
+        for part in case.nominal.parts for is_loss in kinds
+    )  # fmt: skip
+
+
+def _location(
+    case: Case, found: Search, findings: Sequence[Finding], first: Sequence[LatentHeat]
+) -> tuple[Location, ...]:
+    """Places by probability: of what was found, by its rivals' places; else by the unknown heat alone."""
+    weights: dict[str, float] = {}
+    if findings:
+        for h, stage in zip(found.final.found, found.stages, strict=False):
+            for fit, probability in zip(stage.fits, stage.probabilities(), strict=True):
+                node = node_of(case, fit.found[-1])
+                share = float(probability) if fit is not stage.accepted or fit.found[-1] is h else 0.0
+                weights[node] = 1.0 - (1.0 - weights.get(node, 0.0)) * (1.0 - share)
+    else:
+        logs = np.array([h.log_bayes for h in first]) / TEMPER
+        for latent, weight in zip(first, np.exp(logs - np.logaddexp.reduce(logs)), strict=True):
+            weights[latent.node] = weights.get(latent.node, 0.0) + float(weight)
+    chosen = sorted(((n, w) for n, w in weights.items() if w >= 0.02), key=lambda item: -item[1])
+    return tuple(_place(case, found, first, node, weight) for node, weight in chosen)
+
+
+def _place(case: Case, found: Search, first: Sequence[LatentHeat], node: str, weight: float) -> Location:
+    own = next((h for h in found.final.found if node_of(case, h) == node), None)
+    heats = list(heats_of(found.final, own)) if own is not None else []
+    if not heats:
+        candidates = [h for h in first if h.node == node]
+        if own is not None or not candidates:
+            return Location(node=node, probability=min(weight, 1.0), heat_mean_W=0.0, heat_max_W=0.0, when=(),
+                            regime="always")  # fmt: skip
+        heats = list(max(candidates, key=lambda h: h.log_bayes).mean)
+    parts = found.final.fit.parts
+    together = np.concatenate(heats)
+    acting = active(together)
+    T = np.concatenate([p.trajectory.middle[:, p_index(case, node)] for p in parts])
+    inputs = np.concatenate([p.trajectory.piece.inputs for p in parts])
+    hours = np.concatenate([p.trajectory.piece.middle for p in parts]) / 3600.0
+    words = regime(acting, {"speed": (np.abs(inputs[:, 0]), "1/min"), "torque": (np.abs(inputs[:, 1]), "N m"),
+                            f"temperature of {node}": (T, "degC"), "time": (hours, "h")})  # fmt: skip
+    when, before = [], 0
+    for part, heat in zip(parts, heats, strict=True):
+        piece = part.trajectory.piece
+        own_acting = acting[before : before + len(heat)]
+        when += [(piece.recording, a, b) for a, b in windows(piece.middle, own_acting)]
+        before += len(heat)
+    return Location(
+        node=node, probability=min(weight, 1.0), heat_mean_W=float(together.mean()),
+        heat_max_W=float(together[np.argmax(np.abs(together))]), when=tuple(when), regime=words,
+    )  # fmt: skip
+
+
+def p_index(case: Case, node: str) -> int:
+    """Index of a node among the parts; of the first part for one that is none (a boundary, an input)."""
+    names = [part.name for part in case.nominal.parts]
+    return names.index(node) if node in names else 0
+
+
+def _shown(findings: Sequence[Finding], location: Sequence[Location]) -> list[str]:
+    nodes = [f.node for f in findings if f.kind not in ("sensor", "signal")]
+    return list(dict.fromkeys(nodes or [place.node for place in location[:1]]))
+
+
+def _missing_heat(
+    case: Case, found: Search, latents: Sequence[LatentHeat], nodes: Sequence[str]
+) -> tuple[MissingHeat, ...]:
+    """What was found, and what an unknown heat would add to it; without findings that heat alone.
+
+    Taken with the parameters of the final explanation: those of the calibration without it have swallowed most of it.
+    """
+    result = []
+    pieces = [part.trajectory.piece for part in found.final.fit.parts]
+    for node in nodes:
+        candidates = [h for h in latents if h.node == node]
+        if not candidates:
+            continue
+        latent = max(candidates, key=lambda h: h.log_bayes)
+        own = [h for h in found.final.found if node_of(case, h) == node]
+        laws = [heats_of(found.final, h) for h in own]
+        laws = [law for law in laws if law]
+        summed = [np.sum(values, axis=0) for values in zip(*laws, strict=True)] if laws else None
+        lacking = latent.mean if summed is None else [a + b for a, b in zip(summed, latent.mean, strict=True)]
+        mean, sd = heat_over_time(pieces, lacking), heat_over_time(pieces, latent.sd)
+        law = heat_over_time(pieces, summed) if summed is not None else None
+        index = p_index(case, node)
+        T = heat_over_time(pieces, [p.trajectory.middle[:, index] for p in found.final.fit.parts])
+        speed, torque = (heat_over_time(pieces, [np.abs(p.inputs[:, i]) for p in pieces]) for i in (0, 1))
+        result += [
+            MissingHeat(
+                recording=name, node=node, time=time, mean=values, sd=sd[name][1], speed=speed[name][1],
+                torque=torque[name][1], temperature=T[name][1], law=None if law is None else law[name][1],
+            )
+            for name, (time, values) in mean.items()
+        ]  # fmt: skip
+    return tuple(result)
+
+
+# ---------------------------------------------------------------------- fits and courses
+
+
+Predictions = dict[str, dict[str, list[Prediction]]]
+
+
+def _predictions(case: Case, found: Search) -> Predictions:
+    """Free-running predictions: as delivered, calibrated and after, of the training and held-out pieces."""
+    nothing = np.zeros(len(found.calibrated.problem.unknowns))
+
+    def of(problem: Problem, z: Array, *, as_delivered: bool = False) -> list[Prediction]:
+        return [predict(problem, i, z, as_delivered=as_delivered) for i in range(len(problem.pieces))]
+
+    final = found.final
+    return {
+        "train": {
+            "before": of(case.train, nothing, as_delivered=True),
+            "calibrated": of(found.calibrated.problem, found.calibrated.fit.z),
+            "after": of(final.problem, final.fit.z),
+        },
+        "holdout": {
+            "before": of(case.holdout, nothing, as_delivered=True),
+            "calibrated": of(at_holdout(case, found.calibrated), found.calibrated.fit.z),
+            "after": of(at_holdout(case, final), final.fit.z),
+        },
+    }
+
+
+def _fits(case: Case, predictions: Predictions, which: str) -> Fits:
+    per_state, overall = {}, {}
+    temperatures = [i for i, name in enumerate(case.channels) if name != LOSS]
+    for state, predicted in predictions[which].items():
+        residual = np.concatenate([p.residual for p in predicted]) if predicted else np.zeros((0, len(case.channels)))
+        per_state[state] = rmse(residual)
+        good = residual[:, temperatures][np.isfinite(residual[:, temperatures])]
+        overall[state] = float(np.sqrt(np.mean(good**2))) if len(good) else float("nan")
+    sensors = {
+        name: (float(per_state["before"][i]), float(per_state["calibrated"][i]), float(per_state["after"][i]))
+        for i, name in enumerate(case.channels)
+    }
+    return Fits(before=overall["before"], calibrated=overall["calibrated"], after=overall["after"], sensors=sensors)
+
+
+def _courses(case: Case, predictions: Predictions) -> tuple[Course, ...]:
+    result = []
+    for which, states in predictions.items():
+        for before, calibrated, after in zip(states["before"], states["calibrated"], states["after"], strict=True):
+            piece = before.piece
+            at = np.clip(np.arange(len(piece.time)), 0, len(piece.steps) - 1)
+            result.append(Course(
+                recording=piece.recording, held_out=which == "holdout", time=piece.time, speed=piece.inputs[at, 0],
+                torque=piece.inputs[at, 1], measured=_by_channel(case, piece.measured),
+                before=_by_channel(case, before.read), calibrated=_by_channel(case, calibrated.read),
+                after={**_unmeasured(case, after), **_by_channel(case, after.read)},
+                counts_from_s=before.counts_from,
+            ))  # fmt: skip
+    return tuple(result)
+
+
+def _by_channel(case: Case, values: Array) -> dict[str, Array]:
+    return {name: values[:, i] for i, name in enumerate(case.channels)}
+
+
+def _unmeasured(case: Case, prediction: Prediction) -> dict[str, Array]:
+    names = [part.name for part in case.nominal.parts]
+    return {name: prediction.trajectory.T[:, i] for i, name in enumerate(names)}
+
+
+def _calibration(final: Explanation) -> tuple[Calibrated, ...]:
+    sd = np.sqrt(np.diag(final.fit.covariance))
+    taken = {p.name for h in final.found if h.term is not None for p in h.term.parameters}
+    result = []
+    for index, item in enumerate(final.fit.unknowns.items):
+        if item.target in taken:
+            continue
+        value, p = item.value(float(final.fit.z[index])), item.parameter
+        per_z = value * p.sd if p.log else p.sd
+        result.append(Calibrated(
+            parameter=item.target if item.role == "network" else p.name, prior=p.start, value=value,
+            stderr=float(abs(per_z) * sd[index]), shift_in_sd=float(final.fit.z[index]), unit=p.unit,
+        ))  # fmt: skip
+    return tuple(result)
+
+
+# ---------------------------------------------------------------------- ranking and advice
+
+
+def _ranking(found: Search) -> tuple[Ranked, ...]:
+    """Everything of the first look: fitted in earnest with its probability, the rest by the scan."""
+    stage = found.stages[0]
+    fitted = {
+        fit.found[-1].label: (gain, float(p))
+        for fit, gain, p in zip(stage.fits, stage.gains, stage.probabilities() if stage.fits else (), strict=True)
+    }
+    rows = [
+        Ranked(mechanism=s.hypothesis.name, place=s.hypothesis.place, family=s.hypothesis.family,
+               log_bayes=fitted.get(s.hypothesis.label, (s.log_bayes, 0.0))[0],
+               probability=fitted.get(s.hypothesis.label, (0.0, 0.0))[1])
+        for s in stage.scored
+        if s.hypothesis.label in fitted or s.hypothesis.family != "open form"
+    ]  # fmt: skip
+    return tuple(sorted(rows, key=lambda r: (-r.probability, -r.log_bayes))[:RANKED])
+
+
+def _unseen(stage: Stage, catalogue: Mapping[str, Mechanism], threshold: float) -> tuple[Unseen, ...]:
+    """Mechanisms that would not have been seen at their typical strength, at their best place."""
+    best: dict[str, tuple[float, str]] = {}
+    for s in stage.scored:
+        name = s.hypothesis.name
+        if name in catalogue and s.expected > best.get(name, (-np.inf, ""))[0]:
+            best[name] = (s.expected, s.hypothesis.place)
+    return tuple(
+        Unseen(mechanism=name, place=place, needed=catalogue[name].experiment)
+        for name, (expected, place) in sorted(best.items()) if expected < threshold
+    )  # fmt: skip
+
+
+def _next_test(
+    verdict: Verdict, findings: Sequence[Finding], unseen: Sequence[Unseen], catalogue: Mapping[str, Mechanism]
+) -> str:
+    for finding in findings:
+        if finding.confusable_with and finding.confusable_with[0].probability >= 0.05:
+            return finding.confusable_with[0].separate_by
+    if verdict in ("consistent", "insufficient_data") and unseen:
+        wanted = Counter(u.needed for u in unseen).most_common(1)[0][0]
+        return f"{wanted} (it would show {sum(u.needed == wanted for u in unseen)} effect(s) these data cannot)"
+    if verdict == "unexplained":
+        return "repeat the operation in which the heat is missing with one input changed at a time"
+    if findings and findings[0].mechanism in catalogue:
+        return catalogue[findings[0].mechanism].experiment
+    return ""

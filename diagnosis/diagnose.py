@@ -1,0 +1,105 @@
+"""From recordings to a diagnosis: the one function behind the verb ``diagnose``."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from diagnosis.assemble import assembled
+from diagnosis.case import prepare
+from diagnosis.recording import Recording, read_recordings
+from diagnosis.recording_checks import check_holdout
+from diagnosis.recording_plausible import check_plausible
+from diagnosis.result import Diagnosis
+from diagnosis.search import search
+from models.errors import InputError
+from models.gearbox import Gearbox, load_gearbox
+from models.mechanisms import CATALOGUE, Mechanism
+
+Source = str | Path | Recording
+
+
+def diagnose(
+    recordings: Source | Sequence[Source],
+    gearbox: Gearbox | str | Path = "fzg",
+    *,
+    holdout: Source | Sequence[Source] = (),
+    false_alarm_rate: float = 0.05,
+    catalogue: Mapping[str, Mechanism] = CATALOGUE,
+    jobs: int = 1,
+    progress: Callable[[str], None] = lambda _: None,
+) -> Diagnosis:
+    """Say whether recordings agree with the model of a gearbox, and if not, where, by what physics, and how strongly.
+
+    Parameters
+    ----------
+    recordings : path, Recording, or several
+        To learn from; see :func:`diagnosis.recording.read_recordings` for files
+    gearbox : Gearbox, name or path
+    holdout : path, Recording, or several
+        To judge by; without any, the last quarter of every recording is held out
+    false_alarm_rate : float
+        Probability with which consistent recordings may be called inconsistent, 1e-4 to 0.5
+    catalogue : mapping of str to Mechanism
+        By default :data:`models.mechanisms.CATALOGUE`
+    jobs : int
+        Processes
+    progress : callable
+        Told in words what is being done
+
+    Returns
+    -------
+    Diagnosis
+        Prints as a summary; :meth:`Diagnosis.to_dict` is ``diagnosis.json``
+
+    Raises
+    ------
+    InputError
+        If a recording cannot be used, with file, column and rows.
+    """
+    if not 1e-4 <= false_alarm_rate <= 0.5:
+        raise InputError(f"a false-alarm rate of {false_alarm_rate:g} is not possible; 0.0001 to 0.5 is")
+    gearbox = gearbox if isinstance(gearbox, Gearbox) else load_gearbox(gearbox)
+    train, held = _read(recordings, gearbox), _read(holdout, gearbox)
+    if not train:
+        raise InputError("no recording was given to learn from")
+    if held:
+        check_holdout(train, held)
+    _refuse_unusable(train)
+    check_plausible([*train, *held], gearbox.network(), gearbox.losses())
+    progress("reading the recordings and setting up the inference")
+    case = prepare(gearbox, train, held)
+    _refuse_too_short(train, case.train.pieces)
+    found = search(case, catalogue, false_alarm_rate=false_alarm_rate, jobs=jobs, progress=progress)
+    progress("predicting the recordings free-running")
+    return assembled(case, found, catalogue, train, held, false_alarm_rate=false_alarm_rate)
+
+
+def _read(sources: Source | Sequence[Source], gearbox: Gearbox) -> tuple[Recording, ...]:
+    given = [sources] if isinstance(sources, str | Path | Recording) else list(sources)
+    paths = [s for s in given if not isinstance(s, Recording)]
+    read = iter(read_recordings(paths, gearbox.network()) if paths else ())
+    result = [s if isinstance(s, Recording) else next(read) for s in given]
+    names = [r.name for r in result]
+    return tuple(
+        replace(r, name=f"{r.name}_{names[: i + 1].count(r.name)}") if names.count(r.name) > 1 else r
+        for i, r in enumerate(result)
+    )
+
+
+def _refuse_unusable(recordings: Sequence[Recording]) -> None:
+    faults = [
+        f"{r.path}: no temperature of the network is measured; columns T_<node>_degC are needed"
+        for r in recordings if not any(c.name != "P_loss" and np.isfinite(c.values).any() for c in r.channels)
+    ]  # fmt: skip
+    if faults:
+        raise InputError("\n".join(faults))
+
+
+def _refuse_too_short(recordings: Sequence[Recording], pieces: Sequence[object]) -> None:
+    if not pieces:
+        rows = ", ".join(f"{r.name}: {len(r.time)} rows" for r in recordings)
+        raise InputError(f"no piece of the recordings is long enough to simulate ({rows}); a few minutes are needed")

@@ -1,0 +1,92 @@
+"""The files of a diagnosis: report, numbers, correction, and one prediction per recording."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from diagnosis.observation import LOSS
+from diagnosis.recording import Recording
+from diagnosis.result import Diagnosis
+from models.correction import Correction, Estimate, Finding, write_correction
+from models.gearbox import Gearbox
+
+SHAPE = "shape_"
+
+
+def correction_of(diagnosis: Diagnosis, gearbox: Gearbox) -> Correction:
+    """What a diagnosis found as a correction of the definition: findings, calibrated parameters and formula shapes."""
+    nominal = {p.name: p for p in gearbox.network().parameters}
+    calibrated = {c.parameter: c for c in diagnosis.calibration}
+    findings = []
+    for found in diagnosis.findings:
+        if found.term is None:
+            continue
+        prefix = f"{found.term.label}_"
+        estimates = {
+            (p.name if p.name == found.term.label else prefix + p.name): (p.value, p.stderr) for p in found.parameters
+        }
+        findings.append(Finding.of(
+            found.term, estimates, mechanism=found.mechanism, family=found.family, place=found.place, says=found.says,
+            probability=found.probability,
+        ))  # fmt: skip
+    for term in diagnosis.shapes:
+        name = term.strength.name
+        if name in calibrated:
+            findings.append(Finding.of(
+                term, {name: (calibrated[name].value, calibrated[name].stderr)}, mechanism="shape",
+                family="calibration", place=name.removeprefix(SHAPE), says=term.strength.description,
+            ))  # fmt: skip
+    return Correction(
+        gearbox=gearbox.name,
+        gearbox_sha256=gearbox.hash,
+        findings=tuple(findings),
+        calibration=tuple(
+            Estimate(name=c.parameter, value=c.value, stderr=c.stderr, unit=nominal[c.parameter].unit, prior=c.prior)
+            for c in diagnosis.calibration
+            if c.parameter in nominal
+        ),
+        recordings=dict(diagnosis.inputs["recordings"]),
+        version=str(diagnosis.inputs["version"]),
+    )
+
+
+def prediction_table(diagnosis: Diagnosis, recording: Recording) -> pd.DataFrame:
+    """Free-running prediction at the rows of a recording: what each sensor would read, and every other node."""
+    courses = [c for c in diagnosis.courses if c.recording == recording.name]
+    columns = {"time_s": recording.time}
+    for name in courses[0].after if courses else ():
+        values = np.full(len(recording.time), np.nan)
+        for course in courses:
+            inside = (recording.time >= course.time[0]) & (recording.time <= course.time[-1] + 1e-6)
+            values[inside] = np.interp(recording.time[inside], course.time, course.after[name])
+        columns["P_loss_W" if name == LOSS else f"T_{name}_degC"] = values
+    return pd.DataFrame(columns)
+
+
+def write_files(
+    diagnosis: Diagnosis, gearbox: Gearbox, recordings: Sequence[Recording], folder: Path
+) -> tuple[Path, ...]:
+    """Write everything into an existing folder.
+
+    Returns
+    -------
+    tuple of Path
+        What was written, the report first
+    """
+    from diagnosis.report import write_report
+
+    report, numbers, correction = (folder / name for name in ("report.html", "diagnosis.json", "correction.toml"))
+    write_report(diagnosis, report)
+    numbers.write_text(json.dumps(diagnosis.to_dict(), indent=2, allow_nan=False) + "\n", encoding="utf-8")
+    write_correction(correction_of(diagnosis, gearbox), correction)
+    predictions = []
+    for recording in recordings:
+        path = folder / f"{recording.name}.csv"
+        prediction_table(diagnosis, recording).to_csv(path, index=False, float_format="%.3f", lineterminator="\n")
+        predictions.append(path)
+    return report, numbers, correction, *predictions

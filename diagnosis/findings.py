@@ -1,0 +1,141 @@
+"""One effect found, told for people: place, sentence, equation, numbers, and what it could be mistaken for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from diagnosis.case import Case, heat_over_time
+from diagnosis.explain import Explanation
+from diagnosis.hypotheses import Hypothesis
+from diagnosis.result import Finding, ParameterValue, Rival
+from diagnosis.search import Stage, heats_of
+from models.mechanisms import Mechanism, Placed
+
+LEAST_RIVAL = 0.01
+
+
+def node_of(case: Case, h: Hypothesis) -> str:
+    """The part of the network (or the channel, or the boundary) that a hypothesis acts on."""
+    network, term = case.nominal, h.term
+    if term is None:
+        return _node_of_parameter(case, h.place)
+    if term.kind == "loss_factor":
+        return next(s.node for s in network.sources if s.name == term.target[0])
+    if term.kind == "link_factor":
+        parts = {p.name for p in network.parts}
+        ends = next(k.nodes for k in network.links if k.name == term.target[0])
+        return next(node for node in ends if node in parts)
+    if term.kind == "signal":
+        return {"T_ambient": "air", "air_speed": "air"}.get(term.target[0], term.target[0])
+    return term.target[0]
+
+
+def _node_of_parameter(case: Case, name: str) -> str:
+    network = case.nominal
+    bare = name.removeprefix("shape_")
+    for source in network.sources:
+        if any(s.name == name or bare.startswith(f"{s.name}_") for s in source.heat.free_symbols):
+            return source.node
+    for link in network.links:
+        if any(s.name == name or bare.startswith(f"{s.name}_") for s in link.conductance.free_symbols):
+            return next(n for n in link.nodes if n in {p.name for p in network.parts})
+    for part in network.parts:
+        if part.capacity is not None and name in {s.name for s in part.capacity.free_symbols}:
+            return part.name
+    return network.parts[0].name
+
+
+def rivals_of(stage: Stage, catalogue: Mapping[str, Mechanism]) -> tuple[Rival, ...]:
+    """What else would explain it, with what would separate it from what was accepted."""
+    if stage.accepted is None:
+        return ()
+    own = stage.accepted.found[-1]
+    result = []
+    for fit, probability in zip(stage.fits, stage.probabilities(), strict=True):
+        other = fit.found[-1]
+        if fit is stage.accepted or probability < LEAST_RIVAL:
+            continue
+        result.append(Rival(
+            mechanism=other.name, place=other.place, probability=float(probability),
+            separate_by=_separation(own, other, catalogue),
+        ))  # fmt: skip
+    return tuple(sorted(result, key=lambda r: -r.probability))
+
+
+def _separation(own: Hypothesis, other: Hypothesis, catalogue: Mapping[str, Mechanism]) -> str:
+    if own.name == other.name:
+        return f"a temperature sensor at {other.place.replace('_', ' ')}"
+    if own.name in catalogue:
+        return catalogue[own.name].separation(other.name)
+    if other.name in catalogue:
+        return catalogue[other.name].separation(own.name)
+    return "a second recording with other speeds and torques"
+
+
+def finding_of(case: Case, final: Explanation, h: Hypothesis, stage: Stage, rivals: Sequence[Rival]) -> Finding:
+    """A finding with the values of the final explanation."""
+    probabilities = dict(zip((f.found[-1].label for f in stage.fits), stage.probabilities(), strict=True))
+    values = _with_bias(final, h)
+    heats = heats_of(final, h)
+    together = np.concatenate(heats) if heats else np.zeros(1)
+    term = h.term
+    if term is not None:
+        known = {name: value for name, (value, _) in values.items()}
+        term = term.with_values(known)
+        equation = term.equation(known)
+        units = {p.name: p.unit for p in term.parameters}
+        prefix = f"{term.label}_"
+    else:
+        equation, units, prefix = "", {p.name: p.unit for p in case.nominal.parameters}, ""
+    pieces = [part.trajectory.piece for part in final.fit.parts]
+    return Finding(
+        mechanism=h.name,
+        family=h.family,
+        place=h.place,
+        node=node_of(case, h),
+        kind="parameter" if h.term is None else "sensor" if h.term.of_measurement else h.term.kind,
+        says=_says(h, values),
+        reference=h.term.mechanism.reference if isinstance(h.term, Placed) else "",
+        equation=equation,
+        probability=float(probabilities.get(h.label, 0.0)),
+        log_bayes=next((g for f, g in zip(stage.fits, stage.gains, strict=True) if f.found[-1] is h), 0.0),
+        parameters=tuple(
+            ParameterValue(name=name.removeprefix(prefix), value=value, stderr=sd, unit=units.get(name, "1"))
+            for name, (value, sd) in values.items()
+        ),
+        confusable_with=tuple(rivals),
+        heat_mean_W=float(np.abs(together).mean()),
+        heat_max_W=float(np.abs(together).max()),
+        heat=heat_over_time(pieces, heats) if heats else {},
+        term=term,
+    )
+
+
+def _says(h: Hypothesis, values: Mapping[str, tuple[float, float]]) -> str:
+    if isinstance(h.term, Placed):
+        return h.term.says
+    if h.term is None:
+        value = next(iter(values.values()), (float("nan"), 0.0))[0]
+        return f"The parameter {h.place} is {value:.3g}, far from what the definition allows."
+    return f"A heat in {h.place.replace('_', ' ')} goes with {h.name.removeprefix('open form, ')}; no known mechanism."
+
+
+def _with_bias(final: Explanation, h: Hypothesis) -> dict[str, tuple[float, float]]:
+    """Values of what was found; a bias that was found takes the sensor's ordinary tolerance with it."""
+    values = final.values_of(h)
+    term = h.term
+    if term is None or term.form != "shift" or term.kind != "sensor" or len(term.parameters) != 1:
+        return values
+    if {s.name for s in term.expression.free_symbols} != {term.strength.name}:
+        return values
+    items, fit = final.fit.unknowns.items, final.fit
+    own = next(i for i, item in enumerate(items) if item.target == term.strength.name)
+    bias = next((i for i, item in enumerate(items) if item.role == "bias" and item.target == term.target[0]), None)
+    if bias is None:
+        return values
+    pick = np.zeros(len(items))
+    pick[own], pick[bias] = items[own].parameter.sd, items[bias].parameter.sd
+    total = items[own].value(float(fit.z[own])) + items[bias].value(float(fit.z[bias]))
+    return {term.strength.name: (total, float(np.sqrt(pick @ fit.covariance @ pick)))}

@@ -1,0 +1,132 @@
+"""From the rows of a recording to the working grid of the inference: pieces, intervals, means.
+
+The inference walks over intervals of about :data:`INTERVAL_S`. Inputs are means over an interval, measurements means
+around a grid point (a symmetric window, so that a steady drift leaves no error). Recordings that are sampled more
+slowly keep their own times.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.recording import Recording
+from models.types import Array
+
+INTERVAL_S = 20.0
+SAMPLES = 5  # of the inputs per interval, at which losses are computed: they are not linear in speed
+SHORTEST_PIECE = 5  # grid points
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Piece:
+    """One gap-free piece of a recording on the working grid of K intervals.
+
+    Attributes
+    ----------
+    recording : str
+        Name of the recording
+    time : Array, shape (K + 1,)
+        Since the first row of the recording, [s]
+    samples : Array, shape (K, S, inputs)
+        Inputs inside every interval, evenly spread
+    channels : tuple of str
+        What is measured: nodes, or ``P_loss``
+    measured : Array, shape (K + 1, channels)
+        [degC] or [W]; NaN where nothing was measured
+    counts : Array, shape (K + 1, channels)
+        Rows behind every mean
+    """
+
+    recording: str
+    time: Array
+    samples: Array
+    channels: tuple[str, ...]
+    measured: Array
+    counts: Array
+
+    @property
+    def steps(self) -> Array:
+        """Lengths of the intervals, shape (K,), [s]."""
+        return np.diff(self.time)
+
+    @property
+    def middle(self) -> Array:
+        """Middles of the intervals, shape (K,), [s]."""
+        return 0.5 * (self.time[1:] + self.time[:-1])
+
+    @property
+    def inputs(self) -> Array:
+        """Means of the inputs over the intervals, shape (K, inputs)."""
+        return np.asarray(self.samples.mean(axis=1))
+
+
+def pieces(recordings: Sequence[Recording], inputs: Sequence[str], channels: Sequence[str]) -> tuple[Piece, ...]:
+    """All pieces of all recordings.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+    inputs : sequence of str
+        Names of the network's inputs, speed and torque first
+    channels : sequence of str
+        Channels of the result, the same for every piece; those that a recording lacks are NaN there
+
+    Returns
+    -------
+    tuple of Piece
+        Pieces too short to learn anything from are left out
+    """
+    return tuple(piece for recording in recordings for piece in _pieces_of(recording, inputs, channels))
+
+
+def _pieces_of(recording: Recording, inputs: Sequence[str], channels: Sequence[str]) -> Iterator[Piece]:
+    values = {channel.name: channel.values for channel in recording.channels}
+    for rows in recording.segments:
+        time = recording.time[rows]
+        if len(time) < SHORTEST_PIECE:
+            continue
+        native = float(np.median(np.diff(time)))
+        if 2.0 * native > INTERVAL_S:
+            grid = time
+        else:
+            grid = np.arange(time[0], time[-1] + 0.5 * INTERVAL_S, INTERVAL_S)
+            grid = grid[grid <= time[-1] + 1e-9]
+        if len(grid) < SHORTEST_PIECE:
+            continue
+        fractions = (np.arange(SAMPLES) + 0.5) / SAMPLES
+        at = grid[:-1, None] + np.diff(grid)[:, None] * fractions
+        samples = np.stack([np.interp(at, time, recording.inputs[name][rows]) for name in inputs], axis=-1)
+        measured = np.full((len(grid), len(channels)), np.nan)
+        counts = np.zeros((len(grid), len(channels)))
+        edges = np.concatenate([[-np.inf], 0.5 * (grid[1:] + grid[:-1]), [np.inf]])
+        cell = np.searchsorted(edges, time, side="right") - 1
+        for index, name in enumerate(channels):
+            if name in values:
+                measured[:, index], counts[:, index] = _means(values[name][rows], time, cell, grid)
+        yield Piece(
+            recording=recording.name,
+            time=grid,
+            samples=samples,
+            channels=tuple(channels),
+            measured=measured,
+            counts=counts,
+        )
+
+
+def _means(values: Array, time: Array, cell: NDArray[np.intp], grid: Array) -> tuple[Array, Array]:
+    """Mean of the rows around every grid point, moved to the grid point where the rows lie to one side of it."""
+    good = np.isfinite(values)
+    size = len(grid)
+    count = np.bincount(cell[good], minlength=size).astype(float)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        mean = np.bincount(cell[good], values[good], minlength=size) / count
+        offset = np.bincount(cell[good], time[good], minlength=size) / count - grid
+    known = np.flatnonzero(count > 0)
+    if len(known) > 1:
+        slope = np.gradient(mean[known], grid[known] + offset[known])
+        mean[known] -= slope * offset[known] * (np.abs(offset[known]) > 1e-9)
+    return mean, count

@@ -1,0 +1,228 @@
+"""What competes to explain a mismatch, and the score of each: mechanisms at their places, faults of instruments, and
+parameters out of their priors, all in one list and by one measure.
+
+The scan is linear: one column per combination of shape parameters, judged with everything else marginalised
+(:mod:`diagnosis.evidence`). It is fast and decides who is fitted in earnest, not who wins.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+from joblib import Parallel, delayed
+
+from diagnosis.evidence import Marginal, strength
+from diagnosis.latent import white_columns
+from diagnosis.observation import readings
+from diagnosis.posterior import Fit, Linearised, Problem
+from diagnosis.term_on_grid import TermOnGrid
+from diagnosis.trajectory import NetworkOnGrid
+from models.mechanisms import Placed
+from models.terms import Term
+from models.types import Array
+
+MOST_VARIANTS = 24
+CHUNK = 96  # columns that go through the filter together
+WIDE_PRIOR = 4.0  # standard deviations of a parameter that is out of its prior
+NEAR_ZERO = 1e-9
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Hypothesis:
+    """One explanation more.
+
+    Attributes
+    ----------
+    name, place, family : str
+        Mechanism (or ``parameter``), where it acts, what kind of physics
+    term : Term or None
+        What is added; None for a parameter out of its prior
+    unknown : int or None
+        Index of that parameter among the unknowns
+    variants : Array, shape (V, parameters)
+        Values of the term's parameters that are tried, the strength 1
+    """
+
+    name: str
+    place: str
+    family: str
+    term: Term | None = None
+    unknown: int | None = None
+    variants: Array
+
+    @property
+    def label(self) -> str:
+        """Name and place."""
+        return f"{self.name}@{self.place}"
+
+    @property
+    def sign(self) -> int:
+        """Of the strength; 0 where it may be either."""
+        if self.term is None:
+            return 0
+        p = self.term.strength
+        return int(p.lower >= 0.0) - int(p.upper <= 0.0)
+
+    @property
+    def in_network(self) -> bool:
+        """Whether it is heat, and so becomes part of the network."""
+        return self.term is not None and self.term.kind not in ("sensor", "signal")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Scored:
+    """A hypothesis with what the scan says.
+
+    Attributes
+    ----------
+    hypothesis : Hypothesis
+    log_bayes : float
+        Mean over the variants, against nothing
+    variants : tuple of int
+        Its best variants, best first
+    values : Array, shape (V,)
+        Most probable strength of every variant
+    log_bayes_of : Array, shape (V,)
+    expected : float
+        Log Bayes factor to be expected if it were there with its typical strength
+    """
+
+    hypothesis: Hypothesis
+    log_bayes: float
+    variants: tuple[int, ...]
+    values: Array
+    log_bayes_of: Array
+    expected: float
+
+
+def hypothesis_of(placed: Placed) -> Hypothesis:
+    """A mechanism at a place, with the grid of its shape parameters."""
+    grids = [parameter.grid or (parameter.start,) for parameter in placed.parameters[1:]]
+    grid = np.array(list(product(*grids)), dtype=float)
+    if len(grid) > MOST_VARIANTS:
+        grid = grid[np.unique(np.linspace(0, len(grid) - 1, MOST_VARIANTS).round().astype(int))]
+    return Hypothesis(
+        name=placed.name, place=placed.place, family=placed.family, term=placed,
+        variants=np.concatenate([np.ones((len(grid), 1)), grid], axis=1),
+    )  # fmt: skip
+
+
+def parameter_hypotheses(problem: Problem) -> list[Hypothesis]:
+    """Every parameter of the network out of its prior."""
+    return [
+        Hypothesis(name="parameter", place=item.target, family="parameter", unknown=index, variants=np.ones((1, 1)))
+        for index, item in enumerate(problem.unknowns.items)
+        if item.role == "network"
+    ]
+
+
+def scan(
+    problem: Problem, fit: Fit, marginal: Marginal, hypotheses: Sequence[Hypothesis], *, jobs: int = 1,
+    progress: Callable[[float], None] | None = None,
+) -> list[Scored]:  # fmt: skip
+    """The scores of all hypotheses, best first.
+
+    Parameters
+    ----------
+    problem, fit, marginal
+        The explanation so far
+    hypotheses : sequence of Hypothesis
+    jobs : int
+        Processes
+    progress : callable, optional
+        Told the share that is done
+    """
+    chunks = list(_chunks(hypotheses))
+    work = (delayed(_scan_chunk)(problem, fit, marginal, chunk) for chunk in chunks)
+    scored: list[Scored] = []
+    results = Parallel(n_jobs=jobs, return_as="generator")(work) if jobs > 1 else (
+        _scan_chunk(problem, fit, marginal, chunk) for chunk in chunks)  # fmt: skip
+    for count, result in enumerate(results, start=1):
+        scored += result
+        if progress is not None:
+            progress(count / len(chunks))
+    return sorted(scored, key=lambda s: -s.log_bayes)
+
+
+def _chunks(hypotheses: Sequence[Hypothesis]) -> Iterator[list[Hypothesis]]:
+    chunk: list[Hypothesis] = []
+    columns = 0
+    for hypothesis in hypotheses:
+        if chunk and columns + len(hypothesis.variants) > CHUNK:
+            yield chunk
+            chunk, columns = [], 0
+        chunk.append(hypothesis)
+        columns += len(hypothesis.variants)
+    if chunk:
+        yield chunk
+
+
+def _scan_chunk(problem: Problem, fit: Fit, marginal: Marginal, chunk: Sequence[Hypothesis]) -> list[Scored]:
+    model = problem.model
+    heating = [h for h in chunk if h.term is not None and h.term.kind != "sensor"]
+    found = []
+    if heating:
+        terms = [TermOnGrid(model, h.term) for h in heating if h.term is not None]
+        blocks = [_heat_columns(model, part, terms, heating) for part in fit.parts]
+        columns = np.concatenate(blocks)
+        before = 0
+        for h in heating:
+            found.append(_judged(h, marginal, columns[:, before : before + len(h.variants)]))
+            before += len(h.variants)
+    for h in chunk:
+        if h.unknown is not None:
+            found.append(_judged(h, marginal, marginal.columns[:, [h.unknown]], prior_sd=WIDE_PRIOR))
+        elif h.term is not None and h.term.kind == "sensor":
+            term = TermOnGrid(model, h.term)
+            columns = np.concatenate([_distortion_columns(model, part, term, h) for part in fit.parts])
+            found.append(_judged(h, marginal, columns))
+    return found
+
+
+def white_column(problem: Problem, fit: Fit, h: Hypothesis, variant: int) -> Array:
+    """Whitened change of the readings per unit of strength, for one variant of a term, shape (M,)."""
+    assert h.term is not None  # noqa: S101 - a term is asked for
+    one, term = replace(h, variants=h.variants[[variant]]), TermOnGrid(problem.model, h.term)
+    if h.term.kind == "sensor":
+        return np.concatenate([_distortion_columns(problem.model, part, term, one) for part in fit.parts])[:, 0]
+    return np.concatenate([_heat_columns(problem.model, part, [term], [one]) for part in fit.parts])[:, 0]
+
+
+def _heat_columns(
+    model: NetworkOnGrid, part: Linearised, terms: Sequence[TermOnGrid], hypotheses: Sequence[Hypothesis]
+) -> Array:
+    heats, losses = [], []
+    for term, h in zip(terms, hypotheses, strict=True):
+        heat, loss = term.heat(part.trajectory, h.variants)
+        heats.append(np.nan_to_num(heat))
+        losses.append(np.nan_to_num(loss))
+    return white_columns(model, part, np.concatenate(heats, axis=2), np.concatenate(losses, axis=1))
+
+
+def _distortion_columns(model: NetworkOnGrid, part: Linearised, term: TermOnGrid, h: Hypothesis) -> Array:
+    """Whitened readings per unit of strength, by a difference of the size that the fault typically has."""
+    read = readings(model, part.trajectory, part.sensors)
+    size = term.term.strength.sd
+    columns = []
+    for variant in h.variants:
+        values = np.array(variant)
+        values[0] = size
+        columns.append((term.distorted(part.trajectory, part.sensors, read, values) - read) / size)
+    return part.whitening(np.stack(columns, axis=2))
+
+
+def _judged(h: Hypothesis, marginal: Marginal, columns: Array, prior_sd: float | None = None) -> Scored:
+    a, b = marginal.products(columns)
+    if prior_sd is None:
+        assert h.term is not None  # noqa: S101 - a parameter has its prior given
+        prior_sd = h.term.strength.sd
+    found = strength(a, b, prior_sd, h.sign)
+    log_bayes = np.where(b > NEAR_ZERO, found.log_bayes, 0.0)
+    return Scored(
+        hypothesis=h, log_bayes=float(np.logaddexp.reduce(log_bayes) - np.log(len(log_bayes))),
+        variants=tuple(int(i) for i in np.argsort(-log_bayes)), values=found.value, log_bayes_of=log_bayes,
+        expected=float(np.median(0.5 * b * prior_sd**2 - 0.5 * np.log1p(b * prior_sd**2))),
+    )  # fmt: skip

@@ -1,0 +1,135 @@
+"""What the noise of a recording is taken to be, before anything is explained."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from scipy.optimize import nnls
+
+from diagnosis.grid import Piece
+from diagnosis.observation import LOSS
+from diagnosis.recording import Recording
+from diagnosis.trajectory import NetworkOnGrid
+from diagnosis.whitening import Noise
+from models.types import Array
+
+LOWEST_SD_K, LOWEST_SD_W = 0.02, 0.5
+FEWEST_ROWS, DEFAULT_LOSS_RELATIVE = 50, 0.02
+HEAT_FRACTION = 0.005  # random heat in every part, of the typical total loss
+HEAT_TIME_S = 1200.0
+START_KNOWN_K, START_UNKNOWN_K, START_UNKNOWN_SHARE = 2.0, 2.0, 0.15
+
+
+def white_sd(values: Array) -> float:
+    """White noise of a signal from its second differences, robust against steps and outliers.
+
+    Examples
+    --------
+    >>> rng = np.random.default_rng(0)
+    >>> bool(abs(white_sd(np.linspace(0, 50, 4000) + rng.normal(0, 0.2, 4000)) - 0.2) < 0.01)
+    True
+    """
+    second = np.diff(values, 2)
+    second = second[np.isfinite(second)]
+    if not second.size:
+        return 0.0
+    return float(1.4826 * np.median(np.abs(second - np.median(second))) / np.sqrt(6.0))
+
+
+def loss_noise(recordings: Sequence[Recording]) -> tuple[float, float]:
+    """White noise of one row of the measured total loss: a constant part [W] and one relative to the loss [-].
+
+    From the second differences in five classes of loss, by least squares of the variances.
+    """
+    seconds, levels = [], []
+    for recording in recordings:
+        for channel in recording.channels:
+            if channel.name == LOSS:
+                for rows in recording.segments:
+                    values = channel.values[rows]
+                    seconds.append(np.diff(values, 2))
+                    levels.append(values[1:-1])
+    second, level = np.concatenate(seconds), np.abs(np.concatenate(levels))
+    good = np.isfinite(second) & np.isfinite(level)
+    second, level = second[good], level[good]
+    if len(second) < FEWEST_ROWS:
+        return LOWEST_SD_W, DEFAULT_LOSS_RELATIVE
+    classes = np.array_split(np.argsort(level), 5)
+    # Steps of the operating point are rare; the median does not see them.
+    variance = np.array([(1.4826 * np.median(np.abs(second[c]))) ** 2 / 6.0 for c in classes])
+    square = np.array([np.median(level[c]) ** 2 for c in classes])
+    weight = 1.0 / (variance + 1e-6 * variance.max() + 1e-12)
+    (constant, relative), _ = nnls(np.stack([weight, weight * square], axis=1), weight * variance)
+    return max(float(np.sqrt(constant)), LOWEST_SD_W), float(np.sqrt(relative))
+
+
+def channel_noise(recordings: Sequence[Recording], channels: Sequence[str]) -> Mapping[str, float]:
+    """White noise of one row of every temperature, [K]: as the rows show it, or as stated where they are too few."""
+    result = {}
+    for name in channels:
+        found = [c for r in recordings for c in r.channels if c.name == name]
+        stated = [c.noise for c in found if c.noise is not None]
+        if name == LOSS:
+            continue  # see loss_noise: it goes with the loss
+        rows = sum(int(np.isfinite(c.values).sum()) for c in found)
+        # What the rows show is worth more than what a data sheet says.
+        if stated and rows < FEWEST_ROWS:
+            result[name] = max(stated)
+        else:
+            seen = [white_sd(c.values[piece]) for r in recordings for c in r.channels if c.name == name
+                    for piece in r.segments]  # fmt: skip
+            result[name] = max(max(seen, default=0.0), LOWEST_SD_K)
+    return result
+
+
+def noise_of(
+    model: NetworkOnGrid, piece: Piece, white: Mapping[str, float], loss_W: float, *,
+    loss_noise: tuple[float, float] = (0.0, 0.0), heat_fraction: float = HEAT_FRACTION,
+) -> Noise:  # fmt: skip
+    """The noise of one piece.
+
+    Parameters
+    ----------
+    model : NetworkOnGrid
+    piece : Piece
+    white : mapping of channel to float
+        White noise of one row
+    loss_W : float
+        Typical total loss, [W]
+    loss_noise : (float, float)
+        Of the measured total loss where `white` does not state it, see :func:`loss_noise`
+    heat_fraction : float
+        Structural floor: standard deviation of the random heat in every part over `loss_W`, [-]
+    """
+    capacities = model.capacities([p.start for p in model.network.parameters])
+    heavy = capacities > 0.01 * capacities.max()
+    known = np.array([name in piece.channels for name in model.parts])
+    hot = float(np.nanmax(piece.measured[0], initial=0.0)) if np.isfinite(piece.measured[0]).any() else 50.0
+    ambient = _ambient(model, piece)
+    unknown = START_UNKNOWN_K + START_UNKNOWN_SHARE * abs(hot - ambient)
+    return Noise(
+        channel_sd=np.array([white.get(name, loss_noise[0]) for name in piece.channels]),
+        floor_sd=np.array([LOWEST_SD_W if name == LOSS else LOWEST_SD_K for name in piece.channels]),
+        loss_relative_sd=0.0 if LOSS in white else loss_noise[1],
+        heat_sd=np.where(heavy, heat_fraction * loss_W, 0.0),
+        heat_time=HEAT_TIME_S,
+        start_sd=np.where(known, START_KNOWN_K, unknown),
+    )
+
+
+def start_guess(model: NetworkOnGrid, piece: Piece) -> Array:
+    """Start temperatures of all parts: as measured, else the mean of what is, [degC]."""
+    first = {}
+    for index, name in enumerate(piece.channels):
+        seen = piece.measured[:, index]
+        seen = seen[np.isfinite(seen)]
+        if name in model.parts and len(seen):
+            first[name] = float(seen[0])
+    middle = float(np.mean(list(first.values()))) if first else _ambient(model, piece)
+    return np.array([first.get(name, middle) for name in model.parts])
+
+
+def _ambient(model: NetworkOnGrid, piece: Piece) -> float:
+    inputs = model.laws.inputs
+    return float(piece.inputs[0, inputs.index("T_ambient")]) if "T_ambient" in inputs else 20.0

@@ -1,0 +1,128 @@
+"""What the sensors would read along a trajectory, and the derivatives of that: nodes, lag, bias, total loss."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.signal import lfilter
+
+from diagnosis.trajectory import NetworkOnGrid, Trajectory
+from models.types import Array
+
+LOSS = "P_loss"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sensors:
+    """What every channel is like.
+
+    Attributes
+    ----------
+    channels : tuple of str
+        Nodes, or ``P_loss``
+    lag, bias : Array, shape (channels,)
+        First-order lag [s] and bias [K]; of the total loss the bias in W
+    loss_gain : float
+        Factor on the total loss, [-]
+    """
+
+    channels: tuple[str, ...]
+    lag: Array
+    bias: Array
+    loss_gain: float = 1.0
+
+    def ideal(self) -> Sensors:
+        """The same channels without lag, bias or gain."""
+        nothing = np.zeros(len(self.channels))
+        return Sensors(channels=self.channels, lag=nothing, bias=nothing)
+
+
+def readings(model: NetworkOnGrid, trajectory: Trajectory, sensors: Sensors) -> Array:
+    """What the sensors read along a trajectory, shape (K + 1, channels), [degC] or [W]."""
+    read = np.empty((len(trajectory.T), len(sensors.channels)))
+    for index, name in enumerate(sensors.channels):
+        read[:, index] = total_at_points(trajectory.loss) * sensors.loss_gain if name == LOSS else (
+            lagged(trajectory.T[:, model.parts.index(name)], trajectory.piece.steps, sensors.lag[index]))  # fmt: skip
+    return np.asarray(read + sensors.bias)
+
+
+def reading_columns(
+    model: NetworkOnGrid, trajectory: Trajectory, sensors: Sensors, T: Array, direct_loss: Array
+) -> Array:
+    """Change of the readings for changes of temperatures and loss.
+
+    Parameters
+    ----------
+    model, trajectory, sensors
+    T : Array, shape (K + 1, parts, columns)
+        Changes of the temperatures, [K]
+    direct_loss : Array, shape (K, columns)
+        Changes of the total loss at fixed temperatures, [W]
+
+    Returns
+    -------
+    Array, shape (K + 1, channels, columns)
+    """
+    read = np.empty((len(T), len(sensors.channels), T.shape[-1]))
+    for index, name in enumerate(sensors.channels):
+        if name == LOSS:
+            middle = 0.5 * (T[1:] + T[:-1])
+            loss = np.einsum("kn,knc->kc", trajectory.loss_slope, middle) + direct_loss
+            read[:, index] = total_at_points(loss) * sensors.loss_gain
+        else:
+            read[:, index] = lagged(T[:, model.parts.index(name)], trajectory.piece.steps, sensors.lag[index])
+    return read
+
+
+def total_at_points(loss: Array) -> Array:
+    """From the middles of the intervals to the grid points, shape (K, ...) to (K + 1, ...)."""
+    return np.concatenate([loss[:1], 0.5 * (loss[1:] + loss[:-1]), loss[-1:]])
+
+
+def lagged(values: Array, steps: Array, lag: float) -> Array:
+    """A first-order lag, exact for straight lines between the points.
+
+    Parameters
+    ----------
+    values : Array, shape (K + 1, ...)
+    steps : Array, shape (K,)
+        [s]
+    lag : float
+        Time constant, [s]
+
+    Returns
+    -------
+    Array, shape (K + 1, ...)
+        Starting at the first value
+    """
+    if lag <= 0.0:
+        return values
+    if np.ptp(steps) < 1e-6 * steps[0]:
+        h = float(steps[0])
+        a = float(np.exp(-h / lag))
+        share = lag * (1.0 - a) / h  # of the slope over the step
+        # y1 = a y0 + (share - a) x0 + (1 - share) x1
+        start = share * values[:1]  # so that the first reading is the first value
+        filtered, _ = lfilter([1.0 - share, share - a], [1.0, -a], values, axis=0, zi=start)
+        return np.asarray(filtered)
+    result = np.empty_like(values)
+    result[0] = values[0]
+    decays = np.exp(-steps / lag)
+    shares = lag * (1.0 - decays) / steps
+    for k, (a, share) in enumerate(zip(decays.tolist(), shares.tolist(), strict=True)):
+        result[k + 1] = a * result[k] + (share - a) * values[k] + (1.0 - share) * values[k + 1]
+    return result
+
+
+def lag_column(trajectory: Trajectory, node: int, lag: float) -> Array:
+    """Change of a reading per second of lag, shape (K + 1,), [K/s]."""
+    step = 0.5
+    T, steps = trajectory.T[:, node], trajectory.piece.steps
+    return np.asarray((lagged(T, steps, lag + step) - lagged(T, steps, lag)) / step)
+
+
+def loss_channel(channels: Sequence[str]) -> int | None:
+    """Index of the total loss, None where it is not measured."""
+    return list(channels).index(LOSS) if LOSS in channels else None

@@ -1,0 +1,351 @@
+"""The most probable explanation of recordings by one network: maximum a posteriori, with its Laplace evidence.
+
+Gauss-Newton in the whitened residuals, over all pieces of all recordings together. Every iteration simulates each piece
+once (:mod:`diagnosis.trajectory`) and gets all derivatives from the same linearisation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from diagnosis.grid import Piece
+from diagnosis.observation import LOSS, Sensors, lag_column, reading_columns, readings, total_at_points
+from diagnosis.term_on_grid import TermOnGrid, moved_heat
+from diagnosis.trajectory import NetworkOnGrid, Trajectory, parameter_heat, simulate
+from diagnosis.unknowns import Unknown, Unknowns, shifted
+from diagnosis.whitening import Noise, Whitening
+from models.errors import InputError
+from models.terms import Term
+from models.types import Array
+
+ITERATIONS = 8
+SETTLED = 0.05  # of a prior standard deviation
+FARTHEST_STEP = 3.0  # of the z numbers in one iteration
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Linearised:
+    """One piece, linearised at some values of the unknowns.
+
+    Attributes
+    ----------
+    trajectory : Trajectory
+    sensors : Sensors
+    residual : Array, shape (K + 1, channels)
+        Measured minus read, [K] or [W]; NaN where nothing was measured
+    columns : Array, shape (K + 1, channels, unknowns)
+        Derivatives of the readings with respect to z
+    whitening : Whitening
+    white_residual : Array, shape (M,)
+    white_columns : Array, shape (M, unknowns)
+    """
+
+    trajectory: Trajectory
+    sensors: Sensors
+    residual: Array
+    columns: Array
+    whitening: Whitening
+    white_residual: Array
+    white_columns: Array
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Fit:
+    """The most probable values of the unknowns.
+
+    Attributes
+    ----------
+    unknowns : Unknowns
+    z : Array, shape (unknowns,)
+    covariance : Array, shape (unknowns, unknowns)
+        Of z, from the curvature there
+    log_evidence : float
+        Laplace approximation; the constant of the noise is left out, so compare fits of the same data and noise only
+    parts : tuple of Linearised
+    """
+
+    unknowns: Unknowns
+    z: Array
+    covariance: Array
+    log_evidence: float
+    parts: tuple[Linearised, ...]
+
+    @property
+    def white_residual(self) -> Array:
+        """Whitened residual of all pieces, shape (M,)."""
+        return np.concatenate([part.white_residual for part in self.parts])
+
+    @property
+    def white_columns(self) -> Array:
+        """Whitened derivatives of all pieces, shape (M, unknowns)."""
+        return np.concatenate([part.white_columns for part in self.parts])
+
+
+class Problem:
+    """Recordings to be explained by a network.
+
+    Parameters
+    ----------
+    model : NetworkOnGrid
+    pieces : sequence of Piece
+    unknowns : Unknowns
+    noise : sequence of Noise
+        One per piece
+    starts : sequence of Array, shape (parts,)
+        Best guess of the start temperatures of every piece, [degC]
+    whitenings : sequence of Whitening, optional
+        Filters of an earlier fit of the same pieces: with them the evidences of two fits can be compared
+    terms : sequence of Term
+        What shifts an input or distorts a reading; terms inside the network are in `model`
+    """
+
+    def __init__(
+        self, model: NetworkOnGrid, pieces: Sequence[Piece], unknowns: Unknowns, noise: Sequence[Noise],
+        starts: Sequence[Array], whitenings: Sequence[Whitening] | None = None, terms: Sequence[Term] = (),
+    ) -> None:  # fmt: skip
+        self.model, self.pieces, self.unknowns, self.noise, self.starts = model, pieces, unknowns, noise, starts
+        self.whitenings, self.terms = whitenings, tuple(terms)
+        self._shifts = [TermOnGrid(model, term) for term in terms if term.kind == "signal"]
+        self._distortions = [TermOnGrid(model, term) for term in terms if term.kind == "sensor"]
+        self.inputs = model.laws.inputs
+
+    def changed(self, **changes: Any) -> Problem:
+        """The same problem with another `model`, `pieces`, `unknowns` or `terms`."""
+        given: dict[str, Any] = {name: getattr(self, name) for name in
+                                 ("model", "pieces", "unknowns", "noise", "starts", "whitenings", "terms")}  # fmt: skip
+        return Problem(**(given | changes))
+
+    def with_whitenings(self, whitenings: Sequence[Whitening]) -> Problem:
+        """The same problem, judged by given filters."""
+        return self.changed(whitenings=whitenings)
+
+    def linearise(self, index: int, z: Array, guess: Trajectory | Array | None, *, rounds: int = 2) -> Linearised:
+        """Simulate one piece at `z` and linearise there."""
+        model, unknowns = self.model, self.unknowns
+        piece = self.adjusted(index, z, guess if isinstance(guess, Trajectory) else None)
+        values = unknowns.network_values(model.network, z)
+        sensors = unknowns.sensors(piece.channels, z)
+        trajectory = simulate(model, piece, values, self.starts[index], guess=guess, rounds=rounds, settled_K=0.01)
+        residual = piece.measured - self.read(trajectory, sensors, z)
+        columns = self._columns(trajectory, sensors, z)
+        given = self.whitenings
+        whitening = Whitening(model, trajectory, sensors, self.noise[index]) if given is None else given[index]
+        white = whitening(np.concatenate([residual[:, :, None], columns], axis=2))
+        return Linearised(
+            trajectory=trajectory, sensors=sensors, residual=residual, columns=columns, whitening=whitening,
+            white_residual=white[:, 0], white_columns=white[:, 1:],
+        )  # fmt: skip
+
+    def _own(self, term: TermOnGrid, z: Array) -> Array:
+        return self.unknowns.term_values([p.name for p in term.term.parameters], z)
+
+    def adjusted(self, index: int, z: Array, trajectory: Trajectory | None) -> Piece:
+        """A piece with its inputs as they probably were."""
+        piece = self.unknowns.adjusted(self.pieces[index], self.inputs, z)
+        for shift in self._shifts:
+            piece = shift.adjusted(piece, self._own(shift, z), trajectory)
+        return piece
+
+    def read(self, trajectory: Trajectory, sensors: Sensors, z: Array) -> Array:
+        """What the sensors read, faults included, shape (K + 1, channels)."""
+        read = readings(self.model, trajectory, sensors)
+        for distortion in self._distortions:
+            read = distortion.distorted(trajectory, sensors, read, self._own(distortion, z))
+        return read
+
+    def _columns(self, trajectory: Trajectory, sensors: Sensors, z: Array) -> Array:
+        """Derivatives of the readings with respect to z, shape (K + 1, channels, unknowns)."""
+        model, items, piece = self.model, self.unknowns.items, trajectory.piece
+        intervals = len(piece.steps)
+        heats, losses = np.zeros((intervals, model.n, len(items))), np.zeros((intervals, len(items)))
+        names = [p.name for p in model.network.parameters]
+        for index, item in enumerate(items):
+            scale = _value_per_z(item, float(z[index]))
+            if scale == 0.0:
+                continue  # held at a bound
+            if item.role == "network":
+                step = 0.02 * scale
+                heat, loss = parameter_heat(model, trajectory, names.index(item.target), step)
+            elif item.role in ("torque_gain", "ambient_offset"):
+                heat, loss = self._input_heat(trajectory, item)
+            elif item.role == "term" and (shift := self._term_of(self._shifts, item)) is not None:
+                heat, loss = self._shift_heat(trajectory, shift, item, z)
+            else:
+                continue
+            heats[..., index], losses[:, index] = heat * scale, loss * scale
+        columns = reading_columns(model, trajectory, sensors, trajectory.response(heats), losses)
+        self._add_sensors(columns, trajectory, sensors, z)
+        return columns
+
+    def _add_sensors(self, columns: Array, trajectory: Trajectory, sensors: Sensors, z: Array) -> None:
+        """The columns of what the network does not feel."""
+        model = self.model
+        for index, item in enumerate(self.unknowns.items):
+            scale = _value_per_z(item, float(z[index]))
+            if item.role == "bias":
+                columns[:, sensors.channels.index(item.target), index] = scale
+            elif item.role == "term" and (distortion := self._term_of(self._distortions, item)) is not None:
+                columns[:, :, index] += self._distortion(trajectory, sensors, distortion, item, z) * scale
+            elif item.role == "loss_gain":
+                columns[:, sensors.channels.index(LOSS), index] = total_at_points(trajectory.loss) * scale
+            elif item.role == "lag":
+                channel = sensors.channels.index(item.target)
+                node = model.parts.index(item.target)
+                columns[:, channel, index] = lag_column(trajectory, node, sensors.lag[channel]) * scale
+
+    @staticmethod
+    def _term_of(terms: Sequence[TermOnGrid], item: Unknown) -> TermOnGrid | None:
+        return next((t for t in terms if item.target in {p.name for p in t.term.parameters}), None)
+
+    def _moved(self, term: TermOnGrid, item: Unknown, z: Array) -> tuple[Array, Array, float]:
+        """A term's values, the same with one of them moved, and by how much."""
+        names = [p.name for p in term.term.parameters]
+        values = self._own(term, z)
+        step = 0.05 * item.parameter.sd * (abs(values[names.index(item.target)]) if item.parameter.log else 1.0)
+        moved = np.array(values)
+        moved[names.index(item.target)] += step
+        return values, moved, step
+
+    def _shift_heat(self, trajectory: Trajectory, term: TermOnGrid, item: Unknown, z: Array) -> tuple[Array, Array]:
+        values, moved, step = self._moved(term, item, z)
+        # The trajectory's piece is shifted already: only the difference is added.
+        there = term.adjusted(trajectory.piece, moved, trajectory).samples
+        here = term.adjusted(trajectory.piece, values, trajectory).samples
+        piece = replace(trajectory.piece, samples=trajectory.piece.samples + there - here)
+        heat, loss = moved_heat(self.model, trajectory, piece)
+        return heat / step, loss / step
+
+    def _distortion(self, trajectory: Trajectory, sensors: Sensors, term: TermOnGrid, item: Unknown, z: Array) -> Array:
+        values, moved, step = self._moved(term, item, z)
+        read = readings(self.model, trajectory, sensors)
+        there = term.distorted(trajectory, sensors, read, moved)
+        return np.asarray((there - term.distorted(trajectory, sensors, read, values)) / step)
+
+    def _input_heat(self, trajectory: Trajectory, item: Unknown) -> tuple[Array, Array]:
+        """Net heat [W] and loss [W] per unit of a change of an input."""
+        model, piece, T = self.model, trajectory.piece, trajectory.middle
+        step = 0.5 if item.role == "ambient_offset" else 0.02
+        moved = replace(piece, samples=shifted(
+            piece.samples, self.inputs, item.role, step if item.role == "ambient_offset" else 1.0 + step))  # fmt: skip
+        power = trajectory.tangent.at(T[:, model.loss_nodes])
+        changed = power
+        if item.role == "torque_gain":
+            changed = power + model.loss_at(moved, T) - model.loss_at(piece, T)
+        here = model.balance(piece, T, trajectory.values, power, trajectory.memory)
+        there = model.balance(moved, T, trajectory.values, changed, trajectory.memory)
+        loss = (there.sources - here.sources)[:, model.is_loss].sum(axis=-1)
+        return (there.heat - here.heat) / step, loss / step
+
+    def fit(
+        self, z: Array | None = None, guesses: Sequence[Trajectory | Array] | None = None, *,
+        iterations: int = ITERATIONS,
+    ) -> Fit:  # fmt: skip
+        """The most probable unknowns.
+
+        Parameters
+        ----------
+        z : Array, shape (unknowns,), optional
+            Where to start; by default the priors' middles
+        guesses : sequence, one per piece, optional
+            Where to linearise first, see :func:`diagnosis.trajectory.simulate`
+        iterations : int
+            At most
+
+        Raises
+        ------
+        ArithmeticError
+            If there is no solution where it should start.
+        """
+        z = np.zeros(len(self.unknowns)) if z is None else np.array(z)
+        parts = self._attempt(z, guesses)
+        if parts is None:
+            raise ArithmeticError("the simulation has no solution where the fit should start")
+        objective = _objective(parts, z)
+        damping = 0.0
+        for _ in range(iterations):
+            step = _gauss_newton(parts, z, damping)
+            longest = float(np.max(np.abs(step), initial=0.0))
+            step *= min(1.0, FARTHEST_STEP / max(longest, 1e-12))
+            tried = z + step
+            trial = self._attempt(tried, [part.trajectory for part in parts])
+            reached = _objective(trial, tried) if trial is not None else np.inf
+            if trial is not None and reached <= objective + 1e-6:
+                z, parts, gained, objective = tried, trial, objective - reached, reached
+                damping *= 0.2
+                if float(np.max(np.abs(step), initial=0.0)) < SETTLED or gained < 0.02:
+                    break
+            else:
+                damping = max(4.0 * damping, 1.0)
+                if damping > 1e3:
+                    break
+        J = np.concatenate([part.white_columns for part in parts])
+        curvature = np.eye(len(z)) + J.T @ J
+        root = np.linalg.cholesky(curvature)
+        log_evidence = -0.5 * objective - float(np.log(np.diag(root)).sum())
+        inverse_root = np.linalg.inv(root)
+        return Fit(
+            unknowns=self.unknowns, z=z, covariance=inverse_root.T @ inverse_root, log_evidence=log_evidence,
+            parts=tuple(parts),
+        )  # fmt: skip
+
+    def _attempt(self, z: Array, guesses: Sequence[Trajectory | Array] | None) -> list[Linearised] | None:
+        """The linearisation at `z`; None where the simulation has no solution there."""
+        try:
+            return self._linearised(z, guesses)
+        except (InputError, ArithmeticError, np.linalg.LinAlgError):
+            return None
+
+    def objective(self, z: Array, guesses: Sequence[Trajectory | Array]) -> float:
+        """Squared whitened residuals and priors at `z`, without derivatives."""
+        total = float(z @ z)
+        for index, guess in enumerate(guesses):
+            given = self.whitenings
+            if given is None:
+                raise ValueError("an objective alone needs given filters")
+            piece = self.adjusted(index, z, guess if isinstance(guess, Trajectory) else None)
+            values = self.unknowns.network_values(self.model.network, z)
+            try:
+                trajectory = simulate(
+                    self.model, piece, values, self.starts[index], guess=guess, rounds=2, settled_K=0.01
+                )
+            except (InputError, ArithmeticError, np.linalg.LinAlgError):
+                return np.inf
+            sensors = self.unknowns.sensors(piece.channels, z)
+            residual = piece.measured - self.read(trajectory, sensors, z)
+            white = given[index](residual[:, :, None])
+            total += float(white[:, 0] @ white[:, 0])
+        return total
+
+    def _linearised(self, z: Array, guesses: Sequence[Trajectory | Array] | None) -> list[Linearised]:
+        first = guesses is None
+        return [
+            self.linearise(i, z, None if guesses is None else guesses[i], rounds=6 if first else 2)
+            for i in range(len(self.pieces))
+        ]
+
+
+def _value_per_z(item: Unknown, z: float) -> float:
+    p = item.parameter
+    value = item.value(z)
+    if (value <= p.lower and z < 0.0) or (value >= p.upper and z > 0.0):
+        return 0.0
+    return value * p.sd if p.log else p.sd
+
+
+def _objective(parts: Sequence[Linearised], z: Array) -> float:
+    """Squared whitened residuals and priors."""
+    return float(sum(p.white_residual @ p.white_residual for p in parts) + z @ z)
+
+
+def _gauss_newton(parts: Sequence[Linearised], z: Array, damping: float) -> Array:
+    count = len(z)
+    normal, right = np.eye(count), -np.array(z)
+    for part in parts:
+        normal += part.white_columns.T @ part.white_columns
+        right += part.white_columns.T @ part.white_residual
+    normal += damping * np.diag(np.diag(normal))
+    return np.asarray(np.linalg.solve(normal, right))

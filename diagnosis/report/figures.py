@@ -1,0 +1,156 @@
+"""The charts of a diagnosis: courses of every sensor, their errors, and the missing heat."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from markupsafe import Markup
+
+from diagnosis.report.chart import Chart, Curve, averaged, drawn
+from diagnosis.report.wording import LOSS, fixed, name, time_scale
+from diagnosis.result import Course, Diagnosis, Finding, MissingHeat
+from models.types import Array
+
+STAGES = (("as delivered", "before"), ("calibrated", "calibrated"), ("with what was found", "after"))
+SENSOR_PX, ERROR_PX, INPUT_PX = 190, 120, 90
+ERROR_POINTS = 240
+BAND_SD = 2.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Panel:
+    """One recording, or one gap-free part of it: its inputs, and of every sensor the course and the error."""
+
+    title: str
+    held_out: bool
+    length: str
+    inputs: tuple[Markup, ...]
+    sensors: tuple[tuple[Markup, Markup], ...]
+
+
+def courses(diagnosis: Diagnosis) -> list[Panel]:
+    """All recordings, held-out ones first: they are what counts."""
+    ordered = sorted(diagnosis.courses, key=lambda course: not course.held_out)
+    pieces = Counter(course.recording for course in ordered)
+    begun: Counter[str] = Counter()
+    panels = []
+    for course in ordered:
+        begun[course.recording] += 1
+        part = f", part {begun[course.recording]}" if pieces[course.recording] > 1 else ""
+        panels.append(_panel(course, course.recording + part, diagnosis.noise_K, shows_after=bool(diagnosis.findings)))
+    return panels
+
+
+def _panel(course: Course, title: str, noise: float, *, shows_after: bool) -> Panel:
+    seconds, symbol = time_scale(float(course.time[-1] - course.time[0])) if len(course.time) else (1.0, "s")
+    time, label = course.time / seconds, f"Time in {symbol}"
+    span = (float(time[0]), float(time[-1])) if len(time) else None
+    shade = ((span[0], course.counts_from_s / seconds),) if span and course.counts_from_s > course.time[0] else ()
+    inputs = tuple(
+        drawn(Chart(title=title, x_label=label, y_label=unit, x_range=span, height=INPUT_PX, level=True,
+                    curves=(Curve(label=title, look="input", x=time, y=values),)))
+        for title, unit, values in (
+            ("Speed", "Input shaft, 1/min", course.speed), ("Torque", "Input shaft, N m", course.torque)
+        )
+    )  # fmt: skip
+    stages = STAGES if shows_after else STAGES[:2]
+    sensors = []
+    for channel, measured in course.measured.items():
+        unit = "W" if channel == LOSS else "K"
+        runs = [(stage, look, getattr(course, look)[channel]) for stage, look in stages]
+        counted = course.time >= course.counts_from_s
+        rmse = [_rmse((run - measured)[counted]) for _, _, run in runs]
+        curves = (Curve(label="measured", look="measured", x=time, y=measured, kind="points"),
+                  *(Curve(label=stage, look=look, x=time, y=run) for stage, look, run in runs))  # fmt: skip
+        above = Chart(title=name(channel).capitalize(), x_label=label, x_range=span, shade=shade, height=SENSOR_PX,
+                      y_label="Power loss in W" if channel == LOSS else "Temperature in °C", curves=curves)  # fmt: skip
+        errors = tuple(
+            Curve(label=stage, look=look, x=x, y=y)
+            for stage, look, run in runs
+            for x, y in (averaged(time, run - measured, ERROR_POINTS),)
+        )
+        if channel != LOSS and noise > 0.0 and span:
+            edges = np.array(span)
+            errors = (Curve(label=f"noise (± {BAND_SD:g} sd)", look="noise", x=edges, y=np.full(2, BAND_SD * noise),
+                            low=np.full(2, -BAND_SD * noise), kind="band"), *errors)  # fmt: skip
+        below = Chart(title="Simulated less measured", x_label=label, y_label=f"Error in {unit}", x_range=span,
+                      note=f"RMSE {' → '.join(fixed(value) for value in rmse)} {unit}", shade=shade, height=ERROR_PX,
+                      curves=errors, level=True)  # fmt: skip
+        sensors.append((drawn(above), drawn(below)))
+    told = f"{(course.time[-1] - course.time[0]) / seconds:.1f} {symbol}" if len(course.time) else ""
+    return Panel(title=title, held_out=course.held_out, length=told, inputs=inputs,
+                 sensors=tuple(sensors))  # fmt: skip
+
+
+def _rmse(error: Array) -> float:
+    known = error[np.isfinite(error)]
+    return float(np.sqrt(np.mean(known**2))) if len(known) else float("nan")
+
+
+def found_heat(finding: Finding) -> list[Markup]:
+    """The heat of what was found over time, by recording."""
+    charts = []
+    for recording, (time, heat) in finding.heat.items():
+        seconds, symbol = time_scale(float(time[-1] - time[0])) if len(time) else (1.0, "s")
+        curve = Curve(label="heat of it", look="law", x=time / seconds, y=heat)
+        charts.append(drawn(Chart(title=recording, x_label=f"Time in {symbol}", y_label="Heat in W", curves=(curve,),
+                                  height=ERROR_PX, level=True)))  # fmt: skip
+    return charts
+
+
+@dataclass(frozen=True, kw_only=True)
+class HeatPanel:
+    """The missing heat of one node: over time, and against the operating point."""
+
+    node: str
+    has_law: bool
+    over_time: tuple[Markup, ...]
+    against: tuple[Markup, ...]
+
+
+def missing_heat(diagnosis: Diagnosis) -> list[HeatPanel]:
+    """Missing heat by node, in the order of the diagnosis."""
+    nodes = dict.fromkeys(heat.node for heat in diagnosis.missing_heat)
+    return [_heat(node, [heat for heat in diagnosis.missing_heat if heat.node == node]) for node in nodes]
+
+
+def _heat(node: str, heats: Sequence[MissingHeat]) -> HeatPanel:
+    quantities = (
+        ("Against speed", "Speed of the input shaft in 1/min", "speed"),
+        ("Against torque", "Torque at the input shaft in N m", "torque"),
+        ("Against temperature", f"Temperature of {name(node)} in °C", "temperature"),
+    )
+    against = []
+    for title, label, attribute in quantities:
+        x = np.concatenate([getattr(heat, attribute) for heat in heats])
+        curves = [Curve(label="missing heat", look="missing", x=x, y=np.concatenate([h.mean for h in heats]),
+                        kind="points")]  # fmt: skip
+        if any(heat.law is not None for heat in heats):
+            law = np.concatenate([np.full(len(h.time), np.nan) if h.law is None else h.law for h in heats])
+            curves.append(Curve(label="law that was found", look="law", x=x, y=law, kind="points"))
+        against.append(drawn(Chart(title=title, x_label=label, y_label="Heat in W", curves=tuple(curves), level=True)))
+    return HeatPanel(
+        node=node,
+        has_law=any(heat.law is not None for heat in heats),
+        over_time=tuple(_over_time(heats)),
+        against=tuple(against),
+    )
+
+
+def _over_time(heats: Sequence[MissingHeat]) -> Iterator[Markup]:
+    for heat in heats:
+        seconds, symbol = time_scale(float(heat.time[-1] - heat.time[0])) if len(heat.time) else (1.0, "s")
+        time = heat.time / seconds
+        curves = [
+            Curve(label="95 % band", look="missing", x=time, y=heat.mean + BAND_SD * heat.sd,
+                  low=heat.mean - BAND_SD * heat.sd, kind="band"),
+            Curve(label="missing heat", look="missing", x=time, y=heat.mean),
+        ]  # fmt: skip
+        if heat.law is not None:
+            curves.append(Curve(label="law that was found", look="law", x=time, y=heat.law))
+        span = (float(time[0]), float(time[-1])) if len(time) > 1 else None
+        yield drawn(Chart(title=heat.recording, x_label=f"Time in {symbol}", y_label="Heat in W", x_range=span,
+                          curves=tuple(curves), level=True))  # fmt: skip

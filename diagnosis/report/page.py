@@ -1,0 +1,121 @@
+"""The page: everything a diagnosis says, put into the template."""
+
+from __future__ import annotations
+
+import math
+from importlib import resources
+from typing import Any
+
+from jinja2 import Environment, StrictUndefined
+from markupsafe import Markup
+
+from diagnosis.report import equation, figures, network_drawing, wording
+from diagnosis.result import VERDICT_TEXT, Calibrated, Diagnosis, Finding, Fits
+
+PACKAGE = "diagnosis.report"
+SHOWN_RANKS, MOST_RANKS = 10, 300
+LIKELY = 0.01  # probability from which a rival is named
+DISTRESS = 2.0  # standard deviations of a prior
+BAR_SD = 4.0  # at the end of a bar
+
+
+def page(diagnosis: Diagnosis) -> str:
+    """The report as one HTML page that needs nothing else."""
+    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    environment.filters.update(
+        name=wording.name,
+        unit=wording.unit,
+        number=wording.number,
+        fixed=wording.fixed,
+        share=wording.share,
+        chance=wording.chance,
+        sentence=wording.sentence,
+        clause=wording.clause,
+    )
+    with_law = {heat.node for heat in diagnosis.missing_heat if heat.law is not None}
+    marked = network_drawing.marks(diagnosis)
+    measured = {channel for course in diagnosis.courses for channel in course.measured}
+    return environment.from_string(_text("report.html.j2")).render(
+        d=diagnosis,
+        style=Markup(_text("report.css")),  # noqa: S704 - our own file
+        script=Markup(_text("report.js")),  # noqa: S704 - our own file
+        words=wording.WORDS,
+        verdict_text=VERDICT_TEXT[diagnosis.verdict],
+        claims=diagnosis.verdict not in network_drawing.NO_CLAIM,
+        evidence=_evidence(diagnosis),
+        findings=[_finding(finding, with_law) for finding in diagnosis.findings],
+        stages=figures.STAGES if diagnosis.findings else figures.STAGES[:2],
+        network=network_drawing.drawn(network_drawing.corrected(diagnosis), diagnosis.network, measured, marked),
+        told=marked.told(network_drawing.corrected(diagnosis)),
+        fits=[("Held out", _rows(diagnosis.holdout)), ("Learned from", _rows(diagnosis.train))],
+        panels=figures.courses(diagnosis),
+        heats=figures.missing_heat(diagnosis),
+        has_noise=diagnosis.noise_K > 0.0,
+        calibration=[_calibrated(diagnosis, one) for one in sorted(diagnosis.calibration, key=_unmoved)],
+        ranking=diagnosis.ranking[:MOST_RANKS],
+        shown_ranks=SHOWN_RANKS,
+        windows=wording.windows,
+        headline=wording.headline,
+        recordings=len({course.recording for course in diagnosis.courses}),
+        loss=wording.LOSS,
+        provenance=wording.provenance(diagnosis.inputs),
+    )  # fmt: skip
+
+
+def _text(file: str) -> str:
+    return (resources.files(PACKAGE) / file).read_text(encoding="utf-8")
+
+
+def _evidence(diagnosis: Diagnosis) -> dict[str, Any] | None:
+    """Evidence and threshold, and where both are on a bar; None where nothing was tested."""
+    found, needed = diagnosis.log_e_value, diagnosis.threshold
+    if not (math.isfinite(found) and math.isfinite(needed)):
+        return None
+    end = max(2.0 * needed, found, 1.0)
+    return {
+        "reached": found >= needed,
+        "length": 100.0 * max(found, 0.0) / end,
+        "threshold": 100.0 * max(needed, 0.0) / end,
+    }
+
+
+def _finding(finding: Finding, shown: set[str]) -> dict[str, Any]:
+    """What the template needs; `shown`: nodes whose found heat is drawn with the missing one."""
+    prefix = f"{finding.term.label}_" if finding.term is not None else ""
+    return {
+        "of": finding,
+        "equation": equation.drawn(finding.equation),
+        "parameters": [
+            (wording.name(p.name.removeprefix(prefix)), wording.with_error(p.value, p.stderr), wording.unit(p.unit))
+            for p in finding.parameters
+        ],
+        "rivals": [rival for rival in finding.confusable_with if rival.probability >= LIKELY],
+        "heat": figures.found_heat(finding) if finding.node not in shown else [],
+    }
+
+
+def _rows(fits: Fits) -> list[tuple[str, str, tuple[float, float, float]]]:
+    """Sensor, unit and errors; nothing without recordings."""
+    if not math.isfinite(fits.before):
+        return []
+    total = ("all temperatures", "K", (fits.before, fits.calibrated, fits.after))
+    return [total, *((c, "W" if c == wording.LOSS else "K", errors) for c, errors in fits.sensors.items())]
+
+
+def _unmoved(one: Calibrated) -> float:
+    return -abs(one.shift_in_sd)
+
+
+def _calibrated(diagnosis: Diagnosis, one: Calibrated) -> dict[str, Any]:
+    known = (*diagnosis.network.parameters, *(p for term in diagnosis.shapes for p in term.parameters))
+    parameter = next((p for p in known if p.name == one.parameter), None)
+    shift = min(max(one.shift_in_sd, -BAR_SD), BAR_SD) if math.isfinite(one.shift_in_sd) else 0.0
+    return {
+        "of": one,
+        "value": wording.with_error(one.value, one.stderr),
+        "unit": wording.unit(parameter.unit) if parameter else "",
+        "description": parameter.description if parameter else "",
+        "left": 50.0 + 50.0 * min(shift, 0.0) / BAR_SD,
+        "width": 50.0 * abs(shift) / BAR_SD,
+        "distress": abs(one.shift_in_sd) > DISTRESS,
+    }

@@ -1,0 +1,246 @@
+"""How numbers, units, names and terms of art are put to a reader."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+HOUR, MINUTE = 3600.0, 60.0
+LONG_S, SHORT_S = 2.0 * HOUR, 5.0 * MINUTE  # above: in hours; below: in seconds
+RARELY, NEVER = 1e-4, 1e-12  # chances below: as a power of ten; no longer told apart
+NONE = "\N{EN DASH}"
+MINUS = "\N{MINUS SIGN}"
+UNITS = {"1": "", "degC": "°C", "W/degC": "W/K", "N m": "N m", "N.m": "N m", "rpm": "1/min"}
+SUPERSCRIPTS = str.maketrans({"0": "⁰", "1": "¹", "2": "²", "3": "³", "4": "⁴", "5": "⁵", "6": "⁶", "7": "⁷",
+                              "8": "⁸", "9": "⁹", "-": "⁻"})  # fmt: skip
+LOSS = "P_loss"
+PARAMETER = "parameter"
+
+# Shown when hovering a term, and all together at the end of the page.
+WORDS: Mapping[str, str] = {
+    "as delivered": "The model as its definition has it, before any recording was seen.",
+    "calibrated": "The same model with its existing parameters tuned to the recordings, each inside its prior. What a "
+    "correction is worth counts against this, not against the model as delivered.",
+    "with what was found": "The calibrated model with the found physics added.",
+    "held out": "Recordings that served for nothing but judging: the model got their inputs and no measured "
+    "temperature beyond the first minutes, which do not count.",
+    "free-running": "Simulated from the start temperatures on with the recorded inputs alone, never corrected by a "
+    "measurement on the way.",
+    "RMSE": "Root mean square of simulated less measured: the typical size of the error.",
+    "probability": "Share of the belief among all explanations that were compared, before them equally likely; not the "
+    "chance that a thing of this name is in the gearbox if the true cause is none of them.",
+    "evidence": "Natural logarithm of how many times better the data are predicted with the effect than without it, "
+    "averaged over all values of all parameters (log Bayes factor), in nat: 1 nat is a factor of 2.7, 5 nat are 150, "
+    "10 nat are 22 000.",
+    "threshold": "Evidence that has to be reached before anything is claimed; set by the false-alarm rate asked for.",
+    "false-alarm rate": "In how many of 100 healthy cases a mismatch would be claimed at most.",
+    "p": "Bound on the chance to reach this evidence although nothing is missing.",
+    "standard error": "68 % of such estimates lie within ± this of the truth, if the form of the law is right.",
+    "prior": "What the definition states about a parameter before any recording: a value, and how far off it may be.",
+    "shift": "How far the calibration moved a parameter, in standard deviations of its prior. Beyond ±2 it is in "
+    "distress: something else probably pulls at it.",
+    "noise": "Scatter of a temperature reading from row to row; no model can be closer to single rows than this.",
+    "floor": "What is left unexplained even in a model without faults, because a real gearbox is finer than any "
+    "network of few nodes; mismatches below it are not claimed.",
+    "missing heat": "Heat that the calibrated model would need at this place to follow the recordings; negative where "
+    "it has too much. Tuning the parameters swallows part of an effect that is missing, so the law that was found may "
+    "be larger.",
+    "not ruled out": "Explanations that these data cannot tell from the one that is named.",
+}
+
+
+def unit(symbol: str) -> str:
+    """A unit as printed; empty for a plain number.
+
+    Examples
+    --------
+    >>> unit("degC"), unit("mm^2/s"), unit("1")
+    ('°C', 'mm²/s', '')
+    """
+    head, *powers = UNITS.get(symbol, symbol).split("^")
+    for power in powers:
+        digits = len(power) - len(power.lstrip("-0123456789"))
+        head += power[:digits].translate(SUPERSCRIPTS) + power[digits:]
+    return head
+
+
+def name(identifier: str) -> str:
+    """A name of the network for a reader.
+
+    Examples
+    --------
+    >>> name("housing_lower"), name("P_loss")
+    ('housing lower', 'total loss')
+    """
+    return "total loss" if identifier == LOSS else identifier.replace("_", " ")
+
+
+def headline(mechanism: str, place: str = "") -> str:
+    """An explanation and its place.
+
+    Examples
+    --------
+    >>> headline("pump_heat", "oil"), headline("parameter", "h_air")
+    ('pump heat at oil', 'parameter h air')
+    """
+    if not place:
+        return name(mechanism)
+    return f"{name(mechanism)}{' ' if mechanism == PARAMETER else ' at '}{name(place)}"
+
+
+def clause(text: str) -> str:
+    """A text with units as printed and no full stop.
+
+    Examples
+    --------
+    >>> clause("temperature of oil above 60 degC.")
+    'temperature of oil above 60 °C'
+    """
+    return text.replace("degC", "°C").strip().removesuffix(".")
+
+
+def sentence(text: str) -> str:
+    """A text as a sentence.
+
+    Examples
+    --------
+    >>> sentence("hold three speeds without load"), sentence("")
+    ('Hold three speeds without load.', '')
+    """
+    text = clause(text)
+    return f"{text[0].upper()}{text[1:]}." if text else ""
+
+
+def number(value: float | None, digits: int = 3) -> str:
+    """A number with some significant digits; a dash where there is none.
+
+    Examples
+    --------
+    >>> number(-0.04567), number(1234.5), number(float("nan")), number(3e-7)
+    ('−0.0457', '1234', '–', '3·10⁻⁷')
+    """
+    if value is None or not math.isfinite(value):
+        return NONE
+    if value == 0.0:
+        return "0"
+    exponent = math.floor(math.log10(abs(float(f"{value:.{digits - 1}e}"))))
+    if not -4 <= exponent <= 5:
+        mantissa = f"{value / 10.0**exponent:.{digits - 1}f}".rstrip("0").rstrip(".")
+        text = f"{mantissa}·10{str(exponent).translate(SUPERSCRIPTS)}"
+    else:
+        text = f"{value:.{max(digits - 1 - exponent, 0)}f}"
+    return text.replace("-", MINUS)
+
+
+def fixed(value: float | None, decimals: int = 2) -> str:
+    """A number with some decimals, for columns; a dash where there is none.
+
+    Examples
+    --------
+    >>> fixed(3.14159), fixed(-0.001), fixed(None)
+    ('3.14', '0.00', '–')
+    """
+    if value is None or not math.isfinite(value):
+        return NONE
+    return f"{round(value, decimals) + 0.0:.{decimals}f}".replace("-", MINUS)
+
+
+def with_error(value: float, stderr: float) -> str:
+    """A value and its standard error, both to the error's second digit.
+
+    Examples
+    --------
+    >>> with_error(1.8374, 0.1129), with_error(3012.3, 146.0), with_error(2.0, float("nan"))
+    ('1.84 ± 0.11', '3010 ± 150', '2.00')
+    """
+    if not (math.isfinite(value) and math.isfinite(stderr) and stderr > 0.0):
+        return number(value)
+    decimals = 1 - math.floor(math.log10(stderr))
+    if decimals > 6 or abs(value) >= 1e7:
+        return f"{number(value, 4)} ± {number(stderr, 2)}"
+    shown = max(decimals, 0)
+    return f"{round(value, decimals):.{shown}f} ± {round(stderr, decimals):.{shown}f}".replace("-", MINUS)
+
+
+def chance(p: float) -> str:
+    """An upper bound on a probability of something rare.
+
+    Examples
+    --------
+    >>> chance(0.31), chance(0.0004), chance(1e-9), chance(1e-300), chance(1.0)
+    ('0.31', '0.0004', '10⁻⁹', '10⁻¹²', '1')
+    """
+    if not math.isfinite(p):
+        return NONE
+    p = max(p, NEVER)
+    if p < RARELY:
+        return f"10{str(math.ceil(math.log10(p))).translate(SUPERSCRIPTS)}"
+    return f"{p:.2g}"
+
+
+def share(probability: float) -> str:
+    """A probability among explanations; never rounded to certainty.
+
+    Examples
+    --------
+    >>> share(0.914), share(0.9999), share(0.0003)
+    ('0.91', '> 0.99', '< 0.01')
+    """
+    if not math.isfinite(probability):
+        return NONE
+    if probability < 0.01:
+        return "< 0.01"
+    return "> 0.99" if probability > 0.99 else f"{probability:.2f}"
+
+
+def time_scale(duration_s: float) -> tuple[float, str]:
+    """Seconds of the unit that times up to a duration are shown in, and that unit.
+
+    Examples
+    --------
+    >>> time_scale(64800.0), time_scale(600.0)
+    ((3600.0, 'h'), (60.0, 'min'))
+    """
+    if duration_s > LONG_S:
+        return HOUR, "h"
+    return (MINUTE, "min") if duration_s > SHORT_S else (1.0, "s")
+
+
+def windows(when: Sequence[tuple[str, float, float]]) -> list[tuple[str, str]]:
+    """Recordings, and their stretches of time in words.
+
+    Examples
+    --------
+    >>> windows([("a", 0.0, 3600.0), ("a", 32400.0, 64800.0), ("b", 0.0, 90.0)])
+    [('a', '0.0 to 1.0, 9.0 to 18.0 h'), ('b', '0 to 90 s')]
+    """
+    told = []
+    for recording in dict.fromkeys(name for name, _, _ in when):
+        own = [(begin, end) for name, begin, end in when if name == recording]
+        seconds, symbol = time_scale(max(end for _, end in own))
+        decimals = 1 if symbol == "h" else 0
+        spans = ", ".join(f"{a / seconds:.{decimals}f} to {b / seconds:.{decimals}f}" for a, b in own)
+        told.append((recording, f"{spans} {symbol}"))
+    return told
+
+
+def provenance(inputs: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Names and values of what a diagnosis was made from; nested ones one by one.
+
+    Examples
+    --------
+    >>> provenance({"version": "0.1", "recordings": {"a.csv": "12ab"}})
+    [('version', '0.1'), ('recordings: a.csv', '12ab')]
+    """
+    rows: list[tuple[str, str]] = []
+    for key, value in inputs.items():
+        label = str(key).replace("_", " ")
+        if isinstance(value, Mapping):
+            rows += [(f"{label}: {inner}", str(one)) for inner, one in value.items()]
+        elif isinstance(value, list | tuple):
+            told = [", ".join(map(str, one.values())) if isinstance(one, Mapping) else str(one) for one in value]
+            rows += [(label, one) for one in told]
+        else:
+            rows.append((label, str(value)))
+    return rows

@@ -1,0 +1,260 @@
+"""The search: is anything missing, what is it, is anything else.
+
+Step by step: scan everything, fit the best few in earnest, keep the best if the data want it and the held-out
+recordings do not object; look again at what remains. The structural floor follows the explanation, see
+:func:`diagnosis.case.floored`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from diagnosis.case import Case, first, floored
+from diagnosis.evidence import Marginal
+from diagnosis.explain import FITTED, Explanation, best_fits
+from diagnosis.hypotheses import Hypothesis, Scored, hypothesis_of, parameter_hypotheses, scan
+from diagnosis.observation import LOSS
+from diagnosis.open_form import open_hypotheses
+from diagnosis.posterior import Problem
+from diagnosis.predict import predict
+from models.mechanisms import Mechanism
+from models.types import Array
+
+# Frozen on development seeds; see the proof.
+THRESHOLD = 8.0  # log e-value at a false-alarm rate of 5 %
+SECOND_GAIN = 10.0  # log evidence that each further effect has to bring
+OPEN_PENALTY = 10.0  # an open form has to beat the catalogue by this
+LEAST_PROBABILITY = 0.05  # of what may be taken where something more probable fails on held-out data
+WORTH = 0.12  # of the best score, to be fitted in earnest
+# Log evidences are divided by a temperature before they become probabilities, because no model is exactly true: a
+# constant, and a share of the whole evidence, since the form of an effect is known no better than that.
+TEMPER, TEMPER_SHARE = 3.0, 0.03
+# Log odds of what is rarer than a piece of missing physics or a biased sensor.
+RARITY = {"sensor_gain": -2.0, "speed_gain": -3.0, "clock_offset": -1.0, "swapped_channels": -2.0, "parameter": -1.0}
+MOST_EFFECTS = 4
+HOLDOUT_SLACK = 1.05
+HOLDOUT_SLACK_INSTRUMENT = 1.2  # its fault says little about temperatures to come, and calibration swallows half of it
+SMALLEST_HEAT, SMALLEST_K = 0.02, 0.3  # of the typical loss, and of temperature, that matter in practice
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Stage:
+    """One look for one more effect.
+
+    Attributes
+    ----------
+    scored : tuple of Scored
+        Everything, best first
+    log_e_value : float
+        Log of the mean Bayes factor over everything that was scored
+    fits : tuple of Explanation
+        The best few, fitted in earnest, best first
+    gains : tuple of float
+        Their log evidence over the explanation before
+    accepted : Explanation or None
+    matters : bool
+        Whether something that the data show was large enough to matter in practice
+    note : str
+        Why nothing was accepted, if so
+    """
+
+    scored: tuple[Scored, ...]
+    log_e_value: float
+    fits: tuple[Explanation, ...] = ()
+    gains: tuple[float, ...] = ()
+    accepted: Explanation | None = None
+    matters: bool = False
+    note: str = ""
+
+    def probabilities(self) -> Array:
+        """Of the fits, among each other, shape (fits,)."""
+        weights = np.array(self.gains) / (TEMPER + TEMPER_SHARE * max(0.0, *self.gains))
+        weights += np.array([RARITY.get(fit.found[-1].name, 0.0) for fit in self.fits])
+        weights = np.exp(weights - weights.max())
+        return np.asarray(weights / weights.sum())
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Search:
+    """All that the search found.
+
+    Attributes
+    ----------
+    calibrated, final : Explanation
+    stages : tuple of Stage
+        The last one found nothing more, unless the search ended at its greatest number of effects
+    threshold : float
+        Log e-value that the first stage had to reach
+    floor : float
+        Structural floor of the final explanation, in multiples of the least
+    """
+
+    calibrated: Explanation
+    final: Explanation
+    stages: tuple[Stage, ...]
+    threshold: float
+    floor: float
+
+
+def threshold_at(false_alarm_rate: float) -> float:
+    """Log e-value that consistent recordings exceed with this probability at most.
+
+    An e-value exceeds 1/alpha with probability alpha at most (Markov), if the model is true; what the threshold at 5 %
+    has on top of that was measured on simulated gearboxes whose formulas are not exactly the model's.
+    """
+    return THRESHOLD + float(np.log(0.05 / false_alarm_rate))
+
+
+def hypotheses_of(case: Case, explanation: Explanation, catalogue: Mapping[str, Mechanism]) -> list[Hypothesis]:
+    """Everything that may be added to an explanation."""
+    network, taken = explanation.problem.model.network, {h.label for h in explanation.found}
+    found = [
+        hypothesis_of(placed)
+        for mechanism in catalogue.values()
+        for placed in mechanism.placed(network, case.scale, case.channels)
+        if f"{placed.name}@{placed.place}" not in taken
+    ]
+    found += open_hypotheses(network, case.scale, case.channels)
+    found += parameter_hypotheses(explanation.problem)
+    return [h for h in found if h.label not in taken]
+
+
+def search(
+    case: Case, catalogue: Mapping[str, Mechanism], *, false_alarm_rate: float = 0.05, jobs: int = 1,
+    progress: Callable[[str], None] = lambda _: None,
+) -> Search:  # fmt: skip
+    """Look for effects one after another.
+
+    Parameters
+    ----------
+    case : Case
+    catalogue : mapping of str to Mechanism
+    false_alarm_rate : float
+    jobs : int
+        Processes
+    progress : callable
+        Told what is being done
+    """
+    progress("calibrating the model inside its priors")
+    base, floor = first(case)
+    start, threshold = base, threshold_at(false_alarm_rate)
+    stages: list[Stage] = []
+    while len(base.found) < MOST_EFFECTS:
+        progress("scoring everything that may be missing" if not stages else "looking for a further effect")
+        stage = _look(case, base, catalogue, threshold if not stages else SECOND_GAIN, jobs, progress)
+        if stage.accepted is None:
+            stages.append(stage)
+            break
+        base, floor = floored(stage.accepted)
+        stages.append(stage)
+    return Search(calibrated=start, final=base, stages=tuple(stages), threshold=threshold, floor=floor)
+
+
+def _look(
+    case: Case, base: Explanation, catalogue: Mapping[str, Mechanism], needed: float, jobs: int,
+    progress: Callable[[str], None],
+) -> Stage:  # fmt: skip
+    marginal = Marginal(base.fit)
+    scored = scan(base.problem, base.fit, marginal, hypotheses_of(case, base, catalogue), jobs=jobs)
+    real = [s for s in scored if s.hypothesis.family != "open form"]
+    logs = np.array([s.log_bayes for s in real])
+    log_e = float(np.logaddexp.reduce(logs) - np.log(len(logs)))
+    if log_e < needed:
+        return Stage(scored=tuple(scored), log_e_value=log_e, note="nothing reaches the threshold")
+    progress("fitting the best explanations in earnest")
+    opened = [s for s in scored if s.hypothesis.family == "open form"]
+    worth = [s for s in real[:FITTED] if s.log_bayes > WORTH * real[0].log_bayes]
+    chosen = [
+        *(worth if len(worth) > 1 else real[:2]),
+        *(s for s in opened[:2] if s.log_bayes > real[0].log_bayes + OPEN_PENALTY),
+    ]
+    fits = best_fits(base, chosen, jobs=jobs, count=len(chosen))
+    if not fits:
+        return Stage(scored=tuple(scored), log_e_value=log_e, note="no explanation has a solution")
+    gains = [_penalised(fit) - base.log_evidence for fit in fits]
+    stage = Stage(scored=tuple(scored), log_e_value=log_e, fits=tuple(fits), gains=tuple(gains))
+    order = np.argsort(-stage.probabilities())
+    stage = replace(stage, fits=tuple(fits[i] for i in order), gains=tuple(gains[i] for i in order))
+    accepted, matters, note = None, False, "the best explanation is hardly better than none"
+    for fit, gain, probability in zip(stage.fits, stage.gains, stage.probabilities(), strict=True):
+        if gain < needed or probability < LEAST_PROBABILITY:
+            continue
+        if not _matters(case, fit):
+            note = "what the data show is too small to matter"
+            continue
+        matters = True
+        if _holds_out(case, base, fit):
+            accepted = fit
+            break
+        note = "what would explain the training data makes the held-out data worse"
+    return replace(stage, accepted=accepted, matters=matters, note="" if accepted else note)
+
+
+def _penalised(fit: Explanation) -> float:
+    return fit.log_evidence - (OPEN_PENALTY if fit.found[-1].family == "open form" else 0.0)
+
+
+def at_holdout(case: Case, explanation: Explanation) -> Problem:
+    """The held-out recordings with everything that an explanation found; its terms, its model, its noise."""
+    problem = explanation.problem
+    return case.holdout.changed(model=problem.model, unknowns=problem.unknowns, terms=problem.terms)
+
+
+def holdout_rmse(case: Case, explanation: Explanation) -> float:
+    """Root mean square error of the held-out temperatures, free-running, [K]; NaN without held-out recordings."""
+    problem = at_holdout(case, explanation)
+    temperatures = [i for i, name in enumerate(case.channels) if name != LOSS]
+    residuals = [predict(problem, i, explanation.fit.z).residual[:, temperatures] for i in range(len(problem.pieces))]
+    return float(np.sqrt(np.nanmean(np.concatenate(residuals) ** 2))) if residuals else float("nan")
+
+
+def _holds_out(case: Case, base: Explanation, fit: Explanation) -> bool:
+    if not case.holdout.pieces:
+        return True
+    term = fit.found[-1].term
+    slack = HOLDOUT_SLACK_INSTRUMENT if term is not None and term.of_measurement else HOLDOUT_SLACK
+    return holdout_rmse(case, fit) <= slack * holdout_rmse(case, base)
+
+
+def _matters(case: Case, fit: Explanation) -> bool:
+    """Whether an effect is large enough to matter in practice: heat, or temperature."""
+    h = fit.found[-1]
+    if h.term is None or h.term.form == "swapped":
+        return True
+    temperatures = [i for i, name in enumerate(case.channels) if name != LOSS]
+    names = [p.name for p in h.term.parameters]
+    index = next(i for i, item in enumerate(fit.fit.unknowns.items) if item.target == names[0])
+    z, per_z = fit.fit.z[index], [part.columns[:, temperatures, index] for part in fit.fit.parts]
+    change = np.sqrt(np.mean(np.concatenate(per_z) ** 2, axis=0)) * abs(z)
+    if float(change.max(initial=0.0)) > SMALLEST_K:
+        return True
+    if h.term.kind in ("sensor", "signal"):
+        # The ordinary tolerance of an instrument is no fault: what counts is the reading's error.
+        return float(change.max(initial=0.0)) > SMALLEST_K
+    heats = mean_heats(fit, h)
+    return bool(heats) and float(np.mean(np.concatenate(heats))) > SMALLEST_HEAT * case.loss_W
+
+
+def mean_heats(explanation: Explanation, h: Hypothesis) -> Sequence[Array]:
+    """Magnitude of the heat of something found, over the intervals of every piece, [W]; nothing for faults."""
+    return [np.abs(heat) for heat in heats_of(explanation, h)]
+
+
+def heats_of(explanation: Explanation, h: Hypothesis) -> Sequence[Array]:
+    """Heat of something found, over the intervals of every piece, summed over the parts it warms, [W]."""
+    from diagnosis.term_on_grid import TermOnGrid
+
+    if h.term is None or h.term.kind in ("sensor", "signal"):
+        return []
+    values = explanation.values_of(h)
+    given = np.array([[values[p.name][0] for p in h.term.parameters]])
+    model = explanation.problem.model
+    result = []
+    for part in explanation.fit.parts:
+        heat = TermOnGrid(model, h.term).heat(part.trajectory, given)[0][:, :, 0]
+        positive, negative = heat.clip(0.0).sum(axis=1), heat.clip(None, 0.0).sum(axis=1)
+        result.append(np.where(positive > -negative, positive, negative))
+    return result

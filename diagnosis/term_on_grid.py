@@ -1,0 +1,239 @@
+"""A term (a mechanism at its place, or any other addition) evaluated along a trajectory: the heat it brings, the input
+it shifts, or the reading it distorts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+import sympy as sp
+
+from diagnosis.grid import Piece
+from diagnosis.observation import Sensors, lagged
+from diagnosis.trajectory import NetworkOnGrid, Trajectory
+from models.laws import compile_function, function_source, symbol
+from models.network import BASE_SIGNALS
+from models.terms import Term
+from models.types import Array
+
+INPUT_STEP: Mapping[str, float] = {"speed": 5.0, "torque": 1.0}
+OTHER_INPUT_STEP = 0.25
+
+
+class TermOnGrid:
+    """A term whose laws are functions of arrays.
+
+    Parameters
+    ----------
+    model : NetworkOnGrid
+        The network that the term is added to; it need not be in it
+    term : Term
+    """
+
+    def __init__(self, model: NetworkOnGrid, term: Term) -> None:
+        self.model, self.term = model, term
+        network = model.network
+        boundary = {symbol(f"T_{n.name}"): n.temperature for n in network.nodes if n.temperature is not None}
+        own = [p.name for p in term.parameters]
+        given = [
+            *BASE_SIGNALS, *network.inputs, *(f"T_{part.name}" for part in network.parts),
+            *(p.name for p in network.parameters if p.name not in own),
+            *(s.name for s in network.states if s.name not in {own.name for own in term.states}),
+            *(f"P_{c}" for c in network.components),
+        ]  # fmt: skip
+        # The term may be in the network already: its own parameters and states are then given apart.
+        self._kept = np.array([p.name not in own for p in network.parameters], dtype=bool)
+        memories = {s.name for s in term.states}
+        self._remembered = np.array([s.name not in memories for s in network.states], dtype=bool)
+        arguments = [*given, *own, *(s.name for s in term.states)]
+        other = sp.Integer(0) if term.boundary_temperature is None else term.boundary_temperature
+        laws = [law.xreplace(boundary) for law in (term.expression, other)]
+        self._law = compile_function(function_source("law", arguments, laws, vector=True), "law")
+        memory = [s.rate.xreplace(boundary) for s in term.states]
+        memory += [(symbol(s.name) if s.update is None else s.update).xreplace(boundary) for s in term.states]
+        self._memory = compile_function(function_source("memory", arguments, memory, vector=True), "memory")
+        self._switches = any(s.update is not None for s in term.states)
+
+    # ------------------------------------------------------------------ the law
+
+    def law(self, trajectory: Trajectory, values: Array, *, at_points: bool = False) -> tuple[Array, Array]:
+        """The law, and the temperature of a boundary of the term's own.
+
+        Parameters
+        ----------
+        trajectory : Trajectory
+        values : Array, shape (V, parameters)
+            Of the term's own parameters
+        at_points : bool
+            At the grid points instead of the middles of the intervals (for terms without memory)
+
+        Returns
+        -------
+        law, temperature : Array, shape (V, K) or (V, K + 1)
+        """
+        model, piece = self.model, trajectory.piece
+        if at_points:
+            inputs = np.concatenate([piece.inputs[:1], 0.5 * (piece.inputs[1:] + piece.inputs[:-1]), piece.inputs[-1:]])
+            T, time = trajectory.T, piece.time
+            memory, power = (
+                np.zeros((len(T), len(model.network.states))),
+                np.zeros((len(T), len(model.laws.components))),
+            )
+        else:
+            inputs, T, time, memory = piece.inputs, trajectory.middle, piece.middle, trajectory.memory
+            power = trajectory.tangent.at(T[:, model.loss_nodes])
+        kept = trajectory.values[self._kept]
+        rows = [time, *inputs.T, *T.T, *(np.full(len(T), v) for v in kept), *memory[:, self._remembered].T, *power.T]
+        own = [values[:, index, None] for index in range(values.shape[1])]
+        states = self._follow(piece.steps, rows, own, len(values)) if self.term.states else []
+        law, other = self._law(*rows, *own, *states)
+        size = (len(values), len(T))
+        return np.broadcast_to(np.asarray(law, float), size), np.broadcast_to(np.asarray(other, float), size)
+
+    def _follow(self, steps: Array, rows: Sequence[Array], own: Sequence[Array], count: int) -> list[Array]:
+        """The term's states along the trajectory, each of shape (V, K)."""
+        states = self.term.states
+        now: list[Array] = [np.full((count, 1), s.start) for s in states]
+        result = [np.empty((count, len(steps))) for _ in states]
+        table = np.stack(list(rows), axis=-1).tolist()
+        for k, h in enumerate(steps.tolist()):
+            got = self._memory(*table[k], *own, *now)
+            half = [z + 0.5 * h * rate for z, rate in zip(now, got, strict=False)]
+            got = self._memory(*table[k], *own, *half)
+            now = [z + h * rate for z, rate in zip(now, got, strict=False)]
+            for index, value in enumerate(half):
+                result[index][:, k] = np.broadcast_to(value, (count, 1))[:, 0]
+            if self._switches:
+                now = [np.broadcast_to(z, (count, 1)) for z in self._memory(*table[k], *own, *now)[len(states) :]]
+        return result
+
+    # ------------------------------------------------------------------ heat
+
+    def heat(self, trajectory: Trajectory, values: Array) -> tuple[Array, Array]:
+        """The heat that the term brings to the network.
+
+        Parameters
+        ----------
+        trajectory : Trajectory
+        values : Array, shape (V, parameters)
+
+        Returns
+        -------
+        heat : Array, shape (K, parts, V)
+            [W]
+        loss : Array, shape (K, V)
+            What of it is mechanical loss, [W]
+        """
+        model, term = self.model, self.term
+        law, other = (a.T for a in self.law(trajectory, values))
+        heat = np.zeros((len(law), model.n, len(values)))
+        loss = np.zeros(law.shape)
+        if term.kind == "source":
+            for node in term.target:
+                heat[:, model.parts.index(node)] += law / len(term.target)
+            loss = law if term.is_loss else loss
+        elif term.kind == "link":
+            self._link_heat(trajectory, law, other, heat)
+        elif term.kind == "loss_factor":
+            names = [source.name for source in model.network.sources]
+            for name in term.target:
+                index = names.index(name)
+                extra = law * trajectory.balance.sources[:, index, None]
+                heat[:, model.parts.index(model.network.sources[index].node)] += extra
+                loss = loss + extra
+        elif term.kind == "link_factor":
+            names = [link.name for link in model.network.links]
+            flows = trajectory.balance.conductances * trajectory.balance.differences
+            for name in term.target:
+                index = names.index(name)
+                flow = flows[:, index, None] * law
+                heat += model.to_parts[index][:, None] * flow[:, None, :]
+        elif term.kind == "signal":
+            per_unit, loss_per_unit = input_slope(model, trajectory, term.target[0])
+            heat = per_unit[:, :, None] * law[:, None, :]
+            loss = loss_per_unit[:, None] * law
+        else:
+            raise ValueError(f"{term.label}: a term of kind {term.kind!r} brings no heat")
+        return heat, loss
+
+    def _link_heat(self, trajectory: Trajectory, conductance: Array, other: Array, heat: Array) -> None:
+        model, T = self.model, trajectory.middle
+        signals = model.signals(trajectory.piece, T, list(trajectory.values), trajectory.memory)
+        known = dict(zip(model.laws.boundaries, model.laws.boundary(*signals), strict=True))
+        *sides, end = self.term.target
+        for node in sides:
+            here = T[:, model.parts.index(node), None]
+            if end in model.parts:
+                there = T[:, model.parts.index(end), None]
+            else:
+                there = np.broadcast_to(known[end], (len(T),))[:, None] if end in known else other
+            flow = conductance / len(sides) * (here - there)
+            heat[:, model.parts.index(node)] -= flow
+            if end in model.parts:
+                heat[:, model.parts.index(end)] += flow
+
+    # ------------------------------------------------------------------ inputs and readings
+
+    def adjusted(self, piece: Piece, values: Array, trajectory: Trajectory | None) -> Piece:
+        """A piece with the input as it really was, for a term of kind ``signal``; `values` of shape (parameters,)."""
+        model = self.model
+        if trajectory is None:
+            T = np.full((len(piece.steps), model.n), 20.0)
+            memory = np.zeros((len(T), len(model.network.states)))
+            power = np.zeros((len(T), len(model.laws.components)))
+            kept = model.start[self._kept]
+        else:
+            T, memory, kept = trajectory.middle, trajectory.memory, trajectory.values[self._kept]
+            power = trajectory.tangent.at(T[:, model.loss_nodes])
+        memory = memory[:, self._remembered]
+        rows = [piece.middle, *piece.inputs.T, *T.T, *(np.full(len(T), v) for v in kept), *memory.T, *power.T]
+        shift = np.broadcast_to(self._law(*rows, *values.tolist())[0], (len(T),))
+        samples = np.array(piece.samples)
+        samples[..., model.laws.inputs.index(self.term.target[0])] += shift[:, None]
+        return replace(piece, samples=samples)
+
+    def distorted(self, trajectory: Trajectory, sensors: Sensors, read: Array, values: Array) -> Array:
+        """Readings with the fault of a term of kind ``sensor``; `values` of shape (parameters,)."""
+        term, time = self.term, trajectory.piece.time
+        law = self.law(trajectory, values[None, :], at_points=True)[0][0]
+        channels = [sensors.channels.index(name) for name in term.target]
+        read = np.array(read)
+        if term.form == "shift":
+            for index in channels:
+                read[:, index] += law
+        elif term.form == "lag":
+            for index in channels:
+                read[:, index] = lagged(read[:, index], trajectory.piece.steps, float(law[0]))
+        elif term.form == "clock":
+            for index in channels:
+                read[:, index] = np.interp(time - law, time, read[:, index])
+        elif term.form == "stuck":
+            begin = int(np.argmax(law != 0.0))  # the reading is held as it was when the law set in
+            for index in channels:
+                read[:, index] += law * (read[begin, index] - read[:, index])
+        elif term.form == "swapped":
+            read[:, channels] += law[:, None] * (read[:, channels[::-1]] - read[:, channels])
+        return read
+
+
+def input_slope(model: NetworkOnGrid, trajectory: Trajectory, name: str) -> tuple[Array, Array]:
+    """Net heat, shape (K, parts), and loss, (K,), per unit of an input."""
+    step = INPUT_STEP.get(name, OTHER_INPUT_STEP)
+    samples = np.array(trajectory.piece.samples)
+    samples[..., model.laws.inputs.index(name)] += step
+    heat, loss = moved_heat(model, trajectory, replace(trajectory.piece, samples=samples))
+    return heat / step, loss / step
+
+
+def moved_heat(model: NetworkOnGrid, trajectory: Trajectory, moved: Piece) -> tuple[Array, Array]:
+    """Change of the net heat, shape (K, parts), and of the loss, (K,), when the inputs of a piece are others."""
+    piece, T = trajectory.piece, trajectory.middle
+    power = trajectory.tangent.at(T[:, model.loss_nodes])
+    changed = power
+    if not np.array_equal(moved.samples[..., :2], piece.samples[..., :2]):
+        changed = power + model.loss_at(moved, T) - model.loss_at(piece, T)
+    here = model.balance(piece, T, trajectory.values, power, trajectory.memory)
+    there = model.balance(moved, T, trajectory.values, changed, trajectory.memory)
+    return there.heat - here.heat, (there.sources - here.sources)[:, model.is_loss].sum(axis=-1)

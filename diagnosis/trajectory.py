@@ -1,0 +1,476 @@
+"""Temperatures along a recording and their derivatives: the network simulated for all intervals at once.
+
+The network is linearised about a whole trajectory instead of integrated step by step: on every interval the heat
+balance is affine in the temperatures and solved exactly (matrix exponential), the solution is the next trajectory to
+linearise about, and three or four rounds settle it: a Newton iteration on waveforms. Every round is a handful of array
+operations over all intervals, and what it linearised serves the derivatives as well: an extra heat anywhere, at
+any time, of any parameter, answers through the same matrices.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from diagnosis.grid import Piece
+from models.compiled import compile_laws, structure
+from models.laws import compile_function, function_source
+from models.network import BASE_SIGNALS, Losses, ThermalNetwork
+from models.types import Array
+
+ROUNDS = 6
+SETTLED_K = 0.02
+STEADY = 0.01  # relative change of speed or torque within an interval
+LOSS_STEP_K = 2.0  # for the derivatives of the losses
+LOSS_NEAR_K = 0.7  # within it the straight lines are good to some 1e-4 of the loss
+LOSS_REACH_K = 15.0  # beyond it the derivatives are taken anew
+TEMPERATURE_STEP_K = 0.05
+HIGHEST_T, LOWEST_T = 400.0, -60.0  # a trajectory is held here while it settles
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LossTangent:
+    """Losses of a piece as straight lines of the temperatures around a trajectory.
+
+    Attributes
+    ----------
+    T : Array, shape (K, nodes)
+        Temperatures they were computed at, [degC]
+    power : Array, shape (K, components)
+        [W]
+    slope : Array, shape (K, components, nodes)
+        [W/K]
+    samples : Array
+        Inputs that they were computed with, see :class:`diagnosis.grid.Piece`
+    """
+
+    T: Array
+    power: Array
+    slope: Array
+    samples: Array
+
+    def at(self, T: Array) -> Array:
+        """Losses [W], shape (K, components), at temperatures of shape (K, nodes)."""
+        return np.asarray(self.power + np.einsum("kcn,kn->kc", self.slope, T - self.T))
+
+
+class NetworkOnGrid:
+    """A network whose laws are evaluated on all intervals of a piece at once.
+
+    Parameters
+    ----------
+    network : ThermalNetwork
+    losses : Losses
+        The loss model behind the signals ``P_<component>``
+    """
+
+    def __init__(self, network: ThermalNetwork, losses: Losses) -> None:
+        self.network, self.losses = network, losses
+        self.laws = compile_laws(network, vector=True)
+        self.parts = self.laws.parts
+        self.n = len(self.parts)
+        _, to_boundary, self.injection = structure(network)
+        n_all = self.n + to_boundary.shape[-1]
+        self._incidence = np.zeros((len(network.links), n_all))
+        names = [*self.parts, *self.laws.boundaries]
+        for index, link in enumerate(network.links):
+            self._incidence[index, names.index(link.nodes[0])] = 1.0
+            self._incidence[index, names.index(link.nodes[1])] = -1.0
+        self.to_parts = -self._incidence[:, : self.n]
+        varying = np.array(self.laws.varying, dtype=int)
+        self._varying = varying
+        self._constant = np.array([i for i in range(len(network.links)) if i not in set(self.laws.varying)], dtype=int)
+        self.loss_nodes = np.array([self.parts.index(name) for name in losses.temperature_nodes], dtype=int)
+        self.is_loss = np.array(self.laws.losses_of_sources, dtype=bool)
+        self.start = np.array([p.start for p in network.parameters])
+
+    # ------------------------------------------------------------------ heat balance on all intervals
+
+    def signals(self, piece: Piece, T: Array, values: Sequence[float] | Array, memory: Array) -> list[Array | float]:
+        """The common signals of the laws at the middles of the intervals; see :class:`models.runtime.Laws`."""
+        return [
+            piece.middle, *np.moveaxis(piece.inputs, -1, 0), *np.moveaxis(T, -1, 0), *values,
+            *np.moveaxis(memory, -1, 0),
+        ]  # fmt: skip
+
+    def capacities(self, values: Sequence[float] | Array) -> Array:
+        """Heat capacities of the parts [J/K], shape (parts,)."""
+        return np.array(self.laws.fixed(*values)[len(self._constant) :], dtype=float)
+
+    def conductances(
+        self, signals: Sequence[Array | float], values: Sequence[float] | Array, shape: tuple[int, ...]
+    ) -> Array:
+        """Conductances of all links [W/K], shape (K, links)."""
+        result = np.empty((*shape, len(self._incidence)))
+        for index, value in zip(self._constant, self.laws.fixed(*values), strict=False):
+            result[..., index] = value
+        for index, value in zip(self._varying, self.laws.exchange(*signals), strict=True):
+            result[..., index] = value
+        return result
+
+    def differences(self, signals: Sequence[Array | float], T: Array) -> Array:
+        """Temperature differences over the links [K], shape (K, links)."""
+        boundaries = [np.broadcast_to(b, T.shape[:-1]) for b in self.laws.boundary(*signals)]
+        everywhere = np.concatenate([T, np.stack(boundaries, axis=-1)], axis=-1) if boundaries else T
+        return np.asarray(everywhere @ self._incidence.T)
+
+    def source_heats(self, signals: Sequence[Array | float], power: Array) -> Array:
+        """Heats of all sources [W], shape (K, sources)."""
+        values = self.laws.heat(*signals, *np.moveaxis(power, -1, 0))[: len(self.laws.sources)]
+        return np.stack([np.broadcast_to(v, power.shape[:-1]) for v in values], axis=-1)
+
+    def balance(self, piece: Piece, T: Array, values: Sequence[float] | Array, power: Array, memory: Array) -> Balance:
+        """Heat balance at the middles of the intervals.
+
+        Parameters
+        ----------
+        piece : Piece
+        T : Array, shape (K, parts)
+            [degC]
+        values : sequence of float
+            Parameters of the network
+        power : Array, shape (K, components)
+            Nominal losses, [W]
+        memory : Array, shape (K, states)
+        """
+        signals = self.signals(piece, T, values, memory)
+        conductances = self.conductances(signals, values, T.shape[:-1])
+        differences = self.differences(signals, T)
+        sources = self.source_heats(signals, power)
+        heat = sources @ self.injection + (conductances * differences) @ self.to_parts
+        return Balance(heat=heat, sources=sources, conductances=conductances, differences=differences)
+
+    # ------------------------------------------------------------------ losses and memories
+
+    def loss_at(self, piece: Piece, T: Array) -> Array:
+        """Nominal losses, mean over the samples of every interval, [W], shape (K, components)."""
+        mine, operation = T[:, self.loss_nodes], piece.samples[..., :2]
+        speed, torque = operation[..., 0], operation[..., 1]
+        power = self.losses.power(speed.mean(axis=1), torque.mean(axis=1), mine)
+        # Where the operating point moves within an interval, the mean of the losses is not the loss at the mean.
+        moving = np.flatnonzero((np.ptp(operation, axis=1) > STEADY * np.abs(operation).max(axis=1)).any(axis=-1))
+        if len(moving):
+            count = operation.shape[1]
+            at = np.repeat(mine[moving], count, axis=0)
+            each = self.losses.power(speed[moving].ravel(), torque[moving].ravel(), at)
+            power[moving] = each.reshape(len(moving), count, -1).mean(axis=1)
+        return np.asarray(power)
+
+    def loss_tangent(self, piece: Piece, T: Array, previous: LossTangent | None = None) -> LossTangent:
+        """Losses around a trajectory; derivatives of `previous` are kept where it is near enough."""
+        T = np.clip(T, LOWEST_T, HIGHEST_T)
+        mine = T[:, self.loss_nodes]
+        if previous is not None and previous.samples is piece.samples and np.max(
+            np.abs(mine - previous.T), initial=0.0) < LOSS_NEAR_K:  # fmt: skip
+            return previous
+        power = self.loss_at(piece, T)
+        if previous is not None and np.max(np.abs(mine - previous.T), initial=0.0) < LOSS_REACH_K:
+            return LossTangent(T=mine, power=power, slope=previous.slope, samples=piece.samples)
+        slope = np.empty((len(T), power.shape[-1], len(self.loss_nodes)))
+        for index, node in enumerate(self.loss_nodes):
+            moved = T.copy()
+            moved[:, node] += LOSS_STEP_K
+            slope[..., index] = (self.loss_at(piece, moved) - power) / LOSS_STEP_K
+        return LossTangent(T=mine, power=power, slope=slope, samples=piece.samples)
+
+    @cached_property
+    def _memory_law(self) -> Callable[..., tuple[float, ...]]:
+        """Rates and updates of the states on plain numbers, nothing else."""
+        from models.laws import symbol
+
+        network = self.network
+        boundary = {symbol(f"T_{n.name}"): n.temperature for n in network.nodes if n.temperature is not None}
+        parts = [f"T_{part.name}" for part in network.parts]
+        arguments = [*BASE_SIGNALS, *network.inputs, *parts, *(p.name for p in network.parameters),
+                     *(s.name for s in network.states), *(f"P_{c}" for c in network.components)]  # fmt: skip
+        laws = [s.rate for s in network.states]
+        laws += [symbol(s.name) if s.update is None else s.update for s in network.states]
+        source = function_source("memory", arguments, [law.xreplace(boundary) for law in laws], vector=False)
+        return compile_function(source, "memory")
+
+    def memory(self, piece: Piece, T: Array, values: Sequence[float] | Array, power: Array) -> Array:
+        """The states beside the temperatures, at the middles of the intervals, shape (K, states).
+
+        They follow the given trajectory `T` (at the middles), interval by interval: a hysteresis needs the past.
+        """
+        network = self.network
+        count = len(network.states)
+        if not count:
+            return np.zeros((len(T), 0))
+        law, steps, middle = self._memory_law, piece.steps.tolist(), piece.middle.tolist()
+        inputs, temperatures, powers = piece.inputs.tolist(), T.tolist(), power.tolist()
+        given = list(map(float, values))
+        now = [state.start for state in network.states]
+        result = np.empty((len(T), count))
+        for k, h in enumerate(steps):
+            got = law(middle[k], *inputs[k], *temperatures[k], *given, *now, *powers[k])
+            half = [z + 0.5 * h * rate for z, rate in zip(now, got[:count], strict=True)]
+            got = law(middle[k], *inputs[k], *temperatures[k], *given, *half, *powers[k])
+            result[k] = half
+            moved = [z + h * rate for z, rate in zip(now, got[:count], strict=True)]
+            now = [
+                new if state.update is None else float(law(middle[k], *inputs[k], *temperatures[k], *given, *moved,
+                                                           *powers[k])[count + i])
+                for i, (state, new) in enumerate(zip(network.states, moved, strict=True))
+            ]  # fmt: skip
+        return result
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Balance:
+    """Heat balance on all intervals.
+
+    Attributes
+    ----------
+    heat : Array, shape (K, parts)
+        Net heat into every part, [W]
+    sources : Array, shape (K, sources)
+        [W]
+    conductances, differences : Array, shape (K, links)
+        [W/K] and [K]
+    """
+
+    heat: Array
+    sources: Array
+    conductances: Array
+    differences: Array
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Trajectory:
+    """A settled trajectory of one piece and what its linearisation knows.
+
+    Attributes
+    ----------
+    piece : Piece
+    T : Array, shape (K + 1, parts)
+        Temperatures at the grid points, [degC]
+    values : Array, shape (parameters,)
+        Values of the network's parameters
+    tangent : LossTangent
+    memory : Array, shape (K, states)
+    balance : Balance
+    jacobian : Array, shape (K, parts, parts)
+        Derivative of the net heats with respect to the temperatures, losses included, [W/K]
+    loss : Array, shape (K,)
+        Total mechanical loss, [W]
+    loss_slope : Array, shape (K, parts)
+        Its derivative with respect to the temperatures, [W/K]
+    decay, gain : Array, shape (K, parts, parts)
+        Exact solution over an interval: ``T_next = decay T + gain (net heat / capacity)``; [-] and [s]
+    capacities : Array, shape (parts,)
+    """
+
+    piece: Piece
+    T: Array
+    values: Array
+    tangent: LossTangent
+    memory: Array
+    balance: Balance
+    jacobian: Array
+    loss: Array
+    loss_slope: Array
+    decay: Array
+    gain: Array
+    capacities: Array
+
+    @property
+    def middle(self) -> Array:
+        """Temperatures at the middles of the intervals, shape (K, parts), [degC]."""
+        return np.asarray(0.5 * (self.T[1:] + self.T[:-1]))
+
+    def response(self, heat: Array, initial: Array | None = None) -> Array:
+        """Change of the temperatures for extra heats.
+
+        Parameters
+        ----------
+        heat : Array, shape (K, parts, columns)
+            Extra heats, [W]
+        initial : Array, shape (parts, columns), optional
+            Change of the start temperatures, [K]
+
+        Returns
+        -------
+        Array, shape (K + 1, parts, columns)
+            [K]
+        """
+        driven = self.gain @ (heat / self.capacities[:, None])
+        result = np.empty((len(heat) + 1, *heat.shape[1:]))
+        result[0] = 0.0 if initial is None else initial
+        now = result[0]
+        for k, decay in enumerate(self.decay):
+            now = decay @ now
+            now += driven[k]
+            result[k + 1] = now
+        return result
+
+
+def simulate(
+    model: NetworkOnGrid,
+    piece: Piece,
+    values: Array,
+    start: Array,
+    *,
+    guess: Trajectory | Array | None = None,
+    rounds: int = ROUNDS,
+    settled_K: float = SETTLED_K,
+) -> Trajectory:
+    """The free-running trajectory of a piece.
+
+    Parameters
+    ----------
+    model : NetworkOnGrid
+    piece : Piece
+    values : Array, shape (parameters,)
+        Values of the network's parameters
+    start : Array, shape (parts,)
+        Start temperatures, [degC]
+    guess : Trajectory, or Array of shape (K + 1, parts), optional
+        Where to linearise first; by default the start temperatures
+    rounds : int
+        At most
+    settled_K : float
+        Largest change of a round at which it ends, [K]
+
+    Raises
+    ------
+    ArithmeticError
+        If the temperatures leave all bounds.
+    """
+    tangent = guess.tangent if isinstance(guess, Trajectory) else None
+    if isinstance(guess, Trajectory):
+        T = guess.T
+    elif guess is not None:
+        T = guess
+    else:
+        T = np.broadcast_to(start, (len(piece.time), model.n))
+    found = None
+    for _ in range(rounds):
+        with np.errstate(over="ignore", invalid="ignore"):
+            found = _round(model, piece, values, start, np.clip(T, LOWEST_T, HIGHEST_T), tangent)
+        if not np.isfinite(found.T).all():
+            raise ArithmeticError(f"the temperatures of {piece.recording} run away with these parameters")
+        change = float(np.max(np.abs(found.T - T)))
+        T, tangent = found.T, found.tangent
+        if change < settled_K:
+            break
+    assert found is not None  # noqa: S101 - rounds >= 1
+    return found
+
+
+def _round(
+    model: NetworkOnGrid, piece: Piece, values: Array, start: Array, T_ref: Array, tangent: LossTangent | None
+) -> Trajectory:
+    """Linearise about a trajectory and solve."""
+    T = 0.5 * (T_ref[1:] + T_ref[:-1])
+    tangent = model.loss_tangent(piece, T, tangent)
+    power = tangent.at(T[:, model.loss_nodes])
+    memory = model.memory(piece, T, values, power)
+    balance = model.balance(piece, T, values, power, memory)
+    n = model.n
+    jacobian = np.empty((len(T), n, n))
+    loss_slope = np.empty((len(T), n))
+    total = balance.sources[:, model.is_loss].sum(axis=-1)
+    where = {int(node): index for index, node in enumerate(model.loss_nodes)}
+    for node in range(n):
+        moved = T.copy()
+        moved[:, node] += TEMPERATURE_STEP_K
+        changed = power + TEMPERATURE_STEP_K * tangent.slope[..., where[node]] if node in where else power
+        there = model.balance(piece, moved, values, changed, memory)
+        jacobian[:, :, node] = (there.heat - balance.heat) / TEMPERATURE_STEP_K
+        loss_slope[:, node] = (there.sources[:, model.is_loss].sum(axis=-1) - total) / TEMPERATURE_STEP_K
+    capacities = model.capacities(values)
+    matrix = jacobian / capacities[:, None]
+    decay, gain = exponential(matrix, piece.steps)
+    constant = balance.heat / capacities - np.einsum("kij,kj->ki", matrix, T)
+    driven = np.einsum("kij,kj->ki", gain, constant)
+    result = np.empty((len(T) + 1, n))
+    result[0] = now = start
+    for k in range(len(T)):
+        now = decay[k] @ now + driven[k]
+        result[k + 1] = now
+    loss = total + np.einsum("kn,kn->k", loss_slope, 0.5 * (result[1:] + result[:-1]) - T)
+    return Trajectory(
+        piece=piece, T=result, values=values, tangent=tangent, memory=memory, balance=balance, jacobian=jacobian,
+        loss=loss, loss_slope=loss_slope, decay=decay, gain=gain, capacities=capacities,
+    )  # fmt: skip
+
+
+def exponential(matrix: Array, steps: Array) -> tuple[Array, Array]:
+    r"""Exact solution of ``x' = A x + b`` over an interval.
+
+    Parameters
+    ----------
+    matrix : Array, shape (K, n, n)
+        A, [1/s]
+    steps : Array, shape (K,)
+        h, [s]
+
+    Returns
+    -------
+    decay, gain : Array, shape (K, n, n)
+        :math:`e^{hA}` and :math:`\int_0^h e^{sA} ds` [s]: ``x(h) = decay x + gain b``
+
+    References
+    ----------
+    Taylor series of phi_1 with doubling, phi_1(2z) = (e^z + 1) phi_1(z) / 2; Hochbruck, Ostermann, Exponential
+    integrators, Acta Numerica 19 (2010).
+    """
+    z = matrix * steps[:, None, None]
+    largest = float(np.max(np.abs(z).sum(axis=-1), initial=0.0))
+    doublings = max(0, int(np.ceil(np.log2(max(largest, 1e-12) / 0.5))))
+    z = z / 2.0**doublings
+    identity = np.eye(matrix.shape[-1])
+    phi = np.broadcast_to(identity, z.shape).copy()
+    for order in range(9, 1, -1):  # Horner: phi_1 = 1 + z/2 (1 + z/3 (1 + ...))
+        phi = identity + (z / order) @ phi
+    decay = identity + z @ phi
+    for _ in range(doublings):
+        phi = 0.5 * (decay @ phi + phi)
+        decay = decay @ decay
+    return decay, phi * steps[:, None, None]
+
+
+def parameter_heat(model: NetworkOnGrid, trajectory: Trajectory, index: int, step: float) -> tuple[Array, Array]:
+    """Net heat and total loss per unit of a parameter, along a trajectory.
+
+    Parameters
+    ----------
+    model : NetworkOnGrid
+    trajectory : Trajectory
+    index : int
+        Which parameter
+    step : float
+        Of the parameter, in its unit
+
+    Returns
+    -------
+    heat : Array, shape (K, parts)
+        Including the change of stored heat that another capacity makes, per unit of the parameter, [W/unit]
+    loss : Array, shape (K,)
+    """
+    values = np.array(trajectory.values)
+    values[index] += step
+    T, piece = trajectory.middle, trajectory.piece
+    power = trajectory.tangent.at(T[:, model.loss_nodes])
+    name = model.network.parameters[index].name
+    remembered = any(
+        name in {s.name for s in law.free_symbols}
+        for state in model.network.states for law in (state.rate, state.update) if law is not None
+    )  # fmt: skip
+    memory = model.memory(piece, T, values, power) if remembered else trajectory.memory
+    here = model.balance(piece, T, trajectory.values, power, trajectory.memory)
+    there = model.balance(piece, T, values, power, memory)
+    capacities = model.capacities(values)
+    heat = (there.heat * (trajectory.capacities / capacities) - here.heat) / step
+    loss = (there.sources - here.sources)[:, model.is_loss].sum(axis=-1) / step
+    return heat, loss
+
+
+def named_values(network: ThermalNetwork, given: Mapping[str, float] | None = None) -> Array:
+    """Values of all parameters of a network: as delivered, or as given by name."""
+    given = given or {}
+    return np.array([given.get(p.name, p.start) for p in network.parameters])

@@ -1,0 +1,158 @@
+/* The gearbox twin as a model for the FMI layer: values in SI units outside, the thermal network in its own units. */
+#include "loss_networks.h"
+#include "model.h"
+#include "thermal_network.h"
+
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+#define RPM 0.10471975511965977 /* rad/s per 1/min */
+#define FIRST_STEP_S 0.1
+
+typedef struct {
+    double started, outside; /* 0 or 1: the simulation has begun; it was told that the range of training was left */
+    ThermalState thermal;
+} State;
+
+typedef struct {
+    int usable; /* the network has the present parameters */
+    Network network;
+} Scratch;
+
+const size_t model_state_size = sizeof(State), model_scratch_size = sizeof(Scratch);
+
+static double inner(const Model *model, Place place) {
+    return model->values[place.reference] * place.scale + place.offset;
+}
+
+static void show(Model *model, Place place, double value) {
+    model->values[place.reference] = (value - place.offset) / place.scale;
+}
+
+static void start_values(const Model *model, ThermalState *thermal) {
+    const int uniform = model->values[INITIAL_UNIFORM] != 0.0;
+    for (int i = 0; i < N_PARTS; i++) thermal->T[i] = inner(model, uniform ? INITIAL_TEMPERATURE : START[i]);
+    memcpy(thermal->memory, MEMORY_START, sizeof thermal->memory);
+    thermal->step = FIRST_STEP_S;
+}
+
+/* Bring the network up to the present parameters. */
+static ModelStatus prepare(Model *model) {
+    Scratch *scratch = model->scratch;
+    if (model->changed & CHANGED_PARAMETERS) {
+        double parameters[AT_LEAST_ONE(N_PARAMETERS)];
+        const char *fault;
+        for (int i = 0; i < N_PARAMETERS; i++) parameters[i] = inner(model, FACTOR[i]);
+        fault = network_set(&scratch->network, parameters);
+        if (fault) {
+            snprintf(model->message, MESSAGE_SIZE, "the parameters cannot be used: %s", fault);
+            return MODEL_REFUSED;
+        }
+    }
+    model->changed = 0;
+    return MODEL_OK;
+}
+
+ModelStatus model_start(Model *model) {
+    State *state = model->state;
+    if (prepare(model) != MODEL_OK) return MODEL_REFUSED;
+    start_values(model, &state->thermal);
+    state->started = 1.0;
+    return MODEL_OK;
+}
+
+/* Add to a message; what does not fit is cut off. */
+static void append(char *message, const char *format, ...) {
+    const size_t length = strlen(message);
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(message + length, MESSAGE_SIZE - length, format, arguments);
+    va_end(arguments);
+}
+
+/* A warning when the operating point leaves the range of training; none while it stays outside. */
+static ModelStatus excursion(Model *model, State *state, double time, const double *inputs) {
+    const double was_outside = state->outside;
+    const char *separator = " ";
+    double T[N_LOSS_NODES];
+    char *text = model->message;
+    for (int i = 0; i < N_LOSS_NODES; i++) T[i] = state->thermal.T[LOSS_NODE[i]];
+    state->outside = loss_domain_distance(inputs[0], inputs[1], T) > 0.0;
+    if (!state->outside || was_outside) return MODEL_OK;
+    text[0] = '\0';
+    append(text, "at %g s the operating point leaves the range that the networks were trained on:", time);
+    if (fabs(inputs[0]) > SPEED_HIGH) {
+        append(text, "%sspeed %g 1/min (to %g)", separator, inputs[0], SPEED_HIGH);
+        separator = ", ";
+    }
+    if (fabs(inputs[1]) > TORQUE_HIGH) {
+        append(text, "%storque %g N m (to %g)", separator, inputs[1], TORQUE_HIGH);
+        separator = ", ";
+    }
+    for (int i = 0; i < N_LOSS_NODES; i++) {
+        if (T[i] >= T_LOW && T[i] <= T_HIGH) continue;
+        append(text, "%s%s %.1f degC (%g to %g)", separator, LOSS_NODE_NAME[i], T[i], T_LOW, T_HIGH);
+        separator = ", ";
+    }
+    append(text, ". Losses are held at the edge of the range; in_domain and domain_distance show how long");
+    return MODEL_WARNING;
+}
+
+ModelStatus model_step(Model *model, double duration) {
+    State *state = model->state;
+    Scratch *scratch = model->scratch;
+    ThermalState thermal = state->thermal;
+    double inputs[N_INPUTS], slopes[N_INPUTS], failed_at;
+    const char *fault;
+    if (prepare(model) != MODEL_OK) return MODEL_REFUSED;
+    for (int i = 0; i < N_INPUTS; i++) {
+        inputs[i] = inner(model, INPUTS[i]);
+        slopes[i] = model->slopes[INPUTS[i].reference] * INPUTS[i].scale;
+    }
+    fault = network_advance(&scratch->network, &thermal, model->time, duration, inputs, slopes, &failed_at);
+    if (fault) {
+        snprintf(model->message, MESSAGE_SIZE, "the heat balance cannot be solved from %g s on: %s at %g s",
+                 model->time, fault, failed_at);
+        return MODEL_REFUSED;
+    }
+    state->thermal = thermal;
+    for (int i = 0; i < N_INPUTS; i++) {
+        model->values[INPUTS[i].reference] += model->slopes[INPUTS[i].reference] * duration;
+        inputs[i] = inner(model, INPUTS[i]);
+    }
+    return excursion(model, state, model->time + duration, inputs);
+}
+
+ModelStatus model_outputs(Model *model) {
+    const State *state = model->state;
+    Scratch *scratch = model->scratch;
+    ThermalState thermal = state->thermal;
+    double inputs[N_INPUTS], T[N_LOSS_NODES], loss = 0.0, omega, power, useful, given, distance;
+    const Balance *balance;
+    if (prepare(model) != MODEL_OK) return MODEL_REFUSED;
+    if (state->started == 0.0) start_values(model, &thermal);
+    for (int i = 0; i < N_INPUTS; i++) inputs[i] = inner(model, INPUTS[i]);
+    for (int i = 0; i < N_LOSS_NODES; i++) T[i] = thermal.T[LOSS_NODE[i]];
+    balance = network_balance(&scratch->network, model->time, inputs, &thermal);
+    for (int i = 0; i < N_PARTS; i++) show(model, PART_TEMPERATURE[i], thermal.T[i]);
+    for (int i = 0; i < N_BOUNDARIES; i++) show(model, BOUNDARY_TEMPERATURE[i], balance->T_boundary[i]);
+    for (int i = 0; i < N_MEMORY; i++) show(model, MEMORY_OUTPUT[i], thermal.memory[i]);
+    for (int i = 0; i < N_SOURCES; i++) {
+        show(model, HEAT_OUTPUT[i], balance->heat[i]);
+        if (SOURCE_IS_LOSS[i]) loss += balance->heat[i];
+    }
+    /* The loss torque goes linearly through zero below 1 rpm, as the losses do. */
+    omega = inputs[0] * RPM;
+    power = omega * inputs[1];
+    useful = power < 0.0 ? -power : fmax(power - loss, 0.0);
+    given = power < 0.0 ? loss - power : power;
+    distance = loss_domain_distance(inputs[0], inputs[1], T);
+    model->values[TOTAL_LOSS] = loss;
+    model->values[TORQUE_LOSS] = loss * ((omega > 0.0) - (omega < 0.0)) / fmax(fabs(omega), RPM);
+    model->values[EFFICIENCY] = given > 0.0 ? useful / given : 0.0;
+    model->values[DOMAIN_DISTANCE] = distance;
+    model->values[IN_DOMAIN] = distance <= 0.0;
+    return MODEL_OK;
+}

@@ -1,0 +1,66 @@
+/* What the FMI layer (fmi2_cosimulation.c) knows of a model: a table of variables and three functions.
+
+   Values stand in one array of doubles, one per variable in the order of the table; the place in the table is the FMI
+   value reference. The FMI layer guards them: whenever the model is called, all inputs and parameters are finite and
+   within their bounds, fixed parameters have not changed since the start, and the calls come in an allowed order. */
+#ifndef MODEL_H
+#define MODEL_H
+
+#include <stddef.h>
+
+#if defined __GNUC__ && !defined _WIN32
+#pragma GCC visibility push(hidden) /* two FMUs in one process must not see each other's functions */
+#endif
+
+typedef enum { REAL, INTEGER, BOOLEAN } VariableType;
+typedef enum { CALCULATED, INPUT, FIXED, TUNABLE } VariableAccess; /* FIXED: until the simulation starts */
+
+typedef struct {
+    const char *name, *unit;
+    VariableType type;
+    VariableAccess access;
+    double start, minimum, maximum, nominal;
+} Variable;
+
+enum { CHANGED_INPUTS = 1, CHANGED_PARAMETERS = 2, CHANGED_STATE = 4 };
+enum { MESSAGE_SIZE = 1024 };
+
+typedef struct {
+    double *values;       /* by value reference; the model writes the calculated ones, and the inputs after a ramp */
+    const double *slopes; /* by value reference: rate of every input during the next step, 1/s */
+    void *state;          /* model_state_size bytes that the future depends on: no pointers, zero before the start */
+    void *scratch;        /* model_scratch_size bytes of the model's own; not saved, all zero when instantiated */
+    double time;          /* s; the FMI layer moves it on after a step */
+    unsigned changed;     /* CHANGED_...: what was set or restored since the model cleared the bit */
+    char message[MESSAGE_SIZE]; /* of a warning or refusal */
+} Model;
+
+typedef enum {
+    MODEL_OK,
+    MODEL_WARNING, /* done, with a message */
+    MODEL_REFUSED, /* not done, with a message; values and state are as before */
+    MODEL_BROKEN   /* not done, with a message; only a saved state or a reset helps */
+} ModelStatus;
+
+/* Generated */
+extern const char model_guid[];
+extern const unsigned model_variable_count;
+extern const Variable model_variables[];
+
+/* Written with the model */
+extern const size_t model_state_size, model_scratch_size;
+
+/* Take the start values over into the state, at model->time. */
+ModelStatus model_start(Model *model);
+
+/* Go on by `duration` s (> 0) from model->time. Inputs go from their values along their slopes; those that do have
+   their end values afterwards. */
+ModelStatus model_step(Model *model, double duration);
+
+/* Write the calculated values at model->time; before model_start those at the start. */
+ModelStatus model_outputs(Model *model);
+
+#if defined __GNUC__ && !defined _WIN32
+#pragma GCC visibility pop
+#endif
+#endif

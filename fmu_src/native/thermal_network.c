@@ -1,0 +1,130 @@
+/* Heat balance and time integration of a thermal network.
+
+   ROS2 of Verwer, Spee, Blom and Hundsdorfer (SIAM J. Sci. Comput. 20, 1999) with the conductance matrix as Jacobian:
+   second order, L-stable, two balances per step, step size by the embedded first-order solution; constants and choices
+   are those of models/solver.py, which says more. Each step solves three systems (C + gamma h L) k = q with the
+   symmetric conductance matrix L, by generated code that makes no product with a zero. */
+#include "thermal_network.h"
+#include "elementary.h"
+#include "laws.h"
+
+#define GAMMA 0.29289321881345247 /* 1 - sqrt(1/2) */
+#define TOLERANCE_K 0.03
+#define SHORTEST_STEP_S 1e-6
+#define SAFETY 0.9
+#define SHRINK 0.2
+#define GROW 5.0
+
+const char *network_set(Network *network, const double *parameters) {
+    Balance *const balances[] = {&network->now, &network->then};
+    double fixed[N_FIXED + N_PARTS];
+    int fine = 1;
+    law_fixed(parameters, fixed);
+    for (int i = 0; i < N_FIXED + N_PARTS; i++) fine = fine && isfinite(fixed[i]);
+    for (int i = 0; i < N_PARTS; i++) fine = fine && fixed[N_FIXED + i] > 0.0;
+    if (!fine) return "heat capacities must be positive and conductances finite; check the parameters";
+    memcpy(network->capacity, fixed + N_FIXED, sizeof network->capacity);
+    for (int i = 0; i < 2; i++) {
+        balances[i]->valid = 0;
+        memcpy(balances[i]->conductance, fixed, N_FIXED * sizeof(double));
+        memcpy(balances[i]->at.parameters, parameters, N_PARAMETERS * sizeof(double));
+    }
+    if (!network->loss_power) network->loss_power = loss_power_here();
+    return NULL;
+}
+
+/* Fill `balance` for a moment, unless it holds that moment already. */
+static void find_balance(const Network *network, Balance *balance, double time, const double *inputs,
+                         const ThermalState *state) {
+    Signals *at = &balance->at;
+    double T[N_LOSS_NODES];
+    if (balance->valid && (at->time == time || !LAWS_USE_TIME) && !memcmp(at->inputs, inputs, sizeof at->inputs)
+        && !memcmp(at->T, state->T, sizeof at->T) && !memcmp(at->memory, state->memory, sizeof at->memory)) return;
+    at->time = time;
+    memcpy(at->inputs, inputs, sizeof at->inputs);
+    memcpy(at->T, state->T, sizeof at->T);
+    memcpy(at->memory, state->memory, sizeof at->memory);
+    for (int i = 0; i < N_LOSS_NODES; i++) T[i] = state->T[LOSS_NODE[i]];
+    network->loss_power(inputs[0], inputs[1], T, at->power);
+    law_boundary((const double *)at, balance->T_boundary);
+    law_heat((const double *)at, balance->heat);
+    balance->valid = 1;
+    balance->has_gain = 0;
+}
+
+static void find_gain(Balance *balance) {
+    if (balance->has_gain) return;
+    law_exchange((const double *)&balance->at, balance->conductance + N_FIXED);
+    structure_gain(balance->conductance, balance->at.T, balance->T_boundary, balance->heat, balance->gain);
+    balance->has_gain = 1;
+}
+
+const Balance *network_balance(Network *network, double time, const double *inputs, const ThermalState *state) {
+    find_balance(network, &network->now, time, inputs, state);
+    return &network->now;
+}
+
+const char *network_advance(Network *network, ThermalState *state, double time, double duration, const double *inputs,
+                            const double *slopes, double *failed_at) {
+    Balance *const now = &network->now, *const then = &network->then;
+    const double *const capacity = network->capacity;
+    double elapsed = 0.0;
+    while (elapsed < duration) {
+        const double remaining = duration - elapsed, step = larger(state->step, SHORTEST_STEP_S);
+        /* Two even steps instead of a full one and a sliver. */
+        const double h = step >= remaining ? remaining : smaller(step, 0.5 * remaining);
+        double factors[N_FACTORS], now_inputs[N_INPUTS], then_inputs[N_INPUTS];
+        double k_1[N_PARTS], k_2[N_PARTS], both[N_PARTS];
+        double rate_1[AT_LEAST_ONE(N_MEMORY)], rate_2[AT_LEAST_ONE(N_MEMORY)];
+        double error = 0.0, sum = 0.0, next_step;
+        ThermalState later = *state;
+        *failed_at = time + elapsed;
+        for (int i = 0; i < N_INPUTS; i++) {
+            now_inputs[i] = inputs[i] + slopes[i] * elapsed;
+            then_inputs[i] = inputs[i] + slopes[i] * (elapsed + h);
+        }
+        find_balance(network, now, time + elapsed, now_inputs, state);
+        find_gain(now);
+        structure_factorize(now->conductance, capacity, GAMMA * h, factors);
+        structure_solve(factors, now->gain, k_1);
+        for (int i = 0; i < N_PARTS; i++) later.T[i] = state->T[i] + h * k_1[i];
+        for (int i = 0; i < N_MEMORY; i++) {
+            rate_1[i] = now->heat[N_SOURCES + i];
+            later.memory[i] = state->memory[i] + h * rate_1[i];
+        }
+        find_balance(network, then, time + elapsed + h, then_inputs, &later);
+        find_gain(then);
+        for (int i = 0; i < N_PARTS; i++) k_2[i] = then->gain[i] - 2.0 * capacity[i] * k_1[i];
+        structure_solve(factors, k_2, k_2);
+        /* Filtered once more by the implicit matrix: what a stiff node relaxes within the step is no error of it. */
+        for (int i = 0; i < N_PARTS; i++) both[i] = capacity[i] * (k_1[i] + k_2[i]);
+        structure_solve(factors, both, both);
+        for (int i = 0; i < N_PARTS; i++) {
+            error = larger(error, fabs(both[i]));
+            sum += both[i];
+        }
+        for (int i = 0; i < N_MEMORY; i++) {
+            rate_2[i] = then->heat[N_SOURCES + i] - 2.0 * rate_1[i];
+            error = larger(error, fabs(rate_1[i] + rate_2[i]));
+            sum += rate_2[i];
+        }
+        if (!isfinite(sum)) return "the heat balance is not finite";
+        error *= 0.5 * h / TOLERANCE_K;
+        next_step = h * smaller(GROW, larger(SHRINK, SAFETY / sqrt(larger(error, 1e-12))));
+        if (error > 1.0) {
+            if (next_step < SHORTEST_STEP_S) return "the step size fell below 1e-06 s";
+            state->step = next_step;
+            continue;
+        }
+        elapsed = h == remaining ? duration : elapsed + h;
+        for (int i = 0; i < N_PARTS; i++) state->T[i] += h * (1.5 * k_1[i] + 0.5 * k_2[i]);
+        for (int i = 0; i < N_MEMORY; i++) state->memory[i] += h * (1.5 * rate_1[i] + 0.5 * rate_2[i]);
+        /* A short communication step says nothing about the step that the network would allow. */
+        state->step = h < step ? larger(next_step, step) : next_step;
+        if (LAWS_UPDATE) {
+            find_balance(network, now, time + elapsed, then_inputs, state);
+            memcpy(state->memory, now->heat + N_SOURCES + N_MEMORY, N_MEMORY * sizeof(double));
+        }
+    }
+    return NULL;
+}

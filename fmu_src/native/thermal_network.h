@@ -1,0 +1,53 @@
+/* Heat balance and time integration of a thermal network; the scheme of models/solver.py. */
+#ifndef THERMAL_NETWORK_H
+#define THERMAL_NETWORK_H
+
+#include "loss_networks.h"
+#include "model_data.h"
+
+/* What goes into the laws, in the order of their arguments. */
+typedef struct {
+    double time, inputs[N_INPUTS], T[N_PARTS], parameters[AT_LEAST_ONE(N_PARAMETERS)], memory[AT_LEAST_ONE(N_MEMORY)],
+        power[N_COMPONENTS];
+} Signals;
+
+/* The heat balance at one moment. */
+typedef struct {
+    int valid, has_gain; /* outputs need no gain */
+    Signals at;
+    double heat[N_SOURCES + 2 * N_MEMORY]; /* W; then the rates of the memories and their updates */
+    double T_boundary[AT_LEAST_ONE(N_BOUNDARIES)];
+    double conductance[AT_LEAST_ONE(N_FIXED + N_VARYING)]; /* W/K */
+    double gain[N_PARTS];                                  /* W: net heat into the parts */
+} Balance;
+
+/* A network with parameter values. */
+typedef struct {
+    LossPower *loss_power;
+    double capacity[N_PARTS];
+    Balance now, then;
+} Network;
+
+/* Node temperatures [degC], the network's memories, and the step size that the last step recommends, s. */
+typedef struct {
+    double T[N_PARTS], memory[AT_LEAST_ONE(N_MEMORY)], step;
+} ThermalState;
+
+#if defined __GNUC__ && !defined _WIN32
+#pragma GCC visibility push(hidden)
+#endif
+
+/* Take new parameter values; gives NULL, or what is wrong with them. */
+const char *network_set(Network *network, const double *parameters);
+
+/* Sources, boundaries and losses at a moment. */
+const Balance *network_balance(Network *network, double time, const double *inputs, const ThermalState *state);
+
+/* Integrate over `duration`, the inputs going along `slopes`; gives NULL, or why it cannot be done, and *failed_at. */
+const char *network_advance(Network *network, ThermalState *state, double time, double duration, const double *inputs,
+                            const double *slopes, double *failed_at);
+
+#if defined __GNUC__ && !defined _WIN32
+#pragma GCC visibility pop
+#endif
+#endif

@@ -1,0 +1,88 @@
+"""Parameters and shapes that the laws of the catalogue share."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import sympy as sp
+
+from models.laws import Parameter
+from models.mechanisms.scale import Scale
+
+LARGEST = 100.0  # strength, in standard deviations of its prior
+SMALLEST_FACTOR = -0.95  # of a relative change: a loss or conductance never turns round
+DURING = (0.01, 0.03, 0.08, 0.2, 0.4, 0.55, 0.7, 0.85)  # of a recording: where a search for a moment starts
+EDGE_S = 120.0  # half of the time that rain or an oil change takes to come
+
+
+def strength(sd: float, unit: str = "1", description: str = "") -> Parameter:
+    """The parameter that a law is linear in; 0 is absence, `sd` the size that the effect typically has."""
+    lower = SMALLEST_FACTOR if unit == "1" else -LARGEST * sd
+    return Parameter(
+        name="strength", unit=unit, start=0.0, lower=lower, upper=LARGEST * sd, sd=sd, log=False,
+        description=description,
+    )  # fmt: skip
+
+
+def positive(name: str, start: float, *, sd: float, unit: str = "1", grid: Sequence[float] = ()) -> Parameter:
+    """A positive shape parameter; `sd` of its logarithm."""
+    return Parameter(
+        name=name, unit=unit, start=start, lower=start / 50.0, upper=start * 50.0, sd=sd, log=True, grid=tuple(grid)
+    )
+
+
+def plain(
+    name: str, start: float, *, sd: float, lower: float, upper: float, unit: str = "1", grid: Sequence[float] = ()
+) -> Parameter:
+    """A shape parameter that is no factor: an exponent, a temperature."""
+    return Parameter(name=name, unit=unit, start=start, lower=lower, upper=upper, sd=sd, log=False, grid=tuple(grid))
+
+
+def temperature(name: str, start: float, *, sd: float, grid: Sequence[float] = ()) -> Parameter:
+    """A temperature [degC] as a shape parameter."""
+    return plain(name, start, sd=sd, lower=-60.0, upper=250.0, unit="degC", grid=grid)
+
+
+def moment(scale: Scale, name: str = "moment") -> Parameter:
+    """A moment within a recording, [s] since its start."""
+    d = scale.duration
+    grid = [share * d for share in DURING]
+    return plain(name, 0.4 * d, sd=0.3 * d, lower=-d, upper=3.0 * d, unit="s", grid=grid)
+
+
+def length(scale: Scale, *shares: float) -> Parameter:
+    """How long something lasts, [s]; `shares` of the duration to start from."""
+    grid = [share * scale.duration for share in shares]
+    return positive("length", grid[len(grid) // 2], sd=0.8, unit="s", grid=grid)
+
+
+def rises(value: Any, *, at: Any, power: float) -> sp.Expr:
+    """A switch of a value >= 0, from 0 through 1/2 `at` to 1; the higher the `power` the sharper."""
+    return value**power / (value**power + at**power)
+
+
+def steps(value: Any, *, at: Any, width: float) -> sp.Expr:
+    """A switch from 0 through 1/2 `at` to 1 within about four `width`."""
+    return (1.0 + sp.tanh((value - at) / width)) / 2.0
+
+
+def hysteresis(value: Any, state: Any, *, at: Any, band: Any, above: float) -> sp.Expr:
+    """A two-point switch around `at`: `above` (0 or 1) beyond the band, ``1 - above`` below it, between as it was."""
+    # All on one side: with terms on both, sympy 1.14 turns some conditions round and round without end.
+    return sp.Piecewise((above, value - at - band / 2 > 0), (1.0 - above, value - at + band / 2 < 0), (state, True))
+
+
+def share_between(scale: Scale, share: float) -> float:
+    """A temperature [degC] at a share of the way from ambient to the hot oil."""
+    return scale.ambient + share * (scale.temperature - scale.ambient)
+
+
+def during(value: Any, *, at: Any, length: Any, width: float) -> sp.Expr:
+    """A window: 0, from `at` on 1, and 0 again `length` later, with edges of about four `width`."""
+    return (sp.tanh((value - at) / width) - sp.tanh((value - at - length) / width)) / 2.0
+
+
+def share(description: str) -> Parameter:
+    """A strength from 0 to 1, where 1 is the usual case."""
+    return Parameter(name="strength", start=0.0, lower=0.0, upper=1.0, sd=1.0, log=False, description=description)

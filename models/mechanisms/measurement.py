@@ -1,0 +1,174 @@
+"""Faults of sensors, clocks and of the instruments that record the inputs; the gearbox itself has none of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import sympy as sp
+
+from models.laws import LawLike, Parameter
+from models.mechanisms.forms import moment, share, strength
+from models.mechanisms.mechanism import Mechanism, Parameters
+from models.terms import Form
+
+FAMILY = "measurement"
+EXCHANGE = "exchange the sensor with another one and repeat: a fault of the sensor goes with it"
+EQUAL_TEMPERATURE = "let all stand until it is at one temperature: all sensors must agree"
+
+
+def _sensor(
+    name: str, form: Form, *, places: str, parameters: Parameters, law: LawLike, says: str, reference: str,
+    experiment: str = EXCHANGE, signed: bool = True,
+) -> Mechanism:  # fmt: skip
+    return Mechanism(
+        name=name, family=FAMILY, kind="sensor", form=form, of_measurement=True, places=(places,),
+        sign=0 if signed else 1, parameters=parameters, law=law, says=says, reference=reference, experiment=experiment,
+    )  # fmt: skip
+
+
+def _input(
+    name: str, place: str, *, size: Callable[..., Parameter], law: LawLike, says: str, reference: str, experiment: str,
+    signed: bool = True,
+) -> Mechanism:  # fmt: skip
+    return Mechanism(
+        name=name, family=FAMILY, kind="signal", of_measurement=True, places=(place,), sign=0 if signed else -1,
+        parameters=lambda scale: (size(scale),), law=law, says=says, reference=reference, experiment=experiment,
+    )  # fmt: skip
+
+
+sensor_bias = _sensor(
+    "sensor_bias",
+    "shift",
+    places="each thermometer",
+    parameters=lambda _: (strength(2.0, "K", "reading less truth"),),
+    law=lambda s: s.strength,
+    says="The sensor at {place} reads too much or too little by a constant amount.",
+    reference="class of the thermocouple and its amplifier: 1 to 2 K",
+    experiment=EQUAL_TEMPERATURE,
+)
+
+sensor_drift = _sensor(
+    "sensor_drift",
+    "shift",
+    places="each thermometer",
+    parameters=lambda _: (strength(3.0, "K", "reading less truth after the reference duration"),),
+    law=lambda s: s.strength * s.x,
+    says="The reading of the sensor at {place} drifts away in the course of the recording.",
+    reference="ageing thermocouple or loosening contact",
+    experiment=EQUAL_TEMPERATURE + ", before and after the test",
+)
+
+sensor_gain = _sensor(
+    "sensor_gain",
+    "shift",
+    places="each thermometer",
+    parameters=lambda _: (strength(0.04, description="error per kelvin above ambient"),),
+    law=lambda s: s.strength * (s.T_here - s.T_ambient),
+    says="The sensor at {place} shows a wrong share of the rise above ambient: heat flows along its leads, or its gain "
+    "is off.",
+    reference="stem conduction of a thermocouple: 1 to 5 % of the rise; estimate",
+    experiment="insulate the leads, or press a second sensor beside it",
+)
+
+sensor_lag = _sensor(
+    "sensor_lag",
+    "lag",
+    places="each thermometer",
+    parameters=lambda _: (strength(60.0, "s", "time constant"),),
+    law=lambda s: s.strength,
+    says="The sensor at {place} answers late: it has bad contact or a heavy sheath.",
+    reference="first order, 30 to 120 s",
+    experiment="step the torque and compare with a fast sensor beside it",
+    signed=False,
+)
+
+sensor_stuck = _sensor(
+    "sensor_stuck",
+    "stuck",
+    places="each sensor",
+    parameters=lambda scale: (share("share of the reading that is held"), moment(scale)),
+    law=lambda s: sp.Piecewise((s.strength, s.time >= s.moment), (0, True)),
+    says="From a moment on the reading of {place} no longer moves.",
+    reference="frozen channel of a logger",
+    experiment="restart the logger",
+    signed=False,
+)
+
+swapped_channels = _sensor(
+    "swapped_channels",
+    "swapped",
+    places="pair",
+    parameters=lambda _: (share("1: exchanged"),),
+    law=lambda s: s.strength,
+    says="Two channels are exchanged: {place}.",
+    reference="wiring or naming",
+    experiment="warm one sensor by hand and see which channel moves",
+    signed=False,
+)
+
+clock_offset = _sensor(
+    "clock_offset",
+    "clock",
+    places="clock",
+    parameters=lambda _: (strength(60.0, "s", "readings late by"),),
+    law=lambda s: s.strength,
+    says="The clocks of inputs and temperatures differ.",
+    reference="two loggers, started by hand",
+    experiment="step the speed and look where temperatures begin to move; record one signal with both loggers",
+)
+
+torque_offset = _input(
+    "torque_offset",
+    "torque",
+    size=lambda scale: strength(0.05 * scale.torque, "N m", "true less recorded"),
+    law=lambda s: s.strength,
+    says="The torque meter's zero is off by a constant amount.",
+    reference="zero drift of a strain gauge shaft with temperature",
+    experiment="read the torque of the uncoupled shaft, cold and hot",
+)
+
+torque_gain = _input(
+    "torque_gain",
+    "torque",
+    size=lambda _: strength(0.05, description="true over recorded, less 1"),
+    law=lambda s: s.strength * s.torque,
+    says="The torque meter shows a wrong share of the torque.",
+    reference="calibration: 0.1 to 2 %; gross errors by a wrong range",
+    experiment="calibrate with a lever and weights",
+)
+
+speed_gain = _input(
+    "speed_gain",
+    "speed",
+    size=lambda _: strength(0.03, description="true over recorded, less 1"),
+    law=lambda s: s.strength * s.speed,
+    says="The recorded speed is a wrong share of the true one.",
+    reference="wrong pulse count, slip of a belt-driven tachometer",
+    experiment="compare with a hand tachometer",
+)
+
+ambient_probe_offset = _input(
+    "ambient_probe_offset",
+    "T_ambient",
+    size=lambda _: strength(2.0, "K", "true less recorded"),
+    law=lambda s: s.strength,
+    says="The ambient probe reads too much or too little by a constant amount, or hangs where the air is another.",
+    reference="stratified air in a test cell: 1 to 3 K",
+    experiment=EQUAL_TEMPERATURE,
+)
+
+ambient_probe_heated = _input(
+    "ambient_probe_heated",
+    "T_ambient",
+    size=lambda _: strength(0.06, description="true less recorded per kelvin of the housing above it"),
+    law=lambda s: s.strength * (s.T_housing - s.T_ambient),
+    says="The gearbox warms its own ambient probe: the hotter it is, the more the recorded ambient is too high.",
+    reference="plume or radiation of the housing: 3 to 10 % of its rise; estimate",
+    experiment="hang a second probe a metre away, shielded",
+    signed=False,
+)
+
+MECHANISMS = (
+    sensor_bias, sensor_drift, sensor_gain, sensor_lag, sensor_stuck, swapped_channels, clock_offset, torque_offset,
+    torque_gain, speed_gain, ambient_probe_offset, ambient_probe_heated,
+)  # fmt: skip

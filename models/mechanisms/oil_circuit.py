@@ -1,0 +1,240 @@
+"""Coolers, heaters, pumps and what else is done to the oil from outside."""
+
+from __future__ import annotations
+
+import sympy as sp
+
+from models.laws import Parameter
+from models.mechanisms.forms import (
+    EDGE_S,
+    hysteresis,
+    moment,
+    plain,
+    positive,
+    share_between,
+    steps,
+    strength,
+    temperature,
+)
+from models.mechanisms.mechanism import Mechanism, Memory
+from models.mechanisms.scale import Scale
+
+FAMILY = "oil circuit"
+RUNNING = 20.0  # a pump on the shaft delivers all it can from about a tenth of the reference speed
+PAST_SET_POINT = "heat up slowly at constant load past the suspected set-point, then hold"
+RETURN = "measure the oil where it enters and leaves the gearbox"
+SET_POINTS = (0.35, 0.45, 0.55, 0.65, 0.75, 0.85, 0.95, 1.1)  # of the way from ambient to the hot oil
+
+
+def _cooler(scale: Scale) -> Parameter:
+    return strength(0.8 * scale.conductance, "W/K", "conductance of the cooler")
+
+
+def _coolant(scale: Scale) -> Parameter:
+    return temperature("coolant", scale.ambient, sd=10.0)
+
+
+def _set_point(scale: Scale) -> Parameter:
+    grid = [share_between(scale, share) for share in SET_POINTS]
+    return temperature("set_point", share_between(scale, 0.75), sd=15.0, grid=grid)
+
+
+def _band() -> Parameter:
+    return positive("band", 6.0, sd=0.5, unit="K", grid=(3.0, 8.0))
+
+
+cooler_thermostat = Mechanism(
+    name="cooler_thermostat",
+    family=FAMILY,
+    kind="link",
+    places=("oil",),
+    other="coolant",
+    other_temperature=lambda s: s.coolant,
+    parameters=lambda scale: (_cooler(scale), _set_point(scale), _band(), _coolant(scale)),
+    states=(
+        Memory(name="valve", update=lambda s: hysteresis(s.T_oil, s.valve, at=s.set_point, band=s.band, above=1.0)),
+    ),
+    law=lambda s: s.strength * s.valve,
+    says="A thermostat sends the oil through a cooler above a set temperature, and back below a lower one.",
+    reference="two-point control; 6 W/K above 80 degC on the FZG rig",
+    experiment=PAST_SET_POINT + ": the oil saws between two temperatures",
+    separate_by={"cooler_proportional": "hold a load near the set-point: a two-point valve makes the oil saw"},
+)
+
+cooler_proportional = Mechanism(
+    name="cooler_proportional",
+    family=FAMILY,
+    kind="link",
+    places=("oil",),
+    other="coolant",
+    other_temperature=lambda s: s.coolant,
+    parameters=lambda scale: (
+        _cooler(scale),
+        _set_point(scale),
+        positive("band", 10.0, sd=0.6, unit="K", grid=(5.0, 15.0)),
+        _coolant(scale),
+    ),
+    law=lambda s: s.strength * sp.Min(sp.Max((s.T_oil - s.set_point) / s.band, 0.0), 1.0),
+    says="A valve opens in proportion above a set temperature and sends the oil through a cooler.",
+    reference="wax thermostat: opens over 10 to 15 K",
+    experiment=PAST_SET_POINT + " two loads beyond it: the oil temperature hardly rises",
+    separate_by={"cooler_thermostat": "hold a load near the set-point: a two-point valve makes the oil saw"},
+)
+
+cooler_constant = Mechanism(
+    name="cooler_constant",
+    family=FAMILY,
+    kind="link",
+    places=("oil",),
+    other="coolant",
+    other_temperature=lambda s: s.coolant,
+    parameters=lambda scale: (_cooler(scale), _coolant(scale)),
+    law=lambda s: s.strength,
+    says="An oil cooler is always on.",
+    reference="heat exchanger of constant flow",
+    experiment="stand still hot with the pump of the cooler on, then off",
+    separate_by={
+        "foundation_conduction": "measure oil and housing in a cool-down: a cooler makes the oil the cooler one"
+    },
+)
+
+cooler_shaft_driven = Mechanism(
+    name="cooler_shaft_driven",
+    family=FAMILY,
+    kind="link",
+    places=("oil",),
+    other="coolant",
+    other_temperature=lambda s: s.coolant,
+    parameters=lambda scale: (
+        _cooler(scale),
+        plain("exponent", 0.8, sd=0.3, lower=0.2, upper=1.5, grid=(0.5, 0.9)),
+        _coolant(scale),
+    ),
+    law=lambda s: s.strength * s.n**s.exponent,
+    says="The pump or fan of the oil cooler sits on the shaft: it cools with speed and not at standstill.",
+    reference="turbulent heat transfer, ~ flow^0.8",
+    experiment="compare a cool-down at standstill with one at speed without load",
+)
+
+oil_jet = Mechanism(
+    name="oil_jet",
+    family=FAMILY,
+    kind="link",
+    places=("oil", "gears"),
+    other="supply",
+    other_temperature=lambda s: s.supply,
+    parameters=lambda scale: (
+        strength(1.5 * scale.conductance, "W/K", "heat capacity flow of the jet"),
+        temperature(
+            "supply",
+            share_between(scale, 0.5),
+            sd=20.0,
+            grid=[share_between(scale, share) for share in (0.2, 0.5, 0.8)],
+        ),
+    ),
+    law=lambda s: s.strength * sp.tanh(RUNNING * s.n),
+    says="Oil of a constant temperature is injected while the gears turn: cold ones warm, hot ones cool ({place}).",
+    reference="rho c V: 30 W/K per l/min of mineral oil",
+    experiment=RETURN,
+    separate_by={"hot_neighbour": "stand still hot: the jet stops, the neighbour stays"},
+)
+
+pump_heat = Mechanism(
+    name="pump_heat",
+    family=FAMILY,
+    kind="source",
+    places=("oil",),
+    is_loss=True,
+    parameters=lambda scale: (strength(0.1 * scale.loss, "W", "heat at the reference speed"),),
+    law=lambda s: s.strength * s.n,
+    says="A pump on the shaft works against a constant pressure and its power ends as heat in the oil.",
+    reference="displacement pump with a relief valve: p V, proportional to speed",
+    experiment="hold a low and a high speed without load, and read the oil pressure",
+    separate_by={"windage": "hold low and high speed without load: the pump grows with speed, windage with its cube"},
+)
+
+oil_tank = Mechanism(
+    name="oil_tank",
+    family=FAMILY,
+    kind="source",
+    places=("oil",),
+    parameters=lambda scale: (
+        strength(1.5 * scale.conductance, "W/K", "heat capacity flow to the tank"),
+        positive("lag", 1800.0, sd=0.8, unit="s", grid=(600.0, 1800.0, 5400.0)),
+        positive("leak", 0.1, sd=0.8, grid=(0.03, 0.2)),
+    ),
+    states=(
+        Memory(
+            name="tank",
+            start=lambda scale: scale.ambient,
+            rate=lambda s: (s.T_oil - s.tank - s.leak * (s.tank - s.T_ambient)) / s.lag,
+        ),
+    ),
+    law=lambda s: s.strength * (s.tank - s.T_oil),
+    says="Oil circulates through a tank or long pipes outside, which warm late and give heat to the air.",
+    reference="stirred tank: lag = its capacity over the heat capacity flow; leak = its loss to air over it",
+    experiment=RETURN + " after a step of load",
+)
+
+heater_thermostat = Mechanism(
+    name="heater_thermostat",
+    family=FAMILY,
+    kind="source",
+    places=("oil",),
+    parameters=lambda scale: (
+        strength(0.4 * scale.loss, "W", "power of the heater"),
+        temperature(
+            "set_point",
+            share_between(scale, 0.3),
+            sd=12.0,
+            grid=[share_between(scale, share) for share in (0.1, 0.2, 0.3, 0.4, 0.5, 0.7)],
+        ),
+        _band(),
+    ),
+    states=(
+        Memory(name="heating", update=lambda s: hysteresis(s.T_oil, s.heating, at=s.set_point, band=s.band, above=0.0)),
+    ),
+    law=lambda s: s.strength * s.heating * sp.exp(-RUNNING * s.n),
+    says="An electric heater keeps the oil warm while the gearbox stands.",
+    reference="two-point control",
+    experiment="let it stand until it would be cold: the oil stays at a temperature of its own",
+    separate_by={"hot_neighbour": "let it stand: a heater makes the oil the warmest part, a neighbour another one"},
+)
+
+oil_added = Mechanism(
+    name="oil_added",
+    family=FAMILY,
+    kind="loss_factor",
+    places=("churning",),
+    parameters=lambda scale: (strength(0.3, description="relative change of churning"), moment(scale)),
+    law=lambda s: s.strength * steps(s.time, at=s.moment, width=EDGE_S),
+    says="Oil was added: from then on the gears dip deeper and churn more.",
+    reference="churning grows with the immersion depth",
+    experiment="read the level before and after, at the same temperature",
+)
+
+water_jacket = Mechanism(
+    name="water_jacket",
+    family=FAMILY,
+    kind="link",
+    places=("each housing", "housing"),
+    other="water",
+    other_temperature=lambda s: s.water,
+    parameters=lambda scale: (
+        strength(scale.conductance, "W/K", "conductance to the water"),
+        temperature("water", scale.ambient - 5.0, sd=10.0),
+    ),
+    law=lambda s: s.strength,
+    says="Water of a constant temperature flows through the housing ({place}).",
+    reference="heat exchanger of constant flow",
+    experiment="stand still hot with the water on, then off",
+    separate_by={
+        "foundation_conduction": "stand still to the end of the cool-down: it ends at the water's temperature",
+        "cooler_constant": "measure oil and housing in a cool-down: a jacket makes the housing the cooler one",
+    },
+)
+
+MECHANISMS = (
+    cooler_thermostat, cooler_proportional, cooler_constant, cooler_shaft_driven, oil_jet, pump_heat, oil_tank,
+    heater_thermostat, oil_added, water_jacket,
+)  # fmt: skip

@@ -1,0 +1,165 @@
+"""Where in a network a mechanism may sit: from the patterns of the catalogue to nodes, sources and links.
+
+A pattern is a name, a group (its members together), or ``each`` and a group (one place per member), by kind:
+
+- source, link: nodes. ``oil``, ``housing``, ``each bearings``
+- loss_factor: sources. ``mesh_sliding``; the losses in a group of nodes, ``each bearings``; those that a factor of the
+  network multiplies, ``factor seal``; several together, ``mesh_sliding+mesh_rolling``
+- link_factor: links by their ends. ``oil-housing``, ``each bearings-housing``, ``oil-gears+oil-housing``
+- signal: an input. ``torque``
+- sensor: measured channels. ``each sensor`` (temperatures and total loss), ``each thermometer``, ``clock``, ``pair``
+
+A pattern that a network has no part of gives no place.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+from models.laws import symbol
+from models.network import BASE_SIGNALS, ThermalNetwork
+from models.terms import Kind
+
+LOSS_CHANNEL = "P_loss"
+EACH, FACTOR = "each ", "factor "
+
+
+@dataclass(frozen=True, kw_only=True)
+class Spot:
+    """One place of a mechanism.
+
+    Attributes
+    ----------
+    name : str
+        How it is called; an identifier
+    target : tuple of str
+        Nodes, sources, links, inputs or channels
+    here, there : tuple of str
+        Nodes whose mean temperatures a law reads as ``T_here`` and ``T_there``
+    """
+
+    name: str
+    target: tuple[str, ...]
+    here: tuple[str, ...] = ()
+    there: tuple[str, ...] = ()
+
+
+def spots(network: ThermalNetwork, kind: Kind, pattern: str, channels: Sequence[str]) -> tuple[Spot, ...]:
+    """All places of a network that a pattern stands for.
+
+    Parameters
+    ----------
+    network : ThermalNetwork
+    kind : str
+        Of the mechanism
+    pattern : str
+    channels : sequence of str
+        What is measured: nodes, or ``P_loss``
+
+    Examples
+    --------
+    >>> from models.gearbox import load_gearbox
+    >>> network = load_gearbox("fzg").network()
+    >>> [spot.target for spot in spots(network, "link_factor", "each bearings-housing", ())][0]
+    ('bearing_1-housing_lower', 'bearing_1-housing_upper')
+    """
+    if kind in ("source", "link"):
+        found = _nodes(network, pattern)
+    elif kind == "loss_factor":
+        found = _sources(network, pattern)
+    elif kind == "link_factor":
+        found = _links(network, pattern)
+    elif kind == "signal":
+        known = pattern in (*BASE_SIGNALS, *network.inputs)
+        found = iter([Spot(name=pattern, target=(pattern,))] if known else [])
+    else:
+        found = _channels(network, pattern, channels)
+    return tuple(found)
+
+
+def _apart(pattern: str) -> tuple[bool, str]:
+    return pattern.startswith(EACH), pattern.removeprefix(EACH)
+
+
+def _members(network: ThermalNetwork, name: str) -> tuple[str, ...]:
+    return network.groups.get(name, (name,) if name in network.node_names else ())
+
+
+def _nodes(network: ThermalNetwork, pattern: str) -> Iterator[Spot]:
+    each, name = _apart(pattern)
+    parts = {part.name for part in network.parts}
+    members = tuple(node for node in _members(network, name) if node in parts)
+    if each:
+        yield from (Spot(name=node, target=(node,), here=(node,)) for node in members)
+    elif members:
+        yield Spot(name=name, target=members, here=members)
+
+
+def _sources(network: ThermalNetwork, pattern: str) -> Iterator[Spot]:
+    each, rest = _apart(pattern)
+    wanted = rest.split("+")
+    chosen = [
+        source
+        for source in network.sources
+        if source.is_loss
+        and any(
+            source.name == name
+            or (name in network.groups and source.node in network.groups[name])
+            or (name.startswith(FACTOR) and symbol(name.removeprefix(FACTOR)) in source.heat.free_symbols)
+            for name in wanted
+        )
+    ]
+    if each:
+        yield from (Spot(name=source.name, target=(source.name,), here=(source.node,)) for source in chosen)
+    elif chosen:
+        name = "_".join(name.removeprefix(FACTOR) for name in wanted)
+        nodes = tuple(dict.fromkeys(source.node for source in chosen))
+        yield Spot(name=name, target=tuple(source.name for source in chosen), here=nodes)
+
+
+def _links(network: ThermalNetwork, pattern: str) -> Iterator[Spot]:
+    each, rest = _apart(pattern)
+    name = re.sub(r"\W", "_", rest)
+    chosen: dict[str, tuple[str, str]] = {}
+    for ends in rest.split("+"):
+        a, _, b = ends.partition("-")
+        here, there = _members(network, a), _members(network, b)
+        for link in network.links:
+            for first, second in (link.nodes, link.nodes[::-1]):
+                if first in here and second in there:
+                    chosen[link.name] = (first, second)
+    if not each:
+        if chosen:
+            yield _between(name, chosen)
+        return
+    # One place per member of the end that is a group: the first, where both are.
+    side = 0 if rest.partition("-")[0] in network.groups else 1
+    for member in dict.fromkeys(nodes[side] for nodes in chosen.values()):
+        a, b = rest.split("-")
+        own = {link: nodes for link, nodes in chosen.items() if nodes[side] == member}
+        yield _between(f"{member}_{b}" if side == 0 else f"{a}_{member}", own)
+
+
+def _between(name: str, chosen: dict[str, tuple[str, str]]) -> Spot:
+    here, there = (tuple(dict.fromkeys(nodes)) for nodes in zip(*chosen.values(), strict=True))
+    return Spot(name=name, target=tuple(chosen), here=here, there=there)
+
+
+def _channels(network: ThermalNetwork, pattern: str, channels: Sequence[str]) -> Iterator[Spot]:
+    nodes = [name for name in channels if name in network.node_names]
+    if pattern == "clock":
+        # The loss comes from the rig's own torque meters, on one clock with speed and torque, more often than not.
+        if nodes:
+            yield Spot(name="clock", target=tuple(nodes))
+        if nodes and len(nodes) < len(channels):
+            yield Spot(name="clock_of_all", target=tuple(channels))
+    elif pattern == "pair":
+        for pair in combinations(nodes, 2):
+            yield Spot(name="_".join(pair), target=pair, here=pair[:1], there=pair[1:])
+    else:
+        chosen = nodes if pattern == "each thermometer" else channels
+        for name in chosen:
+            yield Spot(name=name, target=(name,), here=(name,) if name in nodes else ())

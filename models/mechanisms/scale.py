@@ -1,0 +1,120 @@
+"""Typical sizes of a gearbox and its operation: what the laws of the catalogue are written in ratios to."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import sympy as sp
+
+from models.laws import symbol
+from models.oil import d341_constants, kinematic_viscosity_d341
+
+if TYPE_CHECKING:
+    from models.gearbox import Gearbox
+
+TYPICAL_OIL = d341_constants(40.0, 100.0, 100.0, 11.2)  # ISO VG 100, mineral
+HOTTEST, COOLEST_RISE, TYPICAL_RISE = 100.0, 20.0, 50.0  # degC, K, K
+TEN_HOURS = 36000.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scale:
+    """Typical sizes, all positive but the temperatures.
+
+    Attributes
+    ----------
+    speed : float
+        Of the input shaft, [1/min]
+    torque : float
+        At the input shaft, [N m]
+    loss : float
+        All losses there, [W]
+    conductance : float
+        From the gearbox to its surroundings, [W/K]
+    capacity : float
+        Of the largest part, [J/K]
+    temperature, ambient : float
+        Hot oil and surroundings, [degC]
+    duration : float
+        Of a recording, [s]
+    oil_m, oil_n : float
+        Constants of the oil's viscosity, see :func:`models.oil.kinematic_viscosity_d341`
+    """
+
+    speed: float
+    torque: float
+    loss: float
+    conductance: float
+    capacity: float
+    temperature: float
+    ambient: float
+    duration: float
+    oil_m: float = TYPICAL_OIL[0]
+    oil_n: float = TYPICAL_OIL[1]
+
+    @property
+    def viscosity(self) -> float:
+        """Kinematic viscosity of the hot oil, [mm^2/s]."""
+        return float(kinematic_viscosity_d341(self.temperature, self.oil_m, self.oil_n))
+
+    def viscosity_at(self, T: sp.Expr) -> sp.Expr:
+        """Kinematic viscosity [mm^2/s] at a temperature [degC], from -40 to 200 and held there beyond."""
+        return kinematic_viscosity_d341(sp.Min(sp.Max(T, -40.0), 200.0), self.oil_m, self.oil_n, xp=sp)
+
+    @classmethod
+    def of(
+        cls,
+        gearbox: Gearbox,
+        *,
+        speed: float | None = None,
+        torque: float | None = None,
+        ambient: float | None = None,
+        duration: float = TEN_HOURS,
+    ) -> Scale:
+        """The scale of a gearbox.
+
+        Parameters
+        ----------
+        gearbox : Gearbox
+        speed, torque : float or None
+            Typical magnitudes of its operation, [1/min] and [N m]; by default half of the training range
+        ambient : float or None
+            [degC]; by default the definition's
+        duration : float
+            Of a recording, [s]
+
+        Examples
+        --------
+        >>> from models.gearbox import load_gearbox
+        >>> scale = Scale.of(load_gearbox("fzg"), speed=2600.0, torque=94.0)
+        >>> round(scale.conductance, 1), round(scale.viscosity, 1)
+        (6.9, 8.1)
+        """
+        speed = 0.5 * max(map(abs, gearbox.training.speed_rpm)) if speed is None else speed
+        torque = 0.5 * max(map(abs, gearbox.training.torque_Nm)) if torque is None else torque
+        ambient = gearbox.ambient.temperature_degC if ambient is None else ambient
+        network, losses, oil = gearbox.network(), gearbox.losses(), gearbox.lubricant()
+        start = {symbol(p.name): p.start for p in network.parameters}
+        boundaries = {node.name for node in network.nodes if node.temperature is not None}
+        here = {symbol(f"T_{name}"): ambient for name in boundaries}
+        here |= {symbol(f"T_{part.name}"): ambient + TYPICAL_RISE for part in network.parts}
+        here |= {symbol(name): value for name, value in network.inputs.items()}
+        here |= {symbol("speed"): speed, symbol("torque"): torque, symbol("time"): 0.0}
+        outward = [link.conductance for link in network.links if boundaries & set(link.nodes)]
+        conductance = float(sum(law.xreplace(start | here).evalf() for law in outward))
+        at = [[ambient + TYPICAL_RISE] * len(losses.temperature_nodes)]
+        loss = float(losses.power([speed], [torque], at).sum())
+        temperature = min(max(ambient + loss / max(conductance, 1e-9), ambient + COOLEST_RISE), HOTTEST)
+        return cls(
+            speed=speed,
+            torque=torque,
+            loss=loss,
+            conductance=conductance,
+            capacity=max(float(sp.sympify(part.capacity).xreplace(start)) for part in network.parts),
+            temperature=max(temperature, ambient + COOLEST_RISE),
+            ambient=ambient,
+            duration=duration,
+            oil_m=oil.m,
+            oil_n=oil.n,
+        )

@@ -1,0 +1,42 @@
+"""A native FMU in a host written in C, without Python: as delivered, and under AddressSanitizer and UBSan."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from tests.contract.native_hosts import SANITIZED, Unpacked, compiled, needs_compiler, run, sanitized, unpacked
+
+pytestmark = needs_compiler
+
+
+@pytest.fixture(scope="module")
+def fmu(fzg_native: Path, tmp_path_factory: pytest.TempPathFactory) -> Unpacked:
+    return unpacked(fzg_native, tmp_path_factory.mktemp("c_host"))
+
+
+def reference(fmu: Unpacked, folder: Path) -> list[str]:
+    """Arguments of ``life.c``: the FMU's own reference run, Booleans left out, and where its columns belong."""
+    tables = [pd.read_csv(fmu.folder / f"documentation/reference_{side}.csv") for side in ("in", "out")]
+    tables[1] = tables[1][["time", *fmu.named("output")]]
+    files = [folder / "in.csv", folder / "out.csv"]
+    for table, file in zip(tables, files, strict=True):
+        table.to_csv(file, index=False)
+    columns = [fmu.references(*table.columns[1:]) for table in tables]
+    return [*columns, fmu.references("initial.T"), fmu.references("in_domain"), *map(str, files)]
+
+
+def test_the_whole_life_as_delivered(fmu: Unpacked, tmp_path: Path) -> None:
+    host = compiled("life", fmu, tmp_path / "life")
+    assert run([host, *fmu.arguments, *reference(fmu, tmp_path)]) == "done\n"
+
+
+def test_the_whole_life_under_the_sanitizers(fmu: Unpacked, tmp_path: Path) -> None:
+    host = compiled("life", fmu, tmp_path / "life", *SANITIZED)
+    library = sanitized(fmu, tmp_path / "sanitized.so")
+    arguments = [str(library), *fmu.arguments[1:], *reference(fmu, tmp_path)]
+    options = {"ASAN_OPTIONS": "detect_leaks=1:abort_on_error=0", "UBSAN_OPTIONS": "print_stacktrace=1"}
+    assert run([host, *arguments], env=os.environ | options) == "done\n"

@@ -1,0 +1,216 @@
+"""The native FMU in the clients that users have: all give the same numbers for the same 600 s."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import zipfile
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from fmpy import simulate_fmu
+
+from builder.native_compile import compile_libraries
+from tests.contract.fmu_host import hosted
+from tests.contract.native_hosts import SOURCES, Unpacked, compiled, needs_compiler, run, unpacked
+
+AGREEMENT = 1e-9  # of every output, relative to its value or 1
+STEPS = 600
+WINE = shutil.which("wine64") or shutil.which("wine")
+
+
+@pytest.fixture(scope="module")
+def fmu(fzg_native: Path, tmp_path_factory: pytest.TempPathFactory) -> Unpacked:
+    return unpacked(fzg_native, tmp_path_factory.mktemp("clients"))
+
+
+@pytest.fixture(scope="module")
+def inputs(fmu: Unpacked) -> pd.DataFrame:
+    """One row per second, in which all four inputs change: every client must hold them for the same second."""
+    t = np.arange(STEPS + 1.0)
+    return pd.DataFrame(
+        {
+            "time": t,
+            "speed": 250.0 + 200.0 * np.sin(t / 60.0),
+            "torque": 80.0 + 60.0 * np.cos(t / 45.0),
+            "T_ambient": 293.15 + t / 100.0,
+            "air_speed": 2.0 + (t // 100) % 3,
+        }
+    )
+
+
+@pytest.fixture(scope="module")
+def expected(fmu: Unpacked, fzg_native: Path, inputs: pd.DataFrame) -> np.ndarray:
+    """Outputs at the end of every second, from plain FMI calls."""
+    rows = []
+    with hosted(fzg_native, inputs.iloc[0, 1:].to_dict()) as host:
+        for row in inputs.iloc[:-1].itertuples():
+            host.set(speed=row.speed, torque=row.torque, T_ambient=row.T_ambient, air_speed=row.air_speed)
+            host.step(1.0)
+            rows.append(host.get(*fmu.named("output")))
+    return np.array(rows)
+
+
+def assert_agree(found: np.ndarray, expected: np.ndarray, names: list[str]) -> None:
+    assert found.shape == expected.shape
+    difference = np.abs(found - expected) / np.maximum(1.0, np.abs(expected))
+    worst = np.unravel_index(np.argmax(difference), difference.shape)
+    assert difference[worst] <= AGREEMENT, f"{names[worst[1]]} at row {worst[0]}: {difference[worst]:.3g}"
+
+
+# ---------------------------------------------------------------------- FMPy
+
+
+def simulated(path: Path, inputs: pd.DataFrame, names: list[str]) -> np.ndarray:
+    """The same seconds by FMPy's ``simulate_fmu``."""
+    result = simulate_fmu(
+        str(path), stop_time=float(STEPS), output_interval=1.0, input=inputs.to_records(index=False), output=names,
+        start_values=inputs.iloc[0, 1:].to_dict(),
+    )  # fmt: skip
+    return np.array([list(row)[1:] for row in result[1:]])
+
+
+def test_fmpy_simulates(fzg_native: Path, fmu: Unpacked, inputs: pd.DataFrame, expected: np.ndarray) -> None:
+    names = fmu.named("output")
+    assert_agree(simulated(fzg_native, inputs, names), expected, names)
+
+
+def test_fmpy_ends_at_a_refused_step(fzg_native: Path, inputs: pd.DataFrame) -> None:
+    """In a process of its own: a host that is not told to end tries the same step for ever."""
+    program = (
+        "import sys, numpy as np; from fmpy import simulate_fmu\n"
+        "rows = [(t, 300.0, 100.0, 293.15 if t < 10 else 20.0, 2.0) for t in range(20)]\n"
+        "kinds = [(n, float) for n in ('time', 'speed', 'torque', 'T_ambient', 'air_speed')]\n"
+        "done = simulate_fmu(sys.argv[1], stop_time=20.0, output_interval=1.0, input=np.array(rows, dtype=kinds))\n"
+        "print(done['time'][-1])"
+    )
+    said = run([sys.executable, "-c", program, fzg_native])
+    assert "if 20 degC is meant, set 293.15" in said
+    assert 9.0 <= float(said.splitlines()[-1]) <= 10.0
+
+
+def test_the_command_line_of_fmpy_validates_and_simulates(fzg_native: Path, tmp_path: Path) -> None:
+    fmpy_command = [sys.executable, "-m", "fmpy"]
+    assert "No problems found" in run([*fmpy_command, "validate", fzg_native])
+    output = tmp_path / "result.csv"
+    run([*fmpy_command, "simulate", "--stop-time", "60", "--output-file", output, fzg_native])
+    assert len(pd.read_csv(output)) > 10
+
+
+@pytest.mark.skipif(shutil.which("cmake") is None, reason="no cmake")
+@needs_compiler
+def test_fmpy_compiles_the_sources_that_it_carries(
+    fzg_native: Path, fmu: Unpacked, inputs: pd.DataFrame, expected: np.ndarray, tmp_path: Path
+) -> None:
+    compiled_here = tmp_path / "fzg.fmu"
+    with zipfile.ZipFile(fzg_native) as archive, zipfile.ZipFile(compiled_here, "w") as bare:
+        for name in archive.namelist():
+            if not name.startswith("binaries/"):
+                bare.writestr(name, archive.read(name))
+    run([sys.executable, "-m", "fmpy", "compile", compiled_here], cwd=tmp_path)
+    names = fmu.named("output")
+    assert_agree(simulated(compiled_here, inputs, names), expected, names)
+
+
+# ---------------------------------------------------------------------- Open Simulation Platform
+
+
+def test_libcosimpy_simulates(fzg_native: Path, fmu: Unpacked, inputs: pd.DataFrame, expected: np.ndarray) -> None:
+    pytest.importorskip("libcosimpy")
+    from libcosimpy.CosimExecution import CosimExecution
+    from libcosimpy.CosimManipulator import CosimManipulator
+    from libcosimpy.CosimObserver import CosimObserver
+    from libcosimpy.CosimSlave import CosimLocalSlave
+
+    names, second = fmu.named("output"), 10**9
+    execution = CosimExecution.from_step_size(step_size=second)
+    index = execution.add_local_slave(CosimLocalSlave(fmu_path=str(fzg_native), instance_name="gearbox"))
+    manipulator, observer = CosimManipulator.create_override(), CosimObserver.create_last_value()
+    execution.add_manipulator(manipulator)
+    execution.add_observer(observer)
+    given, wanted = ([fmu.variables[n].valueReference for n in group] for group in (inputs.columns[1:], names))
+    rows = []
+    for values in inputs.iloc[:-1, 1:].to_numpy().tolist():
+        assert manipulator.slave_real_values(index, given, values)
+        assert execution.step()
+        rows.append(list(observer.last_real_values(slave_index=index, variable_references=wanted)))
+    assert_agree(np.array(rows), expected, names)
+
+
+# ---------------------------------------------------------------------- ecos
+
+
+def test_ecos_simulates(fzg_native: Path, fmu: Unpacked, inputs: pd.DataFrame, expected: np.ndarray) -> None:
+    ecospy = ecos()
+    names, rows = fmu.named("output"), []
+    with ecospy.EcosSimulationStructure() as structure:
+        structure.add_model("gearbox", str(fzg_native))
+        with ecospy.EcosSimulation(structure=structure, step_size=1.0) as simulation:
+            simulation.init()
+            for row in inputs.iloc[:-1, 1:].to_dict("records"):
+                for name, value in row.items():
+                    simulation.set_real(f"gearbox::{name}", value)
+                simulation.step()
+                rows.append([simulation.get_real(f"gearbox::{name}") for name in names])
+            simulation.terminate()
+    assert_agree(np.array(rows), expected, names)
+
+
+def ecos():
+    """ecospy; skips where it or a library that it needs (Debian: libtbb12) is missing."""
+    if find_spec("ecospy") is None:
+        pytest.skip("ecospy is not installed")
+    try:
+        import ecospy
+    except OSError as error:
+        pytest.skip(f"ecospy cannot be loaded: {error}")
+    return ecospy
+
+
+# ---------------------------------------------------------------------- C
+
+
+def played(
+    host: list[str], fmu: Unpacked, library: Path, table: pd.DataFrame, folder: Path, **options: object
+) -> np.ndarray:
+    """What ``play.c`` prints."""
+    file = folder / "in.csv"
+    table.to_csv(file, index=False)
+    columns = [fmu.references(*table.columns[1:]), fmu.references(*fmu.named("output"))]
+    text = run([*host, library, *fmu.arguments[1:], *columns, file], **options)
+    return np.array([[float(cell) for cell in line.split(",")] for line in text.splitlines()])
+
+
+@needs_compiler
+@pytest.mark.skipif(sys.platform == "win32", reason="written for dlopen")
+def test_a_host_in_c_simulates(fmu: Unpacked, inputs: pd.DataFrame, expected: np.ndarray, tmp_path: Path) -> None:
+    host = compiled("play", fmu, tmp_path / "play")
+    assert_agree(played([str(host)], fmu, fmu.library, inputs, tmp_path), expected, fmu.named("output"))
+
+
+# ---------------------------------------------------------------------- Windows, under wine
+
+
+@pytest.mark.slow  # zig compiles its C library for Windows first, which takes minutes
+@pytest.mark.skipif(WINE is None, reason="no wine (Debian: wine64)")
+@pytest.mark.skipif(find_spec("ziglang") is None, reason="no ziglang, which cross-compiles")
+def test_the_windows_library_gives_the_same_under_wine(
+    fmu: Unpacked, inputs: pd.DataFrame, expected: np.ndarray, tmp_path: Path
+) -> None:
+    sources = {path.name: path.read_bytes() for path in (fmu.folder / "sources").iterdir()}
+    library, host = tmp_path / "fzg.dll", tmp_path / "play.exe"
+    library.write_bytes(compile_libraries(sources, "win64").libraries["win64"])
+    zig = [sys.executable, "-m", "ziglang", "cc", "-target", "x86_64-windows-gnu", "-O1", "-w"]
+    run([*zig, f"-I{fmu.folder / 'sources'}", "-o", host, SOURCES / "play.c"])
+    environment = os.environ | {"WINEPREFIX": str(tmp_path / "prefix"), "WINEDEBUG": "-all"}
+    try:
+        found = played([str(WINE), str(host)], fmu, library, inputs, tmp_path, env=environment)
+    finally:  # wine leaves its server behind for a while
+        server = shutil.which("wineserver") or "wineserver"
+        subprocess.run([server, "-k"], env=environment, check=False, capture_output=True)
+    assert_agree(found, expected, fmu.named("output"))

@@ -1,0 +1,422 @@
+"""Recordings: what is read, converted, cleaned, bridged and noted, and which rows count."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from diagnosis.mapping import RecordingMapping, dimension_of, read_mapping
+from diagnosis.recording import Recording, check_holdout, read_recordings
+from diagnosis.recording_cleaning import bridged, dropouts, outliers, resolution_of, stuck_rows
+from diagnosis.recording_plausible import check_plausible
+from diagnosis.recording_time import part_of
+from models.errors import InputError
+from models.gearbox import Gearbox
+from models.network import ThermalNetwork
+from models.table_file import Limits
+
+
+@pytest.fixture(scope="module")
+def network(fzg: Gearbox) -> ThermalNetwork:
+    return fzg.network()
+
+
+def table(rows: int = 200, step: float = 10.0, seed: int = 0) -> pd.DataFrame:
+    """A believable recording: warming up at a speed that changes now and then."""
+    rng = np.random.default_rng(seed)
+    time = step * np.arange(rows)
+    speed = 1500.0 + 500.0 * (np.arange(rows) // 40 % 3)
+    warm = 40.0 * (1.0 - np.exp(-time / 3000.0))
+    return pd.DataFrame({
+        "time_s": time,
+        "speed_rpm": speed,
+        "torque_Nm": np.full(rows, 80.0),
+        "T_ambient_degC": np.round(22.0 + rng.normal(0.0, 0.1, rows), 1),
+        "T_oil_degC": np.round(22.0 + warm + rng.normal(0.0, 0.2, rows), 1),
+        "T_pinion_degC": np.round(22.0 + 1.1 * warm + rng.normal(0.0, 0.2, rows), 1),
+        "P_loss_W": np.round(0.02 * speed * np.pi / 30.0 * 80.0 + rng.normal(0.0, 3.0, rows), 1),
+    })  # fmt: skip
+
+
+def write(path: Path, content: pd.DataFrame) -> Path:
+    if path.suffix == ".parquet":
+        content.to_parquet(path)
+    else:
+        content.to_csv(path, index=False)
+    return path
+
+
+def read(path: Path | str, network: ThermalNetwork, mapping: str = "", **options: object) -> Recording:
+    if mapping:
+        (Path(str(path).partition("@")[0]).parent / "mapping.toml").write_text("schema = 1\n" + mapping)
+    return read_recordings([path], network, **options)[0]  # type: ignore[arg-type]
+
+
+def channel(recording: Recording, name: str) -> np.ndarray:
+    return next(c.values for c in recording.channels if c.name == name)
+
+
+# ---------------------------------------------------------------------- reading
+
+
+@pytest.mark.parametrize("name", ["run.csv", "run.csv.gz", "run.parquet"])
+def test_the_same_recording_from_every_kind_of_file(tmp_path: Path, network: ThermalNetwork, name: str) -> None:
+    source = table()
+    recording = read(write(tmp_path / name, source), network)
+    assert recording.name == "run"
+    np.testing.assert_array_equal(recording.time, source["time_s"])
+    np.testing.assert_array_equal(recording.inputs["speed"], source["speed_rpm"])
+    assert [c.name for c in recording.channels] == ["oil", "pinion", "P_loss"]
+    np.testing.assert_array_equal(channel(recording, "oil"), source["T_oil_degC"])
+    assert {c.name: c.resolution for c in recording.channels} == {"oil": 0.1, "pinion": 0.1, "P_loss": 0.1}
+    assert recording.segments == (slice(0, 200),)
+    assert set(recording.inputs) == {"speed", "torque", *network.inputs}
+    assert any("air_speed_m_s was not recorded" in note for note in recording.notes)
+
+
+def test_an_mdf_file_with_slow_channels(tmp_path: Path, network: ThermalNetwork) -> None:
+    asammdf = pytest.importorskip("asammdf")
+    source = table()
+    time = source["time_s"].to_numpy()
+    slow = slice(3, None, 6)
+    mdf = asammdf.MDF(version="4.10")
+    signal = asammdf.Signal
+    mdf.append([signal(source["speed_rpm"].to_numpy(), time, name="speed_rpm", unit="rpm"),
+                signal(source["torque_Nm"].to_numpy(), time, name="torque_Nm", unit="Nm")])  # fmt: skip
+    mdf.append([signal(source["T_oil_degC"].to_numpy()[slow] + 273.15, time[slow] + 1.0, name="T_oil_degC", unit="K")])
+    mdf.append([signal(source["T_pinion_degC"].to_numpy()[slow], time[slow] - 1.0, name="T_pinion_degC")])
+    mdf.save(tmp_path / "run.mf4", overwrite=True)
+    mdf.close()
+    recording = read(tmp_path / "run.mf4", network)
+    oil = channel(recording, "oil")
+    assert np.isfinite(oil).sum() == len(time[slow])
+    np.testing.assert_allclose(oil[slow], source["T_oil_degC"].to_numpy()[slow], atol=1e-9)
+    np.testing.assert_array_equal(channel(recording, "pinion")[slow], source["T_pinion_degC"].to_numpy()[slow])
+    np.testing.assert_array_equal(recording.inputs["speed"], source["speed_rpm"])
+    assert recording.start is not None
+
+
+def test_iso_times_and_their_start(tmp_path: Path, network: ThermalNetwork) -> None:
+    source = table()
+    stamps = pd.Timestamp("2017-09-01T08:00:00", tz="+02:00") + pd.to_timedelta(source["time_s"], unit="s")
+    source = source.rename(columns={"time_s": "time_utc"}).assign(time_utc=[s.isoformat() for s in stamps])
+    recording = read(write(tmp_path / "run.csv", source), network)
+    assert recording.start == datetime(2017, 9, 1, 6, tzinfo=UTC)
+    assert recording.time[-1] == 1990.0
+    part = read(f"{tmp_path / 'run.csv'}@100..200", network)  # seconds since the first row
+    assert (part.start, len(part.time)) == (datetime(2017, 9, 1, 6, 1, 40, tzinfo=UTC), 10)
+    parquet = source.assign(time_utc=pd.to_datetime(source["time_utc"]))
+    assert read(write(tmp_path / "run.parquet", parquet), network).start == recording.start
+
+
+def test_parts_of_a_file(tmp_path: Path, network: ThermalNetwork) -> None:
+    source = table()
+    path = write(tmp_path / "run.csv", source.assign(time_s=source["time_s"] + 100.0))
+    first, second = read_recordings([f"{path}@100..600", f"{path}@600.."], network)
+    assert (len(first.time), len(second.time)) == (50, 150)  # the end does not belong to a part
+    assert first.name != second.name
+    check_holdout([first], [second])
+    with pytest.raises(InputError, match="is held out, but has the rows of 500 ... 590 s in common with"):
+        check_holdout([first], read_recordings([f"{path}@500..700"], network))
+
+
+def test_a_date_as_the_end_of_a_part_includes_its_day() -> None:
+    part = part_of("2017-09-01..2017-09-02")
+    assert (part.start, part.end) == (datetime(2017, 9, 1, tzinfo=UTC), datetime(2017, 9, 3, tzinfo=UTC))
+
+
+def test_a_part_of_a_large_file_is_read_although_the_whole_is_not(tmp_path: Path, network: ThermalNetwork) -> None:
+    path = write(tmp_path / "run.csv", table(2000))
+    limits = Limits(rows=500, size_bytes=10_000)
+    with pytest.raises(InputError, match="run.csv: has .* GB, more than"):
+        read(path, network, limits=limits)
+    assert len(read(f"{path}@0..1000", network, limits=limits).time) == 100
+
+
+@pytest.mark.parametrize("name", ["run.csv", "run.parquet"])
+def test_rows_are_counted_through_all_parts_of_a_file(
+    tmp_path: Path, network: ThermalNetwork, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    monkeypatch.setattr("models.table_file.CHUNK_ROWS", 30)
+    source = table()
+    source.loc[130, "torque_Nm"] = np.inf
+    with pytest.raises(InputError, match="torque_Nm is inf in row 131"):
+        read(write(tmp_path / name, source), network)
+
+
+def test_names_stay_different(tmp_path: Path, network: ThermalNetwork) -> None:
+    paths = []
+    for folder in ("rig_1", "rig_2"):
+        (tmp_path / folder).mkdir()
+        paths.append(write(tmp_path / folder / "train.csv", table(seed=len(paths))))
+    assert [r.name for r in read_recordings(paths, network)] == ["rig_1_train", "rig_2_train"]
+
+
+# ---------------------------------------------------------------------- mapping
+
+
+def test_a_mapping_names_converts_and_describes(tmp_path: Path, network: ThermalNetwork) -> None:
+    source = table()
+    logged = pd.DataFrame({
+        "t": source["time_s"] / 60.0,
+        "n": source["speed_rpm"] * np.pi / 30.0,
+        "M": source["torque_Nm"] / 2.0e3,
+        "sump": source["T_oil_degC"] * 1.8 + 32.0,
+        "loss": source["P_loss_W"] / 1e3,
+        "valve": source["T_oil_degC"],
+    })  # fmt: skip
+    recording = read(write(tmp_path / "run.csv", logged), network, """
+        time = { column = "t", unit = "min" }
+        constants = { T_ambient = 22.0 }
+        [columns]
+        n = { quantity = "speed", unit = "rad/s" }
+        M = { quantity = "torque", unit = "kN m", scale = 2.0 }
+        loss = { quantity = "P_loss", unit = "kW" }
+        [columns.sump]
+        quantity = "T_oil"
+        unit = "degF"
+        noise = 0.2
+        resolution = 0.1
+        lag_s = 15
+        lag_sd_s = 5
+        bias_sd = 0.5
+        """)  # fmt: skip
+    np.testing.assert_allclose(recording.time, source["time_s"], atol=1e-9)
+    np.testing.assert_allclose(recording.inputs["speed"], source["speed_rpm"])
+    np.testing.assert_allclose(recording.inputs["torque"], 80.0)
+    assert set(recording.inputs["T_ambient"]) == {22.0}
+    oil = next(c for c in recording.channels if c.name == "oil")
+    np.testing.assert_allclose(oil.values, source["T_oil_degC"])
+    assert (oil.noise, oil.resolution, oil.lag_s, oil.lag_sd_s, oil.bias_sd) == (0.2, 0.1, 15.0, 5.0, 0.5)
+    np.testing.assert_allclose(channel(recording, "P_loss"), source["P_loss_W"])
+    assert list(recording.auxiliary) == ["valve"]
+
+
+def test_semicolons_decimal_commas_and_texts_for_missing(tmp_path: Path, network: ThermalNetwork) -> None:
+    source = table()
+    source.loc[5, "T_oil_degC"] = np.nan
+    path = tmp_path / "run.csv"
+    source.to_csv(path, index=False, sep=";", decimal=",", na_rep="Bad")
+    recording = read(path, network, 'csv = { separator = ";", decimal = "," }\nmissing = ["Bad"]\n')
+    np.testing.assert_array_equal(channel(recording, "oil"), source["T_oil_degC"])
+
+
+def test_rows_and_valid_range_of_a_mapping(tmp_path: Path, network: ThermalNetwork) -> None:
+    mapping = """rows = ["0..500", "1000.."]
+        [columns.T_oil_degC]
+        quantity = "T_oil"
+        rows = ["1000.."]
+        valid = [0, 45]
+        """
+    source = table()
+    recording = read(write(tmp_path / "run.csv", source), network, mapping)
+    assert (len(recording.time), len(recording.segments)) == (150, 2)
+    oil = channel(recording, "oil")
+    kept = source["T_oil_degC"].to_numpy()[100:]
+    assert np.isnan(oil[:50]).all()
+    np.testing.assert_array_equal(oil[50:], np.where(kept > 45.0, np.nan, kept))
+
+
+def test_the_own_mapping_comes_before_that_of_the_folder_and_a_definition_is_none(
+    tmp_path: Path, network: ThermalNetwork
+) -> None:
+    path = write(tmp_path / "run.csv", table().rename(columns={"T_oil_degC": "sump"}))
+    (tmp_path / "mapping.toml").write_text('schema = 1\n[columns.sump]\nquantity = "auxiliary"\n')
+    (tmp_path / "run.toml").write_text("schema = 1\n[[stage]]\n")
+    assert "sump" in read(path, network).auxiliary
+    (tmp_path / "run.toml").write_text('schema = 1\n[columns.sump]\nquantity = "T_oil"\n')
+    assert "oil" in {c.name for c in read(path, network).channels}
+
+
+def test_every_unit_of_a_mapping_converts_one_way_and_back(tmp_path: Path) -> None:
+    path = tmp_path / "m.toml"
+    path.write_text('schema = 1\n[columns.x]\nquantity = "T_oil"\nunit = "K"\nscale = 0.1\n')
+    mapping = read_mapping(path)
+    assert isinstance(mapping, RecordingMapping)
+    factor, offset = mapping.columns["x"].conversion(None)
+    assert 2931.5 * factor + offset == pytest.approx(20.0)
+    assert [dimension_of(q) for q in ("speed", "torque", "air_speed")] == ["speed", "torque", "air speed"]
+
+
+# ---------------------------------------------------------------------- cleaning
+
+
+def test_gaps_split_and_short_holes_are_bridged(tmp_path: Path, network: ThermalNetwork) -> None:
+    source = table()
+    source.loc[10:12, "speed_rpm"] = np.nan  # 40 s
+    source.loc[50:70, "torque_Nm"] = np.nan  # 220 s
+    source = source.drop(index=range(120, 140))
+    recording = read(write(tmp_path / "run.csv", source), network)
+    assert recording.inputs["speed"][11] == 1500.0
+    assert len(recording.time) == 200 - 20 - 21
+    assert [(rows.start, rows.stop) for rows in recording.segments] == [(0, 50), (50, 99), (99, 159)]
+    assert all(np.isfinite(values).all() for values in recording.inputs.values())
+    assert any("torque_Nm is missing in 21 of 180 rows" in n and "rows 51-71" in n for n in recording.notes)
+    longer = read(tmp_path / "run.csv", network, max_gap_s=600.0)
+    assert longer.segments == (slice(0, 180),)
+
+
+def test_a_slowly_sampled_input_is_no_row_of_holes() -> None:
+    time = np.arange(0.0, 1000.0, 10.0)
+    values = np.where(np.arange(100) % 20 == 0, time, np.nan)
+    filled, known = bridged(time, values, 60.0)
+    np.testing.assert_allclose(filled[:81], time[:81])
+    assert known.all()
+
+
+def test_outliers_go_and_steps_waves_and_noise_stay() -> None:
+    rng = np.random.default_rng(0)
+    values = 40.0 + rng.normal(0.0, 0.2, 500)
+    values[200:] += 30.0
+    values[300:360] += 12.0 * np.sin(np.linspace(0.0, np.pi, 60))
+    assert not outliers(values, least=8.0).any()
+    values[[100, 250, 251, 400]] += [60.0, -50.0, -50.0, 9.0]
+    assert np.flatnonzero(outliers(values, least=8.0)).tolist() == [100, 250, 251, 400]
+
+
+def test_the_top_of_a_sharp_wave_is_no_outlier() -> None:
+    """From a nacelle's temperature while a fan runs, ten minutes from row to row."""
+    values = np.concatenate([np.full(30, 28.0), [27.85, 15.94, 11.88, 13.78, 20.4], np.full(30, 26.0)])
+    values += 0.3 * np.sin(np.arange(len(values)))
+    assert not outliers(values, least=8.0).any()
+
+
+def test_dropouts_to_a_constant_go_and_a_hanging_sensor_stays() -> None:
+    values = 60.0 + 0.1 * (np.arange(400) % 7)
+    values[100:150] = 0.0
+    values[300:] = values[300]
+    values[200:220] = [80.0] * 10 + [100.0] * 10  # a start in steps, not away and back
+    values[220:] += 60.0
+    assert np.flatnonzero(dropouts(values)).tolist() == list(range(100, 150))
+    time = 60.0 * np.arange(400.0)
+    other = 40.0 + 0.05 * np.arange(400.0)
+    first, end, which, moved = stuck_rows(time, {"oil": values, "pinion": other})["oil"]
+    assert (first, end, which) == (300, 400, "pinion")
+    assert moved == pytest.approx(99 * 0.05)
+
+
+def test_cleaning_is_told_with_rows(tmp_path: Path, network: ThermalNetwork) -> None:
+    source = table()
+    source.loc[30, "T_oil_degC"] = -999.0
+    source.loc[60, "T_pinion_degC"] = 180.0
+    recording = read(write(tmp_path / "run.csv", source), network)
+    assert np.isnan(channel(recording, "oil")[30])
+    assert np.isnan(channel(recording, "pinion")[60])
+    notes = "\n".join(recording.notes)
+    assert "T_oil_degC: 1 of 200 values (row 31) outside" in notes
+    assert "T_pinion_degC: 1 outliers and dropouts in row 61" in notes
+
+
+@pytest.mark.parametrize("quantum", [0.1, 0.0625, 1.0, 0.25 * 5.0 / 9.0])
+def test_the_resolution_is_found(quantum: float) -> None:
+    values = quantum * np.round(np.random.default_rng(0).normal(300.0, 20.0, 500) / quantum)
+    assert resolution_of(values) == pytest.approx(quantum, rel=1e-5)
+
+
+def test_a_comment_between_rows_is_skipped_and_a_hash_in_a_cell_is_not(tmp_path: Path, network: ThermalNetwork) -> None:
+    lines = table().to_csv(index=False).splitlines()
+    path = tmp_path / "run.csv"
+    path.write_text("\n".join(["# rig 7", *lines[:50], "# coffee", *lines[50:]]))
+    assert len(read(path, network).time) == 200
+    path.write_text("\n".join(["# rig 7", *lines[:50], lines[50].replace(",80.0,", ",#REF!,"), *lines[51:]]))
+    with pytest.raises(InputError, match=r"torque_Nm holds '#REF!' at row 50"):
+        read(path, network)
+
+
+# ---------------------------------------------------------------------- what counts once
+
+
+def test_a_copy_in_another_form_is_still_the_same_rows(tmp_path: Path, network: ThermalNetwork) -> None:
+    train = read_recordings([write(tmp_path / "a.csv", table())], network)
+    copy = table().iloc[60:].reset_index(drop=True)
+    copy["time_s"] = copy["time_s"] - copy["time_s"].iloc[0]
+    held = read_recordings([write(tmp_path / "b.parquet", copy)], network)
+    with pytest.raises(
+        InputError, match=r"b.parquet: is held out, but has \d+ of \d+ distinct rows in common with .*a"
+    ):
+        check_holdout(train, held)
+    check_holdout(train, read_recordings([write(tmp_path / "c.csv", table(seed=1))], network))
+
+
+def test_a_recording_named_twice_is_refused(tmp_path: Path, network: ThermalNetwork) -> None:
+    path = write(tmp_path / "a.csv", table())
+    with pytest.raises(InputError, match="a.csv: has the rows of 0 ... 1990 s in common with .*; name every row once"):
+        read_recordings([path, path], network)
+
+
+def test_faults_of_all_files_come_at_once(tmp_path: Path, network: ThermalNetwork) -> None:
+    one = write(tmp_path / "one.csv", table().drop(columns="torque_Nm").assign(T_oil_degC=np.nan))
+    two = write(tmp_path / "two.csv", table().assign(time_s=1.0))
+    with pytest.raises(InputError) as caught:
+        read_recordings([one, two], network)
+    lines = str(caught.value).splitlines()
+    assert len(lines) == 3
+    for part in ("one.csv: column torque_Nm is missing", "one.csv: T_oil_degC has no value", "two.csv: time_s is 1"):
+        assert any(part in line for line in lines), part
+
+
+# ---------------------------------------------------------------------- real and foreign recordings
+
+
+def test_recordings_of_a_foreign_plant_are_read_and_plausible(fzg: Gearbox, recordings_folder: Path) -> None:
+    network = fzg.network()
+    folders = sorted((recordings_folder / "fzg_open").glob("rig_*"))
+    assert folders
+    for folder in folders:
+        train = read_recordings(sorted(folder.glob("train_*.csv.gz")), network)
+        hold = read_recordings(sorted(folder.glob("hold_*.csv.gz")), network)
+        check_holdout(train, hold)
+        check_plausible([*train, *hold], network, fzg.losses())
+        assert all(not r.notes and len(r.segments) == 1 for r in (*train, *hold))
+
+
+@pytest.mark.parametrize(("changes", "says"), [
+    ({"speed_rpm": (np.pi / 30.0, 0.0)}, "speed seems to be in rad/s"),
+    ({"torque_Nm": (1e-3, 0.0)}, "torque seems to be in kN m"),
+    ({"torque_Nm": (1e3, 0.0)}, "torque seems to be in N mm"),
+    ({"T_ambient_degC": (1.8, 32.0)}, "T_ambient seems to be in degF"),
+    ({"T": (1.8, 32.0)}, "temperatures seem to be in degF"),
+    ({"speed_rpm": (0.05, 0.0)}, "is it of another gearbox"),
+])  # fmt: skip
+def test_wrong_units_and_other_gearboxes_are_found_by_the_model(
+    tmp_path: Path, fzg: Gearbox, recordings_folder: Path, changes: dict[str, tuple[float, float]], says: str
+) -> None:
+    source = pd.read_csv(recordings_folder / "fzg_open" / "rig_1" / "train_2.csv.gz").drop(columns="P_loss_W")
+    for column in source.columns:
+        factor, offset = changes.get(column, changes.get("T", (1.0, 0.0)) if column.startswith("T_") else (1.0, 0.0))
+        source[column] = source[column] * factor + offset
+    recordings = read_recordings([write(tmp_path / "run.csv", source)], fzg.network())
+    with pytest.raises(InputError, match=f"run.csv: .*{says}"):
+        check_plausible(recordings, fzg.network(), fzg.losses())
+
+
+MAPPING_OF_THE_WIND_TURBINES = """
+time = { column = "time_utc", unit = "iso8601" }
+[columns]
+Ds_avg = { quantity = "speed", unit = "rpm" }
+Cm_avg = { quantity = "torque", unit = "N.m" }
+Yt_avg = { quantity = "T_ambient", unit = "degC" }
+Gost_avg = { quantity = "T_oil", unit = "degC", noise = 0.3 }
+Gb1t_avg = { quantity = "T_bearing_1", unit = "degC" }
+Gb2t_avg = { quantity = "T_bearing_3", unit = "degC" }
+"""
+
+
+def test_two_real_wind_turbine_gearboxes(tmp_path: Path, network: ThermalNetwork, recordings_folder: Path) -> None:
+    mapping = tmp_path / "mapping.toml"
+    mapping.write_text("schema = 1\n" + MAPPING_OF_THE_WIND_TURBINES)
+    folder = recordings_folder / "la_haute_borne"
+    for turbine, rows in (("R80721", 40_675), ("R80736", 41_602)):
+        whole = read_recordings([folder / f"{turbine}.csv.gz"], network, mapping=mapping)[0]
+        assert 0.98 * rows < len(whole.time) <= rows
+        assert len(whole.segments) > 10
+        removed = sum(int(np.isnan(c.values).sum()) for c in whole.channels)
+        assert removed < 40  # glitches of the logger; a wave of ten-minute means is none
+        autumn = read_recordings([f"{folder / turbine}.csv.gz@2017-09-01..2017-10-31"], network, mapping=mapping)[0]
+        assert autumn.start == datetime(2017, 9, 1, tzinfo=UTC)
+        assert 60.0 < autumn.time[-1] / 86400.0 < 61.0
+        assert autumn.inputs["speed"].max() < 2000.0
