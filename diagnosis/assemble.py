@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -69,7 +68,6 @@ def assembled(
     shown = _shown(findings, location)
     missing = _missing_heat(case, found, remaining if findings else first, shown) if detected else ()
     predictions = _predictions(case, found)
-    unexplained = verdict == "unexplained"
     remaining_p, note = _remaining(found, remaining, case, detected=detected)
     return Diagnosis(
         verdict=verdict,
@@ -79,7 +77,7 @@ def assembled(
         p_value=float(min(1.0, np.exp(-max(found.stages[0].log_e_value, -50.0)))),
         false_alarm_rate=false_alarm_rate,
         location=location,
-        findings=tuple(replace(f, probability=0.5 * f.probability) for f in findings) if unexplained else findings,
+        findings=findings,
         calibration=_calibration(found.final),
         train=_fits(case, predictions, "train"),
         holdout=_fits(case, predictions, "holdout"),

@@ -84,9 +84,8 @@ def prepare(gearbox: Gearbox, recordings: Sequence[Recording], holdout: Sequence
         network, channels, lags={c.name: c.lag_s for c in stated if c.lag_s is not None},
         bias_sd={c.name: c.bias_sd for c in stated if c.bias_sd is not None},
     ))  # fmt: skip
-    white, loss_sd = channel_noise(recordings, channels), (0.0, 0.0)
-    if LOSS in channels and LOSS not in white:
-        loss_sd = loss_noise(recordings)
+    white = channel_noise(recordings, channels)
+    loss_sd = loss_noise(recordings) if LOSS in channels else (0.0, 0.0)
     loss_W = typical_loss(model, recordings)
     problems = []
     learnt, judged = pieces(recordings, model.laws.inputs, channels), pieces(holdout, model.laws.inputs, channels)

@@ -13,7 +13,7 @@ import numpy as np
 from joblib import Parallel, delayed
 from scipy.special import log_ndtr
 
-from diagnosis.hypotheses import Hypothesis, Scored, white_column
+from diagnosis.hypotheses import WIDE_PRIOR, Hypothesis, Scored, white_column
 from diagnosis.posterior import Fit, Problem
 from diagnosis.trajectory import NetworkOnGrid
 from models.types import Array
@@ -80,8 +80,8 @@ def extended(base: Explanation, scored: Scored, variant: int) -> tuple[Problem, 
     z = np.array(base.fit.z)
     if h.unknown is not None:
         item = problem.unknowns.items[h.unknown]
-        wide = problem.unknowns.with_prior(h.unknown, item.parameter.sd * 4.0)
-        z[h.unknown] /= 4.0
+        wide = problem.unknowns.with_prior(h.unknown, item.parameter.sd * WIDE_PRIOR)
+        z[h.unknown] /= WIDE_PRIOR
         return problem.changed(unknowns=wide), z
     term = h.term
     assert term is not None  # noqa: S101 - the other case is above

@@ -7,7 +7,7 @@ The scan is linear: one column per combination of shape parameters, judged with 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -120,9 +120,8 @@ def parameter_hypotheses(problem: Problem) -> list[Hypothesis]:
 
 
 def scan(
-    problem: Problem, fit: Fit, marginal: Marginal, hypotheses: Sequence[Hypothesis], *, jobs: int = 1,
-    progress: Callable[[float], None] | None = None,
-) -> list[Scored]:  # fmt: skip
+    problem: Problem, fit: Fit, marginal: Marginal, hypotheses: Sequence[Hypothesis], *, jobs: int = 1
+) -> list[Scored]:
     """The scores of all hypotheses, best first.
 
     Parameters
@@ -132,18 +131,12 @@ def scan(
     hypotheses : sequence of Hypothesis
     jobs : int
         Processes
-    progress : callable, optional
-        Told the share that is done
     """
     chunks = list(_chunks(hypotheses))
     work = (delayed(_scan_chunk)(problem, fit, marginal, chunk) for chunk in chunks)
-    scored: list[Scored] = []
-    results = Parallel(n_jobs=jobs, return_as="generator")(work) if jobs > 1 else (
+    results = Parallel(n_jobs=jobs)(work) if jobs > 1 else (
         _scan_chunk(problem, fit, marginal, chunk) for chunk in chunks)  # fmt: skip
-    for count, result in enumerate(results, start=1):
-        scored += result
-        if progress is not None:
-            progress(count / len(chunks))
+    scored = [one for result in results for one in result]
     return sorted(scored, key=lambda s: -s.log_bayes)
 
 

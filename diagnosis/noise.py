@@ -68,10 +68,10 @@ def channel_noise(recordings: Sequence[Recording], channels: Sequence[str]) -> M
     """White noise of one row of every temperature, [K]: as the rows show it, or as stated where they are too few."""
     result = {}
     for name in channels:
-        found = [c for r in recordings for c in r.channels if c.name == name]
-        stated = [c.noise for c in found if c.noise is not None]
         if name == LOSS:
             continue  # see loss_noise: it goes with the loss
+        found = [c for r in recordings for c in r.channels if c.name == name]
+        stated = [c.noise for c in found if c.noise is not None]
         rows = sum(int(np.isfinite(c.values).sum()) for c in found)
         # What the rows show is worth more than what a data sheet says.
         if stated and rows < FEWEST_ROWS:
@@ -98,7 +98,7 @@ def noise_of(
     loss_W : float
         Typical total loss, [W]
     loss_noise : (float, float)
-        Of the measured total loss where `white` does not state it, see :func:`loss_noise`
+        Of the measured total loss, see :func:`loss_noise`
     heat_fraction : float
         Structural floor: standard deviation of the random heat in every part over `loss_W`, [-]
     """
@@ -111,7 +111,7 @@ def noise_of(
     return Noise(
         channel_sd=np.array([white.get(name, loss_noise[0]) for name in piece.channels]),
         floor_sd=np.array([LOWEST_SD_W if name == LOSS else LOWEST_SD_K for name in piece.channels]),
-        loss_relative_sd=0.0 if LOSS in white else loss_noise[1],
+        loss_relative_sd=loss_noise[1],
         heat_sd=np.where(heavy, heat_fraction * loss_W, 0.0),
         heat_time=HEAT_TIME_S,
         start_sd=np.where(known, START_KNOWN_K, unknown),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -121,8 +120,3 @@ def lag_column(trajectory: Trajectory, node: int, lag: float) -> Array:
     step = 0.5
     T, steps = trajectory.T[:, node], trajectory.piece.steps
     return np.asarray((lagged(T, steps, lag + step) - lagged(T, steps, lag)) / step)
-
-
-def loss_channel(channels: Sequence[str]) -> int | None:
-    """Index of the total loss, None where it is not measured."""
-    return list(channels).index(LOSS) if LOSS in channels else None

@@ -20,6 +20,7 @@ from diagnosis.observation import LOSS
 from diagnosis.open_form import open_hypotheses
 from diagnosis.posterior import Problem
 from diagnosis.predict import predict
+from diagnosis.term_on_grid import TermOnGrid
 from models.mechanisms import Mechanism
 from models.types import Array
 
@@ -231,10 +232,7 @@ def _matters(case: Case, fit: Explanation) -> bool:
     change = np.sqrt(np.mean(np.concatenate(per_z) ** 2, axis=0)) * abs(z)
     if float(change.max(initial=0.0)) > SMALLEST_K:
         return True
-    if h.term.kind in ("sensor", "signal"):
-        # The ordinary tolerance of an instrument is no fault: what counts is the reading's error.
-        return float(change.max(initial=0.0)) > SMALLEST_K
-    heats = mean_heats(fit, h)
+    heats = mean_heats(fit, h)  # none of a fault of an instrument: there the error of the reading counts alone
     return bool(heats) and float(np.mean(np.concatenate(heats))) > SMALLEST_HEAT * case.loss_W
 
 
@@ -245,8 +243,6 @@ def mean_heats(explanation: Explanation, h: Hypothesis) -> Sequence[Array]:
 
 def heats_of(explanation: Explanation, h: Hypothesis) -> Sequence[Array]:
     """Heat of something found, over the intervals of every piece, summed over the parts it warms, [W]."""
-    from diagnosis.term_on_grid import TermOnGrid
-
     if h.term is None or h.term.kind in ("sensor", "signal"):
         return []
     values = explanation.values_of(h)
