@@ -5,6 +5,7 @@ from __future__ import annotations
 import signal
 import sys
 from collections.abc import Mapping
+from contextlib import nullcontext
 from pathlib import Path
 from types import FrameType
 
@@ -13,11 +14,14 @@ import click
 from builder import console
 from builder.conceal_command import conceal
 from builder.diagnose_command import diagnose
-from builder.files import read_cycle, read_initial, write_table
+from builder.files import appearing_whole, read_cycle, read_initial, write_table
+from builder.prove_command import prove
 from builder.reproduce.command import reproduce
 from models.correction import read_correction
+from models.cycle import COLUMNS
 from models.errors import InputError
 from models.gearbox import Gearbox, known_gearboxes, load_gearbox
+from models.table_file import kind_of
 from models.types import Array
 
 GEARBOX_HELP = f"Name ({', '.join(known_gearboxes())}) or definition file (TOML)."
@@ -74,6 +78,7 @@ def build_fmu(
     if jobs is not None and dask_address is not None:
         raise InputError("--jobs and --dask exclude each other: the work is done here or on the cluster")
     definition = load_gearbox(gearbox)
+    found = None if correction is None else read_correction(correction, definition.network(), made_for=definition)
     folder = output if output is not None else Path("out") / Path(gearbox).stem
     report = build(
         definition,
@@ -86,7 +91,7 @@ def build_fmu(
         seed=seed,
         jobs=jobs,
         dask_address=dask_address,
-        correction=None if correction is None else read_correction(correction, definition.network()),
+        correction=found,
     )
     report.show()
 
@@ -123,6 +128,7 @@ def simulate(
         raise InputError(
             "--correction goes with --gearbox; an FMU is built with its correction (build-fmu --correction)"
         )
+    kind_of(output)  # told before the work, not after it
     start = None if initial is None else read_initial(initial)
     if gearbox is not None:
         columns, groups = _simulate_gearbox(load_gearbox(gearbox), files[0], start, correction)
@@ -130,11 +136,12 @@ def simulate(
     else:
         columns, groups = _simulate_fmu(files[0], files[1], start)
         title = f"{files[0].name}: {files[1].name}"
-    write_table(output, columns)
-    if plot is not None:
-        from builder.plots import plot_cycle
+    with nullcontext() if plot is None else appearing_whole(plot) as picture:
+        if picture is not None:
+            from builder.plots import plot_cycle
 
-        plot_cycle(plot, columns, title=title, groups=groups)
+            plot_cycle(picture, columns, title=title, groups=groups)
+        write_table(output, columns)
     _show_cycle(columns, [output] if plot is None else [output, plot])
 
 
@@ -143,12 +150,12 @@ def _simulate_gearbox(
 ) -> tuple[dict[str, Array], Mapping[str, tuple[str, ...]]]:
     network = gearbox.network()
     if correction is not None:
-        network = read_correction(correction, network).network(gearbox)
-    cycle = read_cycle(cycle_file)
+        network = read_correction(correction, network, made_for=gearbox).network(gearbox)
+    cycle = read_cycle(cycle_file, extra=tuple(name for name in network.inputs if name not in COLUMNS))
     if isinstance(initial, dict):
         initial = {name: T for name, T in initial.items() if name in {part.name for part in network.parts}}
     with console.progress_bar("simulating") as progress:
-        result = network.simulate(cycle, losses=gearbox.losses(), initial=initial, progress=progress)
+        result = network.simulate(cycle, losses=gearbox.loss_laws(), initial=initial, progress=progress)
     return result.columns(), network.groups
 
 
@@ -164,7 +171,9 @@ def _simulate_fmu(
 
 
 def _show_cycle(columns: Mapping[str, Array], files: list[Path]) -> None:
-    temperatures = {n[2:-5]: v for n, v in columns.items() if n.startswith("T_") and n not in ("T_ambient_degC",)}
+    inputs = [name for name, *_ in COLUMNS.values()]
+    shown = [n for n in columns if n.startswith("T_") and n.endswith("_degC") and n not in inputs]
+    temperatures = {n[2:-5]: columns[n] for n in shown}
     rows = [[n, f"{v[0]:.1f}", f"{v.max():.1f}", f"{v[-1]:.1f}"] for n, v in temperatures.items()]
     console.table("Temperatures in degC", ["node", "first", "highest", "last"], rows)
     losses = {n: v for n, v in columns.items() if n.startswith("P_loss")}
@@ -192,3 +201,4 @@ def _show_cycle(columns: Mapping[str, Array], files: list[Path]) -> None:
 commands.add_command(diagnose)
 commands.add_command(reproduce)
 commands.add_command(conceal)
+commands.add_command(prove)

@@ -54,6 +54,8 @@ def conceal(
     The recordings come from a plant of its own, not from the model: about 22 h to learn from (train_1 to train_3) and
     6 h to judge by (hold_1, hold_2). seal.json holds the SHA-256 of the truth.
     """
+    from builder.build import staging
+    from diagnosis.proof.case_files import keep_apart
     from diagnosis.proof.conceal import Plan, conceal_set, random_plans  # imports scipy.signal
 
     if (effect is None) == (not random):
@@ -66,13 +68,11 @@ def conceal(
     else:
         plans = [Plan(group="single", effects=(effect,), strength=strength)] * number
     definition = load_gearbox(gearbox)
-    apart = output / "truth" if truth is None else truth
-    with console.progress_bar("concealing") as progress:
+    recordings, apart = output / "recordings", output / "truth" if truth is None else truth
+    keep_apart(recordings, apart)
+    with staging(recordings) as stage, staging(apart) as sealed, console.progress_bar("concealing") as progress:
         names = conceal_set(
-            definition, plans, seed=seed, recordings=output / "recordings", truth=apart, flat=cases is None,
-            progress=progress,
-        )  # fmt: skip
-    for name in names:
-        console.out.print(
-            f"wrote {output / 'recordings' / ('' if cases is None else name)}, sealed {apart / name}.json"
+            definition, plans, seed=seed, recordings=stage, truth=sealed, flat=cases is None, progress=progress
         )
+    for name in names:
+        console.out.print(f"wrote {recordings / ('' if cases is None else name)}, sealed {apart / name}.json")

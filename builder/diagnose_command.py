@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING
 import click
 
 from builder import console
-from models.errors import InputError
+from models.errors import InputError, did_you_mean
 from models.gearbox import known_gearboxes, load_gearbox
 
 if TYPE_CHECKING:
-    from diagnosis.recording import Recording
     from models.gearbox import Gearbox
+    from models.mechanisms import Mechanism
 
 
 @click.command("diagnose")
@@ -28,33 +28,46 @@ if TYPE_CHECKING:
               help="What the columns mean.  [default: <stem>.toml or mapping.toml beside each]")  # fmt: skip
 @click.option("--mechanisms", type=click.Path(path_type=Path, dir_okay=False), multiple=True,
               metavar="FILE", help="Your own mechanisms (.toml or .py), beside the catalogue's.")  # fmt: skip
+@click.option("--without-mechanism", "without", multiple=True, metavar="NAME",
+              help="Leave one of the catalogue's mechanisms out; may be given several times.")  # fmt: skip
 @click.option("--output", type=click.Path(path_type=Path, file_okay=False), default=Path("out/diagnosis"),
               show_default=True, metavar="DIR", help="Folder for the report and what belongs to it.")  # fmt: skip
 @click.option("--false-alarm-rate", type=click.FloatRange(min=1e-4, max=0.5), default=0.05, show_default=True,
               metavar="P", help="How often recordings that agree may be called inconsistent.")  # fmt: skip
 @click.option("--jobs", type=click.IntRange(min=1), default=None, metavar="N",
               help="Processes on this machine.  [default: all cores]")  # fmt: skip
+@click.option("--fleet", is_flag=True,
+              help="RECORDING is a folder with one folder per gearbox; hold* in it is held out.")  # fmt: skip
+@click.option("--dask", "dask_address", default=None, metavar="ADDRESS",
+              help="Scheduler of a Dask cluster that the gearboxes of a fleet are spread over.")  # fmt: skip
 def diagnose(
     recordings: tuple[str, ...],
     gearbox: str,
     holdout: tuple[str, ...],
     mapping: Path | None,
     mechanisms: tuple[Path, ...],
+    without: tuple[str, ...],
     output: Path,
     false_alarm_rate: float,
     jobs: int | None,
+    fleet: bool,
+    dask_address: str | None,
 ) -> None:
     """Say whether recordings of a real gearbox agree with its model; if not, where, and by what physics.
 
     RECORDING is a table (.csv, .csv.gz, .parquet, .mf4), or a part of one (FILE@start..end), with the columns of a
     cycle and what was measured: T_<node>_degC, P_loss_W.
+
+    Of a fleet every gearbox gets its own report, and all together one table (summary.csv).
     """
     from builder.build import staging
     from diagnosis import diagnose as run
     from diagnosis.files import write_files
+    from diagnosis.recording import read_train_and_holdout
     from models.mechanisms import CATALOGUE
     from models.mechanisms.user_files import load_mechanisms
 
+    _check_options(recordings, holdout, jobs, dask_address, fleet=fleet)
     definition = load_gearbox(gearbox)
     catalogue = dict(CATALOGUE)
     for file in mechanisms:
@@ -62,7 +75,14 @@ def diagnose(
             if mechanism.name in catalogue:
                 raise InputError(f"{file}: a mechanism {mechanism.name!r} exists already; give yours another name")
             catalogue[mechanism.name] = mechanism
-    train, held = _read(recordings, definition, mapping), _read(holdout, definition, mapping)
+    for name in without:
+        if catalogue.pop(name, None) is None:
+            raise InputError(f"--without-mechanism {name}: is not in the catalogue{did_you_mean(name, CATALOGUE)}")
+    if fleet:
+        _diagnose_fleet(Path(recordings[0]), definition, output, mapping=mapping, catalogue=catalogue,
+                        false_alarm_rate=false_alarm_rate, jobs=_jobs(jobs), dask_address=dask_address)  # fmt: skip
+        return
+    train, held = read_train_and_holdout(recordings, holdout, definition.network(), mapping=mapping)
     with staging(output) as stage, _told() as tell:
         found = run(train, definition, holdout=held, false_alarm_rate=false_alarm_rate, catalogue=catalogue,
                     jobs=_jobs(jobs), progress=tell)  # fmt: skip
@@ -75,10 +95,38 @@ def diagnose(
         console.out.print(f"wrote {output / name}")
 
 
-def _read(paths: tuple[str, ...], gearbox: Gearbox, mapping: Path | None) -> tuple[Recording, ...]:
-    from diagnosis.recording import read_recordings
+def _check_options(
+    recordings: tuple[str, ...], holdout: tuple[str, ...], jobs: int | None, dask_address: str | None, *, fleet: bool
+) -> None:
+    if not fleet and dask_address is not None:
+        raise InputError("--dask spreads the gearboxes of a fleet; give --fleet with it, or --jobs for one gearbox")
+    if jobs is not None and dask_address is not None:
+        raise InputError("--jobs and --dask exclude each other: the work is done here or on the cluster")
+    if fleet and (len(recordings) != 1 or holdout):
+        raise InputError("--fleet takes one folder, with a folder per gearbox; what is named hold* in it is held out")
 
-    return read_recordings(paths, gearbox.network(), mapping=mapping) if paths else ()
+
+def _diagnose_fleet(
+    folder: Path, gearbox: Gearbox, output: Path, *, mapping: Path | None, catalogue: Mapping[str, Mechanism],
+    false_alarm_rate: float, jobs: int, dask_address: str | None,
+) -> None:  # fmt: skip
+    from builder.fleet import SUMMARY, diagnose_fleet, members_of
+
+    found = diagnose_fleet(
+        members_of(folder, without=output), gearbox, output, mapping=mapping, catalogue=catalogue,
+        false_alarm_rate=false_alarm_rate, jobs=jobs, dask_address=dask_address,
+    )  # fmt: skip
+    found.show()
+    console.out.print(f"wrote {output / SUMMARY}, and a folder for each that was diagnosed")
+    for name, fault in found.faults.items():
+        console.err.print(f"{name}:\n{fault}", style="red", markup=False)
+    failed = [f"{row.gearbox}: {row.error}" for row in found.rows if row.error]
+    if failed:
+        message = "\n".join([f"{len(failed)} of {len(found.rows)} gearboxes could not be diagnosed:", *failed])
+        if found.faults:
+            console.err.print(message, style="red", markup=False)
+            raise SystemExit(1)
+        raise InputError(message)
 
 
 def _jobs(asked: int | None) -> int:

@@ -132,7 +132,7 @@ def sample_losses(losses: Losses, points: Array, *, jobs: int = 1, dask_address:
         If dask is not installed or the scheduler cannot be reached.
     """
     blocks = [points[start : start + BLOCK_ROWS] for start in range(0, len(points), BLOCK_ROWS)]
-    with _dask(dask_address) if dask_address else nullcontext():
+    with on_dask(dask_address) if dask_address else nullcontext():
         parts = Parallel(n_jobs=None if dask_address else jobs)(delayed(_one_thread)(losses, block) for block in blocks)
     return np.concatenate(list(parts))
 
@@ -143,7 +143,19 @@ def _one_thread(losses: Losses, block: Array) -> Array:
 
 
 @contextmanager
-def _dask(address: str) -> Iterator[None]:
+def on_dask(address: str) -> Iterator[None]:
+    """Let joblib work on a dask cluster.
+
+    Parameters
+    ----------
+    address : str
+        Of its scheduler (``"tcp://host:8786"``)
+
+    Raises
+    ------
+    InputError
+        If dask is not installed or the scheduler cannot be reached.
+    """
     try:
         from distributed import Client
     except ImportError as error:

@@ -56,10 +56,17 @@ def read_initial(value: str) -> float | dict[str, float]:
 def _last_row(path: Path) -> dict[str, float]:
     table = read_table(path)
     columns = [str(c) for c in table.columns if str(c).startswith("T_") and str(c).endswith("_degC")]
-    temperatures = {c[2:-5]: float(table[c].iloc[-1]) for c in columns if c != "T_ambient_degC" and len(table)}
-    if not temperatures:
+    last = {c: table[c].iloc[-1] for c in columns if c != "T_ambient_degC" and len(table)}
+    if not last:
         raise InputError(f"{path}: has no T_<node>_degC columns with values to start from")
-    return temperatures
+    numbers = pd.to_numeric(pd.Series(last), errors="coerce")
+    for name, T in numbers.items():
+        if not -273.15 < T <= HOTTEST_START:
+            raise InputError(
+                f"{path}: {name} is {last[str(name)]} in the last row, row {len(table)}; to start from, a number above "
+                f"-273.15 and up to {HOTTEST_START:g} degC is needed"
+            )
+    return {str(name)[2:-5]: float(T) for name, T in numbers.items()}
 
 
 def write_table(path: Path, columns: Mapping[str, ArrayLike]) -> None:
@@ -90,6 +97,8 @@ def write_table(path: Path, columns: Mapping[str, ArrayLike]) -> None:
 def appearing_whole(path: Path) -> Iterator[Path]:
     """A temporary name beside `path` that becomes `path` when the block ends well, and vanishes otherwise.
 
+    It has the ending of `path`, so that who writes by the ending may write to it.
+
     Raises
     ------
     InputError
@@ -98,7 +107,7 @@ def appearing_whole(path: Path) -> Iterator[Path]:
     folder = path.parent
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=folder)
+        handle, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=path.suffix, dir=folder)
         os.close(handle)
     except OSError as error:
         raise InputError(f"{path}: cannot be written ({error.strerror}); choose another output") from error

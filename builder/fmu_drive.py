@@ -174,7 +174,9 @@ class LoadedFmu:
         faults = [f"{name!r} is not a node of this FMU{did_you_mean(name, nodes)}" for name in unknown]
         missing = [name for name in starts if name not in initial]
         if missing:
-            faults.append(f"initial temperatures are missing for: {', '.join(missing)}")
+            faults.append(
+                f"initial temperatures are missing for: {', '.join(missing)}; give one of every node, or one for all"
+            )
         if faults:
             raise InputError("\n".join(f"{self.path}: {fault}" for fault in faults))
         self.slave.setBoolean([self.variables["initial.uniform"].valueReference], [False])
@@ -310,7 +312,8 @@ def _description(path: Path) -> Any:
     if not path.is_file():
         raise InputError(f"{path}: no such file")
     try:
-        description = fmpy.read_model_description(str(path), validate=False)
+        with path.open("rb") as file:  # which fmpy would leave open where it fails
+            description = fmpy.read_model_description(file, validate=False)
     except Exception as error:  # whatever zipfile, lxml or fmpy find, it is not an FMU
         first = next(iter(str(error).splitlines()), type(error).__name__)
         raise InputError(f"{path}: is not an FMU, or is damaged ({first}); build it again with build-fmu") from error

@@ -11,6 +11,8 @@ from diagnosis.case import Case, heat_over_time
 from diagnosis.evidence import Marginal
 from diagnosis.explain import Explanation
 from diagnosis.findings import finding_of, node_of, rivals_of
+from diagnosis.holdout import at_holdout
+from diagnosis.identifiable import scale_notes
 from diagnosis.latent import LatentHeat, knots_of, latent_heat
 from diagnosis.observation import LOSS
 from diagnosis.posterior import Problem
@@ -29,7 +31,7 @@ from diagnosis.result import (
     Unseen,
     Verdict,
 )  # fmt: skip
-from diagnosis.search import SECOND_GAIN, TEMPER, Search, Stage, at_holdout, heats_of
+from diagnosis.search import SECOND_GAIN, TEMPER, Search, Stage, heats_of
 from diagnosis.shapes import shape_terms
 from models.mechanisms import Mechanism
 from models.types import Array
@@ -99,7 +101,10 @@ def assembled(
             "gearbox": case.gearbox.hash,
             "version": project_version(),
         },
-        notes=tuple(f"{r.name}: {note}" for r in (*train, *holdout) for note in r.notes),
+        notes=(
+            *scale_notes(found.final),
+            *(f"{r.name}: {note}" for r in (*train, *holdout) for note in r.notes),
+        ),
     )
 
 
@@ -168,7 +173,8 @@ def _location(
         for h, stage in zip(found.final.found, found.stages, strict=False):
             for fit, probability in zip(stage.fits, stage.probabilities(), strict=True):
                 node = node_of(case, fit.found[-1])
-                share = float(probability) if fit is not stage.accepted or fit.found[-1] is h else 0.0
+                own = stage.accepted is not None and fit.found[-1] is stage.accepted.found[-1]
+                share = 0.0 if own and fit.found[-1] is not h else float(probability)
                 weights[node] = 1.0 - (1.0 - weights.get(node, 0.0)) * (1.0 - share)
     else:
         logs = np.array([h.log_bayes for h in first]) / TEMPER

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from diagnosis.explain import Explanation, calibrated, settled
-from diagnosis.grid import Piece, pieces
+from diagnosis.grid import Piece, pieces, slow_rows
 from diagnosis.noise import channel_noise, loss_noise, noise_of, start_guess
 from diagnosis.observation import LOSS
 from diagnosis.posterior import Problem
@@ -71,7 +71,7 @@ def prepare(gearbox: Gearbox, recordings: Sequence[Recording], holdout: Sequence
     recordings, holdout : sequence of Recording
         To learn from, and to judge by
     """
-    nominal, losses = gearbox.network(), gearbox.losses()
+    nominal, losses = gearbox.network(), gearbox.loss_laws()
     scale = scale_of(gearbox, recordings)
     network = nominal
     for term in shape_terms(nominal, scale):
@@ -82,7 +82,7 @@ def prepare(gearbox: Gearbox, recordings: Sequence[Recording], holdout: Sequence
     stated = [c for r in recordings for c in r.channels]
     unknowns = _wider_capacities(unknowns_of(
         network, channels, lags={c.name: c.lag_s for c in stated if c.lag_s is not None},
-        bias_sd={c.name: c.bias_sd for c in stated if c.bias_sd is not None},
+        bias_sd={c.name: c.bias_sd for c in stated if c.bias_sd is not None}, slow=slow_rows(recordings),
     ))  # fmt: skip
     white = channel_noise(recordings, channels)
     loss_sd = loss_noise(recordings) if LOSS in channels else (0.0, 0.0)
@@ -93,7 +93,8 @@ def prepare(gearbox: Gearbox, recordings: Sequence[Recording], holdout: Sequence
         learnt, judged = split(learnt)
     for cut in (learnt, judged):
         problems.append(Problem(
-            model, cut, unknowns, [noise_of(model, p, white, loss_W, loss_noise=loss_sd) for p in cut],
+            model, cut, unknowns,
+            [noise_of(model, p, white, loss_W, loss_noise=loss_sd, parametric=gearbox.is_parametric) for p in cut],
             [start_guess(model, p) for p in cut],
         ))  # fmt: skip
     temperatures = [white[name] for name in channels if name != LOSS]
@@ -126,8 +127,11 @@ def scale_of(gearbox: Gearbox, recordings: Sequence[Recording]) -> Scale:
     running = speed > STANDSTILL_RPM
     if not running.any():
         return Scale.of(gearbox)
+    # Without geometry the nominal steady state is a guess; how hot it gets was measured.
+    oil = np.concatenate([c.values for r in recordings for c in r.channels if c.name == "oil"] or [np.zeros(0)])
+    hot = float(np.nanpercentile(oil, 95)) if gearbox.is_parametric and np.isfinite(oil).any() else None
     return Scale.of(
-        gearbox, speed=float(np.percentile(speed[running], 90)),
+        gearbox, temperature=hot, speed=float(np.percentile(speed[running], 90)),
         torque=max(float(np.percentile(torque[running], 75)), 1.0),
         ambient=float(np.median(ambient)) if ambient else None,
         duration=max(float(r.time[-1]) for r in recordings),

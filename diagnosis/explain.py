@@ -7,7 +7,8 @@ model and fitted together with everything else, from several starts, and compare
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from joblib import Parallel, delayed
@@ -18,11 +19,11 @@ from diagnosis.posterior import Fit, Problem
 from diagnosis.trajectory import NetworkOnGrid
 from models.types import Array
 
-FITTED = 5  # hypotheses that are fitted in earnest
-SECOND_STARTS = 1  # of these, how many from two starts
-FIRST_ITERATIONS, ITERATIONS = 4, 10
+FIRST_ITERATIONS, ROUGH_ITERATIONS, ITERATIONS = 4, 3, 10
+RACE_SHARE, RACE_LEAD = 0.15, 15.0  # of the best gain, and log evidence: who is further behind can no longer win
 START_SHARES = (0.6, 0.3, 0.1)
 AS_PROMISED = 0.8
+BACK = 0.3  # of the way that a calibration without an effect went
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -103,24 +104,44 @@ def _inside(value: float, lower: float, upper: float) -> float:
     return min(max(value, lower), upper)
 
 
-def fitted(base: Explanation, scored: Scored, starts: int = 1) -> Explanation | None:
-    """The explanation with one hypothesis more, from the best of several starts; None if none has a solution."""
+def fitted(base: Explanation, scored: Scored, worth: float = -np.inf) -> Explanation | None:
+    """The explanation with one hypothesis more, roughly fitted from the best of its starts; None without a solution.
+
+    Parameters
+    ----------
+    base : Explanation
+    scored : Scored
+        The hypothesis to add
+    worth : float
+        Log evidence over the base below which no second start is tried
+    """
     best: Explanation | None = None
-    for variant in scored.variants[:starts]:
-        problem, middle = extended(base, scored, variant)
-        for start in _starts(base, scored, variant, problem, middle):
-            try:
-                fit = problem.fit(start, [part.trajectory for part in base.fit.parts], iterations=ITERATIONS)
-            except ArithmeticError:
-                continue  # too far: the next start is nearer to what was there before
-            evidence = fit.log_evidence + _one_sided(scored.hypothesis, fit)
-            if best is None or evidence > best.log_evidence:
-                best = Explanation(
-                    problem=problem, fit=fit, found=(*base.found, scored.hypothesis), log_evidence=evidence
-                )
-            if evidence - base.log_evidence > AS_PROMISED * scored.log_bayes_of[variant]:
-                break  # the scan is linear; a fit that reaches what it promised needs no other start
-    return best
+    problem, middle = extended(base, scored, scored.variants[0])
+    promised = scored.log_bayes_of[scored.variants[0]]
+    for start in _starts(base, scored, scored.variants[0], problem, middle):
+        try:
+            fit = problem.fit(start, [part.trajectory for part in base.fit.parts], iterations=ROUGH_ITERATIONS)
+        except ArithmeticError:
+            continue  # too far: the next start is nearer to what was there before
+        found = _explanation(base, scored.hypothesis, problem, fit)
+        if best is None or found.log_evidence > best.log_evidence:
+            best = found
+        gain = best.log_evidence - base.log_evidence
+        if gain > AS_PROMISED * promised or promised < worth:
+            break  # the scan is linear; a fit that reaches what it promised needs no other start
+    return None if best is None else replace(best, fit=best.fit.without_parts())
+
+
+def refined(base: Explanation, rough: Explanation) -> Explanation:
+    """A rough fit of an extension of `base`, fitted to the end."""
+    fit = rough.problem.fit(rough.fit.z, rough.fit.courses, iterations=ITERATIONS)
+    better = _explanation(base, rough.found[-1], rough.problem, fit)
+    return replace(better, fit=fit.without_parts()) if better.log_evidence > rough.log_evidence else rough
+
+
+def _explanation(base: Explanation, h: Hypothesis, problem: Problem, fit: Fit) -> Explanation:
+    evidence = fit.log_evidence + _one_sided(h, fit)
+    return Explanation(problem=problem, fit=fit, found=(*base.found, h), log_evidence=evidence)
 
 
 def _starts(base: Explanation, scored: Scored, variant: int, problem: Problem, z: Array) -> Iterator[Array]:
@@ -138,6 +159,13 @@ def _starts(base: Explanation, scored: Scored, variant: int, problem: Problem, z
         whole[count] = problem.unknowns.items[count].z(1.0)
         yield whole
         return
+    if any(piece.guided for piece in problem.pieces) and not base.found:
+        # Weeks under wide priors bend too much: most of the way back to their middles, the effect at its usual size.
+        item, value = problem.unknowns.items[count], float(scored.values[variant])
+        nearer = np.concatenate([BACK * z[:count], z[count:]])
+        usual = np.copysign(max(abs(value), item.parameter.sd), h.sign or value)
+        nearer[count] = item.z(_inside(float(usual), item.parameter.lower, item.parameter.upper))
+        yield nearer
     J = base.fit.white_columns
     residual = base.fit.white_residual + J @ base.fit.z
     without = residual - white_column(base.problem, base.fit, h, variant) * scored.values[variant]
@@ -163,10 +191,20 @@ def _one_sided(h: Hypothesis, fit: Fit) -> float:
     return float(np.log(2.0) + log_ndtr(h.sign * fit.z[index] / sd))
 
 
-def best_fits(base: Explanation, scored: Sequence[Scored], *, jobs: int = 1, count: int = FITTED) -> list[Explanation]:
-    """The best hypotheses of a scan fitted in earnest, best first."""
-    chosen = list(scored[:count])
-    work = [delayed(fitted)(base, s, 2 if i < SECOND_STARTS and len(s.variants) > 1 else 1)
-            for i, s in enumerate(chosen)]  # fmt: skip
-    results = Parallel(n_jobs=jobs)(work) if jobs > 1 else [f(*a, **k) for f, a, k in work]
-    return sorted((e for e in results if e is not None), key=lambda e: -e.log_evidence)
+def best_fits(base: Explanation, chosen: Sequence[Scored], *, jobs: int = 1) -> list[Explanation]:
+    """Hypotheses of a scan fitted, best first: all of them roughly, those that may still win to the end.
+
+    The fits come without their linearisation, see :meth:`Problem.at`: a dozen of them would fill the memory.
+    """
+    most = max((s.log_bayes for s in chosen), default=0.0)
+    rough = [e for e in _each(jobs, [delayed(fitted)(base, s, AS_PROMISED * most) for s in chosen]) if e is not None]
+    gains = [e.log_evidence - base.log_evidence for e in rough]
+    least = (1.0 - RACE_SHARE) * max(gains, default=0.0) - RACE_LEAD
+    racing = [e for e, gain in zip(rough, gains, strict=True) if gain >= least]
+    beaten = [e for e, gain in zip(rough, gains, strict=True) if gain < least]
+    done = _each(jobs, [delayed(refined)(base, e) for e in racing])
+    return sorted([*done, *beaten], key=lambda e: -e.log_evidence)
+
+
+def _each(jobs: int, work: Sequence[Any]) -> list[Any]:
+    return list(Parallel(n_jobs=jobs)(work)) if jobs > 1 else [f(*a, **k) for f, a, k in work]

@@ -55,7 +55,7 @@ def rivals_of(stage: Stage, catalogue: Mapping[str, Mechanism]) -> tuple[Rival, 
     result = []
     for fit, probability in zip(stage.fits, stage.probabilities(), strict=True):
         other = fit.found[-1]
-        if fit is stage.accepted or probability < LEAST_RIVAL:
+        if other is own or probability < LEAST_RIVAL:
             continue
         result.append(Rival(
             mechanism=other.name, place=other.place, probability=float(probability),

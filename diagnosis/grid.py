@@ -2,13 +2,15 @@
 
 The inference walks over intervals of about :data:`INTERVAL_S`. Inputs are means over an interval, measurements means
 around a grid point (a symmetric window, so that a steady drift leaves no error). Recordings that are sampled more
-slowly keep their own times.
+slowly keep their own times; where their rows are means over the time before their stamp, as those of SCADA are, inputs
+and measurements are late by the same half step, which makes no difference.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +21,7 @@ from models.types import Array
 INTERVAL_S = 20.0
 SAMPLES = 5  # of the inputs per interval, at which losses are computed: they are not linear in speed
 SHORTEST_PIECE = 5  # grid points
+SLOW_S = 60.0  # rows further apart guide the memories, see :class:`Piece`
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -39,6 +42,12 @@ class Piece:
         [degC] or [W]; NaN where nothing was measured
     counts : Array, shape (K + 1, channels)
         Rows behind every mean
+    slow : bool
+        Whether rows lie minutes apart: a switch then acts within an interval, not after it
+    guided : bool
+        Whether memories (switches above all) follow the measured temperatures where there are any. Over weeks of slow
+        rows a simulated two-point control loses its phase; what it does next depends on what was there, and that was
+        measured. For learning only: a prediction runs free
     """
 
     recording: str
@@ -47,18 +56,50 @@ class Piece:
     channels: tuple[str, ...]
     measured: Array
     counts: Array
+    slow: bool = False
+    guided: bool = False
 
-    @property
+    @cached_property
     def steps(self) -> Array:
         """Lengths of the intervals, shape (K,), [s]."""
         return np.diff(self.time)
 
-    @property
+    def finer(self) -> Piece:
+        """The same in intervals as long as the samples of the inputs lie apart, without measurements."""
+        count = self.samples.shape[1]
+        shares = np.arange(count) / count
+        time = np.append((self.time[:-1, None] + self.steps[:, None] * shares).ravel(), self.time[-1])
+        nothing = np.empty((len(time), 0))
+        return replace(
+            self, time=time, samples=self.samples.reshape(-1, 1, self.samples.shape[2]), channels=(),
+            measured=nothing, counts=nothing, guided=False,
+        )  # fmt: skip
+
+    def seen(self, T: Array, parts: Sequence[str]) -> Array:
+        """Temperatures of the parts that memories follow: measured where the piece is guided, else as simulated.
+
+        Parameters
+        ----------
+        T : Array, shape (K + 1, parts)
+            Simulated, at the grid points, [degC]
+        parts : sequence of str
+        """
+        if not self.guided:
+            return T
+        T = np.array(T)
+        for index, name in enumerate(self.channels):
+            if name in parts:
+                node = list(parts).index(name)
+                read = _sharpened(self.measured[:, index])
+                T[:, node] = np.where(np.isfinite(read), read, T[:, node])
+        return T
+
+    @cached_property
     def middle(self) -> Array:
         """Middles of the intervals, shape (K,), [s]."""
         return 0.5 * (self.time[1:] + self.time[:-1])
 
-    @property
+    @cached_property
     def inputs(self) -> Array:
         """Means of the inputs over the intervals, shape (K, inputs)."""
         return np.asarray(self.samples.mean(axis=1))
@@ -81,6 +122,11 @@ def pieces(recordings: Sequence[Recording], inputs: Sequence[str], channels: Seq
         Pieces too short to learn anything from are left out
     """
     return tuple(piece for recording in recordings for piece in _pieces_of(recording, inputs, channels))
+
+
+def slow_rows(recordings: Sequence[Recording]) -> bool:
+    """Whether the rows of all recordings lie minutes apart."""
+    return bool(recordings) and all(float(np.median(np.diff(r.time))) > SLOW_S for r in recordings)
 
 
 def _pieces_of(recording: Recording, inputs: Sequence[str], channels: Sequence[str]) -> Iterator[Piece]:
@@ -114,7 +160,20 @@ def _pieces_of(recording: Recording, inputs: Sequence[str], channels: Sequence[s
             channels=tuple(channels),
             measured=measured,
             counts=counts,
+            slow=native > SLOW_S,
+            guided=native > SLOW_S,
         )
+
+
+def _sharpened(means: Array) -> Array:
+    """Peaks and valleys that means over the rows hide, from their second differences, shape (K + 1,).
+
+    A corner between two slopes that lies at the edge of a row is cut off by half of the second difference there, one in
+    its midst by a sixth.
+    """
+    bend = np.zeros_like(means)
+    bend[1:-1] = 2.0 * means[1:-1] - means[:-2] - means[2:]
+    return np.asarray(means + 0.5 * np.nan_to_num(bend))
 
 
 def _means(values: Array, time: Array, cell: NDArray[np.intp], grid: Array) -> tuple[Array, Array]:

@@ -25,7 +25,7 @@ from models.terms import Term
 from models.types import Array
 
 MOST_VARIANTS = 24
-CHUNK = 96  # columns that go through the filter together
+CHUNK, CHUNK_VALUES = 64, 250_000  # columns that go through the filter together, and values of one of them in all
 WIDE_PRIOR = 4.0  # standard deviations of a parameter that is out of its prior
 NEAR_ZERO = 1e-9
 
@@ -132,7 +132,8 @@ def scan(
     jobs : int
         Processes
     """
-    chunks = list(_chunks(hypotheses))
+    intervals = sum(len(piece.steps) for piece in problem.pieces)
+    chunks = list(_chunks(hypotheses, max(8, min(CHUNK, CHUNK_VALUES // max(intervals, 1)))))
     work = (delayed(_scan_chunk)(problem, fit, marginal, chunk) for chunk in chunks)
     results = Parallel(n_jobs=jobs)(work) if jobs > 1 else (
         _scan_chunk(problem, fit, marginal, chunk) for chunk in chunks)  # fmt: skip
@@ -140,11 +141,11 @@ def scan(
     return sorted(scored, key=lambda s: -s.log_bayes)
 
 
-def _chunks(hypotheses: Sequence[Hypothesis]) -> Iterator[list[Hypothesis]]:
+def _chunks(hypotheses: Sequence[Hypothesis], most: int) -> Iterator[list[Hypothesis]]:
     chunk: list[Hypothesis] = []
     columns = 0
     for hypothesis in hypotheses:
-        if chunk and columns + len(hypothesis.variants) > CHUNK:
+        if chunk and columns + len(hypothesis.variants) > most:
             yield chunk
             chunk, columns = [], 0
         chunk.append(hypothesis)

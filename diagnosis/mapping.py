@@ -19,11 +19,13 @@ lag_sd_s = 10
 bias_sd = 1.0                         # tolerance of the sensor, [K] or [W]
 valid = [-40, 150]                    # in the unit of the column; what lies outside is missing
 ```
+
+A gearbox definition may bring one along (table ``[recording]``), for recordings that have none beside them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from math import pi
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -38,7 +40,7 @@ from models.table_file import TextForm
 
 SCHEMA = 1
 FOLDER_FILE = "mapping.toml"
-DEFINITION_KEY = "stage"  # of a gearbox definition, which is TOML as well
+DEFINITION_KEYS = ("stage", "part")  # of a gearbox definition, which is TOML as well
 LOSS = "P_loss"  # the measured total loss, beside the temperatures ``T_<node>``
 AUXILIARY, IGNORE = "auxiliary", "ignore"
 
@@ -204,12 +206,35 @@ def _with_tuples(node: Any) -> Any:
     return {key: _with_tuples(item) for key, item in node.items()} if isinstance(node, dict) else node
 
 
-def mapping_beside(recording: Path, stem: str) -> RecordingMapping:
-    """The mapping of a recording: ``<stem>.toml`` beside it, else ``mapping.toml`` there, else that of standard names.
+def mapping_beside(recording: Path, stem: str) -> RecordingMapping | None:
+    """The mapping of a recording: ``<stem>.toml`` beside it, else ``mapping.toml`` there, else None.
 
     A gearbox definition that happens to have the stem of the recording is none.
     """
     own, shared = recording.with_name(f"{stem}.toml"), recording.with_name(FOLDER_FILE)
-    if own.is_file() and DEFINITION_KEY not in toml_file.parse(toml_file.read_text(own), file=str(own)):
-        return read_mapping(own)
-    return read_mapping(shared) if shared.is_file() else RecordingMapping()
+    if own.is_file():
+        values = toml_file.parse(toml_file.read_text(own), file=str(own))
+        if not any(key in values for key in DEFINITION_KEYS):
+            return read_mapping(own)
+    return read_mapping(shared) if shared.is_file() else None
+
+
+def mapping_of_definition(values: Mapping[str, Any]) -> RecordingMapping:
+    """The mapping that a gearbox definition brings along in its table ``[recording]``; standard names without one.
+
+    Raises
+    ------
+    InputError
+        With all its faults.
+    """
+    if not values:
+        return RecordingMapping()
+    return validated(RecordingMapping, _with_tuples(dict(values)), file="[recording] of the gearbox definition")
+
+
+def as_far_as_present(mapping: RecordingMapping, columns: Iterable[str]) -> RecordingMapping:
+    """The same without the columns that a file does not have: a definition names what such files may hold."""
+    present = set(columns)
+    kept = {name: column for name, column in mapping.columns.items() if name in present}
+    time = mapping.time if mapping.time is not None and mapping.time.column in present else None
+    return mapping.model_copy(update={"columns": kept, "time": time})

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from scipy.optimize import nnls
 
-from diagnosis.grid import Piece
+from diagnosis.grid import Piece, slow_rows
 from diagnosis.observation import LOSS
 from diagnosis.recording import Recording
 from diagnosis.trajectory import NetworkOnGrid
@@ -18,6 +18,10 @@ LOWEST_SD_K, LOWEST_SD_W = 0.02, 0.5
 FEWEST_ROWS, DEFAULT_LOSS_RELATIVE = 50, 0.02
 HEAT_FRACTION = 0.005  # random heat in every part, of the typical total loss
 HEAT_TIME_S = 1200.0
+# Laws of which only the form is known miss more, in every part; a part of little heat capacity is at once where its
+# heat and conductances put it, so its floor is told as a temperature.
+PARAMETRIC_FRACTION, PARAMETRIC_K = 0.05, 0.7
+SLOW_SD_K = 0.3  # at most, of rows minutes apart: what differs from row to row is operation then, not instrument
 START_KNOWN_K, START_UNKNOWN_K, START_UNKNOWN_SHARE = 2.0, 2.0, 0.15
 
 
@@ -80,12 +84,14 @@ def channel_noise(recordings: Sequence[Recording], channels: Sequence[str]) -> M
             seen = [white_sd(c.values[piece]) for r in recordings for c in r.channels if c.name == name
                     for piece in r.segments]  # fmt: skip
             result[name] = max(max(seen, default=0.0), LOWEST_SD_K)
+            if slow_rows(recordings):
+                result[name] = min(result[name], SLOW_SD_K)
     return result
 
 
 def noise_of(
     model: NetworkOnGrid, piece: Piece, white: Mapping[str, float], loss_W: float, *,
-    loss_noise: tuple[float, float] = (0.0, 0.0), heat_fraction: float = HEAT_FRACTION,
+    loss_noise: tuple[float, float] = (0.0, 0.0), parametric: bool = False,
 ) -> Noise:  # fmt: skip
     """The noise of one piece.
 
@@ -99,11 +105,14 @@ def noise_of(
         Typical total loss, [W]
     loss_noise : (float, float)
         Of the measured total loss, see :func:`loss_noise`
-    heat_fraction : float
-        Structural floor: standard deviation of the random heat in every part over `loss_W`, [-]
+    parametric : bool
+        Whether only the form of the laws is known: the structural floor (random heat in every part) is higher then
     """
     capacities = model.capacities([p.start for p in model.network.parameters])
     heavy = capacities > 0.01 * capacities.max()
+    heat_sd = np.where(heavy, HEAT_FRACTION * loss_W, 0.0)
+    if parametric:
+        heat_sd = np.where(heavy, PARAMETRIC_FRACTION * loss_W, PARAMETRIC_K * _conductances(model, piece))
     known = np.array([name in piece.channels for name in model.parts])
     hot = float(np.nanmax(piece.measured[0], initial=0.0)) if np.isfinite(piece.measured[0]).any() else 50.0
     ambient = _ambient(model, piece)
@@ -112,10 +121,19 @@ def noise_of(
         channel_sd=np.array([white.get(name, loss_noise[0]) for name in piece.channels]),
         floor_sd=np.array([LOWEST_SD_W if name == LOSS else LOWEST_SD_K for name in piece.channels]),
         loss_relative_sd=loss_noise[1],
-        heat_sd=np.where(heavy, heat_fraction * loss_W, 0.0),
+        heat_sd=heat_sd,
         heat_time=HEAT_TIME_S,
         start_sd=np.where(known, START_KNOWN_K, unknown),
+        capacity=float(capacities.sum()) if parametric else 0.0,
     )
+
+
+def _conductances(model: NetworkOnGrid, piece: Piece) -> Array:
+    """Sum of the conductances of every part, mean over a piece, as delivered, [W/K], shape (parts,)."""
+    T = np.broadcast_to(start_guess(model, piece), (len(piece.steps), model.n))
+    memory = np.zeros((len(T), len(model.network.states)))
+    each = model.conductances(model.signals(piece, T, model.start, memory), model.start, (len(T),))
+    return np.asarray(each.mean(axis=0) @ np.abs(model.to_parts))
 
 
 def start_guess(model: NetworkOnGrid, piece: Piece) -> Array:

@@ -15,7 +15,16 @@ import numpy as np
 from diagnosis.grid import Piece
 from diagnosis.observation import LOSS, Sensors, lag_column, reading_columns, readings, total_at_points
 from diagnosis.term_on_grid import TermOnGrid, moved_heat
-from diagnosis.trajectory import NetworkOnGrid, Trajectory, parameter_heat, simulate
+from diagnosis.trajectory import (
+    ROUNDS,
+    TORQUE_STEP,
+    Balance,
+    NetworkOnGrid,
+    Trajectory,
+    parameter_heat,
+    settled_balance,
+    simulate,
+)
 from diagnosis.unknowns import Unknown, Unknowns, shifted
 from diagnosis.whitening import Noise, Whitening
 from models.errors import InputError
@@ -25,6 +34,7 @@ from models.types import Array
 ITERATIONS = 8
 SETTLED = 0.05  # of a prior standard deviation
 FARTHEST_STEP = 3.0  # of the z numbers in one iteration
+GUIDED_PATIENCE = 3  # times as many iterations where switches follow slow measurements: steps are small there
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -66,6 +76,9 @@ class Fit:
     log_evidence : float
         Laplace approximation; the constant of the noise is left out, so compare fits of the same data and noise only
     parts : tuple of Linearised
+        Empty where they were left out
+    courses : tuple of Array, shape (K + 1, parts)
+        Temperatures of every piece where `parts` were left out
     """
 
     unknowns: Unknowns
@@ -73,6 +86,11 @@ class Fit:
     covariance: Array
     log_evidence: float
     parts: tuple[Linearised, ...]
+    courses: tuple[Array, ...] = ()
+
+    def without_parts(self) -> Fit:
+        """The same without its linearisation, which is a hundred times larger; :meth:`Problem.at` brings it back."""
+        return replace(self, parts=(), courses=tuple(part.trajectory.T for part in self.parts))
 
     @property
     def white_residual(self) -> Array:
@@ -163,15 +181,16 @@ class Problem:
         intervals = len(piece.steps)
         heats, losses = np.zeros((intervals, model.n, len(items))), np.zeros((intervals, len(items)))
         names = [p.name for p in model.network.parameters]
+        here = settled_balance(model, trajectory)
         for index, item in enumerate(items):
             scale = _value_per_z(item, float(z[index]))
             if scale == 0.0:
                 continue  # held at a bound
             if item.role == "network":
                 step = 0.02 * scale
-                heat, loss = parameter_heat(model, trajectory, names.index(item.target), step)
+                heat, loss = parameter_heat(model, trajectory, here, names.index(item.target), step)
             elif item.role in ("torque_gain", "ambient_offset"):
-                heat, loss = self._input_heat(trajectory, item)
+                heat, loss = self._input_heat(trajectory, here, item)
             elif item.role == "term" and (shift := self._term_of(self._shifts, item)) is not None:
                 heat, loss = self._shift_heat(trajectory, shift, item, z)
             else:
@@ -225,17 +244,16 @@ class Problem:
         there = term.distorted(trajectory, sensors, read, moved)
         return np.asarray((there - term.distorted(trajectory, sensors, read, values)) / step)
 
-    def _input_heat(self, trajectory: Trajectory, item: Unknown) -> tuple[Array, Array]:
+    def _input_heat(self, trajectory: Trajectory, here: Balance, item: Unknown) -> tuple[Array, Array]:
         """Net heat [W] and loss [W] per unit of a change of an input."""
         model, piece, T = self.model, trajectory.piece, trajectory.middle
-        step = 0.5 if item.role == "ambient_offset" else 0.02
+        step = 0.5 if item.role == "ambient_offset" else TORQUE_STEP
         moved = replace(piece, samples=shifted(
             piece.samples, self.inputs, item.role, step if item.role == "ambient_offset" else 1.0 + step))  # fmt: skip
         power = trajectory.tangent.at(T[:, model.loss_nodes])
         changed = power
         if item.role == "torque_gain":
-            changed = power + model.loss_at(moved, T) - model.loss_at(piece, T)
-        here = model.balance(piece, T, trajectory.values, power, trajectory.memory)
+            changed = power + step * trajectory.tangent.torque_slope
         there = model.balance(moved, T, trajectory.values, changed, trajectory.memory)
         loss = (there.sources - here.sources)[:, model.is_loss].sum(axis=-1)
         return (there.heat - here.heat) / step, loss / step
@@ -261,6 +279,8 @@ class Problem:
             If there is no solution where it should start.
         """
         z = np.zeros(len(self.unknowns)) if z is None else np.array(z)
+        if any(piece.guided for piece in self.pieces):
+            iterations *= GUIDED_PATIENCE
         parts = self._attempt(z, guesses)
         if parts is None:
             raise ArithmeticError("the simulation has no solution where the fit should start")
@@ -292,6 +312,10 @@ class Problem:
             parts=tuple(parts),
         )  # fmt: skip
 
+    def at(self, fit: Fit) -> Fit:
+        """A fit of this problem with its linearisation."""
+        return fit if fit.parts else self.fit(fit.z, fit.courses, iterations=0)
+
     def _attempt(self, z: Array, guesses: Sequence[Trajectory | Array] | None) -> list[Linearised] | None:
         """The linearisation at `z`; None where the simulation has no solution there."""
         try:
@@ -321,9 +345,9 @@ class Problem:
         return total
 
     def _linearised(self, z: Array, guesses: Sequence[Trajectory | Array] | None) -> list[Linearised]:
-        first = guesses is None
+        first = guesses is None  # later, trajectory and unknowns settle together: one round per iteration
         return [
-            self.linearise(i, z, None if guesses is None else guesses[i], rounds=6 if first else 2)
+            self.linearise(i, z, None if guesses is None else guesses[i], rounds=ROUNDS if first else 1)
             for i in range(len(self.pieces))
         ]
 

@@ -12,7 +12,7 @@ import numpy as np
 from diagnosis.grid import Piece
 from diagnosis.observation import LOSS, reading_columns, readings
 from diagnosis.posterior import Problem
-from diagnosis.trajectory import Trajectory, simulate
+from diagnosis.trajectory import Trajectory, free_running, simulate
 from models.types import Array
 
 START_S = 600.0
@@ -67,7 +67,10 @@ def predict(problem: Problem, index: int, z: Array, *, as_delivered: bool = Fals
     for _ in range(START_ROUNDS):
         adjusted = problem.adjusted(index, z, trajectory)
         values = problem.unknowns.network_values(model.network, z)
-        trajectory = simulate(model, adjusted, values, start, guess=trajectory, rounds=4, settled_K=0.02)
+        if piece.guided and model.network.states:
+            trajectory = free_running(model, adjusted, values, start)
+        else:
+            trajectory = simulate(model, adjusted, values, start, guess=trajectory, rounds=4, settled_K=0.02)
         sensors = problem.unknowns.sensors(piece.channels, z)
         if as_delivered:
             sensors = sensors.ideal()

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import datetime
 from pathlib import Path
 
+from diagnosis.mapping import mapping_of_definition
 from diagnosis.recording_checks import check_each_once, check_holdout
 from diagnosis.recording_columns import read_columns
 from diagnosis.recording_file import RecordingFile, name_parts, read_recording_file
@@ -15,7 +16,7 @@ from models.network import ThermalNetwork
 from models.table_file import LIMITS, Limits
 from models.types import Array
 
-__all__ = ["Channel", "Recording", "check_holdout", "read_recordings"]
+__all__ = ["Channel", "Recording", "check_holdout", "read_recordings", "read_train_and_holdout"]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -110,7 +111,7 @@ def read_recordings(
         Tells which nodes and inputs there are
     mapping : Path or None
         Mapping file for all of them (see :mod:`diagnosis.mapping`); by default ``<stem>.toml`` or ``mapping.toml``
-        beside each
+        beside each, else what the definition of the network says
     limits : Limits
         What is read at most
     max_gap_s : float or None
@@ -127,10 +128,10 @@ def read_recordings(
     """
     recordings: list[Recording] = []
     faults: list[str] = []
-    names = _names(paths)
+    names, usual = _names(paths), mapping_of_definition(network.recording)
     for path, name in zip(paths, names, strict=True):
         try:
-            file = read_recording_file(path, mapping=mapping, limits=limits)
+            file = read_recording_file(path, mapping=mapping, usual=usual, limits=limits)
             recordings.append(_recording(file, network, name=name, max_gap_s=max_gap_s))
         except InputError as error:
             faults.append(str(error))
@@ -138,6 +139,15 @@ def read_recordings(
         raise InputError("\n".join(dict.fromkeys(faults)))
     check_each_once(recordings)
     return tuple(recordings)
+
+
+def read_train_and_holdout(
+    train: Sequence[str | Path], holdout: Sequence[str | Path], network: ThermalNetwork, *, mapping: Path | None = None
+) -> tuple[tuple[Recording, ...], tuple[Recording, ...]]:
+    """Recordings to learn from and to judge by, no two of one name; see :func:`read_recordings`."""
+    learnt, judged = (read_recordings(paths, network, mapping=mapping) for paths in (train, holdout))
+    taken = {recording.name for recording in learnt}
+    return learnt, tuple(replace(r, name=f"{r.name}_held_out") if r.name in taken else r for r in judged)
 
 
 def _recording(file: RecordingFile, network: ThermalNetwork, *, name: str, max_gap_s: float | None) -> Recording:

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from diagnosis.mapping import ISO, RecordingMapping, mapping_beside, read_mapping
+from diagnosis.mapping import ISO, RecordingMapping, as_far_as_present, mapping_beside, read_mapping
 from diagnosis.mdf import read_mdf
 from diagnosis.recording_time import Clock, Part, clock_of, inside, part_of, split_path, time_faults
 from models.cycle import COLUMNS
@@ -64,7 +64,9 @@ class RecordingFile:
     faults: tuple[str, ...] = ()
 
 
-def read_recording_file(text: str | Path, *, mapping: Path | None = None, limits: Limits = LIMITS) -> RecordingFile:
+def read_recording_file(
+    text: str | Path, *, mapping: Path | None = None, usual: RecordingMapping | None = None, limits: Limits = LIMITS
+) -> RecordingFile:
     """Read ``FILE`` or ``FILE@start..end``.
 
     Parameters
@@ -72,6 +74,8 @@ def read_recording_file(text: str | Path, *, mapping: Path | None = None, limits
     text : str or Path
     mapping : Path or None
         Mapping file; by default the one beside the recording
+    usual : RecordingMapping or None
+        What holds where there is no mapping file, as far as the file has these columns
     limits : Limits
 
     Raises
@@ -85,9 +89,10 @@ def read_recording_file(text: str | Path, *, mapping: Path | None = None, limits
     if named:  # only the rows of the part are kept, so that the file itself may be larger
         limits = replace(limits, size_bytes=max(limits.size_bytes, 100 * LIMITS.size_bytes))
     check_file(path, limits)
-    found = mapping_beside(path, stem) if mapping is None else read_mapping(mapping)
+    own = mapping_beside(path, stem) if mapping is None else read_mapping(mapping)
+    found = own if own is not None else usual if usual is not None else RecordingMapping()
     parts = named or _parts_of(found, path)
-    reader = _Reader(path, found, parts)
+    reader = _Reader(path, found, parts, strict=own is not None)
     units: Mapping[str, str] = {}
     start_of_file = None
     if kind in MDF_KINDS:
@@ -97,6 +102,8 @@ def read_recording_file(text: str | Path, *, mapping: Path | None = None, limits
         start_of_file = mdf.start
     else:
         table = read_table(path, form=found.text_form, limits=limits, keep=reader.kept)
+    if own is None:
+        found = as_far_as_present(found, [str(column) for column in table.columns])
     clock = reader.clock_for(table)
     if len(table) < FEWEST_ROWS:
         raise InputError("\n".join(f"{path}: {fault}" for fault in [*reader.faults, _row_fault(len(table), parts)]))
@@ -140,8 +147,8 @@ def name_parts(text: str | Path) -> tuple[str, str, str]:
 class _Reader:
     """Keeps the rows of the parts while a file is read piece by piece; knows the clock once it saw the first piece."""
 
-    def __init__(self, path: Path, mapping: RecordingMapping, parts: tuple[Part, ...]) -> None:
-        self.path, self.mapping, self.parts = path, mapping, parts
+    def __init__(self, path: Path, mapping: RecordingMapping, parts: tuple[Part, ...], *, strict: bool) -> None:
+        self.path, self.mapping, self.parts, self.strict = path, mapping, parts, strict
         self.clock: Clock | None = None
         self.faults: list[str] = []
         self.first_s = float("nan")
@@ -156,7 +163,7 @@ class _Reader:
 
     def _clock(self, table: pd.DataFrame) -> Clock:
         time = self.mapping.time
-        if time is None:
+        if time is None or (time.column not in table.columns and not self.strict):
             return clock_of(table)
         if time.column not in table.columns:
             known = did_you_mean(time.column, [str(column) for column in table.columns])

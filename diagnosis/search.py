@@ -14,12 +14,11 @@ import numpy as np
 
 from diagnosis.case import Case, first, floored
 from diagnosis.evidence import Marginal
-from diagnosis.explain import FITTED, Explanation, best_fits
+from diagnosis.explain import Explanation, best_fits
+from diagnosis.holdout import Judge
 from diagnosis.hypotheses import Hypothesis, Scored, hypothesis_of, parameter_hypotheses, scan
 from diagnosis.observation import LOSS
 from diagnosis.open_form import open_hypotheses
-from diagnosis.posterior import Problem
-from diagnosis.predict import predict
 from diagnosis.term_on_grid import TermOnGrid
 from models.mechanisms import Mechanism
 from models.types import Array
@@ -29,14 +28,24 @@ THRESHOLD = 8.0  # log e-value at a false-alarm rate of 5 %
 SECOND_GAIN = 10.0  # log evidence that each further effect has to bring
 OPEN_PENALTY = 10.0  # an open form has to beat the catalogue by this
 LEAST_PROBABILITY = 0.05  # of what may be taken where something more probable fails on held-out data
-WORTH = 0.12  # of the best score, to be fitted in earnest
+FITTED, WORTH = 5, 0.12  # hypotheses that are fitted in earnest, and the share of the best score that they need
+MOST_FITTED, NEAR = 12, 0.6  # where more of them score about as well as the best: the scan is only linear
 # Log evidences are divided by a temperature before they become probabilities, because no model is exactly true: a
 # constant, and a share of the whole evidence, since the form of an effect is known no better than that.
 TEMPER, TEMPER_SHARE = 3.0, 0.03
 # Log odds of what is rarer than a piece of missing physics or a biased sensor.
-RARITY = {"sensor_gain": -2.0, "speed_gain": -3.0, "clock_offset": -1.0, "swapped_channels": -2.0, "parameter": -1.0}
+RARITY = {
+    "sensor_gain": -2.0,
+    "speed_gain": -3.0,
+    "clock_offset": -1.0,
+    "swapped_channels": -2.0,
+    "parameter": -1.0,
+    "water_jacket": -2.0,
+}
 MOST_EFFECTS = 4
-HOLDOUT_SLACK = 1.05
+HOLDOUT_LOSS = -3.0  # log predictive density that what is found may cost on held-out data
+HOLDOUT_SLACK = 1.05  # of the calibrated model's error there
+FURTHER_SLACK = 1.3  # of the error with what was found before
 HOLDOUT_SLACK_INSTRUMENT = 1.2  # its fault says little about temperatures to come, and calibration swallows half of it
 SMALLEST_HEAT, SMALLEST_K = 0.02, 0.3  # of the typical loss, and of temperature, that matter in practice
 
@@ -145,7 +154,7 @@ def search(
     stages: list[Stage] = []
     while len(base.found) < MOST_EFFECTS:
         progress("scoring everything that may be missing" if not stages else "looking for a further effect")
-        stage = _look(case, base, catalogue, threshold if not stages else SECOND_GAIN, jobs, progress)
+        stage = _look(case, start, base, floor, catalogue, threshold if not stages else SECOND_GAIN, jobs, progress)
         if stage.accepted is None:
             stages.append(stage)
             break
@@ -155,8 +164,8 @@ def search(
 
 
 def _look(
-    case: Case, base: Explanation, catalogue: Mapping[str, Mechanism], needed: float, jobs: int,
-    progress: Callable[[str], None],
+    case: Case, calibrated: Explanation, base: Explanation, floor: float, catalogue: Mapping[str, Mechanism],
+    needed: float, jobs: int, progress: Callable[[str], None],
 ) -> Stage:  # fmt: skip
     marginal = Marginal(base.fit)
     scored = scan(base.problem, base.fit, marginal, hypotheses_of(case, base, catalogue), jobs=jobs)
@@ -168,26 +177,29 @@ def _look(
     progress("fitting the best explanations in earnest")
     opened = [s for s in scored if s.hypothesis.family == "open form"]
     worth = [s for s in real[:FITTED] if s.log_bayes > WORTH * real[0].log_bayes]
+    worth += [s for s in real[FITTED:MOST_FITTED] if s.log_bayes > NEAR * real[0].log_bayes]
     chosen = [
         *(worth if len(worth) > 1 else real[:2]),
         *(s for s in opened[:2] if s.log_bayes > real[0].log_bayes + OPEN_PENALTY),
     ]
-    fits = best_fits(base, chosen, jobs=jobs, count=len(chosen))
+    fits = best_fits(base, chosen, jobs=jobs)
     if not fits:
         return Stage(scored=tuple(scored), log_e_value=log_e, note="no explanation has a solution")
     gains = [_penalised(fit) - base.log_evidence for fit in fits]
     stage = Stage(scored=tuple(scored), log_e_value=log_e, fits=tuple(fits), gains=tuple(gains))
     order = np.argsort(-stage.probabilities())
     stage = replace(stage, fits=tuple(fits[i] for i in order), gains=tuple(gains[i] for i in order))
+    judge = Judge(case, base, floor)
     accepted, matters, note = None, False, "the best explanation is hardly better than none"
     for fit, gain, probability in zip(stage.fits, stage.gains, stage.probabilities(), strict=True):
         if gain < needed or probability < LEAST_PROBABILITY:
             continue
+        fit = replace(fit, fit=fit.problem.at(fit.fit))
         if not _matters(case, fit):
             note = "what the data show is too small to matter"
             continue
         matters = True
-        if _holds_out(case, base, fit):
+        if _holds_out(judge, calibrated, fit):
             accepted = fit
             break
         note = "what would explain the training data makes the held-out data worse"
@@ -198,26 +210,20 @@ def _penalised(fit: Explanation) -> float:
     return fit.log_evidence - (OPEN_PENALTY if fit.found[-1].family == "open form" else 0.0)
 
 
-def at_holdout(case: Case, explanation: Explanation) -> Problem:
-    """The held-out recordings with everything that an explanation found; its terms, its model, its noise."""
-    problem = explanation.problem
-    return case.holdout.changed(model=problem.model, unknowns=problem.unknowns, terms=problem.terms)
+def _holds_out(judge: Judge, calibrated: Explanation, fit: Explanation) -> bool:
+    """Whether the held-out recordings support what was found, and the free-running error does not grow by it.
 
-
-def holdout_rmse(case: Case, explanation: Explanation) -> float:
-    """Root mean square error of the held-out temperatures, free-running, [K]; NaN without held-out recordings."""
-    problem = at_holdout(case, explanation)
-    temperatures = [i for i, name in enumerate(case.channels) if name != LOSS]
-    residuals = [predict(problem, i, explanation.fit.z).residual[:, temperatures] for i in range(len(problem.pieces))]
-    return float(np.sqrt(np.nanmean(np.concatenate(residuals) ** 2))) if residuals else float("nan")
-
-
-def _holds_out(case: Case, base: Explanation, fit: Explanation) -> bool:
-    if not case.holdout.pieces:
+    Against the calibrated model it may not grow at all, but for chance; from one effect to the next it may by more, as
+    long as what is predicted becomes more probable: two wrong models can err in opposite directions.
+    """
+    if not judge.case.holdout.pieces:
         return True
+    if judge.gain(fit) < HOLDOUT_LOSS:
+        return False
     term = fit.found[-1].term
     slack = HOLDOUT_SLACK_INSTRUMENT if term is not None and term.of_measurement else HOLDOUT_SLACK
-    return holdout_rmse(case, fit) <= slack * holdout_rmse(case, base)
+    after = judge.rmse(fit)
+    return after <= slack * judge.rmse(calibrated) and after <= FURTHER_SLACK * judge.rmse(judge.base)
 
 
 def _matters(case: Case, fit: Explanation) -> bool:

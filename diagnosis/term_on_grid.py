@@ -12,7 +12,7 @@ import sympy as sp
 
 from diagnosis.grid import Piece
 from diagnosis.observation import Sensors, lagged
-from diagnosis.trajectory import NetworkOnGrid, Trajectory
+from diagnosis.trajectory import NetworkOnGrid, Trajectory, update_of
 from models.laws import compile_function, function_source, symbol
 from models.network import BASE_SIGNALS
 from models.terms import Term
@@ -51,9 +51,13 @@ class TermOnGrid:
         other = sp.Integer(0) if term.boundary_temperature is None else term.boundary_temperature
         laws = [law.xreplace(boundary) for law in (term.expression, other)]
         self._law = compile_function(function_source("law", arguments, laws, vector=True), "law")
-        memory = [s.rate.xreplace(boundary) for s in term.states]
-        memory += [(symbol(s.name) if s.update is None else s.update).xreplace(boundary) for s in term.states]
-        self._memory = compile_function(function_source("memory", arguments, memory, vector=True), "memory")
+        self._memory, self._blurred = (
+            compile_function(function_source("memory", arguments, [
+                *(s.rate.xreplace(boundary) for s in term.states),
+                *(update_of(s, blurred=blurred).xreplace(boundary) for s in term.states),
+            ], vector=True), "memory")
+            for blurred in (False, True)
+        )  # fmt: skip
         self._switches = any(s.update is not None for s in term.states)
 
     # ------------------------------------------------------------------ the law
@@ -87,26 +91,42 @@ class TermOnGrid:
         kept = trajectory.values[self._kept]
         rows = [time, *inputs.T, *T.T, *(np.full(len(T), v) for v in kept), *memory[:, self._remembered].T, *power.T]
         own = [values[:, index, None] for index in range(values.shape[1])]
-        states = self._follow(piece.steps, rows, own, len(values)) if self.term.states else []
+        states = self._follow(trajectory, rows, own, len(values)) if self.term.states else []
         law, other = self._law(*rows, *own, *states)
         size = (len(values), len(T))
         return np.broadcast_to(np.asarray(law, float), size), np.broadcast_to(np.asarray(other, float), size)
 
-    def _follow(self, steps: Array, rows: Sequence[Array], own: Sequence[Array], count: int) -> list[Array]:
+    def _follow(self, trajectory: Trajectory, rows: Sequence[Array], own: Sequence[Array], count: int) -> list[Array]:
         """The term's states along the trajectory, each of shape (V, K)."""
-        states = self.term.states
+        states, piece = self.term.states, trajectory.piece
+        switches = [state.update is not None for state in states]
         now: list[Array] = [np.full((count, 1), s.start) for s in states]
-        result = [np.empty((count, len(steps))) for _ in states]
-        table = np.stack(list(rows), axis=-1).tolist()
-        for k, h in enumerate(steps.tolist()):
-            got = self._memory(*table[k], *own, *now)
+        result = [np.empty((count, len(piece.steps))) for _ in states]
+        seen, first = piece.seen(trajectory.T, self.model.parts), 1 + piece.inputs.shape[1]
+        last = first + seen.shape[1]
+        middle = 0.5 * (seen[1:] + seen[:-1])
+        table = np.stack([*rows[:first], *middle.T, *rows[last:]], axis=-1).tolist()
+        points = seen.tolist()
+        law = self._blurred if piece.guided else self._memory
+
+        def switched(k: int, point: list[float], moved: list[Array]) -> list[Array]:
+            got = law(*table[k][:first], *point, *table[k][last:], *own, *moved)[len(states) :]
+            return [np.broadcast_to(new, (count, 1)) if it else z
+                    for new, z, it in zip(got, moved, switches, strict=True)]  # fmt: skip
+
+        if piece.slow and any(switches):
+            now = switched(0, points[0], now)
+        for k, h in enumerate(piece.steps.tolist()):
+            got = law(*table[k], *own, *now)
             half = [z + 0.5 * h * rate for z, rate in zip(now, got, strict=False)]
-            got = self._memory(*table[k], *own, *half)
-            now = [z + h * rate for z, rate in zip(now, got, strict=False)]
+            got = law(*table[k], *own, *half)
+            before, now = now, [z + h * rate for z, rate in zip(now, got, strict=False)]
+            if any(switches):
+                now = switched(k, points[k + 1] if piece.slow else table[k][first:last], now)
             for index, value in enumerate(half):
-                result[index][:, k] = np.broadcast_to(value, (count, 1))[:, 0]
-            if self._switches:
-                now = [np.broadcast_to(z, (count, 1)) for z in self._memory(*table[k], *own, *now)[len(states) :]]
+                # What switches during a slow interval did so in its midst.
+                mean = 0.5 * (before[index] + now[index]) if piece.slow and switches[index] else value
+                result[index][:, k] = np.broadcast_to(mean, (count, 1))[:, 0]
         return result
 
     # ------------------------------------------------------------------ heat

@@ -10,15 +10,17 @@ any time, of any parameter, answers through the same matrices.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import product
 
 import numpy as np
+import sympy as sp
 
 from diagnosis.grid import Piece
 from models.compiled import compile_laws, structure
-from models.laws import compile_function, function_source
-from models.network import BASE_SIGNALS, Losses, ThermalNetwork
+from models.laws import compile_function, function_source, symbol
+from models.network import BASE_SIGNALS, ExtraState, Losses, ThermalNetwork
 from models.types import Array
 
 ROUNDS = 6
@@ -28,6 +30,8 @@ LOSS_STEP_K = 2.0  # for the derivatives of the losses
 LOSS_NEAR_K = 0.7  # within it the straight lines are good to some 1e-4 of the loss
 LOSS_REACH_K = 15.0  # beyond it the derivatives are taken anew
 TEMPERATURE_STEP_K = 0.05
+TORQUE_STEP = 0.02  # relative
+FREE_SETTLED_K = 0.2  # where switches run free: a switching that comes a step later moves a temperature by more
 HIGHEST_T, LOWEST_T = 400.0, -60.0  # a trajectory is held here while it settles
 
 
@@ -43,6 +47,8 @@ class LossTangent:
         [W]
     slope : Array, shape (K, components, nodes)
         [W/K]
+    torque_slope : Array, shape (K, components)
+        Per relative change of the torque, [W]
     samples : Array
         Inputs that they were computed with, see :class:`diagnosis.grid.Piece`
     """
@@ -50,11 +56,18 @@ class LossTangent:
     T: Array
     power: Array
     slope: Array
+    torque_slope: Array
     samples: Array
 
     def at(self, T: Array) -> Array:
         """Losses [W], shape (K, components), at temperatures of shape (K, nodes)."""
         return np.asarray(self.power + np.einsum("kcn,kn->kc", self.slope, T - self.T))
+
+
+def update_of(state: ExtraState, *, blurred: bool) -> sp.Expr:
+    """What a state becomes after a step; itself if it does not switch."""
+    found = state.blurred if blurred and state.blurred is not None else state.update
+    return symbol(state.name) if found is None else found
 
 
 class NetworkOnGrid:
@@ -168,54 +181,74 @@ class NetworkOnGrid:
             return previous
         power = self.loss_at(piece, T)
         if previous is not None and np.max(np.abs(mine - previous.T), initial=0.0) < LOSS_REACH_K:
-            return LossTangent(T=mine, power=power, slope=previous.slope, samples=piece.samples)
+            return replace(previous, T=mine, power=power, samples=piece.samples)
         slope = np.empty((len(T), power.shape[-1], len(self.loss_nodes)))
         for index, node in enumerate(self.loss_nodes):
             moved = T.copy()
             moved[:, node] += LOSS_STEP_K
             slope[..., index] = (self.loss_at(piece, moved) - power) / LOSS_STEP_K
-        return LossTangent(T=mine, power=power, slope=slope, samples=piece.samples)
+        stronger = np.array(piece.samples)
+        stronger[..., 1] *= 1.0 + TORQUE_STEP
+        torque_slope = (self.loss_at(replace(piece, samples=stronger), T) - power) / TORQUE_STEP
+        return LossTangent(T=mine, power=power, slope=slope, torque_slope=torque_slope, samples=piece.samples)
 
     @cached_property
-    def _memory_law(self) -> Callable[..., tuple[float, ...]]:
+    def memory_law(self) -> Callable[..., tuple[float, ...]]:
         """Rates and updates of the states on plain numbers, nothing else."""
-        from models.laws import symbol
+        return self._memory_law(blurred=False)
 
+    @cached_property
+    def blurred_memory_law(self) -> Callable[..., tuple[float, ...]]:
+        """The same for temperatures that are means over minutes."""
+        return self._memory_law(blurred=True)
+
+    def _memory_law(self, *, blurred: bool) -> Callable[..., tuple[float, ...]]:
         network = self.network
         boundary = {symbol(f"T_{n.name}"): n.temperature for n in network.nodes if n.temperature is not None}
         parts = [f"T_{part.name}" for part in network.parts]
         arguments = [*BASE_SIGNALS, *network.inputs, *parts, *(p.name for p in network.parameters),
                      *(s.name for s in network.states), *(f"P_{c}" for c in network.components)]  # fmt: skip
-        laws = [s.rate for s in network.states]
-        laws += [symbol(s.name) if s.update is None else s.update for s in network.states]
+        laws = [*(s.rate for s in network.states), *(update_of(s, blurred=blurred) for s in network.states)]
         source = function_source("memory", arguments, [law.xreplace(boundary) for law in laws], vector=False)
         return compile_function(source, "memory")
 
     def memory(self, piece: Piece, T: Array, values: Sequence[float] | Array, power: Array) -> Array:
         """The states beside the temperatures, at the middles of the intervals, shape (K, states).
 
-        They follow the given trajectory `T` (at the middles), interval by interval: a hysteresis needs the past.
+        They follow the given trajectory `T` (at the grid points), interval by interval: a hysteresis needs the past.
         """
         network = self.network
         count = len(network.states)
         if not count:
-            return np.zeros((len(T), 0))
-        law, steps, middle = self._memory_law, piece.steps.tolist(), piece.middle.tolist()
-        inputs, temperatures, powers = piece.inputs.tolist(), T.tolist(), power.tolist()
+            return np.zeros((len(T) - 1, 0))
+        law = self.blurred_memory_law if piece.guided else self.memory_law
+        steps, middle = piece.steps.tolist(), piece.middle.tolist()
+        seen = piece.seen(T, self.parts)
+        inputs, powers, points = piece.inputs.tolist(), power.tolist(), seen.tolist()
+        temperatures = (0.5 * (seen[1:] + seen[:-1])).tolist()
         given = list(map(float, values))
+        switches = [state.update is not None for state in network.states]
+
+        def switched(k: int, point: list[float], moved: list[float]) -> list[float]:
+            got = law(middle[k], *inputs[k], *point, *given, *moved, *powers[k])[count:]
+            return [float(new) if it else z for new, z, it in zip(got, moved, switches, strict=True)]
+
         now = [state.start for state in network.states]
-        result = np.empty((len(T), count))
+        if piece.slow:
+            now = switched(0, points[0], now)
+        result = np.empty((len(steps), count))
         for k, h in enumerate(steps):
             got = law(middle[k], *inputs[k], *temperatures[k], *given, *now, *powers[k])
             half = [z + 0.5 * h * rate for z, rate in zip(now, got[:count], strict=True)]
             got = law(middle[k], *inputs[k], *temperatures[k], *given, *half, *powers[k])
-            result[k] = half
-            moved = [z + h * rate for z, rate in zip(now, got[:count], strict=True)]
-            now = [
-                new if state.update is None else float(law(middle[k], *inputs[k], *temperatures[k], *given, *moved,
-                                                           *powers[k])[count + i])
-                for i, (state, new) in enumerate(zip(network.states, moved, strict=True))
-            ]  # fmt: skip
+            before = now
+            now = switched(
+                k, points[k + 1] if piece.slow else temperatures[k],
+                [z + h * rate for z, rate in zip(now, got[:count], strict=True)],
+            )  # fmt: skip
+            # What switches during a slow interval did so in its midst.
+            result[k] = [0.5 * (a + b) if it and piece.slow else z
+                         for a, b, z, it in zip(before, now, half, switches, strict=True)]  # fmt: skip
         return result
 
 
@@ -361,14 +394,93 @@ def simulate(
     return found
 
 
-def _round(
-    model: NetworkOnGrid, piece: Piece, values: Array, start: Array, T_ref: Array, tangent: LossTangent | None
-) -> Trajectory:
-    """Linearise about a trajectory and solve."""
-    T = 0.5 * (T_ref[1:] + T_ref[:-1])
-    tangent = model.loss_tangent(piece, T, tangent)
+def free_running(model: NetworkOnGrid, piece: Piece, values: Array, start: Array) -> Trajectory:
+    """The trajectory of a long piece of a network with switches, that nothing measured guides.
+
+    Whether a switch acts depends on when it acted before, so the rounds of :func:`simulate` settle from the front, one
+    switching after the other. Here every round is linearised for each position of the switches, and what is stepped
+    through is which of them holds; in finer intervals, since a switch acts in the midst of a row. At the grid points
+    stand means over as long as the rows lie apart, as rows of slow recordings are.
+
+    Parameters
+    ----------
+    model : NetworkOnGrid
+    piece : Piece
+    values : Array, shape (parameters,)
+    start : Array, shape (parts,)
+        [degC]
+    """
+    fine, each = piece.finer(), piece.samples.shape[1]
+    count = len(fine.steps)
+    switches = [index for index, state in enumerate(model.network.states) if state.update is not None]
+    positions = list(product((0.0, 1.0), repeat=len(switches)))
+    T = np.broadcast_to(start, (count + 1, model.n))
+    tangent: LossTangent | None = None
+    for _ in range(ROUNDS):
+        middle = np.clip(0.5 * (T[1:] + T[:-1]), LOWEST_T, HIGHEST_T)
+        tangent = model.loss_tangent(fine, middle, tangent)
+        power = tangent.at(middle[:, model.loss_nodes])
+        memory = model.memory(fine, np.clip(T, LOWEST_T, HIGHEST_T), values, power)
+        solutions = []
+        for position in positions:
+            memory[:, switches] = position
+            solved = _linearised(model, fine, values, middle, tangent, memory)
+            solutions.append((solved.decay, solved.driven))
+        before, T = T, _stepped(model, fine, values, start, memory, switches, solutions, power)
+        if not np.isfinite(T).all():
+            raise ArithmeticError(f"the temperatures of {piece.recording} run away with these parameters")
+        if float(np.max(np.abs(T - before))) < FREE_SETTLED_K:
+            break
+    # Means over a row's length around every grid point; at the ends over what there is.
+    total = np.concatenate([np.zeros((1, model.n)), np.cumsum(T, axis=0)])
+    at = np.arange(len(piece.time)) * each
+    low, high = np.maximum(at - each // 2, 0), np.minimum(at + each // 2, count) + 1
+    means = (total[high] - total[low]) / (high - low)[:, None]
+    return replace(_round(model, replace(piece, guided=False), values, start, means, None), T=means)
+
+
+def _stepped(
+    model: NetworkOnGrid, piece: Piece, values: Array, start: Array, memory: Array, switches: Sequence[int],
+    solutions: Sequence[tuple[Array, Array]], power: Array,
+) -> Array:  # fmt: skip
+    """Temperatures at the grid points, from the solutions for every position of the switches; shape (K + 1, parts)."""
+    law, count = model.memory_law, len(model.network.states)
+    given, middle = list(map(float, values)), piece.middle.tolist()
+    inputs, powers, kept = piece.inputs.tolist(), power.tolist(), memory.tolist()
+    now = np.array(start, dtype=float)
+    result = np.empty((len(middle) + 1, model.n))
+    result[0] = now
+    state = [model.network.states[i].start for i in switches]
+    for k in range(len(middle)):
+        full = kept[k]
+        for index, value in zip(switches, state, strict=True):
+            full[index] = value
+        got = law(middle[k], *inputs[k], *now.tolist(), *given, *full, *powers[k])[count:]
+        state = [float(got[index]) for index in switches]
+        decay, driven = solutions[sum(2**i for i, z in enumerate(reversed(state)) if z > 0.5)]
+        now = decay[k] @ now + driven[k]
+        result[k + 1] = now
+    return result
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Solved:
+    """The heat balance linearised about temperatures at the middles, and its exact solution over every interval."""
+
+    balance: Balance
+    jacobian: Array
+    loss_slope: Array
+    total: Array
+    capacities: Array
+    decay: Array
+    gain: Array
+    driven: Array
+
+
+def _linearised(
+    model: NetworkOnGrid, piece: Piece, values: Array, T: Array, tangent: LossTangent, memory: Array
+) -> _Solved:
     power = tangent.at(T[:, model.loss_nodes])
-    memory = model.memory(piece, T, values, power)
     balance = model.balance(piece, T, values, power, memory)
     n = model.n
     jacobian = np.empty((len(T), n, n))
@@ -386,16 +498,30 @@ def _round(
     matrix = jacobian / capacities[:, None]
     decay, gain = exponential(matrix, piece.steps)
     constant = balance.heat / capacities - np.einsum("kij,kj->ki", matrix, T)
-    driven = np.einsum("kij,kj->ki", gain, constant)
-    result = np.empty((len(T) + 1, n))
+    return _Solved(
+        balance=balance, jacobian=jacobian, loss_slope=loss_slope, total=total, capacities=capacities, decay=decay,
+        gain=gain, driven=np.einsum("kij,kj->ki", gain, constant),
+    )  # fmt: skip
+
+
+def _round(
+    model: NetworkOnGrid, piece: Piece, values: Array, start: Array, T_ref: Array, tangent: LossTangent | None
+) -> Trajectory:
+    """Linearise about a trajectory and solve."""
+    T = 0.5 * (T_ref[1:] + T_ref[:-1])
+    tangent = model.loss_tangent(piece, T, tangent)
+    memory = model.memory(piece, T_ref, values, tangent.at(T[:, model.loss_nodes]))
+    solved = _linearised(model, piece, values, T, tangent, memory)
+    result = np.empty((len(T) + 1, model.n))
     result[0] = now = start
     for k in range(len(T)):
-        now = decay[k] @ now + driven[k]
+        now = solved.decay[k] @ now + solved.driven[k]
         result[k + 1] = now
-    loss = total + np.einsum("kn,kn->k", loss_slope, 0.5 * (result[1:] + result[:-1]) - T)
+    loss = solved.total + np.einsum("kn,kn->k", solved.loss_slope, 0.5 * (result[1:] + result[:-1]) - T)
     return Trajectory(
-        piece=piece, T=result, values=values, tangent=tangent, memory=memory, balance=balance, jacobian=jacobian,
-        loss=loss, loss_slope=loss_slope, decay=decay, gain=gain, capacities=capacities,
+        piece=piece, T=result, values=values, tangent=tangent, memory=memory, balance=solved.balance,
+        jacobian=solved.jacobian, loss=loss, loss_slope=solved.loss_slope, decay=solved.decay, gain=solved.gain,
+        capacities=solved.capacities,
     )  # fmt: skip
 
 
@@ -421,6 +547,8 @@ def exponential(matrix: Array, steps: Array) -> tuple[Array, Array]:
     """
     z = matrix * steps[:, None, None]
     largest = float(np.max(np.abs(z).sum(axis=-1), initial=0.0))
+    if not np.isfinite(largest):
+        raise ArithmeticError("the heat balance is no number with these parameters")
     doublings = max(0, int(np.ceil(np.log2(max(largest, 1e-12) / 0.5))))
     z = z / 2.0**doublings
     identity = np.eye(matrix.shape[-1])
@@ -434,13 +562,24 @@ def exponential(matrix: Array, steps: Array) -> tuple[Array, Array]:
     return decay, phi * steps[:, None, None]
 
 
-def parameter_heat(model: NetworkOnGrid, trajectory: Trajectory, index: int, step: float) -> tuple[Array, Array]:
+def settled_balance(model: NetworkOnGrid, trajectory: Trajectory) -> Balance:
+    """The heat balance along a settled trajectory; its own is that of the one before, about which it was solved."""
+    T = trajectory.middle
+    power = trajectory.tangent.at(T[:, model.loss_nodes])
+    return model.balance(trajectory.piece, T, trajectory.values, power, trajectory.memory)
+
+
+def parameter_heat(
+    model: NetworkOnGrid, trajectory: Trajectory, here: Balance, index: int, step: float
+) -> tuple[Array, Array]:
     """Net heat and total loss per unit of a parameter, along a trajectory.
 
     Parameters
     ----------
     model : NetworkOnGrid
     trajectory : Trajectory
+    here : Balance
+        Its :func:`settled_balance`
     index : int
         Which parameter
     step : float
@@ -461,8 +600,7 @@ def parameter_heat(model: NetworkOnGrid, trajectory: Trajectory, index: int, ste
         name in {s.name for s in law.free_symbols}
         for state in model.network.states for law in (state.rate, state.update) if law is not None
     )  # fmt: skip
-    memory = model.memory(piece, T, values, power) if remembered else trajectory.memory
-    here = model.balance(piece, T, trajectory.values, power, trajectory.memory)
+    memory = model.memory(piece, trajectory.T, values, power) if remembered else trajectory.memory
     there = model.balance(piece, T, values, power, memory)
     capacities = model.capacities(values)
     heat = (there.heat * (trajectory.capacities / capacities) - here.heat) / step

@@ -131,7 +131,7 @@ def shifted(samples: Array, inputs: Sequence[str], role: str, value: float) -> A
 
 def unknowns_of(
     network: ThermalNetwork, channels: Sequence[str], *, lags: Mapping[str, float] | None = None,
-    bias_sd: Mapping[str, float] | None = None,
+    bias_sd: Mapping[str, float] | None = None, slow: bool = False,
 ) -> Unknowns:  # fmt: skip
     """The usual unknowns of a network and its sensors.
 
@@ -141,6 +141,8 @@ def unknowns_of(
     channels : sequence of str
     lags, bias_sd : mapping of channel to float
         Time constants [s] and tolerances [K] as their data sheets state them
+    slow : bool
+        Whether the rows lie minutes apart: they show no usual lag of a sensor then
     """
     lags, bias_sd = lags or {}, bias_sd or {}
     items = [Unknown(role="network", target=p.name, parameter=p) for p in network.parameters if p.sd > 0.0]
@@ -158,6 +160,8 @@ def unknowns_of(
                     parameter=_normal(f"bias_{name}", "K", 0.0, max(bias_sd.get(name, 0.0), BIAS_SD_K)),
                 )
             )
+            if slow:
+                continue
             lag = Parameter(
                 name=f"lag_{name}", unit="s", start=max(lags.get(name, LAG_S), SHORTEST_LAG_S), sd=LAG_SD,
                 lower=0.01, upper=1e4, log=True,

@@ -14,7 +14,7 @@ Time Series Models and the Kalman Filter (1989), section 3.4, for the same filte
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -44,6 +44,9 @@ class Noise:
         Its correlation time, [s]
     start_sd : Array, shape (parts,)
         Uncertainty of the start temperatures, [K]
+    capacity : float
+        Sum of the heat capacities that `heat_sd` is told for, [J/K]: it goes with them, else the floor would decide on
+        the size of a gearbox whose recordings tell ratios only; 0 where it is fixed
     """
 
     channel_sd: Array
@@ -52,6 +55,7 @@ class Noise:
     heat_sd: Array
     heat_time: float
     start_sd: Array
+    capacity: float = 0.0
 
 
 class Whitening:
@@ -67,6 +71,9 @@ class Whitening:
 
     def __init__(self, model: NetworkOnGrid, trajectory: Trajectory, sensors: Sensors, noise: Noise) -> None:
         n, piece = model.n, trajectory.piece
+        if noise.capacity > 0.0:
+            share = float(trajectory.capacities.sum()) / noise.capacity
+            noise = replace(noise, heat_sd=noise.heat_sd * share)
         shaken = np.flatnonzero(noise.heat_sd > 0.0)
         size, steps = n + len(shaken), piece.steps
         self._n = n

@@ -14,6 +14,7 @@ from pydantic import ValidationError
 
 from models.definition import Bearing, HousingPart, Section, Shaft, Stage
 from models.errors import did_you_mean
+from models.parametric import KEY, parametric_faults
 
 S = TypeVar("S", bound=Section)
 
@@ -46,6 +47,8 @@ def consistency_faults(values: Mapping[str, Any]) -> list[str]:
     values : Mapping
         The file as plain values: tables as mappings, lists as tuples
     """
+    if KEY in values:
+        return list(parametric_faults(values))
     return [
         *_unsupported(values),
         *_duplicate_names(values),

@@ -178,12 +178,16 @@ class Correction:
         InputError
             If it was made for another definition, or :meth:`apply` refuses.
         """
-        if gearbox.hash != self.gearbox_sha256:
-            raise InputError(
-                f"the correction was made for {self.gearbox!r} with definition {self.gearbox_sha256[:12]}, but "
-                f"{gearbox.name!r} is {gearbox.hash[:12]}; use the definition it was made for, or diagnose again"
-            )
+        _check_made_for(gearbox, self.gearbox, self.gearbox_sha256)
         return self.apply(gearbox.network(), as_recorded=as_recorded)
+
+
+def _check_made_for(gearbox: Gearbox, name: str, sha256: str, where: str = "") -> None:
+    if gearbox.hash != sha256:
+        raise InputError(
+            f"{where}the correction was made for {name!r} with definition {sha256[:12]}, but "
+            f"{gearbox.name!r} is {gearbox.hash[:12]}; use the definition it was made for, or diagnose again"
+        )
 
 
 # ---------------------------------------------------------------------- the file
@@ -252,7 +256,7 @@ class _File(Section):
     finding: tuple[_Finding, ...] = Field(default=(), strict=False)
 
 
-def read_correction(path: str | Path, network: ThermalNetwork) -> Correction:
+def read_correction(path: str | Path, network: ThermalNetwork, *, made_for: Gearbox | None = None) -> Correction:
     """A correction from its file.
 
     Parameters
@@ -260,11 +264,14 @@ def read_correction(path: str | Path, network: ThermalNetwork) -> Correction:
     path : str or Path
     network : ThermalNetwork
         The nominal network of the gearbox, whose signals the laws may use
+    made_for : Gearbox or None
+        Refuse a correction that was made for another one
 
     Raises
     ------
     InputError
-        If the file cannot be read, is not a correction, or a law in it cannot be used; with file, key and reason.
+        If the file cannot be read, is not a correction, was made for another gearbox, or a law in it cannot be used;
+        with file, key and reason.
     """
     file = str(path)
     table = parse(read_text(Path(path)), file=file)
@@ -273,6 +280,8 @@ def read_correction(path: str | Path, network: ThermalNetwork) -> Correction:
             f"{file}: schema is {table.get('schema')!r}; this program reads corrections of schema {SCHEMA}"
         )
     content = validated(_File, table, file=file)
+    if made_for is not None:
+        _check_made_for(made_for, content.gearbox.name, content.gearbox.sha256, f"{file}: ")
     signals = list(network.signals)
     findings = []
     for index, entry in enumerate(content.finding):

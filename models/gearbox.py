@@ -22,11 +22,18 @@ from models.errors import InputError, did_you_mean
 from models.faults import shown, validated
 from models.named_oils import lubricant, read_oil
 from models.oil import Oil as Lubricant
+from models.parametric import (
+    KEY,
+    ParametricDefinition,
+    ParametricLosses,
+    build_parametric_network,
+    viscosity_constants,
+)
 from models.toml_file import known_names, packaged, parse, read_text
 
 if TYPE_CHECKING:
     from models.losses import LossModel
-    from models.network import ThermalNetwork
+    from models.network import Losses, ThermalNetwork
 
 T = TypeVar("T")
 
@@ -47,8 +54,8 @@ class Gearbox:
 
     Attributes
     ----------
-    definition : Definition
-        All values, defaults included
+    definition : Definition or ParametricDefinition
+        All values, defaults included; the latter where the geometry is not known
     notes : Annotations
         Sources and standard deviations by dotted path
     given : frozenset of str
@@ -57,7 +64,7 @@ class Gearbox:
         Name of the file, for messages
     """
 
-    definition: Definition
+    definition: Definition | ParametricDefinition
     notes: Annotations
     given: frozenset[str]
     file: str
@@ -68,55 +75,81 @@ class Gearbox:
         return self.definition.name
 
     @property
+    def is_parametric(self) -> bool:
+        """Whether it has no geometry, and its losses are parametric laws."""
+        return isinstance(self.definition, ParametricDefinition)
+
+    @property
+    def _geometry(self) -> Definition:
+        """The definition with geometry.
+
+        Raises
+        ------
+        InputError
+            If it has none.
+        """
+        if isinstance(self.definition, ParametricDefinition):
+            raise InputError(
+                f"{self.file}: defines a gearbox without geometry ([[part]]); what was asked needs teeth, shafts, "
+                "bearings and a housing ([[stage]], [[shaft]], [[bearing]], [housing])"
+            )
+        return self.definition
+
+    @property
     def ambient(self) -> Ambient:
         """``[ambient]``."""
-        return self.definition.ambient
+        return self._geometry.ambient
+
+    @property
+    def ambient_degC(self) -> float:
+        """Temperature of the surroundings where a cycle or a recording names none."""
+        return self.definition.ambient.temperature_degC
 
     @property
     def oil(self) -> Oil:
         """``[oil]``, with the values of the named oil."""
-        return self.definition.oil
+        return self._geometry.oil
 
     @property
     def shaft(self) -> tuple[Shaft, ...]:
         """``[[shaft]]``."""
-        return self.definition.shaft
+        return self._geometry.shaft
 
     @property
     def stage(self) -> tuple[Stage, ...]:
         """``[[stage]]``; exactly one for now."""
-        return self.definition.stage
+        return self._geometry.stage
 
     @property
     def bearing(self) -> tuple[Bearing, ...]:
         """``[[bearing]]``."""
-        return self.definition.bearing
+        return self._geometry.bearing
 
     @property
     def seal(self) -> tuple[Seal, ...]:
         """``[[seal]]``."""
-        return self.definition.seal
+        return self._geometry.seal
 
     @property
     def housing(self) -> Housing:
         """``[housing]``."""
-        return self.definition.housing
+        return self._geometry.housing
 
     @property
     def node(self) -> tuple[Node, ...]:
         """``[[node]]``: overridden heat capacities."""
-        return self.definition.node
+        return self._geometry.node
 
     @property
     def training(self) -> Training:
         """``[training]``."""
-        return self.definition.training
+        return self._geometry.training
 
     @cached_property
     def factors(self) -> Mapping[str, float]:
         """Every tunable factor of the thermal network by name; 1 where the file names none."""
         return {
-            name: self.definition.factors.get(name, 1.0)
+            name: self._geometry.factors.get(name, 1.0)
             for name in factor_names(tuple(part.name for part in self.housing.part))
         }
 
@@ -204,25 +237,47 @@ class Gearbox:
             except LookupError:
                 faults.append(f"{path} is not a value of this gearbox{did_you_mean(path, self.leaves)}")
         faults += consistency_faults(values)
-        definition = validated(Definition, values, file=self.file, faults=faults)
+        definition = _checked(values, file=self.file, faults=faults)
         changed = dict.fromkeys(changes, CHANGED_SOURCE)
         notes = Annotations(sources={**self.sources, **changed}, priors=dict(self.priors))
         given = {leaf for leaf, _ in _leaves(values) if any(f"{leaf}.".startswith(f"{path}.") for path in changes)}
         return Gearbox(definition, notes, self.given | given, self.file)
+
+    @property
+    def typical_operation(self) -> tuple[float, float]:
+        """Speed [1/min] and torque [N m]: half of what surrogates are trained to, without geometry the reference."""
+        if isinstance(self.definition, ParametricDefinition):
+            return self.definition.reference.speed_rpm, self.definition.reference.torque_Nm
+        return 0.5 * max(self.training.speed_rpm), 0.5 * max(self.training.torque_Nm)
+
+    @property
+    def viscosity_constants(self) -> tuple[float, float]:
+        """Constants m and n of the oil's viscosity, see :func:`models.oil.kinematic_viscosity_d341`."""
+        if isinstance(self.definition, ParametricDefinition):
+            return viscosity_constants(self.definition)
+        oil = self.lubricant()
+        return oil.m, oil.n
 
     def lubricant(self) -> Lubricant:
         """Return the oil as the loss formulas use it."""
         return lubricant(self.oil)
 
     def losses(self) -> LossModel:
-        """Return the full power-loss model of this gearbox."""
+        """Return the full power-loss model of this gearbox; :meth:`loss_laws` also works without geometry."""
         from models.losses import LossModel
 
         return LossModel.from_gearbox(self)
 
+    def loss_laws(self) -> Losses:
+        """Return what its network needs of losses: the full model, or parametric laws where there is no geometry."""
+        return ParametricLosses(self.definition) if isinstance(self.definition, ParametricDefinition) else self.losses()
+
     def network(self) -> ThermalNetwork:
         """Return the thermal network of this gearbox."""
         from models.gearbox_network import build_network
+
+        if isinstance(self.definition, ParametricDefinition):
+            return build_parametric_network(self, self.definition)
 
         return build_network(self)
 
@@ -291,12 +346,18 @@ def read_gearbox(text: str, *, file: str) -> Gearbox:
     if isinstance(values.get("oil"), dict) and "named" in values["oil"]:
         values = values | {"oil": _with_named_oil(values["oil"], notes)}
     faults = [*notes.faults, *consistency_faults(values)]
-    definition = validated(Definition, values, file=file, faults=faults)
+    definition = _checked(values, file=file, faults=faults)
     gearbox = Gearbox(definition, notes, frozenset(path for path, _ in _leaves(values)), file)
     whole = [path for path in notes.priors if isinstance(gearbox.leaves[path], int)]
     if whole:
         raise InputError("\n".join(f"{file}: {path} is a whole number and cannot have an sd" for path in whole))
     return gearbox
+
+
+def _checked(values: Mapping[str, Any], *, file: str, faults: Sequence[str]) -> Definition | ParametricDefinition:
+    if KEY in values:
+        return validated(ParametricDefinition, values, file=file, faults=faults)
+    return validated(Definition, values, file=file, faults=faults)
 
 
 def _alike(tables: Any, key: str, notes: Annotations) -> Any:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -228,6 +229,11 @@ def function_source(name: str, arguments: Sequence[str], expressions: Sequence[s
     -------
     str
     """
+    return _function_source(name, tuple(arguments), tuple(expressions), vector)
+
+
+@lru_cache(maxsize=4096)  # a diagnosis asks for the laws of the same mechanisms again and again
+def _function_source(name: str, arguments: tuple[str, ...], expressions: tuple[sp.Expr, ...], vector: bool) -> str:
     settings = {"fully_qualified_modules": True, "allow_unknown_functions": False}
     printer = _VectorPrinter(settings) if vector else PythonCodePrinter(settings)
     common, reduced = sp.cse(list(expressions), symbols=sp.numbered_symbols("_x", real=True))

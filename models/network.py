@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from functools import cached_property
 from keyword import iskeyword
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import sympy as sp
 from numpy.typing import ArrayLike
@@ -98,12 +98,15 @@ class ExtraState:
         Time derivative, [1/s]; 0 for a state that only switches
     update : sympy.Expr or None
         Its value after each accepted step of the solver, e.g. a thermostat's hysteresis
+    blurred : sympy.Expr or None
+        The same where temperatures are means over minutes, which hide the moment at which something switches
     """
 
     name: str
     start: float
     rate: sp.Expr
     update: sp.Expr | None
+    blurred: sp.Expr | None = None
 
 
 BASE_SIGNALS = ("time", "speed", "torque")
@@ -128,6 +131,8 @@ class ThermalNetwork:
         Laws that could not be traced, by the symbol that stands for them
     operating : mapping of str to sympy.Expr
         ``speed`` or ``torque`` as the losses see it, where that is not the input itself
+    recording : mapping
+        How recordings of this gearbox name their columns, as in a mapping file, where the definition says so
     """
 
     nodes: tuple[Node, ...]
@@ -140,6 +145,7 @@ class ThermalNetwork:
     states: tuple[ExtraState, ...] = ()
     numeric_laws: Mapping[str, NumericLaw] = field(default_factory=dict)
     operating: Mapping[str, sp.Expr] = field(default_factory=dict)
+    recording: Mapping[str, Any] = field(default_factory=dict)
 
     @cached_property
     def node_names(self) -> tuple[str, ...]:
@@ -197,8 +203,9 @@ class ThermalNetwork:
         return replace(self, parameters=(*self.parameters, parameter))
 
     def with_state(
-        self, name: str, *, start: float, rate: LawLike = 0.0, update: LawLike | None = None
-    ) -> ThermalNetwork:
+        self, name: str, *, start: float, rate: LawLike = 0.0, update: LawLike | None = None,
+        blurred: sp.Expr | None = None,
+    ) -> ThermalNetwork:  # fmt: skip
         """A network with a memory.
 
         Parameters
@@ -211,6 +218,8 @@ class ThermalNetwork:
             Its time derivative, [1/s]
         update : law or None
             Its value after each accepted step of the solver
+        blurred : sympy.Expr or None
+            The same where temperatures are means over minutes
         """
         self._new_name(name, self.signals, "signal")
         names = [*self.signals, name]
@@ -221,7 +230,7 @@ class ThermalNetwork:
             numeric = numeric or numeric_update
         if numeric is not None:
             raise InputError(f"the laws of state {name!r} must be expressions; write branches with sympy.Piecewise")
-        state = ExtraState(name=name, start=start, rate=rate_expression, update=update_expression)
+        state = ExtraState(name=name, start=start, rate=rate_expression, update=update_expression, blurred=blurred)
         return replace(self, states=(*self.states, state))
 
     def with_source(self, node: str, law: LawLike, *, name: str, is_loss: bool = False) -> ThermalNetwork:
@@ -413,7 +422,8 @@ class ThermalNetwork:
             sources=tuple(replace(source, heat=source.heat.xreplace(seen)) for source in self.sources),
             states=tuple(
                 replace(state, rate=state.rate.xreplace(seen),
-                        update=None if state.update is None else state.update.xreplace(seen))
+                        update=None if state.update is None else state.update.xreplace(seen),
+                        blurred=None if state.blurred is None else state.blurred.xreplace(seen))
                 for state in self.states
             ),
             operating=operating,

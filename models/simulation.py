@@ -79,7 +79,9 @@ def initial_states(network: ThermalNetwork, initial: float | Mapping[str, float]
                 raise InputError(f"initial temperature of unknown node {name!r}{hint}")
         missing = [name for name in part_names if name not in initial]
         if missing:
-            raise InputError(f"initial temperatures are missing for: {', '.join(missing)}")
+            raise InputError(
+                f"initial temperatures are missing for: {', '.join(missing)}; give one of every node, or one for all"
+            )
         temperatures = np.array([initial[name] for name in part_names], dtype=float)
     else:
         temperatures = np.full(len(part_names), float(initial))

@@ -119,7 +119,9 @@ class Term:
         for parameter in self.with_values(values or {}).parameters:
             network = network.with_parameter(parameter)
         for state in self.states:
-            network = network.with_state(state.name, start=state.start, rate=state.rate, update=state.update)
+            network = network.with_state(
+                state.name, start=state.start, rate=state.rate, update=state.update, blurred=state.blurred
+            )
         return self._placed_in(network)
 
     def _placed_in(self, network: ThermalNetwork) -> ThermalNetwork:

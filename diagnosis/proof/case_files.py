@@ -32,7 +32,7 @@ def keep_apart(recordings: Path, truth: Path) -> None:
 
 def write_case(
     folder: Path,
-    truth_file: Path,
+    truth_file: Path | None,
     recordings: Mapping[str, Mapping[str, Array]],
     truth: Mapping[str, Any],
     stated: Mapping[str, float] | None = None,
@@ -43,8 +43,8 @@ def write_case(
     ----------
     folder : Path
         Gets ``<recording>.csv.gz``, ``seal.json`` and, if anything is stated of the sensors, ``mapping.toml``
-    truth_file : Path
-        Outside `folder`; see :func:`keep_apart`
+    truth_file : Path or None
+        Outside `folder`; see :func:`keep_apart`. None: the truth is sealed and not written
     recordings : mapping of name to columns
     truth : mapping
         Goes into JSON, its ``salt`` with it, which makes the seal unguessable
@@ -59,13 +59,15 @@ def write_case(
     sealed = (json.dumps(truth, indent=1, sort_keys=True, allow_nan=False) + "\n").encode()
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        truth_file.parent.mkdir(parents=True, exist_ok=True)
+        if truth_file is not None:
+            truth_file.parent.mkdir(parents=True, exist_ok=True)
         for name, columns in recordings.items():
             # Neither name nor time go into the archive, so that the same case gives the same bytes.
             _write_whole(folder / f"{name}.csv.gz", gzip.compress(_csv(columns), compresslevel=6, mtime=0))
         if stated is not None:
             _write_whole(folder / MAPPING, _mapping(recordings, stated).encode())
-        _write_whole(truth_file, sealed)
+        if truth_file is not None:
+            _write_whole(truth_file, sealed)
         _write_whole(folder / SEAL, (json.dumps({"truth_sha256": hashlib.sha256(sealed).hexdigest()}) + "\n").encode())
     except OSError as error:
         raise InputError(f"{error.filename}: cannot be written ({error.strerror}); choose another output") from error

@@ -148,7 +148,7 @@ def conceal_set(
     *,
     seed: int,
     recordings: Path,
-    truth: Path,
+    truth: Path | None,
     flat: bool = False,
     progress: Callable[[int, int], None] | None = None,
 ) -> list[str]:
@@ -161,8 +161,9 @@ def conceal_set(
     seed : int
     recordings : Path
         Folder that gets one folder per case with its recordings and ``seal.json``
-    truth : Path
-        Folder that gets ``<case>.json``, what is concealed; must be another one
+    truth : Path or None
+        Folder that gets ``<case>.json``, what is concealed; must be another one. None: only its seal is kept, until
+        the same seed makes it again
     flat : bool
         Whether the recordings of a single case go straight into `recordings`
     progress : callable or None
@@ -181,7 +182,8 @@ def conceal_set(
     """
     if flat and len(plans) != 1:
         raise InputError(f"{len(plans)} cases cannot share one folder; only a single case is written flat")
-    keep_apart(recordings, truth)
+    if truth is not None:
+        keep_apart(recordings, truth)
     plant = Plant(gearbox)
     digits = max(3, len(str(len(plans))))
     cases = [draw_case(plant, plan, seed=(seed, i), name=f"case_{i + 1:0{digits}d}") for i, plan in enumerate(plans)]
@@ -193,7 +195,8 @@ def conceal_set(
 
         for case, columns, facts in simulate_cases(plant, cases[first : first + TOGETHER], tell):
             folder = recordings if flat else recordings / case.name
-            write_case(folder, truth / f"{case.name}.json", columns, facts, case.instruments.stated)
+            sealed = None if truth is None else truth / f"{case.name}.json"
+            write_case(folder, sealed, columns, facts, case.instruments.stated)
     return [case.name for case in cases]
 
 

@@ -151,7 +151,7 @@ def _heat_of(effect: Concealed, k: int, with_it: Outcome, without: Outcome) -> M
 
 
 def _heat(case: Case, heat: Sequence[Mapping[str, Array]]) -> dict[str, Any]:
-    """Mean and greatest heat by place, and when it acted."""
+    """Mean and greatest heat by place, its mean magnitude over all places, and when it acted."""
     places = list(heat[0])
     found: dict[str, Any] = {}
     for kind, members in _sets(case).items():
@@ -171,7 +171,11 @@ def _heat(case: Case, heat: Sequence[Mapping[str, Array]]) -> dict[str, Any]:
     acting = {
         run.programme.name: _spans(values > ACTIVE_SHARE * top) for run, values in zip(case.runs, total, strict=True)
     }
-    return {"heat_W": found, "acting_s": acting}
+    magnitude = {
+        kind: round(float(np.concatenate([total[i] for i in members]).mean()), 3)
+        for kind, members in _sets(case).items()
+    }
+    return {"heat_W": found, "heat_magnitude_W": magnitude, "acting_s": acting}
 
 
 def _spans(active: NDArray[np.bool_]) -> list[list[float]]:

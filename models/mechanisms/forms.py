@@ -73,6 +73,16 @@ def hysteresis(value: Any, state: Any, *, at: Any, band: Any, above: float) -> s
     return sp.Piecewise((above, value - at - band / 2 > 0), (1.0 - above, value - at + band / 2 < 0), (state, True))
 
 
+def soft_hysteresis(value: Any, state: Any, *, at: Any, band: Any, width: float) -> sp.Expr:
+    """A two-point switch around `at` that does not switch at a point but within about four `width` of it.
+
+    For means over minutes, in which the moment of switching is not seen.
+    """
+    on = (1.0 + sp.tanh((value - at - band / 2) / width)) / 2.0
+    off = (1.0 - sp.tanh((value - at + band / 2) / width)) / 2.0
+    return state + (1.0 - state) * on - state * off
+
+
 def share_between(scale: Scale, share: float) -> float:
     """A temperature [degC] at a share of the way from ambient to the hot oil."""
     return scale.ambient + share * (scale.temperature - scale.ambient)

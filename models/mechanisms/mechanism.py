@@ -21,6 +21,8 @@ from models.terms import Form, Kind, Term, equation
 
 Parameters: TypeAlias = Callable[[Scale], tuple[Parameter, ...]]
 STRENGTH = "strength"
+GROUPS = ("housing", "bearings", "shafts", "gears")  # that a law may name; in a network without one it has no place
+ABSENT = symbol("absent_group")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,12 +38,15 @@ class Memory:
         Time derivative, [1/s]
     update : law or None
         Its value after each step, e.g. of a thermostat's switch
+    blurred : law or None
+        The same for temperatures that are means over minutes
     """
 
     name: str
     start: Callable[[Scale], float] = field(default=lambda _: 0.0)
     rate: LawLike = 0.0
     update: LawLike | None = None
+    blurred: LawLike | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -129,7 +134,8 @@ class Mechanism:
         if channels is None:
             channels = (*(part.name for part in network.parts), LOSS_CHANNEL)
         found = [spot for pattern in self.places for spot in spots(network, self.kind, pattern, channels)]
-        return tuple(self._at(network, scale, spot) for spot in found)
+        placed = [self._at(network, scale, spot) for spot in found]
+        return tuple(p for p in placed if not any(ABSENT in law.free_symbols for law in p.written.values()))
 
     def separation(self, other: str) -> str:
         """The experiment that would tell this mechanism from another one."""
@@ -147,7 +153,7 @@ class Mechanism:
         if clash:
             raise InputError(f"mechanism {self.name!r}: {clash[0]!r} is a signal; name the parameter differently")
 
-        other = self.other or "air"
+        other = spot.there[0] if self.kind == "link" and spot.there else self.other or "air"
         own_boundary = self.kind == "link" and other not in network.node_names
         target = spot.target
         if self.kind == "link":
@@ -169,6 +175,8 @@ class Mechanism:
                 written[f"update {label}_{memory.name}"] = read(memory.update)
         meant = {symbol(name): value for name, value in aliases.items()}
         full = {key: expression.xreplace(meant) for key, expression in written.items()}
+        written = {key: expression.xreplace({symbol(f"T_{g}"): ABSENT for g in GROUPS if g not in network.groups})
+                   for key, expression in written.items()}  # fmt: skip
         return Placed(
             mechanism=self,
             place=spot.name,
@@ -185,6 +193,7 @@ class Mechanism:
                     start=float(memory.start(scale)),
                     rate=full[f"rate {label}_{memory.name}"],
                     update=full.get(f"update {label}_{memory.name}"),
+                    blurred=None if memory.blurred is None else read(memory.blurred).xreplace(meant),
                 )
                 for memory in self.states
             ),
@@ -269,6 +278,7 @@ def _aliases(network: ThermalNetwork, scale: Scale, spot: Spot) -> dict[str, sp.
     }
     if "oil" in network.node_names:
         aliases["nu"] = scale.viscosity_at(symbol("T_oil")) / scale.viscosity
+    aliases |= {f"T_{group}": ABSENT for group in GROUPS}
     aliases |= {f"T_{group}": _mean(members) for group, members in network.groups.items()}
     if spot.here:
         aliases["T_here"] = _mean(spot.here)

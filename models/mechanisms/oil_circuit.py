@@ -11,7 +11,9 @@ from models.mechanisms.forms import (
     moment,
     plain,
     positive,
+    rises,
     share_between,
+    soft_hysteresis,
     steps,
     strength,
     temperature,
@@ -23,6 +25,7 @@ FAMILY = "oil circuit"
 RUNNING = 20.0  # a pump on the shaft delivers all it can from about a tenth of the reference speed
 PAST_SET_POINT = "heat up slowly at constant load past the suspected set-point, then hold"
 RETURN = "measure the oil where it enters and leaves the gearbox"
+SOFT_K = 0.3  # a switch that is seen in means over minutes
 SET_POINTS = (0.35, 0.45, 0.55, 0.65, 0.75, 0.85, 0.95, 1.1)  # of the way from ambient to the hot oil
 
 
@@ -234,7 +237,78 @@ water_jacket = Mechanism(
     },
 )
 
+cooler_air_thermostat = Mechanism(
+    name="cooler_air_thermostat",
+    family=FAMILY,
+    kind="link",
+    places=("returns-air", "returns-outdoor", "oil-outdoor"),
+    parameters=lambda scale: (
+        strength(1.5 * scale.conductance, "W/K", "conductance of the cooler"),
+        _set_point(scale),
+        positive("band", 6.0, sd=0.5, unit="K", grid=(3.0, 5.0, 8.0)),
+    ),
+    states=(
+        Memory(
+            name="valve",
+            update=lambda s: hysteresis(s.T_oil, s.valve, at=s.set_point, band=s.band, above=1.0),
+            blurred=lambda s: soft_hysteresis(s.T_oil, s.valve, at=s.set_point, band=s.band, width=SOFT_K),
+        ),
+    ),
+    law=lambda s: s.strength * s.valve,
+    says="A thermostat or fan sends the returning oil through an air cooler above a set oil temperature, and past it "
+    "below a lower one ({place}).",
+    reference="two-point control; wind turbines: fan on at some 60 degC, off at some 55 degC",
+    experiment=PAST_SET_POINT + ": the oil saws between two temperatures, the returning oil steps",
+    separate_by={"cooler_air_proportional": "hold a load near the set-point: a two-point valve makes the oil saw"},
+)
+
+cooler_air_proportional = Mechanism(
+    name="cooler_air_proportional",
+    family=FAMILY,
+    kind="link",
+    places=("returns-air", "returns-outdoor"),
+    parameters=lambda scale: (
+        strength(1.5 * scale.conductance, "W/K", "conductance of the cooler, wide open"),
+        _set_point(scale),
+        positive("band", 10.0, sd=0.6, unit="K", grid=(5.0, 15.0)),
+    ),
+    law=lambda s: s.strength * sp.Min(sp.Max((s.T_oil - s.set_point) / s.band, 0.0), 1.0),
+    says="A wax valve opens with the oil temperature and sends the returning oil through an air cooler ({place}).",
+    reference="wax thermostat: opens over 10 to 15 K",
+    experiment=PAST_SET_POINT + " two loads beyond it: the oil temperature hardly rises",
+    separate_by={"cooler_air_thermostat": "hold a load near the set-point: a two-point valve makes the oil saw"},
+)
+
+bearing_fed_by_return = Mechanism(
+    name="bearing_fed_by_return",
+    family=FAMILY,
+    kind="link",
+    places=("each bearings-returns",),
+    parameters=lambda scale: (strength(0.5 * scale.conductance, "W/K", "heat capacity flow of the feed"),),
+    law=lambda s: s.strength * sp.tanh(RUNNING * s.n),
+    says="The bearing is fed with the oil that comes back, not from the sump: it follows the cooler ({place}).",
+    reference="rho c V: 30 W/K per l/min of mineral oil",
+    experiment=RETURN + " while the cooler switches: the bearing follows at once",
+)
+
+pump_fast_stage = Mechanism(
+    name="pump_fast_stage",
+    family=FAMILY,
+    kind="link_factor",
+    places=("oil-returns",),
+    sign=0,
+    parameters=lambda _: (
+        strength(0.5, description="relative change of the circulation beyond the switch"),
+        positive("switch", 0.8, sd=0.3, grid=(0.5, 0.7, 0.9, 0.98)),
+    ),
+    law=lambda s: s.strength * rises(s.n, at=s.switch, power=24),
+    says="The pump has a second stage: above a speed more or less oil circulates.",
+    reference="pole-changing motor: 1 to 2; or a pump on the shaft with a relief valve",
+    experiment="hold speeds around the switch and measure the oil where it enters and leaves",
+)
+
 MECHANISMS = (
+    cooler_air_thermostat, cooler_air_proportional, bearing_fed_by_return, pump_fast_stage,
     cooler_thermostat, cooler_proportional, cooler_constant, cooler_shaft_driven, oil_jet, pump_heat, oil_tank,
     heater_thermostat, oil_added, water_jacket,
 )  # fmt: skip

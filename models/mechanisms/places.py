@@ -2,7 +2,8 @@
 
 A pattern is a name, a group (its members together), or ``each`` and a group (one place per member), by kind:
 
-- source, link: nodes. ``oil``, ``housing``, ``each bearings``
+- source, link: nodes. ``oil``, ``housing``, ``each bearings``; of a link also both ends, ``each bearings-returns``,
+  the other one a boundary or a group of one
 - loss_factor: sources. ``mesh_sliding``; the losses in a group of nodes, ``each bearings``; those that a factor of the
   network multiplies, ``factor seal``; several together, ``mesh_sliding+mesh_rolling``
 - link_factor: links by their ends. ``oil-housing``, ``each bearings-housing``, ``oil-gears+oil-housing``
@@ -90,12 +91,17 @@ def _members(network: ThermalNetwork, name: str) -> tuple[str, ...]:
 
 def _nodes(network: ThermalNetwork, pattern: str) -> Iterator[Spot]:
     each, name = _apart(pattern)
+    name, dash, other = name.partition("-")
+    there = tuple(_members(network, other)) if dash else ()
+    if dash and len(there) != 1:
+        return
     parts = {part.name for part in network.parts}
-    members = tuple(node for node in _members(network, name) if node in parts)
+    members = tuple(node for node in _members(network, name) if node in parts and node not in there)
+    ending = f"_{other}" if dash else ""
     if each:
-        yield from (Spot(name=node, target=(node,), here=(node,)) for node in members)
+        yield from (Spot(name=node + ending, target=(node,), here=(node,), there=there) for node in members)
     elif members:
-        yield Spot(name=name, target=members, here=members)
+        yield Spot(name=name + ending, target=members, here=members, there=there)
 
 
 def _sources(network: ThermalNetwork, pattern: str) -> Iterator[Spot]:

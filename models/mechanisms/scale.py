@@ -70,6 +70,7 @@ class Scale:
         speed: float | None = None,
         torque: float | None = None,
         ambient: float | None = None,
+        temperature: float | None = None,
         duration: float = TEN_HOURS,
     ) -> Scale:
         """The scale of a gearbox.
@@ -78,9 +79,12 @@ class Scale:
         ----------
         gearbox : Gearbox
         speed, torque : float or None
-            Typical magnitudes of its operation, [1/min] and [N m]; by default half of the training range
+            Typical magnitudes of its operation, [1/min] and [N m]; by default half of the training range,
+            without geometry those of the reference
         ambient : float or None
             [degC]; by default the definition's
+        temperature : float or None
+            Of the hot oil, [degC]; by default where the nominal losses and conductances put it
         duration : float
             Of a recording, [s]
 
@@ -91,10 +95,11 @@ class Scale:
         >>> round(scale.conductance, 1), round(scale.viscosity, 1)
         (6.9, 8.1)
         """
-        speed = 0.5 * max(map(abs, gearbox.training.speed_rpm)) if speed is None else speed
-        torque = 0.5 * max(map(abs, gearbox.training.torque_Nm)) if torque is None else torque
-        ambient = gearbox.ambient.temperature_degC if ambient is None else ambient
-        network, losses, oil = gearbox.network(), gearbox.losses(), gearbox.lubricant()
+        typical_speed, typical_torque = gearbox.typical_operation
+        speed = typical_speed if speed is None else speed
+        torque = typical_torque if torque is None else torque
+        ambient = gearbox.ambient_degC if ambient is None else ambient
+        network, losses, (oil_m, oil_n) = gearbox.network(), gearbox.loss_laws(), gearbox.viscosity_constants
         start = {symbol(p.name): p.start for p in network.parameters}
         boundaries = {node.name for node in network.nodes if node.temperature is not None}
         here = {symbol(f"T_{name}"): ambient for name in boundaries}
@@ -105,7 +110,8 @@ class Scale:
         conductance = float(sum(law.xreplace(start | here).evalf() for law in outward))
         at = [[ambient + TYPICAL_RISE] * len(losses.temperature_nodes)]
         loss = float(losses.power([speed], [torque], at).sum())
-        temperature = min(max(ambient + loss / max(conductance, 1e-9), ambient + COOLEST_RISE), HOTTEST)
+        if temperature is None:
+            temperature = min(max(ambient + loss / max(conductance, 1e-9), ambient + COOLEST_RISE), HOTTEST)
         return cls(
             speed=speed,
             torque=torque,
@@ -115,6 +121,6 @@ class Scale:
             temperature=max(temperature, ambient + COOLEST_RISE),
             ambient=ambient,
             duration=duration,
-            oil_m=oil.m,
-            oil_n=oil.n,
+            oil_m=oil_m,
+            oil_n=oil_n,
         )

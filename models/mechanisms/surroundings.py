@@ -10,6 +10,7 @@ from models.mechanisms.forms import (
     hysteresis,
     length,
     moment,
+    plain,
     positive,
     share_between,
     strength,
@@ -18,6 +19,7 @@ from models.mechanisms.forms import (
 from models.mechanisms.mechanism import Mechanism, Memory
 
 FAMILY = "surroundings"
+HOUR_S = 3600.0
 STANDSTILL_DAY = "let it stand for a day with an ambient probe on each side"
 
 solar_soak = Mechanism(
@@ -95,4 +97,23 @@ ambient_drift = Mechanism(
     experiment=STANDSTILL_DAY,
 )
 
-MECHANISMS = (solar_soak, rain_on_housing, fan_thermostat, ambient_drift)
+ambient_swing = Mechanism(
+    name="ambient_swing",
+    family=FAMILY,
+    kind="signal",
+    of_measurement=True,
+    places=("T_ambient",),
+    sign=0,
+    parameters=lambda _: (
+        strength(2.0, "K", "true less recorded, half of the swing"),
+        positive("period", 6.0 * HOUR_S, sd=0.6, unit="s", grid=[h * HOUR_S for h in (3.0, 6.0, 9.0, 24.0)]),
+        plain("phase", 0.0, sd=1.0, lower=-4.0, upper=4.0, unit="rad", grid=(-0.8, 0.0, 0.8, 1.6)),
+    ),
+    law=lambda s: s.strength * sp.sin(2.0 * sp.pi * s.time / s.period + s.phase),
+    says="The air at the gearbox swings with the day or with the hall's heating, which the recorded ambient does not "
+    "show.",
+    reference="25 to 29 degC in a test cell, where one constant is recorded; the sine is ours",
+    experiment=STANDSTILL_DAY,
+)
+
+MECHANISMS = (solar_soak, rain_on_housing, fan_thermostat, ambient_drift, ambient_swing)

@@ -182,7 +182,7 @@ def _from_python(path: Path) -> tuple[Mechanism, ...]:
     module = module_from_spec(spec)
     try:
         spec.loader.exec_module(module)
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise InputError(f"{path}: fails with {type(error).__name__}: {error}") from error
     content: Mapping[str, Any] = vars(module)
     found = content.get("MECHANISMS")

@@ -28,7 +28,15 @@ from models.types import Array
 MOST_STARTS = 24  # combinations of shape parameters that a search can afford per place
 DURATION = 7200.0
 GEARBOXES = {name: load_gearbox(name) for name in ("fzg", "conveyor")}
-NETWORKS = {name: gearbox.network() for name, gearbox in GEARBOXES.items()}
+
+
+def with_circulation(network: ThermalNetwork) -> ThermalNetwork:
+    """Neither circulates its oil; some mechanisms sit where it comes back."""
+    larger = network.with_node("oil_inlet", 400.0).with_link("oil", "oil_inlet", 8.0)
+    return replace(larger, groups={**network.groups, "returns": ("oil_inlet",)})
+
+
+NETWORKS = {name: with_circulation(gearbox.network()) for name, gearbox in GEARBOXES.items()}
 SCALES = {
     "fzg": Scale.of(GEARBOXES["fzg"], speed=2600.0, torque=94.0, duration=DURATION),
     "conveyor": Scale.of(GEARBOXES["conveyor"], duration=DURATION),

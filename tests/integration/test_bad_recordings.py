@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import gzip
 import random
+import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +16,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from builder.__main__ import main
 from diagnosis.recording import check_holdout, read_recordings
 from models.errors import InputError
 from models.gearbox import Gearbox
@@ -463,6 +465,24 @@ def test_a_bad_recording_is_refused(case: Case, tmp_path: Path, network: Thermal
     for part in case.says:
         assert part in message, message
     assert len(message) < 4000
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
+def test_the_verb_ends_with_status_2_and_leaves_nothing(
+    case: Case, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    home = tmp_path / "in"
+    home.mkdir()
+    given, before = case.spoil(home), sorted(tmp_path.rglob("*"))
+    monkeypatch.setattr(sys, "argv", ["builder", "diagnose", str(given), "--jobs", "1", "--output", f"{tmp_path}/out"])
+    with pytest.raises(SystemExit) as end:
+        main()
+    shown = capsys.readouterr()
+    assert end.value.code == 2
+    assert shown.out == ""
+    assert all(line.startswith(str(home)) for line in shown.err.splitlines()), shown.err
+    assert 0 < len(shown.err) < 4000
+    assert sorted(tmp_path.rglob("*")) == before
 
 
 def test_the_sound_recording_is_accepted(tmp_path: Path, network: ThermalNetwork) -> None:

@@ -1,0 +1,186 @@
+"""A fleet of gearboxes through the verb: one report each, one table of all, and none lost for the fault of another."""
+
+from __future__ import annotations
+
+import gzip
+import json
+import shutil
+import sys
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from builder import fleet
+from builder.__main__ import main
+from builder.fleet import members_of
+from models.cycle import Cycle
+from models.errors import InputError
+from models.gearbox import Gearbox
+
+SENSORS = ("oil", "housing_lower", "bearing_1")
+REPORT = {"report.html", "diagnosis.json", "correction.toml", "train.csv"}
+
+
+def run(*arguments: object) -> int:
+    """Run the command line in this process and return its exit status."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys, "argv", ["builder", *map(str, arguments)])
+        try:
+            main()
+        except SystemExit as end:
+            return int(end.code or 0)
+    return 0
+
+
+def recorded(gearbox: Gearbox, *, seed: int, hours: float, bias: float = 0.0) -> pd.DataFrame:
+    """Steps of 10 min, every 20 s, from the model itself."""
+    rng = np.random.default_rng(seed)
+    time = np.arange(0.0, 3600.0 * hours + 1.0, 20.0)
+    step = (time // 600.0).astype(int)
+    columns = {
+        "time_s": time, "speed_rpm": rng.uniform(500.0, 3500.0, step.max() + 1)[step],
+        "torque_Nm": rng.uniform(30.0, 200.0, step.max() + 1)[step], "T_ambient_degC": np.full(len(time), 23.0),
+        "air_speed_m_s": np.full(len(time), 2.0),
+    }  # fmt: skip
+    result = gearbox.network().simulate(Cycle.from_columns(columns), losses=gearbox.losses(), initial=24.0).columns()
+    for name in SENSORS:
+        columns[f"T_{name}_degC"] = result[f"T_{name}_degC"] + rng.normal(0.0, 0.15, len(time))
+    columns["T_oil_degC"] = columns["T_oil_degC"] + bias
+    return pd.DataFrame(columns).round(3)
+
+
+@pytest.fixture(scope="module")
+def folder(fzg: Gearbox, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Four gearboxes: sound, with a biased sensor and a held-out folder, unreadable, without recordings."""
+    home = tmp_path_factory.mktemp("fleet")
+    for name in ("sound", "biased/holdout", "broken", "empty"):
+        (home / name).mkdir(parents=True)
+    recorded(fzg, seed=1, hours=1.5).to_csv(home / "sound/train.csv", index=False)
+    recorded(fzg, seed=2, hours=1.0).to_csv(home / "sound/hold_1.csv", index=False)
+    recorded(fzg, seed=3, hours=1.5, bias=4.0).to_csv(home / "biased/train.csv", index=False)
+    # The held-out recording has the name of the one that is learned from.
+    recorded(fzg, seed=4, hours=1.0, bias=4.0).to_csv(home / "biased/holdout/train.csv", index=False)
+    recorded(fzg, seed=5, hours=0.5).drop(columns="torque_Nm").to_csv(home / "broken/train.csv", index=False)
+    (home / "empty/notes.txt").write_text("nothing was recorded")
+    return home
+
+
+@pytest.fixture(scope="module")
+def diagnosed(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, int]:
+    """Output and exit status."""
+    out = tmp_path_factory.mktemp("out") / "fleet"
+    return out, run("diagnose", folder, "--fleet", "--jobs", 2, "--output", out)
+
+
+def test_every_gearbox_has_its_row_and_the_good_ones_their_report(diagnosed: tuple[Path, int]) -> None:
+    out, status = diagnosed
+    assert status == 2
+    table = pd.read_csv(out / "summary.csv").set_index("gearbox")
+    assert list(table.index) == ["biased", "broken", "empty", "sound"]
+    assert sorted(p.name for p in out.iterdir()) == ["biased", "sound", "summary.csv"]
+    assert table.loc["biased", "verdict"] == "sensor_fault"
+    assert table.loc["biased", "found"].startswith("sensor_bias at oil")
+    assert list(table.loc[["broken", "empty"], "verdict"]) == ["error", "error"]
+    assert "column torque_Nm is missing" in table.loc["broken", "error"]
+    assert "no recording to learn from" in table.loc["empty", "error"]
+    for name in ("sound", "biased"):
+        found = json.loads((out / name / "diagnosis.json").read_text())
+        assert found["verdict"] == table.loc[name, "verdict"]
+        held = found["fit"]["holdout"]
+        for state in ("before", "calibrated", "after"):
+            assert table.loc[name, f"rmse_{state}_K"] == pytest.approx(held[f"rmse_{state}_K"], abs=1e-6)
+        assert {p.name for p in (out / name).iterdir()} >= REPORT
+        assert pd.isna(table.loc[name, "error"])
+
+
+def test_recordings_of_one_name_get_a_prediction_each(diagnosed: tuple[Path, int], folder: Path) -> None:
+    out, _ = diagnosed
+    learnt, judged = (pd.read_csv(out / "biased" / name) for name in ("train.csv", "train_held_out.csv"))
+    assert len(learnt) == len(pd.read_csv(folder / "biased/train.csv"))
+    assert len(judged) == len(pd.read_csv(folder / "biased/holdout/train.csv"))
+    assert not judged.isna().to_numpy().any()
+
+
+def test_the_table_is_shown_and_the_faults_are_told(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name in ("broken", "empty"):
+        shutil.copytree(folder / name, tmp_path / "fleet" / name)
+    assert run("diagnose", tmp_path / "fleet", "--fleet", "--output", tmp_path / "out") == 2
+    shown = capsys.readouterr()
+    assert "verdict" in shown.out
+    assert "2 of 2 gearboxes could not be diagnosed" in shown.err
+    assert "torque_Nm" in shown.err
+    assert "Traceback" not in shown.err
+    assert [p.name for p in (tmp_path / "out").iterdir()] == ["summary.csv"]
+
+
+def test_our_own_fault_with_one_leaves_the_others_and_ends_with_status_1(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def breaks(*_: object, **__: object) -> None:
+        raise ZeroDivisionError("by chance")
+
+    monkeypatch.setattr(fleet, "diagnose", breaks)
+    assert run("diagnose", folder, "--fleet", "--jobs", 1, "--output", tmp_path / "out") == 1
+    assert "ZeroDivisionError: by chance" in capsys.readouterr().err
+    errors = pd.read_csv(tmp_path / "out/summary.csv").set_index("gearbox")["error"]
+    assert errors["sound"] == "a fault of this program: ZeroDivisionError: by chance"
+    assert "torque_Nm" in errors["broken"]
+
+
+def test_a_cluster_gives_the_same_reports(diagnosed: tuple[Path, int], folder: Path, tmp_path: Path) -> None:
+    distributed = pytest.importorskip("distributed", reason="the extra 'dask' is not installed")
+    for name in ("broken", "biased"):
+        shutil.copytree(folder / name, tmp_path / "fleet" / name)
+    with distributed.LocalCluster(
+        n_workers=1, threads_per_worker=1, processes=True, protocol="tcp", dashboard_address=None
+    ) as cluster:
+        address = cluster.scheduler_address
+        assert run("diagnose", tmp_path / "fleet", "--fleet", "--dask", address, "--output", tmp_path / "out") == 2
+    ours, theirs = diagnosed[0], tmp_path / "out"
+    for name in sorted(p.name for p in (ours / "biased").iterdir()):
+        assert (theirs / "biased" / name).read_bytes() == (ours / "biased" / name).read_bytes(), name
+    assert list(pd.read_csv(theirs / "summary.csv")["verdict"]) == ["sensor_fault", "error"]
+
+
+FAULTY = [
+    (["FOLDER", "--fleet", "--holdout", "x.csv"], "--fleet takes one folder"),
+    (["FOLDER", "FOLDER", "--fleet"], "--fleet takes one folder"),
+    (["FOLDER/nothing", "--fleet"], "nothing: cannot be read (No such file or directory)"),
+    (["FOLDER/sound/train.csv", "--fleet"], "train.csv: cannot be read (Not a directory)"),
+    (["FOLDER/sound", "--fleet"], "it holds recordings itself: name them, without --fleet"),
+    (["FOLDER/empty", "--fleet"], "has no folder of a gearbox in it"),
+    (["FOLDER", "--fleet", "--jobs", "2", "--dask", "tcp://127.0.0.1:1"], "exclude each other"),
+    (["FOLDER", "--fleet", "--dask", "tcp://127.0.0.1:1"], "no dask scheduler answers at tcp://127.0.0.1:1"),
+    (["FOLDER/sound/train.csv", "--dask", "tcp://127.0.0.1:1"], "give --fleet with it"),
+    (["FOLDER", "--fleet", "--gearbox", "fgz"], "did you mean 'fzg'?"),
+]
+
+
+@pytest.mark.parametrize(("arguments", "message"), FAULTY, ids=[message for _, message in FAULTY])
+def test_faulty_options_end_with_status_2_and_leave_nothing(
+    arguments: list[str], message: str, folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    given = [a.replace("FOLDER", str(folder)) for a in arguments]
+    assert run("diagnose", *given, "--output", tmp_path / "out") == 2
+    shown = capsys.readouterr().err
+    assert message in " ".join(shown.split())
+    assert "Traceback" not in shown
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_members_are_folders_with_recordings_of_every_kind(tmp_path: Path) -> None:
+    for name in ("a/train.csv", "a/train.toml", "a/Holdout_2.CSV", "a/.hidden.csv", "a/holdout/x.parquet",
+                 "a/other/x.csv", ".git/x.csv", "out/b/train.csv"):  # fmt: skip
+        path = tmp_path / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(gzip.compress(b""))
+    (only,) = members_of(tmp_path, without=tmp_path / "out")
+    assert only.name == "a"
+    assert [p.name for p in only.train] == ["train.csv"]
+    assert [p.name for p in only.holdout] == ["Holdout_2.CSV", "x.parquet"]
+    with pytest.raises(InputError, match="no folder of a gearbox"):
+        members_of(tmp_path / "out", without=tmp_path / "out/b")

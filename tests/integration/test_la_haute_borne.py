@@ -1,0 +1,73 @@
+"""Two wind-turbine gearboxes of unknown geometry: what ten-minute means over weeks tell about them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from diagnosis import diagnose
+from diagnosis.case import prepare
+from diagnosis.explain import calibrated
+from diagnosis.identifiable import scale_direction, scale_notes
+from diagnosis.recording import Recording, read_recordings
+from models.gearbox import load_gearbox
+
+
+@pytest.fixture(scope="module")
+def farm(recordings_folder: Path) -> Path:
+    folder = recordings_folder / "la_haute_borne"
+    if not folder.is_dir():
+        pytest.skip(f"no recordings of the wind turbines at {folder}")
+    return folder
+
+
+def _read(folder: Path, *parts: str) -> tuple[Recording, ...]:
+    return read_recordings([f"{folder}/{part}" for part in parts], load_gearbox("la_haute_borne").network())
+
+
+def test_both_machines_are_read_as_they_are(farm):
+    for recording in _read(farm, "R80736.csv.gz", "R80721.csv.gz"):
+        assert {c.name for c in recording.channels} == {"oil", "oil_inlet", "bearing_1", "bearing_2"}
+        assert len(recording.time) > 40_000 and len(recording.segments) > 20
+        assert 1795.0 < np.percentile(recording.inputs["speed"], 99) < 1810.0
+        assert recording.inputs["T_outdoor"].max() < 45.0  # one reads 71 degC now and then
+        speed = recording.inputs["speed"]
+        assert (np.abs(speed) < 10.0).mean() > 0.05  # standstill is part of it
+
+
+def test_calibration_knows_that_it_has_no_scale(farm):
+    """A week of the losses-and-conductances model: watts stay as uncertain as the definition's."""
+    gearbox = load_gearbox("la_haute_borne")
+    recordings = _read(farm, "R80736.csv.gz@2017-10-01..2017-10-07")
+    base = calibrated(prepare(gearbox, recordings, ()).train)
+    (note,) = scale_notes(base)
+    assert "only ratios are identified" in note
+    direction = scale_direction(base)
+    common = direction / (direction @ direction)  # the mean logarithm of all sizes, as the priors weigh them
+    posterior = float(np.sqrt(common @ base.fit.covariance @ common))
+    assert posterior > 0.6 / float(np.sqrt(direction @ direction))
+    # While single sizes against the others are known much better than before.
+    sd = dict(zip((i.target for i in base.fit.unknowns.items), np.sqrt(np.diag(base.fit.covariance)), strict=True))
+    assert sd["gears_no_load"] < 0.5
+
+
+@pytest.mark.slow
+def test_an_air_cooler_with_a_thermostat_is_found_and_holds_on_the_other_machine(farm):
+    """Learnt from four weeks of one machine, judged on later weeks of it and on the other one."""
+    found = diagnose(
+        f"{farm}/R80736.csv.gz@2017-09-16..2017-10-14",
+        "la_haute_borne",
+        holdout=[f"{farm}/R80736.csv.gz@2017-10-18..2017-10-31", f"{farm}/R80721.csv.gz@2017-10-10..2017-10-31"],
+    )
+    assert found.verdict == "missing_physics"
+    first = found.findings[0]
+    assert first.mechanism == "cooler_air_thermostat" and first.place.startswith("returns")
+    values = {p.name: p.value for p in first.parameters}
+    # As the rows show by eye: on at 60 degC, off at 55 degC.
+    assert values["set_point"] == pytest.approx(57.5, abs=0.7) and values["band"] == pytest.approx(4.8, abs=1.2)
+    before, calibrated_K, after = found.holdout.sensors["oil"]
+    assert after < 0.55 * calibrated_K < before
+    assert after < 2.0
+    assert any("only ratios are identified" in note for note in found.notes)

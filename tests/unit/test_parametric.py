@@ -1,0 +1,241 @@
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from diagnosis.grid import Piece, pieces
+from diagnosis.recording import read_recordings
+from diagnosis.trajectory import NetworkOnGrid, free_running
+from models.errors import InputError
+from models.gearbox import known_gearboxes, load_gearbox, read_gearbox
+from models.laws import symbol
+from models.mechanisms import CATALOGUE, Scale
+from models.network import ThermalNetwork
+from models.parametric import ParametricLosses
+from models.toml_file import packaged, read_text
+
+TEXT = read_text(packaged("gearboxes", "la_haute_borne"))
+REFERENCE = {"speed": 1800.0, "torque": 10900.0}
+
+
+@pytest.fixture(scope="module")
+def gearbox():
+    return load_gearbox("la_haute_borne")
+
+
+# ---------------------------------------------------------------------- the definition
+
+
+def test_it_is_one_of_the_gearboxes_and_knows_what_it_lacks(gearbox):
+    assert "la_haute_borne" in known_gearboxes()
+    assert gearbox.is_parametric and not load_gearbox("fzg").is_parametric
+    for ask in (lambda: gearbox.stage, gearbox.lubricant, gearbox.losses, lambda: gearbox.speed_ratio):
+        with pytest.raises(InputError, match="without geometry"):
+            ask()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "fault"),
+    [
+        ('between = ["oil", "casing"]', 'between = ["oil", "casin"]', r"no part or boundary 'casin'.*casing"),
+        ('between = ["casing", "air"]', 'between = ["outdoor", "air"]', "joins two boundaries"),
+        ('between = ["casing", "outdoor"]', 'between = ["air", "casing"]', "joined already"),
+        ('between = ["casing", "outdoor"]', 'between = ["casing", "casing"]', "with itself"),
+        ('part = "bearing_1"', 'part = "bearing_9"', "no part 'bearing_9'"),
+        ('name = "bearing_2"\nheat', 'name = "bearing_1"\nheat', "given 2 times"),
+        ('input = "T_ambient"', 'input = "T_nacelle"', "none has input = 'T_ambient'"),
+        ("speed_exponent = { value = 1.8", "speed_exponent = { value = 18.0", "speed_exponent"),
+        ("no_load_W = { value = 8000.0", "no_loads_W = { value = 8000.0", "no_loads_W is not a known key"),
+    ],
+)
+def test_faults_of_a_definition_are_told(old, new, fault):
+    assert old in TEXT
+    with pytest.raises(InputError, match=fault):
+        read_gearbox(TEXT.replace(old, new), file="mine.toml")
+
+
+def test_changed_values_are_checked_as_the_file_is(gearbox):
+    changed = gearbox.with_values({"loss.0.load_W": 10000.0})
+    assert changed.definition.loss[0].load_W == 10000.0
+    with pytest.raises(InputError, match="no part"):
+        gearbox.with_values({"loss.0.part": "crankcase"})
+
+
+# ---------------------------------------------------------------------- losses and network
+
+
+def test_losses_are_what_the_definition_states_at_the_reference(gearbox):
+    losses = gearbox.loss_laws()
+    assert isinstance(losses, ParametricLosses)
+    T = np.full(len(losses.temperature_nodes), 60.0)
+    at = dict(zip(losses.components, losses.power(1800.0, 10900.0, T), strict=True))
+    assert at["gears_no_load"] == pytest.approx(8000.0) and at["gears_load"] == pytest.approx(20000.0)
+    half = dict(zip(losses.components, losses.power(-900.0, 5450.0, T), strict=True))
+    assert half["gears_no_load"] == pytest.approx(8000.0 * 0.5**1.8)
+    assert half["gears_load"] == pytest.approx(20000.0 * 0.25)
+    assert not losses.power(0.0, 5000.0, T).any()  # nothing turns, nothing is lost
+    cold = losses.power(1800.0, 10900.0, T - 40.0)
+    assert cold[0] > 1.3 * at["gears_no_load"] and cold[1] == at["gears_load"]
+
+
+def test_losses_take_arrays_of_any_shape(gearbox):
+    losses = gearbox.loss_laws()
+    speed, torque = np.linspace(0.0, 1800.0, 12).reshape(3, 4), np.linspace(0.0, 9000.0, 4)
+    T = np.full((3, 4, len(losses.temperature_nodes)), 55.0)
+    power = losses.power(speed, torque, T)
+    assert power.shape == (3, 4, len(losses.components))
+    one = losses.power(speed[1, 2], torque[2], T[1, 2])
+    np.testing.assert_allclose(power[1, 2], one)
+    assert losses.domain_distance(speed, torque, T).shape == (3, 4)
+
+
+def test_every_uncertain_number_is_a_parameter_and_no_other(gearbox):
+    network = gearbox.network()
+    names = {p.name for p in network.parameters}
+    assert len(names) == len(gearbox.priors)
+    assert {"C_oil", "G_oil_casing", "standstill_oil_casing", "gears_no_load", "gears_speed_exponent"} <= names
+    assert "C_oil_inlet" not in names  # given without an sd
+    assert network.groups["bearings"] == ("bearing_1", "bearing_2")
+
+
+def test_the_network_rests_where_its_losses_and_conductances_put_it(gearbox):
+    network = gearbox.network()
+    rest = network.steady_state(losses=gearbox.loss_laws(), **REFERENCE)
+    T = rest.temperatures
+    out = 0.0
+    for link in network.links:
+        if {"air", "outdoor"} & set(link.nodes):
+            inner, outer = sorted(link.nodes, key=lambda node: node in ("air", "outdoor"))
+            start = {symbol(p.name): p.start for p in network.parameters} | {symbol("speed"): 1800.0}
+            out += float(link.conductance.xreplace(start)) * (T[inner].item() - {"air": 20.0, "outdoor": 10.0}[outer])
+    assert out == pytest.approx(float(np.ravel(rest.columns()["P_loss_W"])[0]), rel=1e-6)
+
+
+def test_all_sizes_times_one_factor_change_no_temperature(gearbox):
+    network, losses = gearbox.network(), gearbox.loss_laws()
+    sizes = {p.name: 3.0 for p in network.parameters if re.match(r"C_|G_|.*load$", p.name)}
+    # The returning oil's capacity is held; it follows within a minute.
+    steady = np.ones(67)
+    cycle = {"time_s": 600.0 * np.arange(67), "speed_rpm": 1500.0 * steady, "torque_Nm": 4000.0 * steady}
+    one = network.simulate(cycle, losses=losses, initial=30.0).columns()
+    three = network.simulate(cycle, losses=losses, initial=30.0, parameters=sizes).columns()
+    for node in ("oil", "casing", "bearing_1"):
+        np.testing.assert_allclose(three[f"T_{node}_degC"], one[f"T_{node}_degC"], atol=0.6)
+    assert three["P_loss_W"][-1] == pytest.approx(3.0 * one["P_loss_W"][-1], rel=0.01)
+
+
+# ---------------------------------------------------------------------- what the catalogue does with it
+
+
+def test_mechanisms_have_places_where_their_parts_are(gearbox):
+    scale = Scale.of(gearbox)
+    placed = {name: m.placed(gearbox.network(), scale) for name, m in CATALOGUE.items()}
+    assert [p.place for p in placed["cooler_air_thermostat"]] == ["returns_air", "returns_outdoor", "oil_outdoor"]
+    assert placed["cooler_air_thermostat"][0].target == ("oil_inlet", "air")
+    assert placed["windage"] != () and placed["bearing_preload"] == ()  # there are no shafts
+    rig = load_gearbox("fzg")
+    for name in ("cooler_air_thermostat", "cooler_air_proportional", "bearing_fed_by_return", "pump_fast_stage"):
+        assert CATALOGUE[name].placed(rig.network(), Scale.of(rig)) == ()
+
+
+# ---------------------------------------------------------------------- recordings with the definition's columns
+
+
+def _scada(path: Path, **changes: object) -> Path:
+    rows = 60
+    time = pd.date_range("2017-09-01", periods=rows, freq="10min", tz="UTC").strftime("%Y-%m-%dT%H:%M:%SZ")
+    table = pd.DataFrame(
+        {
+            "time_utc": time, "Ds_avg": 1500.0, "Cm_avg": 4000.0, "Yt_avg": 25.0, "Ot_avg": 12.0,
+            "Gost_avg": np.linspace(50.0, 55.0, rows), "Git_avg": 50.0, "Gb1t_avg": 60.0, "Gb2t_avg": 61.0,
+            "P_avg": 600.0,
+        }
+    )  # fmt: skip
+    for name, values in changes.items():
+        table[name] = values
+    table = table.drop(columns=[name for name, values in changes.items() if values is None])
+    table.to_csv(path, index=False)
+    return path
+
+
+def test_columns_of_the_farm_need_no_mapping_file(gearbox, tmp_path):
+    (recording,) = read_recordings([_scada(tmp_path / "R1.csv")], gearbox.network())
+    assert {c.name for c in recording.channels} == {"oil", "oil_inlet", "bearing_1", "bearing_2"}
+    assert recording.inputs["T_ambient"][0] == 25.0 and recording.inputs["T_outdoor"][0] == 12.0
+    assert "P_avg" in recording.auxiliary
+
+
+def test_a_driver_that_was_not_recorded_is_assumed_and_told(gearbox, tmp_path):
+    (recording,) = read_recordings([_scada(tmp_path / "R1.csv", Yt_avg=None)], gearbox.network())
+    assert recording.inputs["T_ambient"][0] == 20.0
+    assert any("T_ambient_degC was not recorded; 20 is assumed" in note for note in recording.notes)
+
+
+def test_a_mapping_file_beside_the_recording_comes_first(gearbox, tmp_path):
+    file = _scada(tmp_path / "R1.csv")
+    (tmp_path / "R1.toml").write_text(
+        'schema = 1\ntime = { column = "time_utc", unit = "iso8601" }\n[columns.Ds_avg]\nquantity = "speed"\n'
+        '[columns.Cm_avg]\nquantity = "torque"\n[columns.Git_avg]\nquantity = "T_oil"\n'
+    )
+    (recording,) = read_recordings([file], gearbox.network())
+    assert [c.name for c in recording.channels] == ["oil"]
+    assert recording.channels[0].values[-1] == 50.0
+
+
+def test_rows_minutes_apart_guide_the_memories_by_sharpened_means(gearbox, tmp_path):
+    # A triangle of period four rows whose corners lie at the edges of rows: means hide half of a row's slope.
+    means = 50.0 + np.tile([1.0, 1.0, -1.0, -1.0], 15)
+    (recording,) = read_recordings([_scada(tmp_path / "R1.csv", Gost_avg=means)], gearbox.network())
+    (piece,) = pieces([recording], ("speed", "torque", "T_ambient", "T_outdoor"), ("oil",))
+    assert piece.guided and piece.slow
+    seen = piece.seen(np.zeros((60, 2)), ("oil", "casing"))
+    np.testing.assert_allclose(seen[1:-1, 0], 50.0 + 2.0 * np.sign(means[1:-1] - 50.0))
+    assert not seen[:, 1].any()  # what is not measured stays as simulated
+
+
+# ---------------------------------------------------------------------- switches over weeks
+
+
+def _thermostat() -> ThermalNetwork:
+    gearbox = load_gearbox("la_haute_borne")
+    cooler = CATALOGUE["cooler_air_thermostat"].placed(gearbox.network(), Scale.of(gearbox))[0]
+    return cooler.with_values(
+        {
+            "cooler_air_thermostat_returns_air_strength": 1500.0,
+            "cooler_air_thermostat_returns_air_set_point": 57.5,
+            "cooler_air_thermostat_returns_air_band": 4.5,
+        }
+    ).apply(gearbox.network())
+
+
+def test_a_thermostat_runs_free_as_the_solver_has_it():
+    gearbox, network = load_gearbox("la_haute_borne"), _thermostat()
+    model = NetworkOnGrid(network, gearbox.loss_laws())
+    time = np.arange(0.0, 86400.0, 600.0)
+    inputs = np.broadcast_to([1500.0, 4000.0, 25.0, 12.0], (len(time) - 1, 5, 4))
+    nothing = np.empty((len(time), 0))
+    piece = Piece(
+        recording="", time=time, samples=np.array(inputs), channels=(), measured=nothing, counts=nothing, slow=True,
+        guided=True,
+    )  # fmt: skip
+    found = free_running(model, piece, model.start, np.full(model.n, 50.0))
+    oil = found.T[:, model.parts.index("oil")]
+    fine = {
+        "time_s": np.arange(0.0, 86400.0, 60.0), "speed_rpm": np.full(1440, 1500.0), "torque_Nm": np.full(1440, 4000.0),
+        "T_ambient_degC": np.full(1440, 25.0), "T_outdoor": np.full(1440, 12.0),
+    }  # fmt: skip
+    truth = network.simulate(fine, losses=gearbox.loss_laws(), initial=50.0).columns()["T_oil_degC"]
+    late = slice(60, None)
+    assert 54.0 < oil[late].min() < 56.5 and 58.5 < oil[late].max() < 61.0
+
+    def switchings(T: np.ndarray) -> int:
+        return int(np.sum(np.diff(np.sign(T - T.mean())) != 0))
+
+    assert switchings(oil[late]) >= 4
+    # Its intervals are two minutes long here, and the cycle lasts half an hour.
+    assert switchings(oil[late]) == pytest.approx(switchings(truth[600:]), rel=0.15)
+    assert oil[late].mean() == pytest.approx(truth[600:].mean(), abs=0.5)
