@@ -159,7 +159,7 @@ def _starts(base: Explanation, scored: Scored, variant: int, problem: Problem, z
         whole[count] = problem.unknowns.items[count].z(1.0)
         yield whole
         return
-    if any(piece.guided for piece in problem.pieces) and not base.found:
+    if any(piece.slow for piece in problem.pieces) and not base.found:
         # Weeks under wide priors bend too much: most of the way back to their middles, the effect at its usual size.
         item, value = problem.unknowns.items[count], float(scored.values[variant])
         nearer = np.concatenate([BACK * z[:count], z[count:]])

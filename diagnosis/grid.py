@@ -21,7 +21,7 @@ from models.types import Array
 INTERVAL_S = 20.0
 SAMPLES = 5  # of the inputs per interval, at which losses are computed: they are not linear in speed
 SHORTEST_PIECE = 5  # grid points
-SLOW_S = 60.0  # rows further apart guide the memories, see :class:`Piece`
+SLOW_S = 60.0  # rows further apart are means that hide what switches do, see :class:`Piece`
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -45,9 +45,9 @@ class Piece:
     slow : bool
         Whether rows lie minutes apart: a switch then acts within an interval, not after it
     guided : bool
-        Whether memories (switches above all) follow the measured temperatures where there are any. Over weeks of slow
-        rows a simulated two-point control loses its phase; what it does next depends on what was there, and that was
-        measured. For learning only: a prediction runs free
+        Whether memories (switches above all) follow the measured temperatures where there are any. A simulated
+        two-point control soon loses its phase, and then no fit can find its set-point; what it does next depends on
+        what was there, and that was measured. For learning only: a prediction runs free
     """
 
     recording: str
@@ -90,7 +90,9 @@ class Piece:
         for index, name in enumerate(self.channels):
             if name in parts:
                 node = list(parts).index(name)
-                read = _sharpened(self.measured[:, index])
+                read = self.measured[:, index]
+                if self.slow:
+                    read = _sharpened(read)
                 T[:, node] = np.where(np.isfinite(read), read, T[:, node])
         return T
 
@@ -161,7 +163,7 @@ def _pieces_of(recording: Recording, inputs: Sequence[str], channels: Sequence[s
             measured=measured,
             counts=counts,
             slow=native > SLOW_S,
-            guided=native > SLOW_S,
+            guided=True,
         )
 
 

@@ -34,7 +34,7 @@ from models.types import Array
 ITERATIONS = 8
 SETTLED = 0.05  # of a prior standard deviation
 FARTHEST_STEP = 3.0  # of the z numbers in one iteration
-GUIDED_PATIENCE = 3  # times as many iterations where switches follow slow measurements: steps are small there
+SLOW_PATIENCE = 3  # times as many iterations where switches follow slow measurements: steps are small there
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -279,8 +279,8 @@ class Problem:
             If there is no solution where it should start.
         """
         z = np.zeros(len(self.unknowns)) if z is None else np.array(z)
-        if any(piece.guided for piece in self.pieces):
-            iterations *= GUIDED_PATIENCE
+        if any(piece.slow for piece in self.pieces):
+            iterations *= SLOW_PATIENCE
         parts = self._attempt(z, guesses)
         if parts is None:
             raise ArithmeticError("the simulation has no solution where the fit should start")

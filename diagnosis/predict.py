@@ -16,7 +16,7 @@ from diagnosis.trajectory import Trajectory, free_running, simulate
 from models.types import Array
 
 START_S = 600.0
-START_ROUNDS = 3
+START_ROUNDS, GUIDED_START_ROUNDS = 3, 2
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -64,7 +64,7 @@ def predict(problem: Problem, index: int, z: Array, *, as_delivered: bool = Fals
     start = np.array(problem.starts[index])
     prior = problem.noise[index].start_sd
     trajectory: Trajectory | None = None
-    for _ in range(START_ROUNDS):
+    for _ in range(GUIDED_START_ROUNDS if piece.guided else START_ROUNDS):
         adjusted = problem.adjusted(index, z, trajectory)
         values = problem.unknowns.network_values(model.network, z)
         if piece.guided and model.network.states:

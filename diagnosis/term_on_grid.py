@@ -107,7 +107,7 @@ class TermOnGrid:
         middle = 0.5 * (seen[1:] + seen[:-1])
         table = np.stack([*rows[:first], *middle.T, *rows[last:]], axis=-1).tolist()
         points = seen.tolist()
-        law = self._blurred if piece.guided else self._memory
+        law = self._blurred if piece.guided and piece.slow else self._memory
 
         def switched(k: int, point: list[float], moved: list[Array]) -> list[Array]:
             got = law(*table[k][:first], *point, *table[k][last:], *own, *moved)[len(states) :]
@@ -205,7 +205,11 @@ class TermOnGrid:
             power = np.zeros((len(T), len(model.laws.components)))
             kept = model.start[self._kept]
         else:
-            T, memory, kept = trajectory.middle, trajectory.memory, trajectory.values[self._kept]
+            # A guess may stem from the network as it was before its latest term, whose numbers come last.
+            T, memory = trajectory.middle, np.zeros((len(trajectory.piece.steps), len(model.network.states)))
+            memory[:, : trajectory.memory.shape[1]] = trajectory.memory
+            values_before = len(trajectory.values)
+            kept = np.concatenate([trajectory.values, model.start[values_before:]])[self._kept]
             power = trajectory.tangent.at(T[:, model.loss_nodes])
         memory = memory[:, self._remembered]
         rows = [piece.middle, *piece.inputs.T, *T.T, *(np.full(len(T), v) for v in kept), *memory.T, *power.T]

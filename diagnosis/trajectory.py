@@ -31,7 +31,8 @@ LOSS_NEAR_K = 0.7  # within it the straight lines are good to some 1e-4 of the l
 LOSS_REACH_K = 15.0  # beyond it the derivatives are taken anew
 TEMPERATURE_STEP_K = 0.05
 TORQUE_STEP = 0.02  # relative
-FREE_SETTLED_K = 0.2  # where switches run free: a switching that comes a step later moves a temperature by more
+# Where switches run free: a switching that comes a step later moves a temperature by more, so rounds end early.
+FREE_ROUNDS, FREE_SETTLED_K = 3, 0.2
 HIGHEST_T, LOWEST_T = 400.0, -60.0  # a trajectory is held here while it settles
 
 
@@ -221,7 +222,7 @@ class NetworkOnGrid:
         count = len(network.states)
         if not count:
             return np.zeros((len(T) - 1, 0))
-        law = self.blurred_memory_law if piece.guided else self.memory_law
+        law = self.blurred_memory_law if piece.guided and piece.slow else self.memory_law
         steps, middle = piece.steps.tolist(), piece.middle.tolist()
         seen = piece.seen(T, self.parts)
         inputs, powers, points = piece.inputs.tolist(), power.tolist(), seen.tolist()
@@ -416,7 +417,7 @@ def free_running(model: NetworkOnGrid, piece: Piece, values: Array, start: Array
     positions = list(product((0.0, 1.0), repeat=len(switches)))
     T = np.broadcast_to(start, (count + 1, model.n))
     tangent: LossTangent | None = None
-    for _ in range(ROUNDS):
+    for _ in range(FREE_ROUNDS):
         middle = np.clip(0.5 * (T[1:] + T[:-1]), LOWEST_T, HIGHEST_T)
         tangent = model.loss_tangent(fine, middle, tangent)
         power = tangent.at(middle[:, model.loss_nodes])

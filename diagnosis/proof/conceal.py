@@ -33,7 +33,7 @@ OUTSIDE = tuple(e.name for e in OUTSIDE_EFFECTS)
 CONTROLS = ("clean", "parameters_off", "parameter_far", "noise_misstated", "lag_wrong")
 MIX = {"control": 0.24, "single": 0.44, "double": 0.10, "sensor": 0.08, "outside": 0.10, "messy": 0.04}
 MINOR = ("windage", "shaft_ends_to_air", "oil_level_thermal", "pump_heat", "radiation_error", "hot_neighbour",
-         "bearing_additive", "oil_mist", "misalignment", "ambient_drift", "run_in_seals", "motor_flange")  # fmt: skip
+         "bearing_additive", "oil_mist", "misalignment", "ambient_swing", "run_in_seals", "motor_flange")  # fmt: skip
 # At usual strength these cause a kelvin or more, so that they stand out among minor ones.
 DOMINANT = ("churning_swirl", "splash_starvation", "run_in_flanks", "gear_wear", "torque_decay", "aeration", "oil_jet",
             "air_cooling_change", "foundation_conduction", "cooler_thermostat", "cooler_proportional", "oil_tank",

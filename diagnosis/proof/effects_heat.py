@@ -201,7 +201,7 @@ def solar_soak(g: Grip) -> None:
     g.heat(g.places[0], g.p["a"] * day**1.2, lost=False)
 
 
-def ambient_drift(g: Grip) -> None:
+def ambient_swing(g: Grip) -> None:
     """The air at the gearbox warms, the probe hangs elsewhere."""
     g.moment.air[g.members] += g.p["a"] * np.sin(2.0 * np.pi * g.hours / g.p["period_h"]) * (g.hours > 0.0)
 
@@ -283,8 +283,8 @@ HEAT_EFFECTS = (
            family="surroundings", after=water_jacket),
     effect("solar_soak", "source", highest_part, share_of_loss(0.15, start_h=(7.5, 10.0)),
            "a sin(pi (hour - 6.5) / 12.5)+^1.2 W", family="surroundings", after=solar_soak),
-    effect("ambient_drift", "signal", at("air"), relative(2.5, period_h=(5.0, 9.0)), "air + a sin(2 pi t / period)",
-           family="surroundings", before=ambient_drift),
+    effect("ambient_swing", "signal", at("air"), relative(2.5, period_h=(5.0, 9.0)), "air + a sin(2 pi t / period)",
+           family="surroundings", before=ambient_swing),
     effect("fan_thermostat", "link_factor", all_parts, relative(0.6, T_on=(50.0, 65.0), band=(3.0, 8.0)),
            "housing to air (1 + a) above T_on, hysteresis", family="surroundings", after=fan_thermostat),
     effect("rain_on_housing", "link", all_parts, share_of_shed(1.0, at_h=(0.5, 1.0), every_h=(4.0, 6.5)),

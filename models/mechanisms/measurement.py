@@ -7,7 +7,7 @@ from collections.abc import Callable
 import sympy as sp
 
 from models.laws import LawLike, Parameter
-from models.mechanisms.forms import moment, share, strength
+from models.mechanisms.forms import moment, plain, share, strength
 from models.mechanisms.mechanism import Mechanism, Parameters
 from models.terms import Form
 
@@ -157,6 +157,22 @@ ambient_probe_offset = _input(
     experiment=EQUAL_TEMPERATURE,
 )
 
+ambient_follows_outdoor = Mechanism(
+    name="ambient_follows_outdoor",
+    family=FAMILY,
+    kind="signal",
+    of_measurement=True,
+    places=("T_ambient",),
+    parameters=lambda _: (
+        strength(0.5, description="1: the air at the gearbox follows the outdoor air, 0: it is as recorded"),
+        plain("above", 8.0, sd=8.0, lower=-20.0, upper=40.0, unit="K", grid=(2.0, 8.0, 14.0)),
+    ),
+    law=lambda s: s.strength * (s.T_outdoor + s.above - s.T_ambient),
+    says="The air at the gearbox was not recorded, or elsewhere: it goes with the outdoor air, some kelvin above it.",
+    reference="ventilated enclosure: its air is the outdoor air and a rise; the constant rise is ours",
+    experiment="hang a probe beside the gearbox for some days",
+)
+
 ambient_probe_heated = _input(
     "ambient_probe_heated",
     "T_ambient",
@@ -170,5 +186,5 @@ ambient_probe_heated = _input(
 
 MECHANISMS = (
     sensor_bias, sensor_drift, sensor_gain, sensor_lag, sensor_stuck, swapped_channels, clock_offset, torque_offset,
-    torque_gain, speed_gain, ambient_probe_offset, ambient_probe_heated,
+    torque_gain, speed_gain, ambient_probe_offset, ambient_probe_heated, ambient_follows_outdoor,
 )  # fmt: skip

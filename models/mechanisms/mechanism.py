@@ -22,7 +22,8 @@ from models.terms import Form, Kind, Term, equation
 Parameters: TypeAlias = Callable[[Scale], tuple[Parameter, ...]]
 STRENGTH = "strength"
 GROUPS = ("housing", "bearings", "shafts", "gears")  # that a law may name; in a network without one it has no place
-ABSENT = symbol("absent_group")
+OPTIONAL = ("T_outdoor",)  # inputs that not every network has; without one it has no place either
+ABSENT = symbol("absent")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -175,8 +176,8 @@ class Mechanism:
                 written[f"update {label}_{memory.name}"] = read(memory.update)
         meant = {symbol(name): value for name, value in aliases.items()}
         full = {key: expression.xreplace(meant) for key, expression in written.items()}
-        written = {key: expression.xreplace({symbol(f"T_{g}"): ABSENT for g in GROUPS if g not in network.groups})
-                   for key, expression in written.items()}  # fmt: skip
+        absent = {symbol(name): value for name, value in aliases.items() if value == ABSENT}
+        written = {key: expression.xreplace(absent) for key, expression in written.items()}
         return Placed(
             mechanism=self,
             place=spot.name,
@@ -279,6 +280,7 @@ def _aliases(network: ThermalNetwork, scale: Scale, spot: Spot) -> dict[str, sp.
     if "oil" in network.node_names:
         aliases["nu"] = scale.viscosity_at(symbol("T_oil")) / scale.viscosity
     aliases |= {f"T_{group}": ABSENT for group in GROUPS}
+    aliases |= {name: ABSENT for name in OPTIONAL if name not in network.signals}
     aliases |= {f"T_{group}": _mean(members) for group, members in network.groups.items()}
     if spot.here:
         aliases["T_here"] = _mean(spot.here)

@@ -31,8 +31,8 @@ GEARBOXES = {name: load_gearbox(name) for name in ("fzg", "conveyor")}
 
 
 def with_circulation(network: ThermalNetwork) -> ThermalNetwork:
-    """Neither circulates its oil; some mechanisms sit where it comes back."""
-    larger = network.with_node("oil_inlet", 400.0).with_link("oil", "oil_inlet", 8.0)
+    """Neither circulates its oil, or knows the air outdoors; some mechanisms sit there."""
+    larger = network.with_node("oil_inlet", 400.0).with_link("oil", "oil_inlet", 8.0).with_input("T_outdoor", 5.0)
     return replace(larger, groups={**network.groups, "returns": ("oil_inlet",)})
 
 
@@ -265,7 +265,7 @@ class TestInANetwork:
         correction = Correction(gearbox=gearbox.name, gearbox_sha256=gearbox.hash, findings=(finding,))
         write_correction(correction, tmp_path / "correction.toml")
         read = read_correction(tmp_path / "correction.toml", base)
-        again = simulate("fzg", read.network(gearbox, as_recorded=True))
+        again = simulate("fzg", read.apply(base, as_recorded=True))
         np.testing.assert_allclose(parts(base, again), parts(base, last_place(name)), rtol=0.0, atol=1e-6)
         assert {p.name: (p.start, p.sd) for p in read.findings[0].term.parameters} == estimates
 
