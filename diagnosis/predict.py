@@ -5,7 +5,7 @@ Start temperatures of parts without a sensor are unknown; they are taken from th
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from diagnosis.trajectory import Trajectory, free_running, simulate
 from models.types import Array
 
 START_S = 600.0
-START_ROUNDS, GUIDED_START_ROUNDS = 3, 2
+START_ROUNDS = 3
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -64,13 +64,11 @@ def predict(problem: Problem, index: int, z: Array, *, as_delivered: bool = Fals
     start = np.array(problem.starts[index])
     prior = problem.noise[index].start_sd
     trajectory: Trajectory | None = None
-    for _ in range(GUIDED_START_ROUNDS if piece.guided else START_ROUNDS):
-        adjusted = problem.adjusted(index, z, trajectory)
+    switching = any(state.update is not None for state in model.network.states)
+    for _ in range(START_ROUNDS):
+        adjusted = replace(problem.adjusted(index, z, trajectory), guided=switching)
         values = problem.unknowns.network_values(model.network, z)
-        if piece.guided and model.network.states:
-            trajectory = free_running(model, adjusted, values, start)
-        else:
-            trajectory = simulate(model, adjusted, values, start, guess=trajectory, rounds=4, settled_K=0.02)
+        trajectory = simulate(model, adjusted, values, start, guess=trajectory, rounds=4, settled_K=0.02)
         sensors = problem.unknowns.sensors(piece.channels, z)
         if as_delivered:
             sensors = sensors.ideal()
@@ -89,6 +87,10 @@ def predict(problem: Problem, index: int, z: Array, *, as_delivered: bool = Fals
             break
         start = start + step
     assert trajectory is not None  # noqa: S101 - START_ROUNDS >= 1
+    if switching:
+        # Until here switches followed what was measured, which is good enough for the start and for nothing else.
+        trajectory = free_running(model, problem.adjusted(index, z, trajectory), trajectory.values, start)
+        read = readings(model, trajectory, sensors) if as_delivered else problem.read(trajectory, sensors, z)
     return Prediction(piece=piece, trajectory=trajectory, read=read, counts_from=counts_from)
 
 

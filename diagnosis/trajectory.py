@@ -411,7 +411,7 @@ def free_running(model: NetworkOnGrid, piece: Piece, values: Array, start: Array
     start : Array, shape (parts,)
         [degC]
     """
-    fine, each = piece.finer(), piece.samples.shape[1]
+    fine, each = (piece.finer(), piece.samples.shape[1]) if piece.slow else (replace(piece, guided=False), 1)
     count = len(fine.steps)
     switches = [index for index, state in enumerate(model.network.states) if state.update is not None]
     positions = list(product((0.0, 1.0), repeat=len(switches)))
