@@ -23,6 +23,7 @@ VERDICT_TEXT: Mapping[str, str] = {
     "unexplained": "Something is missing, and it is none of the physics in the catalogue.",
     "insufficient_data": "These recordings are too short or too calm to decide.",
 }
+PARTLY = "Part of what is missing was found; the rest is none of the physics in the catalogue."
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -336,9 +337,16 @@ class Diagnosis:
             "inputs": dict(self.inputs),
         }  # fmt: skip
 
+    @property
+    def verdict_text(self) -> str:
+        """The verdict in a sentence."""
+        if self.verdict == "unexplained" and any(f.family != "open form" for f in self.findings):
+            return PARTLY
+        return VERDICT_TEXT[self.verdict]
+
     def summary(self) -> list[str]:
         """The diagnosis in about ten lines."""
-        lines = [f"{self.verdict.replace('_', ' ')}: {VERDICT_TEXT[self.verdict]}"]
+        lines = [f"{self.verdict.replace('_', ' ')}: {self.verdict_text}"]
         for finding in self.findings:
             values = ", ".join(
                 f"{p.name} = {p.value:.4g} ± {p.stderr:.2g}" + (f" {p.unit}" if p.unit != "1" else "")

@@ -37,6 +37,8 @@ class Curve:
         NaN where there is nothing
     low : Array, shape (N,), or None
         Lower edge of a band that ends at `y`
+    far : bool
+        Whether it may lie outside the chart, which then keeps to the others
     """
 
     label: str
@@ -45,6 +47,7 @@ class Curve:
     y: Array
     kind: Kind = "line"
     low: Array | None = None
+    far: bool = False
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -82,7 +85,8 @@ class Chart:
 def drawn(chart: Chart) -> Markup:
     """The chart as HTML; a sentence where it has no numbers."""
     x_low, x_high = chart.x_range or _range([curve.x for curve in chart.curves])
-    y_low, y_high = _range([values for c in chart.curves for values in (c.y, c.low) if values is not None])
+    near = [c for c in chart.curves if not c.far] or list(chart.curves)
+    y_low, y_high = _range([values for c in near for values in (c.y, c.low) if values is not None])
     if not np.isfinite([x_low, x_high, y_low, y_high]).all():
         return Markup('<p class="soft">{}: nothing was recorded here.</p>').format(chart.title)
     if chart.level:

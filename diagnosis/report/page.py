@@ -10,7 +10,7 @@ from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
 
 from diagnosis.report import equation, figures, network_drawing, wording
-from diagnosis.result import VERDICT_TEXT, Calibrated, Diagnosis, Finding, Fits
+from diagnosis.result import Calibrated, Diagnosis, Finding, Fits
 
 PACKAGE = "diagnosis.report"
 SHOWN_RANKS, MOST_RANKS = 10, 300
@@ -40,7 +40,7 @@ def page(diagnosis: Diagnosis) -> str:
         style=Markup(_text("report.css")),  # noqa: S704 - our own file
         script=Markup(_text("report.js")),  # noqa: S704 - our own file
         words=wording.WORDS,
-        verdict_text=VERDICT_TEXT[diagnosis.verdict],
+        verdict_text=diagnosis.verdict_text,
         claims=diagnosis.verdict not in network_drawing.NO_CLAIM,
         evidence=_evidence(diagnosis),
         findings=[_finding(finding, with_law) for finding in diagnosis.findings],

@@ -17,6 +17,7 @@ SUPERSCRIPTS = str.maketrans({"0": "⁰", "1": "¹", "2": "²", "3": "³", "4": 
 LOSS = "P_loss"
 PARAMETER = "parameter"
 
+MOST_WINDOWS = 12  # of a recording that are told
 # Shown when hovering a term, and all together at the end of the page.
 WORDS: Mapping[str, str] = {
     "as delivered": "The model as its definition has it, before any recording was seen.",
@@ -214,14 +215,18 @@ def windows(when: Sequence[tuple[str, float, float]]) -> list[tuple[str, str]]:
     --------
     >>> windows([("a", 0.0, 3600.0), ("a", 32400.0, 64800.0), ("b", 0.0, 90.0)])
     [('a', '0.0 to 1.0, 9.0 to 18.0 h'), ('b', '0 to 90 s')]
+
+    Of many the longest are told.
     """
     told = []
     for recording in dict.fromkeys(name for name, _, _ in when):
-        own = [(begin, end) for name, begin, end in when if name == recording]
+        every = [(begin, end) for name, begin, end in when if name == recording]
+        own = sorted(sorted(every, key=lambda span: span[0] - span[1])[:MOST_WINDOWS])
         seconds, symbol = time_scale(max(end for _, end in own))
         decimals = 1 if symbol == "h" else 0
         spans = ", ".join(f"{a / seconds:.{decimals}f} to {b / seconds:.{decimals}f}" for a, b in own)
-        told.append((recording, f"{spans} {symbol}"))
+        more = f" and {len(every) - len(own)} shorter ones" if len(every) > len(own) else ""
+        told.append((recording, f"{spans} {symbol}{more}"))
     return told
 
 
