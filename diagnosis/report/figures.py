@@ -67,7 +67,8 @@ def _panel(course: Course, title: str, noise: float, *, shows_after: bool) -> Pa
         # A definition of guesses as delivered is so far off that nothing else could be told apart beside it.
         far = "before" if len(rmse) > 1 and rmse[0] > FAR * rmse[1] else ""
         curves = (Curve(label="measured", look="measured", x=time, y=measured, kind="points"),
-                  *(Curve(label=stage, look=look, x=time, y=run, far=look == far) for stage, look, run in runs))  # fmt: skip
+                  *(Curve(label=stage, look=look, x=time, y=run, far=look == far)
+                    for stage, look, run in runs))  # fmt: skip
         above = Chart(title=name(channel).capitalize(), x_label=label, x_range=span, shade=shade, height=SENSOR_PX,
                       y_label="Power loss in W" if channel == LOSS else "Temperature in °C", curves=curves)  # fmt: skip
         errors = tuple(
