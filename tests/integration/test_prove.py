@@ -244,7 +244,9 @@ def test_nothing_goes_on_running_after_an_interruption(
 ) -> None:
     folder = tmp_path / "proof"
     shutil.copytree(recorded, folder)
-    sleeping = [sys.executable, "-c", "import time; time.sleep(600)"]
+    # A test run in the background inherits an ignored SIGINT; a user's terminal does not.
+    heeding = "import signal, time; signal.signal(signal.SIGINT, signal.default_int_handler); time.sleep(600)"
+    sleeping = [sys.executable, "-c", heeding]
     monkeypatch.setattr(driver, "_command", lambda _: sleeping)
     started: list[subprocess.Popen[str]] = []
 
@@ -252,7 +254,9 @@ def test_nothing_goes_on_running_after_an_interruption(
         while len(driver._running) < 2:
             time.sleep(0.05)
         started.extend(driver._running)
-        started[0].send_signal(2)  # as a terminal does with all of them
+        while started[0].poll() is None:
+            started[0].send_signal(2)  # as a terminal does with all of them
+            time.sleep(0.1)
 
     thread = threading.Thread(target=interrupt)
     thread.start()
