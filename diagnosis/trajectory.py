@@ -34,6 +34,7 @@ TORQUE_STEP = 0.02  # relative
 # Where switches run free: a switching that comes a step later moves a temperature by more, so rounds end early.
 FREE_ROUNDS, FREE_SETTLED_K = 3, 0.2
 HIGHEST_T, LOWEST_T = 400.0, -60.0  # a trajectory is held here while it settles
+RUNAWAY_T = 1500.0  # degC; beyond it there is no trajectory
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -392,6 +393,9 @@ def simulate(
         if change < settled_K:
             break
     assert found is not None  # noqa: S101 - rounds >= 1
+    # A conductance tilted below zero lets a standing gearbox heat itself for ever: no temperatures at all.
+    if float(np.max(np.abs(found.T))) > RUNAWAY_T:
+        raise ArithmeticError(f"the temperatures of {piece.recording} run away with these parameters")
     return found
 
 
