@@ -17,6 +17,7 @@ from builder.diagnose_command import diagnose
 from builder.files import appearing_whole, read_cycle, read_initial, write_table
 from builder.prove_command import prove
 from builder.reproduce.command import reproduce
+from builder.workers import check_workers
 from models.correction import read_correction
 from models.cycle import COLUMNS
 from models.errors import InputError
@@ -75,8 +76,7 @@ def build_fmu(
     """Train the networks of a gearbox and build its FMU."""
     from builder.build import build  # imports scikit-learn and onnx, which the other verbs need not wait for
 
-    if jobs is not None and dask_address is not None:
-        raise InputError("--jobs and --dask exclude each other: the work is done here or on the cluster")
+    check_workers(jobs, dask_address)
     definition = load_gearbox(gearbox)
     found = None if correction is None else read_correction(correction, definition.network(), made_for=definition)
     folder = output if output is not None else Path("out") / Path(gearbox).stem

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from builder import console
+from builder.workers import check_workers, processes
 from models.errors import InputError, did_you_mean
 from models.gearbox import known_gearboxes, load_gearbox
 
@@ -80,12 +81,12 @@ def diagnose(
             raise InputError(f"--without-mechanism {name}: is not in the catalogue{did_you_mean(name, CATALOGUE)}")
     if fleet:
         _diagnose_fleet(Path(recordings[0]), definition, output, mapping=mapping, catalogue=catalogue,
-                        false_alarm_rate=false_alarm_rate, jobs=_jobs(jobs), dask_address=dask_address)  # fmt: skip
+                        false_alarm_rate=false_alarm_rate, jobs=processes(jobs), dask_address=dask_address)  # fmt: skip
         return
     train, held = read_train_and_holdout(recordings, holdout, definition.network(), mapping=mapping)
     with staging(output) as stage, _told() as tell:
         found = run(train, definition, holdout=held, false_alarm_rate=false_alarm_rate, catalogue=catalogue,
-                    jobs=_jobs(jobs), progress=tell)  # fmt: skip
+                    jobs=processes(jobs), progress=tell)  # fmt: skip
         tell("writing the report")
         names = [path.name for path in write_files(found, definition, [*train, *held], stage)]
     for line in found.summary():
@@ -100,8 +101,7 @@ def _check_options(
 ) -> None:
     if not fleet and dask_address is not None:
         raise InputError("--dask spreads the gearboxes of a fleet; give --fleet with it, or --jobs for one gearbox")
-    if jobs is not None and dask_address is not None:
-        raise InputError("--jobs and --dask exclude each other: the work is done here or on the cluster")
+    check_workers(jobs, dask_address)
     if fleet and (len(recordings) != 1 or holdout):
         raise InputError("--fleet takes one folder, with a folder per gearbox; what is named hold* in it is held out")
 
@@ -127,12 +127,6 @@ def _diagnose_fleet(
             console.err.print(message, style="red", markup=False)
             raise SystemExit(1)
         raise InputError(message)
-
-
-def _jobs(asked: int | None) -> int:
-    from joblib import cpu_count
-
-    return int(cpu_count()) if asked is None else asked
 
 
 @contextmanager

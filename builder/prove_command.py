@@ -11,7 +11,7 @@ from typing import Any
 import click
 
 from builder import console
-from models.errors import InputError
+from builder.workers import check_workers, processes
 
 LINES = 20  # of progress where there is no terminal
 
@@ -49,18 +49,15 @@ def prove(
 
     The truth is on no disk while anything is diagnosed. The same command in the same folder goes on where it stopped.
     """
-    from joblib import cpu_count
-
     from builder.prove import NUMBERS, PAGE
     from builder.prove import prove as run
     from diagnosis.proof.protocol import WHOLE, Settings
 
-    if jobs is not None and dask_address is not None:
-        raise InputError("--jobs and --dask exclude each other: the work is done here or on the cluster")
+    check_workers(jobs, dask_address)
     settings = Settings(seed=seed, cases=WHOLE if cases is None else cases, gearbox=gearbox, cells_every=cells_every,
                         baselines=baselines)  # fmt: skip
     with _told() as tell:
-        found = run(settings, output, jobs=int(cpu_count()) if jobs is None else jobs, dask_address=dask_address,
+        found = run(settings, output, jobs=processes(jobs), dask_address=dask_address,
                     tell=tell)  # fmt: skip
     show(found)
     for name in (PAGE, NUMBERS):

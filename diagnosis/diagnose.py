@@ -74,9 +74,14 @@ def diagnose(
     progress("reading the recordings and setting up the inference")
     case = prepare(gearbox, train, held)
     _refuse_too_short(train, case.train.pieces)
-    found = search(case, catalogue, false_alarm_rate=false_alarm_rate, jobs=jobs, progress=progress)
-    progress("predicting the recordings free-running")
-    return assembled(case, found, catalogue, train, held, false_alarm_rate=false_alarm_rate)
+    try:
+        found = search(case, catalogue, false_alarm_rate=false_alarm_rate, jobs=jobs, progress=progress)
+        progress("predicting the recordings free-running")
+        return assembled(case, found, catalogue, train, held, false_alarm_rate=false_alarm_rate)
+    except ArithmeticError as error:
+        if type(error) is not ArithmeticError:
+            raise  # a division by zero is a fault of ours
+        raise InputError(f"{error}: check the recordings' units and the priors of {gearbox.file}") from error
 
 
 def _read(sources: Source | Sequence[Source], gearbox: Gearbox) -> tuple[Recording, ...]:

@@ -8,13 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
-from joblib import Parallel, delayed
+from joblib import delayed
 from scipy.special import log_ndtr
 
-from diagnosis.hypotheses import WIDE_PRIOR, Hypothesis, Scored, white_column
+from diagnosis.hypotheses import WIDE_PRIOR, Hypothesis, Scored, spread, white_column
 from diagnosis.posterior import Fit, Problem
 from diagnosis.trajectory import NetworkOnGrid
 from models.types import Array
@@ -88,7 +87,7 @@ def settled(problem: Problem, fit: Fit) -> Explanation:
     return Explanation(problem=problem, fit=fit, log_evidence=fit.log_evidence)
 
 
-def extended(base: Explanation, scored: Scored, variant: int) -> tuple[Problem, Array]:
+def extended(base: Explanation, scored: Scored) -> tuple[Problem, Array]:
     """The problem with one hypothesis more, and where its fit should start."""
     h, problem = scored.hypothesis, base.problem
     z = np.array(base.fit.z)
@@ -106,8 +105,8 @@ def extended(base: Explanation, scored: Scored, variant: int) -> tuple[Problem, 
     else:
         unknowns = problem.unknowns.with_parameters("term", term.parameters)
         problem = problem.changed(unknowns=unknowns, terms=(*problem.terms, term))
-    values = np.array(h.variants[variant])
-    values[0] = scored.values[variant]
+    values = np.array(h.variants[scored.best])
+    values[0] = scored.values[scored.best]
     own = [item.z(_inside(value, item.parameter.lower, item.parameter.upper))
            for value, item in zip(values, unknowns.items[-len(values) :], strict=True)]  # fmt: skip
     return problem, np.concatenate([z, own])
@@ -129,9 +128,9 @@ def fitted(base: Explanation, scored: Scored, worth: float = -np.inf) -> Explana
         Log evidence over the base below which no second start is tried
     """
     best: Explanation | None = None
-    problem, middle = extended(base, scored, scored.variants[0])
-    promised = scored.log_bayes_of[scored.variants[0]]
-    for start in _starts(base, scored, scored.variants[0], problem, middle):
+    problem, middle = extended(base, scored)
+    promised = scored.log_bayes_of[scored.best]
+    for start in _starts(base, scored, problem, middle):
         try:
             fit = problem.fit(start, [part.trajectory for part in base.fit.parts], iterations=ROUGH_ITERATIONS)
         except ArithmeticError:
@@ -157,7 +156,7 @@ def _explanation(base: Explanation, h: Hypothesis, problem: Problem, fit: Fit) -
     return Explanation(problem=problem, fit=fit, found=(*base.found, h), log_evidence=evidence)
 
 
-def _starts(base: Explanation, scored: Scored, variant: int, problem: Problem, z: Array) -> Iterator[Array]:
+def _starts(base: Explanation, scored: Scored, problem: Problem, z: Array) -> Iterator[Array]:
     """Where a fit may start: what the scan promises, and a fraction of it where a strong effect bends.
 
     With the effect go the other unknowns: to where they would be with it, back from where the calibration without it
@@ -174,14 +173,14 @@ def _starts(base: Explanation, scored: Scored, variant: int, problem: Problem, z
         return
     if any(piece.slow for piece in problem.pieces) and not base.found:
         # Weeks under wide priors bend too much: most of the way back to their middles, the effect at its usual size.
-        item, value = problem.unknowns.items[count], float(scored.values[variant])
+        item, value = problem.unknowns.items[count], float(scored.values[scored.best])
         nearer = np.concatenate([BACK * z[:count], z[count:]])
         usual = np.copysign(max(abs(value), item.parameter.sd), h.sign or value)
         nearer[count] = item.z(_inside(float(usual), item.parameter.lower, item.parameter.upper))
         yield nearer
     J = base.fit.white_columns
     residual = base.fit.white_residual + J @ base.fit.z
-    without = residual - white_column(base.problem, base.fit, h, variant) * scored.values[variant]
+    without = residual - white_column(base.problem, base.fit, h, scored.best) * scored.values[scored.best]
     there = np.linalg.solve(np.eye(count) + J.T @ J, J.T @ without)
 
     def at(share: float) -> Array:
@@ -210,14 +209,10 @@ def best_fits(base: Explanation, chosen: Sequence[Scored], *, jobs: int = 1) -> 
     The fits come without their linearisation, see :meth:`Problem.at`: a dozen of them would fill the memory.
     """
     most = max((s.log_bayes for s in chosen), default=0.0)
-    rough = [e for e in _each(jobs, [delayed(fitted)(base, s, AS_PROMISED * most) for s in chosen]) if e is not None]
+    rough = [e for e in spread(jobs, [delayed(fitted)(base, s, AS_PROMISED * most) for s in chosen]) if e is not None]
     gains = [e.log_evidence - base.log_evidence for e in rough]
     least = (1.0 - RACE_SHARE) * max(gains, default=0.0) - RACE_LEAD
     racing = [e for e, gain in zip(rough, gains, strict=True) if gain >= least]
     beaten = [e for e, gain in zip(rough, gains, strict=True) if gain < least]
-    done = _each(jobs, [delayed(refined)(base, e) for e in racing])
+    done = spread(jobs, [delayed(refined)(base, e) for e in racing])
     return sorted([*done, *beaten], key=lambda e: -e.log_evidence)
-
-
-def _each(jobs: int, work: Sequence[Any]) -> list[Any]:
-    return list(Parallel(n_jobs=jobs)(work)) if jobs > 1 else [f(*a, **k) for f, a, k in work]

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cache
+from functools import cache, cached_property
 
 import numpy as np
 
 from diagnosis.case import Case, with_floor
 from diagnosis.explain import Explanation
 from diagnosis.observation import LOSS
-from diagnosis.posterior import Problem
+from diagnosis.posterior import Linearised, Problem
 from diagnosis.predict import predict
 from diagnosis.trajectory import ROUNDS
 from diagnosis.whitening import Whitening
@@ -36,44 +36,50 @@ class Judge:
 
     def __init__(self, case: Case, base: Explanation, floor: float) -> None:
         self.case, self.base, self.floor = case, base, floor
-        self._whitenings: Sequence[Whitening] | None = None
-        self._own = self.log_predictive(base) if case.holdout.pieces else 0.0
         self.rmse = cache(self._rmse)
 
-    def log_predictive(self, explanation: Explanation) -> float:
-        """Log density of the held-out readings, predicted with the uncertainty that the training left.
-
-        What an explanation is unsure of widens its prediction: being a little off then costs little, and being
-        right where the rival is off counts, however small it looks in the root mean square.
-        """
-        problem = with_floor(at_holdout(self.case, explanation), self.floor)
-        if self._whitenings is not None:
-            problem = problem.with_whitenings(self._whitenings)
-        z = explanation.fit.z
-        parts = [problem.linearise(i, z, None, rounds=ROUNDS) for i in range(len(problem.pieces))]
-        self._whitenings = [part.whitening for part in parts]
-        residual = np.concatenate([part.white_residual for part in parts])
-        J = np.concatenate([part.white_columns for part in parts])
-        # The posterior of the training is the prior here: r ~ N(0, 1 + J C J^T).
-        root = np.linalg.cholesky(explanation.fit.covariance)
-        X = J @ root
-        inner = np.eye(X.shape[1]) + X.T @ X
-        along = X.T @ residual
-        quadratic = float(residual @ residual - along @ np.linalg.solve(inner, along))
-        return -0.5 * quadratic - 0.5 * float(np.linalg.slogdet(inner)[1])
+    @cached_property
+    def _of_base(self) -> tuple[list[Whitening], float]:
+        """Noise filters of the base, and its own log density."""
+        problem = with_floor(at_holdout(self.case, self.base), self.floor)
+        parts = _linearised(problem, self.base)
+        return [part.whitening for part in parts], _log_density(parts, self.base)
 
     def gain(self, explanation: Explanation) -> float:
-        """Log predictive density of the held-out readings over that of the base."""
+        """Log density of the held-out readings over that of the base, predicted with what the training left unsure.
+
+        What an explanation is unsure of widens its prediction: being a little off then costs little, and being
+        right where the rival is off counts, however small it looks in the root mean square. Switches follow what was
+        measured, as in learning; the root mean square error is that of a free run. Minus infinity without a prediction.
+        """
         try:
-            return self.log_predictive(explanation) - self._own
+            whitenings, own = self._of_base
+            parts = _linearised(at_holdout(self.case, explanation).with_whitenings(whitenings), explanation)
+            return _log_density(parts, explanation) - own
         except (ArithmeticError, np.linalg.LinAlgError):
-            return -np.inf  # no prediction at all
+            return -np.inf
 
     def _rmse(self, explanation: Explanation) -> float:
-        """Root mean square error of the held-out temperatures, free-running, [K]; NaN without held-out recordings."""
+        """Root mean square error of the held-out temperatures, free-running, [K]; infinite without a prediction."""
         problem = at_holdout(self.case, explanation)
         temperatures = [i for i, name in enumerate(self.case.channels) if name != LOSS]
-        residuals = [
-            predict(problem, i, explanation.fit.z).residual[:, temperatures] for i in range(len(problem.pieces))
-        ]
+        try:
+            residuals = [
+                predict(problem, i, explanation.fit.z).residual[:, temperatures] for i in range(len(problem.pieces))
+            ]
+        except (ArithmeticError, np.linalg.LinAlgError):
+            return np.inf
         return float(np.sqrt(np.nanmean(np.concatenate(residuals) ** 2))) if residuals else float("nan")
+
+
+def _linearised(problem: Problem, explanation: Explanation) -> list[Linearised]:
+    return [problem.linearise(i, explanation.fit.z, None, rounds=ROUNDS) for i in range(len(problem.pieces))]
+
+
+def _log_density(parts: Sequence[Linearised], explanation: Explanation) -> float:
+    """Of the whitened residuals: the posterior of the training is the prior here, ``r ~ N(0, 1 + J C J^T)``."""
+    residual = np.concatenate([part.white_residual for part in parts])
+    X = np.concatenate([part.white_columns for part in parts]) @ np.linalg.cholesky(explanation.fit.covariance)
+    inner, along = np.eye(X.shape[1]) + X.T @ X, X.T @ residual
+    quadratic = float(residual @ residual - along @ np.linalg.solve(inner, along))
+    return -0.5 * quadratic - 0.5 * float(np.linalg.slogdet(inner)[1])

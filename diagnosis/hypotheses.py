@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
+from typing import Any
 
 import numpy as np
 from joblib import Parallel, delayed
@@ -81,8 +82,8 @@ class Scored:
     hypothesis : Hypothesis
     log_bayes : float
         Mean over the variants, against nothing
-    variants : tuple of int
-        Its best variants, best first
+    best : int
+        Its best variant
     values : Array, shape (V,)
         Most probable strength of every variant
     log_bayes_of : Array, shape (V,)
@@ -92,7 +93,7 @@ class Scored:
 
     hypothesis: Hypothesis
     log_bayes: float
-    variants: tuple[int, ...]
+    best: int
     values: Array
     log_bayes_of: Array
     expected: float
@@ -134,11 +135,14 @@ def scan(
     """
     intervals = sum(len(piece.steps) for piece in problem.pieces)
     chunks = list(_chunks(hypotheses, max(8, min(CHUNK, CHUNK_VALUES // max(intervals, 1)))))
-    work = (delayed(_scan_chunk)(problem, fit, marginal, chunk) for chunk in chunks)
-    results = Parallel(n_jobs=jobs)(work) if jobs > 1 else (
-        _scan_chunk(problem, fit, marginal, chunk) for chunk in chunks)  # fmt: skip
+    results = spread(jobs, [delayed(_scan_chunk)(problem, fit, marginal, chunk) for chunk in chunks])
     scored = [one for result in results for one in result]
     return sorted(scored, key=lambda s: -s.log_bayes)
+
+
+def spread(jobs: int, work: Sequence[Any]) -> list[Any]:
+    """Results of ``joblib.delayed`` calls, in order: over processes, or here and now where there is one only."""
+    return list(Parallel(n_jobs=jobs)(work)) if jobs > 1 else [f(*a, **k) for f, a, k in work]
 
 
 def _chunks(hypotheses: Sequence[Hypothesis], most: int) -> Iterator[list[Hypothesis]]:
@@ -217,6 +221,6 @@ def _judged(h: Hypothesis, marginal: Marginal, columns: Array, prior_sd: float |
     log_bayes = np.where(b > NEAR_ZERO, found.log_bayes, 0.0)
     return Scored(
         hypothesis=h, log_bayes=float(np.logaddexp.reduce(log_bayes) - np.log(len(log_bayes))),
-        variants=tuple(int(i) for i in np.argsort(-log_bayes)), values=found.value, log_bayes_of=log_bayes,
+        best=int(np.argmax(log_bayes)), values=found.value, log_bayes_of=log_bayes,
         expected=float(np.median(0.5 * b * prior_sd**2 - 0.5 * np.log1p(b * prior_sd**2))),
     )  # fmt: skip

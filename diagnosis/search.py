@@ -243,17 +243,12 @@ def _matters(case: Case, fit: Explanation) -> bool:
     change = np.sqrt(np.mean(np.concatenate(per_z) ** 2, axis=0)) * abs(z)
     if float(change.max(initial=0.0)) > SMALLEST_K:
         return True
-    heats = mean_heats(fit, h)  # none of a fault of an instrument: there the error of the reading counts alone
-    return bool(heats) and float(np.mean(np.concatenate(heats))) > SMALLEST_HEAT * case.loss_W
-
-
-def mean_heats(explanation: Explanation, h: Hypothesis) -> Sequence[Array]:
-    """Magnitude of the heat of something found, over the intervals of every piece, [W]; nothing for faults."""
-    return [np.abs(heat) for heat in heats_of(explanation, h)]
+    heats = heats_of(fit, h)  # none of a fault of an instrument: there the error of the reading counts alone
+    return bool(heats) and float(np.mean(np.abs(np.concatenate(heats)))) > SMALLEST_HEAT * case.loss_W
 
 
 def heats_of(explanation: Explanation, h: Hypothesis) -> Sequence[Array]:
-    """Heat of something found, over the intervals of every piece, summed over the parts it warms, [W]."""
+    """Heat of something found, over all intervals, summed over the parts it warms, [W]; none of a fault."""
     if h.term is None or h.term.kind in ("sensor", "signal"):
         return []
     values = explanation.values_of(h)
