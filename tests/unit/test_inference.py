@@ -9,11 +9,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from diagnosis.case import Case
 from diagnosis.evidence import strength
+from diagnosis.explain import calibrated
 from diagnosis.grid import Piece, pieces
+from diagnosis.holdout import Judge
 from diagnosis.noise import loss_noise, noise_of, start_guess
 from diagnosis.observation import lagged, readings
 from diagnosis.posterior import Problem
+from diagnosis.predict import START_S, predict
 from diagnosis.recording import Channel, Recording
 from diagnosis.term_on_grid import TermOnGrid
 from diagnosis.trajectory import NetworkOnGrid, exponential, named_values, simulate
@@ -231,3 +235,71 @@ def test_term_with_a_memory_gives_the_same_heat_inside_its_network_and_beside_it
         found.append(TermOnGrid(model, placed).heat(source, values)[0])
     assert np.abs(found[0]).max() > 10.0
     np.testing.assert_allclose(found[1], found[0])
+
+
+@pytest.mark.parametrize("name", ["cooler_thermostat", "oil_tank"])
+def test_prediction_does_not_see_what_was_measured_later(
+    fzg: Gearbox, piece: Piece, problem: Problem, name: str
+) -> None:
+    """A switch, and a memory that goes with temperatures: in learning both follow the readings, in predicting neither."""
+    network = fzg.network()
+    (placed,) = CATALOGUE[name].placed(network, Scale.of(fzg, speed=2600.0, torque=150.0))
+    model = NetworkOnGrid(placed.apply(network), fzg.losses())
+    unknowns = unknowns_of(model.network, CHANNELS)
+    index = {item.target: i for i, item in enumerate(unknowns.items)}
+    z = np.zeros(len(unknowns))
+    z[index[placed.strength.name]] = unknowns.items[index[placed.strength.name]].z(4.0)
+    if name == "cooler_thermostat":
+        set_point = next(p.name for p in placed.parameters if p.name.endswith("set_point"))
+        z[index[set_point]] = unknowns.items[index[set_point]].z(35.0)  # switches within this ride
+    late = piece.time > piece.time[0] + START_S
+    lied = replace(piece, measured=np.where(late[:, None], piece.measured - 30.0, piece.measured))
+    told, deceived = (
+        predict(problem.changed(model=model, unknowns=unknowns, pieces=[given]), 0, z) for given in (piece, lied)
+    )
+    np.testing.assert_array_equal(told.read, deceived.read)
+    # While learning they do follow: the lie is felt there, else the comparison above would prove nothing.
+    learnt = [
+        problem.changed(model=model, unknowns=unknowns, pieces=[given]).linearise(0, z, None, rounds=6).trajectory.T
+        for given in (piece, lied)
+    ]
+    assert np.abs(learnt[0] - learnt[1]).max() > 0.5
+
+
+def test_temperatures_that_run_away_are_no_trajectory(model: NetworkOnGrid, piece: Piece) -> None:
+    network = model.network.with_source("oil", lambda s: 40.0 * s.T_oil, name="own_heat")  # W, more than it can shed
+    hot = NetworkOnGrid(network, model.losses)
+    with pytest.raises(ArithmeticError, match="run away"):
+        simulate(hot, piece, hot.start, np.full(hot.n, 60.0))
+
+
+def test_shifted_input_takes_a_guess_from_the_network_before_its_latest_term(fzg: Gearbox, piece: Piece) -> None:
+    network, scale = fzg.network(), Scale.of(fzg, speed=2600.0, torque=150.0)
+    (shift,) = CATALOGUE["ambient_swing"].placed(network, scale)
+    (tank,) = CATALOGUE["oil_tank"].placed(network, scale)
+    before, after = NetworkOnGrid(network, fzg.losses()), NetworkOnGrid(tank.apply(network), fzg.losses())
+    guess = simulate(before, piece, before.start, np.full(before.n, 30.0), rounds=1)
+    values = np.array([2.0, 3600.0, 0.0])
+    moved = TermOnGrid(after, shift).adjusted(piece, values, guess)
+    at = after.laws.inputs.index("T_ambient")
+    expected = 2.0 * np.sin(2.0 * np.pi * piece.middle / 3600.0)
+    np.testing.assert_allclose((moved.samples - piece.samples)[..., at], np.repeat(expected[:, None], 5, axis=1))
+
+
+def test_judge_prefers_the_truth_and_survives_what_has_no_prediction(fzg: Gearbox, problem: Problem) -> None:
+    right = calibrated(problem)
+    case = Case(
+        gearbox=fzg, nominal=fzg.network(), losses=fzg.losses(), scale=Scale.of(fzg), channels=CHANNELS, train=problem,
+        holdout=problem, loss_W=250.0, noise_K=0.2,
+    )  # fmt: skip
+    judge = Judge(case, right, 1.0)
+    assert judge.gain(right) == pytest.approx(0.0, abs=1e-6)
+    shifted = np.array(right.fit.z)
+    shifted[next(i for i, item in enumerate(right.fit.unknowns.items) if item.target == "mesh")] += 2.0
+    wrong = replace(right, fit=replace(right.fit, z=shifted))
+    assert judge.gain(wrong) < -10.0
+    assert judge.rmse(wrong) > 2.0 * judge.rmse(right)
+    network = problem.model.network.with_source("oil", lambda s: 40.0 * s.T_oil, name="own_heat")
+    none = replace(right, problem=problem.changed(model=NetworkOnGrid(network, problem.model.losses)))
+    assert judge.gain(none) == -np.inf
+    assert judge.rmse(none) == np.inf
