@@ -241,7 +241,7 @@ def test_term_with_a_memory_gives_the_same_heat_inside_its_network_and_beside_it
 def test_prediction_does_not_see_what_was_measured_later(
     fzg: Gearbox, piece: Piece, problem: Problem, name: str
 ) -> None:
-    """A switch, and a memory that goes with temperatures: in learning both follow the readings, in predicting neither."""
+    """A switch, and a memory that goes with temperatures: both follow readings in learning, neither in predicting."""
     network = fzg.network()
     (placed,) = CATALOGUE[name].placed(network, Scale.of(fzg, speed=2600.0, torque=150.0))
     model = NetworkOnGrid(placed.apply(network), fzg.losses())
