@@ -57,10 +57,9 @@ def assembled(
     train, holdout : sequence of Recording
     false_alarm_rate : float
     """
-    detected = found.stages[0].log_e_value >= found.threshold and found.stages[0].matters
+    detected = found.detected
     findings = tuple(
-        finding_of(case, found.final, h, stage, rivals_of(stage, catalogue))
-        for h, stage in zip(found.final.found, found.stages, strict=False)
+        finding_of(case, found.final, h, stage, rivals_of(stage, catalogue)) for h, stage in found.findings if detected
     )
     remaining = _latents(case, found.final) if detected else ()
     first = _latents(case, found.calibrated) if detected else ()
@@ -120,7 +119,7 @@ def _verdict(
         visible = 1.0 - len({u.mechanism for u in unseen}) / max(len(physics), 1)
         return "insufficient_data" if visible < ENOUGH_VISIBLE else "consistent"
     if not findings:
-        return "unexplained" if found.stages[0].matters else "consistent"
+        return "unexplained"
     kinds = {f.kind for f in findings}
     if any(f.family == "open form" for f in findings) or _much_is_left(first, remaining):
         return "unexplained"
@@ -170,7 +169,7 @@ def _location(
     """Places by probability: of what was found, by its rivals' places; else by the unknown heat alone."""
     weights: dict[str, float] = {}
     if findings:
-        for h, stage in zip(found.final.found, found.stages, strict=False):
+        for h, stage in found.findings:
             for fit, probability in zip(stage.fits, stage.probabilities(), strict=True):
                 node = node_of(case, fit.found[-1])
                 own = stage.accepted is not None and fit.found[-1] is stage.accepted.found[-1]

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from diagnosis.explain import Explanation, calibrated, settled
+from diagnosis.explain import Explanation, calibrated, evidence_of, settled
 from diagnosis.grid import Piece, pieces, slow_rows
 from diagnosis.noise import channel_noise, loss_noise, noise_of, start_guess
 from diagnosis.observation import LOSS
@@ -190,7 +190,8 @@ def floored(explanation: Explanation) -> tuple[Explanation, float]:
     problem = with_floor(base, FLOORS[best])
     fit = problem.fit(explanation.fit.z, [part.trajectory for part in explanation.fit.parts], iterations=2)
     again = settled(problem, fit)
-    return replace(again, found=explanation.found), FLOORS[best]
+    found = explanation.found
+    return replace(again, found=found, log_evidence=evidence_of(found, again.fit)), FLOORS[best]
 
 
 def _evidence(explanation: Explanation, times: float) -> float:

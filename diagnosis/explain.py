@@ -23,7 +23,7 @@ RACE_SHARE, RACE_LEAD = 0.15, 15.0  # of the best gain, and log evidence: who is
 DISTRESS, SLOW_SENSOR = 2.5, 1.3  # standard deviations: of a parameter, and of a sensor's lag
 START_SHARES = (0.6, 0.3, 0.1)
 AS_PROMISED = 0.8
-BACK = 0.3  # of the way that a calibration without an effect went
+BACK = (0.3, 0.6)  # of the way that a calibration without an effect went
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -89,27 +89,58 @@ def settled(problem: Problem, fit: Fit) -> Explanation:
 
 def extended(base: Explanation, scored: Scored) -> tuple[Problem, Array]:
     """The problem with one hypothesis more, and where its fit should start."""
-    h, problem = scored.hypothesis, base.problem
-    z = np.array(base.fit.z)
+    h, z = scored.hypothesis, np.array(base.fit.z)
+    problem = _with(base.problem, h)
     if h.unknown is not None:
-        item = problem.unknowns.items[h.unknown]
-        wide = problem.unknowns.with_prior(h.unknown, item.parameter.sd * WIDE_PRIOR)
         z[h.unknown] /= WIDE_PRIOR
-        return problem.changed(unknowns=wide), z
-    term = h.term
-    assert term is not None  # noqa: S101 - the other case is above
-    if h.in_network:
-        model = NetworkOnGrid(term.apply(problem.model.network), problem.model.losses)
-        unknowns = problem.unknowns.with_parameters("network", term.parameters)
-        problem = problem.changed(model=model, unknowns=unknowns)
-    else:
-        unknowns = problem.unknowns.with_parameters("term", term.parameters)
-        problem = problem.changed(unknowns=unknowns, terms=(*problem.terms, term))
+        return problem, z
     values = np.array(h.variants[scored.best])
     values[0] = scored.values[scored.best]
     own = [item.z(_inside(value, item.parameter.lower, item.parameter.upper))
-           for value, item in zip(values, unknowns.items[-len(values) :], strict=True)]  # fmt: skip
+           for value, item in zip(values, problem.unknowns.items[-len(values) :], strict=True)]  # fmt: skip
     return problem, np.concatenate([z, own])
+
+
+def _with(problem: Problem, h: Hypothesis) -> Problem:
+    """A problem with one hypothesis more; the parameters of a term come last among its unknowns."""
+    if h.unknown is not None:
+        wide = problem.unknowns.items[h.unknown].parameter.sd * WIDE_PRIOR
+        return problem.changed(unknowns=problem.unknowns.with_prior(h.unknown, wide))
+    term = h.term
+    assert term is not None  # noqa: S101 - the other case is above
+    if not h.in_network:
+        unknowns = problem.unknowns.with_parameters("term", term.parameters)
+        return problem.changed(unknowns=unknowns, terms=(*problem.terms, term))
+    model = NetworkOnGrid(term.apply(problem.model.network), problem.model.losses)
+    return problem.changed(model=model, unknowns=problem.unknowns.with_parameters("network", term.parameters))
+
+
+def without(start: Explanation, explanation: Explanation, index: int) -> Explanation:
+    """An explanation without one of the things it found, fitted anew from where it was.
+
+    Parameters
+    ----------
+    start : Explanation
+        With nothing found, to which everything was added
+    explanation : Explanation
+    index : int
+        Which of what was found
+
+    Raises
+    ------
+    ArithmeticError
+        If there is no solution without it.
+    """
+    found = tuple(h for i, h in enumerate(explanation.found) if i != index)
+    problem, old = start.problem, explanation.problem
+    for h in found:
+        problem = _with(problem, h)
+    problem = problem.changed(noise=old.noise, whitenings=old.whitenings)
+    values = {(item.role, item.target): item.value(float(z))
+              for item, z in zip(old.unknowns.items, explanation.fit.z, strict=True)}  # fmt: skip
+    z = np.array([item.z(values[item.role, item.target]) for item in problem.unknowns.items])
+    fit = problem.fit(z, [part.trajectory.T for part in explanation.fit.parts], iterations=ITERATIONS)
+    return _explanation(found, problem, fit)
 
 
 def _inside(value: float, lower: float, upper: float) -> float:
@@ -135,25 +166,29 @@ def fitted(base: Explanation, scored: Scored, worth: float = -np.inf) -> Explana
             fit = problem.fit(start, [part.trajectory for part in base.fit.parts], iterations=ROUGH_ITERATIONS)
         except ArithmeticError:
             continue  # too far: the next start is nearer to what was there before
-        found = _explanation(base, scored.hypothesis, problem, fit)
+        found = _explanation((*base.found, scored.hypothesis), problem, fit)
         if best is None or found.log_evidence > best.log_evidence:
             best = found
         gain = best.log_evidence - base.log_evidence
-        if gain > AS_PROMISED * promised or promised < worth:
+        if promised < worth or (gain > AS_PROMISED * promised and not any(piece.slow for piece in problem.pieces)):
             break  # the scan is linear; a fit that reaches what it promised needs no other start
     return None if best is None else replace(best, fit=best.fit.without_parts())
 
 
-def refined(base: Explanation, rough: Explanation) -> Explanation:
-    """A rough fit of an extension of `base`, fitted to the end."""
+def refined(rough: Explanation) -> Explanation:
+    """A rough fit, fitted to the end."""
     fit = rough.problem.fit(rough.fit.z, rough.fit.courses, iterations=ITERATIONS)
-    better = _explanation(base, rough.found[-1], rough.problem, fit)
+    better = _explanation(rough.found, rough.problem, fit)
     return replace(better, fit=fit.without_parts()) if better.log_evidence > rough.log_evidence else rough
 
 
-def _explanation(base: Explanation, h: Hypothesis, problem: Problem, fit: Fit) -> Explanation:
-    evidence = fit.log_evidence + _one_sided(h, fit)
-    return Explanation(problem=problem, fit=fit, found=(*base.found, h), log_evidence=evidence)
+def _explanation(found: tuple[Hypothesis, ...], problem: Problem, fit: Fit) -> Explanation:
+    return Explanation(problem=problem, fit=fit, found=found, log_evidence=evidence_of(found, fit))
+
+
+def evidence_of(found: Sequence[Hypothesis], fit: Fit) -> float:
+    """Log evidence of a fit with what was found."""
+    return fit.log_evidence + sum(_one_sided(h, fit) for h in found)
 
 
 def _starts(base: Explanation, scored: Scored, problem: Problem, z: Array) -> Iterator[Array]:
@@ -172,12 +207,13 @@ def _starts(base: Explanation, scored: Scored, problem: Problem, z: Array) -> It
         yield whole
         return
     if any(piece.slow for piece in problem.pieces) and not base.found:
-        # Weeks under wide priors bend too much: most of the way back to their middles, the effect at its usual size.
+        # Weeks under wide priors bend too much: some of the way back to their middles, the effect at its usual size.
         item, value = problem.unknowns.items[count], float(scored.values[scored.best])
-        nearer = np.concatenate([BACK * z[:count], z[count:]])
         usual = np.copysign(max(abs(value), item.parameter.sd), h.sign or value)
-        nearer[count] = item.z(_inside(float(usual), item.parameter.lower, item.parameter.upper))
-        yield nearer
+        for share in BACK:
+            nearer = np.concatenate([share * z[:count], z[count:]])
+            nearer[count] = item.z(_inside(float(usual), item.parameter.lower, item.parameter.upper))
+            yield nearer
     J = base.fit.white_columns
     residual = base.fit.white_residual + J @ base.fit.z
     without = residual - white_column(base.problem, base.fit, h, scored.best) * scored.values[scored.best]
@@ -214,5 +250,5 @@ def best_fits(base: Explanation, chosen: Sequence[Scored], *, jobs: int = 1) -> 
     least = (1.0 - RACE_SHARE) * max(gains, default=0.0) - RACE_LEAD
     racing = [e for e, gain in zip(rough, gains, strict=True) if gain >= least]
     beaten = [e for e, gain in zip(rough, gains, strict=True) if gain < least]
-    done = spread(jobs, [delayed(refined)(base, e) for e in racing])
+    done = spread(jobs, [delayed(refined)(e) for e in racing])
     return sorted([*done, *beaten], key=lambda e: -e.log_evidence)

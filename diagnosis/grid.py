@@ -84,15 +84,16 @@ class Piece:
             Simulated, at the grid points, [degC]
         parts : sequence of str
         """
-        if not self.guided:
-            return T
-        T = np.array(T)
+        measured = self.guide(parts)
+        return np.where(np.isfinite(measured), measured, T)
+
+    def guide(self, parts: Sequence[str]) -> Array:
+        """What was measured of the parts where the piece is guided, else NaN; shape (K + 1, parts), [degC]."""
+        found = np.full((len(self.time), len(parts)), np.nan)
         for index, name in enumerate(self.channels):
-            if name in parts:
-                node = list(parts).index(name)
-                read = _sharpened(self.measured[:, index])
-                T[:, node] = np.where(np.isfinite(read), read, T[:, node])
-        return T
+            if self.guided and name in parts:
+                found[:, list(parts).index(name)] = _sharpened(self.measured[:, index])
+        return found
 
     @cached_property
     def middle(self) -> Array:

@@ -179,7 +179,8 @@ class Problem:
         """Derivatives of the readings with respect to z, shape (K + 1, channels, unknowns)."""
         model, items, piece = self.model, self.unknowns.items, trajectory.piece
         intervals = len(piece.steps)
-        heats, losses = np.zeros((intervals, model.n, len(items))), np.zeros((intervals, len(items)))
+        heats = np.zeros((intervals, model.n + len(model.coupled), len(items)))
+        losses = np.zeros((intervals, len(items)))
         names = [p.name for p in model.network.parameters]
         here = settled_balance(model, trajectory)
         for index, item in enumerate(items):
@@ -195,7 +196,7 @@ class Problem:
                 heat, loss = self._shift_heat(trajectory, shift, item, z)
             else:
                 continue
-            heats[..., index], losses[:, index] = heat * scale, loss * scale
+            heats[:, : heat.shape[1], index], losses[:, index] = heat * scale, loss * scale
         columns = reading_columns(model, trajectory, sensors, trajectory.response(heats), losses)
         self._add_sensors(columns, trajectory, sensors, z)
         return columns

@@ -2,7 +2,7 @@
 
 Film formulas and load sharings of the literature differ by the exponents of speed and load as much as by a factor. A
 model that may only be scaled takes such a misfit for missing physics. So every group of losses and the main heat paths
-may be tilted: one plus ``a ln(x)``, with small priors; the mesh, whose loss is the largest, also bent.
+may be tilted: ``x ** a``, with small priors; the mesh, whose loss is the largest, also bent: ``x ** (a ln(y))``.
 """
 
 from __future__ import annotations
@@ -70,9 +70,10 @@ def _term(
         name=label, start=0.0, sd=sd, lower=-1.0, upper=1.0, log=False,
         description=f"tilt of '{factor}' with {variable}, per e-fold",
     )  # fmt: skip
+    # Never below nothing: a conductance that a straight line tilts through zero lets a standing gearbox heat itself.
+    exponent = symbol(label) * sp.Mul(*(sp.log(_ratio(v, targets, network, scale)) for v in variable.split()))
     return Term(
-        label=label, kind=kind, target=tuple(t.name for t in targets),
-        expression=symbol(label) * sp.Mul(*(sp.log(_ratio(v, targets, network, scale)) for v in variable.split())),
+        label=label, kind=kind, target=tuple(t.name for t in targets), expression=sp.exp(exponent) - 1,
         parameters=(parameter,),
     )  # fmt: skip
 

@@ -12,7 +12,7 @@ import sympy as sp
 
 from diagnosis.grid import Piece
 from diagnosis.observation import Sensors, lagged
-from diagnosis.trajectory import NetworkOnGrid, Trajectory, update_of
+from diagnosis.trajectory import SLOW_SUBSTEPS, NetworkOnGrid, Trajectory, update_of
 from models.laws import compile_function, function_source, symbol
 from models.network import BASE_SIGNALS
 from models.terms import Term
@@ -45,6 +45,7 @@ class TermOnGrid:
         ]  # fmt: skip
         # The term may be in the network already: its own parameters and states are then given apart.
         self._kept = np.array([p.name not in own for p in network.parameters], dtype=bool)
+        self._inside = not self._kept.all()
         memories = {s.name for s in term.states}
         self._remembered = np.array([s.name not in memories for s in network.states], dtype=bool)
         arguments = [*given, *own, *(s.name for s in term.states)]
@@ -102,12 +103,12 @@ class TermOnGrid:
         switches = [state.update is not None for state in states]
         now: list[Array] = [np.full((count, 1), s.start) for s in states]
         result = [np.empty((count, len(piece.steps))) for _ in states]
-        seen, first = piece.seen(trajectory.T, self.model.parts), 1 + piece.inputs.shape[1]
+        seen, first = trajectory.seen, 1 + piece.inputs.shape[1]
         last = first + seen.shape[1]
-        middle = 0.5 * (seen[1:] + seen[:-1])
-        table = np.stack([*rows[:first], *middle.T, *rows[last:]], axis=-1).tolist()
-        points = seen.tolist()
+        table = np.stack(rows, axis=-1).tolist()
+        points = (seen[1:] if piece.slow else 0.5 * (seen[1:] + seen[:-1])).tolist()
         law = self._blurred if piece.guided and piece.slow else self._memory
+        substeps = 0 if all(switches) else SLOW_SUBSTEPS if piece.slow else 1
 
         def switched(k: int, point: list[float], moved: list[Array]) -> list[Array]:
             got = law(*table[k][:first], *point, *table[k][last:], *own, *moved)[len(states) :]
@@ -115,14 +116,17 @@ class TermOnGrid:
                     for new, z, it in zip(got, moved, switches, strict=True)]  # fmt: skip
 
         if piece.slow and any(switches):
-            now = switched(0, points[0], now)
+            now = switched(0, seen[0].tolist(), now)
         for k, h in enumerate(piece.steps.tolist()):
-            got = law(*table[k], *own, *now)
-            half = [z + 0.5 * h * rate for z, rate in zip(now, got, strict=False)]
-            got = law(*table[k], *own, *half)
-            before, now = now, [z + h * rate for z, rate in zip(now, got, strict=False)]
+            before, half = now, now
+            for part in range(substeps):
+                got = law(*table[k], *own, *now)
+                midway = [z + 0.5 * h / substeps * rate for z, rate in zip(now, got, strict=False)]
+                got = law(*table[k], *own, *midway)
+                now = [z + h / substeps * rate for z, rate in zip(now, got, strict=False)]
+                half = midway if part == substeps // 2 else half
             if any(switches):
-                now = switched(k, points[k + 1] if piece.slow else table[k][first:last], now)
+                now = switched(k, points[k], now)
             for index, value in enumerate(half):
                 # What switches during a slow interval did so in its midst.
                 mean = 0.5 * (before[index] + now[index]) if piece.slow and switches[index] else value
@@ -156,20 +160,10 @@ class TermOnGrid:
             loss = law if term.is_loss else loss
         elif term.kind == "link":
             self._link_heat(trajectory, law, other, heat)
-        elif term.kind == "loss_factor":
-            names = [source.name for source in model.network.sources]
-            for name in term.target:
-                index = names.index(name)
-                extra = law * trajectory.balance.sources[:, index, None]
-                heat[:, model.parts.index(model.network.sources[index].node)] += extra
-                loss = loss + extra
-        elif term.kind == "link_factor":
-            names = [link.name for link in model.network.links]
-            flows = trajectory.balance.conductances * trajectory.balance.differences
-            for name in term.target:
-                index = names.index(name)
-                flow = flows[:, index, None] * law
-                heat += model.to_parts[index][:, None] * flow[:, None, :]
+        elif term.kind in ("loss_factor", "link_factor"):
+            # Of what is there with it: the rest of a loss that it halves is as much again.
+            share = law / (1.0 + law) if self._inside else law
+            loss = loss + self._factor_heat(trajectory, share, heat)
         elif term.kind == "signal":
             per_unit, loss_per_unit = input_slope(model, trajectory, term.target[0])
             heat = per_unit[:, :, None] * law[:, None, :]
@@ -177,6 +171,24 @@ class TermOnGrid:
         else:
             raise ValueError(f"{term.label}: a term of kind {term.kind!r} brings no heat")
         return heat, loss
+
+    def _factor_heat(self, trajectory: Trajectory, share: Array, heat: Array) -> Array:
+        """Adds shares of the heats of the targets, shape (K, V), to `heat`; returns what of them is loss."""
+        model, balance, loss = self.model, trajectory.balance, np.zeros(share.shape)
+        if self.term.kind == "loss_factor":
+            sources = [source.name for source in model.network.sources]
+            for name in self.term.target:
+                index = sources.index(name)
+                extra = share * balance.sources[:, index, None]
+                heat[:, model.parts.index(model.network.sources[index].node)] += extra
+                loss += extra
+        else:
+            links = [link.name for link in model.network.links]
+            for name in self.term.target:
+                index = links.index(name)
+                flow = (balance.conductances[:, index] * balance.differences[:, index])[:, None] * share
+                heat += model.to_parts[index][:, None] * flow[:, None, :]
+        return loss
 
     def _link_heat(self, trajectory: Trajectory, conductance: Array, other: Array, heat: Array) -> None:
         model, T = self.model, trajectory.middle

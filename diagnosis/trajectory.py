@@ -13,6 +13,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
+from typing import Any
 
 import numpy as np
 import sympy as sp
@@ -30,11 +31,16 @@ LOSS_STEP_K = 2.0  # for the derivatives of the losses
 LOSS_NEAR_K = 0.7  # within it the straight lines are good to some 1e-4 of the loss
 LOSS_REACH_K = 15.0  # beyond it the derivatives are taken anew
 TEMPERATURE_STEP_K = 0.05
+STATE_STEP = 0.05  # of a state that is solved with the temperatures, mostly a temperature itself
 TORQUE_STEP = 0.02  # relative
 # Where switches run free: a switching that comes a step later moves a temperature by more, so rounds end early.
 FREE_ROUNDS, FREE_SETTLED_K = 3, 0.2
 HIGHEST_T, LOWEST_T = 400.0, -60.0  # a trajectory is held here while it settles
 RUNAWAY_T = 1500.0  # degC; beyond it there is no trajectory
+# Rows are means: a switching that none of them shows sends a guided trajectory astray for hours. Further off than this,
+# switches follow the simulated temperature until it is back.
+ASTRAY_K = 6.0
+SLOW_SUBSTEPS = 11  # of memories within an interval of minutes; odd
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -158,6 +164,12 @@ class NetworkOnGrid:
         heat = sources @ self.injection + (conductances * differences) @ self.to_parts
         return Balance(heat=heat, sources=sources, conductances=conductances, differences=differences)
 
+    def rates(self, piece: Piece, T: Array, values: Sequence[float] | Array, power: Array, memory: Array) -> Array:
+        """Rates of the states that are solved with the temperatures [1/s times their unit], shape (K, coupled)."""
+        signals = self.signals(piece, T, values, memory)
+        found = self._coupled_law(*signals, *np.moveaxis(power, -1, 0))
+        return np.stack([np.broadcast_to(rate, T.shape[:-1]) for rate in found], axis=-1)
+
     # ------------------------------------------------------------------ losses and memories
 
     def loss_at(self, piece: Piece, T: Array) -> Array:
@@ -195,6 +207,25 @@ class NetworkOnGrid:
         return LossTangent(T=mine, power=power, slope=slope, torque_slope=torque_slope, samples=piece.samples)
 
     @cached_property
+    def switches(self) -> list[int]:
+        """Which of the states switch."""
+        return [index for index, state in enumerate(self.network.states) if state.update is not None]
+
+    @cached_property
+    def coupled(self) -> list[int]:
+        """Which of the states go with the temperatures all the time, as a tank does: they are solved with them."""
+        mine = {f"T_{part}" for part in self.parts}
+        return [index for index, state in enumerate(self.network.states)
+                if state.update is None and mine & {symbol.name for symbol in state.rate.free_symbols}]  # fmt: skip
+
+    @cached_property
+    def switched_by(self) -> list[int]:
+        """Which parts' temperatures decide on switches."""
+        laws = [state.update for state in self.network.states if state.update is not None]
+        read = {symbol.name for law in laws for symbol in law.free_symbols}
+        return [index for index, part in enumerate(self.parts) if f"T_{part}" in read]
+
+    @cached_property
     def memory_law(self) -> Callable[..., tuple[float, ...]]:
         """Rates and updates of the states on plain numbers, nothing else."""
         return self._memory_law(blurred=False)
@@ -206,26 +237,35 @@ class NetworkOnGrid:
 
     def _memory_law(self, *, blurred: bool) -> Callable[..., tuple[float, ...]]:
         network = self.network
+        rates = [sp.Integer(0) if i in self.coupled else s.rate for i, s in enumerate(network.states)]
+        return self._compiled([*rates, *(update_of(s, blurred=blurred) for s in network.states)], vector=False)
+
+    @cached_property
+    def _coupled_law(self) -> Callable[..., tuple[Any, ...]]:
+        return self._compiled([self.network.states[index].rate for index in self.coupled], vector=True)
+
+    def _compiled(self, laws: Sequence[sp.Expr], *, vector: bool) -> Callable[..., tuple[Any, ...]]:
+        """Laws as a function of all signals, states and nominal losses."""
+        network = self.network
         boundary = {symbol(f"T_{n.name}"): n.temperature for n in network.nodes if n.temperature is not None}
         parts = [f"T_{part.name}" for part in network.parts]
         arguments = [*BASE_SIGNALS, *network.inputs, *parts, *(p.name for p in network.parameters),
                      *(s.name for s in network.states), *(f"P_{c}" for c in network.components)]  # fmt: skip
-        laws = [*(s.rate for s in network.states), *(update_of(s, blurred=blurred) for s in network.states)]
-        source = function_source("memory", arguments, [law.xreplace(boundary) for law in laws], vector=False)
-        return compile_function(source, "memory")
+        source = function_source("laws", arguments, [law.xreplace(boundary) for law in laws], vector=vector)
+        return compile_function(source, "laws")
 
-    def memory(self, piece: Piece, T: Array, values: Sequence[float] | Array, power: Array) -> Array:
+    def memory(self, piece: Piece, seen: Array, values: Sequence[float] | Array, power: Array) -> Array:
         """The states beside the temperatures, at the middles of the intervals, shape (K, states).
 
-        They follow the given trajectory `T` (at the grid points), interval by interval: a hysteresis needs the past.
+        They follow the temperatures `seen` at the grid points, interval by interval: a hysteresis needs the past. Those
+        that are solved with the temperatures stay at their start.
         """
         network = self.network
         count = len(network.states)
         if not count:
-            return np.zeros((len(T) - 1, 0))
+            return np.zeros((len(seen) - 1, 0))
         law = self.blurred_memory_law if piece.guided and piece.slow else self.memory_law
         steps, middle = piece.steps.tolist(), piece.middle.tolist()
-        seen = piece.seen(T, self.parts)
         inputs, powers, points = piece.inputs.tolist(), power.tolist(), seen.tolist()
         temperatures = (0.5 * (seen[1:] + seen[:-1])).tolist()
         given = list(map(float, values))
@@ -235,19 +275,20 @@ class NetworkOnGrid:
             got = law(middle[k], *inputs[k], *point, *given, *moved, *powers[k])[count:]
             return [float(new) if it else z for new, z, it in zip(got, moved, switches, strict=True)]
 
+        substeps = 0 if all(switches) else SLOW_SUBSTEPS if piece.slow else 1
         now = [state.start for state in network.states]
         if piece.slow:
             now = switched(0, points[0], now)
         result = np.empty((len(steps), count))
         for k, h in enumerate(steps):
-            got = law(middle[k], *inputs[k], *temperatures[k], *given, *now, *powers[k])
-            half = [z + 0.5 * h * rate for z, rate in zip(now, got[:count], strict=True)]
-            got = law(middle[k], *inputs[k], *temperatures[k], *given, *half, *powers[k])
-            before = now
-            now = switched(
-                k, points[k + 1] if piece.slow else temperatures[k],
-                [z + h * rate for z, rate in zip(now, got[:count], strict=True)],
-            )  # fmt: skip
+            before, half, moved = now, now, now
+            for part in range(substeps):
+                got = law(middle[k], *inputs[k], *temperatures[k], *given, *moved, *powers[k])
+                midway = [z + 0.5 * h / substeps * rate for z, rate in zip(moved, got[:count], strict=True)]
+                got = law(middle[k], *inputs[k], *temperatures[k], *given, *midway, *powers[k])
+                moved = [z + h / substeps * rate for z, rate in zip(moved, got[:count], strict=True)]
+                half = midway if part == substeps // 2 else half
+            now = switched(k, points[k + 1] if piece.slow else temperatures[k], moved)
             # What switches during a slow interval did so in its midst.
             result[k] = [0.5 * (a + b) if it and piece.slow else z
                          for a, b, z, it in zip(before, now, half, switches, strict=True)]  # fmt: skip
@@ -286,6 +327,8 @@ class Trajectory:
     values : Array, shape (parameters,)
         Values of the network's parameters
     tangent : LossTangent
+    seen : Array, shape (K + 1, parts)
+        Temperatures that the memories followed, [degC]
     memory : Array, shape (K, states)
     balance : Balance
     jacobian : Array, shape (K, parts, parts)
@@ -294,8 +337,9 @@ class Trajectory:
         Total mechanical loss, [W]
     loss_slope : Array, shape (K, parts)
         Its derivative with respect to the temperatures, [W/K]
-    decay, gain : Array, shape (K, parts, parts)
-        Exact solution over an interval: ``T_next = decay T + gain (net heat / capacity)``; [-] and [s]
+    decay, gain : Array, shape (K, parts + coupled, parts + coupled)
+        Exact solution over an interval: ``T_next = decay T + gain (net heat / capacity)``; [-] and [s]. After the
+        temperatures come the states that are solved with them
     capacities : Array, shape (parts,)
     """
 
@@ -303,6 +347,7 @@ class Trajectory:
     T: Array
     values: Array
     tangent: LossTangent
+    seen: Array
     memory: Array
     balance: Balance
     jacobian: Array
@@ -322,8 +367,8 @@ class Trajectory:
 
         Parameters
         ----------
-        heat : Array, shape (K, parts, columns)
-            Extra heats, [W]
+        heat : Array, shape (K, parts, columns) or (K, parts + coupled, columns)
+            Extra heats, [W]; and extra rates of the states that are solved with the temperatures
         initial : Array, shape (parts, columns), optional
             Change of the start temperatures, [K]
 
@@ -332,15 +377,19 @@ class Trajectory:
         Array, shape (K + 1, parts, columns)
             [K]
         """
-        driven = self.gain @ (heat / self.capacities[:, None])
-        result = np.empty((len(heat) + 1, *heat.shape[1:]))
-        result[0] = 0.0 if initial is None else initial
+        n, size = len(self.capacities), self.decay.shape[-1]
+        driven = self.gain[:, :, :n] @ (heat[:, :n] / self.capacities[:, None])
+        if heat.shape[1] > n:
+            driven += self.gain[:, :, n:] @ heat[:, n:]
+        result = np.zeros((len(heat) + 1, size, heat.shape[2]))
+        if initial is not None:
+            result[0, :n] = initial
         now = result[0]
         for k, decay in enumerate(self.decay):
             now = decay @ now
             now += driven[k]
             result[k + 1] = now
-        return result
+        return result[:, :n]
 
 
 def simulate(
@@ -382,14 +431,14 @@ def simulate(
         T = guess
     else:
         T = np.broadcast_to(start, (len(piece.time), model.n))
-    found = None
+    found, states = None, guess.memory if isinstance(guess, Trajectory) else None
     for _ in range(rounds):
         with np.errstate(over="ignore", invalid="ignore"):
-            found = _round(model, piece, values, start, np.clip(T, LOWEST_T, HIGHEST_T), tangent)
+            found = _round(model, piece, values, start, np.clip(T, LOWEST_T, HIGHEST_T), tangent, states)
         if not np.isfinite(found.T).all():
             raise ArithmeticError(f"the temperatures of {piece.recording} run away with these parameters")
         change = float(np.max(np.abs(found.T - T)))
-        T, tangent = found.T, found.tangent
+        T, tangent, states = found.T, found.tangent, found.memory
         if change < settled_K:
             break
     assert found is not None  # noqa: S101 - rounds >= 1
@@ -417,21 +466,15 @@ def free_running(model: NetworkOnGrid, piece: Piece, values: Array, start: Array
     """
     fine, each = (piece.finer(), piece.samples.shape[1]) if piece.slow else (replace(piece, guided=False), 1)
     count = len(fine.steps)
-    switches = [index for index, state in enumerate(model.network.states) if state.update is not None]
-    positions = list(product((0.0, 1.0), repeat=len(switches)))
     T = np.broadcast_to(start, (count + 1, model.n))
     tangent: LossTangent | None = None
+    states: Array | None = None
     for _ in range(FREE_ROUNDS):
         middle = np.clip(0.5 * (T[1:] + T[:-1]), LOWEST_T, HIGHEST_T)
         tangent = model.loss_tangent(fine, middle, tangent)
         power = tangent.at(middle[:, model.loss_nodes])
-        memory = model.memory(fine, np.clip(T, LOWEST_T, HIGHEST_T), values, power)
-        solutions = []
-        for position in positions:
-            memory[:, switches] = position
-            solved = _linearised(model, fine, values, middle, tangent, memory)
-            solutions.append((solved.decay, solved.driven))
-        before, T = T, _stepped(model, fine, values, start, memory, switches, solutions, power)
+        memory = _with_coupled(model, model.memory(fine, np.clip(T, LOWEST_T, HIGHEST_T), values, power), states)
+        before, (T, _, states) = T, _stepped(model, fine, values, start, middle, tangent, memory)
         if not np.isfinite(T).all():
             raise ArithmeticError(f"the temperatures of {piece.recording} run away with these parameters")
         if float(np.max(np.abs(T - before))) < FREE_SETTLED_K:
@@ -441,31 +484,65 @@ def free_running(model: NetworkOnGrid, piece: Piece, values: Array, start: Array
     at = np.arange(len(piece.time)) * each
     low, high = np.maximum(at - each // 2, 0), np.minimum(at + each // 2, count) + 1
     means = (total[high] - total[low]) / (high - low)[:, None]
-    return replace(_round(model, replace(piece, guided=False), values, start, means, None), T=means)
+    coarse = None if states is None else states.reshape(-1, each, states.shape[1]).mean(axis=1)
+    return replace(_round(model, replace(piece, guided=False), values, start, means, None, coarse), T=means)
+
+
+def _with_coupled(model: NetworkOnGrid, memory: Array, states: Array | None) -> Array:
+    """Memories with the states that are solved with the temperatures as they were last, if they were there."""
+    if states is not None and states.shape[1] == memory.shape[1]:
+        memory[:, model.coupled] = states[:, model.coupled]
+    return memory
 
 
 def _stepped(
-    model: NetworkOnGrid, piece: Piece, values: Array, start: Array, memory: Array, switches: Sequence[int],
-    solutions: Sequence[tuple[Array, Array]], power: Array,
-) -> Array:  # fmt: skip
-    """Temperatures at the grid points, from the solutions for every position of the switches; shape (K + 1, parts)."""
-    law, count = model.memory_law, len(model.network.states)
-    given, middle = list(map(float, values)), piece.middle.tolist()
-    inputs, powers, kept = piece.inputs.tolist(), power.tolist(), memory.tolist()
-    now = np.array(start, dtype=float)
-    result = np.empty((len(middle) + 1, model.n))
+    model: NetworkOnGrid, piece: Piece, values: Array, start: Array, middle: Array, tangent: LossTangent, memory: Array
+) -> tuple[Array, Array, Array]:
+    """Temperatures at the grid points where switches follow them as they come; the other memories are given.
+
+    Linearised about the temperatures `middle` once for every position of the switches. Where the piece is guided, the
+    switches follow what was measured as long as the temperatures are near it.
+
+    Returns
+    -------
+    T, seen : Array, shape (K + 1, parts)
+        Temperatures, and those that the switches followed, [degC]
+    memory : Array, shape (K, states)
+        As given, but for the states that are solved with the temperatures
+    """
+    switches, kept = model.switches, memory.copy()
+    solutions = []
+    for position in product((0.0, 1.0), repeat=len(switches)):
+        kept[:, switches] = position
+        solved = _linearised(model, piece, values, middle, tangent, kept)
+        solutions.append((solved.decay, solved.driven))
+    law = model.blurred_memory_law if piece.guided and piece.slow else model.memory_law
+    count, given = len(model.network.states), list(map(float, values))
+    times, inputs = piece.middle.tolist(), piece.inputs.tolist()
+    powers, states = tangent.at(middle[:, model.loss_nodes]).tolist(), kept.tolist()
+    guide = piece.guide(model.parts)
+    n, now = model.n, _start(model, start)
+    result, seen = np.empty((len(times) + 1, len(now))), np.empty((len(times) + 1, n))
     result[0] = now
     state = [model.network.states[i].start for i in switches]
-    for k in range(len(middle)):
-        full = kept[k]
+    for k in range(len(times)):
+        near = np.abs(now[:n] - guide[k]) < ASTRAY_K  # not where nothing was measured
+        seen[k] = np.where(near, guide[k], now[:n])
         for index, value in zip(switches, state, strict=True):
-            full[index] = value
-        got = law(middle[k], *inputs[k], *now.tolist(), *given, *full, *powers[k])[count:]
+            states[k][index] = value
+        got = law(times[k], *inputs[k], *seen[k].tolist(), *given, *states[k], *powers[k])[count:]
         state = [float(got[index]) for index in switches]
         decay, driven = solutions[sum(2**i for i, z in enumerate(reversed(state)) if z > 0.5)]
         now = decay[k] @ now + driven[k]
         result[k + 1] = now
-    return result
+    seen[-1] = now[:n]
+    kept[:, model.coupled] = 0.5 * (result[1:, n:] + result[:-1, n:])
+    return result[:, :n], seen, kept
+
+
+def _start(model: NetworkOnGrid, start: Array) -> Array:
+    """Start temperatures, and the start of the states that are solved with them."""
+    return np.concatenate([start, [model.network.states[index].start for index in model.coupled]])
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -501,33 +578,81 @@ def _linearised(
         loss_slope[:, node] = (there.sources[:, model.is_loss].sum(axis=-1) - total) / TEMPERATURE_STEP_K
     capacities = model.capacities(values)
     matrix = jacobian / capacities[:, None]
-    decay, gain = exponential(matrix, piece.steps)
     constant = balance.heat / capacities - np.einsum("kij,kj->ki", matrix, T)
+    if model.coupled:
+        matrix, constant = _with_states(model, piece, values, T, tangent, memory, balance, matrix, capacities)
+    decay, gain = exponential(matrix, piece.steps)
     return _Solved(
         balance=balance, jacobian=jacobian, loss_slope=loss_slope, total=total, capacities=capacities, decay=decay,
         gain=gain, driven=np.einsum("kij,kj->ki", gain, constant),
     )  # fmt: skip
 
 
+def _with_states(
+    model: NetworkOnGrid, piece: Piece, values: Array, T: Array, tangent: LossTangent, memory: Array, balance: Balance,
+    matrix: Array, capacities: Array,
+) -> tuple[Array, Array]:  # fmt: skip
+    """Matrix and constant of temperatures and the states that are solved with them."""
+    n, power = model.n, tangent.at(T[:, model.loss_nodes])
+    rates = model.rates(piece, T, values, power, memory)
+    size = n + len(model.coupled)
+    whole = np.zeros((len(T), size, size))
+    whole[:, :n, :n] = matrix
+    for node in range(n):
+        moved = T.copy()
+        moved[:, node] += TEMPERATURE_STEP_K
+        there = model.rates(piece, moved, values, tangent.at(moved[:, model.loss_nodes]), memory)
+        whole[:, n:, node] = (there - rates) / TEMPERATURE_STEP_K
+    for index, state in enumerate(model.coupled):
+        changed = memory.copy()
+        changed[:, state] += STATE_STEP
+        heat = model.balance(piece, T, values, power, changed).heat
+        whole[:, :n, n + index] = (heat - balance.heat) / capacities / STATE_STEP
+        whole[:, n:, n + index] = (model.rates(piece, T, values, power, changed) - rates) / STATE_STEP
+    here = np.concatenate([T, memory[:, model.coupled]], axis=1)
+    slope = np.concatenate([balance.heat / capacities, rates], axis=1)
+    return whole, slope - np.einsum("kij,kj->ki", whole, here)
+
+
 def _round(
-    model: NetworkOnGrid, piece: Piece, values: Array, start: Array, T_ref: Array, tangent: LossTangent | None
-) -> Trajectory:
+    model: NetworkOnGrid, piece: Piece, values: Array, start: Array, T_ref: Array, tangent: LossTangent | None,
+    states: Array | None,
+) -> Trajectory:  # fmt: skip
     """Linearise about a trajectory and solve."""
     T = 0.5 * (T_ref[1:] + T_ref[:-1])
     tangent = model.loss_tangent(piece, T, tangent)
-    memory = model.memory(piece, T_ref, values, tangent.at(T[:, model.loss_nodes]))
-    solved = _linearised(model, piece, values, T, tangent, memory)
-    result = np.empty((len(T) + 1, model.n))
-    result[0] = now = start
-    for k in range(len(T)):
-        now = solved.decay[k] @ now + solved.driven[k]
-        result[k + 1] = now
+    power = tangent.at(T[:, model.loss_nodes])
+    seen = piece.seen(T_ref, model.parts)
+    memory = _with_coupled(model, model.memory(piece, seen, values, power), states)
+    solved, result = _walked(model, piece, values, start, T, tangent, memory)
+    read = model.switched_by
+    if read and np.nanmax(np.abs(result[:, : model.n] - piece.guide(model.parts))[:, read], initial=0.0) > ASTRAY_K:
+        seen = _stepped(model, piece, values, start, T, tangent, memory)[1]
+        memory = _with_coupled(model, model.memory(piece, seen, values, power), states)
+        solved, result = _walked(model, piece, values, start, T, tangent, memory)
+    n = model.n
+    memory[:, model.coupled] = 0.5 * (result[1:, n:] + result[:-1, n:])
+    result = result[:, :n]
     loss = solved.total + np.einsum("kn,kn->k", solved.loss_slope, 0.5 * (result[1:] + result[:-1]) - T)
     return Trajectory(
-        piece=piece, T=result, values=values, tangent=tangent, memory=memory, balance=solved.balance,
+        piece=piece, T=result, values=values, tangent=tangent, seen=seen, memory=memory, balance=solved.balance,
         jacobian=solved.jacobian, loss=loss, loss_slope=solved.loss_slope, decay=solved.decay, gain=solved.gain,
         capacities=solved.capacities,
     )  # fmt: skip
+
+
+def _walked(
+    model: NetworkOnGrid, piece: Piece, values: Array, start: Array, T: Array, tangent: LossTangent, memory: Array
+) -> tuple[_Solved, Array]:
+    """The solution about temperatures at the middles; temperatures and states at the grid points."""
+    solved = _linearised(model, piece, values, T, tangent, memory)
+    now = _start(model, start)
+    result = np.empty((len(T) + 1, len(now)))
+    result[0] = now
+    for k in range(len(T)):
+        now = solved.decay[k] @ now + solved.driven[k]
+        result[k + 1] = now
+    return solved, result
 
 
 def exponential(matrix: Array, steps: Array) -> tuple[Array, Array]:
@@ -592,8 +717,9 @@ def parameter_heat(
 
     Returns
     -------
-    heat : Array, shape (K, parts)
-        Including the change of stored heat that another capacity makes, per unit of the parameter, [W/unit]
+    heat : Array, shape (K, parts + coupled)
+        Including the change of stored heat that another capacity makes, per unit of the parameter, [W/unit]; then the
+        rates of the states that are solved with the temperatures
     loss : Array, shape (K,)
     """
     values = np.array(trajectory.values)
@@ -605,10 +731,15 @@ def parameter_heat(
         name in {s.name for s in law.free_symbols}
         for state in model.network.states for law in (state.rate, state.update) if law is not None
     )  # fmt: skip
-    memory = model.memory(piece, trajectory.T, values, power) if remembered else trajectory.memory
+    memory = trajectory.memory
+    if remembered:
+        memory = _with_coupled(model, model.memory(piece, trajectory.seen, values, power), trajectory.memory)
     there = model.balance(piece, T, values, power, memory)
     capacities = model.capacities(values)
     heat = (there.heat * (trajectory.capacities / capacities) - here.heat) / step
+    if model.coupled:
+        before = model.rates(piece, T, trajectory.values, power, memory)
+        heat = np.concatenate([heat, (model.rates(piece, T, values, power, memory) - before) / step], axis=1)
     loss = (there.sources - here.sources)[:, model.is_loss].sum(axis=-1) / step
     return heat, loss
 

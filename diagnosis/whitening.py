@@ -70,13 +70,12 @@ class Whitening:
     """
 
     def __init__(self, model: NetworkOnGrid, trajectory: Trajectory, sensors: Sensors, noise: Noise) -> None:
-        n, piece = model.n, trajectory.piece
+        n, piece = trajectory.decay.shape[-1], trajectory.piece
         if noise.capacity > 0.0:
             share = float(trajectory.capacities.sum()) / noise.capacity
             noise = replace(noise, heat_sd=noise.heat_sd * share)
         shaken = np.flatnonzero(noise.heat_sd > 0.0)
         size, steps = n + len(shaken), piece.steps
-        self._n = n
         count = len(steps)
         rho = np.exp(-steps / noise.heat_time)
         per_capacity = trajectory.gain[:, :, shaken] / trajectory.capacities[shaken]
@@ -95,7 +94,8 @@ class Whitening:
         self._gain = np.empty((points, size, m))
         self.log_determinant = 0.0
         covariance = np.zeros((size, size))
-        covariance[range(n), range(n)] = noise.start_sd**2
+        covariance[range(n), range(n)] = float(noise.start_sd.max()) ** 2  # of a tank it is as little known as can be
+        covariance[range(model.n), range(model.n)] = noise.start_sd**2
         covariance[range(n, size), range(n, size)] = noise.heat_sd[shaken] ** 2
         half = np.zeros((size, size))
         for k in range(points):

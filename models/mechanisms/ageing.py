@@ -101,10 +101,17 @@ bearing_damage = Mechanism(
     kind="source",
     places=("each bearings",),
     is_loss=True,
-    parameters=lambda scale: (strength(0.1 * scale.loss, "W", "heat at the reference speed"), moment(scale)),
-    law=lambda s: s.strength * s.n * steps(s.time, at=s.moment, width=EDGE_S),
+    parameters=lambda scale: (
+        strength(0.1 * scale.loss, "W", "heat at the reference speed and torque"),
+        moment(scale),
+        plain("load_share", 0.3, sd=0.3, lower=0.0, upper=1.0),
+    ),
+    law=lambda s: (
+        s.strength * s.n * (1.0 - s.load_share + s.load_share * s.m) * steps(s.time, at=s.moment, width=EDGE_S)
+    ),
     says="From a moment on the bearing runs with additional friction: damage, dirt or lost lubrication ({place}).",
-    reference="a constant additional friction torque; hypothesis",
+    reference="an additional friction torque, part of it constant and part with the load, as rolling bearings have "
+    "(Palmgren's M_0 and M_1); hypothesis",
     experiment="repeat the first test, and listen to the bearing",
     separate_by={"misalignment": "repeat the first test: damage came later, misalignment was there from the start"},
 )

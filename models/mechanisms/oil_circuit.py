@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import sympy as sp
 
 from models.laws import Parameter
@@ -156,6 +158,12 @@ pump_heat = Mechanism(
     separate_by={"windage": "hold low and high speed without load: the pump grows with speed, windage with its cube"},
 )
 
+
+def _pumped(s: Any) -> sp.Expr:
+    """Share of the flow: whole while the gearbox turns, the share `standstill` where its pump goes on without it."""
+    return 1.0 - (1.0 - s.standstill) * sp.exp(-RUNNING * s.n)
+
+
 oil_tank = Mechanism(
     name="oil_tank",
     family=FAMILY,
@@ -165,15 +173,16 @@ oil_tank = Mechanism(
         strength(1.5 * scale.conductance, "W/K", "heat capacity flow to the tank"),
         positive("lag", 1800.0, sd=0.8, unit="s", grid=(600.0, 1800.0, 5400.0)),
         positive("leak", 0.1, sd=0.8, grid=(0.03, 0.2)),
+        plain("standstill", 0.5, sd=0.5, lower=0.0, upper=1.0, grid=(0.0, 1.0)),
     ),
     states=(
         Memory(
             name="tank",
             start=lambda scale: scale.ambient,
-            rate=lambda s: (s.T_oil - s.tank - s.leak * (s.tank - s.T_ambient)) / s.lag,
+            rate=lambda s: (_pumped(s) * (s.T_oil - s.tank) - s.leak * (s.tank - s.T_ambient)) / s.lag,
         ),
     ),
-    law=lambda s: s.strength * (s.tank - s.T_oil),
+    law=lambda s: s.strength * _pumped(s) * (s.tank - s.T_oil),
     says="Oil circulates through a tank or long pipes outside, which warm late and give heat to the air.",
     reference="stirred tank: lag = its capacity over the heat capacity flow; leak = its loss to air over it",
     experiment=RETURN + " after a step of load",
