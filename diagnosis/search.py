@@ -215,7 +215,7 @@ def _look(
     finer = spread(jobs, [delayed(sharpened)(base.problem, base.fit, marginal, s) for s in near])
     real = sorted([*finer, *real[len(near) :]], key=lambda s: -s.log_bayes)
     scored = sorted([*real, *(s for s in scored if s.hypothesis.family == "open form")], key=lambda s: -s.log_bayes)
-    log_e = _log_e(real)
+    log_e = log_e_value(real)
     weak = log_e < needed and not base.found
     if log_e < (needed - WEAK if weak and case.holdout.pieces else needed):
         return Stage(scored=tuple(scored), log_e_value=log_e, note="nothing reaches the threshold")
@@ -237,7 +237,7 @@ def _look(
     return _judged(case, calibrated, base, floor, stage, needed, weak=weak)
 
 
-def _log_e(scored: Sequence[Scored]) -> float:
+def log_e_value(scored: Sequence[Scored]) -> float:
     """Log of the mean Bayes factor.
 
     All names weigh the same, but for their rarity, and share it among their places; every instrument may fail for
@@ -313,7 +313,6 @@ def _matters(case: Case, fit: Explanation, h: Hypothesis) -> bool:
     """Whether something found is large enough to matter in practice: by its heat, or by what it does to a reading."""
     if h.term is None:
         return True
-    temperatures = [i for i, name in enumerate(case.channels) if name != LOSS]
     values = fit.values_of(h)
     given = np.array([values[p.name][0] for p in h.term.parameters])
     model, term = fit.problem.model, TermOnGrid(fit.problem.model, h.term)
@@ -321,17 +320,16 @@ def _matters(case: Case, fit: Explanation, h: Hypothesis) -> bool:
     for part in fit.fit.parts:
         if h.term.kind == "sensor":
             read = readings(model, part.trajectory, part.sensors)
-            change = term.distorted(part.trajectory, part.sensors, read, given) - read
+            changes.append(term.distorted(part.trajectory, part.sensors, read, given) - read)
         else:
             heat, loss = term.heat(part.trajectory, given[None, :])
-            change = reading_columns(
-                model, part.trajectory, part.sensors, part.trajectory.response(heat), loss
-            )[:, :, 0]  # fmt: skip
-        changes.append(change[:, temperatures])
-    if float(np.sqrt(np.mean(np.concatenate(changes) ** 2, axis=0)).max(initial=0.0)) > SMALLEST_K:
-        return True
+            T = part.trajectory.response(heat)
+            changes.append(reading_columns(model, part.trajectory, part.sensors, T, loss)[:, :, 0])
+    change = np.sqrt(np.mean(np.concatenate(changes) ** 2, axis=0))
+    least = [SMALLEST_HEAT * case.loss_W if name == LOSS else SMALLEST_K for name in case.channels]
     heats = heats_of(fit, h)  # none of a fault of an instrument: there the error of the reading counts alone
-    return bool(heats) and float(np.mean(np.abs(np.concatenate(heats)))) > SMALLEST_HEAT * case.loss_W
+    warms = bool(heats) and float(np.mean(np.abs(np.concatenate(heats)))) > SMALLEST_HEAT * case.loss_W
+    return warms or bool((change > least).any())
 
 
 def heats_of(explanation: Explanation, h: Hypothesis) -> Sequence[Array]:

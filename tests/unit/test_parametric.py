@@ -1,15 +1,17 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 
+from diagnosis import trajectory
 from diagnosis.grid import Piece, pieces
 from diagnosis.recording import read_recordings
-from diagnosis.trajectory import NetworkOnGrid, free_running
+from diagnosis.trajectory import NetworkOnGrid, free_running, simulate
 from models.errors import InputError
 from models.gearbox import known_gearboxes, load_gearbox, read_gearbox
 from models.laws import symbol
@@ -239,3 +241,25 @@ def test_a_thermostat_runs_free_as_the_solver_has_it():
     # Its intervals are two minutes long here, and the cycle lasts half an hour.
     assert switchings(oil[late]) == pytest.approx(switchings(truth[600:]), rel=0.15)
     assert oil[late].mean() == pytest.approx(truth[600:].mean(), abs=0.5)
+
+
+def test_a_switching_that_no_row_shows_does_not_send_learning_astray(monkeypatch):
+    """Means that never fall to where the cooler switches off: followed blindly, it would cool for hours."""
+    gearbox, network = load_gearbox("la_haute_borne"), _thermostat()
+    model = NetworkOnGrid(network, gearbox.loss_laws())
+    time = np.arange(0.0, 86400.0, 600.0)
+    inputs = np.array(np.broadcast_to([1500.0, 4000.0, 25.0, 12.0], (len(time) - 1, 5, 4)))
+    nothing = np.empty((len(time), 0))
+    piece = Piece(recording="", time=time, samples=inputs, channels=(), measured=nothing, counts=nothing, slow=True)
+    start = np.full(model.n, 50.0)
+    truth = free_running(model, piece, model.start, start).T[:, [model.parts.index("oil")]]
+    hidden = np.where(time[:, None] > 30000.0, np.maximum(truth, 57.0), truth)
+    learnt = replace(piece, channels=("oil",), measured=hidden, counts=np.ones_like(hidden), guided=True)
+
+    def farthest() -> float:
+        T = simulate(model, learnt, model.start, start)
+        return float(np.abs(T.T[:, model.parts.index("oil")] - truth[:, 0]).max())
+
+    near = farthest()
+    monkeypatch.setattr(trajectory, "ASTRAY_K", 1e6)
+    assert near < 9.0 < farthest()
