@@ -2,7 +2,7 @@
 
 Film formulas and load sharings of the literature differ by the exponents of speed and load as much as by a factor. A
 model that may only be scaled takes such a misfit for missing physics. So every group of losses and the main heat paths
-may be tilted: ``x ** a``, with small priors; the mesh, whose loss is the largest, also bent: ``x ** (a ln(y))``.
+may be tilted: one plus ``a ln(x)``, with small priors; the mesh, whose loss is the largest, also bent.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from models.network import Link, Source, ThermalNetwork
 from models.terms import Kind, Term
 
 LOWEST_RATIO = 0.02  # below it a tilt stays as it is
+LOWEST_CHANGE = -0.9  # a conductance that is tilted through zero lets a standing gearbox heat itself
 # Standard deviation of the tilt per e-fold; the published formulas of a loss differ by about as much.
 LOSS_TILTS: Mapping[str, Mapping[str, float]] = {
     "mesh": {"speed": 0.08, "torque": 0.08, "viscosity": 0.08, "speed speed": 0.03, "speed torque": 0.03,
@@ -70,10 +71,9 @@ def _term(
         name=label, start=0.0, sd=sd, lower=-1.0, upper=1.0, log=False,
         description=f"tilt of '{factor}' with {variable}, per e-fold",
     )  # fmt: skip
-    # Never below nothing: a conductance that a straight line tilts through zero lets a standing gearbox heat itself.
-    exponent = symbol(label) * sp.Mul(*(sp.log(_ratio(v, targets, network, scale)) for v in variable.split()))
+    tilt = symbol(label) * sp.Mul(*(sp.log(_ratio(v, targets, network, scale)) for v in variable.split()))
     return Term(
-        label=label, kind=kind, target=tuple(t.name for t in targets), expression=sp.exp(exponent) - 1,
+        label=label, kind=kind, target=tuple(t.name for t in targets), expression=sp.Max(tilt, LOWEST_CHANGE),
         parameters=(parameter,),
     )  # fmt: skip
 
