@@ -68,6 +68,7 @@ def test_an_air_cooler_with_a_thermostat_is_found_and_holds_on_the_other_machine
     # As the rows show by eye: on at 60 degC, off at 55 degC.
     assert values["set_point"] == pytest.approx(57.5, abs=0.7) and values["band"] == pytest.approx(4.8, abs=1.2)
     before, calibrated_K, after = found.holdout.sensors["oil"]
-    assert after < 0.55 * calibrated_K < before
-    assert after < 2.0
+    assert after < 0.5 * calibrated_K < before
+    assert after < 1.6
+    assert [f.mechanism for f in found.findings[1:]] in ([], ["bearing_fed_by_return"])
     assert any("only ratios are identified" in note for note in found.notes)
