@@ -59,6 +59,7 @@ HOLDOUT_SLACK_INSTRUMENT = 1.3  # its fault says little about temperatures to co
 # Of the typical loss, and of temperature: half of what matters in practice, since that much of it may be hidden in what
 # was calibrated.
 SMALLEST_HEAT, SMALLEST_K = 0.01, 0.15
+CERTAIN = 50.0  # log evidence below which it has to be the whole of it
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -270,13 +271,13 @@ def _judged(
         if gain < (needed - WEAK if weak else needed) or probability < LEAST_PROBABILITY:
             continue
         fit = replace(fit, fit=fit.problem.at(fit.fit))
-        large = _matters(case, fit, fit.found[-1])
+        large = _matters(case, fit, fit.found[-1], 1.0 if gain > CERTAIN else 2.0)
         matters = matters or (large and not weak)
         if probability < LEAST_SHARE * probabilities[0]:
             continue
         if not large and cleared:
             note = "what the data show is too small to matter"
-        elif weak and (not large or stage.log_e_value + judge.gain(fit) < needed):
+        elif weak and (not large or stage.log_e_value + judge.gain(fit) < needed or judge.rmse(fit) > judge.rmse(base)):
             note = "nothing reaches the threshold"
         elif _holds_out(judge, calibrated, fit):
             return replace(stage, accepted=fit, matters=large)
@@ -309,8 +310,8 @@ def _holds_out(judge: Judge, calibrated: Explanation, fit: Explanation) -> bool:
     return after <= max(slack * before, before + HOLDOUT_SLACK_K) and after <= FURTHER_SLACK * judge.rmse(judge.base)
 
 
-def _matters(case: Case, fit: Explanation, h: Hypothesis) -> bool:
-    """Whether something found is large enough to matter in practice: by its heat, or by what it does to a reading."""
+def _matters(case: Case, fit: Explanation, h: Hypothesis, times: float = 1.0) -> bool:
+    """Whether something found is so many times what matters: by its heat, or by what it does to a reading."""
     if h.term is None:
         return True
     values = fit.values_of(h)
@@ -326,9 +327,9 @@ def _matters(case: Case, fit: Explanation, h: Hypothesis) -> bool:
             T = part.trajectory.response(heat)
             changes.append(reading_columns(model, part.trajectory, part.sensors, T, loss)[:, :, 0])
     change = np.sqrt(np.mean(np.concatenate(changes) ** 2, axis=0))
-    least = [SMALLEST_HEAT * case.loss_W if name == LOSS else SMALLEST_K for name in case.channels]
+    least = times * np.array([SMALLEST_HEAT * case.loss_W if name == LOSS else SMALLEST_K for name in case.channels])
     heats = heats_of(fit, h)  # none of a fault of an instrument: there the error of the reading counts alone
-    warms = bool(heats) and float(np.mean(np.abs(np.concatenate(heats)))) > SMALLEST_HEAT * case.loss_W
+    warms = bool(heats) and float(np.mean(np.abs(np.concatenate(heats)))) > times * SMALLEST_HEAT * case.loss_W
     return warms or bool((change > least).any())
 
 
