@@ -27,7 +27,6 @@ from models.types import Array
 
 # All set on development cases (seed 1 of `conceal`) and by the four open ones; the proof draws others.
 THRESHOLD = 8.0  # log e-value at a false-alarm rate of 5 %
-WEAK = 5.0  # below the threshold, from where the held-out recordings may add what is lacking
 SECOND_GAIN = 10.0  # log evidence that each further effect has to bring
 OPEN_PENALTY = 10.0  # an open form has to beat the catalogue by this
 LEAST_SHARE = 0.5  # of the best probability, of what may be taken where that fails on held-out data
@@ -217,8 +216,7 @@ def _look(
     real = sorted([*finer, *real[len(near) :]], key=lambda s: -s.log_bayes)
     scored = sorted([*real, *(s for s in scored if s.hypothesis.family == "open form")], key=lambda s: -s.log_bayes)
     log_e = log_e_value(real)
-    weak = log_e < needed and not base.found
-    if log_e < (needed - WEAK if weak and case.holdout.pieces else needed):
+    if log_e < needed:
         return Stage(scored=tuple(scored), log_e_value=log_e, note="nothing reaches the threshold")
     progress("fitting the best explanations in earnest")
     opened = [s for s in scored if s.hypothesis.family == "open form"]
@@ -235,7 +233,7 @@ def _look(
     stage = Stage(scored=tuple(scored), log_e_value=log_e, fits=tuple(fits), gains=tuple(gains))
     order = np.argsort(-stage.probabilities())
     stage = replace(stage, fits=tuple(fits[i] for i in order), gains=tuple(gains[i] for i in order))
-    return _judged(case, calibrated, base, floor, stage, needed, weak=weak)
+    return _judged(case, calibrated, base, floor, stage, needed)
 
 
 def log_e_value(scored: Sequence[Scored]) -> float:
@@ -254,31 +252,25 @@ def log_e_value(scored: Sequence[Scored]) -> float:
     return float(np.logaddexp.reduce(logs + weights) - np.logaddexp.reduce(weights))
 
 
-def _judged(
-    case: Case, calibrated: Explanation, base: Explanation, floor: float, stage: Stage, needed: float, *, weak: bool
-) -> Stage:
+def _judged(case: Case, calibrated: Explanation, base: Explanation, floor: float, stage: Stage, needed: float) -> Stage:
     """A look with what of its fits is accepted.
 
-    What is too small to matter is accepted only to clear the way, as long as nothing that matters was found. Where the
-    training data alone do not reach the threshold, the held-out recordings must bring the rest: what was learnt without
-    them predicts them, so the two log Bayes factors add up.
+    What is too small to matter is accepted only to clear the way, as long as nothing that matters was found.
     """
     judge = Judge(case, base, floor)
     probabilities = stage.probabilities()
     cleared = any(_matters(case, base, h) for h in base.found)
     matters, note = False, "the best explanation is hardly better than none"
     for fit, gain, probability in zip(stage.fits, stage.gains, probabilities, strict=True):
-        if gain < (needed - WEAK if weak else needed) or probability < LEAST_PROBABILITY:
+        if gain < needed or probability < LEAST_PROBABILITY:
             continue
         fit = replace(fit, fit=fit.problem.at(fit.fit))
         large = _matters(case, fit, fit.found[-1], 1.0 if gain > CERTAIN else 2.0)
-        matters = matters or (large and not weak)
+        matters = matters or large
         if probability < LEAST_SHARE * probabilities[0]:
             continue
         if not large and cleared:
             note = "what the data show is too small to matter"
-        elif weak and (not large or stage.log_e_value + judge.gain(fit) < needed or judge.rmse(fit) > judge.rmse(base)):
-            note = "nothing reaches the threshold"
         elif _holds_out(judge, calibrated, fit):
             return replace(stage, accepted=fit, matters=large)
         else:
