@@ -216,8 +216,8 @@ def _starts(base: Explanation, scored: Scored, problem: Problem, z: Array) -> It
             yield nearer
     J = base.fit.white_columns
     residual = base.fit.white_residual + J @ base.fit.z
-    without = residual - white_column(base.problem, base.fit, h, scored.best) * scored.values[scored.best]
-    there = np.linalg.solve(np.eye(count) + J.T @ J, J.T @ without)
+    left = residual - white_column(base.problem, base.fit, h, scored.best) * scored.values[scored.best]
+    there = np.linalg.solve(np.eye(count) + J.T @ J, J.T @ left)
 
     def at(share: float) -> Array:
         start = np.array(z)

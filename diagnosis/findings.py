@@ -77,7 +77,7 @@ def _separation(own: Hypothesis, other: Hypothesis, catalogue: Mapping[str, Mech
 def finding_of(case: Case, final: Explanation, h: Hypothesis, stage: Stage, rivals: Sequence[Rival]) -> Finding:
     """A finding with the values of the final explanation."""
     probabilities = dict(zip((f.found[-1].label for f in stage.fits), stage.probabilities(), strict=True))
-    alone = final.found[0].label == h.label
+    doubt = 0.0 if final.found[0].label == h.label else FORM_DOUBT
     values = _with_bias(final, h)
     heats = heats_of(final, h)
     together = np.concatenate(heats) if heats else np.zeros(1)
@@ -100,7 +100,7 @@ def finding_of(case: Case, final: Explanation, h: Hypothesis, stage: Stage, riva
         says=_says(h, values),
         reference=h.term.mechanism.reference if isinstance(h.term, Placed) else "",
         equation=equation,
-        probability=float(probabilities.get(h.label, 0.0)) * (1.0 if alone else 1.0 - FORM_DOUBT),
+        probability=float(probabilities.get(h.label, 0.0)) * (1.0 - doubt),
         log_bayes=next((g for f, g in zip(stage.fits, stage.gains, strict=True) if f.found[-1] is h), 0.0),
         parameters=tuple(
             ParameterValue(name=name.removeprefix(prefix), value=value, stderr=sd, unit=units.get(name, "1"))

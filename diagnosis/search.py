@@ -241,6 +241,11 @@ def log_e_value(scored: Sequence[Scored]) -> float:
 
     All names weigh the same, but for their rarity, and share it among their places; every instrument may fail for
     itself.
+
+    Parameters
+    ----------
+    scored : sequence of Scored
+        Everything that competes, without open forms
     """
 
     def shares(h: Hypothesis) -> str:
