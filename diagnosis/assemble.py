@@ -154,7 +154,7 @@ def _remaining(found: Search, remaining: Sequence[LatentHeat], case: Case, *, de
 
 def _latents(case: Case, explanation: Explanation) -> tuple[LatentHeat, ...]:
     """Unknown heat in every part, as mechanical loss (where the loss is measured) and not."""
-    marginal, knots = Marginal(explanation.fit), knots_of(explanation.problem.pieces)
+    marginal, knots = Marginal.of(explanation.fit), knots_of(explanation.problem.pieces)
     kinds = (True, False) if LOSS in case.channels else (False,)
     return tuple(
         latent_heat(explanation.problem.model, explanation.fit, marginal, part.name, loss_W=case.loss_W,

@@ -24,22 +24,33 @@ from models.types import Array
 
 
 class Marginal:
-    """The residual of a fit at the priors' middle, and the covariance of everything unknown.
+    """A residual at the priors' middle, and the covariance of everything unknown.
 
     Parameters
     ----------
-    fit : Fit
+    columns : Array, shape (M, unknowns)
+        Whitened derivatives with respect to the unknowns
+    residual : Array, shape (M,)
+        Whitened, where all unknowns are in the middle of their priors
     """
 
-    def __init__(self, fit: Fit) -> None:
-        J = fit.white_columns
-        self.columns = J
-        # Back to the middle of the priors along the linearisation: that is the residual whose covariance is 1 + J J^T.
-        self.residual = fit.white_residual + J @ fit.z
+    def __init__(self, columns: Array, residual: Array) -> None:
+        J = self.columns = columns
+        self.residual = residual
         self._factor = cho_factor(np.eye(J.shape[1]) + J.T @ J)
         self._projected = cho_solve(self._factor, J.T @ self.residual)
         self.rest = self.residual - J @ self._projected  # M^-1 r
         self.chi_square = float(self.residual @ self.rest)
+
+    @classmethod
+    def of(cls, fit: Fit) -> Marginal:
+        """Of a fit: back to the middle of the priors along the linearisation, where the covariance is 1 + J J^T."""
+        J = fit.white_columns
+        return cls(J, fit.white_residual + J @ fit.z)
+
+    def most_probable(self, residual: Array) -> Array:
+        """The unknowns that a residual at the priors' middle speaks for, shape (unknowns,)."""
+        return np.asarray(cho_solve(self._factor, self.columns.T @ residual))
 
     def weighed(self, columns: Array) -> Array:
         """``M^-1 x`` for columns, shape (M, n)."""

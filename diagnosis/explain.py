@@ -8,14 +8,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 from joblib import delayed
 from scipy.special import log_ndtr
 
+from diagnosis.evidence import Marginal, strength
 from diagnosis.hypotheses import WIDE_PRIOR, Hypothesis, Scored, spread, white_column
+from diagnosis.latent import white_columns
 from diagnosis.posterior import Fit, Problem
-from diagnosis.trajectory import NetworkOnGrid
+from diagnosis.term_on_grid import TermOnGrid
+from diagnosis.trajectory import NetworkOnGrid, Trajectory
 from models.types import Array
 
 FIRST_ITERATIONS, ROUGH_ITERATIONS, ITERATIONS = 4, 3, 10
@@ -23,6 +27,10 @@ RACE_SHARE, RACE_LEAD = 0.15, 15.0  # of the best gain, and log evidence: who is
 DISTRESS, SLOW_SENSOR = 2.5, 1.3  # standard deviations: of a parameter, and of a sensor's lag
 START_SHARES = (0.6, 0.3, 0.1)
 AS_PROMISED = 0.8
+LOCAL, ZOOM = 9, (1.0, 0.25, 0.06)  # shapes around those of a fit, within so many spacings of the grid
+RESHAPED_GAIN = 3.0  # log evidence for which a fit goes on with other shapes
+MOST_RESHAPED = 3
+DISTORTED = 4.0  # standard deviations of a parameter
 BACK = (0.3, 0.6)  # of the way that a calibration without an effect went
 
 
@@ -61,6 +69,26 @@ class Explanation:
                 per_z = value * item.parameter.sd if item.parameter.log else item.parameter.sd
                 result[item.target] = (value, abs(per_z) * float(sd[index]))
         return result
+
+
+def distorted(explanation: Explanation) -> bool:
+    """Whether a calibration went so far from its priors that nothing said about its neighbourhood can be trusted."""
+    return float(np.abs(explanation.fit.z).max(initial=0.0)) > DISTORTED
+
+
+def in_the_middle(explanation: Explanation) -> Explanation | None:
+    """An explanation seen from the middle of the priors, but for what was found; None without a solution there.
+
+    A strong effect that is missing bends the calibration so far that the same effect, tried from there, does not fit.
+    """
+    problem = explanation.problem
+    own = {p.name for h in explanation.found if h.term is not None for p in h.term.parameters}
+    z = np.where([item.target in own for item in problem.unknowns.items], explanation.fit.z, 0.0)
+    try:
+        fit = problem.fit(z, [part.trajectory for part in explanation.fit.parts], iterations=0)
+    except ArithmeticError:
+        return None
+    return replace(explanation, fit=fit)
 
 
 def calibrated(problem: Problem) -> Explanation:
@@ -166,7 +194,7 @@ def fitted(base: Explanation, scored: Scored, worth: float = -np.inf) -> Explana
             fit = problem.fit(start, [part.trajectory for part in base.fit.parts], iterations=ROUGH_ITERATIONS)
         except ArithmeticError:
             continue  # too far: the next start is nearer to what was there before
-        found = _explanation((*base.found, scored.hypothesis), problem, fit)
+        found = _reshaped(_explanation((*base.found, scored.hypothesis), problem, fit), ROUGH_ITERATIONS)
         if best is None or found.log_evidence > best.log_evidence:
             best = found
         gain = best.log_evidence - base.log_evidence
@@ -177,9 +205,111 @@ def fitted(base: Explanation, scored: Scored, worth: float = -np.inf) -> Explana
 
 def refined(rough: Explanation) -> Explanation:
     """A rough fit, fitted to the end."""
-    fit = rough.problem.fit(rough.fit.z, rough.fit.courses, iterations=ITERATIONS)
-    better = _explanation(rough.found, rough.problem, fit)
-    return replace(better, fit=fit.without_parts()) if better.log_evidence > rough.log_evidence else rough
+    better = _better(rough, rough.fit.z, rough.fit.courses, ITERATIONS)
+    for _ in range(MOST_RESHAPED):
+        before = replace(better, fit=better.problem.at(better.fit))
+        better = _reshaped(before, ITERATIONS)
+        if better is before:
+            break
+    return replace(better, fit=better.fit.without_parts()) if better.fit.parts else better
+
+
+def _better(there: Explanation, z: Array, guesses: Sequence[Trajectory | Array], iterations: int) -> Explanation:
+    """An explanation fitted anew from `z`, if that is better."""
+    try:
+        fit = there.problem.fit(z, guesses, iterations=iterations)
+    except ArithmeticError:
+        return there
+    found = _explanation(there.found, there.problem, fit)
+    return found if found.log_evidence > there.log_evidence else there
+
+
+def _reshaped(there: Explanation, iterations: int) -> Explanation:
+    """An explanation fitted anew with other shapes of what was found last, if that is better.
+
+    A set-point or a moment moves by jumps: its derivative does not tell where a better one lies. So its neighbourhood
+    is scanned, everything else following linearly.
+    """
+    z = reshaped(there)
+    if z is None:
+        return there
+    return _better(there, z, [part.trajectory for part in there.fit.parts], iterations)
+
+
+def reshaped(explanation: Explanation) -> Array | None:
+    """Where a fit should go on: other shapes of what was found last, and all the rest as it would follow.
+
+    Parameters
+    ----------
+    explanation : Explanation
+        With its linearisation
+
+    Returns
+    -------
+    Array, shape (unknowns,), or None
+        None where no other shapes promise more.
+    """
+    h, problem, fit = explanation.found[-1], explanation.problem, explanation.fit
+    if h.term is None or h.term.kind == "sensor" or len(h.variants) < 2:
+        return None
+    names, items = [p.name for p in h.term.parameters], problem.unknowns.items
+    own = [next(i for i, item in enumerate(items) if item.target == name) for name in names]
+    rest = np.setdiff1d(np.arange(len(items)), own)
+    J, z = fit.white_columns[:, rest], np.array(fit.z)
+    values = np.array([items[i].value(float(z[i])) for i in own])
+    term = TermOnGrid(problem.model, h.term)
+
+    def columns(shapes: Array) -> Array:
+        heats = [term.heat(part.trajectory, shapes, values) for part in fit.parts]
+        white = [white_columns(problem.model, part, *heat) for part, heat in zip(fit.parts, heats, strict=True)]
+        return np.concatenate(white)
+
+    def priors(shapes: Array) -> Array:
+        return np.array([-0.5 * sum(items[i].z(v) ** 2 for i, v in zip(own[1:], row[1:], strict=True))
+                         for row in shapes])  # fmt: skip
+
+    here = np.concatenate([[1.0], values[1:]])[None, :]
+    marginal = Marginal(J, fit.white_residual + J @ z[rest] + columns(here)[:, 0] * values[0])
+    best, first, most, value = here[0], -np.inf, -np.inf, values[0]
+    for zoom in ZOOM:
+        shapes = _shapes_around(h, best, zoom)
+        if zoom == ZOOM[0]:
+            whole = np.concatenate([np.ones((len(h.variants), 1)), h.variants[:, 1:]], axis=1)
+            shapes = np.concatenate([here, whole, shapes])
+        score = strength(*marginal.products(columns(shapes)), h.term.strength.sd, h.sign)
+        total = score.log_bayes + priors(shapes)
+        first = float(total[0]) if zoom == ZOOM[0] else first
+        top = int(np.argmax(total))
+        if total[top] > most:
+            best, most, value = shapes[top], float(total[top]), float(score.value[top])
+    if most < first + RESHAPED_GAIN:
+        return None
+    for i, v in zip(own, [value, *best[1:]], strict=True):
+        z[i] = items[i].z(_inside(float(v), items[i].parameter.lower, items[i].parameter.upper))
+    z[rest] = marginal.most_probable(marginal.residual - columns(best[None, :])[:, 0] * value)
+    return np.asarray(z)
+
+
+def _shapes_around(h: Hypothesis, values: Array, zoom: float) -> Array:
+    """Values of a term's parameters around some, the strength 1: all pairs of its first two shapes, others alone."""
+    assert h.term is not None  # noqa: S101 - a term is asked for
+    grids = [np.unique(h.variants[:, column]) for column in range(h.variants.shape[1])]
+    free = [column for column, grid in enumerate(grids) if column and len(grid) > 1]
+
+    def around(column: int) -> Array:
+        p, grid = h.term.parameters[column], grids[column]  # type: ignore[union-attr]
+        reach = zoom * float(np.ptp(grid)) / (len(grid) - 1)
+        return np.clip(values[column] + reach * np.linspace(-1.0, 1.0, LOCAL), p.lower, p.upper)
+
+    blocks = []
+    for columns in (free[:2], *([column] for column in free[2:])):
+        block = np.array(list(product(*(around(column) for column in columns))))
+        rows = np.tile(values, (len(block), 1))
+        rows[:, columns] = block
+        blocks.append(rows)
+    rows = np.concatenate(blocks)
+    rows[:, 0] = 1.0
+    return rows
 
 
 def _explanation(found: tuple[Hypothesis, ...], problem: Problem, fit: Fit) -> Explanation:
@@ -239,13 +369,21 @@ def _one_sided(h: Hypothesis, fit: Fit) -> float:
     return float(np.log(2.0) + log_ndtr(h.sign * fit.z[index] / sd))
 
 
-def best_fits(base: Explanation, chosen: Sequence[Scored], *, jobs: int = 1) -> list[Explanation]:
-    """Hypotheses of a scan fitted, best first: all of them roughly, those that may still win to the end.
+def best_fits(base: Explanation, chosen: Sequence[tuple[Explanation, Scored]], *, jobs: int = 1) -> list[Explanation]:
+    """Hypotheses of scans fitted, best first: all of them roughly, those that may still win to the end.
 
-    The fits come without their linearisation, see :meth:`Problem.at`: a dozen of them would fill the memory.
+    Every one comes with the explanation that it was scanned from, the base or the same seen from elsewhere; of two that
+    say the same the better one counts. The fits come without their linearisation, see :meth:`Problem.at`: a dozen of
+    them would fill the memory.
     """
-    most = max((s.log_bayes for s in chosen), default=0.0)
-    rough = [e for e in spread(jobs, [delayed(fitted)(base, s, AS_PROMISED * most) for s in chosen]) if e is not None]
+    most = max((s.log_bayes for view, s in chosen if view is base), default=0.0)
+    work = [delayed(fitted)(view, s, AS_PROMISED * most if view is base else -np.inf) for view, s in chosen]
+    by_label: dict[str, Explanation] = {}
+    for found in spread(jobs, work):
+        if found is not None:
+            label = found.found[-1].label
+            by_label[label] = max(found, by_label.get(label, found), key=lambda e: e.log_evidence)
+    rough = list(by_label.values())
     gains = [e.log_evidence - base.log_evidence for e in rough]
     least = (1.0 - RACE_SHARE) * max(gains, default=0.0) - RACE_LEAD
     racing = [e for e, gain in zip(rough, gains, strict=True) if gain >= least]

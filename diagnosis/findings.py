@@ -22,7 +22,8 @@ def node_of(case: Case, h: Hypothesis) -> str:
     if term is None:
         return _node_of_parameter(case, h.place)
     if term.kind == "loss_factor":
-        return next(s.node for s in network.sources if s.name == term.target[0])
+        most, _ = max(term.weighted, key=lambda pair: abs(pair[1]))
+        return next(s.node for s in network.sources if s.name == most)
     if term.kind == "link_factor":
         parts = {p.name for p in network.parts}
         ends = next(k.nodes for k in network.links if k.name == term.target[0])

@@ -108,8 +108,17 @@ def hypothesis_of(placed: Placed) -> Hypothesis:
         grid = grid[np.unique(np.linspace(0, len(grid) - 1, MOST_VARIANTS).round().astype(int))]
     return Hypothesis(
         name=placed.name, place=placed.place, family=placed.family, term=placed,
-        variants=np.concatenate([np.ones((len(grid), 1)), grid], axis=1),
+        variants=_both_ways(placed, np.concatenate([np.ones((len(grid), 1)), grid], axis=1)),
     )  # fmt: skip
+
+
+def _both_ways(term: Term, variants: Array) -> Array:
+    """Variants of a fault of a clock with both signs: being early does not look like being late turned over."""
+    return (
+        np.concatenate([variants, variants * [-1.0, *np.ones(variants.shape[1] - 1)]])
+        if term.form == "clock"
+        else variants
+    )
 
 
 def parameter_hypotheses(problem: Problem) -> list[Hypothesis]:
@@ -238,8 +247,8 @@ def _distortion_columns(model: NetworkOnGrid, part: Linearised, term: TermOnGrid
     columns = []
     for variant in h.variants:
         values = np.array(variant)
-        values[0] = size
-        columns.append((term.distorted(part.trajectory, part.sensors, read, values) - read) / size)
+        values[0] *= size
+        columns.append((term.distorted(part.trajectory, part.sensors, read, values) - read) / values[0])
     return part.whitening(np.stack(columns, axis=2))
 
 

@@ -184,9 +184,7 @@ class Problem:
         names = [p.name for p in model.network.parameters]
         here = settled_balance(model, trajectory)
         for index, item in enumerate(items):
-            scale = _value_per_z(item, float(z[index]))
-            if scale == 0.0:
-                continue  # held at a bound
+            scale = item.per_z(float(z[index]))
             if item.role == "network":
                 step = 0.02 * scale
                 heat, loss = parameter_heat(model, trajectory, here, names.index(item.target), step)
@@ -205,7 +203,7 @@ class Problem:
         """The columns of what the network does not feel."""
         model = self.model
         for index, item in enumerate(self.unknowns.items):
-            scale = _value_per_z(item, float(z[index]))
+            scale = item.per_z(float(z[index]))
             if item.role == "bias":
                 columns[:, sensors.channels.index(item.target), index] = scale
             elif item.role == "term" and (distortion := self._term_of(self._distortions, item)) is not None:
@@ -279,7 +277,8 @@ class Problem:
         ArithmeticError
             If there is no solution where it should start.
         """
-        z = np.zeros(len(self.unknowns)) if z is None else np.array(z)
+        lower, upper = self.unknowns.bounds
+        z = np.zeros(len(self.unknowns)) if z is None else np.clip(z, lower, upper)
         if any(piece.slow for piece in self.pieces):
             iterations *= SLOW_PATIENCE
         parts = self._attempt(z, guesses)
@@ -288,10 +287,10 @@ class Problem:
         objective = _objective(parts, z)
         damping = 0.0
         for _ in range(iterations):
-            step = _gauss_newton(parts, z, damping)
+            step = _gauss_newton(parts, z, damping, lower, upper)
             longest = float(np.max(np.abs(step), initial=0.0))
             step *= min(1.0, FARTHEST_STEP / max(longest, 1e-12))
-            tried = z + step
+            tried = np.clip(z + step, lower, upper)
             trial = self._attempt(tried, [part.trajectory for part in parts])
             reached = _objective(trial, tried) if trial is not None else np.inf
             if trial is not None and reached <= objective + 1e-6:
@@ -353,24 +352,20 @@ class Problem:
         ]
 
 
-def _value_per_z(item: Unknown, z: float) -> float:
-    p = item.parameter
-    value = item.value(z)
-    if (value <= p.lower and z < 0.0) or (value >= p.upper and z > 0.0):
-        return 0.0
-    return value * p.sd if p.log else p.sd
-
-
 def _objective(parts: Sequence[Linearised], z: Array) -> float:
     """Squared whitened residuals and priors."""
     return float(sum(p.white_residual @ p.white_residual for p in parts) + z @ z)
 
 
-def _gauss_newton(parts: Sequence[Linearised], z: Array, damping: float) -> Array:
+def _gauss_newton(parts: Sequence[Linearised], z: Array, damping: float, lower: Array, upper: Array) -> Array:
+    """The step to the minimum of the linearised objective; what it pushes out of its bounds stays where it is."""
     count = len(z)
     normal, right = np.eye(count), -np.array(z)
     for part in parts:
         normal += part.white_columns.T @ part.white_columns
         right += part.white_columns.T @ part.white_residual
     normal += damping * np.diag(np.diag(normal))
-    return np.asarray(np.linalg.solve(normal, right))
+    free = ~((z <= lower) & (right < 0.0)) & ~((z >= upper) & (right > 0.0))
+    step = np.zeros(count)
+    step[free] = np.linalg.solve(normal[np.ix_(free, free)], right[free])
+    return step

@@ -15,7 +15,7 @@ from diagnosis.observation import Sensors, lagged
 from diagnosis.trajectory import SLOW_SUBSTEPS, NetworkOnGrid, Trajectory, update_of
 from models.laws import compile_function, function_source, symbol
 from models.network import BASE_SIGNALS
-from models.terms import Term
+from models.terms import FACTORS, Term
 from models.types import Array
 
 INPUT_STEP: Mapping[str, float] = {"speed": 5.0, "torque": 1.0}
@@ -135,13 +135,15 @@ class TermOnGrid:
 
     # ------------------------------------------------------------------ heat
 
-    def heat(self, trajectory: Trajectory, values: Array) -> tuple[Array, Array]:
+    def heat(self, trajectory: Trajectory, values: Array, there: Array | None = None) -> tuple[Array, Array]:
         """The heat that the term brings to the network.
 
         Parameters
         ----------
         trajectory : Trajectory
         values : Array, shape (V, parameters)
+        there : Array, shape (parameters,), optional
+            Values that a network with the term had in this trajectory, where they are others
 
         Returns
         -------
@@ -160,10 +162,11 @@ class TermOnGrid:
             loss = law if term.is_loss else loss
         elif term.kind == "link":
             self._link_heat(trajectory, law, other, heat)
-        elif term.kind in ("loss_factor", "link_factor"):
-            # Of what is there with it: the rest of a loss that it halves is as much again.
-            share = law / (1.0 + law) if self._inside else law
-            loss = loss + self._factor_heat(trajectory, share, heat)
+        elif term.kind in FACTORS:
+            within = np.zeros_like(law)
+            if self._inside:
+                within = law if there is None else self.law(trajectory, there[None, :])[0].T
+            loss = loss + self._factor_heat(trajectory, law, within, heat)
         elif term.kind == "signal":
             per_unit, loss_per_unit = input_slope(model, trajectory, term.target[0])
             heat = per_unit[:, :, None] * law[:, None, :]
@@ -172,21 +175,28 @@ class TermOnGrid:
             raise ValueError(f"{term.label}: a term of kind {term.kind!r} brings no heat")
         return heat, loss
 
-    def _factor_heat(self, trajectory: Trajectory, share: Array, heat: Array) -> Array:
-        """Adds shares of the heats of the targets, shape (K, V), to `heat`; returns what of them is loss."""
-        model, balance, loss = self.model, trajectory.balance, np.zeros(share.shape)
+    def _factor_heat(self, trajectory: Trajectory, law: Array, within: Array, heat: Array) -> Array:
+        """Adds what a change, shape (K, V), does to the targets to `heat`; returns what of it is loss.
+
+        Their heats have the change `within` in them already: the rest of a loss that is halved is as much again.
+        """
+        model, balance, loss = self.model, trajectory.balance, np.zeros(law.shape)
+
+        def share(weight: float) -> Array:
+            return np.asarray(weight * law / (1.0 + weight * within))
+
         if self.term.kind == "loss_factor":
             sources = [source.name for source in model.network.sources]
-            for name in self.term.target:
+            for name, weight in self.term.weighted:
                 index = sources.index(name)
-                extra = share * balance.sources[:, index, None]
+                extra = share(weight) * balance.sources[:, index, None]
                 heat[:, model.parts.index(model.network.sources[index].node)] += extra
                 loss += extra
         else:
             links = [link.name for link in model.network.links]
-            for name in self.term.target:
+            for name, weight in self.term.weighted:
                 index = links.index(name)
-                flow = (balance.conductances[:, index] * balance.differences[:, index])[:, None] * share
+                flow = (balance.conductances[:, index] * balance.differences[:, index])[:, None] * share(weight)
                 heat += model.to_parts[index][:, None] * flow[:, None, :]
         return loss
 

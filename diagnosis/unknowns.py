@@ -52,6 +52,10 @@ class Unknown:
         value = p.start * np.exp(p.sd * z) if p.log else p.start + p.sd * z
         return float(min(max(value, p.lower), p.upper))
 
+    def per_z(self, z: float) -> float:
+        """Change of the value with `z`, at a bound that to the inside."""
+        return self.value(z) * self.parameter.sd if self.parameter.log else self.parameter.sd
+
     def z(self, value: float) -> float:
         """The standard normal number of a value."""
         p = self.parameter
@@ -72,6 +76,16 @@ class Unknowns:
 
     def __len__(self) -> int:
         return len(self.items)
+
+    @property
+    def bounds(self) -> tuple[Array, Array]:
+        """Lowest and highest standard normal numbers, each of shape (unknowns,)."""
+        parameters = [item.parameter for item in self.items]
+        endless = np.array([p.log and p.lower <= 0.0 for p in parameters], dtype=bool)
+        lowest = [p.start if none else p.lower for p, none in zip(parameters, endless, strict=True)]
+        lower = np.array([item.z(value) for item, value in zip(self.items, lowest, strict=True)])
+        upper = np.array([item.z(p.upper) for item, p in zip(self.items, parameters, strict=True)])
+        return np.where(endless, -np.inf, lower), upper
 
     def with_parameters(self, role: Role, parameters: Iterable[Parameter]) -> Unknowns:
         """The same and further ones."""

@@ -22,7 +22,7 @@ from models.expressions import expression_text, parse_expression
 from models.faults import validated
 from models.laws import Parameter
 from models.network import ExtraState, ThermalNetwork
-from models.terms import Form, Kind, Term
+from models.terms import FACTORS, Form, Kind, Term
 from models.toml_file import parse, read_text
 
 if TYPE_CHECKING:
@@ -219,6 +219,7 @@ class _Finding(Section):
     label: Name
     kind: Kind
     target: tuple[Text, ...] = Field(min_length=1, strict=False)
+    weights: tuple[float, ...] = Field(default=(), strict=False)
     law: Text
     is_loss: bool = False
     boundary_temperature: Text | None = None
@@ -309,6 +310,11 @@ def _finding(entry: _Finding, signals: list[str], where: str) -> Finding:
         if not parameter.lower <= parameter.value <= parameter.upper:
             limits = f"{parameter.lower:g} ... {parameter.upper:g}"
             raise InputError(f"{where}.parameter {parameter.name} is {parameter.value:g}; {limits} is possible")
+    if entry.weights and (entry.kind not in FACTORS or len(entry.weights) != len(entry.target)):
+        raise InputError(
+            f"{where}.weights: {len(entry.weights)} weights for {len(entry.target)} targets of a {entry.kind}; "
+            "a loss_factor or link_factor has one for each target, or none"
+        )
     own = [p.name for p in entry.parameter] + [s.name for s in entry.state]
     names = [*signals, *own]
 
@@ -320,6 +326,7 @@ def _finding(entry: _Finding, signals: list[str], where: str) -> Finding:
         label=entry.label,
         kind=entry.kind,
         target=entry.target,
+        weights=entry.weights,
         expression=law(entry.law, "law"),
         parameters=tuple(
             Parameter(
@@ -392,6 +399,7 @@ def _finding_lines(finding: Finding) -> list[str]:
             "label": term.label,
             "kind": term.kind,
             "target": list(term.target),
+            "weights": list(term.weights) or None,
             "law": expression_text(term.expression),
             "is_loss": term.is_loss,
             "boundary_temperature": None if temperature is None else expression_text(temperature),

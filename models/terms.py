@@ -18,6 +18,7 @@ from models.network import ExtraState, ThermalNetwork
 
 Kind = Literal["source", "link", "loss_factor", "link_factor", "signal", "sensor"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
+FACTORS: tuple[Kind, ...] = ("loss_factor", "link_factor")
 Form = Literal["shift", "lag", "clock", "stuck", "swapped"]
 FORMS: tuple[Form, ...] = get_args(Form)
 DIGITS = 4  # of the numbers in a printed equation
@@ -48,6 +49,9 @@ class Term:
         The law, of the network's signals and of the term's own parameters and states
     parameters : tuple of Parameter
         The strength first
+    weights : tuple of float
+        Of a ``loss_factor`` or ``link_factor``: how much of the change each of the targets has; empty where all have
+        the whole of it
     states : tuple of ExtraState
         Memories; none depends on the strength
     is_loss : bool
@@ -69,6 +73,7 @@ class Term:
     target: tuple[str, ...]
     expression: sp.Expr
     parameters: tuple[Parameter, ...]
+    weights: tuple[float, ...] = ()
     states: tuple[ExtraState, ...] = ()
     is_loss: bool = False
     boundary_temperature: sp.Expr | None = None
@@ -142,9 +147,14 @@ class Term:
             "link_factor": ThermalNetwork.with_link_factor,
             "signal": ThermalNetwork.with_signal_shift,
         }[self.kind]
-        for name in self.target:
-            network = change(network, name, self.expression)
+        for name, weight in self.weighted:
+            network = change(network, name, self.expression if weight == 1.0 else weight * self.expression)
         return network
+
+    @property
+    def weighted(self) -> tuple[tuple[str, float], ...]:
+        """Every target with how much of the change it has."""
+        return tuple(zip(self.target, self.weights or (1.0,) * len(self.target), strict=True))
 
     def _named(self, nodes: Sequence[str]) -> list[tuple[str, str]]:
         return [(node, self.label if len(nodes) == 1 else f"{self.label}_{node}") for node in nodes]
@@ -214,6 +224,9 @@ def equation(term: Term, laws: Mapping[str, sp.Expr], values: Mapping[str, float
         else:
             head = left if key == "law" else f"{name_of(key)} = "
         lines.append(head + latex(expression))
+    if term.weights:
+        shares = ",\\ ".join(rf"{weight:.2g}\,({_roman(name)})" for name, weight in term.weighted)
+        lines.append(rf"\mathrm{{times}}\ {shares}")
     return r",\quad ".join(lines)
 
 

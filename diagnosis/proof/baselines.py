@@ -102,7 +102,7 @@ def _sparse(case: Case, base: Explanation, candidates: Sequence[Hypothesis]) -> 
         from pysindy import STLSQ
     except ImportError:
         return None
-    marginal, pieces = Marginal(base.fit), base.problem.pieces
+    marginal, pieces = Marginal.of(base.fit), base.problem.pieces
     knots = knots_of(pieces)
     kinds = (True, False) if LOSS in case.channels else (False,)
     missing = max(

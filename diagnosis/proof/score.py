@@ -145,12 +145,15 @@ class Answer:
         Most probable place, or ``""``
     holdout_K : (float, float, float)
         Held-out error before, calibrated and after; NaN without
+    unseen : frozenset of str
+        Mechanisms of which is said that these data would not show them
     """
 
     verdict: str
     claims: tuple[Claim, ...] = ()
     node: str = ""
     holdout_K: tuple[float, float, float] = (math.nan, math.nan, math.nan)
+    unseen: frozenset[str] = frozenset()
 
     @classmethod
     def of(cls, said: Mapping[str, Any] | None, *, otherwise: str = "failed") -> Answer:
@@ -166,6 +169,7 @@ class Answer:
             claims=tuple(_claim(finding) for finding in said.get("findings", [])),
             node=location[0]["node"] if location else "",
             holdout_K=(before, calibrated, after),
+            unseen=frozenset(one["mechanism"] for one in said.get("not_visible", [])),
         )
 
     @property
@@ -286,6 +290,13 @@ def single_exact(j: Judged) -> bool | None:
     if j.group != "single" or not j.practical():
         return None
     return bool(j.answer.claims) and j.answer.claims[0].mechanism == j.names[0]
+
+
+def single_answered(j: Judged) -> bool | None:
+    """One effect of practical size: named or tied; or nothing is said but that these data would not show it."""
+    if j.group != "single" or not j.practical():
+        return None
+    return j.names[0] in j.answer.tied or (j.answer.silent and j.names[0] in j.answer.unseen)
 
 
 def single_small(j: Judged) -> bool | None:
@@ -431,6 +442,8 @@ RULES = (
     Rule(key="far", text="parameter far off: called so, and which", judge=far_parameter),
     Rule(key="single_tied", text="single effect named or in the tie set", judge=single_tied, needed=0.95),
     Rule(key="single_exact", text="single effect named exactly", judge=single_exact, needed=0.85),
+    Rule(key="single_answered", text="single effect named, tied, or said to be invisible in these data",
+         judge=single_answered),
     Rule(key="single_small", text="single effect too small to matter: no other named", judge=single_small),
     Rule(key="place", text="place right, or next to it", judge=near_place, needed=0.95),
     Rule(key="place_exact", text="place right exactly", judge=exact_place),

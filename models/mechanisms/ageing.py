@@ -54,14 +54,15 @@ oil_ageing = Mechanism(
     name="oil_ageing",
     family=FAMILY,
     kind="loss_factor",
-    places=("factor bearing", "mesh_sliding", "churning"),
+    places=("losses",),
     sign=0,
-    parameters=lambda scale: (strength(0.15, description="relative change in the end"), _life(scale)),
+    parameters=lambda scale: (strength(0.2, description="relative change of the viscosity in the end"), _life(scale)),
     law=lambda s: s.strength * (1.0 - sp.exp(-s.time / s.life)),
-    says="The oil's viscosity drifts during the test: thicker oil costs more in the bearings and less in the mesh "
-    "({place}).",
-    reference="2 % of viscosity per hour of test; M_rr ~ nu^0.6 after SKF; here one place at a time, in truth all "
-    "at once with opposite signs",
+    weights=lambda scale, source: round(scale.viscosity_exponents.get(source, 0.0), 2),
+    says="The oil's viscosity drifts during the test: thicker oil costs more in bearings and seals and less in the "
+    "mesh.",
+    reference="2 % of viscosity per hour of test; every loss with its own exponent of viscosity, as the loss model has "
+    "it at the reference point",
     experiment=REPEAT + "; take oil samples before and after",
 )
 

@@ -43,6 +43,7 @@ hot_neighbour = Mechanism(
             "neighbour",
             0.5 * (scale.ambient + scale.temperature),
             sd=20.0,
+            lower=scale.ambient,
             grid=[scale.ambient + r * (scale.temperature - scale.ambient) for r in (0.3, 0.6, 1.0)],
         ),
     ),

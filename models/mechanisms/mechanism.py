@@ -68,6 +68,9 @@ class Mechanism:
         (mean temperatures at the place and the other end), ``T_<group>``, ``ambient_ref`` [degC], ``duration_ref`` [s],
         and in ratios to the scale ``n`` (magnitude of speed), ``m`` (of torque), ``x`` (time since the start of the
         recording) and ``nu`` (viscosity of the oil at its temperature)
+    weights : callable of (:class:`Scale`, str) or None
+        Of a factor: how much of the change a loss component or link has, by its name; those that have none drop out.
+        By default all have the whole of it
     sign : int
         Of the strength; 0 if it may be either
     is_loss : bool
@@ -98,6 +101,7 @@ class Mechanism:
     reference: str
     experiment: str
     separate_by: Mapping[str, str] = field(default_factory=dict)
+    weights: Callable[[Scale, str], float] | None = None
     sign: Literal[-1, 0, 1] = 1
     is_loss: bool = False
     other: str | None = None
@@ -136,7 +140,9 @@ class Mechanism:
             channels = (*(part.name for part in network.parts), LOSS_CHANNEL)
         found = [spot for pattern in self.places for spot in spots(network, self.kind, pattern, channels)]
         placed = [self._at(network, scale, spot) for spot in found]
-        return tuple(p for p in placed if not any(ABSENT in law.free_symbols for law in p.written.values()))
+        return tuple(
+            p for p in placed if p.target and not any(ABSENT in law.free_symbols for law in p.written.values())
+        )
 
     def separation(self, other: str) -> str:
         """The experiment that would tell this mechanism from another one."""
@@ -160,6 +166,10 @@ class Mechanism:
         if self.kind == "link":
             end = f"{label}_{other}" if own_boundary else other
             target = (*(node for node in spot.target if node != end), end)
+        weights: tuple[float, ...] = ()
+        if self.weights is not None:
+            kept = [(name, weight) for name in target if (weight := self.weights(scale, name)) != 0.0]
+            target, weights = tuple(name for name, _ in kept), tuple(weight for _, weight in kept)
 
         def read(law: LawLike) -> sp.Expr:
             expression, numeric = trace(law, [*network.signals, *local, *aliases], self.name)
@@ -188,6 +198,7 @@ class Mechanism:
             target=target,
             expression=full["law"],
             parameters=tuple(self._prefixed(p, label) for p in own),
+            weights=weights,
             states=tuple(
                 ExtraState(
                     name=f"{label}_{memory.name}",

@@ -4,8 +4,9 @@ A pattern is a name, a group (its members together), or ``each`` and a group (on
 
 - source, link: nodes. ``oil``, ``housing``, ``each bearings``; of a link also both ends, ``each bearings-returns``,
   the other one a boundary or a group of one
-- loss_factor: sources. ``mesh_sliding``; the losses in a group of nodes, ``each bearings``; those that a factor of the
-  network multiplies, ``factor seal``; several together, ``mesh_sliding+mesh_rolling``
+- loss_factor: sources. ``losses``, all that are mechanical; ``mesh_sliding``; the losses in a group of nodes,
+  ``each bearings``; those that a factor of the network multiplies, ``factor seal``; several together,
+  ``mesh_sliding+mesh_rolling``
 - link_factor: links by their ends. ``oil-housing``, ``each bearings-housing``, ``oil-gears+oil-housing``
 - signal: an input. ``torque``
 - sensor: measured channels. ``each sensor`` (temperatures and total loss), ``each thermometer``, ``clock``, ``pair``
@@ -25,7 +26,7 @@ from models.network import BASE_SIGNALS, ThermalNetwork
 from models.terms import Kind
 
 LOSS_CHANNEL = "P_loss"
-EACH, FACTOR = "each ", "factor "
+EACH, FACTOR, ALL_LOSSES = "each ", "factor ", "losses"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -112,7 +113,7 @@ def _sources(network: ThermalNetwork, pattern: str) -> Iterator[Spot]:
         for source in network.sources
         if source.is_loss
         and any(
-            source.name == name
+            name in (source.name, ALL_LOSSES)
             or (name in network.groups and source.node in network.groups[name])
             or (name.startswith(FACTOR) and symbol(name.removeprefix(FACTOR)) in source.heat.free_symbols)
             for name in wanted

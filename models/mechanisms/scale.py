@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+import numpy as np
 import sympy as sp
 
 from models.laws import symbol
@@ -16,6 +18,7 @@ if TYPE_CHECKING:
 TYPICAL_OIL = d341_constants(40.0, 100.0, 100.0, 11.2)  # ISO VG 100, mineral
 HOTTEST, COOLEST_RISE, TYPICAL_RISE = 100.0, 20.0, 50.0  # degC, K, K
 TEN_HOURS = 36000.0
+EXPONENTS = (-1.0, 1.0)  # within which a loss may go with the viscosity
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,6 +43,8 @@ class Scale:
         Of a recording, [s]
     oil_m, oil_n : float
         Constants of the oil's viscosity, see :func:`models.oil.kinematic_viscosity_d341`
+    viscosity_exponents : mapping of str to float
+        Of every loss in the network, by the name of its source: d ln(loss) / d ln(viscosity) at these sizes, [-]
     """
 
     speed: float
@@ -52,6 +57,7 @@ class Scale:
     duration: float
     oil_m: float = TYPICAL_OIL[0]
     oil_n: float = TYPICAL_OIL[1]
+    viscosity_exponents: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def viscosity(self) -> float:
@@ -123,4 +129,23 @@ class Scale:
             duration=duration,
             oil_m=oil_m,
             oil_n=oil_n,
+            viscosity_exponents=_viscosity_exponents(gearbox, speed, torque, ambient + TYPICAL_RISE),
         )
+
+
+def _viscosity_exponents(gearbox: Gearbox, speed: float, torque: float, T: float) -> dict[str, float]:
+    """Exponent of the viscosity in every loss, by a difference: a colder gearbox has a thicker oil."""
+    network, losses, (oil_m, oil_n) = gearbox.network(), gearbox.loss_laws(), gearbox.viscosity_constants
+    start = {symbol(p.name): p.start for p in network.parameters} | {symbol("time"): 0.0}
+    start |= {symbol("speed"): speed, symbol("torque"): torque}
+    start |= {symbol(name): value for name, value in network.inputs.items()}
+    logs = []
+    for at in (T - 1.0, T + 1.0):
+        power = losses.power([speed], [torque], [[at] * len(losses.temperature_nodes)])[0]
+        here = start | {symbol(f"T_{node.name}"): at for node in network.nodes}
+        here |= {symbol(f"P_{name}"): value for name, value in zip(losses.components, power, strict=True)}
+        heats = [float(source.heat.xreplace(here).evalf()) for source in network.sources]
+        logs.append(np.log(np.maximum([*heats, kinematic_viscosity_d341(at, oil_m, oil_n)], 1e-12)))
+    change = logs[1] - logs[0]
+    exponents = np.clip(change[:-1] / change[-1], *EXPONENTS)
+    return {s.name: float(e) for s, e in zip(network.sources, exponents, strict=True) if s.is_loss}

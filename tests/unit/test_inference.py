@@ -11,13 +11,13 @@ import pytest
 
 from diagnosis.case import Case
 from diagnosis.evidence import Marginal, strength
-from diagnosis.explain import Explanation, calibrated, fitted, without
+from diagnosis.explain import DISTORTED, Explanation, calibrated, distorted, fitted, in_the_middle, without
 from diagnosis.grid import Piece, pieces
 from diagnosis.holdout import Judge
 from diagnosis.hypotheses import Hypothesis, Scored, hypothesis_of, scan, sharpened
 from diagnosis.noise import loss_noise, noise_of, start_guess
 from diagnosis.observation import lagged, readings
-from diagnosis.posterior import Problem
+from diagnosis.posterior import Problem, _gauss_newton
 from diagnosis.predict import START_S, predict
 from diagnosis.recording import Channel, Recording
 from diagnosis.search import log_e_value
@@ -31,7 +31,7 @@ from diagnosis.trajectory import (
     settled_balance,
     simulate,
 )
-from diagnosis.unknowns import unknowns_of
+from diagnosis.unknowns import Unknowns, unknowns_of
 from diagnosis.whitening import Noise, Whitening, reading_variance
 from models.cycle import Cycle
 from models.gearbox import Gearbox
@@ -348,7 +348,7 @@ def test_shapes_are_sought_between_the_grid(fzg: Gearbox, piece: Piece, problem:
     concealed, scale, true = _damaged(fzg, piece, problem)
     placed = CATALOGUE["bearing_damage"].placed(problem.model.network, scale)[0]
     base = calibrated(problem.changed(pieces=[concealed]))
-    marginal = Marginal(base.fit)
+    marginal = Marginal.of(base.fit)
     (coarse,) = scan(base.problem, base.fit, marginal, [hypothesis_of(placed)])
     fine = sharpened(base.problem, base.fit, marginal, coarse)
     moments = [s.hypothesis.variants[s.best, 1] for s in (coarse, fine)]
@@ -363,7 +363,7 @@ def test_what_is_not_needed_can_be_taken_out_again(fzg: Gearbox, piece: Piece, p
 
     def added(base: Explanation, name: str) -> Explanation:
         hypothesis = hypothesis_of(CATALOGUE[name].placed(network, scale, CHANNELS)[0])
-        (scored,) = scan(base.problem, base.fit, Marginal(base.fit), [hypothesis])
+        (scored,) = scan(base.problem, base.fit, Marginal.of(base.fit), [hypothesis])
         found = fitted(base, scored)
         assert found is not None
         return replace(found, fit=found.problem.at(found.fit))
@@ -429,3 +429,87 @@ def test_judge_prefers_the_truth_and_survives_what_has_no_prediction(fzg: Gearbo
     none = replace(right, problem=problem.changed(model=NetworkOnGrid(network, problem.model.losses)))
     assert judge.gain(none) == -np.inf
     assert judge.rmse(none) == np.inf
+
+
+# ---------------------------------------------------------------------- bounds, shapes and far starts
+
+
+def test_a_number_at_its_bound_leaves_it_when_the_data_want_it(problem: Problem) -> None:
+    """Held at a bound it must neither wander beyond, where its value no longer changes, nor stay there for ever."""
+    index = next(i for i, item in enumerate(problem.unknowns.items) if item.target == "mesh")
+    item = problem.unknowns.items[index]
+    upper = item.value(2.0)
+    narrow = replace(item, parameter=replace(item.parameter, upper=upper))
+    items = (*problem.unknowns.items[:index], narrow, *problem.unknowns.items[index + 1 :])
+    bounded = problem.changed(unknowns=Unknowns(items))
+    z = np.zeros(len(items))
+    z[index] = 12.0
+    fit = bounded.fit(z, iterations=10)
+    free = problem.fit(iterations=10)
+    np.testing.assert_allclose(fit.z, free.z, atol=0.05)  # what a fit is settled to
+    assert fit.log_evidence == pytest.approx(free.log_evidence, abs=0.1)
+    # Readings that want still more of it: it ends at the bound, and everything else settles.
+    values = problem.unknowns.network_values(problem.model.network, 6.0 * np.eye(len(items))[index])
+    hot = simulate(problem.model, problem.pieces[0], values, problem.starts[0])
+    sensors = problem.unknowns.sensors(CHANNELS, np.zeros(len(items)))
+    piece = replace(problem.pieces[0], measured=readings(problem.model, hot, sensors))
+    pushed = bounded.changed(pieces=[piece]).fit(iterations=20)
+    assert pushed.z[index] == pytest.approx(2.0)
+    step = _gauss_newton(pushed.parts, pushed.z, 0.0, *bounded.unknowns.bounds)
+    assert float(np.abs(step).max()) < 0.2  # everything else has settled beside it
+
+
+def test_a_set_point_is_found_from_afar(fzg: Gearbox, piece: Piece, problem: Problem) -> None:
+    """A switch moves by jumps, so the derivative with respect to its set-point says nothing: other shapes are tried."""
+    network, scale = problem.model.network, Scale.of(fzg, speed=2600.0, torque=150.0, duration=float(piece.time[-1]))
+    (placed,) = CATALOGUE["fan_thermostat"].placed(network, scale)
+    names = [p.name for p in placed.parameters]
+    nominal = simulate(problem.model, piece, problem.model.start, problem.starts[0])
+    housing = nominal.T[:, [problem.model.parts.index(f"housing_{half}") for half in ("lower", "upper")]].mean(axis=1)
+    true = float(np.percentile(housing, 85))
+    model = NetworkOnGrid(placed.apply(network), fzg.losses())
+    values = named_values(model.network, dict(zip(names, (scale.conductance, true, 2.0), strict=True)))
+    sensors = problem.unknowns.sensors(CHANNELS, np.zeros(len(problem.unknowns)))
+    free = replace(piece, guided=False)
+    seen = readings(model, simulate(model, free, values, problem.starts[0], rounds=12), sensors)
+    base = calibrated(problem.changed(pieces=[replace(piece, measured=seen)]))
+    hypothesis = hypothesis_of(placed)
+    (scored,) = scan(base.problem, base.fit, Marginal.of(base.fit), [hypothesis])
+    far = replace(scored, best=0, hypothesis=replace(hypothesis, variants=np.array([[1.0, true + 9.0, 6.0],
+                                                                                    *hypothesis.variants])),
+                  values=np.array([0.5 * scale.conductance, *scored.values]),
+                  log_bayes_of=np.array([scored.log_bayes, *scored.log_bayes_of]))  # fmt: skip
+    found = fitted(base, far)
+    assert found is not None
+    at, _ = found.values_of(far.hypothesis)[f"{placed.label}_set_point"]
+    assert abs(at - true) < 1.0
+    assert found.log_evidence > base.log_evidence + 20.0
+
+
+@pytest.mark.parametrize("late_s", [90.0, -90.0])
+def test_a_clock_may_be_early_or_late(fzg: Gearbox, piece: Piece, problem: Problem, late_s: float) -> None:
+    (placed, *_) = CATALOGUE["clock_offset"].placed(problem.model.network, Scale.of(fzg), CHANNELS)
+    measured = np.array(piece.measured)
+    for index, name in enumerate(CHANNELS):
+        if name != "P_loss":
+            measured[:, index] = np.interp(piece.time - late_s, piece.time, piece.measured[:, index])
+    base = calibrated(problem.changed(pieces=[replace(piece, measured=measured)]))
+    (scored,) = scan(base.problem, base.fit, Marginal.of(base.fit), [hypothesis_of(placed)])
+    assert np.sign(scored.values[scored.best]) == np.sign(late_s)
+    found = fitted(base, scored)
+    assert found is not None
+    # Late readings and slow sensors look alike: part of it goes into their lags.
+    assert found.values_of(scored.hypothesis)[placed.strength.name][0] == pytest.approx(late_s, abs=20.0)
+
+
+def test_a_distorted_calibration_is_also_seen_from_the_middle_of_the_priors(problem: Problem) -> None:
+    base = calibrated(problem)
+    assert not distorted(base)
+    z = np.array(base.fit.z)
+    z[0] = 1.5 * DISTORTED
+    bent = replace(base, fit=base.problem.fit(z, [part.trajectory for part in base.fit.parts], iterations=0))
+    assert distorted(bent)
+    middle = in_the_middle(bent)
+    assert middle is not None
+    np.testing.assert_array_equal(middle.fit.z, 0.0)
+    assert middle.log_evidence == bent.log_evidence  # what is found from there is compared with the same base
