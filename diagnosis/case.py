@@ -83,6 +83,7 @@ def prepare(gearbox: Gearbox, recordings: Sequence[Recording], holdout: Sequence
     unknowns = _wider_capacities(unknowns_of(
         network, channels, lags={c.name: c.lag_s for c in stated if c.lag_s is not None},
         bias_sd={c.name: c.bias_sd for c in stated if c.bias_sd is not None}, slow=slow_rows(recordings),
+        ambient_assumed=any("T_ambient" in r.assumed for r in recordings),
     ))  # fmt: skip
     white = channel_noise(recordings, channels)
     loss_sd = loss_noise(recordings) if LOSS in channels else (0.0, 0.0)
@@ -135,6 +136,7 @@ def scale_of(gearbox: Gearbox, recordings: Sequence[Recording]) -> Scale:
         torque=max(float(np.percentile(torque[running], 75)), 1.0),
         ambient=float(np.median(ambient)) if ambient else None,
         duration=max(float(r.time[-1]) for r in recordings),
+        interval=float(np.median(np.concatenate([np.diff(r.time) for r in recordings]))),
     )  # fmt: skip
 
 

@@ -30,6 +30,7 @@ AS_PROMISED = 0.8
 LOCAL, ZOOM = 9, (1.0, 0.25, 0.06)  # shapes around those of a fit, within so many spacings of the grid
 RESHAPED_GAIN = 3.0  # log evidence for which a fit goes on with other shapes
 MOST_RESHAPED = 3
+RUNAWAY_W = 1e9
 DISTORTED = 4.0  # standard deviations of a parameter
 BACK = (0.3, 0.6)  # of the way that a calibration without an effect went
 
@@ -72,8 +73,12 @@ class Explanation:
 
 
 def distorted(explanation: Explanation) -> bool:
-    """Whether a calibration went so far from its priors that nothing said about its neighbourhood can be trusted."""
-    return float(np.abs(explanation.fit.z).max(initial=0.0)) > DISTORTED
+    """Whether a calibration went so far that nothing said about its neighbourhood can be trusted.
+
+    So far from its priors; or, where rows lie minutes apart and priors are wide, always.
+    """
+    slow = any(piece.slow for piece in explanation.problem.pieces)
+    return slow or float(np.abs(explanation.fit.z).max(initial=0.0)) > DISTORTED
 
 
 def in_the_middle(explanation: Explanation) -> Explanation | None:
@@ -194,13 +199,16 @@ def fitted(base: Explanation, scored: Scored, worth: float = -np.inf) -> Explana
             fit = problem.fit(start, [part.trajectory for part in base.fit.parts], iterations=ROUGH_ITERATIONS)
         except ArithmeticError:
             continue  # too far: the next start is nearer to what was there before
-        found = _reshaped(_explanation((*base.found, scored.hypothesis), problem, fit), ROUGH_ITERATIONS)
+        found = _explanation((*base.found, scored.hypothesis), problem, fit)
         if best is None or found.log_evidence > best.log_evidence:
             best = found
         gain = best.log_evidence - base.log_evidence
         if promised < worth or (gain > AS_PROMISED * promised and not any(piece.slow for piece in problem.pieces)):
             break  # the scan is linear; a fit that reaches what it promised needs no other start
-    return None if best is None else replace(best, fit=best.fit.without_parts())
+    if best is None:
+        return None
+    best = _reshaped(best, ROUGH_ITERATIONS)
+    return replace(best, fit=best.fit.without_parts())
 
 
 def refined(rough: Explanation) -> Explanation:
@@ -260,8 +268,13 @@ def reshaped(explanation: Explanation) -> Array | None:
     term = TermOnGrid(problem.model, h.term)
 
     def columns(shapes: Array) -> Array:
-        heats = [term.heat(part.trajectory, shapes, values) for part in fit.parts]
-        white = [white_columns(problem.model, part, *heat) for part, heat in zip(fit.parts, heats, strict=True)]
+        white = []
+        for part in fit.parts:
+            with np.errstate(over="ignore", invalid="ignore"):
+                heat, loss = term.heat(part.trajectory, shapes, values)
+            # A memory faster than the grid runs away in its explicit steps: such a shape brings nothing.
+            good = (np.abs(heat) < RUNAWAY_W).all(axis=(0, 1))
+            white.append(white_columns(problem.model, part, np.where(good, heat, 0.0), np.where(good, loss, 0.0)))
         return np.concatenate(white)
 
     def priors(shapes: Array) -> Array:
@@ -296,10 +309,12 @@ def _shapes_around(h: Hypothesis, values: Array, zoom: float) -> Array:
     grids = [np.unique(h.variants[:, column]) for column in range(h.variants.shape[1])]
     free = [column for column, grid in enumerate(grids) if column and len(grid) > 1]
 
+    parameters = h.term.parameters
+
     def around(column: int) -> Array:
-        p, grid = h.term.parameters[column], grids[column]  # type: ignore[union-attr]
+        p, grid = parameters[column], grids[column]
         reach = zoom * float(np.ptp(grid)) / (len(grid) - 1)
-        return np.clip(values[column] + reach * np.linspace(-1.0, 1.0, LOCAL), p.lower, p.upper)
+        return np.asarray(np.clip(values[column] + reach * np.linspace(-1.0, 1.0, LOCAL), p.lower, p.upper))
 
     blocks = []
     for columns in (free[:2], *([column] for column in free[2:])):
@@ -377,7 +392,8 @@ def best_fits(base: Explanation, chosen: Sequence[tuple[Explanation, Scored]], *
     them would fill the memory.
     """
     most = max((s.log_bayes for view, s in chosen if view is base), default=0.0)
-    work = [delayed(fitted)(view, s, AS_PROMISED * most if view is base else -np.inf) for view, s in chosen]
+    # What is seen from elsewhere is a further start already.
+    work = [delayed(fitted)(view, s, AS_PROMISED * most if view is base else np.inf) for view, s in chosen]
     by_label: dict[str, Explanation] = {}
     for found in spread(jobs, work):
         if found is not None:

@@ -30,6 +30,7 @@ CHUNK, CHUNK_VALUES = 64, 250_000  # columns that go through the filter together
 FINER = 9  # values between the neighbours of the best one of a grid
 WIDE_PRIOR = 4.0  # standard deviations of a parameter that is out of its prior
 NEAR_ZERO = 1e-9
+CLOCK_SIZES = (-2.0, -1.0, -0.3, 0.3, 1.0, 2.0)  # of the typical one
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -113,12 +114,10 @@ def hypothesis_of(placed: Placed) -> Hypothesis:
 
 
 def _both_ways(term: Term, variants: Array) -> Array:
-    """Variants of a fault of a clock with both signs: being early does not look like being late turned over."""
-    return (
-        np.concatenate([variants, variants * [-1.0, *np.ones(variants.shape[1] - 1)]])
-        if term.form == "clock"
-        else variants
-    )
+    """Variants of a fault of a clock of both signs and several sizes: none looks like another one, scaled."""
+    if term.form != "clock":
+        return variants
+    return np.concatenate([variants * [size, *np.ones(variants.shape[1] - 1)] for size in CLOCK_SIZES])
 
 
 def parameter_hypotheses(problem: Problem) -> list[Hypothesis]:

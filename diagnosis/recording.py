@@ -74,6 +74,8 @@ class Recording:
         Other numeric columns
     segments : tuple of slice
         Gap-free pieces
+    assumed : tuple of str
+        Inputs that were not recorded: the definition's value stands for them
     notes : tuple of str
         What was cleaned or assumed
     """
@@ -89,6 +91,7 @@ class Recording:
     channels: tuple[Channel, ...]
     auxiliary: Mapping[str, Array] = field(default_factory=dict)
     segments: tuple[slice, ...]
+    assumed: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
 
 
@@ -179,6 +182,7 @@ def _recording(file: RecordingFile, network: ThermalNetwork, *, name: str, max_g
         channels=tuple(channels),
         auxiliary=columns.auxiliary,
         segments=columns.segments,
+        assumed=tuple(columns.assumed),
         notes=tuple(columns.notes),
     )
 

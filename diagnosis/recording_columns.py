@@ -54,6 +54,8 @@ class RecordedColumns:
     resolutions : dict of float
         Quantum of every measured quantity
     segments : tuple of slice
+    assumed : list of str
+        Inputs that were not recorded: the definition's value stands for them
     """
 
     seconds: Array
@@ -65,6 +67,7 @@ class RecordedColumns:
     names: dict[str, str] = field(default_factory=dict)
     resolutions: dict[str, float] = field(default_factory=dict)
     segments: tuple[slice, ...] = ()
+    assumed: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
 
 
@@ -263,6 +266,7 @@ def _add_constants(file: RecordingFile, network: ThermalNetwork, columns: Record
     for name, default in network.inputs.items():
         if name not in columns.inputs:
             columns.inputs[name] = np.full(size, default)
+            columns.assumed.append(name)
             columns.notes.append(
                 f"{_standard_names(network)[name]} was not recorded; {default:g} is assumed, as the definition says"
             )

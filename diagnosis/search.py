@@ -220,7 +220,7 @@ def _look(
     progress("fitting the best explanations in earnest")
     chosen = [(base, s) for s in [*_worth(real), *opened[:2]]
               if s.hypothesis.family != "open form" or s.log_bayes > real[0].log_bayes + OPEN_PENALTY]  # fmt: skip
-    if distorted(base) and (middle := in_the_middle(base)) is not None:
+    if distorted(base) and not base.found and (middle := in_the_middle(base)) is not None:
         known = [h for h in hypotheses if h.family != "open form"]
         chosen += [(middle, s) for s in _worth(_scanned(middle, known, jobs)[0])]
     fits = best_fits(base, chosen, jobs=jobs)
@@ -276,25 +276,33 @@ def log_e_value(scored: Sequence[Scored]) -> float:
 def _judged(case: Case, calibrated: Explanation, base: Explanation, floor: float, stage: Stage, needed: float) -> Stage:
     """A look with what of its fits is accepted.
 
-    What is too small to matter is accepted only to clear the way, as long as nothing that matters was found.
+    What is too small to matter is accepted only to clear the way, as long as nothing that matters was found. What the
+    held-out recordings refuse before is no rival of what is accepted.
     """
     judge = Judge(case, base, floor)
     probabilities = stage.probabilities()
     cleared = any(_matters(case, base, h) for h in base.found)
+    by_name: dict[str, float] = {}  # another place of the same physics is no rival
+    for fit, probability in zip(stage.fits, probabilities, strict=True):
+        by_name[fit.found[-1].name] = by_name.get(fit.found[-1].name, 0.0) + float(probability)
     matters, note = False, "the best explanation is hardly better than none"
-    for fit, gain, probability in zip(stage.fits, stage.gains, probabilities, strict=True):
-        if gain < needed or probability < LEAST_PROBABILITY:
+    refused: list[int] = []
+    for index, (fit, gain) in enumerate(zip(stage.fits, stage.gains, strict=True)):
+        if gain < needed or by_name[fit.found[-1].name] < LEAST_PROBABILITY:
             continue
         fit = replace(fit, fit=fit.problem.at(fit.fit))
         large = _matters(case, fit, fit.found[-1], 1.0 if gain > CERTAIN else 2.0)
         matters = matters or large
-        if probability < LEAST_SHARE * probabilities[0]:
+        if by_name[fit.found[-1].name] < LEAST_SHARE * probabilities[0]:
             continue
         if not large and cleared:
             note = "what the data show is too small to matter"
         elif _holds_out(judge, calibrated, fit):
-            return replace(stage, accepted=fit, matters=large)
+            left = [i for i in range(len(stage.fits)) if i not in refused]
+            fits, gains = tuple(stage.fits[i] for i in left), tuple(stage.gains[i] for i in left)
+            return replace(stage, fits=fits, gains=gains, accepted=fit, matters=large)
         else:
+            refused.append(index)
             note = "what would explain the training data makes the held-out data worse"
     return replace(stage, matters=matters, note=note)
 

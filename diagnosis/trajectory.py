@@ -39,7 +39,7 @@ HIGHEST_T, LOWEST_T = 400.0, -60.0  # a trajectory is held here while it settles
 RUNAWAY_T = 1500.0  # degC; beyond it there is no trajectory
 # Rows are means: a switching that none of them shows sends a guided trajectory astray for hours. Further off than this,
 # switches follow the simulated temperature until it is back.
-ASTRAY_K = 6.0
+ASTRAY_K = 4.0
 SLOW_SUBSTEPS = 11  # of memories within an interval of minutes; odd
 
 

@@ -24,6 +24,7 @@ BIAS_SD_K, LOSS_OFFSET_SD_W, LOSS_GAIN_SD = 0.3, 2.0, 0.02
 LAG_S, LAG_SD = 15.0, 0.8  # of its logarithm: a sensor's lag is that of its seat, not of its data sheet
 SHORTEST_LAG_S = 3.0
 TORQUE_GAIN_SD, AMBIENT_SD_K = 0.01, 0.3
+AMBIENT_ASSUMED_SD_K = 4.0  # of a hall whose temperature nobody recorded
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -145,7 +146,7 @@ def shifted(samples: Array, inputs: Sequence[str], role: str, value: float) -> A
 
 def unknowns_of(
     network: ThermalNetwork, channels: Sequence[str], *, lags: Mapping[str, float] | None = None,
-    bias_sd: Mapping[str, float] | None = None, slow: bool = False,
+    bias_sd: Mapping[str, float] | None = None, slow: bool = False, ambient_assumed: bool = False,
 ) -> Unknowns:  # fmt: skip
     """The usual unknowns of a network and its sensors.
 
@@ -157,6 +158,8 @@ def unknowns_of(
         Time constants [s] and tolerances [K] as their data sheets state them
     slow : bool
         Whether the rows lie minutes apart: they show no usual lag of a sensor then
+    ambient_assumed : bool
+        Whether the ambient temperature was not recorded
     """
     lags, bias_sd = lags or {}, bias_sd or {}
     items = [Unknown(role="network", target=p.name, parameter=p) for p in network.parameters if p.sd > 0.0]
@@ -186,7 +189,7 @@ def unknowns_of(
                        description="true over recorded torque")  # fmt: skip
     items.append(Unknown(role="torque_gain", target="torque", parameter=torque))
     if "T_ambient" in network.inputs:
-        ambient = _normal("ambient_offset", "K", 0.0, AMBIENT_SD_K)
+        ambient = _normal("ambient_offset", "K", 0.0, AMBIENT_ASSUMED_SD_K if ambient_assumed else AMBIENT_SD_K)
         items.append(Unknown(role="ambient_offset", target="T_ambient", parameter=ambient))
     return Unknowns(items)
 

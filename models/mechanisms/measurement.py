@@ -110,7 +110,8 @@ clock_offset = _sensor(
     "clock_offset",
     "clock",
     places="clock",
-    parameters=lambda _: (strength(60.0, "s", "readings late by"),),
+    # Loggers of rows minutes apart are set by hand to the hour, with summer time or without.
+    parameters=lambda scale: (strength(max(60.0, 3.0 * scale.interval), "s", "readings late by"),),
     law=lambda s: s.strength,
     says="The clocks of inputs and temperatures differ.",
     reference="two loggers, started by hand",

@@ -171,7 +171,7 @@ oil_tank = Mechanism(
     places=("oil",),
     parameters=lambda scale: (
         strength(1.5 * scale.conductance, "W/K", "heat capacity flow to the tank"),
-        positive("lag", 1800.0, sd=0.8, unit="s", grid=(600.0, 1800.0, 5400.0)),
+        positive("lag", 1000.0, sd=1.0, unit="s", grid=(200.0, 600.0, 1800.0, 5400.0)),
         positive("leak", 0.1, sd=0.8, grid=(0.03, 0.2)),
         plain("standstill", 0.5, sd=0.5, lower=0.0, upper=1.0, grid=(0.0, 1.0)),
     ),

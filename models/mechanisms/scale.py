@@ -41,6 +41,8 @@ class Scale:
         Hot oil and surroundings, [degC]
     duration : float
         Of a recording, [s]
+    interval : float
+        Between its rows, [s]
     oil_m, oil_n : float
         Constants of the oil's viscosity, see :func:`models.oil.kinematic_viscosity_d341`
     viscosity_exponents : mapping of str to float
@@ -55,6 +57,7 @@ class Scale:
     temperature: float
     ambient: float
     duration: float
+    interval: float = 1.0
     oil_m: float = TYPICAL_OIL[0]
     oil_n: float = TYPICAL_OIL[1]
     viscosity_exponents: Mapping[str, float] = field(default_factory=dict)
@@ -78,6 +81,7 @@ class Scale:
         ambient: float | None = None,
         temperature: float | None = None,
         duration: float = TEN_HOURS,
+        interval: float = 1.0,
     ) -> Scale:
         """The scale of a gearbox.
 
@@ -93,6 +97,8 @@ class Scale:
             Of the hot oil, [degC]; by default where the nominal losses and conductances put it
         duration : float
             Of a recording, [s]
+        interval : float
+            Between its rows, [s]
 
         Examples
         --------
@@ -127,6 +133,7 @@ class Scale:
             temperature=max(temperature, ambient + COOLEST_RISE),
             ambient=ambient,
             duration=duration,
+            interval=interval,
             oil_m=oil_m,
             oil_n=oil_n,
             viscosity_exponents=_viscosity_exponents(gearbox, speed, torque, ambient + TYPICAL_RISE),
