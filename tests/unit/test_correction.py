@@ -33,7 +33,12 @@ def finding(name: str, strength: float) -> Finding:
 CORRECTION = Correction(
     gearbox=RIG.name,
     gearbox_sha256=RIG.hash,
-    findings=(finding("windage", 9.5), finding("cooler_thermostat", 6.25), finding("torque_gain", 0.02)),
+    findings=(
+        finding("windage", 9.5),
+        finding("cooler_thermostat", 6.25),
+        finding("torque_gain", 0.02),
+        finding("oil_ageing", 0.3),
+    ),
     calibration=(Estimate(name="h_air", value=0.9312345678901234, stderr=0.04, prior=1.0),),
     recordings={'first "cold"\n.csv': "0" * 64},
     version="0.1.0",
@@ -54,6 +59,7 @@ def test_the_file_holds_everything(file: Path) -> None:
     assert read.calibration == CORRECTION.calibration
     assert [f.term.expression for f in read.findings] == [f.term.expression for f in CORRECTION.findings]
     assert [f.says for f in read.findings] == [f.says for f in CORRECTION.findings]
+    assert [f.term.weighted for f in read.findings] == [f.term.weighted for f in CORRECTION.findings]
 
 
 def test_corrected_network(file: Path) -> None:
@@ -115,6 +121,8 @@ FAULTS = [
     ("Abs(speed)", "Abs(sped)", "finding.0.law: 'sped' is not a signal; did you mean 'speed'"),
     ("Abs(speed)", "open('x')", "finding.0.law: 'open' is not a function"),
     ("Abs(speed)", "speed.real", "finding.0.law: .* has no place in a law"),
+    ("weights = [", "weights = [1.0, ", "finding.3.weights: 9 weights for 8 targets of a loss_factor"),
+    ('target = ["oil"]', 'target = ["oil"]\nweights = [1.0]', "finding.0.weights: 1 weights for 1 targets of a source"),
     ('target = ["oil"]', "target = []", "finding.0.target: has too few entries"),
     ('sha256 = "0000', 'sha256 = "zz00', "sha256"),
 ]

@@ -3,12 +3,15 @@ evidence against plain linear algebra."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
+from diagnosis import search
 from diagnosis.case import Case
 from diagnosis.evidence import Marginal, strength
 from diagnosis.explain import DISTORTED, Explanation, calibrated, distorted, fitted, in_the_middle, refined, without
@@ -34,7 +37,7 @@ from diagnosis.trajectory import (
 from diagnosis.unknowns import Unknowns, unknowns_of
 from diagnosis.whitening import Noise, Whitening, reading_variance
 from models.cycle import Cycle
-from models.gearbox import Gearbox
+from models.gearbox import Gearbox, load_gearbox
 from models.laws import symbol
 from models.mechanisms import CATALOGUE, Scale
 from models.types import Array
@@ -236,6 +239,7 @@ def test_noise_needs_no_floor(model: NetworkOnGrid, piece: Piece, problem: Probl
         ("cooler_thermostat", {"strength": 3.0, "set_point": 35.0}),  # switches within this ride
         ("run_in_seals", {"strength": -0.6}),
         ("oil_housing_speed", {"strength": 0.8}),
+        ("oil_ageing", {"strength": 0.5, "life": 600.0}),  # every loss with a weight of its own
     ],
 )
 def test_term_gives_the_same_heat_inside_its_network_and_beside_it(
@@ -516,3 +520,69 @@ def test_a_distorted_calibration_is_also_seen_from_the_middle_of_the_priors(prob
     assert middle is not None
     np.testing.assert_array_equal(middle.fit.z, 0.0)
     assert middle.log_evidence == bent.log_evidence  # what is found from there is compared with the same base
+
+
+def test_oil_that_thickens_costs_more_in_bearings_and_less_in_the_mesh(fzg: Gearbox) -> None:
+    """Exponents of viscosity as the loss model has them, against the literature and against their definition."""
+    scale = Scale.of(fzg, speed=2600.0, torque=150.0)
+    exponents = scale.viscosity_exponents
+    assert all(0.2 < exponents[f"bearing_{k}"] < 0.6 for k in (1, 2, 3, 4))  # SKF: M_rr ~ nu^0.6, less with starvation
+    assert -0.4 < exponents["mesh_sliding"] < 0.0  # a thicker film carries more of the load
+    assert 0.5 < exponents["mesh_rolling"] < 0.8  # ~ film thickness, nu^0.67 to 0.7
+    assert exponents["churning"] == pytest.approx(0.0)  # Niemann's formula has no viscosity
+    (placed,) = CATALOGUE["oil_ageing"].placed(fzg.network(), scale)
+    weights = dict(placed.weighted)
+    assert "churning" not in weights and weights["mesh_sliding"] == pytest.approx(exponents["mesh_sliding"], abs=0.005)
+    farm = load_gearbox("la_haute_borne")
+    stated = Scale.of(farm).viscosity_exponents
+    assert stated["gears_no_load"] == pytest.approx(0.2) and stated["bearing_1_no_load"] == pytest.approx(0.4)
+    assert stated["gears_load"] == pytest.approx(0.0)
+
+
+def test_clocks_of_slow_rows_may_differ_by_more(fzg: Gearbox) -> None:
+    network = fzg.network()
+    sizes = [CATALOGUE["clock_offset"].placed(network, Scale.of(fzg, interval=step), CHANNELS)[0].strength.sd
+             for step in (1.0, 10.0, 600.0)]  # fmt: skip
+    assert sizes == [60.0, 60.0, 1800.0]
+    variants = hypothesis_of(CATALOGUE["clock_offset"].placed(network, Scale.of(fzg), CHANNELS)[0]).variants
+    assert set(np.sign(variants[:, 0])) == {-1.0, 1.0} and len(set(np.abs(variants[:, 0]))) > 1
+
+
+def test_air_that_nobody_recorded_is_less_certain(problem: Problem) -> None:
+    network = problem.model.network
+    sd = [next(i.parameter.sd for i in unknowns_of(network, CHANNELS, ambient_assumed=assumed).items
+               if i.role == "ambient_offset") for assumed in (False, True)]  # fmt: skip
+    assert sd[0] < 1.0 < 3.0 < sd[1]
+
+
+def test_another_place_of_the_same_physics_may_be_taken_where_the_best_one_fails(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """What the held-out recordings refuse is no rival any more; another name far behind the best is not taken."""
+
+    @dataclass(frozen=True)
+    class Fitted:  # what a look needs to know of an explanation
+        found: tuple[Any, ...]
+        fit: Any = None
+
+        @property
+        def problem(self) -> Any:
+            return SimpleNamespace(at=lambda fit: fit)
+
+    def explanation(name: str, place: str) -> Fitted:
+        return Fitted(found=(SimpleNamespace(name=name, place=place, label=f"{name}@{place}"),))
+
+    monkeypatch.setattr(search, "Judge", lambda *_: None)
+    monkeypatch.setattr(search, "_matters", lambda *_: True)
+    monkeypatch.setattr(search, "_holds_out", lambda _judge, _start, fit: fit.found[-1].place != "first")
+    base: Any = Fitted(found=())
+    fits: Any = (explanation("feed", "first"), explanation("feed", "second"), explanation("tank", "oil"))
+    stage = search.Stage(scored=(), log_e_value=90.0, fits=fits, gains=(120.0, 60.0, 55.0))
+    case: Any = None
+    found = search._judged(case, base, base, 1.0, stage, 10.0)
+    assert found.accepted is not None and found.accepted.found[-1].label == "feed@second"
+    assert [fit.found[-1].label for fit in found.fits] == ["feed@second", "tank@oil"]
+    assert found.probabilities()[0] > 0.5
+    others = replace(stage, fits=(fits[0], fits[2]), gains=(120.0, 55.0))
+    refused = search._judged(case, base, base, 1.0, others, 10.0)
+    assert refused.accepted is None and "held-out data worse" in refused.note

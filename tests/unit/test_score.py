@@ -8,6 +8,7 @@ import math
 import re
 import sys
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -111,6 +112,19 @@ def test_a_single_effect_named_tied_or_mistaken() -> None:
     assert [by("single_exact", j) for j in (exact, tied, barely)] == [True, False, False]
     assert [by("single_tied", j) for j in (exact, tied, barely)] == [True, True, False]
     assert by("single_tied", judged(true, "consistent")) is False
+
+
+def test_silence_is_an_answer_where_it_is_said_that_the_data_would_not_show_it() -> None:
+    true = truth("single", effect("windage"))
+    silent = judged(true, "consistent")
+    open_about_it = replace(silent, answer=replace(silent.answer, unseen=frozenset({"windage"})))
+    wrong = judged(true, "missing_physics", claim("pump_heat"))
+    wrong = replace(wrong, answer=replace(wrong.answer, unseen=frozenset({"windage"})))
+    named = judged(true, "missing_physics", claim("windage"))
+    assert [by("single_answered", j) for j in (silent, open_about_it, wrong, named)] == [False, True, False, True]
+    assert by("single_tied", open_about_it) is False  # which asks for more
+    said = {"verdict": "consistent", "not_visible": [{"mechanism": "windage", "place": "oil", "needed": "speed"}]}
+    assert Answer.of(said).unseen == {"windage"}
 
 
 def test_of_a_small_effect_silence_is_right_and_a_wrong_name_is_not() -> None:
