@@ -8,17 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import product
 
 import numpy as np
 from joblib import delayed
 from scipy.special import log_ndtr
 
-from diagnosis.evidence import Marginal, strength
 from diagnosis.hypotheses import WIDE_PRIOR, Hypothesis, Scored, spread, white_column
-from diagnosis.latent import white_columns
 from diagnosis.posterior import Fit, Problem
-from diagnosis.term_on_grid import TermOnGrid
+from diagnosis.reshape import reshaped
 from diagnosis.trajectory import NetworkOnGrid, Trajectory
 from models.types import Array
 
@@ -27,10 +24,7 @@ RACE_SHARE, RACE_LEAD = 0.15, 15.0  # of the best gain, and log evidence: who is
 DISTRESS, SLOW_SENSOR = 2.5, 1.3  # standard deviations: of a parameter, and of a sensor's lag
 START_SHARES = (0.6, 0.3, 0.1)
 AS_PROMISED = 0.8
-LOCAL, ZOOM = 9, (1.0, 0.25, 0.06)  # shapes around those of a fit, within so many spacings of the grid
-RESHAPED_GAIN = 3.0  # log evidence for which a fit goes on with other shapes
 MOST_RESHAPED = 3
-RUNAWAY_W = 1e9
 DISTORTED = 4.0  # standard deviations of a parameter
 BACK = (0.3, 0.6)  # of the way that a calibration without an effect went
 
@@ -129,7 +123,7 @@ def extended(base: Explanation, scored: Scored) -> tuple[Problem, Array]:
         return problem, z
     values = np.array(h.variants[scored.best])
     values[0] = scored.values[scored.best]
-    own = [item.z(_inside(value, item.parameter.lower, item.parameter.upper))
+    own = [item.z_inside(value)
            for value, item in zip(values, problem.unknowns.items[-len(values) :], strict=True)]  # fmt: skip
     return problem, np.concatenate([z, own])
 
@@ -174,10 +168,6 @@ def without(start: Explanation, explanation: Explanation, index: int) -> Explana
     z = np.array([item.z(values[item.role, item.target]) for item in problem.unknowns.items])
     fit = problem.fit(z, [part.trajectory.T for part in explanation.fit.parts], iterations=ITERATIONS)
     return _explanation(found, problem, fit)
-
-
-def _inside(value: float, lower: float, upper: float) -> float:
-    return min(max(value, lower), upper)
 
 
 def fitted(base: Explanation, scored: Scored, worth: float = -np.inf) -> Explanation | None:
@@ -233,98 +223,11 @@ def _better(there: Explanation, z: Array, guesses: Sequence[Trajectory | Array],
 
 
 def _reshaped(there: Explanation, iterations: int) -> Explanation:
-    """An explanation fitted anew with other shapes of what was found last, if that is better.
-
-    A set-point or a moment moves by jumps: its derivative does not tell where a better one lies. So its neighbourhood
-    is scanned, everything else following linearly.
-    """
-    z = reshaped(there)
+    """An explanation fitted anew with other shapes of what was found last, if that is better."""
+    z = reshaped(there.found[-1], there.problem, there.fit)
     if z is None:
         return there
     return _better(there, z, [part.trajectory for part in there.fit.parts], iterations)
-
-
-def reshaped(explanation: Explanation) -> Array | None:
-    """Where a fit should go on: other shapes of what was found last, and all the rest as it would follow.
-
-    Parameters
-    ----------
-    explanation : Explanation
-        With its linearisation
-
-    Returns
-    -------
-    Array, shape (unknowns,), or None
-        None where no other shapes promise more.
-    """
-    h, problem, fit = explanation.found[-1], explanation.problem, explanation.fit
-    if h.term is None or h.term.kind == "sensor" or len(h.variants) < 2:
-        return None
-    names, items = [p.name for p in h.term.parameters], problem.unknowns.items
-    own = [next(i for i, item in enumerate(items) if item.target == name) for name in names]
-    rest = np.setdiff1d(np.arange(len(items)), own)
-    J, z = fit.white_columns[:, rest], np.array(fit.z)
-    values = np.array([items[i].value(float(z[i])) for i in own])
-    term = TermOnGrid(problem.model, h.term)
-
-    def columns(shapes: Array) -> Array:
-        white = []
-        for part in fit.parts:
-            with np.errstate(over="ignore", invalid="ignore"):
-                heat, loss = term.heat(part.trajectory, shapes, values)
-            # A memory faster than the grid runs away in its explicit steps: such a shape brings nothing.
-            good = (np.abs(heat) < RUNAWAY_W).all(axis=(0, 1))
-            white.append(white_columns(problem.model, part, np.where(good, heat, 0.0), np.where(good, loss, 0.0)))
-        return np.concatenate(white)
-
-    def priors(shapes: Array) -> Array:
-        return np.array([-0.5 * sum(items[i].z(v) ** 2 for i, v in zip(own[1:], row[1:], strict=True))
-                         for row in shapes])  # fmt: skip
-
-    here = np.concatenate([[1.0], values[1:]])[None, :]
-    marginal = Marginal(J, fit.white_residual + J @ z[rest] + columns(here)[:, 0] * values[0])
-    best, first, most, value = here[0], -np.inf, -np.inf, values[0]
-    for zoom in ZOOM:
-        shapes = _shapes_around(h, best, zoom)
-        if zoom == ZOOM[0]:
-            whole = np.concatenate([np.ones((len(h.variants), 1)), h.variants[:, 1:]], axis=1)
-            shapes = np.concatenate([here, whole, shapes])
-        score = strength(*marginal.products(columns(shapes)), h.term.strength.sd, h.sign)
-        total = score.log_bayes + priors(shapes)
-        first = float(total[0]) if zoom == ZOOM[0] else first
-        top = int(np.argmax(total))
-        if total[top] > most:
-            best, most, value = shapes[top], float(total[top]), float(score.value[top])
-    if most < first + RESHAPED_GAIN:
-        return None
-    for i, v in zip(own, [value, *best[1:]], strict=True):
-        z[i] = items[i].z(_inside(float(v), items[i].parameter.lower, items[i].parameter.upper))
-    z[rest] = marginal.most_probable(marginal.residual - columns(best[None, :])[:, 0] * value)
-    return np.asarray(z)
-
-
-def _shapes_around(h: Hypothesis, values: Array, zoom: float) -> Array:
-    """Values of a term's parameters around some, the strength 1: all pairs of its first two shapes, others alone."""
-    assert h.term is not None  # noqa: S101 - a term is asked for
-    grids = [np.unique(h.variants[:, column]) for column in range(h.variants.shape[1])]
-    free = [column for column, grid in enumerate(grids) if column and len(grid) > 1]
-
-    parameters = h.term.parameters
-
-    def around(column: int) -> Array:
-        p, grid = parameters[column], grids[column]
-        reach = zoom * float(np.ptp(grid)) / (len(grid) - 1)
-        return np.asarray(np.clip(values[column] + reach * np.linspace(-1.0, 1.0, LOCAL), p.lower, p.upper))
-
-    blocks = []
-    for columns in (free[:2], *([column] for column in free[2:])):
-        block = np.array(list(product(*(around(column) for column in columns))))
-        rows = np.tile(values, (len(block), 1))
-        rows[:, columns] = block
-        blocks.append(rows)
-    rows = np.concatenate(blocks)
-    rows[:, 0] = 1.0
-    return rows
 
 
 def _explanation(found: tuple[Hypothesis, ...], problem: Problem, fit: Fit) -> Explanation:
@@ -357,7 +260,7 @@ def _starts(base: Explanation, scored: Scored, problem: Problem, z: Array) -> It
         usual = np.copysign(max(abs(value), item.parameter.sd), h.sign or value)
         for share in BACK:
             nearer = np.concatenate([share * z[:count], z[count:]])
-            nearer[count] = item.z(_inside(float(usual), item.parameter.lower, item.parameter.upper))
+            nearer[count] = item.z_inside(float(usual))
             yield nearer
     J = base.fit.white_columns
     residual = base.fit.white_residual + J @ base.fit.z

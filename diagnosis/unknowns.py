@@ -53,6 +53,10 @@ class Unknown:
         value = p.start * np.exp(p.sd * z) if p.log else p.start + p.sd * z
         return float(min(max(value, p.lower), p.upper))
 
+    def z_inside(self, value: float) -> float:
+        """The standard normal number of the nearest possible value."""
+        return self.z(min(max(value, self.parameter.lower), self.parameter.upper))
+
     def per_z(self, z: float) -> float:
         """Change of the value with `z`, at a bound that to the inside."""
         return self.value(z) * self.parameter.sd if self.parameter.log else self.parameter.sd

@@ -225,7 +225,10 @@ def equation(term: Term, laws: Mapping[str, sp.Expr], values: Mapping[str, float
             head = left if key == "law" else f"{name_of(key)} = "
         lines.append(head + latex(expression))
     if term.weights:
-        shares = ",\\ ".join(rf"{weight:.2g}\,({_roman(name)})" for name, weight in term.weighted)
+        names: dict[float, list[str]] = {}
+        for target, weight in term.weighted:
+            names.setdefault(weight, []).append(_roman(target))
+        shares = ",\\ ".join(rf"{weight:.2g}\,({', '.join(group)})" for weight, group in names.items())
         lines.append(rf"\mathrm{{times}}\ {shares}")
     return r",\quad ".join(lines)
 
