@@ -67,6 +67,8 @@ def rivals_of(stage: Stage, catalogue: Mapping[str, Mechanism]) -> tuple[Rival, 
 
 def _separation(own: Hypothesis, other: Hypothesis, catalogue: Mapping[str, Mechanism]) -> str:
     if own.name == other.name:
+        if own.term is not None and other.term is not None and own.term.target[0] == other.term.target[0]:
+            return f"see on the machine which: {own.place.replace('_', ' ')}, or {other.place.replace('_', ' ')}"
         return f"a temperature sensor at {other.place.replace('_', ' ')}"
     if own.name in catalogue:
         return catalogue[own.name].separation(other.name)
