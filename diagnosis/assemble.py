@@ -14,6 +14,7 @@ from diagnosis.findings import finding_of, node_of, rivals_of
 from diagnosis.holdout import at_holdout
 from diagnosis.identifiable import scale_notes
 from diagnosis.latent import LatentHeat, knots_of, latent_heat
+from diagnosis.noise import HEAT_FRACTION, PARAMETRIC_FRACTION, PARAMETRIC_K
 from diagnosis.observation import LOSS
 from diagnosis.posterior import Problem
 from diagnosis.predict import Prediction, predict, rmse
@@ -69,7 +70,7 @@ def assembled(
     shown = _shown(findings, location)
     missing = _missing_heat(case, found, remaining if findings else first, shown) if detected else ()
     predictions = _predictions(case, found)
-    remaining_p, note = _remaining(found, remaining, case, detected=detected)
+    remaining_p, note = _remaining(found, first, remaining, case, detected=detected)
     return Diagnosis(
         verdict=verdict,
         gearbox=case.gearbox.name,
@@ -83,8 +84,7 @@ def assembled(
         train=_fits(case, predictions, "train"),
         holdout=_fits(case, predictions, "holdout"),
         noise_K=case.noise_K,
-        floor=f"random heat of {found.floor * 0.5:.1f} % of the typical loss ({case.loss_W:.0f} W) in every part: "
-        + ("assumed" if found.floor == 1.0 else "raised because the remainder asks for it"),
+        floor=_floor(case, found),
         remaining_p_value=remaining_p,
         remaining_note=note,
         ranking=_ranking(found),
@@ -105,6 +105,15 @@ def assembled(
             *(f"{r.name}: {note}" for r in (*train, *holdout) for note in r.notes),
         ),
     )
+
+
+def _floor(case: Case, found: Search) -> str:
+    share = HEAT_FRACTION
+    text = f"in every part: {'assumed' if found.floor == 1.0 else 'raised because the remainder asks for it'}"
+    if case.gearbox.is_parametric:  # watts are known but for a common factor
+        share = PARAMETRIC_FRACTION
+        text += f"; of a part of little heat capacity {PARAMETRIC_K * found.floor:.1f} K"
+    return f"random heat of {100.0 * share * found.floor:.1f} % of the typical loss ({case.loss_W:.0f} W) {text}"
 
 
 # ---------------------------------------------------------------------- verdict
@@ -137,14 +146,17 @@ def _much_is_left(first: Sequence[LatentHeat], remaining: Sequence[LatentHeat]) 
     return after > SECOND_GAIN and after > UNEXPLAINED_SHARE * before
 
 
-def _remaining(found: Search, remaining: Sequence[LatentHeat], case: Case, *, detected: bool) -> tuple[float, str]:
+def _remaining(
+    found: Search, first: Sequence[LatentHeat], remaining: Sequence[LatentHeat], case: Case, *, detected: bool
+) -> tuple[float, str]:
     log_e = found.stages[-1].log_e_value if found.stages[-1].accepted is None else 0.0
     p_value = float(min(1.0, np.exp(-max(log_e, 0.0))))
     if not detected:
         return p_value, ""
     best = max(remaining, key=lambda h: h.log_bayes)
     size = float(np.sqrt(np.mean(np.concatenate(best.mean) ** 2)))
-    if best.log_bayes < SECOND_GAIN or size < REMAINING_W_SHARE * case.loss_W:
+    small = size < REMAINING_W_SHARE * case.loss_W and not _much_is_left(first, remaining)
+    if best.log_bayes < SECOND_GAIN or small:
         return p_value, "nothing that stands out of noise and structural floor"
     return p_value, f"an unknown heat of about {size:.0f} W (rms) in {best.node} would still help"
 
