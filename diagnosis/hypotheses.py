@@ -256,10 +256,13 @@ def _judged(h: Hypothesis, marginal: Marginal, columns: Array, prior_sd: float |
     if prior_sd is None:
         assert h.term is not None  # noqa: S101 - a parameter has its prior given
         prior_sd = h.term.strength.sd
-    found = strength(a, b, prior_sd, h.sign)
+    # A clock that is early does not look like a late one turned over: every variant speaks for its own sign only.
+    way = np.sign(h.variants[:, 0])
+    both = len(set(way)) > 1
+    found = strength(a * way, b, prior_sd, 1 if both else h.sign)
     log_bayes = np.where(b > NEAR_ZERO, found.log_bayes, 0.0)
     return Scored(
         hypothesis=h, log_bayes=float(np.logaddexp.reduce(log_bayes) - np.log(len(log_bayes))),
-        best=int(np.argmax(log_bayes)), values=found.value, log_bayes_of=log_bayes,
+        best=int(np.argmax(log_bayes)), values=found.value * way, log_bayes_of=log_bayes,
         expected=float(np.median(0.5 * b * prior_sd**2 - 0.5 * np.log1p(b * prior_sd**2))),
     )  # fmt: skip
