@@ -32,7 +32,7 @@ from diagnosis.result import (
     Unseen,
     Verdict,
 )  # fmt: skip
-from diagnosis.search import SECOND_GAIN, TEMPER, Search, Stage, heats_of
+from diagnosis.search import SECOND_GAIN, TEMPER, Search, Stage, heats_of, log_weights
 from diagnosis.shapes import shape_terms
 from models.mechanisms import Mechanism
 from models.types import Array
@@ -376,13 +376,14 @@ def _ranking(found: Search) -> tuple[Ranked, ...]:
 def _unseen(stage: Stage, catalogue: Mapping[str, Mechanism], threshold: float) -> tuple[Unseen, ...]:
     """Mechanisms that would not have been seen at their typical strength, at their best place."""
     best: dict[str, tuple[float, str]] = {}
-    for s in stage.scored:
-        name = s.hypothesis.name
-        if name in catalogue and s.expected > best.get(name, (-np.inf, ""))[0]:
-            best[name] = (s.expected, s.hypothesis.place)
+    competing = [s for s in stage.scored if s.hypothesis.family != "open form"]
+    for s, weight in zip(competing, log_weights(competing), strict=True):
+        name, reached = s.hypothesis.name, s.expected + float(weight)
+        if name in catalogue and reached > best.get(name, (-np.inf, ""))[0]:
+            best[name] = (reached, s.hypothesis.place)
     return tuple(
         Unseen(mechanism=name, place=place, needed=catalogue[name].experiment)
-        for name, (expected, place) in sorted(best.items()) if expected < threshold
+        for name, (reached, place) in sorted(best.items()) if reached < threshold
     )  # fmt: skip
 
 

@@ -252,8 +252,8 @@ def _worth(scored: Sequence[Scored]) -> list[Scored]:
     return found if len(found) > 1 else list(scored[:2])
 
 
-def log_e_value(scored: Sequence[Scored]) -> float:
-    """Log of the mean Bayes factor.
+def log_weights(scored: Sequence[Scored]) -> Array:
+    """Logarithms of what everything weighs in the mean Bayes factor, together 1, shape (scored,).
 
     All names weigh the same, but for their rarity, and share it among their places; every instrument may fail for
     itself.
@@ -269,8 +269,12 @@ def log_e_value(scored: Sequence[Scored]) -> float:
 
     places = Counter(shares(s.hypothesis) for s in scored)
     weights = np.array([RARITY.get(s.hypothesis.name, 0.0) - np.log(places[shares(s.hypothesis)]) for s in scored])
-    logs = np.array([s.log_bayes for s in scored])
-    return float(np.logaddexp.reduce(logs + weights) - np.logaddexp.reduce(weights))
+    return np.asarray(weights - np.logaddexp.reduce(weights))
+
+
+def log_e_value(scored: Sequence[Scored]) -> float:
+    """Log of the mean Bayes factor, see :func:`log_weights`."""
+    return float(np.logaddexp.reduce(np.array([s.log_bayes for s in scored]) + log_weights(scored)))
 
 
 def _judged(case: Case, calibrated: Explanation, base: Explanation, floor: float, stage: Stage, needed: float) -> Stage:
