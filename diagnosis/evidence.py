@@ -38,8 +38,7 @@ class Marginal:
         J = self.columns = columns
         self.residual = residual
         self._factor = cho_factor(np.eye(J.shape[1]) + J.T @ J)
-        self._projected = cho_solve(self._factor, J.T @ self.residual)
-        self.rest = self.residual - J @ self._projected  # M^-1 r
+        self.rest = residual - J @ self.most_probable(residual)  # M^-1 r
         self.chi_square = float(self.residual @ self.rest)
 
     @classmethod

@@ -13,6 +13,7 @@ import numpy as np
 from joblib import delayed
 from scipy.special import log_ndtr
 
+from diagnosis.evidence import Marginal
 from diagnosis.hypotheses import WIDE_PRIOR, Hypothesis, Scored, spread, white_column
 from diagnosis.posterior import Fit, Problem
 from diagnosis.reshape import reshaped
@@ -71,8 +72,7 @@ def distorted(explanation: Explanation) -> bool:
 
     So far from its priors; or, where rows lie minutes apart and priors are wide, always.
     """
-    slow = any(piece.slow for piece in explanation.problem.pieces)
-    return slow or float(np.abs(explanation.fit.z).max(initial=0.0)) > DISTORTED
+    return explanation.problem.slow or float(np.abs(explanation.fit.z).max(initial=0.0)) > DISTORTED
 
 
 def in_the_middle(explanation: Explanation) -> Explanation | None:
@@ -193,7 +193,7 @@ def fitted(base: Explanation, scored: Scored, worth: float = -np.inf) -> Explana
         if best is None or found.log_evidence > best.log_evidence:
             best = found
         gain = best.log_evidence - base.log_evidence
-        if promised < worth or (gain > AS_PROMISED * promised and not any(piece.slow for piece in problem.pieces)):
+        if promised < worth or (gain > AS_PROMISED * promised and not problem.slow):
             break  # the scan is linear; a fit that reaches what it promised needs no other start
     if best is None:
         return None
@@ -254,7 +254,7 @@ def _starts(base: Explanation, scored: Scored, problem: Problem, z: Array) -> It
         whole[count] = problem.unknowns.items[count].z(1.0)
         yield whole
         return
-    if any(piece.slow for piece in problem.pieces) and not base.found:
+    if problem.slow and not base.found:
         # Weeks under wide priors bend too much: some of the way back to their middles, the effect at its usual size.
         item, value = problem.unknowns.items[count], float(scored.values[scored.best])
         usual = np.copysign(max(abs(value), item.parameter.sd), h.sign or value)
@@ -262,10 +262,9 @@ def _starts(base: Explanation, scored: Scored, problem: Problem, z: Array) -> It
             nearer = np.concatenate([share * z[:count], z[count:]])
             nearer[count] = item.z_inside(float(usual))
             yield nearer
-    J = base.fit.white_columns
-    residual = base.fit.white_residual + J @ base.fit.z
-    left = residual - white_column(base.problem, base.fit, h, scored.best) * scored.values[scored.best]
-    there = np.linalg.solve(np.eye(count) + J.T @ J, J.T @ left)
+    marginal = Marginal.of(base.fit)
+    brought = white_column(base.problem, base.fit, h, scored.best) * scored.values[scored.best]
+    there = marginal.most_probable(marginal.residual - brought)
 
     def at(share: float) -> Array:
         start = np.array(z)

@@ -18,9 +18,7 @@ from models.laws import symbol
 from models.network import ThermalNetwork
 from models.types import Array
 
-LITTLE = (
-    0.05  # of what the sizes do one by one; 0.003 to 0.02 is left of it where a switch acts and no loss is measured
-)
+LITTLE = 0.01  # of what the recordings know about the sizes one by one: a small part of fixed capacity pretends so much
 
 
 def scale_direction(explanation: Explanation) -> Array:

@@ -131,6 +131,11 @@ class Problem:
         self._distortions = [TermOnGrid(model, term) for term in terms if term.kind == "sensor"]
         self.inputs = model.laws.inputs
 
+    @property
+    def slow(self) -> bool:
+        """Whether the rows of any piece lie minutes apart."""
+        return any(piece.slow for piece in self.pieces)
+
     def changed(self, **changes: Any) -> Problem:
         """The same problem with another `model`, `pieces`, `unknowns` or `terms`."""
         given: dict[str, Any] = {name: getattr(self, name) for name in
@@ -279,7 +284,7 @@ class Problem:
         """
         lower, upper = self.unknowns.bounds
         z = np.zeros(len(self.unknowns)) if z is None else np.clip(z, lower, upper)
-        if any(piece.slow for piece in self.pieces):
+        if self.slow:
             iterations *= SLOW_PATIENCE
         parts = self._attempt(z, guesses)
         if parts is None:

@@ -324,8 +324,7 @@ def _holds_out(judge: Judge, calibrated: Explanation, fit: Explanation) -> bool:
     if not judge.case.holdout.pieces:
         return True
     # Means over minutes do not show when a switch acted: where that goes wrong only the free run tells.
-    slow = any(piece.slow for piece in judge.case.holdout.pieces)
-    clearly = slow and judge.rmse(fit) < CLEARLY_BETTER * judge.rmse(judge.base)
+    clearly = judge.case.holdout.slow and judge.rmse(fit) < CLEARLY_BETTER * judge.rmse(judge.base)
     if judge.gain(fit) < HOLDOUT_LOSS and not clearly:
         return False
     term = fit.found[-1].term

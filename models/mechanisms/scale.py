@@ -14,11 +14,13 @@ from models.oil import d341_constants, kinematic_viscosity_d341
 
 if TYPE_CHECKING:
     from models.gearbox import Gearbox
+    from models.network import Losses, ThermalNetwork
 
 TYPICAL_OIL = d341_constants(40.0, 100.0, 100.0, 11.2)  # ISO VG 100, mineral
 HOTTEST, COOLEST_RISE, TYPICAL_RISE = 100.0, 20.0, 50.0  # degC, K, K
 TEN_HOURS = 36000.0
 EXPONENTS = (-1.0, 1.0)  # within which a loss may go with the viscosity
+LEAST = 1e-12  # W, of a loss that is nothing here
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -136,23 +138,23 @@ class Scale:
             interval=interval,
             oil_m=oil_m,
             oil_n=oil_n,
-            viscosity_exponents=_viscosity_exponents(gearbox, speed, torque, ambient + TYPICAL_RISE),
+            viscosity_exponents=_viscosity_exponents(network, losses, (oil_m, oil_n), start | here),
         )
 
 
-def _viscosity_exponents(gearbox: Gearbox, speed: float, torque: float, T: float) -> dict[str, float]:
+def _viscosity_exponents(
+    network: ThermalNetwork, losses: Losses, oil: tuple[float, float], at: Mapping[sp.Symbol, float]
+) -> dict[str, float]:
     """Exponent of the viscosity in every loss, by a difference: a colder gearbox has a thicker oil."""
-    network, losses, (oil_m, oil_n) = gearbox.network(), gearbox.loss_laws(), gearbox.viscosity_constants
-    start = {symbol(p.name): p.start for p in network.parameters} | {symbol("time"): 0.0}
-    start |= {symbol("speed"): speed, symbol("torque"): torque}
-    start |= {symbol(name): value for name, value in network.inputs.items()}
+    speed, torque = at[symbol("speed")], at[symbol("torque")]
+    middle = at[symbol(f"T_{network.parts[0].name}")]
     logs = []
-    for at in (T - 1.0, T + 1.0):
-        power = losses.power([speed], [torque], [[at] * len(losses.temperature_nodes)])[0]
-        here = start | {symbol(f"T_{node.name}"): at for node in network.nodes}
+    for T in (middle - 1.0, middle + 1.0):
+        power = losses.power([speed], [torque], [[T] * len(losses.temperature_nodes)])[0]
+        here = dict(at) | {symbol(f"T_{part.name}"): T for part in network.parts}
         here |= {symbol(f"P_{name}"): value for name, value in zip(losses.components, power, strict=True)}
         heats = [float(source.heat.xreplace(here).evalf()) for source in network.sources]
-        logs.append(np.log(np.maximum([*heats, kinematic_viscosity_d341(at, oil_m, oil_n)], 1e-12)))
+        logs.append(np.log(np.maximum([*heats, kinematic_viscosity_d341(T, *oil)], LEAST)))
     change = logs[1] - logs[0]
     exponents = np.clip(change[:-1] / change[-1], *EXPONENTS)
     return {s.name: float(e) for s, e in zip(network.sources, exponents, strict=True) if s.is_loss}
