@@ -17,6 +17,7 @@ from diagnosis.unknowns import Unknown
 from models.types import Array
 
 LOCAL, ZOOM = 9, (1.0, 0.25, 0.06)  # shapes around those of a fit, within so many spacings of the grid
+SWEPT = 65  # values of a period, everything else as fitted
 LEAST_GAIN = 3.0  # log evidence for which a fit goes on with other shapes
 RUNAWAY_W = 1e9
 
@@ -53,7 +54,7 @@ def reshaped(h: Hypothesis, problem: Problem, fit: Fit) -> Array | None:
     for look, zoom in enumerate(ZOOM):
         shapes = _around(h, free, best, zoom)
         if look == 0:
-            shapes = np.concatenate([here, coarse, shapes])
+            shapes = np.concatenate([here, coarse, shapes, *_swept(h, best)])
         score = strength(*marginal.products(_columns(h, problem, fit, shapes, values)), h.term.strength.sd, h.sign)
         total = score.log_bayes + _prior([items[i] for i in own[1:]], shapes[:, 1:])
         if look == 0:
@@ -70,8 +71,23 @@ def reshaped(h: Hypothesis, problem: Problem, fit: Fit) -> Array | None:
 
 
 def _free(h: Hypothesis) -> list[int]:
-    """Which of a term's parameters have a grid."""
-    return [c for c in range(1, h.variants.shape[1]) if len(np.unique(h.variants[:, c])) > 1]
+    """Which of a term's parameters are sought: those with a grid or a sweep."""
+    return [c for c in range(1, h.variants.shape[1]) if len(np.unique(h.variants[:, c])) > 1 or _sweep(h, c)]
+
+
+def _sweep(h: Hypothesis, column: int) -> tuple[float, float] | None:
+    return None if h.term is None else h.term.parameters[column].sweep
+
+
+def _swept(h: Hypothesis, values: Array) -> list[Array]:
+    """Values of a term's parameters, one of them gone through over all its range; for every one that has such."""
+    found = []
+    for column in _free(h):
+        if ends := _sweep(h, column):
+            rows = np.tile(values, (SWEPT, 1))
+            rows[:, column] = np.geomspace(*ends, SWEPT)
+            found.append(rows)
+    return found
 
 
 def _columns(h: Hypothesis, problem: Problem, fit: Fit, shapes: Array, values: Array) -> Array:
@@ -99,7 +115,10 @@ def _around(h: Hypothesis, free: list[int], values: Array, zoom: float) -> Array
     axes = {}
     for column in free:
         p, grid = h.term.parameters[column], np.unique(h.variants[:, column])
-        reach = zoom * float(np.ptp(grid)) / (len(grid) - 1)
+        if p.sweep:
+            reach = zoom * values[column] * np.log(p.sweep[1] / p.sweep[0]) / (SWEPT - 1)
+        else:
+            reach = zoom * float(np.ptp(grid)) / (len(grid) - 1)
         axes[column] = np.clip(values[column] + reach * np.linspace(-1.0, 1.0, LOCAL), p.lower, p.upper)
     blocks = []
     for columns in (free[:2], *([column] for column in free[2:])):

@@ -26,7 +26,7 @@ LARGEST_NUMBER = sys.float_info.max
 FUNCTIONS: Mapping[str, Callable[..., Any]] = {
     "Abs": sp.Abs, "abs": sp.Abs, "sign": sp.sign, "sqrt": sp.sqrt, "exp": sp.exp, "log": sp.log,
     "sin": sp.sin, "cos": sp.cos, "tan": sp.tan, "atan": sp.atan, "sinh": sp.sinh, "cosh": sp.cosh, "tanh": sp.tanh,
-    "Min": sp.Min, "min": sp.Min, "Max": sp.Max, "max": sp.Max,
+    "Min": sp.Min, "min": sp.Min, "Max": sp.Max, "max": sp.Max, "Mod": sp.Mod,
 }  # fmt: skip
 COMPARISONS: Mapping[type[ast.cmpop], Callable[[Any, Any], Any]] = {
     ast.Lt: sp.StrictLessThan, ast.LtE: sp.LessThan, ast.Gt: sp.StrictGreaterThan, ast.GtE: sp.GreaterThan,

@@ -42,6 +42,8 @@ class Parameter:
     description : str
     grid : tuple of float
         Values from which a search for it starts, where one start may miss the best; empty: `start` alone
+    sweep : (float, float) or None
+        Positive range that is gone through finely once the rest is found, where no grid is fine enough: of a period
     """
 
     name: str
@@ -53,6 +55,7 @@ class Parameter:
     log: bool = True
     description: str = ""
     grid: tuple[float, ...] = ()
+    sweep: tuple[float, float] | None = None
 
 
 def symbol(name: str) -> sp.Symbol:
@@ -211,6 +214,14 @@ class _VectorPrinter(NumPyPrinter):  # type: ignore[misc]
         return code
 
 
+class _ScalarPrinter(PythonCodePrinter):  # type: ignore[misc]
+    """Python code of plain numbers."""
+
+    def _print_Mod(self, expr: sp.Mod) -> str:
+        dividend, divisor = expr.args  # sympy 1.14 leaves the outer parentheses out: 2*(x % y) becomes 2*x % y
+        return f"(({self._print(dividend)}) % ({self._print(divisor)}))"
+
+
 def function_source(name: str, arguments: Sequence[str], expressions: Sequence[sp.Expr], *, vector: bool) -> str:
     """Python source of a function that evaluates expressions, common subexpressions once.
 
@@ -235,7 +246,7 @@ def function_source(name: str, arguments: Sequence[str], expressions: Sequence[s
 @lru_cache(maxsize=4096)  # a diagnosis asks for the laws of the same mechanisms again and again
 def _function_source(name: str, arguments: tuple[str, ...], expressions: tuple[sp.Expr, ...], vector: bool) -> str:
     settings = {"fully_qualified_modules": True, "allow_unknown_functions": False}
-    printer = _VectorPrinter(settings) if vector else PythonCodePrinter(settings)
+    printer = _VectorPrinter(settings) if vector else _ScalarPrinter(settings)
     common, reduced = sp.cse(list(expressions), symbols=sp.numbered_symbols("_x", real=True))
     lines = [f"def {name}({', '.join(arguments)}):"]
     lines += [f"    {variable} = {printer.doprint(value)}" for variable, value in common]

@@ -13,7 +13,8 @@ from models.mechanisms.scale import Scale
 LARGEST = 100.0  # strength, in standard deviations of its prior
 SMALLEST_FACTOR = -0.95  # of a relative change: a loss or conductance never turns round
 DURING = (0.01, 0.03, 0.08, 0.2, 0.4, 0.55, 0.7, 0.85)  # of a recording: where a search for a moment starts
-EDGE_S = 120.0  # half of the time that rain or an oil change takes to come
+ONCE = 6.0  # durations of a recording, after which what happened once would come again
+EDGE_S = 120.0  # half of the time that damage or an oil change takes to come
 
 
 def strength(sd: float, unit: str = "1", description: str = "") -> Parameter:
@@ -57,6 +58,15 @@ def length(scale: Scale, *shares: float) -> Parameter:
     return positive("length", grid[len(grid) // 2], sd=0.8, unit="s", grid=grid)
 
 
+def period(scale: Scale) -> Parameter:
+    """After which time something comes again, [s]; by default not within a recording."""
+    d = scale.duration
+    return Parameter(
+        name="every", unit="s", start=ONCE * d, lower=0.05 * d, upper=2.0 * ONCE * d, sd=1.5, log=True,
+        sweep=(0.12 * d, 0.6 * d),
+    )  # fmt: skip
+
+
 def rises(value: Any, *, at: Any, power: float) -> sp.Expr:
     """A switch of a value >= 0, from 0 through 1/2 `at` to 1; the higher the `power` the sharper."""
     return value**power / (value**power + at**power)
@@ -88,9 +98,9 @@ def share_between(scale: Scale, share: float) -> float:
     return scale.ambient + share * (scale.temperature - scale.ambient)
 
 
-def during(value: Any, *, at: Any, length: Any, width: float) -> sp.Expr:
-    """A window: 0, from `at` on 1, and 0 again `length` later, with edges of about four `width`."""
-    return (sp.tanh((value - at) / width) - sp.tanh((value - at - length) / width)) / 2.0
+def again(since: Any, *, every: Any) -> sp.Expr:
+    """Time since the nearest of many moments, `every` apart; negative before it."""
+    return sp.Mod(since + every / 2, every) - every / 2
 
 
 def share(description: str) -> Parameter:

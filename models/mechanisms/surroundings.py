@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import sympy as sp
 
 from models.mechanisms.forms import (
-    EDGE_S,
-    during,
+    again,
     hysteresis,
     length,
     moment,
+    period,
     plain,
     positive,
     share_between,
@@ -20,6 +22,7 @@ from models.mechanisms.mechanism import Mechanism, Memory
 
 FAMILY = "surroundings"
 HOUR_S = 3600.0
+WETTED_S = 300.0  # after which a shower has wetted everything
 STANDSTILL_DAY = "let it stand for a day with an ambient probe on each side"
 
 solar_soak = Mechanism(
@@ -38,20 +41,30 @@ solar_soak = Mechanism(
     experiment="shade the housing and repeat at the same hour",
 )
 
+def _wet(s: Any) -> sp.Expr:
+    """Share of the housing that is wet: all of it soon after a shower begins, until that ends and the housing dries."""
+    since = again(s.time - s.onset, every=s.every)
+    return sp.Min(sp.Max(since / WETTED_S, 0.0), 1.0) * sp.exp(-sp.Max(since - s.length, 0.0) / s.drying)
+
+
 rain_on_housing = Mechanism(
     name="rain_on_housing",
     family=FAMILY,
     kind="link",
     places=("each housing", "housing"),
-    other="air",
+    other="rain",
+    other_temperature=lambda s: s.T_ambient - s.colder,
     parameters=lambda scale: (
         strength(1.5 * scale.conductance, "W/K", "additional conductance to the air"),
         moment(scale, "onset"),
         length(scale, 0.04, 0.1, 0.3),
+        period(scale),
+        positive("drying", 400.0, sd=0.7, unit="s"),
+        plain("colder", 2.0, sd=2.0, lower=0.0, upper=15.0, unit="K"),
     ),
-    law=lambda s: s.strength * during(s.time, at=s.onset, length=s.length, width=EDGE_S),
-    says="For a while the housing is cooled much better: rain, spray or a gust ({place}).",
-    reference="wet walls: 100 to 500 W/(m^2 K); estimate",
+    law=lambda s: s.strength * _wet(s),
+    says="For a while, once or again and again, the housing is cooled much better: rain, spray or a gust ({place}).",
+    reference="wet walls: 100 to 500 W/(m^2 K), down to the wet-bulb temperature; estimate",
     experiment="log the weather, or repeat under a roof",
 )
 

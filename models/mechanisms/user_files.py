@@ -34,6 +34,7 @@ class _Parameter(Section):
     upper: float | None = None
     log: bool = False
     grid: tuple[float, ...] = Field(default=(), strict=False)
+    sweep: tuple[Positive, Positive] | None = Field(default=None, strict=False)
     description: str = ""
 
 
@@ -159,9 +160,12 @@ def _parameter(entry: _Parameter, where: str) -> Parameter:
     for value in entry.grid:
         if not lower <= value <= upper:
             raise InputError(f"{where}: {value:g} of the grid is not within {lower:g} ... {upper:g}")
+    if entry.sweep is not None and not lower <= entry.sweep[0] < entry.sweep[1] <= upper:
+        low, high = entry.sweep
+        raise InputError(f"{where}: the sweep from {low:g} to {high:g} does not rise within {lower:g} ... {upper:g}")
     return Parameter(
         name=entry.name, unit=entry.unit, start=start, lower=lower, upper=upper, sd=entry.sd, log=entry.log,
-        grid=entry.grid, description=entry.description,
+        grid=entry.grid, sweep=entry.sweep, description=entry.description,
     )  # fmt: skip
 
 

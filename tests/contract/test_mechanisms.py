@@ -97,10 +97,11 @@ def placed(name: str, gearbox: str = "fzg") -> tuple[Placed, ...]:
 
 
 def usual(term: Placed) -> dict[str, float]:
-    """The term at the size that it typically has, and the first shape of its grid."""
+    """The term at the size that it typically has, and the first shape of its grid, or the middle one of its sweep."""
     strength = term.strength
     size = min(strength.sd, strength.upper) if term.sign >= 0 else max(-strength.sd, strength.lower)
-    return {p.name: p.grid[0] if p.grid else p.start for p in term.parameters} | {strength.name: size}
+    shapes = {p.name: prod(p.sweep) ** 0.5 if p.sweep else p.grid[0] if p.grid else p.start for p in term.parameters}
+    return shapes | {strength.name: size}
 
 
 @cache

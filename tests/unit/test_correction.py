@@ -281,6 +281,8 @@ def test_a_mechanism_from_python(tmp_path: Path) -> None:
         ("start = 2.0", "", "belt_guard.parameter exponent: start is missing"),
         ("grid = [1.5, 2.5]", "grid = [1.5, 99.0]", "99 of the grid is not within"),
         ("grid = [1.5, 2.5]", "upper = 1.0", "start 2 is not within"),
+        ("grid = [1.5, 2.5]", "sweep = [3.0, 1.0]", "the sweep from 3 to 1 does not rise within"),
+        ("grid = [1.5, 2.5]", "sweep = [1.0]", "mechanism.0.parameter.1.sweep"),
         ("start = 2.0", "start = -2.0\nlog = true", "a log-normal parameter is positive"),
         ("exp(-worn)", "exec(worn)", "'exec' is not a function"),
         ("exp(-worn)", "exp(-worn", "is not an expression"),

@@ -11,10 +11,21 @@ from typing import Any
 import numpy as np
 import pytest
 
-from diagnosis import search
+from diagnosis import assemble, explain, search
 from diagnosis.case import Case
 from diagnosis.evidence import Marginal, strength
-from diagnosis.explain import DISTORTED, Explanation, calibrated, distorted, fitted, in_the_middle, refined, without
+from diagnosis.explain import (
+    DISTORTED,
+    Explanation,
+    best_fits,
+    calibrated,
+    distorted,
+    fitted,
+    in_the_middle,
+    refined,
+    without,
+)
+from diagnosis.findings import finding_of
 from diagnosis.grid import Piece, pieces
 from diagnosis.holdout import Judge
 from diagnosis.hypotheses import Hypothesis, Scored, hypothesis_of, scan, sharpened
@@ -379,20 +390,25 @@ def test_what_is_not_needed_can_be_taken_out_again(fzg: Gearbox, piece: Piece, p
     assert alone.log_evidence > one.log_evidence - 0.5  # as good as if it had never been added
     assert two.log_evidence < alone.log_evidence + 3.0  # the second one explains nothing
     assert without(start, two, 0).log_evidence < two.log_evidence - 3.0  # the first one does
+    # A further effect may be what the form of the first one lacks, however far it is ahead of its rivals.
+    case: Any = SimpleNamespace(nominal=network)
+    stages = [search.Stage(scored=(), log_e_value=30.0, fits=(e,), gains=(20.0,), accepted=e) for e in (one, two)]
+    stated = [finding_of(case, two, h, stage, ()).probability for h, stage in zip(two.found, stages, strict=True)]
+    assert stated == pytest.approx([1.0, 0.7])
 
 
-def test_names_share_their_weight_among_their_places(problem: Problem) -> None:
-    def scored(name: str, place: str, log_bayes: float) -> Scored:
-        h = Hypothesis(name=name, place=place, family="", variants=np.ones((1, 1)), unknown=0)
-        return Scored(
-            hypothesis=h, log_bayes=log_bayes, best=0, values=np.zeros(1), log_bayes_of=np.array([log_bayes]),
-            expected=0.0,
-        )  # fmt: skip
+def _scored(name: str, place: str, log_bayes: float) -> Scored:
+    h = Hypothesis(name=name, place=place, family="", variants=np.ones((1, 1)), unknown=0)
+    return Scored(
+        hypothesis=h, log_bayes=log_bayes, best=0, values=np.zeros(1), log_bayes_of=np.array([log_bayes]), expected=0.0
+    )
 
-    nothing = [scored("a", str(i), 0.0) for i in range(7)] + [scored("water_jacket", "x", 0.0)]
+
+def test_names_share_their_weight_among_their_places() -> None:
+    nothing = [_scored("a", str(i), 0.0) for i in range(7)] + [_scored("water_jacket", "x", 0.0)]
     assert log_e_value(nothing) == pytest.approx(0.0)
-    many = [scored("a", "0", 12.0), *(scored("a", str(i), 0.0) for i in range(1, 7)), scored("b", "", 0.0)]
-    one = [scored("a", "0", 0.0), *(scored("a", str(i), 0.0) for i in range(1, 7)), scored("b", "", 12.0)]
+    many = [_scored("a", "0", 12.0), *(_scored("a", str(i), 0.0) for i in range(1, 7)), _scored("b", "", 0.0)]
+    one = [_scored("a", "0", 0.0), *(_scored("a", str(i), 0.0) for i in range(1, 7)), _scored("b", "", 12.0)]
     assert log_e_value(one) - log_e_value(many) == pytest.approx(np.log(7.0), abs=0.01)
 
 
@@ -493,6 +509,31 @@ def test_a_set_point_is_found_from_afar(fzg: Gearbox, piece: Piece, problem: Pro
     assert found.log_evidence > base.log_evidence + 20.0
 
 
+def test_what_comes_again_and_again_is_found_with_its_period(fzg: Gearbox, piece: Piece, problem: Problem) -> None:
+    """A scan knows single showers only: that they come again, and when, is swept for where one of them was found."""
+    network, scale = problem.model.network, Scale.of(fzg, speed=2600.0, torque=150.0, duration=float(piece.time[-1]))
+    placed = next(t for t in CATALOGUE["rain_on_housing"].placed(network, scale) if len(t.target) > 2)
+    names = [p.name for p in placed.parameters]
+    true = {"strength": 2.0 * scale.conductance, "onset": 250.0, "length": 240.0, "every": 900.0, "drying": 150.0,
+            "colder": 2.0}  # fmt: skip
+    assert [name.removeprefix(f"{placed.label}_") for name in names] == list(true)
+    model = NetworkOnGrid(placed.apply(network), fzg.losses())
+    values = named_values(model.network, dict(zip(names, true.values(), strict=True)))
+    sensors = problem.unknowns.sensors(CHANNELS, np.zeros(len(problem.unknowns)))
+    seen = readings(model, simulate(model, piece, values, problem.starts[0]), sensors)
+    base = calibrated(problem.changed(pieces=[replace(piece, measured=seen)]))
+    (scored,) = scan(base.problem, base.fit, Marginal.of(base.fit), [hypothesis_of(placed)])
+    once = scored.hypothesis.variants[scored.best, 3]
+    assert once > 2.0 * scale.duration
+    rough = fitted(base, scored)
+    assert rough is not None
+    found = refined(rough)
+    got = {n.removeprefix(f"{placed.label}_"): v for n, (v, _) in found.values_of(scored.hypothesis).items()}
+    assert got["every"] == pytest.approx(true["every"], rel=0.03)
+    assert (got["onset"] - true["onset"] + 450.0) % true["every"] == pytest.approx(450.0, abs=40.0)
+    assert found.log_evidence > base.log_evidence + 50.0
+
+
 @pytest.mark.parametrize("late_s", [90.0, -90.0])
 def test_a_clock_may_be_early_or_late(fzg: Gearbox, piece: Piece, problem: Problem, late_s: float) -> None:
     (placed, *_) = CATALOGUE["clock_offset"].placed(problem.model.network, Scale.of(fzg), CHANNELS)
@@ -590,3 +631,52 @@ def test_another_place_of_the_same_physics_may_be_taken_where_the_best_one_fails
     others = replace(stage, fits=(fits[0], fits[2]), gains=(120.0, 55.0))
     refused = search._judged(case, base, base, 1.0, others, 10.0)
     assert refused.accepted is None and "held-out data worse" in refused.note
+
+
+def test_of_two_views_of_one_hypothesis_the_better_fit_counts(monkeypatch: pytest.MonkeyPatch) -> None:
+    nothing: Any = None
+    base = Explanation(problem=nothing, fit=nothing, log_evidence=100.0)
+    middle = replace(base)
+    tried: list[float] = []
+
+    def fit(view: Explanation, scored: Scored, worth: float) -> Explanation:
+        tried.append(worth)
+        return replace(base, found=(scored.hypothesis,), log_evidence=120.0 if view is base else 180.0)
+
+    monkeypatch.setattr(explain, "fitted", fit)
+    monkeypatch.setattr(explain, "refined", lambda rough: replace(rough, log_evidence=rough.log_evidence + 1.0))
+    fan, tank = _scored("fan", "x", 40.0), _scored("tank", "oil", 30.0)
+    found = best_fits(base, [(base, fan), (middle, fan), (base, tank)])
+    # What can no longer win is not fitted to the end.
+    assert [(e.found[-1].name, e.log_evidence) for e in found] == [("fan", 181.0), ("tank", 120.0)]
+    # A second start is for what scores nearly as well as the best; another view is one already.
+    assert tried[1] == np.inf and 0.5 * fan.log_bayes < tried[0] == tried[2] < fan.log_bayes
+
+
+def test_what_is_barely_evident_has_to_be_larger(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Half of what matters may be hidden in what was calibrated, where the evidence is small."""
+    monkeypatch.setattr(search, "Judge", lambda *_: None)
+    monkeypatch.setattr(search, "_holds_out", lambda *_: True)
+    monkeypatch.setattr(search, "_matters", lambda _case, _fit, _h, times=1.0: times < 1.5)
+    h = _scored("fan", "x", 0.0).hypothesis
+    nothing: Any = SimpleNamespace(at=lambda fit: fit)
+    fit = Explanation(problem=nothing, fit=nothing, log_evidence=0.0, found=(h,))
+    base, case = replace(fit, found=()), nothing
+    for gain, matters in ((40.0, False), (60.0, True)):
+        stage = search.Stage(scored=(), log_e_value=gain, fits=(fit,), gains=(gain,))
+        found = search._judged(case, base, base, 1.0, stage, 10.0)
+        assert found.matters is matters and found.accepted is not None  # what is small is taken to clear the way
+
+
+@pytest.mark.parametrize(
+    ("log_bayes", "heat_W", "says"),
+    [(5.0, 50.0, "nothing that"), (90.0, 2.0, "nothing that"), (90.0, 50.0, "about 50 W"), (400.0, 2.0, "about 2 W")],
+)
+def test_what_remains_is_told_where_it_is_large_or_most_of_it(log_bayes: float, heat_W: float, says: str) -> None:
+    def latent(log_bayes: float, heat_W: float) -> Any:
+        return SimpleNamespace(log_bayes=log_bayes, mean=[np.full(9, heat_W)], node="oil")
+
+    found: Any = SimpleNamespace(stages=[search.Stage(scored=(), log_e_value=0.0)])
+    case: Any = SimpleNamespace(loss_W=300.0)
+    _, note = assemble._remaining(found, [latent(1000.0, 80.0)], [latent(log_bayes, heat_W)], case, detected=True)
+    assert says in note

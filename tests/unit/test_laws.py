@@ -94,3 +94,12 @@ def test_array_code_number_code_and_sympy_agree(expression: sp.Expr) -> None:
 
 def test_functions_of_nothing_give_an_empty_tuple() -> None:
     assert compile_function(function_source("f", ["x"], [], vector=False), "f")(1.0) == ()
+
+
+def test_a_remainder_keeps_its_parentheses() -> None:
+    """sympy prints 2*Mod(x, y) without them, as plain Python code."""
+    law = 2.0 * sp.Mod(symbol("x") + 3.0, symbol("y")) / symbol("y")
+    for vector in (False, True):
+        source = function_source("law", ["x", "y"], [law], vector=vector)
+        assert float(compile_function(source, "law")(8.5, 4.0)[0]) == pytest.approx(2.0 * (11.5 % 4.0) / 4.0)
+        assert float(compile_function(source, "law")(-8.5, 4.0)[0]) == pytest.approx(2.0 * (-5.5 % 4.0) / 4.0)
