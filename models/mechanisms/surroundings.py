@@ -41,6 +41,7 @@ solar_soak = Mechanism(
     experiment="shade the housing and repeat at the same hour",
 )
 
+
 def _wet(s: Any) -> sp.Expr:
     """Share of the housing that is wet: all of it soon after a shower begins, until that ends and the housing dries."""
     since = again(s.time - s.onset, every=s.every)
