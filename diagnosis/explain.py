@@ -307,4 +307,25 @@ def best_fits(base: Explanation, chosen: Sequence[tuple[Explanation, Scored]], *
     racing = [e for e, gain in zip(rough, gains, strict=True) if gain >= least]
     beaten = [e for e, gain in zip(rough, gains, strict=True) if gain < least]
     done = spread(jobs, [delayed(refined)(e) for e in racing])
-    return sorted([*done, *beaten], key=lambda e: -e.log_evidence)
+    return sorted(_elsewhere([*done, *beaten], jobs), key=lambda e: -e.log_evidence)
+
+
+def _elsewhere(fits: Sequence[Explanation], jobs: int) -> list[Explanation]:
+    """The same fits; those of the best one's physics at other places started once more from what the best one found.
+
+    Moments and set-points that one place found hold at the others as well: only then the places are compared.
+    """
+    if not fits:
+        return []
+    best = max(fits, key=lambda e: e.log_evidence)
+    own = best.found[-1]
+    shaped = own.variants.shape[1] > 1
+    again = [shaped and e is not best and e.found[-1].name == own.name for e in fits]
+    better = iter(spread(jobs, [delayed(_started_from)(e, best) for e, it in zip(fits, again, strict=True) if it]))
+    return [next(better) if it else e for e, it in zip(fits, again, strict=True)]
+
+
+def _started_from(there: Explanation, other: Explanation) -> Explanation:
+    """An explanation fitted anew from where another one with the same unknowns ended, if that is better."""
+    better = _better(there, other.fit.z, other.fit.courses, ITERATIONS)
+    return replace(better, fit=better.fit.without_parts()) if better.fit.parts else better

@@ -79,6 +79,8 @@ class Stage:
     gains : tuple of float
         Their log evidence over the explanation before
     accepted : Explanation or None
+    tentative : bool
+        Whether what was accepted stands only if a further effect is found with which the held-out error does not grow
     matters : bool
         Whether what was accepted, or else anything that would explain the data, is large enough to matter in practice
     note : str
@@ -90,6 +92,7 @@ class Stage:
     fits: tuple[Explanation, ...] = ()
     gains: tuple[float, ...] = ()
     accepted: Explanation | None = None
+    tentative: bool = False
     matters: bool = False
     note: str = ""
 
@@ -175,15 +178,22 @@ def search(
         Told what is being done
     """
     progress("calibrating the model inside its priors")
-    base, floor = first(case)
-    start, threshold = base, threshold_at(false_alarm_rate)
+    start, start_floor = base, floor = first(case)
+    threshold = threshold_at(false_alarm_rate)
     stages: list[Stage] = []
     for look in range(MOST_EFFECTS):
         progress("scoring everything that may be missing" if not look else "looking for a further effect")
         stage = _look(case, start, base, floor, catalogue, threshold if not look else SECOND_GAIN, jobs, progress)
+        if stage.accepted is None and stages and stages[-1].tentative:
+            stages[-1] = replace(stages[-1], accepted=None, tentative=False)
+            base, floor = start, start_floor
+            break
         stages.append(stage)
         if stage.accepted is None:
             break
+        if stage.tentative:
+            base = stage.accepted
+            continue
         slim = _needed_of(case, start, base, floor, stage.accepted)
         raised, floor_after = floored(slim)
         if floor_after > 1.0 and not _holds_out(Judge(case, base, floor), start, raised):
@@ -281,7 +291,8 @@ def _judged(case: Case, calibrated: Explanation, base: Explanation, floor: float
     """A look with what of its fits is accepted.
 
     What is too small to matter is accepted only to clear the way, as long as nothing that matters was found. What the
-    held-out recordings refuse before is no rival of what is accepted.
+    held-out recordings refuse before is no rival of what is accepted. Where another strong effect is still missing, the
+    first one may make their error larger although it makes them far more probable: that one is accepted tentatively.
     """
     judge = Judge(case, base, floor)
     probabilities = stage.probabilities()
@@ -291,6 +302,7 @@ def _judged(case: Case, calibrated: Explanation, base: Explanation, floor: float
         by_name[fit.found[-1].name] = by_name.get(fit.found[-1].name, 0.0) + float(probability)
     matters, note = False, "the best explanation is hardly better than none"
     refused: list[int] = []
+    promising: Explanation | None = None
     for index, (fit, gain) in enumerate(zip(stage.fits, stage.gains, strict=True)):
         if gain < needed or by_name[fit.found[-1].name] < LEAST_PROBABILITY:
             continue
@@ -308,7 +320,9 @@ def _judged(case: Case, calibrated: Explanation, base: Explanation, floor: float
         else:
             refused.append(index)
             note = "what would explain the training data makes the held-out data worse"
-    return replace(stage, matters=matters, note=note)
+            if promising is None and large and not base.found and judge.gain(fit) > CERTAIN:
+                promising = fit
+    return replace(stage, matters=matters, note=note, accepted=promising, tentative=promising is not None)
 
 
 def _penalised(fit: Explanation) -> float:

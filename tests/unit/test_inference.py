@@ -617,7 +617,7 @@ def test_another_place_of_the_same_physics_may_be_taken_where_the_best_one_fails
     def explanation(name: str, place: str) -> Fitted:
         return Fitted(found=(SimpleNamespace(name=name, place=place, label=f"{name}@{place}"),))
 
-    monkeypatch.setattr(search, "Judge", lambda *_: None)
+    monkeypatch.setattr(search, "Judge", lambda *_: SimpleNamespace(gain=lambda _: -5.0))
     monkeypatch.setattr(search, "_matters", lambda *_: True)
     monkeypatch.setattr(search, "_holds_out", lambda _judge, _start, fit: fit.found[-1].place != "first")
     base: Any = Fitted(found=())
@@ -680,3 +680,64 @@ def test_what_remains_is_told_where_it_is_large_or_most_of_it(log_bayes: float, 
     case: Any = SimpleNamespace(loss_W=300.0)
     _, note = assemble._remaining(found, [latent(1000.0, 80.0)], [latent(log_bayes, heat_W)], case, detected=True)
     assert says in note
+
+
+def test_a_first_effect_whose_error_another_one_hides_stands_only_beside_that_one(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """It makes the held-out recordings more probable and their error larger: what the error says waits for a second."""
+    nothing: Any = SimpleNamespace(at=lambda fit: fit)
+
+    def explanation(*names: str) -> Explanation:
+        return Explanation(
+            problem=nothing, fit=nothing, log_evidence=0.0, found=tuple(_scored(n, "x", 0.0).hypothesis for n in names)
+        )
+
+    base, wear, both = explanation(), explanation("wear"), explanation("wear", "rain")
+    gain = {"wear": 400.0, "fan": 20.0}
+    monkeypatch.setattr(search, "Judge", lambda *_: SimpleNamespace(gain=lambda fit: gain[fit.found[-1].name]))
+    monkeypatch.setattr(search, "_matters", lambda *_: True)
+    monkeypatch.setattr(search, "_holds_out", lambda *_: False)
+
+    def judged(before: Explanation, fit: Explanation) -> search.Stage:
+        stage = search.Stage(scored=(), log_e_value=90.0, fits=(fit,), gains=(120.0,))
+        return search._judged(nothing, base, before, 1.0, stage, 10.0)
+
+    first = judged(base, wear)
+    assert first.tentative and first.accepted is not None and first.accepted.found[-1].name == "wear"
+    assert not judged(base, explanation("fan")).tentative  # hardly more probable
+    assert judged(explanation("rain"), explanation("rain", "wear")).accepted is None  # one at a time
+
+    second = search.Stage(scored=(), log_e_value=50.0, fits=(both,), gains=(90.0,), accepted=both, matters=True)
+    end = search.Stage(scored=(), log_e_value=0.0)
+    monkeypatch.setattr(search, "first", lambda _: (base, 1.0))
+    monkeypatch.setattr(search, "floored", lambda fit: (fit, 1.0))
+    monkeypatch.setattr(search, "_needed_of", lambda _case, _start, _base, _floor, accepted: accepted)
+    for looks, names in (((first, second, end), ["wear", "rain"]), ((first, end), [])):
+        coming = iter(looks)
+        monkeypatch.setattr(search, "_look", lambda *_, coming=coming: next(coming))
+        found = search.search(nothing, {})
+        assert [h.name for h in found.final.found] == [h.name for h, _ in found.findings] == names
+        assert found.detected and (found.final is base) == (not names)
+
+
+def test_what_one_place_found_is_tried_at_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    nothing: Any = None
+    fit: Any = SimpleNamespace(z=np.array([1.0, 2.0]), courses=("course",), parts=())
+
+    def explanation(name: str, place: str, log_evidence: float) -> Explanation:
+        h = replace(_scored(name, place, 0.0).hypothesis, variants=np.ones((3, 2)))
+        return Explanation(problem=nothing, fit=fit, found=(h,), log_evidence=log_evidence)
+
+    tried: list[tuple[str, Any]] = []
+
+    def better(there: Explanation, z: Array, guesses: Any, _: int) -> Explanation:
+        tried.append((there.found[-1].label, guesses))
+        assert z is fit.z
+        return replace(there, log_evidence=70.0)
+
+    monkeypatch.setattr(explain, "_better", better)
+    fits = [explanation("rain", "upper", 50.0), explanation("rain", "lower", 10.0), explanation("sun", "lower", 20.0)]
+    found = explain._elsewhere(fits, 1)
+    assert [e.log_evidence for e in found] == [50.0, 70.0, 20.0]
+    assert tried == [("rain@lower", ("course",))]
