@@ -114,7 +114,8 @@ def noise_of(
     if parametric:
         heat_sd = np.where(heavy, PARAMETRIC_FRACTION * loss_W, PARAMETRIC_K * _conductances(model, piece))
     known = np.array([name in piece.channels for name in model.parts])
-    hot = float(np.nanmax(piece.measured[0], initial=0.0)) if np.isfinite(piece.measured[0]).any() else 50.0
+    first = piece.measured[0, [name != LOSS for name in piece.channels]]
+    hot = float(np.nanmax(first)) if np.isfinite(first).any() else 50.0
     ambient = _ambient(model, piece)
     unknown = START_UNKNOWN_K + START_UNKNOWN_SHARE * abs(hot - ambient)
     return Noise(

@@ -155,6 +155,8 @@ class Problem:
         trajectory = simulate(model, piece, values, self.starts[index], guess=guess, rounds=rounds, settled_K=0.01)
         residual = piece.measured - self.read(trajectory, sensors, z)
         columns = self._columns(trajectory, sensors, z)
+        if not np.isfinite(columns).all():
+            raise ArithmeticError(f"the laws of {piece.recording} have no derivative with these parameters")
         given = self.whitenings
         whitening = Whitening(model, trajectory, sensors, self.noise[index]) if given is None else given[index]
         white = whitening(np.concatenate([residual[:, :, None], columns], axis=2))

@@ -61,14 +61,20 @@ def predict(problem: Problem, index: int, z: Array, *, as_delivered: bool = Fals
     span = float(piece.time[-1] - piece.time[0])
     counts_from = float(piece.time[0]) + min(START_S, 0.2 * span)
     early = piece.time <= counts_from
-    start = np.array(problem.starts[index])
+    before = start = np.array(problem.starts[index])
     prior = problem.noise[index].start_sd
     trajectory: Trajectory | None = None
     switching = any(state.update is not None for state in model.network.states)
     for _ in range(START_ROUNDS):
         adjusted = replace(problem.adjusted(index, z, trajectory), guided=switching)
         values = problem.unknowns.network_values(model.network, z)
-        trajectory = simulate(model, adjusted, values, start, guess=trajectory, rounds=4, settled_K=0.02)
+        try:
+            trajectory = simulate(model, adjusted, values, start, guess=trajectory, rounds=4, settled_K=0.02)
+        except ArithmeticError:
+            if trajectory is None:
+                raise
+            start = before  # what the first minutes ask of it leads nowhere
+            break
         sensors = problem.unknowns.sensors(piece.channels, z)
         if as_delivered:
             sensors = sensors.ideal()
@@ -85,7 +91,7 @@ def predict(problem: Problem, index: int, z: Array, *, as_delivered: bool = Fals
         step = np.linalg.solve(precision + J.T @ J, J.T @ residual + precision @ (problem.starts[index] - start))
         if float(np.max(np.abs(step))) < 0.01:
             break
-        start = start + step
+        before, start = start, start + step
     assert trajectory is not None  # noqa: S101 - START_ROUNDS >= 1
     if switching:
         # Until here switches followed what was measured, which is good enough for the start and for nothing else.

@@ -234,6 +234,48 @@ def test_sensors_read_nodes_and_the_total_loss(problem: Problem, model: NetworkO
     assert read[:, 3].mean() == pytest.approx(part.trajectory.balance.sources.sum(axis=-1).mean(), rel=0.01)
 
 
+def test_watts_are_no_start_temperature(model: NetworkOnGrid, piece: Piece) -> None:
+    """How uncertain an unmeasured start is goes with how hot the gearbox is, whatever it loses."""
+    white = dict.fromkeys(CHANNELS, 0.2) | {"P_loss": 5.0}
+    watts, hot = np.array(piece.measured), np.array(piece.measured)
+    watts[0, CHANNELS.index("P_loss")] = 700.0
+    hot[0, CHANNELS.index("oil")] = 92.0
+    sd = [noise_of(model, replace(piece, measured=m), white, 250.0).start_sd for m in (piece.measured, watts, hot)]
+    np.testing.assert_array_equal(sd[1], sd[0])
+    unknown = [index for index, name in enumerate(model.parts) if name not in CHANNELS]
+    assert (sd[0][unknown] < 4.0).all()  # everything is near the air of 22 degC
+    assert (sd[2][unknown] > 10.0).all() and (sd[2][unknown] < 15.0).all()
+
+
+def test_without_derivatives_there_is_no_fit(monkeypatch: pytest.MonkeyPatch, problem: Problem) -> None:
+    monkeypatch.setattr(Problem, "_columns", lambda self, *_: np.full((2, 2, len(self.unknowns)), np.nan))
+    with pytest.raises(ArithmeticError, match="no derivative"):
+        problem.linearise(0, np.zeros(len(problem.unknowns)), None)
+    with pytest.raises(ArithmeticError, match="no solution where the fit should start"):
+        problem.fit()
+
+
+def test_a_start_that_leads_nowhere_is_not_taken(monkeypatch: pytest.MonkeyPatch, problem: Problem) -> None:
+    calls: list[Array] = []
+
+    def once(model: NetworkOnGrid, piece: Piece, values: Array, start: Array, **given: Any) -> Any:
+        calls.append(start)
+        if len(calls) > 1:
+            raise ArithmeticError("run away")
+        return simulate(model, piece, values, start, **given)
+
+    measured = np.array(problem.pieces[0].measured)
+    measured[:20] += 3.0  # so that another start is asked for
+    moved = problem.changed(pieces=[replace(problem.pieces[0], measured=measured)])
+    monkeypatch.setattr("diagnosis.predict.simulate", once)
+    found = predict(moved, 0, np.zeros(len(problem.unknowns)))
+    assert len(calls) == 2 and np.abs(calls[1] - calls[0]).max() > 0.5
+    np.testing.assert_array_equal(found.trajectory.T[0], calls[0])
+    monkeypatch.setattr("diagnosis.predict.simulate", lambda *_, **__: (_ for _ in ()).throw(ArithmeticError("away")))
+    with pytest.raises(ArithmeticError, match="away"):
+        predict(moved, 0, np.zeros(len(problem.unknowns)))
+
+
 def test_noise_needs_no_floor(model: NetworkOnGrid, piece: Piece, problem: Problem) -> None:
     quiet = Noise(
         channel_sd=np.full(4, 0.1), floor_sd=np.zeros(4), loss_relative_sd=0.01, heat_sd=np.zeros(model.n),
@@ -464,9 +506,10 @@ def test_a_number_at_its_bound_leaves_it_when_the_data_want_it(problem: Problem)
     bounded = problem.changed(unknowns=Unknowns(items))
     z = np.zeros(len(items))
     z[index] = 12.0
-    fit = bounded.fit(z, iterations=10)
+    fit = bounded.fit(bounded.fit(z, iterations=10).z, iterations=10)
     free = problem.fit(iterations=10)
-    np.testing.assert_allclose(fit.z, free.z, atol=0.05)  # what a fit is settled to
+    # A fit ends where a step gains less than 0.02: along what the data hardly tell, z is settled to the root of that.
+    np.testing.assert_allclose(fit.z, free.z, atol=0.15)
     assert fit.log_evidence == pytest.approx(free.log_evidence, abs=0.1)
     # Readings that want still more of it: it ends at the bound, and everything else settles.
     values = problem.unknowns.network_values(problem.model.network, 6.0 * np.eye(len(items))[index])
@@ -548,8 +591,9 @@ def test_a_clock_may_be_early_or_late(fzg: Gearbox, piece: Piece, problem: Probl
     # misfits where the operation jumps look like a clock that no fit then finds.
     for h, value, log_bayes in zip(scored.hypothesis.variants, scored.values, scored.log_bayes_of, strict=True):
         assert h[0] * value > 0.0 or log_bayes < 0.0
-    found = fitted(base, scored)
-    assert found is not None
+    rough = fitted(base, scored)
+    assert rough is not None
+    found = refined(rough)
     # Late readings and slow sensors look alike: part of it goes into their lags.
     assert found.values_of(scored.hypothesis)[placed.strength.name][0] == pytest.approx(late_s, abs=20.0)
 
