@@ -199,11 +199,9 @@ def sharpened(problem: Problem, fit: Fit, marginal: Marginal, scored: Scored) ->
     h = scored.hypothesis
     if len(h.variants) < 2:
         return scored
-    # Around the second best as well: where a strong effect has bent the calibration, the order of the grid tells little.
-    tried = [
-        _finer(problem, fit, marginal, scored, int(index))
-        for index in np.argsort(-scored.log_bayes_of)[:SHARPENED_FROM]
-    ]
+    # Around the second best as well: where a strong effect has bent the calibration, their order tells little.
+    chosen = np.argsort(-scored.log_bayes_of)[:SHARPENED_FROM]
+    tried = [_finer(problem, fit, marginal, scored, int(index)) for index in chosen]
     best, value, log_bayes = max(tried, key=lambda one: one[2])
     return replace(
         scored, hypothesis=replace(h, variants=np.concatenate([h.variants, best[None, :]])),

@@ -282,7 +282,7 @@ def test_held_out_recordings_come_first() -> None:
 @pytest.mark.parametrize(
     ("mechanism", "place"),
     [("windage", "oil"), ("cooler_thermostat", "oil"), ("sensor_stuck", "oil"), ("motor_flange", "shaft_1"),
-     ("radiation_error", "housing_air"), ("cooler_proportional", "oil")],
+     ("radiation_error", "housing_air"), ("cooler_proportional", "oil"), ("rain_on_housing", "housing")],
 )  # fmt: skip
 def test_laws_of_the_catalogue_are_drawn(mechanism: str, place: str) -> None:
     latex = placed(mechanism, place).equation()
