@@ -20,7 +20,8 @@ SEPARATOR = r",\quad "
 CASES = re.compile(r"^(?P<before>.*?)\\begin\{cases\}(?P<rows>.*?)\\end\{cases\}(?P<after>.*)$", re.DOTALL)
 # What sympy and the laws write for machines, and what a reader wants: factors apart, no "1.0", no "3.6e+04".
 FOR_READERS = (
-    (re.compile(r"(?<=[}\w*)]) (?=[A-Za-z(\\])(?!\\(?:leftarrow|leq?|geq?|cdot|right|quad|neq)\b)"), r"\\, "),
+    (re.compile(r"\\bmod\b"), r"\\;\\mathrm{mod}\\;"),  # which matplotlib does not know
+    (re.compile(r"(?<=[}\w*)]) (?=[A-Za-z(\\])(?!\\(?:leftarrow|leq?|geq?|cdot|right|quad|neq|;)\b)"), r"\\, "),
     (re.compile(r"(\d)e\+?(-?)0*(\d+)"), r"\1 \\cdot 10^{\2\3}"),
     (re.compile(r"(?<![\d.])(\d+)\.0(?!\d)"), r"\1"),
 )

@@ -99,8 +99,8 @@ def share_between(scale: Scale, share: float) -> float:
 
 
 def again(since: Any, *, every: Any) -> sp.Expr:
-    """Time since the nearest of many moments, `every` apart; negative before it."""
-    return sp.Mod(since + every / 2, every) - every / 2
+    """Time since the last of many moments, `every` apart, of which one was `since` ago (will be, where negative)."""
+    return sp.Mod(since, every)
 
 
 def share(description: str) -> Parameter:

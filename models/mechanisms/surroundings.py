@@ -45,7 +45,7 @@ solar_soak = Mechanism(
 def _wet(s: Any) -> sp.Expr:
     """Share of the housing that is wet: all of it soon after a shower begins, until that ends and the housing dries."""
     since = again(s.time - s.onset, every=s.every)
-    return sp.Min(sp.Max(since / WETTED_S, 0.0), 1.0) * sp.exp(-sp.Max(since - s.length, 0.0) / s.drying)
+    return sp.Min(since / WETTED_S, 1.0) * sp.exp(-sp.Max(since - s.length, 0.0) / s.drying)
 
 
 rain_on_housing = Mechanism(
