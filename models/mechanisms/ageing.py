@@ -11,6 +11,7 @@ from models.mechanisms.scale import Scale
 
 FAMILY = "ageing and running-in"
 REPEAT = "repeat the first test after the last one: only what changes with time differs"
+TURNING = 20.0  # a shaft at a tenth of the reference speed counts as turning
 
 
 def _life(scale: Scale) -> Parameter:
@@ -41,11 +42,16 @@ run_in_seals = Mechanism(
     family=FAMILY,
     kind="loss_factor",
     places=("factor seal",),
-    parameters=lambda scale: (strength(0.3, description="relative change of the seal losses, lips new"), _life(scale)),
-    states=(Memory(name="worn", rate=lambda s: s.n / s.life),),
+    parameters=lambda scale: (
+        strength(0.3, description="relative change of the seal losses, lips new"),
+        _life(scale),
+        plain("exponent", 0.5, sd=0.4, lower=0.0, upper=1.5, grid=(0.0, 1.0)),
+    ),
+    states=(Memory(name="worn", rate=lambda s: sp.tanh(TURNING * s.n) * s.n**s.exponent / s.life),),
     law=lambda s: s.strength * sp.exp(-s.worn),
-    says="New seal lips press harder: their friction starts higher and falls with the revolutions run.",
-    reference="Freudenberg: 1.5 times the settled torque during the first hours; the exponential form is ours",
+    says="New seal lips press harder: their friction starts higher and falls while the shafts turn.",
+    reference="Freudenberg: 1.5 times the settled torque during the first hours; the exponential form is ours, and so is "
+    "that it goes with a power of speed between hours run (0) and revolutions (1)",
     experiment=REPEAT,
     separate_by={"run_in_flanks": "repeat without load: run-in of the seals shows without torque as well"},
 )
