@@ -28,13 +28,11 @@ run_in_flanks = Mechanism(
     parameters=lambda scale: (
         strength(0.2, description="relative change of the sliding loss, flanks new"),
         _life(scale),
-        plain("load_exponent", 0.3, sd=0.3, lower=0.0, upper=1.0),
     ),
-    states=(Memory(name="worn", rate=lambda s: s.n * s.m**s.load_exponent / s.life),),
+    states=(Memory(name="worn", rate=lambda s: s.n / s.life),),
     law=lambda s: s.strength * sp.exp(-s.worn),
     says="New flanks are still rough: sliding friction starts higher and falls with the revolutions run.",
-    reference="Sjoeberg 2010, Sosa 2017: roughness falls with the first revolutions, faster under load; the "
-    "exponential form and the power of load are ours",
+    reference="Sjoeberg 2010, Sosa 2017: roughness falls with the first revolutions; the exponential form is ours",
     experiment=REPEAT,
     separate_by={"run_in_seals": "repeat without load: run-in of the flanks shows under torque only"},
 )
@@ -52,8 +50,8 @@ run_in_seals = Mechanism(
     states=(Memory(name="worn", rate=lambda s: sp.tanh(TURNING * s.n) * s.n**s.exponent / s.life),),
     law=lambda s: s.strength * sp.exp(-s.worn),
     says="New seal lips press harder: their friction starts higher and falls while the shafts turn.",
-    reference="Freudenberg: 1.5 times the settled torque during the first hours; the exponential form is ours, and so "
-    "is that it goes with a power of speed between hours run (0) and revolutions (1)",
+    reference="Freudenberg: 1.5 times the settled torque during the first hours; the exponential form is ours, and so is "
+    "that it goes with a power of speed between hours run (0) and revolutions (1)",
     experiment=REPEAT,
     separate_by={"run_in_flanks": "repeat without load: run-in of the seals shows without torque as well"},
 )
