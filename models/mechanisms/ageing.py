@@ -50,8 +50,8 @@ run_in_seals = Mechanism(
     states=(Memory(name="worn", rate=lambda s: sp.tanh(TURNING * s.n) * s.n**s.exponent / s.life),),
     law=lambda s: s.strength * sp.exp(-s.worn),
     says="New seal lips press harder: their friction starts higher and falls while the shafts turn.",
-    reference="Freudenberg: 1.5 times the settled torque during the first hours; the exponential form is ours, and so is "
-    "that it goes with a power of speed between hours run (0) and revolutions (1)",
+    reference="Freudenberg: 1.5 times the settled torque during the first hours; the exponential form is ours, and so "
+    "is that it goes with a power of speed between hours run (0) and revolutions (1)",
     experiment=REPEAT,
     separate_by={"run_in_flanks": "repeat without load: run-in of the seals shows without torque as well"},
 )
