@@ -95,12 +95,16 @@ def test_losses_take_arrays_of_any_shape(gearbox):
     assert losses.domain_distance(speed, torque, T).shape == (3, 4)
 
 
-def test_every_uncertain_number_is_a_parameter_and_no_other(gearbox):
+def test_every_uncertain_number_is_a_parameter_and_no_other(gearbox, tmp_path):
     network = gearbox.network()
     names = {p.name for p in network.parameters}
     assert len(names) == len(gearbox.priors)
     assert {"C_oil", "G_oil_casing", "standstill_oil_casing", "gears_no_load", "gears_speed_exponent"} <= names
-    assert "C_oil_inlet" not in names  # given without an sd
+    stated = '{ value = 4.0e4, sd = "100 %"'
+    assert "C_oil_inlet" in names and TEXT.count(stated) == 1
+    held = tmp_path / "held.toml"
+    held.write_text(TEXT.replace(stated, "{ value = 4.0e4"), encoding="utf-8")
+    assert names - {p.name for p in load_gearbox(held).network().parameters} == {"C_oil_inlet"}  # without an sd
     assert network.groups["bearings"] == ("bearing_1", "bearing_2")
 
 

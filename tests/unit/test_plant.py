@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ast
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -136,13 +136,17 @@ def test_another_gearbox_serves_as_well(programme: Programme) -> None:
     assert cooled.T.min() < plain.T.min() + 1e-9
 
 
-def test_sixty_cases_take_minutes_not_hours(plant: Plant, programme: Programme) -> None:
-    runs = [run_of(programme, specimen(plant, name)) for name in PHYSICS]
-    begin = time.process_time()
-    plant.run(runs)
-    per_row = (time.process_time() - begin) / len(runs) / len(programme)
-    rows_of_60 = 60 * 2 * sum(len(p) for p in programmes(plant.gearbox, np.random.default_rng(0)))
-    assert per_row * rows_of_60 < 240.0  # processor time; measured: 130 s beside other work
+def test_many_gearboxes_take_little_longer_than_one(plant: Plant, programme: Programme) -> None:
+    """All runs of a set advance together, row by row: sixty cases take minutes, not hours."""
+
+    def processor_s(names: Sequence[str]) -> float:
+        runs = [run_of(programme, specimen(plant, name)) for name in names]
+        begin = time.process_time()
+        plant.run(runs)
+        return time.process_time() - begin
+
+    alone = min(processor_s(PHYSICS[:1]), processor_s(PHYSICS[-1:]))
+    assert processor_s(PHYSICS) < 0.5 * len(PHYSICS) * alone
 
 
 # ---------------------------------------------------------------------- effects
