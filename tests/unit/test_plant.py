@@ -13,7 +13,7 @@ from scipy.linalg import expm
 
 import diagnosis.proof
 from diagnosis.proof.conceal import EFFECTS, FAULTS, OUTSIDE, PHYSICS, Plan, draw_case
-from diagnosis.proof.cycles import ROW_S, Programme, programmes, reference_torque, top_speed
+from diagnosis.proof.cycles import ROW_S, Programme, reference_torque, top_speed
 from diagnosis.proof.effect import Concealed
 from diagnosis.proof.instruments import lagged, record
 from diagnosis.proof.integrator import sdirk_step
