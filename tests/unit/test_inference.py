@@ -506,10 +506,10 @@ def test_a_number_at_its_bound_leaves_it_when_the_data_want_it(problem: Problem)
     bounded = problem.changed(unknowns=Unknowns(items))
     z = np.zeros(len(items))
     z[index] = 12.0
-    fit = bounded.fit(bounded.fit(z, iterations=10).z, iterations=10)
-    free = problem.fit(iterations=10)
-    # A fit ends where a step gains less than 0.02: along what the data hardly tell, z is settled to the root of that.
-    np.testing.assert_allclose(fit.z, free.z, atol=0.15)
+    fit, free = bounded.fit(z, iterations=10), problem.fit(iterations=10)
+    for _ in range(5):  # a fit ends where a step gains less than 0.02; again from there, until nothing moves
+        fit, free = bounded.fit(fit.z, iterations=10), problem.fit(free.z, iterations=10)
+    np.testing.assert_allclose(fit.z, free.z, atol=0.05)  # what a fit is settled to
     assert fit.log_evidence == pytest.approx(free.log_evidence, abs=0.1)
     # Readings that want still more of it: it ends at the bound, and everything else settles.
     values = problem.unknowns.network_values(problem.model.network, 6.0 * np.eye(len(items))[index])

@@ -146,7 +146,7 @@ def test_many_gearboxes_take_little_longer_than_one(plant: Plant, programme: Pro
         return time.process_time() - begin
 
     alone = min(processor_s(PHYSICS[:1]), processor_s(PHYSICS[-1:]))
-    assert processor_s(PHYSICS) < 0.5 * len(PHYSICS) * alone
+    assert processor_s(PHYSICS) < 0.2 * len(PHYSICS) * alone  # measured: 0.086
 
 
 # ---------------------------------------------------------------------- effects
