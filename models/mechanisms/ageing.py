@@ -5,13 +5,12 @@ from __future__ import annotations
 import sympy as sp
 
 from models.laws import Parameter
-from models.mechanisms.forms import EDGE_S, moment, plain, positive, steps, strength
+from models.mechanisms.forms import EDGE_S, RUNNING, moment, plain, positive, steps, strength
 from models.mechanisms.mechanism import Mechanism, Memory
 from models.mechanisms.scale import Scale
 
 FAMILY = "ageing and running-in"
 REPEAT = "repeat the first test after the last one: only what changes with time differs"
-TURNING = 20.0  # a shaft at a tenth of the reference speed counts as turning
 
 
 def _life(scale: Scale) -> Parameter:
@@ -47,7 +46,7 @@ run_in_seals = Mechanism(
         _life(scale),
         plain("exponent", 0.5, sd=0.4, lower=0.0, upper=1.5, grid=(0.0, 1.0)),
     ),
-    states=(Memory(name="worn", rate=lambda s: sp.tanh(TURNING * s.n) * s.n**s.exponent / s.life),),
+    states=(Memory(name="worn", rate=lambda s: sp.tanh(RUNNING * s.n) * s.n**s.exponent / s.life),),
     law=lambda s: s.strength * sp.exp(-s.worn),
     says="New seal lips press harder: their friction starts higher and falls while the shafts turn.",
     reference="Freudenberg: 1.5 times the settled torque during the first hours; the exponential form is ours, and so "

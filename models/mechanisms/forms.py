@@ -13,6 +13,7 @@ from models.mechanisms.scale import Scale
 LARGEST = 100.0  # strength, in standard deviations of its prior
 SMALLEST_FACTOR = -0.95  # of a relative change: a loss or conductance never turns round
 DURING = (0.01, 0.03, 0.08, 0.2, 0.4, 0.55, 0.7, 0.85)  # of a recording: where a search for a moment starts
+RUNNING = 20.0  # sharpness of what begins with the shafts: from about a tenth of the reference speed it is all there
 ONCE = 6.0  # durations of a recording, after which what happened once would come again
 EDGE_S = 120.0  # half of the time that damage or an oil change takes to come
 
@@ -96,11 +97,6 @@ def soft_hysteresis(value: Any, state: Any, *, at: Any, band: Any, width: float)
 def share_between(scale: Scale, share: float) -> float:
     """A temperature [degC] at a share of the way from ambient to the hot oil."""
     return scale.ambient + share * (scale.temperature - scale.ambient)
-
-
-def again(since: Any, *, every: Any) -> sp.Expr:
-    """Time since the last of many moments, `every` apart, of which one was `since` ago (will be, where negative)."""
-    return sp.Mod(since, every)
 
 
 def share(description: str) -> Parameter:

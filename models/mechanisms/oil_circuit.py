@@ -9,6 +9,7 @@ import sympy as sp
 from models.laws import Parameter
 from models.mechanisms.forms import (
     EDGE_S,
+    RUNNING,
     hysteresis,
     moment,
     plain,
@@ -24,7 +25,6 @@ from models.mechanisms.mechanism import Mechanism, Memory
 from models.mechanisms.scale import Scale
 
 FAMILY = "oil circuit"
-RUNNING = 20.0  # a pump on the shaft delivers all it can from about a tenth of the reference speed
 PAST_SET_POINT = "heat up slowly at constant load past the suspected set-point, then hold"
 RETURN = "measure the oil where it enters and leaves the gearbox"
 SOFT_K = 0.3  # a switch that is seen in means over minutes

@@ -7,7 +7,6 @@ from typing import Any
 import sympy as sp
 
 from models.mechanisms.forms import (
-    again,
     hysteresis,
     length,
     moment,
@@ -44,7 +43,7 @@ solar_soak = Mechanism(
 
 def _wet(s: Any) -> sp.Expr:
     """Share of the housing that is wet: all of it soon after a shower begins, until that ends and the housing dries."""
-    since = again(s.time - s.onset, every=s.every)
+    since = sp.Mod(s.time - s.onset, s.every)  # the last one began
     return sp.Min(since / WETTED_S, 1.0) * sp.exp(-sp.Max(since - s.length, 0.0) / s.drying)
 
 
