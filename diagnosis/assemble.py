@@ -14,10 +14,10 @@ from diagnosis.findings import finding_of, node_of, rivals_of
 from diagnosis.holdout import at_holdout
 from diagnosis.identifiable import scale_notes
 from diagnosis.latent import LatentHeat, knots_of, latent_heat
+from diagnosis.mapping import LOSS
 from diagnosis.noise import HEAT_FRACTION, PARAMETRIC_FRACTION, PARAMETRIC_K
-from diagnosis.observation import LOSS
 from diagnosis.posterior import Problem
-from diagnosis.predict import Prediction, predict, rmse
+from diagnosis.predict import Prediction, overall_rmse, predict, rmse
 from diagnosis.recording import Recording
 from diagnosis.regime import active, regime, windows
 from diagnosis.result import (
@@ -154,7 +154,8 @@ def _remaining(
     if not detected:
         return p_value, ""
     best = max(remaining, key=lambda h: h.log_bayes)
-    size = float(np.sqrt(np.mean(np.concatenate(best.mean) ** 2)))
+    steps = np.concatenate([piece.steps for piece in case.train.pieces])
+    size = float(np.sqrt(np.average(np.concatenate(best.mean) ** 2, weights=steps)))
     small = size < REMAINING_W_SHARE * case.loss_W and not _much_is_left(first, remaining)
     if best.log_bayes < SECOND_GAIN or small:
         return p_value, "nothing that stands out of noise and structural floor"
@@ -206,12 +207,14 @@ def _place(case: Case, found: Search, first: Sequence[LatentHeat], node: str, we
         heats = list(max(candidates, key=lambda h: h.log_bayes).mean)
     parts = found.final.fit.parts
     together = np.concatenate(heats)
-    acting = active(together)
     T = np.concatenate([p.trajectory.middle[:, p_index(case, node)] for p in parts])
     inputs = np.concatenate([p.trajectory.piece.inputs for p in parts])
     hours = np.concatenate([p.trajectory.piece.middle for p in parts]) / 3600.0
-    words = regime(acting, {"speed": (np.abs(inputs[:, 0]), "1/min"), "torque": (np.abs(inputs[:, 1]), "N m"),
-                            f"temperature of {node}": (T, "degC"), "time": (hours, "h")})  # fmt: skip
+    steps = np.concatenate([p.trajectory.piece.steps for p in parts])
+    acting = active(together, steps)
+    signals = {"speed": (np.abs(inputs[:, 0]), "1/min"), "torque": (np.abs(inputs[:, 1]), "N m"),
+               f"temperature of {node}": (T, "degC"), "time": (hours, "h")}  # fmt: skip
+    words = regime(acting, signals, steps)
     when, before = [], 0
     for part, heat in zip(parts, heats, strict=True):
         piece = part.trajectory.piece
@@ -219,7 +222,7 @@ def _place(case: Case, found: Search, first: Sequence[LatentHeat], node: str, we
         when += [(piece.recording, a, b) for a, b in windows(piece.middle, own_acting)]
         before += len(heat)
     return Location(
-        node=node, probability=min(weight, 1.0), heat_mean_W=float(together.mean()),
+        node=node, probability=min(weight, 1.0), heat_mean_W=float(np.average(together, weights=steps)),
         heat_max_W=float(together[np.argmax(np.abs(together))]), when=tuple(when), regime=words,
     )  # fmt: skip
 
@@ -301,10 +304,10 @@ def _fits(case: Case, predictions: Predictions, which: str) -> Fits:
     per_state, overall = {}, {}
     temperatures = [i for i, name in enumerate(case.channels) if name != LOSS]
     for state, predicted in predictions[which].items():
-        residual = np.concatenate([p.residual for p in predicted]) if predicted else np.zeros((0, len(case.channels)))
-        per_state[state] = rmse(residual)
-        good = residual[:, temperatures][np.isfinite(residual[:, temperatures])]
-        overall[state] = float(np.sqrt(np.mean(good**2))) if len(good) else float("nan")
+        nothing = [np.zeros((0, len(case.channels)))]
+        residual = np.concatenate([p.residual for p in predicted] or nothing)
+        per_state[state] = rmse(residual, np.concatenate([p.weights for p in predicted] or [np.zeros(0)]))
+        overall[state] = overall_rmse(predicted, temperatures)
     sensors = {
         name: (float(per_state["before"][i]), float(per_state["calibrated"][i]), float(per_state["after"][i]))
         for i, name in enumerate(case.channels)

@@ -9,8 +9,8 @@ import numpy as np
 
 from diagnosis.explain import Explanation, calibrated, evidence_of, settled
 from diagnosis.grid import Piece, pieces, slow_rows
+from diagnosis.mapping import LOSS
 from diagnosis.noise import channel_noise, loss_noise, noise_of, start_guess
-from diagnosis.observation import LOSS
 from diagnosis.posterior import Problem
 from diagnosis.predict import START_S
 from diagnosis.recording import Recording
@@ -62,7 +62,9 @@ class Case:
     noise_K: float
 
 
-def prepare(gearbox: Gearbox, recordings: Sequence[Recording], holdout: Sequence[Recording]) -> Case:
+def prepare(
+    gearbox: Gearbox, recordings: Sequence[Recording], holdout: Sequence[Recording], *, even: bool = False
+) -> Case:
     """Set up the inference.
 
     Parameters
@@ -70,6 +72,8 @@ def prepare(gearbox: Gearbox, recordings: Sequence[Recording], holdout: Sequence
     gearbox : Gearbox
     recordings, holdout : sequence of Recording
         To learn from, and to judge by
+    even : bool
+        Whether all intervals shall be of one length, see :func:`diagnosis.grid.pieces`
     """
     nominal, losses = gearbox.network(), gearbox.loss_laws()
     scale = scale_of(gearbox, recordings)
@@ -89,7 +93,7 @@ def prepare(gearbox: Gearbox, recordings: Sequence[Recording], holdout: Sequence
     loss_sd = loss_noise(recordings) if LOSS in channels else (0.0, 0.0)
     loss_W = typical_loss(model, recordings)
     problems = []
-    learnt, judged = pieces(recordings, model.laws.inputs, channels), pieces(holdout, model.laws.inputs, channels)
+    learnt, judged = (pieces(given, model.laws.inputs, channels, even=even) for given in (recordings, holdout))
     if not holdout:
         learnt, judged = split(learnt)
     for cut in (learnt, judged):

@@ -83,7 +83,9 @@ def finding_of(case: Case, final: Explanation, h: Hypothesis, stage: Stage, riva
     doubt = 0.0 if final.found[0].label == h.label else FORM_DOUBT
     values = _with_bias(final, h)
     heats = heats_of(final, h)
-    together = np.concatenate(heats) if heats else np.zeros(1)
+    pieces = [part.trajectory.piece for part in final.fit.parts]
+    together = np.abs(np.concatenate(heats)) if heats else np.zeros(1)
+    steps = np.concatenate([piece.steps for piece in pieces]) if heats else np.ones(1)
     term = h.term
     if term is not None:
         known = {name: value for name, (value, _) in values.items()}
@@ -93,7 +95,6 @@ def finding_of(case: Case, final: Explanation, h: Hypothesis, stage: Stage, riva
         prefix = f"{term.label}_"
     else:
         equation, units, prefix = "", {p.name: p.unit for p in case.nominal.parameters}, ""
-    pieces = [part.trajectory.piece for part in final.fit.parts]
     return Finding(
         mechanism=h.name,
         family=h.family,
@@ -110,8 +111,8 @@ def finding_of(case: Case, final: Explanation, h: Hypothesis, stage: Stage, riva
             for name, (value, sd) in values.items()
         ),
         confusable_with=tuple(rivals),
-        heat_mean_W=float(np.abs(together).mean()),
-        heat_max_W=float(np.abs(together).max()),
+        heat_mean_W=float(np.average(together, weights=steps)),
+        heat_max_W=float(together.max()),
         heat=heat_over_time(pieces, heats) if heats else {},
         term=term,
     )

@@ -1,25 +1,32 @@
 """From the rows of a recording to the working grid of the inference: pieces, intervals, means.
 
-The inference walks over intervals of about :data:`INTERVAL_S`. Inputs are means over an interval, measurements means
-around a grid point (a symmetric window, so that a steady drift leaves no error). Recordings that are sampled more
-slowly keep their own times; where their rows are means over the time before their stamp, as those of SCADA are, inputs
-and measurements are late by the same half step, which makes no difference.
+The inference walks over intervals of :data:`INTERVAL_S` where something happens, and of up to :data:`LONGEST` times as
+long where for a while nothing has. Inputs are means over an interval, measurements means around a grid point (so wide
+that a steady drift leaves no error). Recordings that are sampled more slowly keep their own times; where their rows are
+means over the time before their stamp, as those of SCADA are, inputs and measurements are late by the same half step,
+which makes no difference.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.mapping import LOSS
 from diagnosis.recording import Recording
 from models.types import Array
 
 INTERVAL_S = 20.0
 SAMPLES = 5  # of the inputs per interval, at which losses are computed: they are not linear in speed
+LONGEST = 5  # times INTERVAL_S: of an interval in which nothing happens
+CALM_SHARE = 0.5  # of the time since something happened, that an interval may last
+STEADY_INPUT = 0.02  # change from one interval to the next, of the usual size
+BEND_REACH = 3  # intervals to either side of a grid point, over which means are compared to see a temperature bend
+BEND_SDS, LEAST_BEND_K, LEAST_BEND_W = 6.0, 0.1, 2.0
 SHORTEST_PIECE = 5  # grid points
 SLOW_S = 60.0  # rows further apart are means that hide what switches do, see :class:`Piece`
 
@@ -64,16 +71,31 @@ class Piece:
         """Lengths of the intervals, shape (K,), [s]."""
         return np.diff(self.time)
 
-    def finer(self) -> Piece:
-        """The same in intervals as long as the samples of the inputs lie apart, without measurements."""
-        count = self.samples.shape[1]
-        shares = np.arange(count) / count
-        time = np.append((self.time[:-1, None] + self.steps[:, None] * shares).ravel(), self.time[-1])
+    def finer(self) -> tuple[Piece, NDArray[np.intp]]:
+        """The same in intervals of about :data:`INTERVAL_S`, or as long as the samples of the inputs lie apart.
+
+        Returns
+        -------
+        piece : Piece
+            Without measurements
+        at : Array of int, shape (K + 1,)
+            Where the grid points are in it
+        """
+        most = self.samples.shape[1]
+        parts = np.full(len(self.steps), most)
+        if not self.slow:
+            parts = np.clip(np.rint(self.steps / INTERVAL_S), 1, most).astype(int)
+        at = np.concatenate([[0], np.cumsum(parts)])
+        owner = np.repeat(np.arange(len(parts)), parts)
+        place, count = np.arange(at[-1]) - at[owner], parts[owner]
+        time = np.append(self.time[owner] + self.steps[owner] * place / count, self.time[-1])
+        inside = (place[:, None] + (np.arange(most) + 0.5) / most) / count[:, None] * most
         nothing = np.empty((len(time), 0))
-        return replace(
-            self, time=time, samples=self.samples.reshape(-1, 1, self.samples.shape[2]), channels=(),
-            measured=nothing, counts=nothing, guided=False,
+        fine = replace(
+            self, time=time, samples=self.samples[owner[:, None], inside.astype(int)], channels=(), measured=nothing,
+            counts=nothing, guided=False,
         )  # fmt: skip
+        return fine, at
 
     def seen(self, T: Array, parts: Sequence[str]) -> Array:
         """Temperatures of the parts that memories follow: measured where the piece is guided, else as simulated.
@@ -92,7 +114,7 @@ class Piece:
         found = np.full((len(self.time), len(parts)), np.nan)
         for index, name in enumerate(self.channels):
             if self.guided and name in parts:
-                found[:, list(parts).index(name)] = _sharpened(self.measured[:, index])
+                found[:, list(parts).index(name)] = _sharpened(self.measured[:, index], self.steps)
         return found
 
     @cached_property
@@ -106,7 +128,9 @@ class Piece:
         return np.asarray(self.samples.mean(axis=1))
 
 
-def pieces(recordings: Sequence[Recording], inputs: Sequence[str], channels: Sequence[str]) -> tuple[Piece, ...]:
+def pieces(
+    recordings: Sequence[Recording], inputs: Sequence[str], channels: Sequence[str], *, even: bool = False
+) -> tuple[Piece, ...]:
     """All pieces of all recordings.
 
     Parameters
@@ -116,13 +140,15 @@ def pieces(recordings: Sequence[Recording], inputs: Sequence[str], channels: Seq
         Names of the network's inputs, speed and torque first
     channels : sequence of str
         Channels of the result, the same for every piece; those that a recording lacks are NaN there
+    even : bool
+        Whether the intervals shall all be :data:`INTERVAL_S` long where rows lie closer together
 
     Returns
     -------
     tuple of Piece
         Pieces too short to learn anything from are left out
     """
-    return tuple(piece for recording in recordings for piece in _pieces_of(recording, inputs, channels))
+    return tuple(piece for recording in recordings for piece in _pieces_of(recording, inputs, channels, even=even))
 
 
 def slow_rows(recordings: Sequence[Recording]) -> bool:
@@ -130,7 +156,7 @@ def slow_rows(recordings: Sequence[Recording]) -> bool:
     return bool(recordings) and all(float(np.median(np.diff(r.time))) > SLOW_S for r in recordings)
 
 
-def _pieces_of(recording: Recording, inputs: Sequence[str], channels: Sequence[str]) -> Iterator[Piece]:
+def _pieces_of(recording: Recording, inputs: Sequence[str], channels: Sequence[str], *, even: bool) -> Iterator[Piece]:
     values = {channel.name: channel.values for channel in recording.channels}
     for rows in recording.segments:
         time = recording.time[rows]
@@ -142,6 +168,9 @@ def _pieces_of(recording: Recording, inputs: Sequence[str], channels: Sequence[s
         else:
             grid = np.arange(time[0], time[-1] + 0.5 * INTERVAL_S, INTERVAL_S)
             grid = grid[grid <= time[-1] + 1e-9]
+            if not even:
+                grid = _thinned(grid, time, {name: recording.inputs[name][rows] for name in inputs},
+                                {name: values[name][rows] for name in channels if name in values})  # fmt: skip
         if len(grid) < SHORTEST_PIECE:
             continue
         fractions = (np.arange(SAMPLES) + 0.5) / SAMPLES
@@ -166,14 +195,84 @@ def _pieces_of(recording: Recording, inputs: Sequence[str], channels: Sequence[s
         )
 
 
-def _sharpened(means: Array) -> Array:
-    """Peaks and valleys that means over the rows hide, from their second differences, shape (K + 1,).
+def stands_for(time: Array) -> Array:
+    """Time that every grid point stands for, shape (K + 1,), [s]: half of the intervals beside it.
+
+    Examples
+    --------
+    >>> stands_for(np.array([0.0, 20.0, 40.0, 100.0]))
+    array([10., 20., 40., 30.])
+    """
+    return np.asarray(np.diff(np.concatenate([time[:1], 0.5 * (time[1:] + time[:-1]), time[-1:]])))
+
+
+def _thinned(even: Array, time: Array, inputs: Mapping[str, Array], values: Mapping[str, Array]) -> Array:
+    """Grid points without those that lie amidst a calm.
+
+    Parameters
+    ----------
+    even : Array
+        Grid points :data:`INTERVAL_S` apart
+    time : Array, shape (rows,)
+    inputs : mapping of str to Array
+    values : mapping of str to Array
+        What was measured, with gaps
+    """
+    if len(even) < SHORTEST_PIECE:
+        return even
+    cell = np.clip(((time - time[0]) / INTERVAL_S).astype(int), 0, len(even) - 2)
+    happens = np.zeros(len(even) - 1, dtype=bool)
+    for name, rows in inputs.items():
+        if name != "T_ambient":  # it changes slowly, and samples inside the interval follow it
+            moved = np.abs(np.diff(_cell_means(rows, cell, len(happens)))) > STEADY_INPUT * np.percentile(abs(rows), 95)
+            happens[1:] |= moved
+            happens[:-1] |= moved
+    for name, rows in values.items():
+        happens |= _bends(_cell_means(rows, cell, len(happens)), LEAST_BEND_W if name == LOSS else LEAST_BEND_K)
+    chosen, k, calm = [0], 0, 0
+    upcoming = np.append(np.flatnonzero(happens), len(happens))
+    while k < len(happens):
+        ahead = int(upcoming[np.searchsorted(upcoming, k)]) - k  # intervals until something happens
+        length = max(1, min(int(CALM_SHARE * calm), LONGEST, ahead))
+        calm = calm + length if ahead else 0
+        k += length
+        chosen.append(k)
+    return np.asarray(even[chosen])
+
+
+def _cell_means(rows: Array, cell: NDArray[np.intp], count: int) -> Array:
+    """Means over cells, shape (count,); where there are none, between those beside."""
+    good = np.isfinite(rows)
+    seen = np.bincount(cell[good], minlength=count)
+    known = np.flatnonzero(seen)
+    if not len(known):
+        return np.zeros(count)
+    means = np.bincount(cell[good], rows[good], minlength=count)[known] / seen[known]
+    return np.asarray(np.interp(np.arange(count), known, means))
+
+
+def _bends(means: Array, least: float) -> NDArray[np.bool_]:
+    """Where the slope of a signal changes by more than its noise would make it, shape (K,)."""
+    result, width = np.zeros(len(means), dtype=bool), 2 * BEND_REACH
+    if len(means) < 3 * width:
+        return result
+    total = np.concatenate([[0.0], np.cumsum(means)])
+    box = (total[width:] - total[:-width]) / width
+    bend = np.abs(box[2 * width :] + box[: -2 * width] - 2.0 * box[width:-width])
+    usual = 1.4826 * float(np.median(bend))
+    at = np.flatnonzero(bend > max(BEND_SDS * usual, least))
+    result[at + width + BEND_REACH] = True
+    return result
+
+
+def _sharpened(means: Array, steps: Array) -> Array:
+    """Peaks and valleys that means over the rows hide, from their change of slope, shape (K + 1,).
 
     A corner between two slopes that lies at the edge of a row is cut off by half of the second difference there, one in
     its midst by a sixth.
     """
-    bend = np.zeros_like(means)
-    bend[1:-1] = 2.0 * means[1:-1] - means[:-2] - means[2:]
+    bend, slope = np.zeros_like(means), np.diff(means) / steps
+    bend[1:-1] = (slope[:-1] - slope[1:]) * np.minimum(steps[:-1], steps[1:])
     return np.asarray(means + 0.5 * np.nan_to_num(bend))
 
 

@@ -9,9 +9,9 @@ import numpy as np
 
 from diagnosis.case import Case, with_floor
 from diagnosis.explain import Explanation
-from diagnosis.observation import LOSS
+from diagnosis.mapping import LOSS
 from diagnosis.posterior import Linearised, Problem
-from diagnosis.predict import predict
+from diagnosis.predict import overall_rmse, predict
 from diagnosis.trajectory import ROUNDS
 from diagnosis.whitening import Whitening
 
@@ -64,12 +64,10 @@ class Judge:
         problem = at_holdout(self.case, explanation)
         temperatures = [i for i, name in enumerate(self.case.channels) if name != LOSS]
         try:
-            residuals = [
-                predict(problem, i, explanation.fit.z).residual[:, temperatures] for i in range(len(problem.pieces))
-            ]
+            predictions = [predict(problem, i, explanation.fit.z) for i in range(len(problem.pieces))]
         except (ArithmeticError, np.linalg.LinAlgError):
             return np.inf
-        return float(np.sqrt(np.nanmean(np.concatenate(residuals) ** 2))) if residuals else float("nan")
+        return overall_rmse(predictions, temperatures)
 
 
 def _linearised(problem: Problem, explanation: Explanation) -> list[Linearised]:

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.optimize import nnls
 
 from diagnosis.grid import Piece, slow_rows
-from diagnosis.observation import LOSS
+from diagnosis.mapping import LOSS
 from diagnosis.recording import Recording
 from diagnosis.trajectory import NetworkOnGrid
 from diagnosis.whitening import Noise

@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import lfilter
 
+from diagnosis.mapping import LOSS
 from diagnosis.trajectory import NetworkOnGrid, Trajectory
 from models.types import Array
 
-LOSS = "P_loss"
+FORGOTTEN = 1e-15  # share of an older reading in a lagged one
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -98,20 +98,17 @@ def lagged(values: Array, steps: Array, lag: float) -> Array:
     """
     if lag <= 0.0:
         return values
-    if np.ptp(steps) < 1e-6 * steps[0]:
-        h = float(steps[0])
-        a = float(np.exp(-h / lag))
-        share = lag * (1.0 - a) / h  # of the slope over the step
-        # y1 = a y0 + (share - a) x0 + (1 - share) x1
-        start = share * values[:1]  # so that the first reading is the first value
-        filtered, _ = lfilter([1.0 - share, share - a], [1.0, -a], values, axis=0, zi=start)
-        return np.asarray(filtered)
-    result = np.empty_like(values)
-    result[0] = values[0]
     decays = np.exp(-steps / lag)
-    shares = lag * (1.0 - decays) / steps
-    for k, (a, share) in enumerate(zip(decays.tolist(), shares.tolist(), strict=True)):
-        result[k + 1] = a * result[k] + (share - a) * values[k] + (1.0 - share) * values[k + 1]
+    shares = (lag * (1.0 - decays) / steps).reshape(-1, *[1] * (values.ndim - 1))
+    result = np.array(values, dtype=float)
+    result[1:] = (shares - decays.reshape(shares.shape)) * values[:-1] + (1.0 - shares) * values[1:]
+    # y[k] = a[k] y[k-1] + b[k], by doubling how far back every row has been followed, until nothing is left of it.
+    left, reach = np.append(0.0, decays).reshape(-1, *shares.shape[1:]), 1
+    while reach < len(result) and float(left.max()) > FORGOTTEN:
+        result[reach:] += left[reach:] * result[:-reach]
+        left[reach:] = left[reach:] * left[:-reach]
+        left[:reach] = 0.0
+        reach *= 2
     return result
 
 

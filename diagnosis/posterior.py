@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 
 from diagnosis.grid import Piece
-from diagnosis.observation import LOSS, Sensors, lag_column, reading_columns, readings, total_at_points
+from diagnosis.mapping import LOSS
+from diagnosis.observation import Sensors, lag_column, reading_columns, readings, total_at_points
 from diagnosis.term_on_grid import TermOnGrid, moved_heat
 from diagnosis.trajectory import (
     ROUNDS,

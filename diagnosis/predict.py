@@ -5,12 +5,14 @@ Start temperatures of parts without a sensor are unknown; they are taken from th
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from diagnosis.grid import Piece
-from diagnosis.observation import LOSS, reading_columns, readings
+from diagnosis.grid import Piece, stands_for
+from diagnosis.mapping import LOSS
+from diagnosis.observation import reading_columns, readings
 from diagnosis.posterior import Problem
 from diagnosis.trajectory import Trajectory, free_running, simulate
 from models.types import Array
@@ -43,6 +45,11 @@ class Prediction:
         """Measured minus read where it counts, NaN elsewhere, shape (K + 1, channels)."""
         late = self.piece.time >= self.counts_from
         return np.where(late[:, None], self.piece.measured - self.read, np.nan)
+
+    @property
+    def weights(self) -> Array:
+        """Time that every row stands for, shape (K + 1,), [s]."""
+        return stands_for(self.piece.time)
 
 
 def predict(problem: Problem, index: int, z: Array, *, as_delivered: bool = False) -> Prediction:
@@ -100,9 +107,33 @@ def predict(problem: Problem, index: int, z: Array, *, as_delivered: bool = Fals
     return Prediction(piece=piece, trajectory=trajectory, read=read, counts_from=counts_from)
 
 
-def rmse(residuals: Array) -> Array:
-    """Root mean square per channel, shape (channels,); NaN where nothing was measured."""
+def rmse(residuals: Array, weights: Array) -> Array:
+    """Root mean square per channel, shape (channels,); NaN where nothing was measured.
+
+    Parameters
+    ----------
+    residuals : Array, shape (rows, channels)
+    weights : Array, shape (rows,)
+        Time that every row stands for
+    """
     good = np.isfinite(residuals)
-    count = good.sum(axis=0)
     with np.errstate(invalid="ignore", divide="ignore"):
-        return np.asarray(np.sqrt(np.where(good, residuals, 0.0).__pow__(2).sum(axis=0) / count))
+        return np.asarray(np.sqrt((weights @ np.where(good, residuals, 0.0) ** 2) / (weights @ good)))
+
+
+def overall_rmse(predictions: Sequence[Prediction], columns: Sequence[int]) -> float:
+    """Root mean square of the residuals of some channels of several predictions; NaN where nothing was measured.
+
+    Parameters
+    ----------
+    predictions : sequence of Prediction
+    columns : sequence of int
+        Which channels
+    """
+    squares = total = 0.0
+    for predicted in predictions:
+        residual = predicted.residual[:, columns]
+        good = np.isfinite(residual)
+        squares += float((predicted.weights @ np.where(good, residual, 0.0) ** 2).sum())
+        total += float((predicted.weights @ good).sum())
+    return float(np.sqrt(squares / total)) if total > 0.0 else float("nan")

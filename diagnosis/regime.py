@@ -14,10 +14,19 @@ SHORTEST_WINDOW_S, SHORTEST_GAP_S = 120.0, 300.0
 GOOD_ENOUGH = 0.9  # of the intervals told rightly
 
 
-def active(heat: Array) -> NDArray[np.bool_]:
-    """Where a heat acts, shape (K,): where it is at least a third of its largest magnitudes."""
+def active(heat: Array, steps: Array) -> NDArray[np.bool_]:
+    """Where a heat acts, shape (K,): where it is at least a third of the size that it has for a hundredth of the time.
+
+    Parameters
+    ----------
+    heat : Array, shape (K,)
+    steps : Array, shape (K,)
+        Lengths of the intervals
+    """
     size = np.abs(heat)
-    return np.asarray(size > ACTIVE_SHARE * max(float(np.percentile(size, 99.0, method="lower")), 1e-9))
+    order = np.argsort(-size)
+    largest = size[order[int(np.searchsorted(np.cumsum(steps[order]), 0.01 * steps.sum()))]]
+    return np.asarray(size > ACTIVE_SHARE * max(float(largest), 1e-9))
 
 
 def windows(time: Array, acting: NDArray[np.bool_]) -> list[tuple[float, float]]:
@@ -40,21 +49,23 @@ def windows(time: Array, acting: NDArray[np.bool_]) -> list[tuple[float, float]]
     return [w for w in found if w[1] - w[0] >= SHORTEST_WINDOW_S]
 
 
-def regime(acting: NDArray[np.bool_], signals: Mapping[str, tuple[Array, str]]) -> str:
+def regime(acting: NDArray[np.bool_], signals: Mapping[str, tuple[Array, str]], steps: Array) -> str:
     """The operation in which something acts, as one threshold (a percentile) of one signal, if enough.
 
     Parameters
     ----------
     acting : bool array, shape (K,)
     signals : mapping of name to (values of shape (K,), unit)
+    steps : Array, shape (K,)
+        Lengths of the intervals
 
     Examples
     --------
     >>> n = np.linspace(0.0, 3000.0, 301)
-    >>> regime(n > 2000.0, {"speed": (n, "1/min")})
+    >>> regime(n > 2000.0, {"speed": (n, "1/min")}, np.ones(301))
     'speed above 1980 1/min'
     """
-    share = float(acting.mean())
+    share = float(np.average(acting, weights=steps))
     if share > 0.95:
         return "always"
     if share < 0.02:
@@ -64,7 +75,8 @@ def regime(acting: NDArray[np.bool_], signals: Mapping[str, tuple[Array, str]]) 
         for threshold in np.unique(np.percentile(values, np.arange(2, 99, 2))):
             above = values > threshold
             # Both sides count alike, however rare one is.
-            hit = 0.5 * (float(above[acting].mean()) + float((~above)[~acting].mean()))
+            hit = 0.5 * (float(np.average(above[acting], weights=steps[acting]))
+                         + float(np.average(~above[~acting], weights=steps[~acting])))  # fmt: skip
             for told, side in ((hit, "above"), (1.0 - hit, "below")):
                 if told > best + 0.005:
                     best, words = told, f"{name} {side} {threshold:.3g} {unit}"

@@ -19,7 +19,8 @@ from diagnosis.evidence import Marginal
 from diagnosis.explain import Explanation, best_fits, distorted, in_the_middle, without
 from diagnosis.holdout import Judge
 from diagnosis.hypotheses import Hypothesis, Scored, hypothesis_of, parameter_hypotheses, scan, sharpened, spread
-from diagnosis.observation import LOSS, reading_columns, readings
+from diagnosis.mapping import LOSS
+from diagnosis.observation import reading_columns, readings
 from diagnosis.open_form import open_hypotheses
 from diagnosis.term_on_grid import TermOnGrid
 from models.mechanisms import Mechanism

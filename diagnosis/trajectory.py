@@ -464,7 +464,7 @@ def free_running(model: NetworkOnGrid, piece: Piece, values: Array, start: Array
     start : Array, shape (parts,)
         [degC]
     """
-    fine, each = (piece.finer(), piece.samples.shape[1]) if piece.slow else (replace(piece, guided=False), 1)
+    fine, at = piece.finer()
     count = len(fine.steps)
     T = np.broadcast_to(start, (count + 1, model.n))
     tangent: LossTangent | None = None
@@ -479,12 +479,12 @@ def free_running(model: NetworkOnGrid, piece: Piece, values: Array, start: Array
             raise ArithmeticError(f"the temperatures of {piece.recording} run away with these parameters")
         if float(np.max(np.abs(T - before))) < FREE_SETTLED_K:
             break
-    # Means over a row's length around every grid point; at the ends over what there is.
+    # What rows minutes apart show are means, over as much around every grid point; at the ends over what there is.
+    half = piece.samples.shape[1] // 2 if piece.slow else 0
     total = np.concatenate([np.zeros((1, model.n)), np.cumsum(T, axis=0)])
-    at = np.arange(len(piece.time)) * each
-    low, high = np.maximum(at - each // 2, 0), np.minimum(at + each // 2, count) + 1
+    low, high = np.maximum(at - half, 0), np.minimum(at + half, count) + 1
     means = (total[high] - total[low]) / (high - low)[:, None]
-    coarse = None if states is None else states.reshape(-1, each, states.shape[1]).mean(axis=1)
+    coarse = None if states is None else np.add.reduceat(states, at[:-1]) / np.diff(at)[:, None]
     return replace(_round(model, replace(piece, guided=False), values, start, means, None, coarse), T=means)
 
 

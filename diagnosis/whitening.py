@@ -18,7 +18,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from diagnosis.observation import LOSS, Sensors, total_at_points
+from diagnosis.mapping import LOSS
+from diagnosis.observation import Sensors, total_at_points
 from diagnosis.trajectory import NetworkOnGrid, Trajectory
 from models.types import Array
 

@@ -256,7 +256,8 @@ def _function_source(name: str, arguments: tuple[str, ...], expressions: tuple[s
 
 def compile_function(source: str, name: str) -> Callable[..., tuple[Any, ...]]:
     """The function that :func:`function_source` wrote."""
-    namespace: dict[str, Any] = {"math": math, "numpy": np}
+    # Without the name of a module, pickling looks for it in all of them.
+    namespace: dict[str, Any] = {"math": math, "numpy": np, "__name__": __name__}
     exec(compile(source, f"<law {name}>", "exec"), namespace)  # noqa: S102 - our own generated code
     function: Callable[..., tuple[Any, ...]] = namespace[name]
     return function

@@ -28,7 +28,7 @@ from diagnosis.findings import node_of
 from diagnosis.holdout import at_holdout
 from diagnosis.hypotheses import Hypothesis, hypothesis_of, scan
 from diagnosis.latent import knots_of, latent_heat
-from diagnosis.observation import LOSS
+from diagnosis.mapping import LOSS
 from diagnosis.posterior import Fit
 from diagnosis.predict import Prediction, predict
 from diagnosis.recording import read_recordings
@@ -204,7 +204,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     network = gearbox.network()
     train = read_recordings(given.recordings, network)
     held = read_recordings(given.holdout, network) if given.holdout else ()
-    said = baselines(prepare(gearbox, train, held))
+    said = baselines(prepare(gearbox, train, held, even=True))
     given.output.write_text(json.dumps(said, indent=1, allow_nan=False) + "\n", encoding="utf-8")
 
 

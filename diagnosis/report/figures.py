@@ -9,10 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 from markupsafe import Markup
 
+from diagnosis.grid import stands_for
+from diagnosis.predict import rmse
 from diagnosis.report.chart import Chart, Curve, averaged, drawn
 from diagnosis.report.wording import LOSS, fixed, name, time_scale
 from diagnosis.result import Course, Diagnosis, Finding, MissingHeat
-from models.types import Array
 
 STAGES = (("as delivered", "before"), ("calibrated", "calibrated"), ("with what was found", "after"))
 SENSOR_PX, ERROR_PX, INPUT_PX = 190, 120, 90
@@ -63,9 +64,10 @@ def _panel(course: Course, title: str, noise: float, *, shows_after: bool) -> Pa
         unit = "W" if channel == LOSS else "K"
         runs = [(stage, look, getattr(course, look)[channel]) for stage, look in stages]
         counted = course.time >= course.counts_from_s
-        rmse = [_rmse((run - measured)[counted]) for _, _, run in runs]
+        weights = stands_for(course.time)[counted]
+        sizes = [float(rmse((run - measured)[counted, None], weights)[0]) for _, _, run in runs]
         # A definition of guesses as delivered is so far off that nothing else could be told apart beside it.
-        far = "before" if len(rmse) > 1 and rmse[0] > FAR * rmse[1] else ""
+        far = "before" if len(sizes) > 1 and sizes[0] > FAR * sizes[1] else ""
         curves = (Curve(label="measured", look="measured", x=time, y=measured, kind="points"),
                   *(Curve(label=stage, look=look, x=time, y=run, far=look == far)
                     for stage, look, run in runs))  # fmt: skip
@@ -81,17 +83,12 @@ def _panel(course: Course, title: str, noise: float, *, shows_after: bool) -> Pa
             errors = (Curve(label=f"noise (± {BAND_SD:g} sd)", look="noise", x=edges, y=np.full(2, BAND_SD * noise),
                             low=np.full(2, -BAND_SD * noise), kind="band"), *errors)  # fmt: skip
         below = Chart(title="Simulated less measured", x_label=label, y_label=f"Error in {unit}", x_range=span,
-                      note=f"RMSE {' → '.join(fixed(value) for value in rmse)} {unit}", shade=shade, height=ERROR_PX,
+                      note=f"RMSE {' → '.join(fixed(value) for value in sizes)} {unit}", shade=shade, height=ERROR_PX,
                       curves=errors, level=True)  # fmt: skip
         sensors.append((drawn(above), drawn(below)))
     told = f"{(course.time[-1] - course.time[0]) / seconds:.1f} {symbol}" if len(course.time) else ""
     return Panel(title=title, held_out=course.held_out, length=told, inputs=inputs,
                  sensors=tuple(sensors))  # fmt: skip
-
-
-def _rmse(error: Array) -> float:
-    known = error[np.isfinite(error)]
-    return float(np.sqrt(np.mean(known**2))) if len(known) else float("nan")
 
 
 def found_heat(finding: Finding) -> list[Markup]:
