@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from diagnosis.mapping import LOSS
@@ -24,7 +25,7 @@ INTERVAL_S = 20.0
 SAMPLES = 5  # of the inputs per interval, at which losses are computed: they are not linear in speed
 LONGEST = 5  # times INTERVAL_S: of an interval in which nothing happens
 CALM_SHARE = 0.5  # of the time since something happened, that an interval may last
-STEADY_INPUT = 0.02  # change from one interval to the next, of the usual size
+STEADY_INPUT, STEADY_AMBIENT_K = 0.01, 1.0  # range of the inputs inside an interval, of their usual size; and in K
 BEND_REACH = 3  # intervals to either side of a grid point, over which means are compared to see a temperature bend
 BEND_SDS, LEAST_BEND_K, LEAST_BEND_W = 6.0, 0.1, 2.0
 SHORTEST_PIECE = 5  # grid points
@@ -220,20 +221,26 @@ def _thinned(even: Array, time: Array, inputs: Mapping[str, Array], values: Mapp
     """
     if len(even) < SHORTEST_PIECE:
         return even
-    cell = np.clip(((time - time[0]) / INTERVAL_S).astype(int), 0, len(even) - 2)
-    happens = np.zeros(len(even) - 1, dtype=bool)
+    count = len(even) - 1
+    cell = np.clip(((time - time[0]) / INTERVAL_S).astype(int), 0, count - 1)
+    happens = np.zeros(count, dtype=bool)
+    longest = np.full(count, LONGEST)  # of the interval that begins there
     for name, rows in inputs.items():
-        if name != "T_ambient":  # it changes slowly, and samples inside the interval follow it
-            moved = np.abs(np.diff(_cell_means(rows, cell, len(happens)))) > STEADY_INPUT * np.percentile(abs(rows), 95)
-            happens[1:] |= moved
-            happens[:-1] |= moved
+        means = _cell_means(rows, cell, count)
+        allowed = STEADY_AMBIENT_K if name == "T_ambient" else STEADY_INPUT * float(np.percentile(np.abs(rows), 95))
+        moved = np.abs(np.diff(means)) > allowed
+        happens[1:] |= moved
+        happens[:-1] |= moved
+        for length in range(LONGEST, 1, -1):
+            windows = sliding_window_view(np.append(means, np.full(length - 1, means[-1])), length)
+            longest[np.ptp(windows, axis=-1) > allowed] = length - 1  # the shortest is the last to say so
     for name, rows in values.items():
-        happens |= _bends(_cell_means(rows, cell, len(happens)), LEAST_BEND_W if name == LOSS else LEAST_BEND_K)
+        happens |= _bends(_cell_means(rows, cell, count), LEAST_BEND_W if name == LOSS else LEAST_BEND_K)
     chosen, k, calm = [0], 0, 0
-    upcoming = np.append(np.flatnonzero(happens), len(happens))
-    while k < len(happens):
+    upcoming = np.append(np.flatnonzero(happens), count)
+    while k < count:
         ahead = int(upcoming[np.searchsorted(upcoming, k)]) - k  # intervals until something happens
-        length = max(1, min(int(CALM_SHARE * calm), LONGEST, ahead))
+        length = max(1, min(int(CALM_SHARE * calm), int(longest[k]), ahead))
         calm = calm + length if ahead else 0
         k += length
         chosen.append(k)

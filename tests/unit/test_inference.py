@@ -92,7 +92,7 @@ def model(fzg: Gearbox) -> NetworkOnGrid:
 @pytest.fixture(scope="module")
 def piece(model: NetworkOnGrid, ride: dict[str, Array], simulated: dict[str, Array]) -> Piece:
     channels = {n: simulated["P_loss_W" if n == "P_loss" else f"T_{n}_degC"] for n in CHANNELS}
-    (found,) = pieces([recording_of(ride, channels)], model.laws.inputs, CHANNELS)
+    (found,) = pieces([recording_of(ride, channels)], model.laws.inputs, CHANNELS, even=True)
     return found
 
 
@@ -103,9 +103,11 @@ def problem(fzg: Gearbox, model: NetworkOnGrid, piece: Piece) -> Problem:
     return Problem(model, [piece], unknowns_of(fzg.network(), CHANNELS), [noise], [start_guess(model, piece)])
 
 
+@pytest.mark.parametrize("even", [True, False])
 def test_trajectory_is_that_of_the_solver(
-    model: NetworkOnGrid, piece: Piece, ride: dict[str, Array], simulated: dict[str, Array]
+    model: NetworkOnGrid, ride: dict[str, Array], simulated: dict[str, Array], even: bool
 ) -> None:
+    (piece,) = pieces([recording_of(ride, {})], model.laws.inputs, (), even=even)
     found = simulate(model, piece, named_values(model.network), np.full(model.n, 25.0), rounds=8, settled_K=1e-4)
     for index, part in enumerate(model.parts):
         solved = np.interp(piece.time, ride["time_s"], simulated[f"T_{part}_degC"])
@@ -721,7 +723,8 @@ def test_what_remains_is_told_where_it_is_large_or_most_of_it(log_bayes: float, 
         return SimpleNamespace(log_bayes=log_bayes, mean=[np.full(9, heat_W)], node="oil")
 
     found: Any = SimpleNamespace(stages=[search.Stage(scored=(), log_e_value=0.0)])
-    case: Any = SimpleNamespace(loss_W=300.0)
+    train = SimpleNamespace(pieces=[SimpleNamespace(steps=np.full(9, 20.0))])
+    case: Any = SimpleNamespace(loss_W=300.0, train=train)
     _, note = assemble._remaining(found, [latent(1000.0, 80.0)], [latent(log_bayes, heat_W)], case, detected=True)
     assert says in note
 

@@ -1,0 +1,109 @@
+"""The working grid: fine where something happens, coarse where nothing does, and nothing lost by it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from diagnosis.grid import INTERVAL_S, LONGEST, SAMPLES, Piece, pieces, stands_for
+from diagnosis.recording import Channel, Recording
+from diagnosis.trajectory import NetworkOnGrid, free_running
+from models.gearbox import Gearbox
+from models.mechanisms import CATALOGUE, Scale
+from models.types import Array
+
+INPUTS = ("speed", "torque", "T_ambient", "air_speed")
+TIME = np.arange(0.0, 7201.0, 10.0)
+COARSE = LONGEST * INTERVAL_S
+
+
+def piece_of(
+    time: Array = TIME, *, speed: Array | float = 1500.0, oil: Array | None = None, even: bool = False
+) -> Piece:
+    inputs = {"speed": speed, "torque": 120.0, "T_ambient": 22.0, "air_speed": 2.0}
+    channels = () if oil is None else (Channel(name="oil", values=oil),)
+    recording = Recording(
+        name="made", path=Path("made.csv"), sha256="0" * 64, time=time, channels=channels,
+        inputs={name: np.broadcast_to(np.asarray(values, float), time.shape) for name, values in inputs.items()},
+        segments=(slice(0, len(time)),),
+    )  # fmt: skip
+    (found,) = pieces([recording], INPUTS, () if oil is None else ("oil",), even=even)
+    return found
+
+
+def step_at(piece: Piece, time: float) -> float:
+    return float(piece.steps[np.searchsorted(piece.time, time, side="right") - 1])
+
+
+def test_fine_where_the_operation_jumps() -> None:
+    piece = piece_of(speed=np.where(TIME < 3000.0, 1500.0, 2500.0))
+    assert step_at(piece, 2985.0) == step_at(piece, 3005.0) == step_at(piece, 3045.0) == INTERVAL_S
+    assert step_at(piece, 2500.0) == step_at(piece, 4000.0) == COARSE
+    assert piece.time[0] == 0.0
+    assert piece.time[-1] == 7200.0
+
+
+def test_a_drift_is_followed() -> None:
+    """Within an interval inputs change by a hundredth at most."""
+    speed = 1500.0 * (1.0 + 0.3 * np.sin(TIME / 1500.0))
+    piece = piece_of(speed=speed)
+    ranges = np.ptp(piece.samples[..., 0], axis=1)
+    longer = piece.steps > INTERVAL_S
+    assert longer.any()
+    assert ranges[longer].max() < 0.0125 * np.percentile(speed, 95)  # means over cells are compared, not rows
+
+
+def test_noise_is_no_event_and_a_corner_is_one() -> None:
+    rng = np.random.default_rng(0)
+    noise = rng.normal(0.0, 0.2, len(TIME))
+    drift = 40.0 + 20.0 * (1.0 - np.exp(-TIME / 4000.0))
+    assert len(piece_of(oil=drift + noise).steps) < len(TIME) / 2 / 4
+    corner = drift + np.maximum(TIME - 4000.0, 0.0) * 1.0 / 60.0  # a cooler that closes: 1 K/min from then on
+    assert step_at(piece_of(oil=corner + noise), 4005.0) == INTERVAL_S
+
+
+def test_measurements_are_those_of_the_rows_around() -> None:
+    """Of a straight line nothing is lost, however long the intervals beside a grid point are."""
+    piece = piece_of(speed=np.where(TIME < 3000.0, 1500.0, 2500.0), oil=30.0 + TIME / 300.0)
+    assert len(set(piece.steps)) > 2
+    np.testing.assert_allclose(piece.measured[1:-1, 0], 30.0 + piece.time[1:-1] / 300.0, atol=1e-9)
+    assert piece.counts.sum() == len(TIME)
+
+
+def test_time_that_grid_points_stand_for() -> None:
+    piece = piece_of(speed=np.where(TIME < 3000.0, 1500.0, 2500.0))
+    assert stands_for(piece.time).sum() == pytest.approx(7200.0)
+    assert piece_of(even=True).steps.tolist() == [INTERVAL_S] * 360
+
+
+def test_finer_has_the_same_inputs() -> None:
+    speed = np.where(TIME < 3000.0, 1500.0, 2500.0) + TIME / 100.0
+    piece = piece_of(speed=speed)
+    fine, at = piece.finer()
+    assert set(fine.steps) == {INTERVAL_S}
+    np.testing.assert_array_equal(fine.time[at], piece.time)
+    for k in range(len(piece.steps)):
+        assert fine.inputs[at[k] : at[k + 1], 0].mean() == pytest.approx(piece.inputs[k, 0])
+    slow = piece_of(np.arange(0.0, 60001.0, 600.0))
+    fine, at = slow.finer()
+    assert set(np.diff(at)) == {SAMPLES}
+    np.testing.assert_allclose(fine.steps, 600.0 / SAMPLES)
+
+
+def test_switches_run_free_as_on_an_even_grid(fzg: Gearbox) -> None:
+    (placed,) = CATALOGUE["cooler_thermostat"].placed(fzg.network(), Scale.of(fzg, speed=1500.0, torque=120.0))
+    model = NetworkOnGrid(placed.apply(fzg.network()), fzg.losses())
+    values = model.start.copy()
+    for name, value in (("strength", 25.0), ("set_point", 45.0)):
+        values[[p.name for p in model.network.parameters].index(f"{placed.label}_{name}")] = value
+    time = np.arange(0.0, 14401.0, 10.0)
+    coarse, even = piece_of(time), piece_of(time, even=True)
+    assert len(coarse.steps) < len(even.steps) / 4
+    oil = model.parts.index("oil")
+    found, expected = (free_running(model, p, values, np.full(model.n, 25.0)) for p in (coarse, even))
+    switched = np.abs(np.diff(expected.memory[:, model.switches[0]])).sum()
+    assert switched > 4  # on and off, again and again
+    differences = found.T[:, oil] - np.interp(coarse.time, even.time, expected.T[:, oil])
+    assert np.abs(differences).max() < 0.25
