@@ -12,6 +12,7 @@ from models.terms import Term
 from models.types import Array
 
 SCHEMA = 1
+FAR_SD, MOST_FAR = 3.0, 3  # standard deviations of a prior, beyond which the summary tells of a parameter; how many
 Verdict = Literal[
     "consistent", "parameter_error", "missing_physics", "sensor_fault", "unexplained", "insufficient_data"
 ]
@@ -370,6 +371,10 @@ class Diagnosis:
                     f"RMSE {name}: {fits.before:.2f} K as delivered, {fits.calibrated:.2f} K calibrated, "
                     f"{fits.after:.2f} K with what was found (noise {self.noise_K:.2f} K)"
                 )
+        far = sorted((c for c in self.calibration if abs(c.shift_in_sd) > FAR_SD), key=lambda c: -abs(c.shift_in_sd))
+        if far:
+            told = ", ".join(f"{c.parameter} = {c.value:.3g} ({abs(c.shift_in_sd):.1f} sd)" for c in far[:MOST_FAR])
+            lines.append(f"Far from what the definition expects: {told}")
         if self.remaining_note:
             lines.append(f"Remaining: {self.remaining_note}")
         if self.next_test:

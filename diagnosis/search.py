@@ -355,6 +355,8 @@ def _matters(case: Case, fit: Explanation, h: Hypothesis, times: float = 1.0) ->
         return True
     values = fit.values_of(h)
     given = np.array([values[p.name][0] for p in h.term.parameters])
+    if h.term.form == "clock" and abs(given[0]) < times * case.scale.interval:
+        return False  # what a row stands for, the time before its stamp or after it, is not known either
     model, term = fit.problem.model, TermOnGrid(fit.problem.model, h.term)
     changes = []
     for part in fit.fit.parts:

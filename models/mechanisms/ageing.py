@@ -25,13 +25,16 @@ run_in_flanks = Mechanism(
     kind="loss_factor",
     places=("mesh_sliding",),
     parameters=lambda scale: (
-        strength(0.2, description="relative change of the sliding loss, flanks new"),
+        strength(0.2, description="relative change of the sliding loss, flanks new and speed low"),
         _life(scale),
+        plain("film", 3.0, sd=3.0, lower=0.0, upper=20.0, grid=(0.0, 6.0)),
     ),
     states=(Memory(name="worn", rate=lambda s: s.n / s.life),),
-    law=lambda s: s.strength * sp.exp(-s.worn),
-    says="New flanks are still rough: sliding friction starts higher and falls with the revolutions run.",
-    reference="Sjoeberg 2010, Sosa 2017: roughness falls with the first revolutions; the exponential form is ours",
+    law=lambda s: s.strength * sp.exp(-s.worn) / (1.0 + s.film * s.n),
+    says="New flanks are still rough: sliding friction starts higher, most of all where the film is thin, and falls "
+    "with the revolutions run.",
+    reference="Sjoeberg 2010, Sosa 2017: roughness falls with the first revolutions; the exponential form is ours, and "
+    "so is how the film, which grows with speed, hides roughness",
     experiment=REPEAT,
     separate_by={"run_in_seals": "repeat without load: run-in of the flanks shows under torque only"},
 )
@@ -92,11 +95,13 @@ gear_wear = Mechanism(
     parameters=lambda _: (
         strength(0.2, description="relative change after the reference duration at reference speed and torque"),
         plain("exponent", 1.0, sd=0.3, lower=0.3, upper=2.5),
+        plain("speed_exponent", 0.5, sd=0.4, lower=0.0, upper=1.5, grid=(0.0, 1.0)),
     ),
-    states=(Memory(name="worn", rate=lambda s: s.n * s.m / s.duration_ref),),
+    states=(Memory(name="worn", rate=lambda s: sp.tanh(RUNNING * s.n) * s.n**s.speed_exponent * s.m / s.duration_ref),),
     law=lambda s: s.strength * sp.Max(s.worn, 0.0) ** s.exponent,
     says="The flanks wear or pit: sliding friction grows with the work done.",
-    reference="Archard: wear ~ load times sliding distance; its effect on friction is a hypothesis",
+    reference="Archard: wear ~ load times sliding distance; its effect on friction is a hypothesis, and so is that it "
+    "goes with a power of speed between loaded hours (0) and loaded revolutions (1)",
     experiment=REPEAT + "; look at the flanks",
     separate_by={"oil_ageing": "change the oil and repeat: wear stays"},
 )

@@ -1,0 +1,49 @@
+"""The few lines that a terminal or a notebook shows of a diagnosis."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from diagnosis.result import VERDICT_TEXT
+from tests.unit.diagnosis_example import consistent, missing_physics, two_effects
+
+
+def test_what_was_found_where_and_how_well_it_fits() -> None:
+    lines = missing_physics().summary()
+    assert lines[0] == f"missing physics: {VERDICT_TEXT['missing_physics']}"
+    assert "[windage at oil, probability 0.9" in lines[1]
+    assert "strength = 18.43 ± 1.1 W" in lines[2]
+    assert any(line.strip().startswith("not ruled out: pocketing at ") for line in lines)
+    assert "Where: oil (0.96); speed above 2900 1/min" in lines
+    assert "RMSE held-out: 5.21 K as delivered, 3.62 K calibrated, 0.52 K with what was found (noise 0.20 K)" in lines
+    assert lines[-1].startswith("Next: Hold 20 m/s")
+    assert len(lines) <= 10
+
+
+def test_two_effects_are_both_told() -> None:
+    told = str(two_effects())
+    assert "[cooler_thermostat at oil" in told
+    assert "[bearing_seat_contact at bearing_1_housing" in told
+
+
+def test_consistent_names_no_place() -> None:
+    lines = consistent().summary()
+    assert lines[0] == f"consistent: {VERDICT_TEXT['consistent']}"
+    assert not any(line.startswith("Where:") for line in lines)
+
+
+def test_parameters_far_from_their_priors_are_told_the_farthest_first() -> None:
+    usual = consistent()
+    assert not any(line.startswith("Far from") for line in usual.summary())  # all within 2.6 sd
+    seal, bearing, *rest = usual.calibration
+    far = (replace(bearing, parameter="bearing", value=1.9, shift_in_sd=3.2),
+           replace(seal, parameter="seal", value=0.319, shift_in_sd=-4.57))  # fmt: skip
+    lines = replace(usual, calibration=(*far, *rest)).summary()
+    assert "Far from what the definition expects: seal = 0.319 (4.6 sd), bearing = 1.9 (3.2 sd)" in lines
+
+
+def test_a_notebook_shows_the_same_lines_escaped() -> None:
+    found = replace(missing_physics(), next_test="hold <20> m/s & wait")
+    shown = found._repr_html_()
+    assert "hold &lt;20&gt; m/s &amp; wait" in shown
+    assert shown.count("<li>") == len(found.summary()) - 1
