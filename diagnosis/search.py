@@ -292,8 +292,10 @@ def _judged(case: Case, calibrated: Explanation, base: Explanation, floor: float
     """A look with what of its fits is accepted.
 
     What is too small to matter is accepted only to clear the way, as long as nothing that matters was found. What the
-    held-out recordings refuse before is no rival of what is accepted. Where another strong effect is still missing, the
-    first one may make their error larger although it makes them far more probable: that one is accepted tentatively.
+    held-out recordings refuse before is no rival of what is accepted; what the training data hold for much less likely
+    than that is accepted only where the held-out recordings themselves speak for it. Where another strong effect is
+    still missing, the first one may make their error larger although it makes them far more probable: that one is
+    accepted tentatively.
     """
     judge = Judge(case, base, floor)
     probabilities = stage.probabilities()
@@ -310,7 +312,8 @@ def _judged(case: Case, calibrated: Explanation, base: Explanation, floor: float
         fit = replace(fit, fit=fit.problem.at(fit.fit))
         large = _matters(case, fit, fit.found[-1], 1.0 if gain > CERTAIN else 2.0)
         matters = matters or large
-        if by_name[fit.found[-1].name] < LEAST_SHARE * probabilities[0]:
+        unlikely = by_name[fit.found[-1].name] < LEAST_SHARE * probabilities[0]
+        if unlikely and judge.gain(fit) < SECOND_GAIN:
             continue
         if not large and cleared:
             note = "what the data show is too small to matter"
