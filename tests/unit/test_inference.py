@@ -598,6 +598,11 @@ def test_a_clock_may_be_early_or_late(fzg: Gearbox, piece: Piece, problem: Probl
     found = refined(rough)
     # Late readings and slow sensors look alike: part of it goes into their lags.
     assert found.values_of(scored.hypothesis)[placed.strength.name][0] == pytest.approx(late_s, abs=20.0)
+    # What a row stands for, the time before its stamp or after it, is not known either.
+    found = replace(found, fit=found.problem.at(found.fit))
+    for interval, matters in ((10.0, True), (150.0, False)):
+        case: Any = SimpleNamespace(scale=SimpleNamespace(interval=interval), channels=CHANNELS, loss_W=250.0)
+        assert search._matters(case, found, scored.hypothesis) is matters
 
 
 def test_a_distorted_calibration_is_also_seen_from_the_middle_of_the_priors(problem: Problem) -> None:
@@ -766,6 +771,24 @@ def test_a_first_effect_whose_error_another_one_hides_stands_only_beside_that_on
         found = search.search(nothing, {})
         assert [h.name for h in found.final.found] == [h.name for h, _ in found.findings] == names
         assert found.detected and (found.final is base) == (not names)
+
+
+@pytest.mark.parametrize(("heldout_gain", "named"), [(11.0, "heater"), (9.0, None)])
+def test_what_is_unlikely_is_named_after_a_refusal_only_where_held_out_recordings_speak_for_it(
+    monkeypatch: pytest.MonkeyPatch, heldout_gain: float, named: str | None
+) -> None:
+    nothing: Any = SimpleNamespace(at=lambda fit: fit)
+    best, other = (
+        Explanation(problem=nothing, fit=nothing, log_evidence=0.0, found=(_scored(n, "oil", 0.0).hypothesis,))
+        for n in ("open form, standstill", "heater")
+    )
+    monkeypatch.setattr(search, "Judge", lambda *_: SimpleNamespace(gain=lambda _: heldout_gain))
+    monkeypatch.setattr(search, "_matters", lambda *_: True)
+    monkeypatch.setattr(search, "_holds_out", lambda _judge, _calibrated, fit: fit.found == other.found)
+    stage = search.Stage(scored=(), log_e_value=170.0, fits=(best, other), gains=(204.0, 193.0))
+    assert stage.probabilities()[1] < search.LEAST_SHARE * stage.probabilities()[0]
+    accepted = search._judged(nothing, replace(best, found=()), replace(best, found=()), 1.0, stage, 10.0).accepted
+    assert (accepted.found[-1].name if accepted is not None else None) == named
 
 
 def test_what_one_place_found_is_tried_at_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
