@@ -137,7 +137,7 @@ bearing_preload = Mechanism(
     name="bearing_preload",
     family=FAMILY_LOAD,
     kind="loss_factor",
-    places=("factor bearing", "each bearings"),
+    places=("factor bearing", "each shafts>bearings", "each bearings"),
     parameters=lambda _: (
         strength(0.3, description="relative change of the bearing loss per 10 K beyond the threshold"),
         plain("threshold", 15.0, sd=12.0, lower=-10.0, upper=80.0, unit="K", grid=(0.0, 8.0, 16.0, 24.0, 32.0)),

@@ -5,8 +5,8 @@ A pattern is a name, a group (its members together), or ``each`` and a group (on
 - source, link: nodes. ``oil``, ``housing``, ``each bearings``; of a link also both ends, ``each bearings-returns``,
   the other one a boundary or a group of one
 - loss_factor: sources. ``losses``, all that are mechanical; ``mesh_sliding``; the losses in a group of nodes,
-  ``each bearings``; those that a factor of the network multiplies, ``factor seal``; several together,
-  ``mesh_sliding+mesh_rolling``
+  ``each bearings``; those in the nodes of a group that hang on one member of another, ``each shafts>bearings``; those
+  that a factor of the network multiplies, ``factor seal``; several together, ``mesh_sliding+mesh_rolling``
 - link_factor: links by their ends. ``oil-housing``, ``each bearings-housing``, ``oil-gears+oil-housing``
 - signal: an input. ``torque``
 - sensor: measured channels. ``each sensor`` (temperatures and total loss), ``each thermometer``, ``clock``, ``pair``
@@ -67,6 +67,8 @@ def spots(network: ThermalNetwork, kind: Kind, pattern: str, channels: Sequence[
     >>> network = load_gearbox("fzg").network()
     >>> [spot.target for spot in spots(network, "link_factor", "each bearings-housing", ())][0]
     ('bearing_1-housing_lower', 'bearing_1-housing_upper')
+    >>> [spot.target for spot in spots(network, "loss_factor", "each shafts>bearings", ())]
+    [('bearing_1', 'bearing_2'), ('bearing_3', 'bearing_4')]
     """
     if kind in ("source", "link"):
         found = _nodes(network, pattern)
@@ -107,6 +109,10 @@ def _nodes(network: ThermalNetwork, pattern: str) -> Iterator[Spot]:
 
 def _sources(network: ThermalNetwork, pattern: str) -> Iterator[Spot]:
     each, rest = _apart(pattern)
+    holder, carries, held = rest.partition(">")
+    if each and carries:
+        yield from _held(network, holder, held)
+        return
     wanted = rest.split("+")
     chosen = [
         source
@@ -125,6 +131,16 @@ def _sources(network: ThermalNetwork, pattern: str) -> Iterator[Spot]:
         name = "_".join(name.removeprefix(FACTOR) for name in wanted)
         nodes = tuple(dict.fromkeys(source.node for source in chosen))
         yield Spot(name=name, target=tuple(source.name for source in chosen), here=nodes)
+
+
+def _held(network: ThermalNetwork, holder: str, held: str) -> Iterator[Spot]:
+    """One place per member of `holder`: the losses in those nodes of `held` that share a link with it, if several."""
+    for member in _members(network, holder):
+        beside = {node for link in network.links if member in link.nodes for node in link.nodes}
+        nodes = tuple(node for node in _members(network, held) if node in beside)
+        target = tuple(source.name for source in network.sources if source.is_loss and source.node in nodes)
+        if len(target) > 1:
+            yield Spot(name=f"{held}_of_{member}", target=target, here=nodes)
 
 
 def _links(network: ThermalNetwork, pattern: str) -> Iterator[Spot]:
