@@ -8,6 +8,7 @@ from typing import Any
 import sympy as sp
 
 from models.laws import Parameter
+from models.mechanisms.mechanism import Memory
 from models.mechanisms.scale import Scale
 
 LARGEST = 100.0  # strength, in standard deviations of its prior
@@ -15,6 +16,7 @@ SMALLEST_FACTOR = -0.95  # of a relative change: a loss or conductance never tur
 DURING = (0.01, 0.03, 0.08, 0.2, 0.4, 0.55, 0.7, 0.85)  # of a recording: where a search for a moment starts
 RUNNING = 20.0  # sharpness of what begins with the shafts: from about a tenth of the reference speed it is all there
 ONCE = 6.0  # durations of a recording, after which what happened once would come again
+SOFT_K = 0.3  # width of a switch that is seen in means over minutes
 EDGE_S = 120.0  # half of the time that damage or an oil change takes to come
 
 
@@ -84,14 +86,29 @@ def hysteresis(value: Any, state: Any, *, at: Any, band: Any, above: float) -> s
     return sp.Piecewise((above, value - at - band / 2 > 0), (1.0 - above, value - at + band / 2 < 0), (state, True))
 
 
-def soft_hysteresis(value: Any, state: Any, *, at: Any, band: Any, width: float) -> sp.Expr:
+def soft_hysteresis(value: Any, state: Any, *, at: Any, band: Any, above: float, width: float) -> sp.Expr:
     """A two-point switch around `at` that does not switch at a point but within about four `width` of it.
 
     For means over minutes, in which the moment of switching is not seen.
     """
-    on = (1.0 + sp.tanh((value - at - band / 2) / width)) / 2.0
-    off = (1.0 - sp.tanh((value - at + band / 2) / width)) / 2.0
+    high = (1.0 + sp.tanh((value - at - band / 2) / width)) / 2.0
+    low = (1.0 - sp.tanh((value - at + band / 2) / width)) / 2.0
+    on, off = (high, low) if above else (low, high)
     return state + (1.0 - state) * on - state * off
+
+
+def two_point(name: str, *, reads: str = "T_oil", above: float = 1.0) -> Memory:
+    """What a two-point control around `set_point` remembers: `above` beyond its `band`, ``1 - above`` below it."""
+
+    def control(s: Any) -> dict[str, Any]:
+        return {"value": getattr(s, reads), "state": getattr(s, name), "at": s.set_point, "band": s.band,
+                "above": above}  # fmt: skip
+
+    return Memory(
+        name=name,
+        update=lambda s: hysteresis(**control(s)),
+        blurred=lambda s: soft_hysteresis(**control(s), width=SOFT_K),
+    )
 
 
 def share_between(scale: Scale, share: float) -> float:

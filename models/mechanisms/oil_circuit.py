@@ -10,16 +10,15 @@ from models.laws import Parameter
 from models.mechanisms.forms import (
     EDGE_S,
     RUNNING,
-    hysteresis,
     moment,
     plain,
     positive,
     rises,
     share_between,
-    soft_hysteresis,
     steps,
     strength,
     temperature,
+    two_point,
 )
 from models.mechanisms.mechanism import Mechanism, Memory
 from models.mechanisms.scale import Scale
@@ -27,7 +26,6 @@ from models.mechanisms.scale import Scale
 FAMILY = "oil circuit"
 PAST_SET_POINT = "heat up slowly at constant load past the suspected set-point, then hold"
 RETURN = "measure the oil where it enters and leaves the gearbox"
-SOFT_K = 0.3  # a switch that is seen in means over minutes
 SET_POINTS = (0.35, 0.45, 0.55, 0.65, 0.75, 0.85, 0.95, 1.1)  # of the way from ambient to the hot oil
 
 
@@ -56,9 +54,7 @@ cooler_thermostat = Mechanism(
     other="coolant",
     other_temperature=lambda s: s.coolant,
     parameters=lambda scale: (_cooler(scale), _set_point(scale), _band(), _coolant(scale)),
-    states=(
-        Memory(name="valve", update=lambda s: hysteresis(s.T_oil, s.valve, at=s.set_point, band=s.band, above=1.0)),
-    ),
+    states=(two_point("valve"),),
     law=lambda s: s.strength * s.valve,
     says="A thermostat sends the oil through a cooler above a set temperature, and back below a lower one.",
     reference="two-point control; 6 W/K above 80 degC on the FZG rig",
@@ -203,9 +199,7 @@ heater_thermostat = Mechanism(
         ),
         _band(),
     ),
-    states=(
-        Memory(name="heating", update=lambda s: hysteresis(s.T_oil, s.heating, at=s.set_point, band=s.band, above=0.0)),
-    ),
+    states=(two_point("heating", above=0.0),),
     law=lambda s: s.strength * s.heating * sp.exp(-RUNNING * s.n),
     says="An electric heater keeps the oil warm while the gearbox stands.",
     reference="two-point control",
@@ -256,13 +250,7 @@ cooler_air_thermostat = Mechanism(
         _set_point(scale),
         positive("band", 6.0, sd=0.5, unit="K", grid=(3.0, 5.0, 8.0)),
     ),
-    states=(
-        Memory(
-            name="valve",
-            update=lambda s: hysteresis(s.T_oil, s.valve, at=s.set_point, band=s.band, above=1.0),
-            blurred=lambda s: soft_hysteresis(s.T_oil, s.valve, at=s.set_point, band=s.band, width=SOFT_K),
-        ),
-    ),
+    states=(two_point("valve"),),
     law=lambda s: s.strength * s.valve,
     says="A thermostat or fan sends the returning oil through an air cooler above a set oil temperature, and past it "
     "below a lower one ({place}).",

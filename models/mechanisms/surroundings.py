@@ -7,7 +7,6 @@ from typing import Any
 import sympy as sp
 
 from models.mechanisms.forms import (
-    hysteresis,
     length,
     moment,
     period,
@@ -16,8 +15,9 @@ from models.mechanisms.forms import (
     share_between,
     strength,
     temperature,
+    two_point,
 )
-from models.mechanisms.mechanism import Mechanism, Memory
+from models.mechanisms.mechanism import Mechanism
 
 FAMILY = "surroundings"
 HOUR_S = 3600.0
@@ -84,11 +84,7 @@ fan_thermostat = Mechanism(
         ),
         positive("band", 6.0, sd=0.5, unit="K", grid=(3.0, 8.0)),
     ),
-    states=(
-        Memory(
-            name="blowing", update=lambda s: hysteresis(s.T_here, s.blowing, at=s.set_point, band=s.band, above=1.0)
-        ),
-    ),
+    states=(two_point("blowing", reads="T_here"),),
     law=lambda s: s.strength * s.blowing,
     says="A fan switches on when the housing is warm and off when it is cooler.",
     reference="two-point control; a fan doubles to triples the conductance to air",
