@@ -21,7 +21,8 @@ from diagnosis.trajectory import NetworkOnGrid, Trajectory
 from models.types import Array
 
 FIRST_ITERATIONS, ROUGH_ITERATIONS, ITERATIONS = 4, 3, 10
-RACE_SHARE, RACE_LEAD = 0.15, 15.0  # of the best gain, and log evidence: who is further behind can no longer win
+RACE_SHARE, RACE_LEAD = 0.15, 15.0  # of the best gain, and log evidence: who is further behind can no longer win ...
+RACERS = 3  # ... but for the best few where a strong effect has bent the calibration: rough fits tell little there
 DISTRESS, SLOW_SENSOR = 2.5, 1.3  # standard deviations: of a parameter, and of a sensor's lag
 START_SHARES = (0.6, 0.3, 0.1)
 AS_PROMISED = 0.8
@@ -301,11 +302,13 @@ def best_fits(base: Explanation, chosen: Sequence[tuple[Explanation, Scored]], *
         if found is not None:
             label = found.found[-1].label
             by_label[label] = max(found, by_label.get(label, found), key=lambda e: e.log_evidence)
-    rough = list(by_label.values())
+    rough = sorted(by_label.values(), key=lambda e: -e.log_evidence)
     gains = [e.log_evidence - base.log_evidence for e in rough]
     least = (1.0 - RACE_SHARE) * max(gains, default=0.0) - RACE_LEAD
-    racing = [e for e, gain in zip(rough, gains, strict=True) if gain >= least]
-    beaten = [e for e, gain in zip(rough, gains, strict=True) if gain < least]
+    count = sum(gain >= least for gain in gains)
+    if distorted(base) and not base.problem.slow:
+        count = max(count, RACERS)
+    racing, beaten = rough[:count], rough[count:]
     done = spread(jobs, [delayed(refined)(e) for e in racing])
     return sorted(_elsewhere([*done, *beaten], jobs), key=lambda e: -e.log_evidence)
 

@@ -29,6 +29,8 @@ STEADY_INPUT, STEADY_AMBIENT_K = 0.01, 1.0  # range of the inputs inside an inte
 BEND_REACH = 3  # intervals to either side of a grid point, over which means are compared to see a temperature bend
 BEND_SDS, LEAST_BEND_K, LEAST_BEND_W = 6.0, 0.1, 2.0
 SHORTEST_PIECE = 5  # grid points
+FORGOTTEN = 1e-15  # share of an older reading in a lagged one
+FREE_S = 5.0  # length of intervals in which switches run free
 SLOW_S = 60.0  # rows further apart are means that hide what switches do, see :class:`Piece`
 
 
@@ -66,14 +68,23 @@ class Piece:
     counts: Array
     slow: bool = False
     guided: bool = False
+    lags: Array | None = None
 
     @cached_property
     def steps(self) -> Array:
         """Lengths of the intervals, shape (K,), [s]."""
         return np.diff(self.time)
 
+    def until(self, time: float) -> Piece:
+        """The same up to a time [s], one interval at least."""
+        count = max(int(np.searchsorted(self.time, time, side="right")), 2)
+        return replace(
+            self, time=self.time[:count], samples=self.samples[: count - 1], measured=self.measured[:count],
+            counts=self.counts[:count],
+        )  # fmt: skip
+
     def finer(self) -> tuple[Piece, NDArray[np.intp]]:
-        """The same in intervals of about :data:`INTERVAL_S`, or as long as the samples of the inputs lie apart.
+        """The same in intervals of about :data:`FREE_S`; of slow rows, as long as the samples of the inputs lie apart.
 
         Returns
         -------
@@ -85,7 +96,7 @@ class Piece:
         most = self.samples.shape[1]
         parts = np.full(len(self.steps), most)
         if not self.slow:
-            parts = np.clip(np.rint(self.steps / INTERVAL_S), 1, most).astype(int)
+            parts = np.maximum(np.rint(self.steps / FREE_S), 1).astype(int)
         at = np.concatenate([[0], np.cumsum(parts)])
         owner = np.repeat(np.arange(len(parts)), parts)
         place, count = np.arange(at[-1]) - at[owner], parts[owner]
@@ -94,7 +105,7 @@ class Piece:
         nothing = np.empty((len(time), 0))
         fine = replace(
             self, time=time, samples=self.samples[owner[:, None], inside.astype(int)], channels=(), measured=nothing,
-            counts=nothing, guided=False,
+            counts=nothing, guided=False, lags=None,
         )  # fmt: skip
         return fine, at
 
@@ -107,15 +118,21 @@ class Piece:
             Simulated, at the grid points, [degC]
         parts : sequence of str
         """
-        measured = self.guide(parts)
+        measured = self.guide(T, parts)
         return np.where(np.isfinite(measured), measured, T)
 
-    def guide(self, parts: Sequence[str]) -> Array:
-        """What was measured of the parts where the piece is guided, else NaN; shape (K + 1, parts), [degC]."""
+    def guide(self, T: Array, parts: Sequence[str]) -> Array:
+        """What the parts had where that was measured and the piece is guided, else NaN; shape (K + 1, parts), [degC].
+
+        Of what a sensor lags behind, the simulated temperatures tell; see :meth:`seen`.
+        """
         found = np.full((len(self.time), len(parts)), np.nan)
         for index, name in enumerate(self.channels):
             if self.guided and name in parts:
-                found[:, list(parts).index(name)] = _sharpened(self.measured[:, index], self.steps)
+                at = list(parts).index(name)
+                found[:, at] = _sharpened(self.measured[:, index], self.steps)
+                if self.lags is not None:
+                    found[:, at] += T[:, at] - lagged(T[:, at], self.steps, float(self.lags[index]))
         return found
 
     @cached_property
@@ -207,6 +224,38 @@ def stands_for(time: Array) -> Array:
     return np.asarray(np.diff(np.concatenate([time[:1], 0.5 * (time[1:] + time[:-1]), time[-1:]])))
 
 
+def lagged(values: Array, steps: Array, lag: float) -> Array:
+    """A first-order lag, exact for straight lines between the points.
+
+    Parameters
+    ----------
+    values : Array, shape (K + 1, ...)
+    steps : Array, shape (K,)
+        [s]
+    lag : float
+        Time constant, [s]
+
+    Returns
+    -------
+    Array, shape (K + 1, ...)
+        Starting at the first value
+    """
+    if lag <= 0.0:
+        return values
+    decays = np.exp(-steps / lag)
+    shares = (lag * (1.0 - decays) / steps).reshape(-1, *[1] * (values.ndim - 1))
+    result = np.array(values, dtype=float)
+    result[1:] = (shares - decays.reshape(shares.shape)) * values[:-1] + (1.0 - shares) * values[1:]
+    # y[k] = a[k] y[k-1] + b[k], by doubling how far back every row has been followed, until nothing is left of it.
+    left, reach = np.append(0.0, decays).reshape(-1, *shares.shape[1:]), 1
+    while reach < len(result) and float(left.max()) > FORGOTTEN:
+        result[reach:] += left[reach:] * result[:-reach]
+        left[reach:] = left[reach:] * left[:-reach]
+        left[:reach] = 0.0
+        reach *= 2
+    return result
+
+
 def _thinned(even: Array, time: Array, inputs: Mapping[str, Array], values: Mapping[str, Array]) -> Array:
     """Grid points without those that lie amidst a calm.
 
@@ -266,8 +315,9 @@ def _bends(means: Array, least: float) -> NDArray[np.bool_]:
     total = np.concatenate([[0.0], np.cumsum(means)])
     box = (total[width:] - total[:-width]) / width
     bend = np.abs(box[2 * width :] + box[: -2 * width] - 2.0 * box[width:-width])
-    usual = 1.4826 * float(np.median(bend))
-    at = np.flatnonzero(bend > max(BEND_SDS * usual, least))
+    # The noise of one cell from its second differences, which a saw of slopes leaves alone but for its few corners.
+    noise = 1.4826 * float(np.median(np.abs(np.diff(means, 2)))) / np.sqrt(6.0)
+    at = np.flatnonzero(bend > max(BEND_SDS * noise * np.sqrt(6.0 / width), least))
     result[at + width + BEND_REACH] = True
     return result
 

@@ -6,11 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from diagnosis.grid import lagged
 from diagnosis.mapping import LOSS
 from diagnosis.trajectory import NetworkOnGrid, Trajectory
 from models.types import Array
-
-FORGOTTEN = 1e-15  # share of an older reading in a lagged one
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,38 +77,6 @@ def reading_columns(
 def total_at_points(loss: Array) -> Array:
     """From the middles of the intervals to the grid points, shape (K, ...) to (K + 1, ...)."""
     return np.concatenate([loss[:1], 0.5 * (loss[1:] + loss[:-1]), loss[-1:]])
-
-
-def lagged(values: Array, steps: Array, lag: float) -> Array:
-    """A first-order lag, exact for straight lines between the points.
-
-    Parameters
-    ----------
-    values : Array, shape (K + 1, ...)
-    steps : Array, shape (K,)
-        [s]
-    lag : float
-        Time constant, [s]
-
-    Returns
-    -------
-    Array, shape (K + 1, ...)
-        Starting at the first value
-    """
-    if lag <= 0.0:
-        return values
-    decays = np.exp(-steps / lag)
-    shares = (lag * (1.0 - decays) / steps).reshape(-1, *[1] * (values.ndim - 1))
-    result = np.array(values, dtype=float)
-    result[1:] = (shares - decays.reshape(shares.shape)) * values[:-1] + (1.0 - shares) * values[1:]
-    # y[k] = a[k] y[k-1] + b[k], by doubling how far back every row has been followed, until nothing is left of it.
-    left, reach = np.append(0.0, decays).reshape(-1, *shares.shape[1:]), 1
-    while reach < len(result) and float(left.max()) > FORGOTTEN:
-        result[reach:] += left[reach:] * result[:-reach]
-        left[reach:] = left[reach:] * left[:-reach]
-        left[:reach] = 0.0
-        reach *= 2
-    return result
 
 
 def lag_column(trajectory: Trajectory, node: int, lag: float) -> Array:

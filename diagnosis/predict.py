@@ -12,13 +12,14 @@ import numpy as np
 
 from diagnosis.grid import Piece, stands_for
 from diagnosis.mapping import LOSS
-from diagnosis.observation import reading_columns, readings
+from diagnosis.observation import Sensors, reading_columns, readings
 from diagnosis.posterior import Problem
 from diagnosis.trajectory import Trajectory, free_running, simulate
 from models.types import Array
 
 START_S = 600.0
-START_ROUNDS = 3
+START_ROUNDS, START_SETTLED_K = 3, 0.01
+SETTLED_K = 0.02
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -67,44 +68,62 @@ def predict(problem: Problem, index: int, z: Array, *, as_delivered: bool = Fals
     model, piece = problem.model, problem.pieces[index]
     span = float(piece.time[-1] - piece.time[0])
     counts_from = float(piece.time[0]) + min(START_S, 0.2 * span)
-    early = piece.time <= counts_from
-    before = start = np.array(problem.starts[index])
-    prior = problem.noise[index].start_sd
+    sensors = problem.unknowns.sensors(piece.channels, z)
+    if as_delivered:
+        sensors = sensors.ideal()
+    start = _start(problem, index, z, sensors, counts_from, as_delivered=as_delivered)
+    try:
+        trajectory = _free_run(problem, index, z, start)
+    except ArithmeticError:  # what the first minutes ask of it leads nowhere
+        trajectory = _free_run(problem, index, z, problem.starts[index])
+    read = readings(model, trajectory, sensors) if as_delivered else problem.read(trajectory, sensors, z)
+    return Prediction(piece=piece, trajectory=trajectory, read=read, counts_from=counts_from)
+
+
+def _free_run(problem: Problem, index: int, z: Array, start: Array) -> Trajectory:
+    """The trajectory of a whole piece that nothing measured guides."""
+    model, values = problem.model, problem.unknowns.network_values(problem.model.network, z)
     trajectory: Trajectory | None = None
-    switching = any(state.update is not None for state in model.network.states)
+    follows = any(term.kind == "signal" for term in problem.terms)  # an input that is shifted by temperatures
+    for _ in range(2 if follows else 1):
+        piece = replace(problem.adjusted(index, z, trajectory), guided=False)
+        if any(state.update is not None for state in model.network.states):
+            trajectory = free_running(model, piece, values, start)
+        else:
+            trajectory = simulate(model, piece, values, start, guess=trajectory, settled_K=SETTLED_K)
+    assert trajectory is not None  # noqa: S101 - one run at least
+    return trajectory
+
+
+def _start(
+    problem: Problem, index: int, z: Array, sensors: Sensors, until: float, *, as_delivered: bool
+) -> Array:  # fmt: skip
+    """Start temperatures of all parts, [degC]: as probable as can be by what the first minutes show."""
+    model, start = problem.model, np.array(problem.starts[index])
+    early = problem.changed(pieces=[piece.until(until) if i == index else piece
+                                    for i, piece in enumerate(problem.pieces)])  # fmt: skip
+    piece, noise = early.pieces[index], problem.noise[index]
+    temperatures = [i for i, name in enumerate(piece.channels) if name != LOSS]
+    seen = np.isfinite(piece.measured[:, temperatures])
+    sd, precision = noise.channel_sd[temperatures], np.diag(1.0 / noise.start_sd**2)
+    values = problem.unknowns.network_values(model.network, z)
+    trajectory: Trajectory | None = None
     for _ in range(START_ROUNDS):
-        adjusted = replace(problem.adjusted(index, z, trajectory), guided=switching)
-        values = problem.unknowns.network_values(model.network, z)
+        adjusted = early.adjusted(index, z, trajectory)
         try:
-            trajectory = simulate(model, adjusted, values, start, guess=trajectory, rounds=4, settled_K=0.02)
+            trajectory = simulate(model, adjusted, values, start, guess=trajectory, settled_K=SETTLED_K)
         except ArithmeticError:
-            if trajectory is None:
-                raise
-            start = before  # what the first minutes ask of it leads nowhere
-            break
-        sensors = problem.unknowns.sensors(piece.channels, z)
-        if as_delivered:
-            sensors = sensors.ideal()
-        read = readings(model, trajectory, sensors) if as_delivered else problem.read(trajectory, sensors, z)
+            return np.array(problem.starts[index])
+        read = readings(model, trajectory, sensors) if as_delivered else early.read(trajectory, sensors, z)
         free = trajectory.response(np.zeros((len(piece.steps), model.n, model.n)), np.eye(model.n))
         columns = reading_columns(model, trajectory, sensors, free, np.zeros((len(piece.steps), model.n)))
-        temperatures = [i for i, name in enumerate(piece.channels) if name != LOSS]
-        seen = early[:, None] & np.isfinite(piece.measured)
-        seen = seen[:, temperatures]
-        sd = problem.noise[index].channel_sd[temperatures]
         residual = ((piece.measured - read)[:, temperatures] / sd)[seen]
         J = (columns[:, temperatures] / sd[:, None])[seen]
-        precision = np.diag(1.0 / prior**2)
         step = np.linalg.solve(precision + J.T @ J, J.T @ residual + precision @ (problem.starts[index] - start))
-        if float(np.max(np.abs(step))) < 0.01:
+        start = start + step
+        if float(np.max(np.abs(step))) < START_SETTLED_K:
             break
-        before, start = start, start + step
-    assert trajectory is not None  # noqa: S101 - START_ROUNDS >= 1
-    if switching:
-        # Until here switches followed what was measured, which is good enough for the start and for nothing else.
-        trajectory = free_running(model, problem.adjusted(index, z, trajectory), trajectory.values, start)
-        read = readings(model, trajectory, sensors) if as_delivered else problem.read(trajectory, sensors, z)
-    return Prediction(piece=piece, trajectory=trajectory, read=read, counts_from=counts_from)
+    return start
 
 
 def rmse(residuals: Array, weights: Array) -> Array:

@@ -305,17 +305,19 @@ def _judged(case: Case, calibrated: Explanation, base: Explanation, floor: float
         by_name[fit.found[-1].name] = by_name.get(fit.found[-1].name, 0.0) + float(probability)
     matters, note = False, "the best explanation is hardly better than none"
     refused: list[int] = []
+    ahead = 0.0  # probability of what is more likely and too small
     promising: Explanation | None = None
-    for index, (fit, gain) in enumerate(zip(stage.fits, stage.gains, strict=True)):
+    for index, (fit, gain, probability) in enumerate(zip(stage.fits, stage.gains, probabilities, strict=True)):
         if gain < needed or by_name[fit.found[-1].name] < LEAST_PROBABILITY:
             continue
         fit = replace(fit, fit=fit.problem.at(fit.fit))
         large = _matters(case, fit, fit.found[-1], 1.0 if gain > CERTAIN else 2.0)
         matters = matters or large
         unlikely = by_name[fit.found[-1].name] < LEAST_SHARE * probabilities[0]
-        if unlikely and judge.gain(fit) < SECOND_GAIN:
+        if probability < LEAST_SHARE * ahead or (unlikely and judge.gain(fit) < SECOND_GAIN):
             continue
         if not large and cleared:
+            ahead = max(ahead, float(probability))
             note = "what the data show is too small to matter"
         elif _holds_out(judge, calibrated, fit):
             left = [i for i in range(len(stage.fits)) if i not in refused]

@@ -10,9 +10,9 @@ from dataclasses import replace
 import numpy as np
 import sympy as sp
 
-from diagnosis.grid import Piece
-from diagnosis.observation import Sensors, lagged
-from diagnosis.trajectory import SLOW_SUBSTEPS, NetworkOnGrid, Trajectory, update_of
+from diagnosis.grid import Piece, lagged
+from diagnosis.observation import Sensors
+from diagnosis.trajectory import SLOW_SUBSTEPS, SWITCHED_PARTS, NetworkOnGrid, Trajectory, update_of, within
 from models.laws import compile_function, function_source, symbol
 from models.network import BASE_SIGNALS
 from models.terms import FACTORS, Term
@@ -106,7 +106,8 @@ class TermOnGrid:
         seen, first = trajectory.seen, 1 + piece.inputs.shape[1]
         last = first + seen.shape[1]
         table = np.stack(rows, axis=-1).tolist()
-        points = (seen[1:] if piece.slow else 0.5 * (seen[1:] + seen[:-1])).tolist()
+        parts = SWITCHED_PARTS if any(switches) and not piece.slow else 1
+        points = (seen[1:, None] if piece.slow else within(seen, parts)).tolist()
         law = self._blurred if piece.guided and piece.slow else self._memory
         substeps = 0 if all(switches) else SLOW_SUBSTEPS if piece.slow else 1
 
@@ -125,11 +126,13 @@ class TermOnGrid:
                 got = law(*table[k], *own, *midway)
                 now = [z + h / substeps * rate for z, rate in zip(now, got, strict=False)]
                 half = midway if part == substeps // 2 else half
-            if any(switches):
-                now = switched(k, points[k], now)
+            on = [np.zeros((count, 1)) for _ in states]
+            for point in points[k] if any(switches) else ():
+                now = switched(k, point, now)
+                on = [total + z / parts for total, z in zip(on, now, strict=True)]
             for index, value in enumerate(half):
                 # What switches during a slow interval did so in its midst.
-                mean = 0.5 * (before[index] + now[index]) if piece.slow and switches[index] else value
+                mean = (0.5 * (before[index] + now[index]) if piece.slow else on[index]) if switches[index] else value
                 result[index][:, k] = np.broadcast_to(mean, (count, 1))[:, 0]
         return result
 

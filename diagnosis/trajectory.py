@@ -40,6 +40,7 @@ RUNAWAY_T = 1500.0  # degC; beyond it there is no trajectory
 # Rows are means: a switching that none of them shows sends a guided trajectory astray for hours. Further off than this,
 # switches follow the simulated temperature until it is back.
 ASTRAY_K = 4.0
+SWITCHED_PARTS = 4  # of an interval, in which it is looked whether something switches
 SLOW_SUBSTEPS = 11  # of memories within an interval of minutes; odd
 
 
@@ -70,6 +71,12 @@ class LossTangent:
     def at(self, T: Array) -> Array:
         """Losses [W], shape (K, components), at temperatures of shape (K, nodes)."""
         return np.asarray(self.power + np.einsum("kcn,kn->kc", self.slope, T - self.T))
+
+
+def within(points: Array, parts: int) -> Array:
+    """Values in the middles of so many parts of every interval, shape (K, parts, ...), by straight lines."""
+    shares = (np.arange(parts) + 0.5) / parts
+    return np.asarray(points[:-1, None] + shares[:, None] * (points[1:] - points[:-1])[:, None])
 
 
 def update_of(state: ExtraState, *, blurred: bool) -> sp.Expr:
@@ -276,6 +283,7 @@ class NetworkOnGrid:
             return [float(new) if it else z for new, z, it in zip(got, moved, switches, strict=True)]
 
         substeps = 0 if all(switches) else SLOW_SUBSTEPS if piece.slow else 1
+        between = within(seen, SWITCHED_PARTS if any(switches) else 1).tolist()
         now = [state.start for state in network.states]
         if piece.slow:
             now = switched(0, points[0], now)
@@ -288,10 +296,15 @@ class NetworkOnGrid:
                 got = law(middle[k], *inputs[k], *temperatures[k], *given, *midway, *powers[k])
                 moved = [z + h / substeps * rate for z, rate in zip(moved, got[:count], strict=True)]
                 half = midway if part == substeps // 2 else half
-            now = switched(k, points[k + 1] if piece.slow else temperatures[k], moved)
-            # What switches during a slow interval did so in its midst.
-            result[k] = [0.5 * (a + b) if it and piece.slow else z
-                         for a, b, z, it in zip(before, now, half, switches, strict=True)]  # fmt: skip
+            if piece.slow:  # what switches during a slow interval did so in its midst
+                now = switched(k, points[k + 1], moved)
+                on = [0.5 * (a + b) for a, b in zip(before, now, strict=True)]
+            else:
+                now, on = moved, [0.0] * count
+                for point in between[k]:
+                    now = switched(k, point, now)
+                    on = [total + z / len(between[k]) for total, z in zip(on, now, strict=True)]
+            result[k] = [mean if it else z for mean, z, it in zip(on, half, switches, strict=True)]
         return result
 
 
@@ -474,7 +487,8 @@ def free_running(model: NetworkOnGrid, piece: Piece, values: Array, start: Array
         tangent = model.loss_tangent(fine, middle, tangent)
         power = tangent.at(middle[:, model.loss_nodes])
         memory = _with_coupled(model, model.memory(fine, np.clip(T, LOWEST_T, HIGHEST_T), values, power), states)
-        before, (T, _, states) = T, _stepped(model, fine, values, start, middle, tangent, memory)
+        nothing = np.full_like(T, np.nan)
+        before, (T, _, states) = T, _stepped(model, fine, values, start, middle, tangent, memory, nothing)
         if not np.isfinite(T).all():
             raise ArithmeticError(f"the temperatures of {piece.recording} run away with these parameters")
         if float(np.max(np.abs(T - before))) < FREE_SETTLED_K:
@@ -496,12 +510,13 @@ def _with_coupled(model: NetworkOnGrid, memory: Array, states: Array | None) -> 
 
 
 def _stepped(
-    model: NetworkOnGrid, piece: Piece, values: Array, start: Array, middle: Array, tangent: LossTangent, memory: Array
-) -> tuple[Array, Array, Array]:
+    model: NetworkOnGrid, piece: Piece, values: Array, start: Array, middle: Array, tangent: LossTangent,
+    memory: Array, guide: Array,
+) -> tuple[Array, Array, Array]:  # fmt: skip
     """Temperatures at the grid points where switches follow them as they come; the other memories are given.
 
-    Linearised about the temperatures `middle` once for every position of the switches. Where the piece is guided, the
-    switches follow what was measured as long as the temperatures are near it.
+    Linearised about the temperatures `middle` once for every position of the switches. Where there is a `guide`, see
+    :meth:`diagnosis.grid.Piece.guide`, the switches follow it as long as the temperatures are near it.
 
     Returns
     -------
@@ -520,7 +535,6 @@ def _stepped(
     count, given = len(model.network.states), list(map(float, values))
     times, inputs = piece.middle.tolist(), piece.inputs.tolist()
     powers, states = tangent.at(middle[:, model.loss_nodes]).tolist(), kept.tolist()
-    guide = piece.guide(model.parts)
     n, now = model.n, _start(model, start)
     result, seen = np.empty((len(times) + 1, len(now))), np.empty((len(times) + 1, n))
     result[0] = now
@@ -622,12 +636,13 @@ def _round(
     T = 0.5 * (T_ref[1:] + T_ref[:-1])
     tangent = model.loss_tangent(piece, T, tangent)
     power = tangent.at(T[:, model.loss_nodes])
-    seen = piece.seen(T_ref, model.parts)
+    guide = piece.guide(T_ref, model.parts)
+    seen = np.where(np.isfinite(guide), guide, T_ref)
     memory = _with_coupled(model, model.memory(piece, seen, values, power), states)
     solved, result = _walked(model, piece, values, start, T, tangent, memory)
     read = model.switched_by
-    if read and np.nanmax(np.abs(result[:, : model.n] - piece.guide(model.parts))[:, read], initial=0.0) > ASTRAY_K:
-        seen = _stepped(model, piece, values, start, T, tangent, memory)[1]
+    if read and np.nanmax(np.abs(result[:, : model.n] - guide)[:, read], initial=0.0) > ASTRAY_K:
+        seen = _stepped(model, piece, values, start, T, tangent, memory, guide)[1]
         memory = _with_coupled(model, model.memory(piece, seen, values, power), states)
         solved, result = _walked(model, piece, values, start, T, tangent, memory)
     n = model.n

@@ -131,12 +131,12 @@ class Unknowns:
         return Sensors(channels=tuple(channels), lag=lag, bias=bias, loss_gain=gain)
 
     def adjusted(self, piece: Piece, inputs: Sequence[str], z: Array) -> Piece:
-        """A piece with the inputs as they probably were."""
+        """A piece with the inputs as they probably were, and with the lags of its sensors."""
         samples = piece.samples
         for item, value in zip(self.items, self.values(z), strict=True):
             if item.role in ("torque_gain", "ambient_offset") and value != item.parameter.start:
                 samples = shifted(samples, inputs, item.role, value)
-        return piece if samples is piece.samples else replace(piece, samples=samples)
+        return replace(piece, samples=samples, lags=self.sensors(piece.channels, z).lag)
 
 
 def shifted(samples: Array, inputs: Sequence[str], role: str, value: float) -> Array:

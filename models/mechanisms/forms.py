@@ -43,9 +43,11 @@ def plain(
     return Parameter(name=name, unit=unit, start=start, lower=lower, upper=upper, sd=sd, log=False, grid=tuple(grid))
 
 
-def temperature(name: str, start: float, *, sd: float, lower: float = -60.0, grid: Sequence[float] = ()) -> Parameter:
+def temperature(
+    name: str, start: float, *, sd: float, lower: float = -60.0, upper: float = 250.0, grid: Sequence[float] = ()
+) -> Parameter:
     """A temperature [degC] as a shape parameter."""
-    return plain(name, start, sd=sd, lower=lower, upper=250.0, unit="degC", grid=grid)
+    return plain(name, start, sd=sd, lower=lower, upper=upper, unit="degC", grid=grid)
 
 
 def moment(scale: Scale, name: str = "moment") -> Parameter:

@@ -26,6 +26,8 @@ from models.mechanisms.scale import Scale
 FAMILY = "oil circuit"
 PAST_SET_POINT = "heat up slowly at constant load past the suspected set-point, then hold"
 RETURN = "measure the oil where it enters and leaves the gearbox"
+# Below and above the surroundings: a fit that goes further trades the coolant's temperature for the cooler's strength.
+COLDEST_COOLANT_K, WARMEST_COOLANT_K = 30.0, 20.0
 SET_POINTS = (0.35, 0.45, 0.55, 0.65, 0.75, 0.85, 0.95, 1.1)  # of the way from ambient to the hot oil
 
 
@@ -34,7 +36,8 @@ def _cooler(scale: Scale) -> Parameter:
 
 
 def _coolant(scale: Scale) -> Parameter:
-    return temperature("coolant", scale.ambient, sd=10.0)
+    coldest, warmest = scale.ambient - COLDEST_COOLANT_K, scale.ambient + WARMEST_COOLANT_K
+    return temperature("coolant", scale.ambient, sd=10.0, lower=coldest, upper=warmest)
 
 
 def _set_point(scale: Scale) -> Parameter:

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from diagnosis.grid import INTERVAL_S, LONGEST, SAMPLES, Piece, pieces, stands_for
+from diagnosis.grid import FREE_S, INTERVAL_S, LONGEST, SAMPLES, Piece, pieces, stands_for
 from diagnosis.recording import Channel, Recording
 from diagnosis.trajectory import NetworkOnGrid, free_running
 from models.gearbox import Gearbox
@@ -82,7 +82,7 @@ def test_finer_has_the_same_inputs() -> None:
     speed = np.where(TIME < 3000.0, 1500.0, 2500.0) + TIME / 100.0
     piece = piece_of(speed=speed)
     fine, at = piece.finer()
-    assert set(fine.steps) == {INTERVAL_S}
+    assert set(fine.steps) == {FREE_S}
     np.testing.assert_array_equal(fine.time[at], piece.time)
     for k in range(len(piece.steps)):
         assert fine.inputs[at[k] : at[k + 1], 0].mean() == pytest.approx(piece.inputs[k, 0])
