@@ -27,7 +27,8 @@ LONGEST = 5  # times INTERVAL_S: of an interval in which nothing happens
 CALM_SHARE = 0.5  # of the time since something happened, that an interval may last
 STEADY_INPUT, STEADY_AMBIENT_K = 0.01, 1.0  # range of the inputs inside an interval, of their usual size; and in K
 BEND_REACH = 3  # intervals to either side of a grid point, over which means are compared to see a temperature bend
-BEND_SDS, LEAST_BEND_K, LEAST_BEND_W = 6.0, 0.1, 2.0
+BEND_SDS, LEAST_BEND_K, LEAST_BEND_W = 6.0, 0.3, 2.0
+SETTLING_S = 600.0  # after a jump of the inputs, in which temperatures bend because of it, and smoothly
 SHORTEST_PIECE = 5  # grid points
 FORGOTTEN = 1e-15  # share of an older reading in a lagged one
 FREE_S = 5.0  # length of intervals in which switches run free
@@ -283,8 +284,11 @@ def _thinned(even: Array, time: Array, inputs: Mapping[str, Array], values: Mapp
         for length in range(LONGEST, 1, -1):
             windows = sliding_window_view(np.append(means, np.full(length - 1, means[-1])), length)
             longest[np.ptp(windows, axis=-1) > allowed] = length - 1  # the shortest is the last to say so
+    at = np.arange(count)
+    jumped = np.maximum.accumulate(np.where(happens, at, -count))
+    settled = (at - jumped) * INTERVAL_S > SETTLING_S
     for name, rows in values.items():
-        happens |= _bends(_cell_means(rows, cell, count), LEAST_BEND_W if name == LOSS else LEAST_BEND_K)
+        happens |= settled & _bends(_cell_means(rows, cell, count), LEAST_BEND_W if name == LOSS else LEAST_BEND_K)
     chosen, k, calm = [0], 0, 0
     upcoming = np.append(np.flatnonzero(happens), count)
     while k < count:
