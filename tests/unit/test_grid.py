@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from diagnosis.grid import FREE_S, INTERVAL_S, LONGEST, SAMPLES, Piece, pieces, stands_for
+from diagnosis.grid import FREE_S, INTERVAL_S, LONGEST, SAMPLES, Piece, lagged, pieces, stands_for
 from diagnosis.recording import Channel, Recording
 from diagnosis.trajectory import NetworkOnGrid, free_running
 from models.gearbox import Gearbox
@@ -107,3 +108,39 @@ def test_switches_run_free_as_on_an_even_grid(fzg: Gearbox) -> None:
     assert switched > 4  # on and off, again and again
     differences = found.T[:, oil] - np.interp(coarse.time, even.time, expected.T[:, oil])
     assert np.abs(differences).max() < 0.25
+
+
+def test_a_slow_sensor_guides_switches_by_what_it_does_not_show_yet() -> None:
+    """Of what it lags behind, the simulated temperatures tell; of where they are, what was measured."""
+    true = 40.0 + 0.04 * TIME + 3.0 * np.sin(TIME / 200.0)
+    even = piece_of(oil=true, even=True)
+    at = np.interp(even.time, TIME, true)
+    shown = lagged(at, even.steps, 60.0)
+    assert np.abs(shown - at).max() > 2.0
+    piece = replace(even, measured=shown[:, None], lags=np.array([60.0]))
+    simulated = (at - 1.5)[:, None]  # off, but of the same course
+    seen = piece.seen(simulated, ("oil",))[:, 0]
+    assert np.abs(seen - at)[5:-1].max() < 0.1
+    assert np.abs(replace(piece, lags=None).seen(simulated, ("oil",))[:, 0] - at)[5:].max() > 2.0
+    np.testing.assert_array_equal(replace(piece, guided=False).seen(simulated, ("oil",)), simulated)
+
+
+def test_a_switch_acts_for_its_share_of_an_interval(fzg: Gearbox) -> None:
+    (placed,) = CATALOGUE["cooler_thermostat"].placed(fzg.network(), Scale.of(fzg, speed=1500.0, torque=120.0))
+    model = NetworkOnGrid(placed.apply(fzg.network()), fzg.losses())
+    names = [p.name for p in model.network.parameters]
+    values = model.start.copy()
+    values[names.index(f"{placed.label}_set_point")], values[names.index(f"{placed.label}_band")] = 60.0, 4.0
+    piece = piece_of(np.arange(0.0, 101.0, 10.0), even=True)
+    seen = np.full((len(piece.time), model.n), 50.0)
+    seen[:, model.parts.index("oil")] = [58.0, 61.0, 63.0, 59.0, 57.0, 57.0]  # on at 62, off at 58
+    power = np.zeros((len(piece.steps), len(model.laws.components)))
+    np.testing.assert_allclose(model.memory(piece, seen, values, power)[:, 0], [0.0, 0.5, 1.0, 0.5, 0.0])
+
+
+def test_the_first_minutes_of_a_piece() -> None:
+    piece = piece_of(oil=30.0 + TIME / 300.0)
+    early = piece.until(600.0)
+    assert early.time[-1] <= 600.0 < piece.time[len(early.time)]
+    assert len(early.steps) == len(early.samples) == len(early.measured) - 1 == len(early.counts) - 1
+    assert len(piece.until(0.0).steps) == 1
