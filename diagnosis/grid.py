@@ -59,6 +59,8 @@ class Piece:
         Whether memories (switches above all) follow the measured temperatures where there are any. A simulated
         two-point control soon loses its phase, and then no fit can find its set-point; what it does next depends on
         what was there, and that was measured. For learning only: a prediction runs free
+    lags : Array, shape (channels,), or None
+        Time constants of the sensors, [s]: switches feel what a slow sensor does not show yet
     """
 
     recording: str
