@@ -283,7 +283,7 @@ class NetworkOnGrid:
             return [float(new) if it else z for new, z, it in zip(got, moved, switches, strict=True)]
 
         substeps = 0 if all(switches) else SLOW_SUBSTEPS if piece.slow else 1
-        between = within(seen, SWITCHED_PARTS if any(switches) else 1).tolist()
+        between = within(seen, SWITCHED_PARTS if any(switches) and not piece.slow else 1).tolist()
         now = [state.start for state in network.states]
         if piece.slow:
             now = switched(0, points[0], now)
@@ -636,8 +636,7 @@ def _round(
     T = 0.5 * (T_ref[1:] + T_ref[:-1])
     tangent = model.loss_tangent(piece, T, tangent)
     power = tangent.at(T[:, model.loss_nodes])
-    guide = piece.guide(T_ref, model.parts)
-    seen = np.where(np.isfinite(guide), guide, T_ref)
+    guide, seen = piece.guide(T_ref, model.parts), piece.seen(T_ref, model.parts)
     memory = _with_coupled(model, model.memory(piece, seen, values, power), states)
     solved, result = _walked(model, piece, values, start, T, tangent, memory)
     read = model.switched_by

@@ -65,6 +65,14 @@ def test_noise_is_no_event_and_a_corner_is_one() -> None:
     assert step_at(piece_of(oil=corner + noise), 4005.0) == INTERVAL_S
 
 
+def test_what_a_jump_bends_is_smooth_and_needs_no_fine_grid() -> None:
+    speed = np.where(TIME < 3000.0, 1500.0, 2500.0)
+    after = np.maximum(TIME - 3000.0, 0.0)
+    settling = 40.0 + 20.0 * (1.0 - np.exp(-after / 150.0))
+    assert step_at(piece_of(speed=speed, oil=settling), 3500.0) == COARSE
+    assert step_at(piece_of(oil=settling), 3100.0) == INTERVAL_S  # without a jump of the inputs it may be a switch
+
+
 def test_measurements_are_those_of_the_rows_around() -> None:
     """Of a straight line nothing is lost, however long the intervals beside a grid point are."""
     piece = piece_of(speed=np.where(TIME < 3000.0, 1500.0, 2500.0), oil=30.0 + TIME / 300.0)
@@ -106,8 +114,8 @@ def test_switches_run_free_as_on_an_even_grid(fzg: Gearbox) -> None:
     found, expected = (free_running(model, p, values, np.full(model.n, 25.0)) for p in (coarse, even))
     switched = np.abs(np.diff(expected.memory[:, model.switches[0]])).sum()
     assert switched > 4  # on and off, again and again
-    differences = found.T[:, oil] - np.interp(coarse.time, even.time, expected.T[:, oil])
-    assert np.abs(differences).max() < 0.25
+    expected_there = np.interp(coarse.time, even.time, expected.T[:, oil])
+    np.testing.assert_allclose(found.T[:, oil], expected_there, atol=1e-9)  # both run in steps of FREE_S
 
 
 def test_a_slow_sensor_guides_switches_by_what_it_does_not_show_yet() -> None:
@@ -120,7 +128,7 @@ def test_a_slow_sensor_guides_switches_by_what_it_does_not_show_yet() -> None:
     piece = replace(even, measured=shown[:, None], lags=np.array([60.0]))
     simulated = (at - 1.5)[:, None]  # off, but of the same course
     seen = piece.seen(simulated, ("oil",))[:, 0]
-    assert np.abs(seen - at)[5:-1].max() < 0.1
+    assert np.abs(seen - at)[5:-1].max() < 0.05
     assert np.abs(replace(piece, lags=None).seen(simulated, ("oil",))[:, 0] - at)[5:].max() > 2.0
     np.testing.assert_array_equal(replace(piece, guided=False).seen(simulated, ("oil",)), simulated)
 
