@@ -3,10 +3,12 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
 import pytest
+import sympy as sp
 
 from diagnosis import trajectory
 from diagnosis.grid import Piece, pieces
@@ -16,6 +18,7 @@ from models.errors import InputError
 from models.gearbox import known_gearboxes, load_gearbox, read_gearbox
 from models.laws import symbol
 from models.mechanisms import CATALOGUE, Scale
+from models.mechanisms.forms import two_point
 from models.network import ThermalNetwork
 from models.parametric import ParametricLosses
 from models.toml_file import packaged, read_text
@@ -267,3 +270,13 @@ def test_a_switching_that_no_row_shows_does_not_send_learning_astray(monkeypatch
     near = farthest()
     monkeypatch.setattr(trajectory, "ASTRAY_K", 1e6)
     assert near < 12.0 < 15.0 < farthest()
+
+
+@pytest.mark.parametrize(("above", "cold", "hot"), [(1.0, 0.0, 1.0), (0.0, 1.0, 0.0)])
+def test_coolers_and_heaters_switch_the_other_way_round_also_in_means(above, cold, hot):
+    memory = two_point("valve", above=above)
+    for law in (memory.update, memory.blurred):
+        for T, was, then in ((40.0, 0.0, cold), (40.0, 1.0, cold), (70.0, 0.0, hot), (70.0, 1.0, hot),
+                             (55.0, 0.0, 0.0), (55.0, 1.0, 1.0)):  # fmt: skip
+            signals = SimpleNamespace(T_oil=sp.Float(T), valve=sp.Float(was), set_point=55.0, band=6.0)
+            assert float(law(signals)) == pytest.approx(then, abs=1e-6)
