@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from diagnosis.mapping import LOSS
 from diagnosis.recording import Recording
+from diagnosis.recurrence import lagged
 from models.types import Array
 
 INTERVAL_S = 20.0
@@ -30,7 +31,6 @@ BEND_REACH = 3  # intervals to either side of a grid point, over which means are
 BEND_SDS, LEAST_BEND_K, LEAST_BEND_W = 6.0, 0.3, 2.0  # a bend that counts: of its noise, and at least
 SETTLING_S = 600.0  # after a jump of the inputs, in which temperatures bend because of it, and smoothly
 SHORTEST_PIECE = 5  # grid points
-FORGOTTEN = 1e-15  # share of an older reading in a lagged one
 FREE_S = 5.0  # length of intervals in which switches run free
 SLOW_S = 60.0  # rows further apart are means that hide what switches do, see :class:`Piece`
 
@@ -225,38 +225,6 @@ def stands_for(time: Array) -> Array:
     array([10., 20., 40., 30.])
     """
     return np.asarray(np.diff(np.concatenate([time[:1], 0.5 * (time[1:] + time[:-1]), time[-1:]])))
-
-
-def lagged(values: Array, steps: Array, lag: float) -> Array:
-    """A first-order lag, exact for straight lines between the points.
-
-    Parameters
-    ----------
-    values : Array, shape (K + 1, ...)
-    steps : Array, shape (K,)
-        [s]
-    lag : float
-        Time constant, [s]
-
-    Returns
-    -------
-    Array, shape (K + 1, ...)
-        Starting at the first value
-    """
-    if lag <= 0.0:
-        return values
-    decays = np.exp(-steps / lag)
-    shares = (lag * (1.0 - decays) / steps).reshape(-1, *[1] * (values.ndim - 1))
-    result = np.array(values, dtype=float)
-    result[1:] = (shares - decays.reshape(shares.shape)) * values[:-1] + (1.0 - shares) * values[1:]
-    # y[k] = a[k] y[k-1] + b[k], by doubling how far back every row has been followed, until nothing is left of it.
-    left, reach = np.append(0.0, decays).reshape(-1, *shares.shape[1:]), 1
-    while reach < len(result) and float(left.max()) > FORGOTTEN:
-        result[reach:] += left[reach:] * result[:-reach]
-        left[reach:] = left[reach:] * left[:-reach]
-        left[:reach] = 0.0
-        reach *= 2
-    return result
 
 
 def _thinned(even: Array, time: Array, inputs: Mapping[str, Array], values: Mapping[str, Array]) -> Array:

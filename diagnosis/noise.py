@@ -108,7 +108,7 @@ def noise_of(
     parametric : bool
         Whether only the form of the laws is known: the structural floor (random heat in every part) is higher then
     """
-    capacities = model.capacities([p.start for p in model.network.parameters])
+    capacities = model.capacities(model.start)
     heavy = capacities > 0.01 * capacities.max()
     heat_sd = np.where(heavy, HEAT_FRACTION * loss_W, 0.0)
     if parametric:

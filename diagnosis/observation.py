@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from diagnosis.grid import lagged
 from diagnosis.mapping import LOSS
+from diagnosis.recurrence import lagged
 from diagnosis.trajectory import NetworkOnGrid, Trajectory
 from models.types import Array
 

@@ -22,7 +22,7 @@ from diagnosis.trajectory import (
     Balance,
     NetworkOnGrid,
     Trajectory,
-    parameter_heat,
+    parameter_heats,
     settled_balance,
     simulate,
 )
@@ -34,6 +34,7 @@ from models.types import Array
 
 ITERATIONS = 8
 SETTLED = 0.05  # of a prior standard deviation
+PARAMETER_STEP = 0.02  # of its prior standard deviation, for derivatives
 FARTHEST_STEP = 3.0  # of the z numbers in one iteration
 SLOW_PATIENCE = 3  # times as many iterations where switches follow slow measurements: steps are small there
 
@@ -191,12 +192,16 @@ class Problem:
         losses = np.zeros((intervals, len(items)))
         names = [p.name for p in model.network.parameters]
         here = settled_balance(model, trajectory)
+        scales = np.array([item.per_z(float(value)) for item, value in zip(items, z, strict=True)])
+        mine = [index for index, item in enumerate(items) if item.role == "network"]
+        heats[:, :, mine], losses[:, mine] = parameter_heats(
+            model, trajectory, here, [names.index(items[i].target) for i in mine], PARAMETER_STEP * scales[mine]
+        )
+        heats[:, :, mine] *= scales[mine]
+        losses[:, mine] *= scales[mine]
         for index, item in enumerate(items):
-            scale = item.per_z(float(z[index]))
-            if item.role == "network":
-                step = 0.02 * scale
-                heat, loss = parameter_heat(model, trajectory, here, names.index(item.target), step)
-            elif item.role in ("torque_gain", "ambient_offset"):
+            scale = scales[index]
+            if item.role in ("torque_gain", "ambient_offset"):
                 heat, loss = self._input_heat(trajectory, here, item)
             elif item.role == "term" and (shift := self._term_of(self._shifts, item)) is not None:
                 heat, loss = self._shift_heat(trajectory, shift, item, z)

@@ -4,15 +4,17 @@ it shifts, or the reading it distorts.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 import sympy as sp
 
-from diagnosis.grid import Piece, lagged
+from diagnosis.grid import Piece
+from diagnosis.memories import Memories
 from diagnosis.observation import Sensors
-from diagnosis.trajectory import SLOW_SUBSTEPS, SWITCHED_PARTS, NetworkOnGrid, Trajectory, update_of, within
+from diagnosis.recurrence import lagged
+from diagnosis.trajectory import NetworkOnGrid, Trajectory
 from models.laws import compile_function, function_source, symbol
 from models.network import BASE_SIGNALS
 from models.terms import FACTORS, Term
@@ -52,14 +54,7 @@ class TermOnGrid:
         other = sp.Integer(0) if term.boundary_temperature is None else term.boundary_temperature
         laws = [law.xreplace(boundary) for law in (term.expression, other)]
         self._law = compile_function(function_source("law", arguments, laws, vector=True), "law")
-        self._memory, self._blurred = (
-            compile_function(function_source("memory", arguments, [
-                *(s.rate.xreplace(boundary) for s in term.states),
-                *(update_of(s, blurred=blurred).xreplace(boundary) for s in term.states),
-            ], vector=True), "memory")
-            for blurred in (False, True)
-        )  # fmt: skip
-        self._switches = any(s.update is not None for s in term.states)
+        self._memories = Memories(term.states, [*given, *own], model.parts, boundary)
 
     # ------------------------------------------------------------------ the law
 
@@ -92,49 +87,10 @@ class TermOnGrid:
         kept = trajectory.values[self._kept]
         rows = [time, *inputs.T, *T.T, *(np.full(len(T), v) for v in kept), *memory[:, self._remembered].T, *power.T]
         own = [values[:, index, None] for index in range(values.shape[1])]
-        states = self._follow(trajectory, rows, own, len(values)) if self.term.states else []
+        states = self._memories.follow(piece, [*rows, *own], trajectory.seen)
         law, other = self._law(*rows, *own, *states)
         size = (len(values), len(T))
         return np.broadcast_to(np.asarray(law, float), size), np.broadcast_to(np.asarray(other, float), size)
-
-    def _follow(self, trajectory: Trajectory, rows: Sequence[Array], own: Sequence[Array], count: int) -> list[Array]:
-        """The term's states along the trajectory, each of shape (V, K)."""
-        states, piece = self.term.states, trajectory.piece
-        switches = [state.update is not None for state in states]
-        now: list[Array] = [np.full((count, 1), s.start) for s in states]
-        result = [np.empty((count, len(piece.steps))) for _ in states]
-        seen, first = trajectory.seen, 1 + piece.inputs.shape[1]
-        last = first + seen.shape[1]
-        table = np.stack(rows, axis=-1).tolist()
-        parts = SWITCHED_PARTS if any(switches) and not piece.slow else 1
-        points = (seen[1:, None] if piece.slow else within(seen, parts)).tolist()
-        law = self._blurred if piece.guided and piece.slow else self._memory
-        substeps = 0 if all(switches) else SLOW_SUBSTEPS if piece.slow else 1
-
-        def switched(k: int, point: list[float], moved: list[Array]) -> list[Array]:
-            got = law(*table[k][:first], *point, *table[k][last:], *own, *moved)[len(states) :]
-            return [np.broadcast_to(new, (count, 1)) if it else z
-                    for new, z, it in zip(got, moved, switches, strict=True)]  # fmt: skip
-
-        if piece.slow and any(switches):
-            now = switched(0, seen[0].tolist(), now)
-        for k, h in enumerate(piece.steps.tolist()):
-            before, half = now, now
-            for part in range(substeps):
-                got = law(*table[k], *own, *now)
-                midway = [z + 0.5 * h / substeps * rate for z, rate in zip(now, got, strict=False)]
-                got = law(*table[k], *own, *midway)
-                now = [z + h / substeps * rate for z, rate in zip(now, got, strict=False)]
-                half = midway if part == substeps // 2 else half
-            on = [np.zeros((count, 1)) for _ in states]
-            for point in points[k] if any(switches) else ():
-                now = switched(k, point, now)
-                on = [total + z / parts for total, z in zip(on, now, strict=True)]
-            for index, value in enumerate(half):
-                # What switches during a slow interval did so in its midst.
-                mean = (0.5 * (before[index] + now[index]) if piece.slow else on[index]) if switches[index] else value
-                result[index][:, k] = np.broadcast_to(mean, (count, 1))[:, 0]
-        return result
 
     # ------------------------------------------------------------------ heat
 
@@ -205,7 +161,7 @@ class TermOnGrid:
 
     def _link_heat(self, trajectory: Trajectory, conductance: Array, other: Array, heat: Array) -> None:
         model, T = self.model, trajectory.middle
-        signals = model.signals(trajectory.piece, T, list(trajectory.values), trajectory.memory)
+        signals = model.signals(trajectory.piece, T, trajectory.values, trajectory.memory)
         known = dict(zip(model.laws.boundaries, model.laws.boundary(*signals), strict=True))
         *sides, end = self.term.target
         for node in sides:

@@ -9,6 +9,7 @@ any time, of any parameter, answers through the same matrices.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -19,9 +20,10 @@ import numpy as np
 import sympy as sp
 
 from diagnosis.grid import Piece
+from diagnosis.memories import Memories, update_of
 from models.compiled import compile_laws, structure
 from models.laws import compile_function, function_source, symbol
-from models.network import BASE_SIGNALS, ExtraState, Losses, ThermalNetwork
+from models.network import BASE_SIGNALS, Losses, ThermalNetwork
 from models.types import Array
 
 ROUNDS = 6
@@ -40,8 +42,8 @@ RUNAWAY_T = 1500.0  # degC; beyond it there is no trajectory
 # Rows are means: a switching that none of them shows sends a guided trajectory astray for hours. Further off than this,
 # switches follow the simulated temperature until it is back.
 ASTRAY_K = 4.0
-SWITCHED_PARTS = 4  # of an interval, in which it is looked whether something switches
-SLOW_SUBSTEPS = 11  # of memories within an interval of minutes; odd
+SMALL = 1e-9
+MOST_AT_ONCE = 40_000  # intervals times parameters whose derivatives are taken together
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -70,19 +72,7 @@ class LossTangent:
 
     def at(self, T: Array) -> Array:
         """Losses [W], shape (K, components), at temperatures of shape (K, nodes)."""
-        return np.asarray(self.power + np.einsum("kcn,kn->kc", self.slope, T - self.T))
-
-
-def within(points: Array, parts: int) -> Array:
-    """Values in the middles of so many parts of every interval, shape (K, parts, ...), by straight lines."""
-    shares = (np.arange(parts) + 0.5) / parts
-    return np.asarray(points[:-1, None] + shares[:, None] * (points[1:] - points[:-1])[:, None])
-
-
-def update_of(state: ExtraState, *, blurred: bool) -> sp.Expr:
-    """What a state becomes after a step; itself if it does not switch."""
-    found = state.blurred if blurred and state.blurred is not None else state.update
-    return symbol(state.name) if found is None else found
+        return np.asarray(self.power + np.einsum("kcn,...kn->...kc", self.slope, T - self.T))
 
 
 class NetworkOnGrid:
@@ -116,66 +106,71 @@ class NetworkOnGrid:
         self.start = np.array([p.start for p in network.parameters])
 
     # ------------------------------------------------------------------ heat balance on all intervals
+    # Temperatures, losses, memories and parameters may each be many at once: a further first axis, V.
 
-    def signals(self, piece: Piece, T: Array, values: Sequence[float] | Array, memory: Array) -> list[Array | float]:
+    def signals(self, piece: Piece, T: Array, values: Array, memory: Array) -> list[Array | float]:
         """The common signals of the laws at the middles of the intervals; see :class:`models.runtime.Laws`."""
         return [
-            piece.middle, *np.moveaxis(piece.inputs, -1, 0), *np.moveaxis(T, -1, 0), *values,
+            piece.middle, *np.moveaxis(piece.inputs, -1, 0), *np.moveaxis(T, -1, 0), *_one_each(values),
             *np.moveaxis(memory, -1, 0),
         ]  # fmt: skip
 
-    def capacities(self, values: Sequence[float] | Array) -> Array:
-        """Heat capacities of the parts [J/K], shape (parts,)."""
-        return np.array(self.laws.fixed(*values)[len(self._constant) :], dtype=float)
+    def capacities(self, values: Array) -> Array:
+        """Heat capacities of the parts [J/K], shape (parts,) or (V, parts)."""
+        found = self.laws.fixed(*np.moveaxis(values, -1, 0))[len(self._constant) :]
+        return np.stack([np.broadcast_to(np.asarray(c, float), np.shape(values)[:-1]) for c in found], axis=-1)
 
-    def conductances(
-        self, signals: Sequence[Array | float], values: Sequence[float] | Array, shape: tuple[int, ...]
-    ) -> Array:
-        """Conductances of all links [W/K], shape (K, links)."""
+    def conductances(self, signals: Sequence[Array | float], values: Array, shape: tuple[int, ...]) -> Array:
+        """Conductances of all links [W/K], shape (K, links) or (V, K, links)."""
         result = np.empty((*shape, len(self._incidence)))
-        for index, value in zip(self._constant, self.laws.fixed(*values), strict=False):
+        for index, value in zip(self._constant, self.laws.fixed(*_one_each(values)), strict=False):
             result[..., index] = value
         for index, value in zip(self._varying, self.laws.exchange(*signals), strict=True):
             result[..., index] = value
         return result
 
-    def differences(self, signals: Sequence[Array | float], T: Array) -> Array:
-        """Temperature differences over the links [K], shape (K, links)."""
-        boundaries = [np.broadcast_to(b, T.shape[:-1]) for b in self.laws.boundary(*signals)]
-        everywhere = np.concatenate([T, np.stack(boundaries, axis=-1)], axis=-1) if boundaries else T
+    def differences(self, signals: Sequence[Array | float], T: Array, shape: tuple[int, ...]) -> Array:
+        """Temperature differences over the links [K], shape (K, links) or (V, K, links)."""
+        everywhere = np.empty((*shape, self._incidence.shape[1]))
+        everywhere[..., : self.n] = T
+        for index, value in enumerate(self.laws.boundary(*signals), start=self.n):
+            everywhere[..., index] = value
         return np.asarray(everywhere @ self._incidence.T)
 
-    def source_heats(self, signals: Sequence[Array | float], power: Array) -> Array:
-        """Heats of all sources [W], shape (K, sources)."""
-        values = self.laws.heat(*signals, *np.moveaxis(power, -1, 0))[: len(self.laws.sources)]
-        return np.stack([np.broadcast_to(v, power.shape[:-1]) for v in values], axis=-1)
+    def source_heats(self, signals: Sequence[Array | float], power: Array, shape: tuple[int, ...]) -> Array:
+        """Heats of all sources [W], shape (K, sources) or (V, K, sources)."""
+        result = np.empty((*shape, len(self.laws.sources)))
+        for index, value in enumerate(self.laws.heat(*signals, *np.moveaxis(power, -1, 0))[: result.shape[-1]]):
+            result[..., index] = value
+        return result
 
-    def balance(self, piece: Piece, T: Array, values: Sequence[float] | Array, power: Array, memory: Array) -> Balance:
+    def balance(self, piece: Piece, T: Array, values: Array, power: Array, memory: Array) -> Balance:
         """Heat balance at the middles of the intervals.
 
         Parameters
         ----------
         piece : Piece
-        T : Array, shape (K, parts)
+        T : Array, shape (K, parts) or (V, K, parts)
             [degC]
-        values : sequence of float
+        values : Array, shape (parameters,) or (V, parameters)
             Parameters of the network
-        power : Array, shape (K, components)
+        power : Array, shape (K, components) or (V, K, components)
             Nominal losses, [W]
-        memory : Array, shape (K, states)
+        memory : Array, shape (K, states) or (V, K, states)
         """
+        shape = np.broadcast_shapes(T.shape[:-1], power.shape[:-1], memory.shape[:-1], (*values.shape[:-1], 1))
         signals = self.signals(piece, T, values, memory)
-        conductances = self.conductances(signals, values, T.shape[:-1])
-        differences = self.differences(signals, T)
-        sources = self.source_heats(signals, power)
+        conductances = self.conductances(signals, values, shape)
+        differences = self.differences(signals, T, shape)
+        sources = self.source_heats(signals, power, shape)
         heat = sources @ self.injection + (conductances * differences) @ self.to_parts
         return Balance(heat=heat, sources=sources, conductances=conductances, differences=differences)
 
-    def rates(self, piece: Piece, T: Array, values: Sequence[float] | Array, power: Array, memory: Array) -> Array:
-        """Rates of the states that are solved with the temperatures [1/s times their unit], shape (K, coupled)."""
-        signals = self.signals(piece, T, values, memory)
-        found = self._coupled_law(*signals, *np.moveaxis(power, -1, 0))
-        return np.stack([np.broadcast_to(rate, T.shape[:-1]) for rate in found], axis=-1)
+    def rates(self, piece: Piece, T: Array, values: Array, power: Array, memory: Array) -> Array:
+        """Rates of the states that are solved with the temperatures [1/s times their unit], shape (..., K, coupled)."""
+        shape = np.broadcast_shapes(T.shape[:-1], power.shape[:-1], memory.shape[:-1], (*values.shape[:-1], 1))
+        found = self._coupled_law(*self.signals(piece, T, values, memory), *np.moveaxis(power, -1, 0))
+        return np.stack([np.broadcast_to(rate, shape) for rate in found], axis=-1)
 
     # ------------------------------------------------------------------ losses and memories
 
@@ -223,89 +218,114 @@ class NetworkOnGrid:
         """Which of the states go with the temperatures all the time, as a tank does: they are solved with them."""
         mine = {f"T_{part}" for part in self.parts}
         return [index for index, state in enumerate(self.network.states)
-                if state.update is None and mine & {symbol.name for symbol in state.rate.free_symbols}]  # fmt: skip
+                if state.update is None and mine & {s.name for s in state.rate.free_symbols}]  # fmt: skip
+
+    @cached_property
+    def actuated(self) -> list[int]:
+        """Which of the others follow a switch, as a slow valve does."""
+        states = self.network.states
+        switches = {states[index].name for index in self.switches}
+        return [index for index, state in enumerate(states) if state.update is None and index not in self.coupled
+                and switches & {s.name for s in state.rate.free_symbols}]  # fmt: skip
+
+    @cached_property
+    def acting(self) -> list[int]:
+        """Which of both the heat balance feels; it is taken for a straight line of them."""
+        network = self.network
+        laws = [*(link.conductance for link in network.links), *(source.heat for source in network.sources),
+                *self._boundary.values(), *(network.states[index].rate for index in self.coupled)]  # fmt: skip
+        felt = {s.name for law in laws for s in law.free_symbols}
+        return [index for index in (*self.switches, *self.actuated) if network.states[index].name in felt]
 
     @cached_property
     def switched_by(self) -> list[int]:
         """Which parts' temperatures decide on switches."""
-        laws = [state.update for state in self.network.states if state.update is not None]
-        read = {symbol.name for law in laws for symbol in law.free_symbols}
+        laws = [update_of(self.network.states[index], blurred=False) for index in self.switches]
+        read = {s.name for law in laws for s in law.xreplace(self._boundary).free_symbols}
         return [index for index, part in enumerate(self.parts) if f"T_{part}" in read]
 
     @cached_property
-    def memory_law(self) -> Callable[..., tuple[float, ...]]:
-        """Rates and updates of the states on plain numbers, nothing else."""
-        return self._memory_law(blurred=False)
+    def _boundary(self) -> Mapping[sp.Symbol, sp.Expr]:
+        return {symbol(f"T_{n.name}"): n.temperature for n in self.network.nodes if n.temperature is not None}
 
     @cached_property
-    def blurred_memory_law(self) -> Callable[..., tuple[float, ...]]:
-        """The same for temperatures that are means over minutes."""
-        return self._memory_law(blurred=True)
-
-    def _memory_law(self, *, blurred: bool) -> Callable[..., tuple[float, ...]]:
-        network = self.network
-        rates = [sp.Integer(0) if i in self.coupled else s.rate for i, s in enumerate(network.states)]
-        return self._compiled([*rates, *(update_of(s, blurred=blurred) for s in network.states)], vector=False)
+    def _signal_names(self) -> list[str]:
+        """All signals but states and losses."""
+        return [*BASE_SIGNALS, *self.network.inputs, *(f"T_{part}" for part in self.parts),
+                *(p.name for p in self.network.parameters)]  # fmt: skip
 
     @cached_property
     def _coupled_law(self) -> Callable[..., tuple[Any, ...]]:
-        return self._compiled([self.network.states[index].rate for index in self.coupled], vector=True)
-
-    def _compiled(self, laws: Sequence[sp.Expr], *, vector: bool) -> Callable[..., tuple[Any, ...]]:
-        """Laws as a function of all signals, states and nominal losses."""
         network = self.network
-        boundary = {symbol(f"T_{n.name}"): n.temperature for n in network.nodes if n.temperature is not None}
-        parts = [f"T_{part.name}" for part in network.parts]
-        arguments = [*BASE_SIGNALS, *network.inputs, *parts, *(p.name for p in network.parameters),
-                     *(s.name for s in network.states), *(f"P_{c}" for c in network.components)]  # fmt: skip
-        source = function_source("laws", arguments, [law.xreplace(boundary) for law in laws], vector=vector)
-        return compile_function(source, "laws")
+        arguments = [*self._signal_names, *(s.name for s in network.states), *(f"P_{c}" for c in network.components)]
+        laws = [network.states[index].rate.xreplace(self._boundary) for index in self.coupled]
+        return compile_function(function_source("rates", arguments, laws, vector=True), "rates")
 
-    def memory(self, piece: Piece, seen: Array, values: Sequence[float] | Array, power: Array) -> Array:
-        """The states beside the temperatures, at the middles of the intervals, shape (K, states).
+    @cached_property
+    def _memories(self) -> Memories:
+        arguments = [*self._signal_names, *(f"P_{c}" for c in self.network.components)]
+        return Memories(self.network.states, arguments, self.parts, self._boundary)
 
-        They follow the temperatures `seen` at the grid points, interval by interval: a hysteresis needs the past. Those
-        that are solved with the temperatures stay at their start.
+    @cached_property
+    def remembered(self) -> frozenset[str]:
+        """Parameters that decide on states."""
+        laws = [law for state in self.network.states for law in (state.rate, state.update) if law is not None]
+        return frozenset(s.name for law in laws for s in law.free_symbols) & {p.name for p in self.network.parameters}
+
+    def memory(
+        self, piece: Piece, T: Array, seen: Array, values: Array, power: Array, before: Array | None = None
+    ) -> Array:  # fmt: skip
+        """The states beside the temperatures, at the middles of the intervals.
+
+        Parameters
+        ----------
+        piece : Piece
+        T : Array, shape (K + 1, parts)
+            Temperatures at the grid points, [degC]
+        seen : Array, shape (K + 1, parts)
+            Those that switches follow, [degC]
+        values : Array, shape (parameters,) or (V, parameters)
+        power : Array, shape (K, components)
+            Nominal losses, [W]
+        before : Array, shape (K, states), optional
+            Where the states that are solved with the temperatures are taken from, if they are there
+
+        Returns
+        -------
+        Array, shape (K, states) or (V, K, states)
         """
-        network = self.network
-        count = len(network.states)
-        if not count:
-            return np.zeros((len(seen) - 1, 0))
-        law = self.blurred_memory_law if piece.guided and piece.slow else self.memory_law
-        steps, middle = piece.steps.tolist(), piece.middle.tolist()
-        inputs, powers, points = piece.inputs.tolist(), power.tolist(), seen.tolist()
-        temperatures = (0.5 * (seen[1:] + seen[:-1])).tolist()
-        given = list(map(float, values))
-        switches = [state.update is not None for state in network.states]
-
-        def switched(k: int, point: list[float], moved: list[float]) -> list[float]:
-            got = law(middle[k], *inputs[k], *point, *given, *moved, *powers[k])[count:]
-            return [float(new) if it else z for new, z, it in zip(got, moved, switches, strict=True)]
-
-        substeps = 0 if all(switches) else SLOW_SUBSTEPS if piece.slow else 1
-        between = within(seen, SWITCHED_PARTS if any(switches) and not piece.slow else 1).tolist()
-        now = [state.start for state in network.states]
-        if piece.slow:
-            now = switched(0, points[0], now)
-        result = np.empty((len(steps), count))
-        for k, h in enumerate(steps):
-            before, half, moved = now, now, now
-            for part in range(substeps):
-                got = law(middle[k], *inputs[k], *temperatures[k], *given, *moved, *powers[k])
-                midway = [z + 0.5 * h / substeps * rate for z, rate in zip(moved, got[:count], strict=True)]
-                got = law(middle[k], *inputs[k], *temperatures[k], *given, *midway, *powers[k])
-                moved = [z + h / substeps * rate for z, rate in zip(moved, got[:count], strict=True)]
-                half = midway if part == substeps // 2 else half
-            if piece.slow:  # what switches during a slow interval did so in its midst
-                now = switched(k, points[k + 1], moved)
-                on = [0.5 * (a + b) for a, b in zip(before, now, strict=True)]
-            else:
-                now, on = moved, [0.0] * count
-                for point in between[k]:
-                    now = switched(k, point, now)
-                    on = [total + z / len(between[k]) for total, z in zip(on, now, strict=True)]
-            result[k] = [mean if it else z for mean, z, it in zip(on, half, switches, strict=True)]
+        count = len(self.network.states)
+        known = {} if before is None or before.shape[1] != count else {i: before[:, i] for i in self.coupled}
+        middle = 0.5 * (T[1:] + T[:-1])
+        rows = [piece.middle, *piece.inputs.T, *middle.T, *_one_each(np.atleast_2d(values)), *power.T]
+        result = np.empty((*values.shape[:-1], len(piece.steps), count))
+        for index, state in enumerate(self._memories.follow(piece, rows, seen, known)):
+            result[..., index] = state
         return result
+
+    def switching(self, *, blurred: bool) -> Callable[[Sequence[Any]], tuple[float, ...]]:
+        """What switches become, on plain numbers: of all signals in the order of the laws."""
+        return self._picked([update_of(self.network.states[index], blurred=blurred) for index in self.switches])
+
+    @cached_property
+    def actuation(self) -> Callable[[Sequence[Any]], tuple[float, ...]]:
+        """Rates of the states that follow switches, then the derivative of each with respect to itself."""
+        states = [self.network.states[index] for index in self.actuated]
+        return self._picked([*(s.rate for s in states), *(sp.diff(s.rate, symbol(s.name)) for s in states)])
+
+    def _picked(self, laws: Sequence[sp.Expr]) -> Callable[[Sequence[Any]], tuple[float, ...]]:
+        network = self.network
+        laws = [law.xreplace(self._boundary) for law in laws]
+        names = [*self._signal_names, *(s.name for s in network.states), *(f"P_{c}" for c in network.components)]
+        used = {s.name for law in laws for s in law.free_symbols}
+        places = [index for index, name in enumerate(names) if name in used]  # few of dozens
+        function = compile_function(function_source("laws", [names[i] for i in places], laws, vector=False), "laws")
+        return lambda signals: function(*(signals[i] for i in places))
+
+
+def _one_each(values: Array) -> list[Array | float]:
+    """Parameters one by one: numbers, or columns of shape (V, 1)."""
+    return list(values) if values.ndim == 1 else [values[:, index, None] for index in range(values.shape[1])]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -486,7 +506,8 @@ def free_running(model: NetworkOnGrid, piece: Piece, values: Array, start: Array
         middle = np.clip(0.5 * (T[1:] + T[:-1]), LOWEST_T, HIGHEST_T)
         tangent = model.loss_tangent(fine, middle, tangent)
         power = tangent.at(middle[:, model.loss_nodes])
-        memory = _with_coupled(model, model.memory(fine, np.clip(T, LOWEST_T, HIGHEST_T), values, power), states)
+        held = np.clip(T, LOWEST_T, HIGHEST_T)
+        memory = model.memory(fine, held, held, values, power, states)
         nothing = np.full_like(T, np.nan)
         before, (T, _, states) = T, _stepped(model, fine, values, start, middle, tangent, memory, nothing)
         if not np.isfinite(T).all():
@@ -498,15 +519,10 @@ def free_running(model: NetworkOnGrid, piece: Piece, values: Array, start: Array
     total = np.concatenate([np.zeros((1, model.n)), np.cumsum(T, axis=0)])
     low, high = np.maximum(at - half, 0), np.minimum(at + half, count) + 1
     means = (total[high] - total[low]) / (high - low)[:, None]
-    coarse = None if states is None else np.add.reduceat(states, at[:-1]) / np.diff(at)[:, None]
-    return replace(_round(model, replace(piece, guided=False), values, start, means, None, coarse), T=means)
-
-
-def _with_coupled(model: NetworkOnGrid, memory: Array, states: Array | None) -> Array:
-    """Memories with the states that are solved with the temperatures as they were last, if they were there."""
-    if states is not None and states.shape[1] == memory.shape[1]:
-        memory[:, model.coupled] = states[:, model.coupled]
-    return memory
+    assert states is not None  # noqa: S101 - rounds >= 1
+    memory = np.add.reduceat(states, at[:-1]) / np.diff(at)[:, None]
+    unguided = replace(piece, guided=False)
+    return replace(_round(model, unguided, values, start, means, None, memory, follow=False), T=means)
 
 
 def _stepped(
@@ -515,7 +531,8 @@ def _stepped(
 ) -> tuple[Array, Array, Array]:  # fmt: skip
     """Temperatures at the grid points where switches follow them as they come; the other memories are given.
 
-    Linearised about the temperatures `middle` once for every position of the switches. Where there is a `guide`, see
+    Linearised about the temperatures `middle` once for every position of the switches, and of what follows them, as a
+    slow valve does: between its ends the step is taken in proportion. Where there is a `guide`, see
     :meth:`diagnosis.grid.Piece.guide`, the switches follow it as long as the temperatures are near it.
 
     Returns
@@ -523,35 +540,63 @@ def _stepped(
     T, seen : Array, shape (K + 1, parts)
         Temperatures, and those that the switches followed, [degC]
     memory : Array, shape (K, states)
-        As given, but for the states that are solved with the temperatures
+        As given, but for what was found here
     """
-    switches, kept = model.switches, memory.copy()
+    switches, actuated, acting, kept = model.switches, model.actuated, model.acting, memory.copy()
+    corners = list(product((0.0, 1.0), repeat=len(acting)))
     solutions = []
-    for position in product((0.0, 1.0), repeat=len(switches)):
-        kept[:, switches] = position
+    for corner in corners:
+        kept[:, acting] = corner
         solved = _linearised(model, piece, values, middle, tangent, kept)
         solutions.append((solved.decay, solved.driven))
-    law = model.blurred_memory_law if piece.guided and piece.slow else model.memory_law
-    count, given = len(model.network.states), list(map(float, values))
-    times, inputs = piece.middle.tolist(), piece.inputs.tolist()
-    powers, states = tangent.at(middle[:, model.loss_nodes]).tolist(), kept.tolist()
+    switching, actuation = model.switching(blurred=piece.guided and piece.slow), model.actuation
+    power = tangent.at(middle[:, model.loss_nodes])
+    given = np.broadcast_to(values, (len(kept), len(values)))
+    table = np.concatenate([piece.middle[:, None], piece.inputs, middle, given, kept, power], axis=1).tolist()
+    first = 1 + piece.inputs.shape[1]
+    states = first + model.n + len(values)
     n, now = model.n, _start(model, start)
-    result, seen = np.empty((len(times) + 1, len(now))), np.empty((len(times) + 1, n))
+    result, seen = np.empty((len(kept) + 1, len(now))), np.empty((len(kept) + 1, n))
     result[0] = now
-    state = [model.network.states[i].start for i in switches]
-    for k in range(len(times)):
+    state = {index: model.network.states[index].start for index in (*switches, *actuated)}
+    for k, (signals, h) in enumerate(zip(table, piece.steps.tolist(), strict=True)):
         near = np.abs(now[:n] - guide[k]) < ASTRAY_K  # not where nothing was measured
         seen[k] = np.where(near, guide[k], now[:n])
-        for index, value in zip(switches, state, strict=True):
-            states[k][index] = value
-        got = law(times[k], *inputs[k], *seen[k].tolist(), *given, *states[k], *powers[k])[count:]
-        state = [float(got[index]) for index in switches]
-        decay, driven = solutions[sum(2**i for i, z in enumerate(reversed(state)) if z > 0.5)]
-        now = decay[k] @ now + driven[k]
+        signals[first : first + n] = seen[k].tolist()
+        for index, value in state.items():
+            signals[states + index] = value
+        for index, value in zip(switches, switching(signals), strict=True):
+            state[index] = signals[states + index] = value
+        opening = dict(state)
+        if actuated:
+            found = actuation(signals)
+            for index, rate, slope in zip(actuated, found, found[len(actuated) :], strict=False):
+                opening[index] += rate * _gain(slope, 0.5 * h)
+                state[index] += rate * _gain(slope, h)
+        kept[k, list(opening)] = list(opening.values())
+        now = _between(solutions, corners, [opening[index] for index in acting], k, now)
         result[k + 1] = now
     seen[-1] = now[:n]
     kept[:, model.coupled] = 0.5 * (result[1:, n:] + result[:-1, n:])
     return result[:, :n], seen, kept
+
+
+def _between(
+    solutions: Sequence[tuple[Array, Array]], corners: Sequence[tuple[float, ...]], positions: Sequence[float], k: int,
+    now: Array,
+) -> Array:  # fmt: skip
+    """One step between the solutions at the ends of what acts."""
+    result = np.zeros_like(now)
+    for corner, (decay, driven) in zip(corners, solutions, strict=True):
+        weight = math.prod(z if end else 1.0 - z for z, end in zip(positions, corner, strict=True))
+        if weight:
+            result += weight * (decay[k] @ now + driven[k])
+    return result
+
+
+def _gain(slope: float, h: float) -> float:
+    """Change after a time ``h`` per rate at its begin, of a state whose rate has this slope, [s]."""
+    return h if abs(slope * h) < SMALL else math.expm1(slope * h) / slope
 
 
 def _start(model: NetworkOnGrid, start: Array) -> Array:
@@ -578,18 +623,11 @@ def _linearised(
 ) -> _Solved:
     power = tangent.at(T[:, model.loss_nodes])
     balance = model.balance(piece, T, values, power, memory)
-    n = model.n
-    jacobian = np.empty((len(T), n, n))
-    loss_slope = np.empty((len(T), n))
     total = balance.sources[:, model.is_loss].sum(axis=-1)
-    where = {int(node): index for index, node in enumerate(model.loss_nodes)}
-    for node in range(n):
-        moved = T.copy()
-        moved[:, node] += TEMPERATURE_STEP_K
-        changed = power + TEMPERATURE_STEP_K * tangent.slope[..., where[node]] if node in where else power
-        there = model.balance(piece, moved, values, changed, memory)
-        jacobian[:, :, node] = (there.heat - balance.heat) / TEMPERATURE_STEP_K
-        loss_slope[:, node] = (there.sources[:, model.is_loss].sum(axis=-1) - total) / TEMPERATURE_STEP_K
+    moved, changed = _moved(model, T, tangent)
+    there = model.balance(piece, moved, values, changed, memory)
+    jacobian = np.ascontiguousarray(np.moveaxis((there.heat - balance.heat) / TEMPERATURE_STEP_K, 0, -1))
+    loss_slope = ((there.sources[..., model.is_loss].sum(axis=-1) - total) / TEMPERATURE_STEP_K).T
     capacities = model.capacities(values)
     matrix = jacobian / capacities[:, None]
     constant = balance.heat / capacities - np.einsum("kij,kj->ki", matrix, T)
@@ -602,6 +640,12 @@ def _linearised(
     )  # fmt: skip
 
 
+def _moved(model: NetworkOnGrid, T: Array, tangent: LossTangent) -> tuple[Array, Array]:
+    """Temperatures of which one part's is a little higher, and the losses there, for every part: (parts, K, ...)."""
+    moved = T + TEMPERATURE_STEP_K * np.eye(model.n)[:, None, :]
+    return moved, tangent.at(moved[..., model.loss_nodes])
+
+
 def _with_states(
     model: NetworkOnGrid, piece: Piece, values: Array, T: Array, tangent: LossTangent, memory: Array, balance: Balance,
     matrix: Array, capacities: Array,
@@ -612,11 +656,9 @@ def _with_states(
     size = n + len(model.coupled)
     whole = np.zeros((len(T), size, size))
     whole[:, :n, :n] = matrix
-    for node in range(n):
-        moved = T.copy()
-        moved[:, node] += TEMPERATURE_STEP_K
-        there = model.rates(piece, moved, values, tangent.at(moved[:, model.loss_nodes]), memory)
-        whole[:, n:, node] = (there - rates) / TEMPERATURE_STEP_K
+    moved, changed = _moved(model, T, tangent)
+    there = model.rates(piece, moved, values, changed, memory)
+    whole[:, n:, :n] = np.moveaxis((there - rates) / TEMPERATURE_STEP_K, 0, -1)
     for index, state in enumerate(model.coupled):
         changed = memory.copy()
         changed[:, state] += STATE_STEP
@@ -630,19 +672,22 @@ def _with_states(
 
 def _round(
     model: NetworkOnGrid, piece: Piece, values: Array, start: Array, T_ref: Array, tangent: LossTangent | None,
-    states: Array | None,
+    states: Array | None, *, follow: bool = True,
 ) -> Trajectory:  # fmt: skip
-    """Linearise about a trajectory and solve."""
+    """Linearise about a trajectory and solve; with the states as given, or those that follow its temperatures."""
     T = 0.5 * (T_ref[1:] + T_ref[:-1])
     tangent = model.loss_tangent(piece, T, tangent)
     power = tangent.at(T[:, model.loss_nodes])
     guide, seen = piece.guide(T_ref, model.parts), piece.seen(T_ref, model.parts)
-    memory = _with_coupled(model, model.memory(piece, seen, values, power), states)
+    if not follow and states is not None:
+        memory = states.copy()
+    else:
+        memory = model.memory(piece, T_ref, seen, values, power, states)
     solved, result = _walked(model, piece, values, start, T, tangent, memory)
     read = model.switched_by
-    if read and np.nanmax(np.abs(result[:, : model.n] - guide)[:, read], initial=0.0) > ASTRAY_K:
+    if read and follow and np.nanmax(np.abs(result[:, : model.n] - guide)[:, read], initial=0.0) > ASTRAY_K:
         seen = _stepped(model, piece, values, start, T, tangent, memory, guide)[1]
-        memory = _with_coupled(model, model.memory(piece, seen, values, power), states)
+        memory = model.memory(piece, T_ref, seen, values, power, states)
         solved, result = _walked(model, piece, values, start, T, tangent, memory)
     n = model.n
     memory[:, model.coupled] = 0.5 * (result[1:, n:] + result[:-1, n:])
@@ -713,10 +758,10 @@ def settled_balance(model: NetworkOnGrid, trajectory: Trajectory) -> Balance:
     return model.balance(trajectory.piece, T, trajectory.values, power, trajectory.memory)
 
 
-def parameter_heat(
-    model: NetworkOnGrid, trajectory: Trajectory, here: Balance, index: int, step: float
+def parameter_heats(
+    model: NetworkOnGrid, trajectory: Trajectory, here: Balance, indices: Sequence[int], steps: Array
 ) -> tuple[Array, Array]:
-    """Net heat and total loss per unit of a parameter, along a trajectory.
+    """Net heat and total loss per unit of some parameters, along a trajectory.
 
     Parameters
     ----------
@@ -724,38 +769,46 @@ def parameter_heat(
     trajectory : Trajectory
     here : Balance
         Its :func:`settled_balance`
-    index : int
-        Which parameter
-    step : float
-        Of the parameter, in its unit
+    indices : sequence of int
+        Which parameters
+    steps : Array, shape (V,)
+        Of every parameter, in its unit
 
     Returns
     -------
-    heat : Array, shape (K, parts + coupled)
+    heat : Array, shape (K, parts + coupled, V)
         Including the change of stored heat that another capacity makes, per unit of the parameter, [W/unit]; then the
         rates of the states that are solved with the temperatures
-    loss : Array, shape (K,)
+    loss : Array, shape (K, V)
     """
-    values = np.array(trajectory.values)
-    values[index] += step
-    T, piece = trajectory.middle, trajectory.piece
+    count = max(1, MOST_AT_ONCE // len(trajectory.memory))
+    found = [_parameter_heats(model, trajectory, here, indices[i : i + count], steps[i : i + count])
+             for i in range(0, len(indices), count)]  # fmt: skip
+    heats, losses = zip(*found, strict=True)
+    return np.concatenate(heats, axis=-1), np.concatenate(losses, axis=-1)
+
+
+def _parameter_heats(
+    model: NetworkOnGrid, trajectory: Trajectory, here: Balance, indices: Sequence[int], steps: Array
+) -> tuple[Array, Array]:
+    T, piece, memory = trajectory.middle, trajectory.piece, trajectory.memory
+    values = np.tile(trajectory.values, (len(indices), 1))
+    values[range(len(indices)), indices] += steps
     power = trajectory.tangent.at(T[:, model.loss_nodes])
-    name = model.network.parameters[index].name
-    remembered = any(
-        name in {s.name for s in law.free_symbols}
-        for state in model.network.states for law in (state.rate, state.update) if law is not None
-    )  # fmt: skip
-    memory = trajectory.memory
+    remembered = [i for i, index in enumerate(indices) if model.network.parameters[index].name in model.remembered]
+    memories = memory
     if remembered:
-        memory = _with_coupled(model, model.memory(piece, trajectory.seen, values, power), trajectory.memory)
-    there = model.balance(piece, T, values, power, memory)
-    capacities = model.capacities(values)
-    heat = (there.heat * (trajectory.capacities / capacities) - here.heat) / step
+        memories = np.tile(memory, (len(indices), 1, 1))
+        memories[remembered] = model.memory(piece, trajectory.T, trajectory.seen, values[remembered], power, memory)
+    there = model.balance(piece, T, values, power, memories)
+    stored = (trajectory.capacities / model.capacities(values))[:, None, :]
+    heat = (there.heat * stored - here.heat) / steps[:, None, None]
     if model.coupled:
         before = model.rates(piece, T, trajectory.values, power, memory)
-        heat = np.concatenate([heat, (model.rates(piece, T, values, power, memory) - before) / step], axis=1)
-    loss = (there.sources - here.sources)[:, model.is_loss].sum(axis=-1) / step
-    return heat, loss
+        driven = (model.rates(piece, T, values, power, memories) - before) / steps[:, None, None]
+        heat = np.concatenate([heat, driven], axis=-1)
+    loss = (there.sources - here.sources)[..., model.is_loss].sum(axis=-1) / steps[:, None]
+    return np.moveaxis(heat, 0, -1), loss.T
 
 
 def named_values(network: ThermalNetwork, given: Mapping[str, float] | None = None) -> Array:

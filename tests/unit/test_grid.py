@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from diagnosis.grid import FREE_S, INTERVAL_S, LONGEST, SAMPLES, Piece, lagged, pieces, stands_for
+from diagnosis.grid import FREE_S, INTERVAL_S, LONGEST, SAMPLES, Piece, pieces, stands_for
 from diagnosis.recording import Channel, Recording
+from diagnosis.recurrence import lagged
 from diagnosis.trajectory import NetworkOnGrid, free_running
 from models.gearbox import Gearbox
 from models.mechanisms import CATALOGUE, Scale
@@ -143,7 +144,7 @@ def test_a_switch_acts_for_its_share_of_an_interval(fzg: Gearbox) -> None:
     seen = np.full((len(piece.time), model.n), 50.0)
     seen[:, model.parts.index("oil")] = [58.0, 61.0, 63.0, 59.0, 57.0, 57.0]  # on at 62, off at 58
     power = np.zeros((len(piece.steps), len(model.laws.components)))
-    np.testing.assert_allclose(model.memory(piece, seen, values, power)[:, 0], [0.0, 0.5, 1.0, 0.5, 0.0])
+    np.testing.assert_allclose(model.memory(piece, seen, seen, values, power)[:, 0], [0.0, 0.5, 1.0, 0.5, 0.0])
 
 
 def test_the_first_minutes_of_a_piece() -> None:

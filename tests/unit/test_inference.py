@@ -26,7 +26,7 @@ from diagnosis.explain import (
     without,
 )
 from diagnosis.findings import finding_of
-from diagnosis.grid import Piece, lagged, pieces
+from diagnosis.grid import Piece, pieces
 from diagnosis.holdout import Judge
 from diagnosis.hypotheses import Hypothesis, Scored, hypothesis_of, scan, sharpened
 from diagnosis.noise import loss_noise, noise_of, start_guess
@@ -34,6 +34,7 @@ from diagnosis.observation import readings
 from diagnosis.posterior import Problem, _gauss_newton
 from diagnosis.predict import START_S, predict
 from diagnosis.recording import Channel, Recording
+from diagnosis.recurrence import lagged
 from diagnosis.search import log_e_value
 from diagnosis.shapes import shape_terms
 from diagnosis.term_on_grid import TermOnGrid
@@ -41,7 +42,7 @@ from diagnosis.trajectory import (
     NetworkOnGrid,
     exponential,
     named_values,
-    parameter_heat,
+    parameter_heats,
     settled_balance,
     simulate,
 )
@@ -314,7 +315,7 @@ def test_term_gives_the_same_heat_inside_its_network_and_beside_it(
         tangent = model.loss_tangent(piece, 0.5 * (T[1:] + T[:-1]))
         start = named_values(model.network, given)
         trajectory = simulate(model, piece, start, T[0], guess=T, rounds=1)
-        memory = model.memory(piece, piece.seen(T, model.parts), start, tangent.power)
+        memory = model.memory(piece, T, piece.seen(T, model.parts), start, tangent.power)
         here = replace(trajectory, T=T, seen=piece.seen(T, model.parts), tangent=tangent, memory=memory)
         here = replace(here, balance=settled_balance(model, here))
         found.append(TermOnGrid(model, placed).heat(here, values)[0])
@@ -371,8 +372,8 @@ def test_a_tank_is_solved_with_the_temperatures(fzg: Gearbox, piece: Piece, ride
     names, here = [p.name for p in model.network.parameters], settled_balance(model, found)
     for name in (placed.parameters[1].name, placed.parameters[2].name):
         step = 0.02 * given[name]
-        heat, _ = parameter_heat(model, found, here, names.index(name), step)
-        column = found.response(heat[:, :, None])[:, nodes, 0]
+        heat, _ = parameter_heats(model, found, here, [names.index(name)], np.array([step]))
+        column = found.response(heat)[:, nodes, 0]
         sides = [simulate(model, piece, named_values(model.network, given | {name: given[name] + sign * step}),
                           found.T[0], settled_K=1e-6, rounds=20).T[:, nodes] for sign in (1, -1)]  # fmt: skip
         numeric = (sides[0] - sides[1]) / (2.0 * step)
