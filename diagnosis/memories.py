@@ -25,6 +25,7 @@ from models.types import Array
 SWITCHED_PARTS = 4  # of an interval, in which it is looked whether something switches
 SLOW_SUBSTEPS = 11  # of an interval of minutes, where there is no closed form; odd
 TINY = 1e-9
+MOVED = 1e-3  # of a state, for the slope of its rate
 
 
 def update_of(state: ExtraState, *, blurred: bool) -> sp.Expr:
@@ -153,8 +154,14 @@ class Memories:
         def held(k: int, now: Sequence[Array]) -> list[Array]:
             return [known[i][:, k, None] if i in known else z for i, z in enumerate(now)]
 
-        def rates(k: int, now: Sequence[Array]) -> Sequence[Array]:
+        def law_at(k: int, now: Sequence[Array]) -> Sequence[Array]:
             return law(*(_of_interval(row, np.array([k])) for row in rows), *held(k, now))[:size]
+
+        def rates(k: int, now: list[Array]) -> list[tuple[Array, Array]]:
+            """Of every state its rate, and the slope of that with itself: a lag may be far shorter than a step."""
+            rate = law_at(k, now)
+            moved = [law_at(k, [*now[:i], now[i] + MOVED, *now[i + 1 :]])[i] for i in range(size)]
+            return [(r, (m - r) / MOVED) for r, m in zip(rate, moved, strict=True)]
 
         def switched(k: int, point: Array, now: Sequence[Array]) -> list[Array]:
             got = law(*self._at(rows, np.array([k]), point[None, :]), *held(k, now))[size:]
@@ -167,8 +174,9 @@ class Memories:
         for k, h in enumerate(piece.steps / substeps):
             before, half = now, now
             for part in range(substeps):
-                midway = [z + 0.5 * h * rate for z, rate in zip(now, rates(k, now), strict=True)]
-                now = [z + h * rate for z, rate in zip(now, rates(k, midway), strict=True)]
+                driven = rates(k, now)
+                midway = [z + 0.5 * h * _phi(0.5 * h * own) * r for z, (r, own) in zip(now, driven, strict=True)]
+                now = [z + h * _phi(h * own) * r for z, (r, own) in zip(now, driven, strict=True)]
                 half = midway if part == substeps // 2 else half
             on = [np.zeros((count, 1)) for _ in self._states]
             for point in points[k]:

@@ -1,0 +1,182 @@
+"""What remembers along a recording: on all intervals at once as interval by interval, and as the solver has it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import sympy as sp
+
+from diagnosis.grid import Piece, pieces
+from diagnosis.memories import SWITCHED_PARTS, Memories, within
+from diagnosis.recording import Recording
+from diagnosis.recurrence import lagged, recurrence
+from diagnosis.trajectory import NetworkOnGrid, free_running, named_values, parameter_heats, settled_balance, simulate
+from models.cycle import Cycle
+from models.gearbox import Gearbox
+from models.laws import symbol
+from models.mechanisms import CATALOGUE, Placed, Scale
+from models.network import ExtraState
+from models.types import Array
+
+INPUTS = ("speed", "torque", "T_ambient", "air_speed")
+REMEMBERING = sorted(
+    name
+    for name in CATALOGUE
+    if name not in ("cooler_air_thermostat", "cooler_air_proportional") and CATALOGUE[name].states
+)
+
+
+def piece_of(time: Array, *, speed: Array | float = 2600.0, torque: float = 150.0) -> Piece:
+    inputs = {"speed": speed, "torque": torque, "T_ambient": 22.0, "air_speed": 2.0}
+    recording = Recording(
+        name="made", path=Path("made.csv"), sha256="0" * 64, time=time, channels=(),
+        inputs={name: np.broadcast_to(np.asarray(values, float), time.shape) for name, values in inputs.items()},
+        segments=(slice(0, len(time)),),
+    )  # fmt: skip
+    (found,) = pieces([recording], INPUTS, (), even=True)
+    return found
+
+
+def placed_on(gearbox: Gearbox, name: str) -> Placed:
+    return CATALOGUE[name].placed(gearbox.network(), Scale.of(gearbox, speed=2600.0, torque=150.0))[0]
+
+
+def test_recurrence_is_a_loop() -> None:
+    rng = np.random.default_rng(3)
+    slope, driven = rng.uniform(-1.0, 1.0, (300, 4)), rng.normal(size=(300, 4))
+    slope[rng.uniform(size=slope.shape) < 0.3] = 1.0
+    expected = np.array(driven)
+    for k in range(1, len(driven)):
+        expected[k] += slope[k] * expected[k - 1]
+    np.testing.assert_allclose(recurrence(slope, driven), expected, rtol=1e-12, atol=1e-12)
+
+
+def test_a_lag_follows_its_equation() -> None:
+    """dy/dt = (u - y)/tau for a ramp: y = u - c tau (1 - exp(-t/tau)), whatever the steps."""
+    steps = np.array([1.0, 40.0, 3.0, 100.0, 20.0])
+    time = np.concatenate([[0.0], np.cumsum(steps)])
+    expected = 0.5 * time - 0.5 * 30.0 * (1.0 - np.exp(-time / 30.0))
+    np.testing.assert_allclose(lagged(0.5 * time, steps, 30.0), expected, rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize("spacing", [10.0, 600.0])
+@pytest.mark.parametrize("name", REMEMBERING)
+def test_at_once_as_interval_by_interval(fzg: Gearbox, name: str, spacing: float) -> None:
+    placed = placed_on(fzg, name)
+    model = NetworkOnGrid(placed.apply(fzg.network()), fzg.losses())
+    time = np.arange(0.0, 200.0 * spacing, spacing)
+    piece = replace(piece_of(time, speed=np.where(np.sin(time / spacing / 15.0) > -0.6, 2600.0, 0.0)), guided=True)
+    assert piece.slow == (spacing > 60.0)
+    swing = 0.5 + 0.5 * np.sin(piece.time / spacing / 9.0)
+    T = 25.0 + 100.0 * swing[:, None] * np.linspace(0.8, 1.0, model.n)
+    power = np.full((len(piece.steps), len(model.laws.components)), 30.0)
+    values = np.stack([model.start, model.start * 1.1])
+    memories = model._memories
+    assert memories._in_turn  # all of the catalogue: else its diagnosis would be slow
+    found = model.memory(piece, T, T, values, power)
+    memories._in_turn = False
+    expected = model.memory(piece, T, T, values, power)
+    for index, state in enumerate(model.network.states):
+        range_of = np.ptp(expected[..., index], axis=1)
+        assert (range_of > 0.0).all()
+        # The loop takes steps of its own where a rate drives the state, and sees a switch at the ends of an interval.
+        tolerance = 1e-12 if state.update is not None else 0.02 * range_of.min()
+        if index in model.actuated:
+            assert np.abs(found[..., index] - expected[..., index]).mean() < 0.03
+        else:
+            np.testing.assert_allclose(found[..., index], expected[..., index], atol=tolerance)
+    memories._in_turn = True
+    np.testing.assert_array_equal(model.memory(piece, T, T, values[1], power), found[1])  # each as it is alone
+
+
+HOTTEST, OIL = symbol("hottest"), symbol("T_oil")
+
+
+@pytest.mark.parametrize(
+    ("update", "follows"),
+    [
+        (sp.Max(HOTTEST, OIL), max),
+        (sp.Piecewise((OIL, HOTTEST < 35.0), (HOTTEST, True)), lambda was, oil: oil if was < 35.0 else was),
+    ],
+)
+def test_what_is_no_straight_line_of_itself_is_followed_one_by_one(
+    update: sp.Expr, follows: Callable[[float, float], float]
+) -> None:
+    memories = Memories(
+        [ExtraState(name="hottest", start=0.0, rate=sp.Integer(0), update=update)], ["time", "T_oil"], ["oil"], {}
+    )
+    assert not memories._in_turn
+    piece = piece_of(np.arange(0.0, 81.0, 20.0))
+    seen = np.array([30.0, 32.0, 46.0, 20.0, 20.0])[:, None]
+    (found,) = memories.follow(piece, [piece.middle, 0.5 * (seen[1:, 0] + seen[:-1, 0])], seen)
+    state, expected = 0.0, []
+    for oil in within(seen, SWITCHED_PARTS).ravel():
+        state = follows(state, oil)
+        expected.append(state)
+    np.testing.assert_allclose(found[0], np.reshape(expected, (-1, SWITCHED_PARTS)).mean(axis=1))
+
+
+def test_states_that_are_given_are_not_followed() -> None:
+    valve = ExtraState(name="valve", start=0.0, rate=sp.Integer(0), update=sp.Float(1.0))
+    opening = ExtraState(name="opening", start=0.0, rate=(symbol("valve") - symbol("opening")) / 50.0, update=None)
+    memories = Memories([valve, opening], ["time", "T_oil"], ["oil"], {})
+    piece = piece_of(np.arange(0.0, 201.0, 20.0))
+    seen = np.full((len(piece.time), 1), 40.0)
+    rows = [piece.middle, np.full(len(piece.steps), 40.0)]
+    expected = 1.0 - np.exp(-piece.middle / 50.0)  # of what comes before it in the list
+    np.testing.assert_allclose(memories.follow(piece, rows, seen)[1][0], expected, rtol=1e-12)
+    closed = memories.follow(piece, rows, seen, {0: np.zeros(len(piece.steps))})
+    assert not closed[0].any()
+    assert not closed[1].any()
+
+
+def thermostat(gearbox: Gearbox) -> tuple[NetworkOnGrid, Placed, dict[str, float]]:
+    placed = placed_on(gearbox, "cooler_thermostat")
+    given = dict(zip([p.name for p in placed.parameters], (7.0, 45.0, 4.0, 20.0, 40.0), strict=True))
+    return NetworkOnGrid(placed.apply(gearbox.network()), gearbox.losses()), placed, given
+
+
+def test_a_slow_valve_runs_free_as_the_solver_has_it(fzg: Gearbox) -> None:
+    model, _, given = thermostat(fzg)
+    time = np.arange(0.0, 5401.0, 5.0)
+    piece = piece_of(time)
+    found = free_running(model, piece, named_values(model.network, given), np.full(model.n, 25.0))
+    columns = {"time_s": time, "speed_rpm": np.full(len(time), 2600.0), "torque_Nm": np.full(len(time), 150.0),
+               "T_ambient_degC": np.full(len(time), 22.0), "air_speed_m_s": np.full(len(time), 2.0)}  # fmt: skip
+    cycle = Cycle.from_columns(columns)
+    solved = model.network.simulate(cycle, losses=fzg.losses(), initial=25.0, parameters=given).columns()["T_oil_degC"]
+    oil = model.parts.index("oil")
+    late = piece.time > 1800.0
+    expected = np.interp(piece.time, time, solved)[late]
+    assert np.ptp(expected) > 4.0  # it saws, beyond its band since the valve is slow
+    assert np.mean(found.T[late, oil]) == pytest.approx(np.mean(expected), abs=0.1)
+    assert np.std(found.T[late, oil]) == pytest.approx(np.std(expected), rel=0.1)
+    np.testing.assert_allclose(found.T[~late, oil], np.interp(piece.time, time, solved)[~late], atol=0.5)
+
+
+def test_derivatives_of_a_slow_valve(fzg: Gearbox) -> None:
+    """Against differences, where switches follow what was measured."""
+    model, placed, given = thermostat(fzg)
+    time = np.arange(0.0, 5401.0, 20.0)
+    oil = 45.0 + 4.0 * np.sin(time / 200.0)
+    piece = replace(
+        piece_of(time), guided=True, channels=("oil",), measured=oil[:, None], counts=np.ones((len(oil), 1))
+    )
+    start = np.full(model.n, 45.0)
+    found = simulate(model, piece, named_values(model.network, given), start, rounds=20, settled_K=1e-7)
+    names, here = [p.name for p in model.network.parameters], settled_balance(model, found)
+    for parameter, least in zip((placed.parameters[0], placed.parameters[4]), (0.1, 0.002), strict=True):
+        step = 0.02 * given[parameter.name]
+        heat, _ = parameter_heats(model, found, here, [names.index(parameter.name)], np.array([step]))
+        column = found.response(heat)[..., 0]
+        sides = []
+        for moved in (given[parameter.name] + step, given[parameter.name] - step):
+            values = named_values(model.network, given | {parameter.name: moved})
+            sides.append(simulate(model, piece, values, start, rounds=20, settled_K=1e-7).T)
+        numeric = (sides[0] - sides[1]) / (2.0 * step)
+        assert np.abs(numeric).max() > least
+        np.testing.assert_allclose(column, numeric, atol=0.02 * np.abs(numeric).max())
