@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 
 from diagnosis.mapping import LOSS
 from diagnosis.recording import Recording
-from diagnosis.recurrence import lagged
 from models.types import Array
 
 INTERVAL_S = 20.0
@@ -31,6 +30,7 @@ BEND_REACH = 3  # intervals to either side of a grid point, over which means are
 BEND_SDS, LEAST_BEND_K, LEAST_BEND_W = 6.0, 0.3, 2.0  # a bend that counts: of its noise, and at least
 SETTLING_S = 600.0  # after a jump of the inputs, in which temperatures bend because of it, and smoothly
 SHORTEST_PIECE = 5  # grid points
+DOUBT_SDS, TURN_SDS = 2.0, 6.0  # of the noise: benefit of the doubt at a turning point, and how clear that has to be
 FREE_S = 5.0  # length of intervals in which switches run free
 SLOW_S = 60.0  # rows further apart are means that hide what switches do, see :class:`Piece`
 
@@ -121,22 +121,29 @@ class Piece:
             Simulated, at the grid points, [degC]
         parts : sequence of str
         """
-        measured = self.guide(T, parts)
+        measured = self.guide(parts)
         return np.where(np.isfinite(measured), measured, T)
 
-    def guide(self, T: Array, parts: Sequence[str]) -> Array:
-        """What the parts had where that was measured and the piece is guided, else NaN; shape (K + 1, parts), [degC].
-
-        Of what a sensor lags behind, the simulated temperatures tell; see :meth:`seen`.
-        """
+    def guide(self, parts: Sequence[str]) -> Array:
+        """What parts had where it was measured and the piece is guided, else NaN; shape (K + 1, parts), [degC]."""
         found = np.full((len(self.time), len(parts)), np.nan)
         for index, name in enumerate(self.channels):
             if self.guided and name in parts:
-                at = list(parts).index(name)
-                found[:, at] = _sharpened(self.measured[:, index], self.steps)
-                if self.lags is not None:
-                    found[:, at] += T[:, at] - lagged(T[:, at], self.steps, float(self.lags[index]))
+                lag = 0.0 if self.lags is None else float(self.lags[index])
+                found[:, list(parts).index(name)] = self._without_sensor(self.measured[:, index], lag)
         return found
+
+    def _without_sensor(self, measured: Array, lag: float) -> Array:
+        """What a part probably had: without the lag of its sensor, peaks and valleys not cut off.
+
+        Of the measured course alone: taken from the simulated one, it would be another one in every round.
+        """
+        sharp, behind = _sharpened(measured, self.steps), lag * _slope(measured, self.steps)
+        if self.slow:
+            return np.asarray(sharp + behind)
+        turns, noise = _turning(measured)
+        # Noise must not decide whether the switch acted that made the temperature turn.
+        return np.asarray(sharp + np.where(turns == 0.0, behind, DOUBT_SDS * noise * turns))
 
     @cached_property
     def middle(self) -> Array:
@@ -258,7 +265,8 @@ def _thinned(even: Array, time: Array, inputs: Mapping[str, Array], values: Mapp
     jumped = np.maximum.accumulate(np.where(happens, at, -count))
     settled = (at - jumped) * INTERVAL_S > SETTLING_S
     for name, rows in values.items():
-        happens |= settled & _bends(_cell_means(rows, cell, count), LEAST_BEND_W if name == LOSS else LEAST_BEND_K)
+        bends, turns = _bends(_cell_means(rows, cell, count), LEAST_BEND_W if name == LOSS else LEAST_BEND_K)
+        happens |= (settled & bends) | turns
     chosen, k, calm = [0], 0, 0
     upcoming = np.append(np.flatnonzero(happens), count)
     while k < count:
@@ -281,19 +289,21 @@ def _cell_means(rows: Array, cell: NDArray[np.intp], count: int) -> Array:
     return np.asarray(np.interp(np.arange(count), known, means))
 
 
-def _bends(means: Array, least: float) -> NDArray[np.bool_]:
-    """Where the slope of a signal changes by more than its noise would make it, shape (K,)."""
-    result, width = np.zeros(len(means), dtype=bool), 2 * BEND_REACH
+def _bends(means: Array, least: float) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Where the slope of a signal changes by more than its noise would make it, and where it turns round; (K,) each."""
+    bends, turns, width = np.zeros(len(means), dtype=bool), np.zeros(len(means), dtype=bool), 2 * BEND_REACH
     if len(means) < 3 * width:
-        return result
+        return bends, turns
     total = np.concatenate([[0.0], np.cumsum(means)])
     box = (total[width:] - total[:-width]) / width
-    bend = np.abs(box[2 * width :] + box[: -2 * width] - 2.0 * box[width:-width])
+    before, after = box[width:-width] - box[: -2 * width], box[2 * width :] - box[width:-width]
     # The noise of one cell from its second differences, which a saw of slopes leaves alone but for its few corners.
     noise = 1.4826 * float(np.median(np.abs(np.diff(means, 2)))) / np.sqrt(6.0)
-    at = np.flatnonzero(bend > max(BEND_SDS * noise * np.sqrt(6.0 / width), least))
-    result[at + width + BEND_REACH] = True
-    return result
+    middle = slice(width + BEND_REACH, width + BEND_REACH + len(before))
+    bends[middle] = np.abs(after - before) > max(BEND_SDS * noise * np.sqrt(6.0 / width), least)
+    turns[middle] = np.minimum(before, -after) > max(BEND_SDS * noise * np.sqrt(2.0 / width), 0.5 * least)
+    turns[middle] |= np.minimum(-before, after) > max(BEND_SDS * noise * np.sqrt(2.0 / width), 0.5 * least)
+    return bends, turns
 
 
 def _sharpened(means: Array, steps: Array) -> Array:
@@ -305,6 +315,27 @@ def _sharpened(means: Array, steps: Array) -> Array:
     bend, slope = np.zeros_like(means), np.diff(means) / steps
     bend[1:-1] = (slope[:-1] - slope[1:]) * np.minimum(steps[:-1], steps[1:])
     return np.asarray(means + 0.5 * np.nan_to_num(bend))
+
+
+def _slope(means: Array, steps: Array) -> Array:
+    """How fast means over the rows change, shape (K + 1,)."""
+    slope, result = np.diff(means) / steps, np.zeros_like(means)
+    result[1:-1] = 0.5 * (slope[1:] + slope[:-1])
+    return np.nan_to_num(result)
+
+
+def _turning(means: Array) -> tuple[Array, float]:
+    """Where means over the rows turn round, 1 at a peak and -1 in a valley, shape (K + 1,); and their noise."""
+    result, reach = np.zeros(len(means)), 2 * BEND_REACH
+    noise = 1.4826 * float(np.nanmedian(np.abs(np.diff(means, 2)))) / np.sqrt(6.0) if len(means) > 2 else 0.0
+    if len(means) <= 2 * reach or not np.isfinite(noise):
+        return result, 0.0
+    for sign in (1.0, -1.0):
+        around = sliding_window_view(np.nan_to_num(sign * means, nan=-np.inf), 2 * reach + 1)
+        here = around[:, reach]
+        foot = np.maximum(around[:, 0], around[:, -1])
+        result[reach:-reach][(here >= around.max(axis=1)) & (here - foot > TURN_SDS * noise)] = sign
+    return result, noise
 
 
 def _means(values: Array, time: Array, cell: NDArray[np.intp], grid: Array) -> tuple[Array, Array]:

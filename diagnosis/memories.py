@@ -22,7 +22,7 @@ from models.laws import compile_function, function_source, symbol
 from models.network import ExtraState
 from models.types import Array
 
-SWITCHED_PARTS = 4  # of an interval, in which it is looked whether something switches
+SWITCHED_PARTS = 32  # of an interval, in which it is looked whether something switches
 SLOW_SUBSTEPS = 11  # of an interval of minutes, where there is no closed form; odd
 TINY = 1e-9
 MOVED = 1e-3  # of a state, for the slope of its rate
@@ -172,20 +172,26 @@ class Memories:
         if piece.slow:
             now = switched(0, seen[0], now)
         for k, h in enumerate(piece.steps / substeps):
-            before, half = now, now
+            before, positions = now, [now] if piece.slow else []
+            for point in points[k]:
+                positions.append(switched(k, point, positions[-1] if positions else before))
+            means = [np.mean(np.broadcast_arrays(*each), axis=0) for each in zip(*positions, strict=True)]
+            after = positions[-1]
+            # What a rate drives feels the mean position of a switch.
+            now = half = [mean if it else z for mean, z, it in zip(means, before, self._switches, strict=True)]
             for part in range(substeps):
                 driven = rates(k, now)
-                midway = [z + 0.5 * h * _phi(0.5 * h * own) * r for z, (r, own) in zip(now, driven, strict=True)]
-                now = [z + h * _phi(h * own) * r for z, (r, own) in zip(now, driven, strict=True)]
-                half = midway if part == substeps // 2 else half
-            on = [np.zeros((count, 1)) for _ in self._states]
-            for point in points[k]:
-                now = switched(k, point, now)
-                on = [total + z / parts for total, z in zip(on, now, strict=True)]
-            for index, it in enumerate(self._switches):
-                mean = 0.5 * (before[index] + now[index]) if piece.slow else on[index]
-                result[index][:, k] = np.broadcast_to(mean if it else half[index], (count, 1))[:, 0]
+                half = _advanced(now, driven, 0.5 * h) if part == substeps // 2 else half
+                now = _advanced(now, driven, h)
+            for index, state in enumerate(half):
+                result[index][:, k] = np.broadcast_to(state, (count, 1))[:, 0]
+            now = [last if it else z for last, z, it in zip(after, now, self._switches, strict=True)]
         return [known.get(index, state) for index, state in enumerate(result)]
+
+
+def _advanced(states: Sequence[Array], driven: Sequence[tuple[Array, Array]], h: float) -> list[Array]:
+    """States after a time, by their rates and the slopes of these."""
+    return [z + h * _phi(h * slope) * rate for z, (rate, slope) in zip(states, driven, strict=True)]
 
 
 def _of_interval(row: Array | float, owner: NDArray[np.intp]) -> Array | float:

@@ -298,7 +298,7 @@ class Problem:
         if parts is None:
             raise ArithmeticError("the simulation has no solution where the fit should start")
         objective = _objective(parts, z)
-        damping = 0.0
+        damping, settled = 0.0, False
         for _ in range(iterations):
             step = _gauss_newton(parts, z, damping, lower, upper)
             longest = float(np.max(np.abs(step), initial=0.0))
@@ -308,11 +308,15 @@ class Problem:
             reached = _objective(trial, tried) if trial is not None else np.inf
             if trial is not None and reached <= objective + 1e-6:
                 z, parts, gained, objective = tried, trial, objective - reached, reached
-                damping *= 0.2
+                damping, settled = 0.2 * damping, False
                 if float(np.max(np.abs(step), initial=0.0)) < SETTLED or gained < 0.02:
                     break
             else:
-                damping = max(4.0 * damping, 1.0)
+                # The trajectory may not have settled at these values yet, and look better than it is.
+                again = None if settled else self._attempt(z, [part.trajectory for part in parts])
+                if again is not None:
+                    parts, objective = again, _objective(again, z)
+                settled, damping = True, max(4.0 * damping, 1.0)
                 if damping > 1e3:
                     break
         J = np.concatenate([part.white_columns for part in parts])

@@ -158,7 +158,8 @@ def hypotheses_of(case: Case, explanation: Explanation, catalogue: Mapping[str, 
         if f"{placed.name}@{placed.place}" not in taken
     ]
     found += open_hypotheses(case.train.model.network, case.scale, case.channels)
-    found += parameter_hypotheses(explanation.problem)
+    own = {p.name for h in explanation.found if h.term is not None for p in h.term.parameters}
+    found += [h for h in parameter_hypotheses(explanation.problem) if h.place not in own]
     return [h for h in found if h.label not in taken]
 
 

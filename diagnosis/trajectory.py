@@ -39,8 +39,8 @@ TORQUE_STEP = 0.02  # relative
 FREE_ROUNDS, FREE_SETTLED_K = 3, 0.2
 HIGHEST_T, LOWEST_T = 400.0, -60.0  # a trajectory is held here while it settles
 RUNAWAY_T = 1500.0  # degC; beyond it there is no trajectory
-# Rows are means: a switching that none of them shows sends a guided trajectory astray for hours. Further off than this,
-# switches follow the simulated temperature until it is back.
+# A switching that no row shows, be they means over minutes or noisy near a set-point, sends a guided trajectory astray.
+# Further off than this, switches follow the simulated temperature until it is back.
 ASTRAY_K = 4.0
 SMALL = 1e-9
 MOST_AT_ONCE = 40_000  # intervals times parameters whose derivatives are taken together
@@ -678,7 +678,7 @@ def _round(
     T = 0.5 * (T_ref[1:] + T_ref[:-1])
     tangent = model.loss_tangent(piece, T, tangent)
     power = tangent.at(T[:, model.loss_nodes])
-    guide, seen = piece.guide(T_ref, model.parts), piece.seen(T_ref, model.parts)
+    guide, seen = piece.guide(model.parts), piece.seen(T_ref, model.parts)
     if not follow and states is not None:
         memory = states.copy()
     else:
