@@ -74,6 +74,17 @@ def test_what_a_jump_bends_is_smooth_and_needs_no_fine_grid() -> None:
     assert step_at(piece_of(oil=settling), 3100.0) == INTERVAL_S  # without a jump of the inputs it may be a switch
 
 
+def test_a_switch_that_acts_soon_after_a_jump_is_not_jumped_over() -> None:
+    """Ever longer intervals follow a jump, but none across a peak."""
+    speed = np.where(TIME < 3000.0, 1500.0, 2500.0)
+    heating = 40.0 + np.maximum(TIME - 3000.0, 0.0) / 60.0
+    noise = np.random.default_rng(0).normal(0.0, 0.2, len(TIME))
+    peak = heating - np.maximum(TIME - 3520.0, 0.0) * 3.0 / 60.0  # 520 s later a cooler opens
+    piece = piece_of(speed=speed, oil=peak + noise)
+    assert step_at(piece_of(speed=speed, oil=heating + noise), 3525.0) > 2 * INTERVAL_S
+    assert piece.measured[:, 0].max() > peak.max() - 0.4
+
+
 def test_measurements_are_those_of_the_rows_around() -> None:
     """Of a straight line nothing is lost, however long the intervals beside a grid point are."""
     piece = piece_of(speed=np.where(TIME < 3000.0, 1500.0, 2500.0), oil=30.0 + TIME / 300.0)
@@ -120,18 +131,38 @@ def test_switches_run_free_as_on_an_even_grid(fzg: Gearbox) -> None:
 
 
 def test_a_slow_sensor_guides_switches_by_what_it_does_not_show_yet() -> None:
-    """Of what it lags behind, the simulated temperatures tell; of where they are, what was measured."""
     true = 40.0 + 0.04 * TIME + 3.0 * np.sin(TIME / 200.0)
     even = piece_of(oil=true, even=True)
     at = np.interp(even.time, TIME, true)
     shown = lagged(at, even.steps, 60.0)
     assert np.abs(shown - at).max() > 2.0
     piece = replace(even, measured=shown[:, None], lags=np.array([60.0]))
-    simulated = (at - 1.5)[:, None]  # off, but of the same course
-    seen = piece.seen(simulated, ("oil",))[:, 0]
-    assert np.abs(seen - at)[5:-1].max() < 0.05
-    assert np.abs(replace(piece, lags=None).seen(simulated, ("oil",))[:, 0] - at)[5:].max() > 2.0
-    np.testing.assert_array_equal(replace(piece, guided=False).seen(simulated, ("oil",)), simulated)
+    elsewhere = np.full((len(at), 1), 20.0)
+    assert np.abs(piece.seen(elsewhere, ("oil",))[:, 0] - at)[5:-1].max() < 0.1
+    assert np.abs(replace(piece, lags=None).seen(elsewhere, ("oil",))[:, 0] - at)[5:].max() > 2.0
+    np.testing.assert_array_equal(replace(piece, guided=False).seen(elsewhere, ("oil",)), elsewhere)
+
+
+def test_noise_hides_no_peak_that_a_switch_has_made() -> None:
+    """Of 40 peaks at 70 and valleys at 64 degC every one counts as reached, and few cells beside them."""
+    time = np.arange(0.0, 24001.0, 10.0)
+    saw = 67.0 + 3.0 * (2.0 * np.abs(2.0 * ((time / 600.0) % 1.0) - 1.0) - 1.0)
+    oil = saw + np.random.default_rng(1).normal(0.0, 0.2, len(time))
+    piece = replace(piece_of(time, oil=oil, even=True), guided=True)
+    seen = piece.seen(np.zeros((len(piece.time), 1)), ("oil",))[:, 0]
+    assert (
+        sum(seen[(piece.time > t - 100.0) & (piece.time < t + 100.0)].max() > 70.0 for t in range(600, 24000, 600)) > 37
+    )
+    assert (
+        sum(seen[(piece.time > t - 100.0) & (piece.time < t + 100.0)].min() < 64.0 for t in range(300, 24000, 600)) > 38
+    )
+    measured = piece.measured[:, 0]
+    assert (
+        sum(measured[(piece.time > t - 100.0) & (piece.time < t + 100.0)].max() > 70.0 for t in range(600, 24000, 600))
+        < 20
+    )
+    away = np.abs((piece.time % 300.0) - 150.0) < 90.0
+    assert np.abs(seen - measured)[away].mean() < 0.15
 
 
 def test_a_switch_acts_for_its_share_of_an_interval(fzg: Gearbox) -> None:

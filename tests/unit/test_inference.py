@@ -607,6 +607,17 @@ def test_a_clock_may_be_early_or_late(fzg: Gearbox, piece: Piece, problem: Probl
         assert search._matters(case, found, scored.hypothesis) is matters
 
 
+def test_parameters_of_what_was_found_are_no_further_explanation(fzg: Gearbox, problem: Problem) -> None:
+    (placed,) = CATALOGUE["cooler_thermostat"].placed(problem.model.network, Scale.of(fzg))
+    found = hypothesis_of(placed)
+    case: Any = SimpleNamespace(train=SimpleNamespace(model=problem.model), scale=Scale.of(fzg), channels=CHANNELS)
+    before: Any = SimpleNamespace(found=(), problem=problem)
+    after: Any = SimpleNamespace(found=(found,), problem=explain._with(problem, found))
+    labels = [{h.label for h in search.hypotheses_of(case, e, CATALOGUE)} for e in (before, after)]
+    assert len(after.problem.unknowns) > len(problem.unknowns)
+    assert labels[1] == labels[0] - {found.label}
+
+
 def test_a_distorted_calibration_is_also_seen_from_the_middle_of_the_priors(problem: Problem) -> None:
     base = calibrated(problem)
     assert not distorted(base)
