@@ -70,7 +70,7 @@ def test_corrected_network(file: Path) -> None:
     assert parameters["windage_oil_strength"].start == 9.5
     assert network.sources[-1].name == "windage_oil" and network.sources[-1].is_loss
     assert network.links[-1].nodes == ("oil", "cooler_thermostat_oil_coolant")
-    assert [state.name for state in network.states] == ["cooler_thermostat_oil_valve"]
+    assert [state.name for state in network.states] == ["cooler_thermostat_oil_valve", "cooler_thermostat_oil_opening"]
 
 
 def test_a_twin_gets_true_torque_and_a_recording_the_recorded_one(file: Path) -> None:
