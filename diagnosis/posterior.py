@@ -312,8 +312,9 @@ class Problem:
                 if float(np.max(np.abs(step), initial=0.0)) < SETTLED or gained < 0.02:
                     break
             else:
-                # The trajectory may not have settled at these values yet, and look better than it is.
-                again = None if settled else self._attempt(z, [part.trajectory for part in parts])
+                # The trajectory may not have settled at these values yet, and look better than it is. Where switches follow
+                # means over minutes it never settles to the last.
+                again = None if settled or self.slow else self._attempt(z, [part.trajectory for part in parts])
                 if again is not None:
                     parts, objective = again, _objective(again, z)
                 settled, damping = True, max(4.0 * damping, 1.0)

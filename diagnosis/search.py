@@ -301,15 +301,16 @@ def _judged(case: Case, calibrated: Explanation, base: Explanation, floor: float
     judge = Judge(case, base, floor)
     probabilities = stage.probabilities()
     cleared = any(_matters(case, base, h) for h in base.found)
+    matters, note = False, "the best explanation is hardly better than none"
+    refused: list[int] = []
     by_name: dict[str, float] = {}  # another place of the same physics is no rival
     for fit, probability in zip(stage.fits, probabilities, strict=True):
         by_name[fit.found[-1].name] = by_name.get(fit.found[-1].name, 0.0) + float(probability)
-    matters, note = False, "the best explanation is hardly better than none"
-    refused: list[int] = []
     ahead = 0.0  # probability of what is more likely and too small
     promising: Explanation | None = None
     for index, (fit, gain, probability) in enumerate(zip(stage.fits, stage.gains, probabilities, strict=True)):
-        if gain < needed or by_name[fit.found[-1].name] < LEAST_PROBABILITY:
+        left = [i for i in range(len(stage.fits)) if i not in refused]
+        if gain < needed or probability < LEAST_PROBABILITY * probabilities[left].sum():
             continue
         fit = replace(fit, fit=fit.problem.at(fit.fit))
         large = _matters(case, fit, fit.found[-1], 1.0 if gain > CERTAIN else 2.0)
@@ -321,7 +322,6 @@ def _judged(case: Case, calibrated: Explanation, base: Explanation, floor: float
             ahead = max(ahead, float(probability))
             note = "what the data show is too small to matter"
         elif _holds_out(judge, calibrated, fit):
-            left = [i for i in range(len(stage.fits)) if i not in refused]
             fits, gains = tuple(stage.fits[i] for i in left), tuple(stage.gains[i] for i in left)
             return replace(stage, fits=fits, gains=gains, accepted=fit, matters=large)
         else:

@@ -567,7 +567,8 @@ def _stepped(
             signals[states + index] = value
         for index, value in zip(switches, switching(signals), strict=True):
             state[index] = signals[states + index] = value
-        opening = dict(state)
+        # Seen in means over minutes a switch may be half way; it is where it is more likely to be.
+        opening = state | {index: float(state[index] > 0.5) for index in switches}
         if actuated:
             found = actuation(signals)
             for index, rate, slope in zip(actuated, found, found[len(actuated) :], strict=False):
