@@ -312,8 +312,8 @@ class Problem:
                 if float(np.max(np.abs(step), initial=0.0)) < SETTLED or gained < 0.02:
                     break
             else:
-                # The trajectory may not have settled at these values yet, and look better than it is. Where switches follow
-                # means over minutes it never settles to the last.
+                # The trajectory may not have settled at these values yet, and look better than it is. Where switches
+                # follow means over minutes it never settles to the last.
                 again = None if settled or self.slow else self._attempt(z, [part.trajectory for part in parts])
                 if again is not None:
                     parts, objective = again, _objective(again, z)
