@@ -15,9 +15,10 @@ from scipy.special import log_ndtr
 
 from diagnosis.evidence import Marginal
 from diagnosis.hypotheses import WIDE_PRIOR, Hypothesis, Scored, spread, white_column
+from diagnosis.network_on_grid import NetworkOnGrid
 from diagnosis.posterior import Fit, Problem
 from diagnosis.reshape import reshaped
-from diagnosis.trajectory import NetworkOnGrid, Trajectory
+from diagnosis.trajectory import Trajectory
 from models.types import Array
 
 FIRST_ITERATIONS, ROUGH_ITERATIONS, ITERATIONS = 4, 3, 10

@@ -17,10 +17,10 @@ from joblib import Parallel, delayed
 
 from diagnosis.evidence import Marginal, strength
 from diagnosis.latent import white_columns
+from diagnosis.network_on_grid import NetworkOnGrid
 from diagnosis.observation import readings
 from diagnosis.posterior import Fit, Linearised, Problem
 from diagnosis.term_on_grid import TermOnGrid
-from diagnosis.trajectory import NetworkOnGrid
 from models.mechanisms import Placed
 from models.terms import Term
 from models.types import Array

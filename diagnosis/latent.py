@@ -14,9 +14,9 @@ import numpy as np
 
 from diagnosis.evidence import Marginal
 from diagnosis.grid import Piece
+from diagnosis.network_on_grid import NetworkOnGrid
 from diagnosis.observation import reading_columns
 from diagnosis.posterior import Fit, Linearised
-from diagnosis.trajectory import NetworkOnGrid
 from models.types import Array
 
 KNOT_S = 1200.0

@@ -9,8 +9,8 @@ from scipy.optimize import nnls
 
 from diagnosis.grid import Piece, slow_rows
 from diagnosis.mapping import LOSS
+from diagnosis.network_on_grid import NetworkOnGrid
 from diagnosis.recording import Recording
-from diagnosis.trajectory import NetworkOnGrid
 from diagnosis.whitening import Noise
 from models.types import Array
 

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from diagnosis.mapping import LOSS
+from diagnosis.network_on_grid import NetworkOnGrid
 from diagnosis.recurrence import lagged
-from diagnosis.trajectory import NetworkOnGrid, Trajectory
+from diagnosis.trajectory import Trajectory
 from models.types import Array
 
 

@@ -14,8 +14,9 @@ import numpy as np
 
 from diagnosis.grid import Piece
 from diagnosis.mapping import LOSS
+from diagnosis.network_on_grid import NetworkOnGrid
 from diagnosis.recording import Recording
-from diagnosis.trajectory import NetworkOnGrid, simulate
+from diagnosis.trajectory import simulate
 from models.errors import InputError
 from models.network import Losses, ThermalNetwork
 from models.types import Array

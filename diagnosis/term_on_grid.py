@@ -12,9 +12,10 @@ import sympy as sp
 
 from diagnosis.grid import Piece
 from diagnosis.memories import Memories
+from diagnosis.network_on_grid import NetworkOnGrid
 from diagnosis.observation import Sensors
 from diagnosis.recurrence import lagged
-from diagnosis.trajectory import NetworkOnGrid, Trajectory
+from diagnosis.trajectory import Trajectory
 from models.laws import compile_function, function_source, symbol
 from models.network import BASE_SIGNALS
 from models.terms import FACTORS, Term

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from diagnosis.grid import FREE_S, INTERVAL_S, LONGEST, SAMPLES, Piece, pieces, stands_for
+from diagnosis.network_on_grid import NetworkOnGrid
 from diagnosis.recording import Channel, Recording
 from diagnosis.recurrence import lagged
-from diagnosis.trajectory import NetworkOnGrid, free_running
+from diagnosis.trajectory import free_running
 from models.gearbox import Gearbox
 from models.mechanisms import CATALOGUE, Scale
 from models.types import Array

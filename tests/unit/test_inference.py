@@ -29,6 +29,7 @@ from diagnosis.findings import finding_of
 from diagnosis.grid import Piece, pieces
 from diagnosis.holdout import Judge
 from diagnosis.hypotheses import Hypothesis, Scored, hypothesis_of, scan, sharpened
+from diagnosis.network_on_grid import NetworkOnGrid, named_values
 from diagnosis.noise import loss_noise, noise_of, start_guess
 from diagnosis.observation import readings
 from diagnosis.posterior import Problem, _gauss_newton
@@ -38,14 +39,7 @@ from diagnosis.recurrence import lagged
 from diagnosis.search import log_e_value
 from diagnosis.shapes import shape_terms
 from diagnosis.term_on_grid import TermOnGrid
-from diagnosis.trajectory import (
-    NetworkOnGrid,
-    exponential,
-    named_values,
-    parameter_heats,
-    settled_balance,
-    simulate,
-)
+from diagnosis.trajectory import exponential, parameter_heats, settled_balance, simulate
 from diagnosis.unknowns import Unknowns, unknowns_of
 from diagnosis.whitening import Noise, Whitening, reading_variance
 from models.cycle import Cycle
@@ -692,6 +686,11 @@ def test_another_place_of_the_same_physics_may_be_taken_where_the_best_one_fails
     assert found.accepted is not None and found.accepted.found[-1].label == "feed@second"
     assert [fit.found[-1].label for fit in found.fits] == ["feed@second", "tank@oil"]
     assert found.probabilities()[0] > 0.5
+    # But not where something else is far more probable than that place.
+    rather = search._judged(
+        case, base, base, 1.0, replace(stage, fits=(fits[0], fits[2], fits[1]), gains=(120.0, 55.0, 25.0)), 10.0
+    )
+    assert rather.accepted is None
     others = replace(stage, fits=(fits[0], fits[2]), gains=(120.0, 55.0))
     refused = search._judged(case, base, base, 1.0, others, 10.0)
     assert refused.accepted is None and "held-out data worse" in refused.note

@@ -12,9 +12,10 @@ import sympy as sp
 
 from diagnosis.grid import Piece, pieces
 from diagnosis.memories import SWITCHED_PARTS, Memories, within
+from diagnosis.network_on_grid import NetworkOnGrid, named_values
 from diagnosis.recording import Recording
 from diagnosis.recurrence import lagged, recurrence
-from diagnosis.trajectory import NetworkOnGrid, free_running, named_values, parameter_heats, settled_balance, simulate
+from diagnosis.trajectory import free_running, parameter_heats, settled_balance, simulate
 from models.cycle import Cycle
 from models.gearbox import Gearbox
 from models.laws import symbol

@@ -12,8 +12,9 @@ import sympy as sp
 
 from diagnosis import trajectory
 from diagnosis.grid import Piece, pieces
+from diagnosis.network_on_grid import NetworkOnGrid
 from diagnosis.recording import read_recordings
-from diagnosis.trajectory import NetworkOnGrid, free_running, simulate
+from diagnosis.trajectory import free_running, simulate
 from models.errors import InputError
 from models.gearbox import known_gearboxes, load_gearbox, read_gearbox
 from models.laws import symbol
