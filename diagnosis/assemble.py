@@ -282,22 +282,21 @@ def _predictions(case: Case, found: Search) -> Predictions:
     """Free-running predictions: as delivered, calibrated and after, of the training and held-out pieces."""
     nothing = np.zeros(len(found.calibrated.problem.unknowns))
 
-    def of(problem: Problem, z: Array, *, as_delivered: bool = False) -> list[Prediction]:
-        return [predict(problem, i, z, as_delivered=as_delivered) for i in range(len(problem.pieces))]
+    def of(
+        problem: Problem, z: Array, about: Sequence[Prediction] = (), *, as_delivered: bool = False
+    ) -> list[Prediction]:  # fmt: skip
+        return [predict(problem, i, z, as_delivered=as_delivered, guess=about[i].trajectory.T if about else None)
+                for i in range(len(problem.pieces))]  # fmt: skip
 
-    final = found.final
-    return {
-        "train": {
-            "before": of(case.train, nothing, as_delivered=True),
-            "calibrated": of(found.calibrated.problem, found.calibrated.fit.z),
-            "after": of(final.problem, final.fit.z),
-        },
-        "holdout": {
-            "before": of(case.holdout, nothing, as_delivered=True),
-            "calibrated": of(at_holdout(case, found.calibrated), found.calibrated.fit.z),
-            "after": of(at_holdout(case, final), final.fit.z),
-        },
-    }
+    result = {}
+    for name, nominal, calibrated, final in (
+        ("train", case.train, found.calibrated.problem, found.final.problem),
+        ("holdout", case.holdout, at_holdout(case, found.calibrated), at_holdout(case, found.final)),
+    ):
+        before = of(nominal, nothing, as_delivered=True)
+        tuned = of(calibrated, found.calibrated.fit.z, before)
+        result[name] = {"before": before, "calibrated": tuned, "after": of(final, found.final.fit.z, tuned)}
+    return result
 
 
 def _fits(case: Case, predictions: Predictions, which: str) -> Fits:

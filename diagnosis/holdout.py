@@ -14,6 +14,7 @@ from diagnosis.posterior import Linearised, Problem
 from diagnosis.predict import overall_rmse, predict
 from diagnosis.trajectory import ROUNDS
 from diagnosis.whitening import Whitening
+from models.types import Array
 
 
 def at_holdout(case: Case, explanation: Explanation) -> Problem:
@@ -45,6 +46,12 @@ class Judge:
         parts = _linearised(problem, self.base)
         return [part.whitening for part in parts], _log_density(parts, self.base)
 
+    @cached_property
+    def _courses(self) -> list[Array]:
+        """Temperatures that the base predicts, free-running."""
+        problem = at_holdout(self.case, self.base)
+        return [predict(problem, i, self.base.fit.z).trajectory.T for i in range(len(problem.pieces))]
+
     def gain(self, explanation: Explanation) -> float:
         """Log density of the held-out readings over that of the base, predicted with what the training left unsure.
 
@@ -64,7 +71,8 @@ class Judge:
         problem = at_holdout(self.case, explanation)
         temperatures = [i for i, name in enumerate(self.case.channels) if name != LOSS]
         try:
-            predictions = [predict(problem, i, explanation.fit.z) for i in range(len(problem.pieces))]
+            predictions = [predict(problem, i, explanation.fit.z, guess=course)
+                           for i, course in enumerate(self._courses)]  # fmt: skip
         except (ArithmeticError, np.linalg.LinAlgError):
             return np.inf
         return overall_rmse(predictions, temperatures)

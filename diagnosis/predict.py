@@ -53,7 +53,9 @@ class Prediction:
         return stands_for(self.piece.time)
 
 
-def predict(problem: Problem, index: int, z: Array, *, as_delivered: bool = False) -> Prediction:
+def predict(
+    problem: Problem, index: int, z: Array, *, as_delivered: bool = False, guess: Array | None = None
+) -> Prediction:  # fmt: skip
     """Predict one piece of a problem.
 
     Parameters
@@ -64,6 +66,8 @@ def predict(problem: Problem, index: int, z: Array, *, as_delivered: bool = Fals
     z : Array, shape (unknowns,)
     as_delivered : bool
         Sensors without lag and bias, as somebody would use the nominal model
+    guess : Array, shape (K + 1, parts), optional
+        Temperatures to linearise about first, of another prediction: it saves time and nothing else
     """
     model, piece = problem.model, problem.pieces[index]
     span = float(piece.time[-1] - piece.time[0])
@@ -73,14 +77,14 @@ def predict(problem: Problem, index: int, z: Array, *, as_delivered: bool = Fals
         sensors = sensors.ideal()
     start = _start(problem, index, z, sensors, counts_from, as_delivered=as_delivered)
     try:
-        trajectory = _free_run(problem, index, z, start)
+        trajectory = _free_run(problem, index, z, start, guess)
     except ArithmeticError:  # what the first minutes ask of it leads nowhere
-        trajectory = _free_run(problem, index, z, problem.starts[index])
+        trajectory = _free_run(problem, index, z, problem.starts[index], None)
     read = readings(model, trajectory, sensors) if as_delivered else problem.read(trajectory, sensors, z)
     return Prediction(piece=piece, trajectory=trajectory, read=read, counts_from=counts_from)
 
 
-def _free_run(problem: Problem, index: int, z: Array, start: Array) -> Trajectory:
+def _free_run(problem: Problem, index: int, z: Array, start: Array, guess: Array | None) -> Trajectory:
     """The trajectory of a whole piece that nothing measured guides."""
     model, values = problem.model, problem.unknowns.network_values(problem.model.network, z)
     trajectory: Trajectory | None = None
@@ -88,9 +92,10 @@ def _free_run(problem: Problem, index: int, z: Array, start: Array) -> Trajector
     for _ in range(2 if follows else 1):
         piece = replace(problem.adjusted(index, z, trajectory), guided=False)
         if any(state.update is not None for state in model.network.states):
-            trajectory = free_running(model, piece, values, start)
+            trajectory = free_running(model, piece, values, start, guess=guess)
         else:
-            trajectory = simulate(model, piece, values, start, guess=trajectory, settled_K=SETTLED_K)
+            about = guess if trajectory is None else trajectory
+            trajectory = simulate(model, piece, values, start, guess=about, settled_K=SETTLED_K)
     assert trajectory is not None  # noqa: S101 - one run at least
     return trajectory
 

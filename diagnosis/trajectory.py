@@ -167,7 +167,9 @@ def simulate(
     return found
 
 
-def free_running(model: NetworkOnGrid, piece: Piece, values: Array, start: Array) -> Trajectory:
+def free_running(
+    model: NetworkOnGrid, piece: Piece, values: Array, start: Array, *, guess: Array | None = None
+) -> Trajectory:  # fmt: skip
     """The trajectory of a long piece of a network with switches, that nothing measured guides.
 
     Whether a switch acts depends on when it acted before, so the rounds of :func:`simulate` settle from the front, one
@@ -182,10 +184,14 @@ def free_running(model: NetworkOnGrid, piece: Piece, values: Array, start: Array
     values : Array, shape (parameters,)
     start : Array, shape (parts,)
         [degC]
+    guess : Array, shape (K + 1, parts), optional
+        Where to linearise first; by default the start temperatures
     """
     fine, at = piece.finer()
     count = len(fine.steps)
     T = np.broadcast_to(start, (count + 1, model.n))
+    if guess is not None:
+        T = np.stack([np.interp(fine.time, piece.time, course) for course in guess.T], axis=-1)
     tangent: LossTangent | None = None
     states: Array | None = None
     for _ in range(FREE_ROUNDS):

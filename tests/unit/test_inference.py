@@ -338,6 +338,8 @@ def test_prediction_does_not_see_what_was_measured_later(
         predict(problem.changed(model=model, unknowns=unknowns, pieces=[given]), 0, z) for given in (piece, lied)
     )
     np.testing.assert_array_equal(told.read, deceived.read)
+    again = predict(problem.changed(model=model, unknowns=unknowns), 0, z, guess=told.trajectory.T + 5.0)
+    np.testing.assert_allclose(again.read, told.read, rtol=1e-3)  # of degC and of W
     learnt = [
         problem.changed(model=model, unknowns=unknowns, pieces=[given]).linearise(0, z, None, rounds=6).trajectory.T
         for given in (piece, lied)
