@@ -23,7 +23,8 @@ def test_every_verb_that_is_named_exists() -> None:
 
 
 def test_every_option_that_is_named_exists() -> None:
-    known = {name for command in commands.commands.values() for p in command.params for name in p.opts}
+    known = {name for command in commands.commands.values() for p in command.params
+             for name in (*p.opts, *p.secondary_opts)}  # fmt: skip
     named = {o for line in README.splitlines() if "-m builder" in line for o in re.findall(r" (--[a-z-]+)", line)}
     assert named - {"--quiet"} <= known
 
