@@ -234,6 +234,22 @@ def stands_for(time: Array) -> Array:
     return np.asarray(np.diff(np.concatenate([time[:1], 0.5 * (time[1:] + time[:-1]), time[-1:]])))
 
 
+def white_sd(values: Array) -> float:
+    """White noise of a signal from its second differences, robust against steps and outliers.
+
+    Examples
+    --------
+    >>> rng = np.random.default_rng(0)
+    >>> bool(abs(white_sd(np.linspace(0, 50, 4000) + rng.normal(0, 0.2, 4000)) - 0.2) < 0.01)
+    True
+    """
+    second = np.diff(values, 2)
+    second = second[np.isfinite(second)]
+    if not second.size:
+        return 0.0
+    return float(1.4826 * np.median(np.abs(second - np.median(second))) / np.sqrt(6.0))
+
+
 def _thinned(even: Array, time: Array, inputs: Mapping[str, Array], values: Mapping[str, Array]) -> Array:
     """Grid points without those that lie amidst a calm.
 
@@ -297,12 +313,11 @@ def _bends(means: Array, least: float) -> tuple[NDArray[np.bool_], NDArray[np.bo
     total = np.concatenate([[0.0], np.cumsum(means)])
     box = (total[width:] - total[:-width]) / width
     before, after = box[width:-width] - box[: -2 * width], box[2 * width :] - box[width:-width]
-    # The noise of one cell from its second differences, which a saw of slopes leaves alone but for its few corners.
-    noise = 1.4826 * float(np.median(np.abs(np.diff(means, 2)))) / np.sqrt(6.0)
+    noise = white_sd(means)
     middle = slice(width + BEND_REACH, width + BEND_REACH + len(before))
     bends[middle] = np.abs(after - before) > max(BEND_SDS * noise * np.sqrt(6.0 / width), least)
-    turns[middle] = np.minimum(before, -after) > max(BEND_SDS * noise * np.sqrt(2.0 / width), 0.5 * least)
-    turns[middle] |= np.minimum(-before, after) > max(BEND_SDS * noise * np.sqrt(2.0 / width), 0.5 * least)
+    peak, valley = np.minimum(before, -after), np.minimum(-before, after)
+    turns[middle] = np.maximum(peak, valley) > max(BEND_SDS * noise * np.sqrt(2.0 / width), 0.5 * least)
     return bends, turns
 
 
@@ -327,9 +342,9 @@ def _slope(means: Array, steps: Array) -> Array:
 def _turning(means: Array) -> tuple[Array, float]:
     """Where means over the rows turn round, 1 at a peak and -1 in a valley, shape (K + 1,); and their noise."""
     result, reach = np.zeros(len(means)), 2 * BEND_REACH
-    noise = 1.4826 * float(np.nanmedian(np.abs(np.diff(means, 2)))) / np.sqrt(6.0) if len(means) > 2 else 0.0
-    if len(means) <= 2 * reach or not np.isfinite(noise):
-        return result, 0.0
+    noise = white_sd(means)
+    if len(means) <= 2 * reach:
+        return result, noise
     for sign in (1.0, -1.0):
         around = sliding_window_view(np.nan_to_num(sign * means, nan=-np.inf), 2 * reach + 1)
         here = around[:, reach]

@@ -47,10 +47,13 @@ class Judge:
         return [part.whitening for part in parts], _log_density(parts, self.base)
 
     @cached_property
-    def _courses(self) -> list[Array]:
-        """Temperatures that the base predicts, free-running."""
+    def _courses(self) -> list[Array | None]:
+        """Temperatures that the base predicts, free-running, for others to start from; None without a prediction."""
         problem = at_holdout(self.case, self.base)
-        return [predict(problem, i, self.base.fit.z).trajectory.T for i in range(len(problem.pieces))]
+        try:
+            return [predict(problem, i, self.base.fit.z).trajectory.T for i in range(len(problem.pieces))]
+        except (ArithmeticError, np.linalg.LinAlgError):
+            return [None] * len(problem.pieces)
 
     def gain(self, explanation: Explanation) -> float:
         """Log density of the held-out readings over that of the base, predicted with what the training left unsure.

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import sympy as sp
 from numpy.typing import NDArray
+from scipy.special import exprel
 from sympy.core.relational import Relational
 
 from diagnosis.grid import Piece
@@ -24,7 +25,6 @@ from models.types import Array
 
 SWITCHED_PARTS = 32  # of an interval, in which it is looked whether something switches
 SLOW_SUBSTEPS = 11  # of an interval of minutes, where there is no closed form; odd
-TINY = 1e-9
 MOVED = 1e-3  # of a state, for the slope of its rate
 
 
@@ -67,7 +67,8 @@ class Memories:
         self._laws = {}
         for blurred in (False, True):
             updates = [update_of(state, blurred=blurred).xreplace(boundary) for state in states]
-            self._laws[blurred] = _compiled(tuple(names), (*rates, *updates))
+            source = function_source("memory", names, [*rates, *updates], vector=True)
+            self._laws[blurred] = compile_function(source, "memory")
         self._in_turn = all(_in_turn(state, states[index + 1 :]) for index, state in enumerate(states))
 
     def follow(
@@ -92,8 +93,9 @@ class Memories:
             for index, switches in enumerate(self._switches):
                 if index not in known:
                     before = [*rows, *(known.get(i, start) for i, start in enumerate(self._starts))]
-                    follow = self._switched if switches else self._driven
-                    known[index] = follow(index, piece, before, seen)
+                    known[index] = (
+                        self._switched(index, piece, before, seen) if switches else self._driven(index, piece, before)
+                    )
         return [known[index] for index in range(len(self._states))]
 
     def _law(self, piece: Piece) -> Callable[..., tuple[Any, ...]]:
@@ -131,14 +133,14 @@ class Memories:
         found[self._first : self._first + self._count] = list(points.T)
         return found
 
-    def _driven(self, index: int, piece: Piece, rows: Sequence[Array | float], _: Array) -> Array:
+    def _driven(self, index: int, piece: Piece, rows: Sequence[Array | float]) -> Array:
         """A state that a rate drives."""
         rate, slope = self._line(index, piece, rows, len(piece.steps), 0)
         h = piece.steps[:, None]
-        decay, gain = np.exp(slope * h), h * _phi(slope * h)
+        decay, gain = np.exp(slope * h), h * exprel(slope * h)
         after = recurrence(decay, _started(rate * gain, decay, self._starts[index]))
         before = np.concatenate([np.full((1, after.shape[1]), self._starts[index]), after[:-1]])
-        return np.asarray((np.exp(0.5 * slope * h) * before + 0.5 * h * _phi(0.5 * slope * h) * rate).T)
+        return np.asarray((np.exp(0.5 * slope * h) * before + 0.5 * h * exprel(0.5 * slope * h) * rate).T)
 
     def _one_by_one(
         self, piece: Piece, rows: Sequence[Array | float], seen: Array, known: Mapping[int, Array]
@@ -191,7 +193,7 @@ class Memories:
 
 def _advanced(states: Sequence[Array], driven: Sequence[tuple[Array, Array]], h: float) -> list[Array]:
     """States after a time, by their rates and the slopes of these."""
-    return [z + h * _phi(h * slope) * rate for z, (rate, slope) in zip(states, driven, strict=True)]
+    return [z + h * exprel(h * slope) * rate for z, (rate, slope) in zip(states, driven, strict=True)]
 
 
 def _of_interval(row: Array | float, owner: NDArray[np.intp]) -> Array | float:
@@ -199,11 +201,6 @@ def _of_interval(row: Array | float, owner: NDArray[np.intp]) -> Array | float:
     if isinstance(row, float) or row.ndim == 0 or row.shape[-1] == 1:
         return row
     return np.asarray(row[..., owner])
-
-
-@lru_cache(maxsize=512)
-def _compiled(names: tuple[str, ...], laws: tuple[sp.Expr, ...]) -> Callable[..., tuple[Any, ...]]:
-    return compile_function(function_source("memory", names, laws, vector=True), "memory")
 
 
 def _in_turn(state: ExtraState, later: Sequence[ExtraState]) -> bool:
@@ -225,9 +222,3 @@ def _started(driven: Array, slope: Array, start: float) -> Array:
     result = np.array(driven)
     result[0] += slope[0] * start
     return result
-
-
-def _phi(x: Array) -> Array:
-    """``(exp(x) - 1) / x``, shape as `x`."""
-    small = np.abs(x) < TINY
-    return np.asarray(np.where(small, 1.0 + 0.5 * x, np.expm1(x) / np.where(small, 1.0, x)))

@@ -31,11 +31,11 @@ class Balance:
 
     Attributes
     ----------
-    heat : Array, shape (K, parts)
+    heat : Array, shape (..., K, parts)
         Net heat into every part, [W]
-    sources : Array, shape (K, sources)
+    sources : Array, shape (..., K, sources)
         [W]
-    conductances, differences : Array, shape (K, links)
+    conductances, differences : Array, shape (..., K, links)
         [W/K] and [K]
     """
 
@@ -70,7 +70,7 @@ class LossTangent:
     samples: Array
 
     def at(self, T: Array) -> Array:
-        """Losses [W], shape (K, components), at temperatures of shape (K, nodes)."""
+        """Losses [W], shape (..., K, components), at temperatures of shape (..., K, nodes)."""
         return np.asarray(self.power + np.einsum("kcn,...kn->...kc", self.slope, T - self.T))
 
 
@@ -232,7 +232,7 @@ class NetworkOnGrid:
         """Which of both the heat balance feels; it is taken for a straight line of them."""
         network = self.network
         laws = [*(link.conductance for link in network.links), *(source.heat for source in network.sources),
-                *self._boundary.values(), *(network.states[index].rate for index in self.coupled)]  # fmt: skip
+                *self.boundary.values(), *(network.states[index].rate for index in self.coupled)]  # fmt: skip
         felt = {s.name for law in laws for s in law.free_symbols}
         return [index for index in (*self.switches, *self.actuated) if network.states[index].name in felt]
 
@@ -240,11 +240,12 @@ class NetworkOnGrid:
     def switched_by(self) -> list[int]:
         """Which parts' temperatures decide on switches."""
         laws = [update_of(self.network.states[index], blurred=False) for index in self.switches]
-        read = {s.name for law in laws for s in law.xreplace(self._boundary).free_symbols}
+        read = {s.name for law in laws for s in law.xreplace(self.boundary).free_symbols}
         return [index for index, part in enumerate(self.parts) if f"T_{part}" in read]
 
     @cached_property
-    def _boundary(self) -> Mapping[sp.Symbol, sp.Expr]:
+    def boundary(self) -> Mapping[sp.Symbol, sp.Expr]:
+        """Temperatures of all boundaries, [degC], by the signal that stands for each."""
         return {symbol(f"T_{n.name}"): n.temperature for n in self.network.nodes if n.temperature is not None}
 
     @cached_property
@@ -257,13 +258,13 @@ class NetworkOnGrid:
     def _coupled_law(self) -> Callable[..., tuple[Any, ...]]:
         network = self.network
         arguments = [*self._signal_names, *(s.name for s in network.states), *(f"P_{c}" for c in network.components)]
-        laws = [network.states[index].rate.xreplace(self._boundary) for index in self.coupled]
+        laws = [network.states[index].rate.xreplace(self.boundary) for index in self.coupled]
         return compile_function(function_source("rates", arguments, laws, vector=True), "rates")
 
     @cached_property
     def _memories(self) -> Memories:
         arguments = [*self._signal_names, *(f"P_{c}" for c in self.network.components)]
-        return Memories(self.network.states, arguments, self.parts, self._boundary)
+        return Memories(self.network.states, arguments, self.parts, self.boundary)
 
     @cached_property
     def remembered(self) -> frozenset[str]:
@@ -314,7 +315,7 @@ class NetworkOnGrid:
 
     def _picked(self, laws: Sequence[sp.Expr]) -> Callable[[Sequence[Any]], tuple[float, ...]]:
         network = self.network
-        laws = [law.xreplace(self._boundary) for law in laws]
+        laws = [law.xreplace(self.boundary) for law in laws]
         names = [*self._signal_names, *(s.name for s in network.states), *(f"P_{c}" for c in network.components)]
         used = {s.name for law in laws for s in law.free_symbols}
         places = [index for index, name in enumerate(names) if name in used]  # few of dozens

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from scipy.optimize import nnls
 
-from diagnosis.grid import Piece, slow_rows
+from diagnosis.grid import Piece, slow_rows, white_sd
 from diagnosis.mapping import LOSS
 from diagnosis.network_on_grid import NetworkOnGrid
 from diagnosis.recording import Recording
@@ -23,22 +23,6 @@ HEAT_TIME_S = 1200.0
 PARAMETRIC_FRACTION, PARAMETRIC_K = 0.05, 0.7
 SLOW_SD_K = 0.3  # at most, of rows minutes apart: what differs from row to row is operation then, not instrument
 START_KNOWN_K, START_UNKNOWN_K, START_UNKNOWN_SHARE = 2.0, 2.0, 0.15
-
-
-def white_sd(values: Array) -> float:
-    """White noise of a signal from its second differences, robust against steps and outliers.
-
-    Examples
-    --------
-    >>> rng = np.random.default_rng(0)
-    >>> bool(abs(white_sd(np.linspace(0, 50, 4000) + rng.normal(0, 0.2, 4000)) - 0.2) < 0.01)
-    True
-    """
-    second = np.diff(values, 2)
-    second = second[np.isfinite(second)]
-    if not second.size:
-        return 0.0
-    return float(1.4826 * np.median(np.abs(second - np.median(second))) / np.sqrt(6.0))
 
 
 def loss_noise(recordings: Sequence[Recording]) -> tuple[float, float]:

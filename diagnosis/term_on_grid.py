@@ -16,7 +16,7 @@ from diagnosis.network_on_grid import NetworkOnGrid
 from diagnosis.observation import Sensors
 from diagnosis.recurrence import lagged
 from diagnosis.trajectory import Trajectory
-from models.laws import compile_function, function_source, symbol
+from models.laws import compile_function, function_source
 from models.network import BASE_SIGNALS
 from models.terms import FACTORS, Term
 from models.types import Array
@@ -38,7 +38,6 @@ class TermOnGrid:
     def __init__(self, model: NetworkOnGrid, term: Term) -> None:
         self.model, self.term = model, term
         network = model.network
-        boundary = {symbol(f"T_{n.name}"): n.temperature for n in network.nodes if n.temperature is not None}
         own = [p.name for p in term.parameters]
         given = [
             *BASE_SIGNALS, *network.inputs, *(f"T_{part.name}" for part in network.parts),
@@ -53,9 +52,9 @@ class TermOnGrid:
         self._remembered = np.array([s.name not in memories for s in network.states], dtype=bool)
         arguments = [*given, *own, *(s.name for s in term.states)]
         other = sp.Integer(0) if term.boundary_temperature is None else term.boundary_temperature
-        laws = [law.xreplace(boundary) for law in (term.expression, other)]
+        laws = [law.xreplace(model.boundary) for law in (term.expression, other)]
         self._law = compile_function(function_source("law", arguments, laws, vector=True), "law")
-        self._memories = Memories(term.states, [*given, *own], model.parts, boundary)
+        self._memories = Memories(term.states, [*given, *own], model.parts, model.boundary)
 
     # ------------------------------------------------------------------ the law
 

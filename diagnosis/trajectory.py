@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
+from scipy.special import exprel
 
 from diagnosis.grid import Piece
 from diagnosis.network_on_grid import HIGHEST_T, LOWEST_T, Balance, LossTangent, NetworkOnGrid
@@ -30,7 +31,6 @@ RUNAWAY_T = 1500.0  # degC; beyond it there is no trajectory
 # A switching that no row shows, be they means over minutes or noisy near a set-point, sends a guided trajectory astray.
 # Further off than this, switches follow the simulated temperature until it is back.
 ASTRAY_K = 4.0
-SMALL = 1e-9
 MOST_AT_ONCE = 40_000  # intervals times parameters whose derivatives are taken together
 
 
@@ -186,6 +186,11 @@ def free_running(
         [degC]
     guess : Array, shape (K + 1, parts), optional
         Where to linearise first; by default the start temperatures
+
+    Raises
+    ------
+    ArithmeticError
+        If the temperatures leave all bounds.
     """
     fine, at = piece.finer()
     count = len(fine.steps)
@@ -214,7 +219,7 @@ def free_running(
     assert states is not None  # noqa: S101 - rounds >= 1
     memory = np.add.reduceat(states, at[:-1]) / np.diff(at)[:, None]
     unguided = replace(piece, guided=False)
-    return replace(_round(model, unguided, values, start, means, None, memory, follow=False), T=means)
+    return replace(_round(model, unguided, values, start, means, None, None, given=memory), T=means)
 
 
 def _stepped(
@@ -264,8 +269,8 @@ def _stepped(
         if actuated:
             found = actuation(signals)
             for index, rate, slope in zip(actuated, found, found[len(actuated) :], strict=False):
-                opening[index] += rate * _gain(slope, 0.5 * h)
-                state[index] += rate * _gain(slope, h)
+                opening[index] += rate * 0.5 * h * float(exprel(0.5 * h * slope))
+                state[index] += rate * h * float(exprel(h * slope))
         kept[k, list(opening)] = list(opening.values())
         now = _between(solutions, corners, [opening[index] for index in acting], k, now)
         result[k + 1] = now
@@ -285,11 +290,6 @@ def _between(
         if weight:
             result += weight * (decay[k] @ now + driven[k])
     return result
-
-
-def _gain(slope: float, h: float) -> float:
-    """Change after a time ``h`` per rate at its begin, of a state whose rate has this slope, [s]."""
-    return h if abs(slope * h) < SMALL else math.expm1(slope * h) / slope
 
 
 def _start(model: NetworkOnGrid, start: Array) -> Array:
@@ -365,20 +365,17 @@ def _with_states(
 
 def _round(
     model: NetworkOnGrid, piece: Piece, values: Array, start: Array, T_ref: Array, tangent: LossTangent | None,
-    states: Array | None, *, follow: bool = True,
+    states: Array | None, *, given: Array | None = None,
 ) -> Trajectory:  # fmt: skip
-    """Linearise about a trajectory and solve; with the states as given, or those that follow its temperatures."""
+    """Linearise about a trajectory and solve; with states that follow its temperatures, if none are given."""
     T = 0.5 * (T_ref[1:] + T_ref[:-1])
     tangent = model.loss_tangent(piece, T, tangent)
     power = tangent.at(T[:, model.loss_nodes])
     guide, seen = piece.guide(model.parts), piece.seen(T_ref, model.parts)
-    if not follow and states is not None:
-        memory = states.copy()
-    else:
-        memory = model.memory(piece, T_ref, seen, values, power, states)
+    memory = model.memory(piece, T_ref, seen, values, power, states) if given is None else given.copy()
     solved, result = _walked(model, piece, values, start, T, tangent, memory)
     read = model.switched_by
-    if read and follow and np.nanmax(np.abs(result[:, : model.n] - guide)[:, read], initial=0.0) > ASTRAY_K:
+    if read and given is None and np.nanmax(np.abs(result[:, : model.n] - guide)[:, read], initial=0.0) > ASTRAY_K:
         seen = _stepped(model, piece, values, start, T, tangent, memory, guide)[1]
         memory = model.memory(piece, T_ref, seen, values, power, states)
         solved, result = _walked(model, piece, values, start, T, tangent, memory)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import lru_cache
 from typing import Any
 from weakref import WeakKeyDictionary
 
@@ -24,14 +23,11 @@ def compile_laws(network: ThermalNetwork, *, vector: bool) -> Laws:
     """The laws of `network` on arrays (`vector`) or on plain numbers; kept for the next call with the same network."""
     kept = _compiled.setdefault(network, {})
     if vector not in kept:
-        functions = {name: _function(source, name) for name, source in law_source(network, vector=vector).items()}
+        functions = {
+            name: compile_function(source, name) for name, source in law_source(network, vector=vector).items()
+        }
         kept[vector] = laws_of(network, functions)
     return kept[vector]
-
-
-@lru_cache(maxsize=256)
-def _function(source: str, name: str) -> Callable[..., tuple[Any, ...]]:
-    return compile_function(source, name)
 
 
 def laws_of(network: ThermalNetwork, functions: Mapping[str, Callable[..., tuple[Any, ...]]]) -> Laws:

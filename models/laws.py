@@ -254,6 +254,7 @@ def _function_source(name: str, arguments: tuple[str, ...], expressions: tuple[s
     return "\n".join(lines) + "\n"
 
 
+@lru_cache(maxsize=4096)  # the same laws are asked for again and again
 def compile_function(source: str, name: str) -> Callable[..., tuple[Any, ...]]:
     """The function that :func:`function_source` wrote."""
     # Without the name of a module, pickling looks for it in all of them.

@@ -66,8 +66,8 @@ cooler_thermostat = Mechanism(
     states=(two_point("valve"), Memory(name="opening", rate=lambda s: (s.valve - s.opening) / s.delay)),
     law=lambda s: s.strength * s.opening,
     says="A thermostat sends the oil through a cooler above a set temperature, and back below a lower one.",
-    reference="two-point control; 6 W/K above 80 degC on the FZG rig; that the valve follows with one time constant, and "
-    "its 10 to 60 s, are estimates",
+    reference="two-point control; 6 W/K above 80 degC on the FZG rig; that the valve follows with one time constant "
+    "of 10 to 60 s is an estimate",
     experiment=PAST_SET_POINT + ": the oil saws between two temperatures",
     separate_by={"cooler_proportional": "hold a load near the set-point: a two-point valve makes the oil saw"},
 )

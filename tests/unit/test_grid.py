@@ -144,7 +144,7 @@ def test_a_slow_sensor_guides_switches_by_what_it_does_not_show_yet() -> None:
     np.testing.assert_array_equal(replace(piece, guided=False).seen(elsewhere, ("oil",)), elsewhere)
 
 
-def test_noise_hides_no_peak_that_a_switch_has_made() -> None:
+def test_noise_hides_hardly_a_peak_that_a_switch_has_made() -> None:
     """Of 40 peaks at 70 and valleys at 64 degC every one counts as reached, and few cells beside them."""
     time = np.arange(0.0, 24001.0, 10.0)
     saw = 67.0 + 3.0 * (2.0 * np.abs(2.0 * ((time / 600.0) % 1.0) - 1.0) - 1.0)

@@ -339,7 +339,9 @@ def test_prediction_does_not_see_what_was_measured_later(
     )
     np.testing.assert_array_equal(told.read, deceived.read)
     again = predict(problem.changed(model=model, unknowns=unknowns), 0, z, guess=told.trajectory.T + 5.0)
-    np.testing.assert_allclose(again.read, told.read, rtol=1e-3)  # of degC and of W
+    temperatures = [i for i, channel in enumerate(piece.channels) if channel != "P_loss"]
+    np.testing.assert_allclose(again.read[:, temperatures], told.read[:, temperatures], atol=0.02)
+    np.testing.assert_allclose(again.read, told.read, rtol=1e-3)  # the loss, of which straight lines know 1e-4
     learnt = [
         problem.changed(model=model, unknowns=unknowns, pieces=[given]).linearise(0, z, None, rounds=6).trajectory.T
         for given in (piece, lied)
@@ -601,6 +603,25 @@ def test_a_clock_may_be_early_or_late(fzg: Gearbox, piece: Piece, problem: Probl
     for interval, matters in ((10.0, True), (150.0, False)):
         case: Any = SimpleNamespace(scale=SimpleNamespace(interval=interval), channels=CHANNELS, loss_W=250.0)
         assert search._matters(case, found, scored.hypothesis) is matters
+
+
+def test_a_fit_leaves_a_start_that_only_looks_good(monkeypatch: pytest.MonkeyPatch, problem: Problem) -> None:
+    """A trajectory that had not settled made the first objective too small; measured by that, no step is any better."""
+    honest, calls = Problem._attempt, 0
+
+    def attempt(self: Problem, z: Array, guesses: Any) -> Any:
+        nonlocal calls
+        calls += 1
+        parts = honest(self, z, guesses)
+        if calls > 1 or parts is None:
+            return parts
+        return [replace(part, white_residual=0.01 * part.white_residual) for part in parts]
+
+    expected = problem.fit(iterations=10)
+    monkeypatch.setattr(Problem, "_attempt", attempt)
+    found = problem.fit(iterations=10)
+    assert np.abs(expected.z).max() > 1.0
+    np.testing.assert_allclose(found.z, expected.z, atol=0.1)
 
 
 def test_parameters_of_what_was_found_are_no_further_explanation(fzg: Gearbox, problem: Problem) -> None:
