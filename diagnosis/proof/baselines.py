@@ -25,11 +25,10 @@ from diagnosis.case import Case, first, prepare
 from diagnosis.evidence import Marginal
 from diagnosis.explain import Explanation
 from diagnosis.findings import node_of
-from diagnosis.holdout import at_holdout
 from diagnosis.hypotheses import Hypothesis, hypothesis_of, scan
 from diagnosis.latent import knots_of, latent_heat
 from diagnosis.mapping import LOSS
-from diagnosis.posterior import Fit
+from diagnosis.posterior import Fit, Problem
 from diagnosis.predict import Prediction, predict
 from diagnosis.recording import read_recordings
 from diagnosis.search import threshold_at
@@ -61,12 +60,14 @@ class _ParametersHeld:
         return np.asarray(columns.T @ self.rest), np.einsum("mn,mn->n", columns, columns)
 
 
-def baselines(case: Case) -> dict[str, Any]:
+def baselines(case: Case, even: Case) -> dict[str, Any]:
     """What the methods say of one case.
 
     Parameters
     ----------
     case : Case
+    even : Case
+        The same on intervals of one length, on which the network remembers its inputs
 
     Returns
     -------
@@ -83,7 +84,7 @@ def baselines(case: Case) -> dict[str, Any]:
     return {
         "naive": _naive(case, base, candidates),
         "sparse": _sparse(case, base, candidates),
-        "black_box": _black_box(case, base),
+        "black_box": _black_box(even, base),
     }
 
 
@@ -113,8 +114,9 @@ def _sparse(case: Case, base: Explanation, candidates: Sequence[Hypothesis]) -> 
     here = [h for h in candidates if h.in_network and node_of(case, h) == missing.node]
     if missing.log_bayes < threshold_at(0.05) or not here:
         return _said(case, None)
-    columns = np.column_stack([_heat(base, h) for h in here])
-    target = np.concatenate(missing.mean)
+    weights = np.sqrt(np.concatenate([piece.steps for piece in pieces]))  # intervals are of different lengths
+    columns = weights[:, None] * np.column_stack([_heat(base, h) for h in here])
+    target = weights * np.concatenate(missing.mean)
     norms = np.linalg.norm(columns, axis=0)
     here = [h for h, norm in zip(here, norms, strict=True) if norm > 0.0]
     columns = columns[:, norms > 0.0] / norms[norms > 0.0]
@@ -153,14 +155,15 @@ def _said(case: Case, h: Hypothesis | None) -> dict[str, Any]:
 # ---------------------------------------------------------------------- black box
 
 
-def _black_box(case: Case, base: Explanation) -> dict[str, Any]:
+def _black_box(even: Case, base: Explanation) -> dict[str, Any]:
     """A network from inputs, their fading memories and the calibrated prediction to what that prediction lacks."""
-    temperatures = [i for i, name in enumerate(case.channels) if name != LOSS]
-    learnt = [predict(base.problem, i, base.fit.z) for i in range(len(base.problem.pieces))]
-    held = at_holdout(case, base)
-    judged = [predict(held, i, base.fit.z) for i in range(len(held.pieces))]
-    x, y = _table(learnt, temperatures)
-    x_held, y_held = _table(judged, temperatures)
+    temperatures = [i for i, name in enumerate(even.channels) if name != LOSS]
+
+    def table(problem: Problem) -> tuple[Array, Array]:
+        return _table([predict(problem, i, base.fit.z) for i in range(len(problem.pieces))], temperatures)
+
+    x, y = table(even.train)
+    x_held, y_held = table(even.holdout)
     if not len(x) or not len(x_held):
         return {"rmse_K": None}
     step = max(1, len(x) // MOST_ROWS)
@@ -204,7 +207,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     network = gearbox.network()
     train = read_recordings(given.recordings, network)
     held = read_recordings(given.holdout, network) if given.holdout else ()
-    said = baselines(prepare(gearbox, train, held, even=True))
+    said = baselines(prepare(gearbox, train, held), prepare(gearbox, train, held, even=True))
     given.output.write_text(json.dumps(said, indent=1, allow_nan=False) + "\n", encoding="utf-8")
 
 
