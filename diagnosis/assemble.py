@@ -39,7 +39,6 @@ from models.types import Array
 from models.version import project_version
 
 ENOUGH_VISIBLE = 0.2  # of the catalogue, for a "consistent" that means something
-RANKED = 15
 REMAINING_W_SHARE = 0.03  # of the typical loss: a smaller remainder is not worth a word
 UNEXPLAINED_SHARE = 0.25  # of the evidence that is left when the catalogue has done its best
 
@@ -372,7 +371,7 @@ def _ranking(found: Search) -> tuple[Ranked, ...]:
         for s in stage.scored
         if s.hypothesis.label in fitted or s.hypothesis.family != "open form"
     ]  # fmt: skip
-    return tuple(sorted(rows, key=lambda r: (-r.probability, -r.log_bayes))[:RANKED])
+    return tuple(sorted(rows, key=lambda r: (-r.probability, -r.log_bayes)))
 
 
 def _unseen(stage: Stage, catalogue: Mapping[str, Mechanism], threshold: float) -> tuple[Unseen, ...]:

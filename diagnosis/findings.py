@@ -10,7 +10,7 @@ from diagnosis.case import Case, heat_over_time
 from diagnosis.explain import Explanation
 from diagnosis.hypotheses import Hypothesis
 from diagnosis.result import Finding, ParameterValue, Rival
-from diagnosis.search import FORM_DOUBT, Stage, heats_of
+from diagnosis.search import FORM_DOUBT, Stage, heats_of, mean_heat_of
 from models.mechanisms import Mechanism, Placed
 
 LEAST_RIVAL = 0.01
@@ -85,7 +85,7 @@ def finding_of(case: Case, final: Explanation, h: Hypothesis, stage: Stage, riva
     heats = heats_of(final, h)
     pieces = [part.trajectory.piece for part in final.fit.parts]
     together = np.abs(np.concatenate(heats)) if heats else np.zeros(1)
-    steps = np.concatenate([piece.steps for piece in pieces]) if heats else np.ones(1)
+    mean, stderr = mean_heat_of(final, h)
     term = h.term
     if term is not None:
         known = {name: value for name, (value, _) in values.items()}
@@ -111,7 +111,8 @@ def finding_of(case: Case, final: Explanation, h: Hypothesis, stage: Stage, riva
             for name, (value, sd) in values.items()
         ),
         confusable_with=tuple(rivals),
-        heat_mean_W=float(np.average(together, weights=steps)),
+        heat_mean_W=mean,
+        heat_stderr_W=stderr,
         heat_max_W=float(together.max()),
         heat=heat_over_time(pieces, heats) if heats else {},
         term=term,

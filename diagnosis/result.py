@@ -74,8 +74,9 @@ class Finding:
         Evidence against leaving it out, [nat]
     parameters : tuple of ParameterValue
     confusable_with : tuple of Rival
-    heat_mean_W, heat_max_W : float
-        Mean and largest magnitude over the training recordings; 0 for a fault of an instrument
+    heat_mean_W, heat_stderr_W, heat_max_W : float
+        Mean magnitude over the training recordings with its standard error, and the largest one; 0 for a fault of an
+        instrument
     heat : mapping of recording to (time [s], heat [W]) Arrays
         Over time, of what was found; empty for faults of instruments
     term : Term or None
@@ -95,6 +96,7 @@ class Finding:
     parameters: tuple[ParameterValue, ...]
     confusable_with: tuple[Rival, ...] = ()
     heat_mean_W: float = 0.0
+    heat_stderr_W: float = 0.0
     heat_max_W: float = 0.0
     heat: Mapping[str, tuple[Array, Array]] = field(default_factory=dict)
     term: Term | None = None
@@ -402,7 +404,7 @@ def _finding(finding: Finding) -> dict[str, Any]:
         "reference": finding.reference,
         "probability": finding.probability,
         "log_bayes": finding.log_bayes,
-        "heat_W": {"mean": finding.heat_mean_W, "max": finding.heat_max_W},
+        "heat_W": {"mean": finding.heat_mean_W, "stderr": finding.heat_stderr_W, "max": finding.heat_max_W},
         "parameters": [
             {"name": p.name, "value": p.value, "stderr": p.stderr, "unit": p.unit} for p in finding.parameters
         ],

@@ -386,10 +386,35 @@ def heats_of(explanation: Explanation, h: Hypothesis) -> Sequence[Array]:
         return []
     values = explanation.values_of(h)
     given = np.array([[values[p.name][0] for p in h.term.parameters]])
-    model = explanation.problem.model
-    result = []
+    return [heat[:, 0] for heat in _heats_with(explanation, h, given)]
+
+
+def _heats_with(explanation: Explanation, h: Hypothesis, values: Array) -> list[Array]:
+    """Heat with each row of `values`, the first as fitted, for its parameters; shape (K, rows) per piece, [W]."""
+    assert h.term is not None  # noqa: S101 - only a term brings heat
+    term, result = TermOnGrid(explanation.problem.model, h.term), []
     for part in explanation.fit.parts:
-        heat = TermOnGrid(model, h.term).heat(part.trajectory, given)[0][:, :, 0]
+        heat = term.heat(part.trajectory, values, there=values[0])[0]
         positive, negative = heat.clip(0.0).sum(axis=1), heat.clip(None, 0.0).sum(axis=1)
         result.append(np.where(positive > -negative, positive, negative))
     return result
+
+
+def mean_heat_of(explanation: Explanation, h: Hypothesis) -> tuple[float, float]:
+    """Mean magnitude of the heat of something found and its standard error, [W]; nothing of a fault.
+
+    The error is that of the term's own parameters, everything else that was fitted marginalised.
+    """
+    if h.term is None or h.term.kind in ("sensor", "signal"):
+        return 0.0, 0.0
+    items, fit = explanation.fit.unknowns.items, explanation.fit
+    own = [next(i for i, item in enumerate(items) if item.target == p.name) for p in h.term.parameters]
+    covariance = fit.covariance[np.ix_(own, own)]
+    sd = np.sqrt(np.diag(covariance))
+    moved = fit.z[own] + np.concatenate([np.zeros((1, len(own))), np.diag(sd), -np.diag(sd)])
+    values = np.array([[items[i].value(float(x)) for i, x in zip(own, row, strict=True)] for row in moved])
+    steps = np.concatenate([part.trajectory.piece.steps for part in fit.parts])
+    means = np.average(np.abs(np.concatenate(_heats_with(explanation, h, values))), axis=0, weights=steps)
+    up, down = np.split(means[1:], 2)
+    slope = (up - down) / (2.0 * sd)
+    return float(means[0]), float(np.sqrt(slope @ covariance @ slope))

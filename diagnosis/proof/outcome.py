@@ -139,7 +139,7 @@ def _methods(
     rule: Rule, main: Mapping[str, Judged], others: Mapping[str, Mapping[str, Any] | None]
 ) -> dict[str, Count]:
     """The same rule for other methods; strength and held-out errors are not theirs to tell."""
-    if rule.key in ("strength", "heldout", "far"):
+    if rule.key.startswith("strength") or rule.key.endswith("evident") or rule.key in ("heldout", "far"):
         return {}
     found = {}
     for method in NAMING:
@@ -190,6 +190,7 @@ def _told(j: Judged) -> dict[str, Any]:
         "case": j.case,
         "group": j.group,
         "truth": [f"{e['name']} at {e['nodes'][0]}, {e['strength']:.2f} x" for e in j.truth["effects"]] or [control],
+        "evidence": [round(j.answer.evidence[name], 1) if name in j.answer.evidence else None for name in j.names],
         "practical": bool(j.truth["effects"]) and j.practical(),
         "verdict": j.answer.verdict,
         "named": [

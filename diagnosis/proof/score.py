@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any
 
@@ -23,6 +23,7 @@ from models.gearbox import Gearbox
 CONFIDENCE = 0.95
 TIE_PROBABILITY = 0.05  # from which a rival belongs to the tie set
 STRENGTH_ERROR = 0.15
+EVIDENT = 10.0  # nats for an effect at its best place, as the diagnosis itself weighs it: less is lost in a catalogue
 SILENT = ("consistent", "insufficient_data", "refused", "failed")
 CANNOT_TELL = ("insufficient_data", "refused")
 OPEN = "open form"
@@ -112,10 +113,10 @@ class Claim:
     mechanism, place, node, family : str
     odds : mapping of mechanism to float
         Its own probability and its rivals', places of the same mechanism together
-    heat_W : float
-        Mean magnitude
-    strength : float
-        First parameter
+    heat_W, heat_sd_W : float
+        Mean magnitude, and its stated standard error
+    strength, strength_sd : float
+        First parameter, and its stated standard error
     """
 
     mechanism: str
@@ -124,7 +125,9 @@ class Claim:
     family: str
     odds: Mapping[str, float]
     heat_W: float
+    heat_sd_W: float = math.nan
     strength: float
+    strength_sd: float = math.nan
 
     @property
     def tied(self) -> frozenset[str]:
@@ -147,6 +150,8 @@ class Answer:
         Held-out error before, calibrated and after; NaN without
     unseen : frozenset of str
         Mechanisms of which is said that these data would not show them
+    evidence : mapping of mechanism to float
+        Best log Bayes factor over its places in the first look, [nat]; of what is not in the ranking there is none
     """
 
     verdict: str
@@ -154,6 +159,7 @@ class Answer:
     node: str = ""
     holdout_K: tuple[float, float, float] = (math.nan, math.nan, math.nan)
     unseen: frozenset[str] = frozenset()
+    evidence: Mapping[str, float] = field(default_factory=dict)
 
     @classmethod
     def of(cls, said: Mapping[str, Any] | None, *, otherwise: str = "failed") -> Answer:
@@ -164,12 +170,16 @@ class Answer:
         values = [errors.get(f"rmse_{stage}_K") for stage in ("before", "calibrated", "after")]
         before, calibrated, after = (math.nan if v is None else float(v) for v in values)
         location = said.get("location", [])
+        evidence: dict[str, float] = {}
+        for row in said.get("ranking", []):
+            evidence[row["mechanism"]] = max(row["log_bayes"], evidence.get(row["mechanism"], -math.inf))
         return cls(
             verdict=said["verdict"],
             claims=tuple(_claim(finding) for finding in said.get("findings", [])),
             node=location[0]["node"] if location else "",
             holdout_K=(before, calibrated, after),
             unseen=frozenset(one["mechanism"] for one in said.get("not_visible", [])),
+            evidence=evidence,
         )
 
     @property
@@ -197,11 +207,12 @@ def _claim(finding: Mapping[str, Any]) -> Claim:
     odds: Counter[str] = Counter({finding["mechanism"]: finding["probability"]})
     for rival in finding.get("confusable_with", []):
         odds[rival["mechanism"]] += rival["probability"]
-    parameters = finding.get("parameters", [])
+    parameters, heat = finding.get("parameters", []), finding.get("heat_W", {})
+    first = parameters[0] if parameters else {}
     return Claim(
         mechanism=finding["mechanism"], place=finding["place"], node=finding["node"], family=finding["family"],
-        odds=dict(odds), heat_W=finding.get("heat_W", {}).get("mean", math.nan),
-        strength=parameters[0]["value"] if parameters else math.nan,
+        odds=dict(odds), heat_W=heat.get("mean", math.nan), heat_sd_W=heat.get("stderr", math.nan),
+        strength=first.get("value", math.nan), strength_sd=first.get("stderr", math.nan),
     )  # fmt: skip
 
 
@@ -243,6 +254,10 @@ class Judged:
     def practical(self, k: int = 0) -> bool:
         """Whether an effect is large enough to matter; where the truth does not know, it is taken to be."""
         return self.truth["practical"][k] is not False
+
+    def evident(self) -> bool:
+        """Whether these data speak for the dominant effect, whoever looks at them with the same priors."""
+        return bool(self.names) and self.answer.evidence.get(self.names[0], math.inf) >= EVIDENT
 
     def right(self) -> bool | None:
         """Whether the main thing is said; None where nothing need be said."""
@@ -299,6 +314,11 @@ def single_answered(j: Judged) -> bool | None:
     return j.names[0] in j.answer.tied or (j.answer.silent and j.names[0] in j.answer.unseen)
 
 
+def single_evident(j: Judged) -> bool | None:
+    """One effect of practical size for which these data speak with 10 nats or more: named, or in the tie set."""
+    return single_tied(j) if j.evident() else None
+
+
 def single_small(j: Judged) -> bool | None:
     """One effect too small to matter: no other is named."""
     if j.group != "single" or j.practical():
@@ -326,20 +346,37 @@ def exact_place(j: Judged) -> bool | None:
     return j.answer.node in j.truth["effects"][0]["nodes"]
 
 
-def strength(j: Judged) -> bool | None:
-    """One effect, exactly named: its mean heat (of a fault of measurement, its size) within 15 % of the truth."""
+def _strengths(j: Judged) -> tuple[float, float, float] | None:
+    """Of one effect, exactly named: how strong it is said to be, the stated error, and the truth."""
     if j.group not in ("single", "sensor") or not j.practical() or not j.answer.claims:
         return None
     claim, effect = j.answer.claims[0], j.truth["effects"][0]
     if claim.mechanism != effect["name"]:
         return None
     if effect["name"] in SAME_STRENGTH:
-        found, true = abs(claim.strength), abs(float(effect["parameters"]["a"]))
-    elif effect["kind"] == "signal" or j.group == "sensor":
+        return abs(claim.strength), claim.strength_sd, abs(float(effect["parameters"]["a"]))
+    if effect["kind"] == "signal" or j.group == "sensor":
         return None
-    else:
-        found, true = claim.heat_W, float(effect["heat_magnitude_W"]["train"])
-    return abs(found - true) <= STRENGTH_ERROR * true
+    return claim.heat_W, claim.heat_sd_W, float(effect["heat_magnitude_W"]["train"])
+
+
+def strength(j: Judged) -> bool | None:
+    """One effect, exactly named: its mean heat (of a fault of measurement, its size) within 15 % of the truth."""
+    said = _strengths(j)
+    return None if said is None else abs(said[0] - said[2]) <= STRENGTH_ERROR * said[2]
+
+
+def strength_as_stated(j: Judged) -> bool | None:
+    """The same cases: within twice the standard error that the diagnosis states."""
+    said = _strengths(j)
+    return None if said is None or not math.isfinite(said[1]) else abs(said[0] - said[2]) <= 2.0 * said[1]
+
+
+def strength_certain(j: Judged) -> bool | None:
+    """Of the same cases those whose stated standard error is below half of 15 %: within 15 % of the truth."""
+    said = _strengths(j)
+    sure = said is not None and 2.0 * said[1] <= STRENGTH_ERROR * said[0]
+    return strength(j) if sure else None
 
 
 def both_of_two(j: Judged) -> bool | None:
@@ -368,6 +405,11 @@ def sensor_named(j: Judged) -> bool | None:
     if j.group != "sensor" or not j.practical():
         return None
     return j.names[0] in j.answer.tied
+
+
+def sensor_evident(j: Judged) -> bool | None:
+    """A fault of measurement for which these data speak with 10 nats or more: named or tied."""
+    return sensor_named(j) if j.evident() else None
 
 
 def outside_unnamed(j: Judged) -> bool | None:
@@ -444,14 +486,20 @@ RULES = (
     Rule(key="single_exact", text="single effect named exactly", judge=single_exact, needed=0.85),
     Rule(key="single_answered", text="single effect named, tied, or said to be invisible in these data",
          judge=single_answered),
+    Rule(key="single_evident", text="single effect for which the data speak: named or in the tie set",
+         judge=single_evident),
     Rule(key="single_small", text="single effect too small to matter: no other named", judge=single_small),
     Rule(key="place", text="place right, or next to it", judge=near_place, needed=0.95),
     Rule(key="place_exact", text="place right exactly", judge=exact_place),
     Rule(key="strength", text="strength within 15 %", judge=strength, needed=0.90),
+    Rule(key="strength_as_stated", text="strength within twice the stated error", judge=strength_as_stated),
+    Rule(key="strength_certain", text="strength within 15 %, where that is claimed", judge=strength_certain),
     Rule(key="both", text="two effects: both", judge=both_of_two, needed=0.75),
     Rule(key="one", text="two effects: at least one", judge=one_of_two, needed=0.95),
     Rule(key="messy", text="one dominant, six minor: the dominant one first", judge=dominant_first),
     Rule(key="sensor", text="fault of measurement named or in the tie set", judge=sensor_named, needed=0.90),
+    Rule(key="sensor_evident", text="fault of measurement for which the data speak: named or in the tie set",
+         judge=sensor_evident),
     Rule(key="outside", text="outside the catalogue: said to be so", judge=outside_unnamed),
     Rule(key="outside_forced", text="outside the catalogue: forced into a name", judge=outside_forced, needed=0.0,
          at_most=True),

@@ -441,6 +441,31 @@ def test_what_is_not_needed_can_be_taken_out_again(fzg: Gearbox, piece: Piece, p
     assert stated == pytest.approx([1.0, 0.7])
 
 
+def test_the_error_of_a_mean_heat_is_that_of_the_strength_and_of_what_goes_with_it(
+    fzg: Gearbox, piece: Piece, problem: Problem
+) -> None:
+    """Straight in its strength it has the same relative error; at its moment the heat shows what is unsure of that."""
+    concealed, scale, _ = _damaged(fzg, piece, problem)
+    start = calibrated(problem.changed(pieces=[concealed]))
+    h = hypothesis_of(CATALOGUE["bearing_damage"].placed(problem.model.network, scale, CHANNELS)[0])
+    (scored,) = scan(start.problem, start.fit, Marginal.of(start.fit), [h])
+    found = fitted(start, scored)
+    assert found is not None
+    found = replace(found, fit=found.problem.at(found.fit))
+    mean, error = search.mean_heat_of(found, h)
+    heats, steps = np.concatenate(search.heats_of(found, h)), np.concatenate([p.steps for p in found.problem.pieces])
+    assert mean == pytest.approx(np.average(np.abs(heats), weights=steps))
+    # The same by many draws from the posterior of the term's parameters.
+    assert h.term is not None
+    items, rng = found.fit.unknowns.items, np.random.default_rng(3)
+    own = [next(i for i, item in enumerate(items) if item.target == p.name) for p in h.term.parameters]
+    draws = rng.multivariate_normal(found.fit.z[own], found.fit.covariance[np.ix_(own, own)], 400)
+    values = np.array([[items[i].value(x) for i, x in zip(own, draw, strict=True)] for draw in draws])
+    heat = np.concatenate(search._heats_with(found, h, np.concatenate([values.mean(axis=0, keepdims=True), values])))
+    drawn = np.average(np.abs(heat[:, 1:]), axis=0, weights=steps)
+    assert error == pytest.approx(drawn.std(), rel=0.2)
+
+
 def _scored(name: str, place: str, log_bayes: float) -> Scored:
     h = Hypothesis(name=name, place=place, family="", variants=np.ones((1, 1)), unknown=0)
     return Scored(

@@ -36,15 +36,15 @@ def truth(group: str, *effects: dict[str, Any], control: str | None = None, prac
     return {"group": group, "control": control, "effects": list(effects), "practical": [practical] * len(effects)}
 
 
-def claim(name: str, probability: float = 0.9, *, heat: float = 50.0, strength: float = 1.0,
+def claim(name: str, probability: float = 0.9, *, heat: float = 50.0, heat_sd: float = math.nan, strength: float = 1.0,
           family: str = "oil circuit", place: str = "oil", **rivals: float) -> Claim:  # fmt: skip
     return Claim(mechanism=name, place=place, node="oil", family=family, odds={name: probability, **rivals},
-                 heat_W=heat, strength=strength)  # fmt: skip
+                 heat_W=heat, heat_sd_W=heat_sd, strength=strength)  # fmt: skip
 
 
 def judged(true: dict[str, Any], verdict: str, *claims: Claim, node: str = "oil", kin: frozenset[str] = frozenset(),
-           holdout: tuple[float, float, float] = (3.0, 1.0, 0.5)) -> Judged:  # fmt: skip
-    answer = Answer(verdict=verdict, claims=claims, node=node, holdout_K=holdout)
+           holdout: tuple[float, float, float] = (3.0, 1.0, 0.5), **evidence: float) -> Judged:  # fmt: skip
+    answer = Answer(verdict=verdict, claims=claims, node=node, holdout_K=holdout, evidence=evidence)
     return Judged(case="case_001", truth=true, answer=answer, near=NEAR, far="h_air", kin=kin)
 
 
@@ -152,6 +152,30 @@ def test_strength_is_heat_within_15_percent(heat: float, right: bool) -> None:
     true = truth("single", effect("windage", heat=50.0))
     assert by("strength", judged(true, "missing_physics", claim("windage", heat=heat))) is right
     assert by("strength", judged(true, "missing_physics", claim("pump_heat", heat=heat))) is None
+
+
+@pytest.mark.parametrize(
+    ("heat", "sd", "as_stated", "certain"),
+    [(57.0, 3.6, True, True), (57.0, 3.4, False, True), (60.0, 4.0, False, False), (60.0, 6.0, True, None)],
+)  # fmt: skip
+def test_stated_errors_of_strengths_are_judged(heat: float, sd: float, as_stated: bool, certain: bool | None) -> None:
+    true = truth("single", effect("windage", heat=50.0))
+    j = judged(true, "missing_physics", claim("windage", heat=heat, heat_sd=sd))
+    assert by("strength_as_stated", j) is as_stated
+    assert by("strength_certain", j) is certain
+    silent = judged(true, "missing_physics", claim("windage", heat=heat))  # of an answer without errors
+    assert by("strength_as_stated", silent) is None
+    assert by("strength_certain", silent) is None
+
+
+def test_what_the_data_do_not_speak_for_is_counted_apart() -> None:
+    single, fault = truth("single", effect("windage")), truth("sensor", effect("sensor_bias"))
+    assert by("single_evident", judged(single, "consistent", windage=9.9)) is None
+    assert by("single_evident", judged(single, "consistent", windage=10.1)) is False
+    assert by("single_evident", judged(single, "missing_physics", claim("windage"), windage=10.1)) is True
+    assert by("single_evident", judged(single, "failed")) is False  # an answer that says nothing is no excuse
+    assert by("sensor_evident", judged(fault, "consistent", sensor_bias=12.0)) is False
+    assert by("sensor_evident", judged(fault, "consistent", sensor_bias=2.0)) is None
 
 
 def test_strength_of_a_fault_is_its_size_whatever_its_sign() -> None:
@@ -281,10 +305,12 @@ def test_an_answer_is_read_from_the_numbers_of_a_diagnosis() -> None:
         }],
         "location": [{"node": "wheel"}],
         "fit": {"holdout": {"rmse_before_K": 3.0, "rmse_calibrated_K": None, "rmse_after_K": 0.4}},
+        "ranking": [{"mechanism": "windage", "log_bayes": 3.0}, {"mechanism": "windage", "log_bayes": 7.0}],
     }  # fmt: skip
     answer = Answer.of(said)
     assert answer.claims[0].odds == pytest.approx({"windage": 0.9, "pump_heat": 0.06})
     assert answer.tied == {"windage", "pump_heat"}
+    assert answer.evidence == {"windage": 7.0}
     assert answer.node == "wheel"
     assert math.isnan(answer.holdout_K[1])
     assert Answer.of(None, otherwise="refused").silent
