@@ -25,7 +25,7 @@ from models.types import Array
 
 STANDSTILL_RPM = 10.0
 HELD_OUT_SHARE = 0.25  # of every recording, where none is held out as a whole
-CAPACITY_SD = 0.2  # at least: one temperature stands for a body that has many
+CAPACITY_SD = 0.3  # at least: one temperature stands for a body that has many
 FLOORS = (1.0, 2.0, 4.0)  # times the structural floor that is assumed at least
 FLOOR_GAIN = 10.0  # log evidence that a higher floor has to bring
 
@@ -87,7 +87,7 @@ def prepare(
     unknowns = _wider_capacities(unknowns_of(
         network, channels, lags={c.name: c.lag_s for c in stated if c.lag_s is not None},
         bias_sd={c.name: c.bias_sd for c in stated if c.bias_sd is not None}, slow=slow_rows(recordings),
-        ambient_assumed=any("T_ambient" in r.assumed for r in recordings),
+        interval=scale.interval, ambient_assumed=any("T_ambient" in r.assumed for r in recordings),
     ))  # fmt: skip
     white = channel_noise(recordings, channels)
     loss_sd = loss_noise(recordings) if LOSS in channels else (0.0, 0.0)

@@ -25,15 +25,18 @@ class Sensors:
         First-order lag [s] and bias [K]; of the total loss the bias in W
     loss_gain : float
         Factor on the total loss, [-]
+    loss_delay : float
+        Of the total loss behind the inputs, [s]; negative where it is ahead
     """
 
     channels: tuple[str, ...]
     lag: Array
     bias: Array
     loss_gain: float = 1.0
+    loss_delay: float = 0.0
 
     def ideal(self) -> Sensors:
-        """The same channels without lag, bias or gain."""
+        """The same channels without lag, bias, gain or delay."""
         nothing = np.zeros(len(self.channels))
         return Sensors(channels=self.channels, lag=nothing, bias=nothing)
 
@@ -42,7 +45,7 @@ def readings(model: NetworkOnGrid, trajectory: Trajectory, sensors: Sensors) -> 
     """What the sensors read along a trajectory, shape (K + 1, channels), [degC] or [W]."""
     read = np.empty((len(trajectory.T), len(sensors.channels)))
     for index, name in enumerate(sensors.channels):
-        read[:, index] = total_at_points(trajectory.loss) * sensors.loss_gain if name == LOSS else (
+        read[:, index] = delayed_loss(trajectory, sensors.loss_delay) * sensors.loss_gain if name == LOSS else (
             lagged(trajectory.T[:, model.parts.index(name)], trajectory.piece.steps, sensors.lag[index]))  # fmt: skip
     return np.asarray(read + sensors.bias)
 
@@ -78,6 +81,19 @@ def reading_columns(
 def total_at_points(loss: Array) -> Array:
     """From the middles of the intervals to the grid points, shape (K, ...) to (K + 1, ...)."""
     return np.concatenate([loss[:1], 0.5 * (loss[1:] + loss[:-1]), loss[-1:]])
+
+
+def delayed_loss(trajectory: Trajectory, delay: float) -> Array:
+    """Total loss at the grid points as it was `delay` seconds before, shape (K + 1,), [W]."""
+    loss, time = total_at_points(trajectory.loss), trajectory.piece.time
+    return loss if delay == 0.0 else np.interp(time - delay, time, loss)
+
+
+def delay_column(trajectory: Trajectory, delay: float) -> Array:
+    """Change of the total loss per second of delay, shape (K + 1,), [W/s]."""
+    step = 1.0
+    later, earlier = (delayed_loss(trajectory, delay + way * step) for way in (1.0, -1.0))
+    return np.asarray((later - earlier) / (2.0 * step))
 
 
 def lag_column(trajectory: Trajectory, node: int, lag: float) -> Array:

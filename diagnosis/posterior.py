@@ -15,7 +15,7 @@ import numpy as np
 from diagnosis.grid import Piece
 from diagnosis.mapping import LOSS
 from diagnosis.network_on_grid import TORQUE_STEP, Balance, NetworkOnGrid
-from diagnosis.observation import Sensors, lag_column, reading_columns, readings, total_at_points
+from diagnosis.observation import Sensors, delay_column, lag_column, reading_columns, readings, total_at_points
 from diagnosis.term_on_grid import TermOnGrid, moved_heat
 from diagnosis.trajectory import ROUNDS, Trajectory, parameter_heats, settled_balance, simulate
 from diagnosis.unknowns import Unknown, Unknowns, shifted
@@ -215,6 +215,9 @@ class Problem:
                 columns[:, :, index] += self._distortion(trajectory, sensors, distortion, item, z) * scale
             elif item.role == "loss_gain":
                 columns[:, sensors.channels.index(LOSS), index] = total_at_points(trajectory.loss) * scale
+            elif item.role == "loss_delay":
+                column = delay_column(trajectory, sensors.loss_delay) * sensors.loss_gain
+                columns[:, sensors.channels.index(LOSS), index] = column * scale
             elif item.role == "lag":
                 channel = sensors.channels.index(item.target)
                 node = model.parts.index(item.target)

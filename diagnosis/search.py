@@ -44,7 +44,6 @@ RARITY = {
     "speed_gain": -3.0,
     "clock_offset": -1.0,
     "swapped_channels": -2.0,
-    "parameter": -1.0,
     "water_jacket": -1.0,
     # Like what formulas of mesh and bearings leave in consistent recordings; the first has no published law either.
     "churning_load": -5.0,
@@ -268,7 +267,7 @@ def log_weights(scored: Sequence[Scored]) -> Array:
     """Logarithms of what everything weighs in the mean Bayes factor, together 1, shape (scored,).
 
     All names weigh the same, but for their rarity, and share it among their places; every instrument may fail for
-    itself.
+    itself, and every parameter be off.
 
     Parameters
     ----------
@@ -277,7 +276,7 @@ def log_weights(scored: Sequence[Scored]) -> Array:
     """
 
     def shares(h: Hypothesis) -> str:
-        return h.label if h.term is not None and h.term.of_measurement else h.name
+        return h.label if h.term is None or h.term.of_measurement else h.name
 
     places = Counter(shares(s.hypothesis) for s in scored)
     weights = np.array([RARITY.get(s.hypothesis.name, 0.0) - np.log(places[shares(s.hypothesis)]) for s in scored])

@@ -20,8 +20,9 @@ from models.laws import Parameter
 from models.network import ThermalNetwork
 from models.types import Array
 
-Role = Literal["network", "bias", "lag", "loss_gain", "torque_gain", "ambient_offset", "term"]
+Role = Literal["network", "bias", "lag", "loss_gain", "loss_delay", "torque_gain", "ambient_offset", "term"]
 BIAS_SD_K, LOSS_OFFSET_SD_W, LOSS_GAIN_SD = 0.3, 2.0, 0.02
+LOSS_DELAY_ROWS = 0.5  # whether a row is the mean of the time before its stamp or after it, or a moment, is not known
 LAG_S, LAG_SD = 15.0, 0.8  # of its logarithm: a sensor's lag is that of its seat, not of its data sheet
 SHORTEST_LAG_S = 3.0
 TORQUE_GAIN_SD, AMBIENT_SD_K = 0.01, 0.3
@@ -35,7 +36,8 @@ class Unknown:
     Attributes
     ----------
     role : str
-        ``network``: a parameter of it; ``bias`` and ``lag`` of a channel; ``loss_gain`` of the measured total loss;
+        ``network``: a parameter of it; ``bias`` and ``lag`` of a channel; ``loss_gain`` and ``loss_delay`` of the
+        measured total loss;
         ``torque_gain`` and ``ambient_offset`` of the recorded inputs; ``term``: a parameter of a term outside the
         network (an input shifted, a reading distorted)
     target : str
@@ -120,7 +122,7 @@ class Unknowns:
 
     def sensors(self, channels: Sequence[str], z: Array) -> Sensors:
         """The sensors."""
-        lag, bias, gain = np.zeros(len(channels)), np.zeros(len(channels)), 1.0
+        lag, bias, gain, delay = np.zeros(len(channels)), np.zeros(len(channels)), 1.0, 0.0
         for item, value in zip(self.items, self.values(z), strict=True):
             if item.role == "lag":
                 lag[channels.index(item.target)] = value
@@ -128,7 +130,9 @@ class Unknowns:
                 bias[channels.index(item.target)] = value
             elif item.role == "loss_gain":
                 gain = value
-        return Sensors(channels=tuple(channels), lag=lag, bias=bias, loss_gain=gain)
+            elif item.role == "loss_delay":
+                delay = value
+        return Sensors(channels=tuple(channels), lag=lag, bias=bias, loss_gain=gain, loss_delay=delay)
 
     def adjusted(self, piece: Piece, inputs: Sequence[str], z: Array) -> Piece:
         """A piece with the inputs as they probably were, and with the lags of its sensors."""
@@ -151,7 +155,8 @@ def shifted(samples: Array, inputs: Sequence[str], role: str, value: float) -> A
 
 def unknowns_of(
     network: ThermalNetwork, channels: Sequence[str], *, lags: Mapping[str, float] | None = None,
-    bias_sd: Mapping[str, float] | None = None, slow: bool = False, ambient_assumed: bool = False,
+    bias_sd: Mapping[str, float] | None = None, slow: bool = False, interval: float = 10.0,
+    ambient_assumed: bool = False,
 ) -> Unknowns:  # fmt: skip
     """The usual unknowns of a network and its sensors.
 
@@ -163,6 +168,8 @@ def unknowns_of(
         Time constants [s] and tolerances [K] as their data sheets state them
     slow : bool
         Whether the rows lie minutes apart: they show no usual lag of a sensor then
+    interval : float
+        Between rows, [s]
     ambient_assumed : bool
         Whether the ambient temperature was not recorded
     """
@@ -174,6 +181,9 @@ def unknowns_of(
             offset = _normal("bias_P_loss", "W", 0.0, LOSS_OFFSET_SD_W)
             items += [Unknown(role="loss_gain", target=LOSS, parameter=gain),
                       Unknown(role="bias", target=LOSS, parameter=offset)]  # fmt: skip
+            if not slow:
+                delay = _normal("delay_P_loss", "s", 0.0, LOSS_DELAY_ROWS * interval)
+                items.append(Unknown(role="loss_delay", target=LOSS, parameter=delay))
         else:
             items.append(
                 Unknown(

@@ -406,7 +406,10 @@ def test_shapes_are_sought_between_the_grid(fzg: Gearbox, piece: Piece, problem:
     """A moment that lies between two of the grid, where the fit from either would creep."""
     concealed, scale, true = _damaged(fzg, piece, problem)
     placed = CATALOGUE["bearing_damage"].placed(problem.model.network, scale)[0]
-    base = calibrated(problem.changed(pieces=[concealed]))
+    base = in_the_middle(
+        calibrated(problem.changed(pieces=[concealed]))
+    )  # a calibration that went astray: so the search
+    assert base is not None
     marginal = Marginal.of(base.fit)
     (coarse,) = scan(base.problem, base.fit, marginal, [hypothesis_of(placed)])
     fine = sharpened(base.problem, base.fit, marginal, coarse)
@@ -467,7 +470,8 @@ def test_the_error_of_a_mean_heat_is_that_of_the_strength_and_of_what_goes_with_
 
 
 def _scored(name: str, place: str, log_bayes: float) -> Scored:
-    h = Hypothesis(name=name, place=place, family="", variants=np.ones((1, 1)), unknown=0)
+    term: Any = None if name == "parameter" else SimpleNamespace(of_measurement=False)
+    h = Hypothesis(name=name, place=place, family="", variants=np.ones((1, 1)), term=term)
     return Scored(
         hypothesis=h, log_bayes=log_bayes, best=0, values=np.zeros(1), log_bayes_of=np.array([log_bayes]), expected=0.0
     )
@@ -479,6 +483,10 @@ def test_names_share_their_weight_among_their_places() -> None:
     many = [_scored("a", "0", 12.0), *(_scored("a", str(i), 0.0) for i in range(1, 7)), _scored("b", "", 0.0)]
     one = [_scored("a", "0", 0.0), *(_scored("a", str(i), 0.0) for i in range(1, 7)), _scored("b", "", 12.0)]
     assert log_e_value(one) - log_e_value(many) == pytest.approx(np.log(7.0), abs=0.01)
+    # One parameter far off is no less likely because there are many.
+    others = [_scored("a", "0", 0.0), _scored("parameter", "mesh", 12.0)]
+    more = [_scored("parameter", str(i), -50.0) for i in range(8)]
+    assert log_e_value(others) - log_e_value([*others, *more]) == pytest.approx(np.log(10.0 / 2.0), abs=0.01)
 
 
 def test_temperatures_that_run_away_are_no_trajectory(model: NetworkOnGrid, piece: Piece) -> None:
@@ -628,6 +636,22 @@ def test_a_clock_may_be_early_or_late(fzg: Gearbox, piece: Piece, problem: Probl
     for interval, matters in ((10.0, True), (150.0, False)):
         case: Any = SimpleNamespace(scale=SimpleNamespace(interval=interval), channels=CHANNELS, loss_W=250.0)
         assert search._matters(case, found, scored.hypothesis) is matters
+
+
+@pytest.mark.parametrize("late_s", [5.0, -5.0])
+def test_what_a_row_of_losses_stands_for_is_learnt_and_no_finding(
+    fzg: Gearbox, piece: Piece, problem: Problem, late_s: float
+) -> None:
+    """Means of the ten seconds before their stamp, or after it, beside temperatures of that moment."""
+    measured, at = np.array(piece.measured), CHANNELS.index("P_loss")
+    measured[:, at] = np.interp(piece.time - late_s, piece.time, piece.measured[:, at])
+    base = calibrated(problem.changed(pieces=[replace(piece, measured=measured)]))
+    assert base.fit.unknowns.sensors(CHANNELS, base.fit.z).loss_delay == pytest.approx(late_s, abs=1.0)
+    clocks = CATALOGUE["clock_offset"].placed(problem.model.network, Scale.of(fzg), CHANNELS)
+    scored = scan(base.problem, base.fit, Marginal.of(base.fit), [hypothesis_of(placed) for placed in clocks])
+    assert len(scored) == 2 and max(s.log_bayes for s in scored) < 0.0
+    slow = unknowns_of(fzg.network(), CHANNELS, slow=True)  # rows that are minutes apart are means, all of them
+    assert not any(item.role == "loss_delay" for item in slow.items)
 
 
 def test_a_fit_leaves_a_start_that_only_looks_good(monkeypatch: pytest.MonkeyPatch, problem: Problem) -> None:
