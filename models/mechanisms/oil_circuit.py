@@ -208,11 +208,12 @@ heater_thermostat = Mechanism(
             grid=[share_between(scale, share) for share in (0.1, 0.2, 0.3, 0.4, 0.5, 0.7)],
         ),
         _band(),
-        # Share of the reference speed with which it goes off: some interlocks want standstill, some allow turning over.
-        positive("until", 1.0 / RUNNING, sd=1.0, grid=(0.1 / RUNNING, 1.0 / RUNNING)),
+        # Share of the reference speed: some interlocks want standstill, some let the shafts turn over, and means over
+        # minutes know both.
+        positive("until", 1.0 / RUNNING, sd=0.7, grid=(0.4 / RUNNING, 1.0 / RUNNING)),
     ),
     states=(two_point("heating", above=0.0),),
-    law=lambda s: s.strength * s.heating * sp.exp(-s.n / s.until),
+    law=lambda s: s.strength * s.heating * sp.exp(-((s.n / s.until) ** 2)),
     says="An electric heater keeps the oil warm while the gearbox stands.",
     reference="two-point control",
     experiment="let it stand until it would be cold: the oil stays at a temperature of its own",
