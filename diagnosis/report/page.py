@@ -84,6 +84,7 @@ def _finding(finding: Finding, shown: set[str]) -> dict[str, Any]:
     prefix = f"{finding.term.label}_" if finding.term is not None else ""
     return {
         "of": finding,
+        "mean_heat": wording.with_error(finding.heat_mean_W, finding.heat_stderr_W),
         "equation": equation.drawn(finding.equation),
         "parameters": [
             (wording.name(p.name.removeprefix(prefix)), wording.with_error(p.value, p.stderr), wording.unit(p.unit))
