@@ -185,9 +185,9 @@ def build(
             with _timed(f"package, {kind} FMU", seconds), _spoken() as tell:
                 tell(f"packaging the {kind} FMU")
                 if kind == "python":
-                    build_python_fmu(gearbox, training, networks, path, network=network)
+                    build_python_fmu(gearbox, training, networks, path, correction=correction)
                 else:
-                    build_native_fmu(gearbox, training, networks, path, platforms=platforms, network=network)
+                    build_native_fmu(gearbox, training, networks, path, platforms=platforms, correction=correction)
         cycle, losses = reference_cycle(gearbox), gearbox.losses()
         with _timed("reference cycle, full model", seconds), console.progress_bar("full model") as progress:
             full = network.simulate(cycle, losses=losses, initial=COLD_START, progress=progress).columns()

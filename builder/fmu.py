@@ -28,6 +28,7 @@ from builder.units import UNITS
 from fmu_src.contents import DATA
 from fmu_src.twin import LISTS
 from models.compiled import compile_laws, law_source
+from models.correction import Correction
 from models.errors import InputError
 from models.gearbox import Gearbox
 from models.network import ThermalNetwork
@@ -74,6 +75,7 @@ def build_python_fmu(
     output: Path,
     *,
     network: ThermalNetwork | None = None,
+    correction: Correction | None = None,
 ) -> Path:
     """Package a gearbox as an FMU that needs Python, numpy and onnxruntime where it is used.
 
@@ -87,7 +89,9 @@ def build_python_fmu(
     output : Path
         The FMU; its stem becomes the model identifier
     network : ThermalNetwork or None
-        The thermal network, where it is not the gearbox's nominal one
+        The thermal network, where it is neither the gearbox's nominal nor the corrected one
+    correction : Correction or None
+        What a diagnosis found; the FMU has it and says so
 
     Returns
     -------
@@ -100,11 +104,12 @@ def build_python_fmu(
         If the folder cannot be written to, the network has laws that are no expressions, or the networks are another
         gearbox's.
     """
-    network = gearbox.network() if network is None else network
+    if network is None:
+        network = gearbox.network() if correction is None else correction.network(gearbox)
     refuse_mismatch(network, training.losses, networks)
     with appearing_whole(output) as partial, tempfile.TemporaryDirectory(prefix="twin-fmu-") as scratch:
         table = signal_table(gearbox, network, training.losses)
-        identity = gearbox_identity(gearbox, output, FLAGS)
+        identity = gearbox_identity(gearbox, output, FLAGS, correction)
         data = twin_data(table, network, training.losses, definition=gearbox.hash)
         files = {DATA: _json(data)} | {path.name: path.read_bytes() for path in networks}
         stage = Path(scratch) / "resources"
@@ -118,13 +123,16 @@ def build_python_fmu(
     return output
 
 
-def gearbox_identity(gearbox: Gearbox, output: Path, flags: Mapping[str, bool]) -> Identity:
+def gearbox_identity(
+    gearbox: Gearbox, output: Path, flags: Mapping[str, bool], correction: Correction | None
+) -> Identity:
     """What an FMU of a gearbox says about itself."""
     version = project_version()
+    model = "reduced-order twin of a detailed loss model" + ("" if correction is None else f", {correction.words}")
     return Identity(
         model_name=gearbox.name,
         model_identifier=model_identifier(output.stem),
-        description=f"Power loss and temperatures of {gearbox.name}: reduced-order twin of a detailed loss model",
+        description=f"Power loss and temperatures of {gearbox.name}: {model}",
         version=version,
         author=AUTHOR,
         license="MIT; see documentation/licenses",

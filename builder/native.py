@@ -22,6 +22,7 @@ from builder.native_data import gearbox_sources, number
 from builder.onnx_export import read_network
 from builder.signals import Signal, SignalTable, signal_table
 from builder.train import TrainingResult
+from models.correction import Correction
 from models.gearbox import Gearbox
 from models.network import ThermalNetwork
 
@@ -78,6 +79,7 @@ def build_native_fmu(
     output: Path,
     *,
     network: ThermalNetwork | None = None,
+    correction: Correction | None = None,
     platforms: str = "all",
 ) -> NativeBuild:
     """Package a gearbox as a native FMU.
@@ -92,7 +94,9 @@ def build_native_fmu(
     output : Path
         The FMU; its stem becomes the model identifier
     network : ThermalNetwork or None
-        The thermal network, where it is not the gearbox's nominal one
+        The thermal network, where it is neither the gearbox's nominal nor the corrected one
+    correction : Correction or None
+        What a diagnosis found; the FMU has it and says so
     platforms : str
         See :func:`builder.native_compile.compile_libraries`
 
@@ -102,7 +106,8 @@ def build_native_fmu(
         If the folder cannot be written to, the network has laws that are no expressions, the networks are another
         gearbox's, or there is no compiler.
     """
-    network = gearbox.network() if network is None else network
+    if network is None:
+        network = gearbox.network() if correction is None else correction.network(gearbox)
     refuse_mismatch(network, training.losses, networks)
     by_name = {path.name: path for path in networks}
     losses = replace(
@@ -110,7 +115,7 @@ def build_native_fmu(
         networks=tuple(read_network(by_name[f"{n.name}.onnx"], n) for n in training.losses.networks),
     )
     table = signal_table(gearbox, network, losses)
-    identity = gearbox_identity(gearbox, output, FLAGS)
+    identity = gearbox_identity(gearbox, output, FLAGS, correction)
     written = {name: native_source(name) for name in GEARBOX_MODEL}
     return build_native_archive(
         output,

@@ -170,6 +170,12 @@ class Correction:
             "findings": [f"{f.mechanism} at {f.place}" for f in self.findings if f.mechanism != "shape"],
         }
 
+    @property
+    def words(self) -> str:
+        """What it is in half a sentence, for an FMU that carries it."""
+        summary = self.summary()
+        return f"corrected by {', '.join(summary['findings']) or 'calibration'} (correction {summary['sha256'][:12]})"
+
     def network(self, gearbox: Gearbox, *, as_recorded: bool = False) -> ThermalNetwork:
         """The corrected network of the gearbox that the correction was made for.
 

@@ -5,14 +5,15 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
+from fmpy import read_model_description
 
 from builder.files import read_cycle
+from builder.fmu import build_python_fmu
 from builder.fmu_drive import drive_fmu
 from builder.native import build_native_fmu
 from builder.train import TrainingResult
@@ -111,18 +112,21 @@ def test_prediction_files_give_the_figures_of_the_diagnosis(diagnosed: tuple[Pat
 
 def test_corrected_model_and_rebuilt_fmus_follow_the_held_out_recording(
     diagnosed: tuple[Path, Path], fzg: Gearbox, fzg_training: TrainingResult, fzg_networks: tuple[Path, ...],
-    build_fmu: Callable[..., Path], tmp_path: Path,
+    tmp_path: Path,
 ) -> None:  # fmt: skip
     folder, out = diagnosed
     result = tmp_path / "result.csv"
     options = ("--correction", out / "correction.toml", "--initial", 24, "--output", result)
     done = run("simulate", "--gearbox", "fzg", folder / "hold.csv", *options)
     assert done.returncode == 0, done.stderr
-    network = read_correction(out / "correction.toml", fzg.network()).network(fzg)
+    correction = read_correction(out / "correction.toml", fzg.network())
     cycle = read_cycle(folder / "hold.csv")
-    python = build_fmu(tmp_path / "corrected.fmu", network)
-    native = tmp_path / "native.fmu"
-    build_native_fmu(fzg, fzg_training, fzg_networks, native, platforms="host", network=network)
+    python, native = tmp_path / "corrected.fmu", tmp_path / "native.fmu"
+    build_python_fmu(fzg, fzg_training, fzg_networks, python, correction=correction)
+    build_native_fmu(fzg, fzg_training, fzg_networks, native, platforms="host", correction=correction)
+    for fmu in (python, native):  # it says what it is
+        said = read_model_description(fmu).description
+        assert correction.findings[0].mechanism in said and correction.summary()["sha256"][:12] in said
     driven = {
         "full model": pd.read_csv(result),
         "python": drive_fmu(python, cycle, initial=24.0),
