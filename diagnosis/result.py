@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
+from diagnosis.numbers import MINUS, with_error
 from models.network import ThermalNetwork
 from models.terms import Term
 from models.types import Array
@@ -351,19 +352,7 @@ class Diagnosis:
         """The diagnosis in about ten lines."""
         lines = [f"{self.verdict.replace('_', ' ')}: {self.verdict_text}"]
         for finding in self.findings:
-            values = ", ".join(
-                f"{p.name} = {p.value:.4g} ± {p.stderr:.2g}" + (f" {p.unit}" if p.unit != "1" else "")
-                for p in finding.parameters
-            )
-            lines.append(
-                f"{finding.says} [{finding.mechanism} at {finding.place}, probability {finding.probability:.2f}]"
-            )
-            if values:
-                lines.append(f"    {values}")
-            rivals = [r for r in finding.confusable_with if r.probability >= 0.01]
-            if rivals:
-                named = ", ".join(f"{r.mechanism} at {r.place} ({r.probability:.2f})" for r in rivals)
-                lines.append(f"    not ruled out: {named}; {rivals[0].separate_by}")
+            lines += _lines(finding)
         if self.location and self.verdict not in ("consistent", "insufficient_data"):
             place = self.location[0]
             lines.append(f"Where: {place.node} ({place.probability:.2f}); {place.regime}")
@@ -390,6 +379,25 @@ class Diagnosis:
         head, *rest = self.summary()
         items = "".join(f"<li>{html.escape(line.strip())}</li>" for line in rest)
         return f"<div><b>{html.escape(head)}</b><ul>{items}</ul></div>"
+
+
+def _lines(finding: Finding) -> list[str]:
+    """A finding for a terminal: what, how strong, what else it may be."""
+    lines = [f"{finding.says} [{finding.mechanism} at {finding.place}, probability {finding.probability:.2f}]"]
+    values = [(p.name, p.value, p.stderr, p.unit) for p in finding.parameters]
+    if finding.heat_mean_W > 0.0:
+        values.append(("mean heat", finding.heat_mean_W, finding.heat_stderr_W, "W"))
+    if values:
+        told = (
+            f"{name} = {with_error(value, stderr).replace(MINUS, '-')}" + (f" {unit}" if unit != "1" else "")
+            for name, value, stderr, unit in values
+        )
+        lines.append(f"    {', '.join(told)}")
+    rivals = [r for r in finding.confusable_with if r.probability >= 0.01]
+    if rivals:
+        named = ", ".join(f"{r.mechanism} at {r.place} ({r.probability:.2f})" for r in rivals)
+        lines.append(f"    not ruled out: {named}; {rivals[0].separate_by}")
+    return lines
 
 
 def _finding(finding: Finding) -> dict[str, Any]:

@@ -11,6 +11,7 @@ import numpy as np
 from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
 
+from diagnosis.numbers import NONE, fixed
 from diagnosis.proof.protocol import DATA, SENSORS
 from diagnosis.proof.score import FAR, NOTHING, OUTCOMES, OUTSIDE, TO_FIND
 from diagnosis.report import wording
@@ -40,7 +41,7 @@ def page(found: Mapping[str, Any]) -> str:
     """
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     environment.filters.update(
-        name=wording.name, fixed=wording.fixed, clause=wording.clause, title=title, count=count,
+        name=wording.name, fixed=fixed, clause=wording.clause, title=title, count=count,
         share=share, limits=limits,
     )  # fmt: skip
     asked = [rule for rule in found["rules"] if rule["met"] is not None]
@@ -86,12 +87,12 @@ def count(found: Mapping[str, Any]) -> str:
     >>> count({"hits": 57, "of": 60})
     '57/60'
     """
-    return f"{found['hits']}/{found['of']}" if found["of"] else wording.NONE
+    return f"{found['hits']}/{found['of']}" if found["of"] else NONE
 
 
 def share(found: Mapping[str, Any]) -> str:
     """Share in per cent; a dash of nothing."""
-    return f"{100.0 * found['hits'] / found['of']:.0f} %" if found["of"] else wording.NONE
+    return f"{100.0 * found['hits'] / found['of']:.0f} %" if found["of"] else NONE
 
 
 def limits(found: Mapping[str, Any]) -> str:

@@ -14,7 +14,7 @@ import numpy as np
 from markupsafe import Markup
 from matplotlib.ticker import MaxNLocator
 
-from diagnosis.report.wording import MINUS
+from diagnosis.numbers import MINUS
 from models.types import Array
 
 Kind = Literal["line", "points", "band"]

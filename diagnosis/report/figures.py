@@ -10,9 +10,10 @@ import numpy as np
 from markupsafe import Markup
 
 from diagnosis.grid import stands_for
+from diagnosis.numbers import fixed
 from diagnosis.predict import rmse
 from diagnosis.report.chart import Chart, Curve, averaged, drawn
-from diagnosis.report.wording import LOSS, fixed, name, time_scale
+from diagnosis.report.wording import LOSS, name, time_scale
 from diagnosis.result import Course, Diagnosis, Finding, MissingHeat
 
 STAGES = (("as delivered", "before"), ("calibrated", "calibrated"), ("with what was found", "after"))

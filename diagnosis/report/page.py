@@ -9,6 +9,7 @@ from typing import Any
 from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
 
+from diagnosis import numbers
 from diagnosis.report import equation, figures, network_drawing, wording
 from diagnosis.result import Calibrated, Diagnosis, Finding, Fits
 
@@ -25,8 +26,8 @@ def page(diagnosis: Diagnosis) -> str:
     environment.filters.update(
         name=wording.name,
         unit=wording.unit,
-        number=wording.number,
-        fixed=wording.fixed,
+        number=numbers.number,
+        fixed=numbers.fixed,
         share=wording.share,
         chance=wording.chance,
         sentence=wording.sentence,
@@ -84,10 +85,10 @@ def _finding(finding: Finding, shown: set[str]) -> dict[str, Any]:
     prefix = f"{finding.term.label}_" if finding.term is not None else ""
     return {
         "of": finding,
-        "mean_heat": wording.with_error(finding.heat_mean_W, finding.heat_stderr_W),
+        "mean_heat": numbers.with_error(finding.heat_mean_W, finding.heat_stderr_W),
         "equation": equation.drawn(finding.equation),
         "parameters": [
-            (wording.name(p.name.removeprefix(prefix)), wording.with_error(p.value, p.stderr), wording.unit(p.unit))
+            (wording.name(p.name.removeprefix(prefix)), numbers.with_error(p.value, p.stderr), wording.unit(p.unit))
             for p in finding.parameters
         ],
         "rivals": [rival for rival in finding.confusable_with if rival.probability >= LIKELY],
@@ -113,7 +114,7 @@ def _calibrated(diagnosis: Diagnosis, one: Calibrated) -> dict[str, Any]:
     shift = min(max(one.shift_in_sd, -BAR_SD), BAR_SD) if math.isfinite(one.shift_in_sd) else 0.0
     return {
         "of": one,
-        "value": wording.with_error(one.value, one.stderr),
+        "value": numbers.with_error(one.value, one.stderr),
         "unit": wording.unit(parameter.unit) if parameter else "",
         "description": parameter.description if parameter else "",
         "left": 50.0 + 50.0 * min(shift, 0.0) / BAR_SD,

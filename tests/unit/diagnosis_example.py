@@ -192,6 +192,7 @@ def _windage() -> Finding:
             ),
         ),
         heat_mean_W=21.0,
+        heat_stderr_W=1.3,
         heat_max_W=66.0,
         heat={"train_1": (time, _law(_speed(time, 64800.0)))},
         term=windage.with_values({strength: 18.43, exponent: 2.87}),

@@ -12,12 +12,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from diagnosis.numbers import MINUS, NONE, fixed
 from diagnosis.report import equation as equations
 from diagnosis.report import network_drawing as drawing
 from diagnosis.report import page, write_report
 from diagnosis.report.chart import GRID, Chart, Curve, averaged, drawn, stretches, thinned
 from diagnosis.report.figures import courses
-from diagnosis.report.wording import MINUS, NONE, WORDS, fixed
+from diagnosis.report.wording import WORDS
 from diagnosis.result import VERDICT_TEXT, Diagnosis
 from models.errors import InputError
 from tests.unit.diagnosis_example import (
