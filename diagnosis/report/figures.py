@@ -47,8 +47,16 @@ def courses(diagnosis: Diagnosis) -> list[Panel]:
     return panels
 
 
+def _length(course: Course) -> str:
+    if not len(course.time):
+        return ""
+    span = float(course.time[-1] - course.time[0])
+    seconds, symbol = time_scale(span)
+    return f"{span / seconds:.1f} {symbol}"
+
+
 def _panel(course: Course, title: str, noise: float, *, shows_after: bool) -> Panel:
-    seconds, symbol = time_scale(float(course.time[-1] - course.time[0])) if len(course.time) else (1.0, "s")
+    seconds, symbol = time_scale(float(course.time[-1])) if len(course.time) else (1.0, "s")
     time, label = course.time / seconds, f"Time in {symbol}"
     span = (float(time[0]), float(time[-1])) if len(time) else None
     shade = ((span[0], course.counts_from_s / seconds),) if span and course.counts_from_s > course.time[0] else ()
@@ -87,8 +95,7 @@ def _panel(course: Course, title: str, noise: float, *, shows_after: bool) -> Pa
                       note=f"RMSE {' → '.join(fixed(value) for value in sizes)} {unit}", shade=shade, height=ERROR_PX,
                       curves=errors, level=True)  # fmt: skip
         sensors.append((drawn(above), drawn(below)))
-    told = f"{(course.time[-1] - course.time[0]) / seconds:.1f} {symbol}" if len(course.time) else ""
-    return Panel(title=title, held_out=course.held_out, length=told, inputs=inputs,
+    return Panel(title=title, held_out=course.held_out, length=_length(course), inputs=inputs,
                  sensors=tuple(sensors))  # fmt: skip
 
 
@@ -96,7 +103,7 @@ def found_heat(finding: Finding) -> list[Markup]:
     """The heat of what was found over time, by recording."""
     charts = []
     for recording, (time, heat) in finding.heat.items():
-        seconds, symbol = time_scale(float(time[-1] - time[0])) if len(time) else (1.0, "s")
+        seconds, symbol = time_scale(float(time[-1])) if len(time) else (1.0, "s")
         curve = Curve(label="heat of it", look="law", x=time / seconds, y=heat)
         charts.append(drawn(Chart(title=recording, x_label=f"Time in {symbol}", y_label="Heat in W", curves=(curve,),
                                   height=ERROR_PX, level=True)))  # fmt: skip
@@ -144,7 +151,7 @@ def _heat(node: str, heats: Sequence[MissingHeat]) -> HeatPanel:
 
 def _over_time(heats: Sequence[MissingHeat]) -> Iterator[Markup]:
     for heat in heats:
-        seconds, symbol = time_scale(float(heat.time[-1] - heat.time[0])) if len(heat.time) else (1.0, "s")
+        seconds, symbol = time_scale(float(heat.time[-1])) if len(heat.time) else (1.0, "s")
         time = heat.time / seconds
         curves = [
             Curve(label="95 % band", look="missing", x=time, y=heat.mean + BAND_SD * heat.sd,

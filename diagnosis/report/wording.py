@@ -8,8 +8,8 @@ from typing import Any
 
 from diagnosis.numbers import NONE, SUPERSCRIPTS
 
-HOUR, MINUTE = 3600.0, 60.0
-LONG_S, SHORT_S = 2.0 * HOUR, 5.0 * MINUTE  # above: in hours; below: in seconds
+DAY, HOUR, MINUTE = 86_400.0, 3600.0, 60.0
+WEEKS_S, LONG_S, SHORT_S = 14.0 * DAY, 2.0 * HOUR, 5.0 * MINUTE  # above: in days, in hours; below: in seconds
 RARELY, NEVER = 1e-4, 1e-12  # chances below: as a power of ten; no longer told apart
 UNITS = {"1": "", "degC": "°C", "W/degC": "W/K", "N m": "N m", "N.m": "N m", "rpm": "1/min"}
 LOSS = "P_loss"
@@ -142,17 +142,19 @@ def share(probability: float) -> str:
     return "> 0.99" if probability > 0.99 else f"{probability:.2f}"
 
 
-def time_scale(duration_s: float) -> tuple[float, str]:
-    """Seconds of the unit that times up to a duration are shown in, and that unit.
+def time_scale(end_s: float) -> tuple[float, str]:
+    """Seconds of the unit that times up to an end are shown in, and that unit.
 
     Examples
     --------
-    >>> time_scale(64800.0), time_scale(600.0)
-    ((3600.0, 'h'), (60.0, 'min'))
+    >>> time_scale(64800.0), time_scale(600.0), time_scale(5e6)
+    ((3600.0, 'h'), (60.0, 'min'), (86400.0, 'd'))
     """
-    if duration_s > LONG_S:
+    if end_s > WEEKS_S:
+        return DAY, "d"
+    if end_s > LONG_S:
         return HOUR, "h"
-    return (MINUTE, "min") if duration_s > SHORT_S else (1.0, "s")
+    return (MINUTE, "min") if end_s > SHORT_S else (1.0, "s")
 
 
 def windows(when: Sequence[tuple[str, float, float]]) -> list[tuple[str, str]]:
@@ -170,7 +172,7 @@ def windows(when: Sequence[tuple[str, float, float]]) -> list[tuple[str, str]]:
         every = [(begin, end) for name, begin, end in when if name == recording]
         own = sorted(sorted(every, key=lambda span: span[0] - span[1])[:MOST_WINDOWS])
         seconds, symbol = time_scale(max(end for _, end in own))
-        decimals = 1 if symbol == "h" else 0
+        decimals = 1 if symbol in ("d", "h") else 0
         spans = ", ".join(f"{a / seconds:.{decimals}f} to {b / seconds:.{decimals}f}" for a, b in own)
         more = f" and {len(every) - len(own)} shorter ones" if len(every) > len(own) else ""
         told.append((recording, f"{spans} {symbol}{more}"))

@@ -163,6 +163,16 @@ def test_pieces_of_one_recording_are_told_apart_and_counted_once() -> None:
     assert "from 2 recordings" in Text(page(diagnosis)).told
 
 
+def test_a_short_piece_years_after_the_start_is_shown_in_days() -> None:
+    example = consistent()
+    late = replace(example.courses[0], time=0.05 * example.courses[0].time + 1.3e8)
+    (panel, *_) = courses(replace(example, courses=(late,)))
+    text = str(panel)
+    assert panel.length == f"{(late.time[-1] - late.time[0]) / 60.0:.1f} min"
+    assert "Time in d" in text and "1504.66" in text
+    assert "Time in min" not in text
+
+
 def test_a_parameter_out_of_its_prior_is_told_as_one() -> None:
     base = missing_physics()
     finding = replace(
