@@ -24,6 +24,7 @@ from models.mechanisms.mechanism import Mechanism, Memory
 from models.mechanisms.scale import Scale
 
 FAMILY = "oil circuit"
+STANDING = 25.0  # sharpness of an interlock: at a tenth of the reference speed it is off
 PAST_SET_POINT = "heat up slowly at constant load past the suspected set-point, then hold"
 RETURN = "measure the oil where it enters and leaves the gearbox"
 # Below and above the surroundings: a fit that goes further trades the coolant's temperature for the cooler's strength.
@@ -208,12 +209,9 @@ heater_thermostat = Mechanism(
             grid=[share_between(scale, share) for share in (0.1, 0.2, 0.3, 0.4, 0.5, 0.7)],
         ),
         _band(),
-        # Share of the reference speed: some interlocks want standstill, some let the shafts turn over, and means over
-        # minutes know both.
-        positive("until", 1.0 / RUNNING, sd=0.7, grid=(0.4 / RUNNING, 1.0 / RUNNING)),
     ),
     states=(two_point("heating", above=0.0),),
-    law=lambda s: s.strength * s.heating * sp.exp(-((s.n / s.until) ** 2)),
+    law=lambda s: s.strength * s.heating * sp.exp(-((STANDING * s.n) ** 2)),
     says="An electric heater keeps the oil warm while the gearbox stands.",
     reference="two-point control",
     experiment="let it stand until it would be cold: the oil stays at a temperature of its own",
