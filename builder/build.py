@@ -24,7 +24,7 @@ from builder.native_compile import host_platform, plan_for
 from builder.onnx_export import export_onnx
 from builder.plots import plot_cycle
 from builder.train import TrainingResult, train_surrogate
-from models.correction import Correction
+from models.correction import Correction, corrected_network
 from models.errors import InputError
 from models.gearbox import Gearbox
 from models.types import Array
@@ -170,7 +170,7 @@ def build(
     if kinds is None:
         raise InputError(f"target {target!r} is not known; python, native and both are")
     note = plan_for(platforms).note if "native" in kinds else ""  # a missing compiler is told before the training
-    network = gearbox.network() if correction is None else correction.network(gearbox)
+    network = corrected_network(gearbox, correction)
     seconds: dict[str, float] = {}
     with staging(folder) as stage:
         with _timed("train", seconds), _spoken() as tell:

@@ -28,7 +28,7 @@ from builder.units import UNITS
 from fmu_src.contents import DATA
 from fmu_src.twin import LISTS
 from models.compiled import compile_laws, law_source
-from models.correction import Correction
+from models.correction import Correction, corrected_network
 from models.errors import InputError
 from models.gearbox import Gearbox
 from models.network import ThermalNetwork
@@ -104,8 +104,7 @@ def build_python_fmu(
         If the folder cannot be written to, the network has laws that are no expressions, or the networks are another
         gearbox's.
     """
-    if network is None:
-        network = gearbox.network() if correction is None else correction.network(gearbox)
+    network = corrected_network(gearbox, correction) if network is None else network
     refuse_mismatch(network, training.losses, networks)
     with appearing_whole(output) as partial, tempfile.TemporaryDirectory(prefix="twin-fmu-") as scratch:
         table = signal_table(gearbox, network, training.losses)

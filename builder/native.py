@@ -22,7 +22,7 @@ from builder.native_data import gearbox_sources, number
 from builder.onnx_export import read_network
 from builder.signals import Signal, SignalTable, signal_table
 from builder.train import TrainingResult
-from models.correction import Correction
+from models.correction import Correction, corrected_network
 from models.gearbox import Gearbox
 from models.network import ThermalNetwork
 
@@ -106,8 +106,7 @@ def build_native_fmu(
         If the folder cannot be written to, the network has laws that are no expressions, the networks are another
         gearbox's, or there is no compiler.
     """
-    if network is None:
-        network = gearbox.network() if correction is None else correction.network(gearbox)
+    network = corrected_network(gearbox, correction) if network is None else network
     refuse_mismatch(network, training.losses, networks)
     by_name = {path.name: path for path in networks}
     losses = replace(

@@ -283,7 +283,7 @@ def _one_sided(h: Hypothesis, fit: Fit) -> float:
     """Correction of the Laplace evidence where only one sign of the strength is possible."""
     if not h.sign or h.term is None:
         return 0.0
-    index = next(i for i, item in enumerate(fit.unknowns.items) if item.target == h.term.strength.name)
+    (index,) = fit.unknowns.of([h.term.strength])
     sd = float(np.sqrt(fit.covariance[index, index]))
     return float(np.log(2.0) + log_ndtr(h.sign * fit.z[index] / sd))
 

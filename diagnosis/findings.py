@@ -137,7 +137,7 @@ def _with_bias(final: Explanation, h: Hypothesis) -> dict[str, tuple[float, floa
     if {s.name for s in term.expression.free_symbols} != {term.strength.name}:
         return values
     items, fit = final.fit.unknowns.items, final.fit
-    own = next(i for i, item in enumerate(items) if item.target == term.strength.name)
+    (own,) = fit.unknowns.of([term.strength])
     bias = next((i for i, item in enumerate(items) if item.role == "bias" and item.target == term.target[0]), None)
     if bias is None:
         return values

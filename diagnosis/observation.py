@@ -55,6 +55,8 @@ def reading_columns(
 ) -> Array:
     """Change of the readings for changes of temperatures and loss.
 
+    The delay of the loss, half a row or so, is left out here: it moves a small change by next to nothing.
+
     Parameters
     ----------
     model, trajectory, sensors

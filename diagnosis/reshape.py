@@ -42,7 +42,7 @@ def reshaped(h: Hypothesis, problem: Problem, fit: Fit) -> Array | None:
     if h.term is None or h.term.kind == "sensor" or not free:
         return None
     items, z = problem.unknowns.items, np.array(fit.z)
-    own = [next(i for i, item in enumerate(items) if item.target == p.name) for p in h.term.parameters]
+    own = problem.unknowns.of(h.term.parameters)
     rest = np.setdiff1d(np.arange(len(items)), own)
     values = np.array([items[i].value(float(z[i])) for i in own])
     here = np.concatenate([[1.0], values[1:]])[None, :]

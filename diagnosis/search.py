@@ -407,7 +407,7 @@ def mean_heat_of(explanation: Explanation, h: Hypothesis) -> tuple[float, float]
     if h.term is None or h.term.kind in ("sensor", "signal"):
         return 0.0, 0.0
     items, fit = explanation.fit.unknowns.items, explanation.fit
-    own = [next(i for i, item in enumerate(items) if item.target == p.name) for p in h.term.parameters]
+    own = fit.unknowns.of(h.term.parameters)
     covariance = fit.covariance[np.ix_(own, own)]
     sd = np.sqrt(np.diag(covariance))
     moved = fit.z[own] + np.concatenate([np.zeros((1, len(own))), np.diag(sd), -np.diag(sd)])

@@ -27,6 +27,9 @@ TEMPERATURE_STEP_K = 0.05
 STATE_STEP = 0.05  # of a state that is solved with the temperatures, mostly a temperature itself
 # Where switches run free: a switching that comes a step later moves a temperature by more, so rounds end early.
 FREE_ROUNDS, FREE_SETTLED_K = 3, 0.2
+# From a cold start, losses linearised there are no good at operating temperature: it takes further rounds until their
+# tangents have arrived.
+MOST_FREE_ROUNDS, LOSS_ARRIVED = 10, 0.01
 RUNAWAY_T = 1500.0  # degC; beyond it there is no trajectory
 # A switching that no row shows, be they means over minutes or noisy near a set-point, sends a guided trajectory astray.
 # Further off than this, switches follow the simulated temperature until it is back.
@@ -199,9 +202,11 @@ def free_running(
         T = np.stack([np.interp(fine.time, piece.time, course) for course in guess.T], axis=-1)
     tangent: LossTangent | None = None
     states: Array | None = None
-    for _ in range(FREE_ROUNDS):
+    for done in range(MOST_FREE_ROUNDS):
         middle = np.clip(0.5 * (T[1:] + T[:-1]), LOWEST_T, HIGHEST_T)
-        tangent = model.loss_tangent(fine, middle, tangent)
+        last, tangent = tangent, model.loss_tangent(fine, middle, tangent)
+        if done >= FREE_ROUNDS and last is not None and _arrived(model, last, tangent, middle):
+            break
         power = tangent.at(middle[:, model.loss_nodes])
         held = np.clip(T, LOWEST_T, HIGHEST_T)
         memory = model.memory(fine, held, held, values, power, states)
@@ -220,6 +225,13 @@ def free_running(
     memory = np.add.reduceat(states, at[:-1]) / np.diff(at)[:, None]
     unguided = replace(piece, guided=False)
     return replace(_round(model, unguided, values, start, means, None, None, given=memory), T=means)
+
+
+def _arrived(model: NetworkOnGrid, last: LossTangent, tangent: LossTangent, middle: Array) -> bool:
+    """Whether losses by the tangents of the last round are those at the temperatures that came out of it."""
+    mine = middle[:, model.loss_nodes]
+    off = np.abs(last.at(mine) - tangent.at(mine))
+    return bool((off.mean(axis=0) <= LOSS_ARRIVED * np.abs(tangent.at(mine)).mean(axis=0)).all())
 
 
 def _stepped(

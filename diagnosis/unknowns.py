@@ -106,6 +106,11 @@ class Unknowns:
         wider = replace(item, parameter=replace(item.parameter, sd=sd))
         return Unknowns((*self.items[:index], wider, *self.items[index + 1 :]))
 
+    def of(self, parameters: Iterable[Parameter]) -> list[int]:
+        """Where parameters are among them, by name."""
+        at = {item.target: index for index, item in enumerate(self.items) if item.role in ("network", "term")}
+        return [at[p.name] for p in parameters]
+
     def values(self, z: Array) -> list[float]:
         """Values of all unknowns."""
         return [item.value(float(x)) for item, x in zip(self.items, z, strict=True)]

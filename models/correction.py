@@ -188,6 +188,17 @@ class Correction:
         return self.apply(gearbox.network(), as_recorded=as_recorded)
 
 
+def corrected_network(gearbox: Gearbox, correction: Correction | None) -> ThermalNetwork:
+    """The network of a gearbox, corrected where there is a correction.
+
+    Raises
+    ------
+    InputError
+        If the correction was made for another definition.
+    """
+    return gearbox.network() if correction is None else correction.network(gearbox)
+
+
 def _check_made_for(gearbox: Gearbox, name: str, sha256: str, where: str = "") -> None:
     if gearbox.hash != sha256:
         raise InputError(

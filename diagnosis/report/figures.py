@@ -15,6 +15,7 @@ from diagnosis.predict import rmse
 from diagnosis.report.chart import Chart, Curve, averaged, drawn
 from diagnosis.report.wording import LOSS, name, time_scale
 from diagnosis.result import Course, Diagnosis, Finding, MissingHeat
+from models.types import Array
 
 STAGES = (("as delivered", "before"), ("calibrated", "calibrated"), ("with what was found", "after"))
 SENSOR_PX, ERROR_PX, INPUT_PX = 190, 120, 90
@@ -47,6 +48,10 @@ def courses(diagnosis: Diagnosis) -> list[Panel]:
     return panels
 
 
+def _end(time: Array) -> float:
+    return float(time[-1]) if len(time) else 0.0
+
+
 def _length(course: Course) -> str:
     if not len(course.time):
         return ""
@@ -56,7 +61,7 @@ def _length(course: Course) -> str:
 
 
 def _panel(course: Course, title: str, noise: float, *, shows_after: bool) -> Panel:
-    seconds, symbol = time_scale(float(course.time[-1])) if len(course.time) else (1.0, "s")
+    seconds, symbol = time_scale(_end(course.time))
     time, label = course.time / seconds, f"Time in {symbol}"
     span = (float(time[0]), float(time[-1])) if len(time) else None
     shade = ((span[0], course.counts_from_s / seconds),) if span and course.counts_from_s > course.time[0] else ()
@@ -103,7 +108,7 @@ def found_heat(finding: Finding) -> list[Markup]:
     """The heat of what was found over time, by recording."""
     charts = []
     for recording, (time, heat) in finding.heat.items():
-        seconds, symbol = time_scale(float(time[-1])) if len(time) else (1.0, "s")
+        seconds, symbol = time_scale(_end(time))
         curve = Curve(label="heat of it", look="law", x=time / seconds, y=heat)
         charts.append(drawn(Chart(title=recording, x_label=f"Time in {symbol}", y_label="Heat in W", curves=(curve,),
                                   height=ERROR_PX, level=True)))  # fmt: skip
@@ -151,7 +156,7 @@ def _heat(node: str, heats: Sequence[MissingHeat]) -> HeatPanel:
 
 def _over_time(heats: Sequence[MissingHeat]) -> Iterator[Markup]:
     for heat in heats:
-        seconds, symbol = time_scale(float(heat.time[-1])) if len(heat.time) else (1.0, "s")
+        seconds, symbol = time_scale(_end(heat.time))
         time = heat.time / seconds
         curves = [
             Curve(label="95 % band", look="missing", x=time, y=heat.mean + BAND_SD * heat.sd,

@@ -12,7 +12,7 @@ import sympy as sp
 
 from diagnosis import trajectory
 from diagnosis.grid import Piece, pieces
-from diagnosis.network_on_grid import NetworkOnGrid
+from diagnosis.network_on_grid import NetworkOnGrid, named_values
 from diagnosis.recording import read_recordings
 from diagnosis.trajectory import free_running, simulate
 from models.errors import InputError
@@ -249,6 +249,26 @@ def test_a_thermostat_runs_free_as_the_solver_has_it():
     # Its intervals are two minutes long here, and the cycle lasts half an hour.
     assert switchings(oil[late]) == pytest.approx(switchings(truth[600:]), rel=0.15)
     assert oil[late].mean() == pytest.approx(truth[600:].mean(), abs=0.5)
+
+
+def test_losses_linearised_in_the_cold_do_not_stay_so_when_it_runs():
+    """Thick oil at the start: a few rounds leave a bearing many kelvin too cold for weeks."""
+    gearbox, network = load_gearbox("la_haute_borne"), _thermostat()
+    model = NetworkOnGrid(network, gearbox.loss_laws())
+    time = np.arange(0.0, 86400.0, 600.0)
+    inputs = np.array(np.broadcast_to([1500.0, 4000.0, 25.0, 12.0], (len(time) - 1, 5, 4)))
+    nothing = np.empty((len(time), 0))
+    piece = Piece(recording="", time=time, samples=inputs, channels=(), measured=nothing, counts=nothing, slow=True)
+    steep = {"bearing_1_viscosity_exponent": 1.0}
+    from_cold = free_running(model, piece, named_values(network, steep), np.full(model.n, 5.0))
+    fine = {
+        "time_s": time, "speed_rpm": np.full(len(time), 1500.0), "torque_Nm": np.full(len(time), 4000.0),
+        "T_ambient_degC": np.full(len(time), 25.0), "T_outdoor": np.full(len(time), 12.0),
+    }  # fmt: skip
+    truth = network.simulate(fine, losses=gearbox.loss_laws(), initial=5.0, parameters=steep).columns()
+    late = slice(60, None)
+    found = from_cold.T[late, model.parts.index("bearing_1")]
+    assert found.mean() == pytest.approx(truth["T_bearing_1_degC"][late].mean(), abs=0.3)
 
 
 def test_a_switching_that_no_row_shows_does_not_send_learning_astray(monkeypatch):
