@@ -51,6 +51,11 @@ class Explanation:
     found: tuple[Hypothesis, ...] = ()
     log_evidence: float
 
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """What was found, by name and place."""
+        return tuple(h.label for h in self.found)
+
     def values_of(self, hypothesis: Hypothesis) -> dict[str, tuple[float, float]]:
         """Value and standard error of every parameter of something found, by name."""
         result = {}
@@ -291,13 +296,15 @@ def _one_sided(h: Hypothesis, fit: Fit) -> float:
 def best_fits(base: Explanation, chosen: Sequence[tuple[Explanation, Scored]], *, jobs: int = 1) -> list[Explanation]:
     """Hypotheses of scans fitted, best first: all of them roughly, those that may still win to the end.
 
-    Every one comes with the explanation that it was scanned from, the base or the same seen from elsewhere; of two that
-    say the same the better one counts. The fits come without their linearisation, see :meth:`Problem.at`: a dozen of
-    them would fill the memory.
+    Every one comes with the explanation that it was scanned from: the base, the same seen from elsewhere, or a rival of
+    it. Of two that add the same the better one counts. The fits come without their linearisation, see
+    :meth:`Problem.at`: a dozen of them would fill the memory.
     """
     most = max((s.log_bayes for view, s in chosen if view is base), default=0.0)
-    # What is seen from elsewhere is a further start already.
-    work = [delayed(fitted)(view, s, AS_PROMISED * most if view is base else np.inf) for view, s in chosen]
+    # The base seen from elsewhere is a further start already.
+    again = [view is not base and view.labels == base.labels for view, _ in chosen]
+    work = [delayed(fitted)(view, s, np.inf if it else AS_PROMISED * most)
+            for (view, s), it in zip(chosen, again, strict=True)]  # fmt: skip
     by_label: dict[str, Explanation] = {}
     for found in spread(jobs, work):
         if found is not None:

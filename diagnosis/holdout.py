@@ -43,7 +43,7 @@ class Judge:
     def _of_base(self) -> tuple[list[Whitening], float]:
         """Noise filters of the base, and its own log density."""
         problem = with_floor(at_holdout(self.case, self.base), self.floor)
-        parts = _linearised(problem, self.base)
+        parts = _linearised(problem, self.base, self._courses)
         return [part.whitening for part in parts], _log_density(parts, self.base)
 
     @cached_property
@@ -64,7 +64,8 @@ class Judge:
         """
         try:
             whitenings, own = self._of_base
-            parts = _linearised(at_holdout(self.case, explanation).with_whitenings(whitenings), explanation)
+            problem = at_holdout(self.case, explanation).with_whitenings(whitenings)
+            parts = _linearised(problem, explanation, self._courses)
             return _log_density(parts, explanation) - own
         except (ArithmeticError, np.linalg.LinAlgError):
             return -np.inf
@@ -81,8 +82,8 @@ class Judge:
         return overall_rmse(predictions, temperatures)
 
 
-def _linearised(problem: Problem, explanation: Explanation) -> list[Linearised]:
-    return [problem.linearise(i, explanation.fit.z, None, rounds=ROUNDS) for i in range(len(problem.pieces))]
+def _linearised(problem: Problem, explanation: Explanation, courses: Sequence[Array | None]) -> list[Linearised]:
+    return [problem.linearise(i, explanation.fit.z, course, rounds=ROUNDS) for i, course in enumerate(courses)]
 
 
 def _log_density(parts: Sequence[Linearised], explanation: Explanation) -> float:

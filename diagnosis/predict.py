@@ -19,7 +19,7 @@ from models.types import Array
 
 START_S = 600.0
 START_ROUNDS, START_SETTLED_K = 3, 0.01
-SETTLED_K = 0.02
+SETTLED_K, MOST_ROUNDS = 0.02, 30  # thick oil at a cold start takes many rounds
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -95,7 +95,7 @@ def _free_run(problem: Problem, index: int, z: Array, start: Array, guess: Array
             trajectory = free_running(model, piece, values, start, guess=guess)
         else:
             about = guess if trajectory is None else trajectory
-            trajectory = simulate(model, piece, values, start, guess=about, settled_K=SETTLED_K)
+            trajectory = simulate(model, piece, values, start, guess=about, rounds=MOST_ROUNDS, settled_K=SETTLED_K)
     assert trajectory is not None  # noqa: S101 - one run at least
     return trajectory
 

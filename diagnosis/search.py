@@ -16,7 +16,7 @@ from joblib import delayed
 
 from diagnosis.case import Case, first, floored
 from diagnosis.evidence import Marginal
-from diagnosis.explain import Explanation, best_fits, distorted, in_the_middle, without
+from diagnosis.explain import Explanation, best_fits, distorted, evidence_of, in_the_middle, without
 from diagnosis.holdout import Judge
 from diagnosis.hypotheses import Hypothesis, Scored, hypothesis_of, parameter_hypotheses, scan, sharpened, spread
 from diagnosis.mapping import LOSS
@@ -35,6 +35,9 @@ LEAST_PROBABILITY = 0.05  # of what counts when it is asked whether anything of 
 SHARPENED, SHARPEN_FROM = 15, 2.0  # best hypotheses whose shapes are sought between the grid, from this score on
 FITTED, WORTH = 5, 0.12  # hypotheses that are fitted in earnest, and the share of the best score that they need
 MOST_FITTED, NEAR = 12, 0.6  # where more of them score about as well as the best: the scan is only linear
+# What was nearly as likely as what was accepted may be right beside a further effect: so many are seen, from this share
+# of its probability.
+OTHERS, LIKELY = 2, 0.1
 # Log evidences are divided by a temperature before they become probabilities, because no model is exactly true: a
 # constant, and a share of the whole evidence, since the form of an effect is known no better than that.
 TEMPER, TEMPER_SHARE = 3.0, 0.03
@@ -103,6 +106,11 @@ class Stage:
         weights = np.exp(weights - weights.max())
         return np.asarray(weights / weights.sum())
 
+    def ranked(self) -> Stage:
+        """The same, the most probable fit first."""
+        order = np.argsort(-self.probabilities())
+        return replace(self, fits=tuple(self.fits[i] for i in order), gains=tuple(self.gains[i] for i in order))
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Search:
@@ -149,7 +157,7 @@ def threshold_at(false_alarm_rate: float) -> float:
 
 def hypotheses_of(case: Case, explanation: Explanation, catalogue: Mapping[str, Mechanism]) -> list[Hypothesis]:
     """Everything that may be added to an explanation."""
-    taken = {h.label for h in explanation.found}
+    taken = set(explanation.labels)
     found = [
         hypothesis_of(placed)
         for mechanism in catalogue.values()
@@ -182,9 +190,12 @@ def search(
     start, start_floor = base, floor = first(case)
     threshold = threshold_at(false_alarm_rate)
     stages: list[Stage] = []
+    others: list[Explanation] = []
     for look in range(MOST_EFFECTS):
         progress("scoring everything that may be missing" if not look else "looking for a further effect")
-        stage = _look(case, start, base, floor, catalogue, threshold if not look else SECOND_GAIN, jobs, progress)
+        needed = SECOND_GAIN if look else threshold
+        judge = Judge(case, base, floor)
+        stage = _look(judge, start, catalogue, needed, jobs, progress, others)
         if stage.accepted is None and stages and stages[-1].tentative:
             stages[-1] = replace(stages[-1], accepted=None, tentative=False)
             base, floor = start, start_floor
@@ -192,22 +203,64 @@ def search(
         stages.append(stage)
         if stage.accepted is None:
             break
+        stages = _reconsidered(stages, base)
+        others = []
         if stage.tentative:
             base = stage.accepted
             continue
-        slim = _needed_of(case, start, base, floor, stage.accepted)
+        slim = _needed_of(judge, start, stage.accepted)
         raised, floor_after = floored(slim)
-        if floor_after > 1.0 and not _holds_out(Judge(case, base, floor), start, raised):
+        if floor_after > 1.0 and not _holds_out(judge, start, raised):
             raised, floor_after = slim, 1.0  # fitted anew with a higher floor it went astray
         base, floor = raised, floor_after
+        others = _others(base, stage)
     return Search(calibrated=start, final=base, stages=tuple(stages), threshold=threshold, floor=floor)
 
 
-def _needed_of(
-    case: Case, calibrated: Explanation, base: Explanation, floor: float, accepted: Explanation
-) -> Explanation:
+def _others(base: Explanation, stage: Stage) -> list[Explanation]:
+    """What was nearly as likely as what a look accepted, judged by the same noise as the base that came of it."""
+    accepted = stage.accepted
+    if accepted is None or base.labels != accepted.labels:
+        return []
+    probability = {fit.found[-1].label: p for fit, p in zip(stage.fits, stage.probabilities(), strict=True)}
+    likely = LIKELY * probability[accepted.found[-1].label]
+    found = []
+    for fit in stage.fits:
+        last = fit.found[-1]
+        if last.label == accepted.found[-1].label or last.family == "open form" or probability[last.label] < likely:
+            continue
+        problem = fit.problem.changed(noise=base.problem.noise, whitenings=base.problem.whitenings)
+        same = fit.problem.whitenings is base.problem.whitenings
+        try:
+            again = problem.fit(fit.fit.z, fit.fit.courses, iterations=0 if same else 2)
+        except ArithmeticError:
+            continue
+        found.append(replace(fit, problem=problem, fit=again, log_evidence=evidence_of(fit.found, again)))
+    return found[:OTHERS]
+
+
+def _reconsidered(stages: Sequence[Stage], base: Explanation) -> list[Stage]:
+    """The looks, where the last one accepted its effect beside another one than the base has: that one stands then."""
+    *before, last = stages
+    assert last.accepted is not None  # noqa: S101 - the caller looked
+    now = last.accepted.labels[:-1]
+    gone, come = set(base.labels) - set(now), set(now) - set(base.labels)
+    if len(gone) != 1 or len(come) != 1:
+        return list(stages)
+    beside_base = [fit.log_evidence for fit in last.fits if fit.labels[:-1] == base.labels]
+    ahead = last.accepted.log_evidence - max([base.log_evidence, *beside_base])
+    for index, stage in enumerate(before):
+        labels = [fit.found[-1].label for fit in stage.fits]
+        if stage.accepted is not None and stage.accepted.found[-1].label in gone and come <= set(labels):
+            mine, old = (labels.index(next(iter(which))) for which in (come, gone))
+            gains = list(stage.gains)
+            gains[mine] = gains[old] + ahead
+            before[index] = replace(stage, gains=tuple(gains), accepted=stage.fits[mine]).ranked()
+    return [*before, last]
+
+
+def _needed_of(judge: Judge, calibrated: Explanation, accepted: Explanation) -> Explanation:
     """What was accepted, without anything found earlier that is not needed beside it."""
-    judge = Judge(case, base, floor)
     for index in reversed(range(len(accepted.found) - 1)):
         try:
             slim = without(calibrated, accepted, index)
@@ -219,9 +272,11 @@ def _needed_of(
 
 
 def _look(
-    case: Case, calibrated: Explanation, base: Explanation, floor: float, catalogue: Mapping[str, Mechanism],
-    needed: float, jobs: int, progress: Callable[[str], None],
+    judge: Judge, calibrated: Explanation, catalogue: Mapping[str, Mechanism], needed: float, jobs: int,
+    progress: Callable[[str], None], others: Sequence[Explanation],
 ) -> Stage:  # fmt: skip
+    """Look for one more effect than the judge's base has; it may be found beside one of `others` instead."""
+    case, base = judge.case, judge.base
     hypotheses = hypotheses_of(case, base, catalogue)
     real, opened = _scanned(base, hypotheses, jobs)
     scored = sorted([*real, *opened], key=lambda s: -s.log_bayes)
@@ -231,17 +286,18 @@ def _look(
     progress("fitting the best explanations in earnest")
     chosen = [(base, s) for s in [*_worth(real), *opened[:2]]
               if s.hypothesis.family != "open form" or s.log_bayes > real[0].log_bayes + OPEN_PENALTY]  # fmt: skip
+    views = list(others)
     if distorted(base) and not base.found and (middle := in_the_middle(base)) is not None:
-        known = [h for h in hypotheses if h.family != "open form"]
-        chosen += [(middle, s) for s in _worth(_scanned(middle, known, jobs)[0])]
+        views.append(middle)
+    for view in views:
+        known = [h for h in hypotheses_of(case, view, catalogue) if h.family != "open form"]
+        chosen += [(view, s) for s in _worth(_scanned(view, known, jobs)[0])]
     fits = best_fits(base, chosen, jobs=jobs)
     if not fits:
         return Stage(scored=tuple(scored), log_e_value=log_e, note="no explanation has a solution")
     gains = [_penalised(fit) - base.log_evidence for fit in fits]
-    stage = Stage(scored=tuple(scored), log_e_value=log_e, fits=tuple(fits), gains=tuple(gains))
-    order = np.argsort(-stage.probabilities())
-    stage = replace(stage, fits=tuple(fits[i] for i in order), gains=tuple(gains[i] for i in order))
-    return _judged(case, calibrated, base, floor, stage, needed)
+    stage = Stage(scored=tuple(scored), log_e_value=log_e, fits=tuple(fits), gains=tuple(gains)).ranked()
+    return _judged(judge, calibrated, stage, needed)
 
 
 def _scanned(base: Explanation, hypotheses: Sequence[Hypothesis], jobs: int) -> tuple[list[Scored], list[Scored]]:
@@ -288,7 +344,7 @@ def log_e_value(scored: Sequence[Scored]) -> float:
     return float(np.logaddexp.reduce(np.array([s.log_bayes for s in scored]) + log_weights(scored)))
 
 
-def _judged(case: Case, calibrated: Explanation, base: Explanation, floor: float, stage: Stage, needed: float) -> Stage:
+def _judged(judge: Judge, calibrated: Explanation, stage: Stage, needed: float) -> Stage:
     """A look with what of its fits is accepted.
 
     What is too small to matter is accepted only to clear the way, as long as nothing that matters was found. What the
@@ -297,8 +353,7 @@ def _judged(case: Case, calibrated: Explanation, base: Explanation, floor: float
     still missing, the first one may make their error larger although it makes them far more probable: that one is
     accepted tentatively.
     """
-    judge = Judge(case, base, floor)
-    probabilities = stage.probabilities()
+    case, base, probabilities = judge.case, judge.base, stage.probabilities()
     cleared = any(_matters(case, base, h) for h in base.found)
     matters, note = False, "the best explanation is hardly better than none"
     refused: list[int] = []

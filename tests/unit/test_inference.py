@@ -677,8 +677,9 @@ def test_parameters_of_what_was_found_are_no_further_explanation(fzg: Gearbox, p
     (placed,) = CATALOGUE["cooler_thermostat"].placed(problem.model.network, Scale.of(fzg))
     found = hypothesis_of(placed)
     case: Any = SimpleNamespace(train=SimpleNamespace(model=problem.model), scale=Scale.of(fzg), channels=CHANNELS)
-    before: Any = SimpleNamespace(found=(), problem=problem)
-    after: Any = SimpleNamespace(found=(found,), problem=explain._with(problem, found))
+    nothing: Any = None
+    before = Explanation(problem=problem, fit=nothing, log_evidence=0.0)
+    after = Explanation(problem=explain._with(problem, found), fit=nothing, log_evidence=0.0, found=(found,))
     labels = [{h.label for h in search.hypotheses_of(case, e, CATALOGUE)} for e in (before, after)]
     assert len(after.problem.unknowns) > len(problem.unknowns)
     assert labels[1] == labels[0] - {found.label}
@@ -730,6 +731,12 @@ def test_air_that_nobody_recorded_is_less_certain(problem: Problem) -> None:
     assert sd[0] < 1.0 < 3.0 < sd[1]
 
 
+def _judge(base: Any, gain: Any = 0.0) -> Any:
+    """A judge by held-out recordings that gain so much, or what a function of an explanation says."""
+    case: Any = SimpleNamespace()
+    return SimpleNamespace(case=case, base=base, floor=1.0, gain=gain if callable(gain) else lambda _: gain)
+
+
 def test_another_place_of_the_same_physics_may_be_taken_where_the_best_one_fails(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -747,24 +754,23 @@ def test_another_place_of_the_same_physics_may_be_taken_where_the_best_one_fails
     def explanation(name: str, place: str) -> Fitted:
         return Fitted(found=(SimpleNamespace(name=name, place=place, label=f"{name}@{place}"),))
 
-    monkeypatch.setattr(search, "Judge", lambda *_: SimpleNamespace(gain=lambda _: -5.0))
     monkeypatch.setattr(search, "_matters", lambda *_: True)
     monkeypatch.setattr(search, "_holds_out", lambda _judge, _start, fit: fit.found[-1].place != "first")
     base: Any = Fitted(found=())
+    judge = _judge(base, -5.0)
     fits: Any = (explanation("feed", "first"), explanation("feed", "second"), explanation("tank", "oil"))
     stage = search.Stage(scored=(), log_e_value=90.0, fits=fits, gains=(120.0, 60.0, 55.0))
-    case: Any = None
-    found = search._judged(case, base, base, 1.0, stage, 10.0)
+    found = search._judged(judge, base, stage, 10.0)
     assert found.accepted is not None and found.accepted.found[-1].label == "feed@second"
     assert [fit.found[-1].label for fit in found.fits] == ["feed@second", "tank@oil"]
     assert found.probabilities()[0] > 0.5
     # But not where something else is far more probable than that place.
     rather = search._judged(
-        case, base, base, 1.0, replace(stage, fits=(fits[0], fits[2], fits[1]), gains=(120.0, 55.0, 25.0)), 10.0
+        judge, base, replace(stage, fits=(fits[0], fits[2], fits[1]), gains=(120.0, 55.0, 25.0)), 10.0
     )
     assert rather.accepted is None
     others = replace(stage, fits=(fits[0], fits[2]), gains=(120.0, 55.0))
-    refused = search._judged(case, base, base, 1.0, others, 10.0)
+    refused = search._judged(judge, base, others, 10.0)
     assert refused.accepted is None and "held-out data worse" in refused.note
 
 
@@ -795,16 +801,15 @@ def test_of_two_views_of_one_hypothesis_the_better_fit_counts(
 
 def test_what_is_barely_evident_has_to_be_larger(monkeypatch: pytest.MonkeyPatch) -> None:
     """Half of what matters may be hidden in what was calibrated, where the evidence is small."""
-    monkeypatch.setattr(search, "Judge", lambda *_: None)
     monkeypatch.setattr(search, "_holds_out", lambda *_: True)
     monkeypatch.setattr(search, "_matters", lambda _case, _fit, _h, times=1.0: times < 1.5)
     h = _scored("fan", "x", 0.0).hypothesis
     nothing: Any = SimpleNamespace(at=lambda fit: fit)
     fit = Explanation(problem=nothing, fit=nothing, log_evidence=0.0, found=(h,))
-    base, case = replace(fit, found=()), nothing
+    base = replace(fit, found=())
     for gain, matters in ((40.0, False), (60.0, True)):
         stage = search.Stage(scored=(), log_e_value=gain, fits=(fit,), gains=(gain,))
-        found = search._judged(case, base, base, 1.0, stage, 10.0)
+        found = search._judged(_judge(base), base, stage, 10.0)
         assert found.matters is matters and found.accepted is not None  # what is small is taken to clear the way
 
 
@@ -836,13 +841,12 @@ def test_a_first_effect_whose_error_another_one_hides_stands_only_beside_that_on
 
     base, wear, both = explanation(), explanation("wear"), explanation("wear", "rain")
     gain = {"wear": 400.0, "fan": 20.0}
-    monkeypatch.setattr(search, "Judge", lambda *_: SimpleNamespace(gain=lambda fit: gain[fit.found[-1].name]))
     monkeypatch.setattr(search, "_matters", lambda *_: True)
     monkeypatch.setattr(search, "_holds_out", lambda *_: False)
 
     def judged(before: Explanation, fit: Explanation) -> search.Stage:
         stage = search.Stage(scored=(), log_e_value=90.0, fits=(fit,), gains=(120.0,))
-        return search._judged(nothing, base, before, 1.0, stage, 10.0)
+        return search._judged(_judge(before, lambda fit: gain[fit.found[-1].name]), base, stage, 10.0)
 
     first = judged(base, wear)
     assert first.tentative and first.accepted is not None and first.accepted.found[-1].name == "wear"
@@ -853,7 +857,7 @@ def test_a_first_effect_whose_error_another_one_hides_stands_only_beside_that_on
     end = search.Stage(scored=(), log_e_value=0.0)
     monkeypatch.setattr(search, "first", lambda _: (base, 1.0))
     monkeypatch.setattr(search, "floored", lambda fit: (fit, 1.0))
-    monkeypatch.setattr(search, "_needed_of", lambda _case, _start, _base, _floor, accepted: accepted)
+    monkeypatch.setattr(search, "_needed_of", lambda _judge, _start, accepted: accepted)
     for looks, names in (((first, second, end), ["wear", "rain"]), ((first, end), [])):
         coming = iter(looks)
         monkeypatch.setattr(search, "_look", lambda *_, coming=coming: next(coming))
@@ -870,14 +874,13 @@ def test_what_is_likely_and_too_small_is_not_told_as_something_unlikely_and_larg
         Explanation(problem=nothing, fit=nothing, log_evidence=0.0, found=(_scored(name, place, 0.0).hypothesis,))
         for name, place in (("valve", "air"), ("valve", "outdoor"), ("cooler", "air"))
     )
-    monkeypatch.setattr(search, "Judge", lambda *_: SimpleNamespace(gain=lambda _: 40.0))
     monkeypatch.setattr(search, "_holds_out", lambda *_: True)
     monkeypatch.setattr(
         search, "_matters", lambda _case, _fit, h, _times=1.0: h.place == "outdoor" or h is before.found[0]
     )
     for gains, accepted in (((120.0, 70.0), None), ((120.0, 119.0), there)):
         stage = search.Stage(scored=(), log_e_value=90.0, fits=(here, there), gains=gains)
-        found = search._judged(nothing, replace(before, found=()), before, 1.0, stage, 10.0).accepted
+        found = search._judged(_judge(before, 40.0), replace(before, found=()), stage, 10.0).accepted
         assert (found.found if found is not None else None) == (accepted.found if accepted is not None else None)
 
 
@@ -890,13 +893,48 @@ def test_what_is_unlikely_is_named_after_a_refusal_only_where_held_out_recording
         Explanation(problem=nothing, fit=nothing, log_evidence=0.0, found=(_scored(n, "oil", 0.0).hypothesis,))
         for n in ("open form, standstill", "heater")
     )
-    monkeypatch.setattr(search, "Judge", lambda *_: SimpleNamespace(gain=lambda _: heldout_gain))
     monkeypatch.setattr(search, "_matters", lambda *_: True)
     monkeypatch.setattr(search, "_holds_out", lambda _judge, _calibrated, fit: fit.found == other.found)
     stage = search.Stage(scored=(), log_e_value=170.0, fits=(best, other), gains=(204.0, 193.0))
     assert stage.probabilities()[1] < search.LEAST_SHARE * stage.probabilities()[0]
-    accepted = search._judged(nothing, replace(best, found=()), replace(best, found=()), 1.0, stage, 10.0).accepted
+    base = replace(best, found=())
+    accepted = search._judged(_judge(base, heldout_gain), base, stage, 10.0).accepted
     assert (accepted.found[-1].name if accepted is not None else None) == named
+
+
+def test_what_a_first_look_held_for_less_likely_may_stand_beside_a_second_effect(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A cooler at two places, nearly tied; the bearing's feed fits beside the second one far better."""
+    problem: Any = SimpleNamespace(noise=(), whitenings=object())
+    problem.changed = lambda **_: problem
+    problem.fit = lambda z, courses, iterations: SimpleNamespace(iterations=iterations, log_evidence=77.0)
+    cooler, other, feed, far = (
+        _scored(name, place, 0.0).hypothesis
+        for name, place in (("cooler", "outdoor"), ("cooler", "air"), ("feed", "bearing"), ("fan", "air"))
+    )
+
+    def explanation(log_evidence: float, *found: Any) -> Explanation:
+        fit: Any = SimpleNamespace(z=None, courses=None)
+        return Explanation(problem=problem, fit=fit, log_evidence=log_evidence, found=found)
+
+    monkeypatch.setattr(explain, "_one_sided", lambda *_: 0.0)
+    base = explanation(1000.0, cooler)
+    fits = (base, explanation(995.0, other), explanation(700.0, far))
+    first = search.Stage(scored=(), log_e_value=900.0, fits=fits, gains=(900.0, 895.0, 600.0), accepted=base)
+    (rival,) = search._others(base, first)  # what is far less likely is not looked at again
+    assert rival.labels == ("cooler@air",) and rival.log_evidence == 77.0 and rival.fit.iterations == 0  # type: ignore[attr-defined]
+    assert search._others(explanation(1000.0), first) == []  # nothing of the look is left
+
+    beside_base, beside_other = explanation(1100.0, cooler, feed), explanation(1300.0, other, feed)
+    second = search.Stage(
+        scored=(), log_e_value=90.0, fits=(beside_other, beside_base), gains=(300.0, 100.0), accepted=beside_other
+    )
+    one, two = search._reconsidered([first, second], base)
+    assert two is second and one.accepted is fits[1] and one.fits[0] is fits[1]
+    assert one.gains[0] == pytest.approx(900.0 + 200.0) and one.probabilities()[0] > 0.9
+    stands = replace(second, accepted=beside_base)
+    assert search._reconsidered([first, stands], base) == [first, stands]
 
 
 def test_what_one_place_found_is_tried_at_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
