@@ -64,6 +64,9 @@ HOLDOUT_SLACK_INSTRUMENT = 1.3  # its fault says little about temperatures to co
 # Of the typical loss, and of temperature: half of what matters in practice, since that much of it may be hidden in what
 # was calibrated.
 SMALLEST_HEAT, SMALLEST_K = 0.01, 0.15
+# Standard deviations: an explanation that holds only with another parameter so far off, and so much further than
+# without it, is none. (A sensor's lag may stand for a heat capacity; the capacity then goes to nothing.)
+FAR_OFF, FURTHER_OFF = 8.0, 3.0
 CERTAIN = 50.0  # log evidence below which it has to be the whole of it
 
 
@@ -367,6 +370,10 @@ def _judged(judge: Judge, calibrated: Explanation, stage: Stage, needed: float) 
         if gain < needed or probability < LEAST_PROBABILITY * probabilities[left].sum():
             continue
         fit = replace(fit, fit=fit.problem.at(fit.fit))
+        if _drives_away(base, fit):
+            refused.append(index)
+            note = "what would explain the data needs another parameter where it cannot be"
+            continue
         large = _matters(case, fit, fit.found[-1], 1.0 if gain > CERTAIN else 2.0)
         matters = matters or large
         unlikely = by_name[fit.found[-1].name] < LEAST_SHARE * probabilities[0]
@@ -384,6 +391,18 @@ def _judged(judge: Judge, calibrated: Explanation, stage: Stage, needed: float) 
             if promising is None and large and not base.found and judge.gain(fit) > CERTAIN:
                 promising = fit
     return replace(stage, matters=matters, note=note, accepted=promising, tentative=promising is not None)
+
+
+def _drives_away(base: Explanation, fit: Explanation) -> bool:
+    """Whether an explanation sends a parameter that is none of its own where its prior hardly reaches."""
+    own = {p.name for h in fit.found if h.term is not None for p in h.term.parameters}
+    own |= {h.place for h in fit.found if h.term is None}
+    before = {(i.role, i.target): abs(float(z)) for i, z in zip(base.fit.unknowns.items, base.fit.z, strict=True)}
+    return any(
+        abs(float(z)) > max(FAR_OFF, before.get((i.role, i.target), 0.0) + FURTHER_OFF)
+        for i, z in zip(fit.fit.unknowns.items, fit.fit.z, strict=True)
+        if i.target not in own
+    )
 
 
 def _penalised(fit: Explanation) -> float:

@@ -3,7 +3,7 @@ evidence against plain linear algebra."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -40,7 +40,7 @@ from diagnosis.search import log_e_value
 from diagnosis.shapes import shape_terms
 from diagnosis.term_on_grid import TermOnGrid
 from diagnosis.trajectory import exponential, parameter_heats, settled_balance, simulate
-from diagnosis.unknowns import Unknowns, unknowns_of
+from diagnosis.unknowns import Unknown, Unknowns, unknowns_of
 from diagnosis.whitening import Noise, Whitening, reading_variance
 from models.cycle import Cycle
 from models.gearbox import Gearbox, load_gearbox
@@ -470,7 +470,7 @@ def test_the_error_of_a_mean_heat_is_that_of_the_strength_and_of_what_goes_with_
 
 
 def _scored(name: str, place: str, log_bayes: float) -> Scored:
-    term: Any = None if name == "parameter" else SimpleNamespace(of_measurement=False)
+    term: Any = None if name == "parameter" else SimpleNamespace(of_measurement=False, parameters=())
     h = Hypothesis(name=name, place=place, family="", variants=np.ones((1, 1)), term=term)
     return Scored(
         hypothesis=h, log_bayes=log_bayes, best=0, values=np.zeros(1), log_bayes_of=np.array([log_bayes]), expected=0.0
@@ -731,6 +731,10 @@ def test_air_that_nobody_recorded_is_less_certain(problem: Problem) -> None:
     assert sd[0] < 1.0 < 3.0 < sd[1]
 
 
+# A fit without unknowns, and a problem that has no other.
+NOTHING: Any = SimpleNamespace(at=lambda fit: fit, unknowns=SimpleNamespace(items=()), z=())
+
+
 def _judge(base: Any, gain: Any = 0.0) -> Any:
     """A judge by held-out recordings that gain so much, or what a function of an explanation says."""
     case: Any = SimpleNamespace()
@@ -742,23 +746,15 @@ def test_another_place_of_the_same_physics_may_be_taken_where_the_best_one_fails
 ) -> None:
     """What the held-out recordings refuse is no rival any more; another name far behind the best is not taken."""
 
-    @dataclass(frozen=True)
-    class Fitted:  # what a look needs to know of an explanation
-        found: tuple[Any, ...]
-        fit: Any = None
-
-        @property
-        def problem(self) -> Any:
-            return SimpleNamespace(at=lambda fit: fit)
-
-    def explanation(name: str, place: str) -> Fitted:
-        return Fitted(found=(SimpleNamespace(name=name, place=place, label=f"{name}@{place}"),))
+    def explanation(*found: tuple[str, str]) -> Explanation:
+        hypotheses = tuple(_scored(name, place, 0.0).hypothesis for name, place in found)
+        return Explanation(problem=NOTHING, fit=NOTHING, log_evidence=0.0, found=hypotheses)
 
     monkeypatch.setattr(search, "_matters", lambda *_: True)
     monkeypatch.setattr(search, "_holds_out", lambda _judge, _start, fit: fit.found[-1].place != "first")
-    base: Any = Fitted(found=())
+    base = explanation()
     judge = _judge(base, -5.0)
-    fits: Any = (explanation("feed", "first"), explanation("feed", "second"), explanation("tank", "oil"))
+    fits = tuple(explanation(h) for h in (("feed", "first"), ("feed", "second"), ("tank", "oil")))
     stage = search.Stage(scored=(), log_e_value=90.0, fits=fits, gains=(120.0, 60.0, 55.0))
     found = search._judged(judge, base, stage, 10.0)
     assert found.accepted is not None and found.accepted.found[-1].label == "feed@second"
@@ -804,7 +800,7 @@ def test_what_is_barely_evident_has_to_be_larger(monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr(search, "_holds_out", lambda *_: True)
     monkeypatch.setattr(search, "_matters", lambda _case, _fit, _h, times=1.0: times < 1.5)
     h = _scored("fan", "x", 0.0).hypothesis
-    nothing: Any = SimpleNamespace(at=lambda fit: fit)
+    nothing = NOTHING
     fit = Explanation(problem=nothing, fit=nothing, log_evidence=0.0, found=(h,))
     base = replace(fit, found=())
     for gain, matters in ((40.0, False), (60.0, True)):
@@ -832,7 +828,7 @@ def test_a_first_effect_whose_error_another_one_hides_stands_only_beside_that_on
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """It makes the held-out recordings more probable and their error larger: what the error says waits for a second."""
-    nothing: Any = SimpleNamespace(at=lambda fit: fit)
+    nothing = NOTHING
 
     def explanation(*names: str) -> Explanation:
         return Explanation(
@@ -869,7 +865,7 @@ def test_a_first_effect_whose_error_another_one_hides_stands_only_beside_that_on
 def test_what_is_likely_and_too_small_is_not_told_as_something_unlikely_and_large(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    nothing: Any = SimpleNamespace(at=lambda fit: fit)
+    nothing = NOTHING
     here, there, before = (
         Explanation(problem=nothing, fit=nothing, log_evidence=0.0, found=(_scored(name, place, 0.0).hypothesis,))
         for name, place in (("valve", "air"), ("valve", "outdoor"), ("cooler", "air"))
@@ -888,7 +884,7 @@ def test_what_is_likely_and_too_small_is_not_told_as_something_unlikely_and_larg
 def test_what_is_unlikely_is_named_after_a_refusal_only_where_held_out_recordings_speak_for_it(
     monkeypatch: pytest.MonkeyPatch, heldout_gain: float, named: str | None
 ) -> None:
-    nothing: Any = SimpleNamespace(at=lambda fit: fit)
+    nothing = NOTHING
     best, other = (
         Explanation(problem=nothing, fit=nothing, log_evidence=0.0, found=(_scored(n, "oil", 0.0).hypothesis,))
         for n in ("open form, standstill", "heater")
@@ -900,6 +896,29 @@ def test_what_is_unlikely_is_named_after_a_refusal_only_where_held_out_recording
     base = replace(best, found=())
     accepted = search._judged(_judge(base, heldout_gain), base, stage, 10.0).accepted
     assert (accepted.found[-1].name if accepted is not None else None) == named
+
+
+@pytest.mark.parametrize(("z", "away"), [(9.0, True), (7.0, False)])
+def test_an_explanation_that_sends_a_capacity_away_is_none(
+    fzg: Gearbox, problem: Problem, z: float, away: bool
+) -> None:
+    (h, *_) = (hypothesis_of(lag) for lag in CATALOGUE["sensor_lag"].placed(fzg.network(), Scale.of(fzg), CHANNELS))
+    assert h.term is not None
+    own = [Unknown(role="term", target=p.name, parameter=p) for p in h.term.parameters]
+
+    def explanation(found: Any, *shifts: tuple[str, float]) -> Explanation:
+        items = (*problem.unknowns.items, *(own if found else ()))
+        at = np.zeros(len(items))
+        for target, value in shifts:
+            at[[i.target for i in items].index(target)] = value
+        fit: Any = SimpleNamespace(unknowns=Unknowns(items), z=at)
+        return Explanation(problem=problem, fit=fit, log_evidence=0.0, found=found)
+
+    base = explanation(())
+    assert search._drives_away(base, explanation((h,), ("C_oil", -z))) is away
+    assert not search._drives_away(explanation((), ("C_oil", -z)), explanation((h,), ("C_oil", -z - 1.0)))
+    for item in own:
+        assert not search._drives_away(base, explanation((h,), (item.target, z)))
 
 
 def test_what_a_first_look_held_for_less_likely_may_stand_beside_a_second_effect(
