@@ -370,12 +370,12 @@ def _judged(judge: Judge, calibrated: Explanation, stage: Stage, needed: float) 
         if gain < needed or probability < LEAST_PROBABILITY * probabilities[left].sum():
             continue
         fit = replace(fit, fit=fit.problem.at(fit.fit))
+        large = _matters(case, fit, fit.found[-1], 1.0 if gain > CERTAIN else 2.0)
+        matters = matters or large
         if _drives_away(base, fit):
             refused.append(index)
             note = "what would explain the data needs another parameter where it cannot be"
             continue
-        large = _matters(case, fit, fit.found[-1], 1.0 if gain > CERTAIN else 2.0)
-        matters = matters or large
         unlikely = by_name[fit.found[-1].name] < LEAST_SHARE * probabilities[0]
         if probability < LEAST_SHARE * ahead or (unlikely and judge.gain(fit) < SECOND_GAIN):
             continue
