@@ -64,8 +64,8 @@ HOLDOUT_SLACK_INSTRUMENT = 1.3  # its fault says little about temperatures to co
 # Of the typical loss, and of temperature: half of what matters in practice, since that much of it may be hidden in what
 # was calibrated.
 SMALLEST_HEAT, SMALLEST_K = 0.01, 0.15
-# Standard deviations: an explanation that holds only with another parameter so far off, and so much further than
-# without it, is none. (A sensor's lag may stand for a heat capacity; the capacity then goes to nothing.)
+# Standard deviations: an instrument's fault changes nothing in the gearbox. One that holds only with a parameter of it so
+# far off, and so much further than without, is none: a sensor's lag stands for a heat capacity that went to nothing.
 FAR_OFF, FURTHER_OFF = 8.0, 3.0
 CERTAIN = 50.0  # log evidence below which it has to be the whole of it
 
@@ -374,7 +374,7 @@ def _judged(judge: Judge, calibrated: Explanation, stage: Stage, needed: float) 
         matters = matters or large
         if _drives_away(base, fit):
             refused.append(index)
-            note = "what would explain the data needs another parameter where it cannot be"
+            note = "the fault of an instrument would need a parameter of the gearbox where it cannot be"
             continue
         unlikely = by_name[fit.found[-1].name] < LEAST_SHARE * probabilities[0]
         if probability < LEAST_SHARE * ahead or (unlikely and judge.gain(fit) < SECOND_GAIN):
@@ -394,7 +394,10 @@ def _judged(judge: Judge, calibrated: Explanation, stage: Stage, needed: float) 
 
 
 def _drives_away(base: Explanation, fit: Explanation) -> bool:
-    """Whether an explanation sends a parameter that is none of its own where its prior hardly reaches."""
+    """Whether the fault of an instrument sends a parameter of the gearbox where its prior hardly reaches."""
+    term = fit.found[-1].term
+    if term is None or not term.of_measurement:
+        return False
     own = {p.name for h in fit.found if h.term is not None for p in h.term.parameters}
     own |= {h.place for h in fit.found if h.term is None}
     before = {(i.role, i.target): abs(float(z)) for i, z in zip(base.fit.unknowns.items, base.fit.z, strict=True)}
