@@ -64,8 +64,8 @@ HOLDOUT_SLACK_INSTRUMENT = 1.3  # its fault says little about temperatures to co
 # Of the typical loss, and of temperature: half of what matters in practice, since that much of it may be hidden in what
 # was calibrated.
 SMALLEST_HEAT, SMALLEST_K = 0.01, 0.15
-# Standard deviations: an instrument's fault changes nothing in the gearbox. One that holds only with a parameter of it so
-# far off, and so much further than without, is none: a sensor's lag stands for a heat capacity that went to nothing.
+# Standard deviations: an instrument's fault changes nothing in the gearbox. One that holds only with a parameter of it
+# so far off, and so much further than without, is none: a sensor's lag stands for a heat capacity gone to nothing.
 FAR_OFF, FURTHER_OFF = 8.0, 3.0
 CERTAIN = 50.0  # log evidence below which it has to be the whole of it
 
