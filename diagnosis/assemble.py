@@ -40,6 +40,7 @@ from models.version import project_version
 
 ENOUGH_VISIBLE = 0.2  # of the catalogue, for a "consistent" that means something
 REMAINING_W_SHARE = 0.03  # of the typical loss: a smaller remainder is not worth a word
+MOST_MISFIT = 1.0  # noise and structural floor themselves make 0.6 of it in recordings that are explained
 UNEXPLAINED_SHARE = 0.25  # of the evidence that is left when the catalogue has done its best
 
 
@@ -64,12 +65,14 @@ def assembled(
     remaining = _latents(case, found.final) if detected else ()
     first = _latents(case, found.calibrated) if detected else ()
     unseen = _unseen(found.stages[-1], catalogue, found.threshold)
-    verdict = _verdict(found, findings, first, remaining, unseen, detected=detected, catalogue=catalogue)
+    misfit = _misfit(found.final)
+    left = misfit > MOST_MISFIT or _much_is_left(first, remaining)
+    verdict = _verdict(found, findings, unseen, left=left, detected=detected, catalogue=catalogue)
     location = _location(case, found, findings, first) if detected else ()
     shown = _shown(findings, location)
     missing = _missing_heat(case, found, remaining if findings else first, shown) if detected else ()
     predictions = _predictions(case, found)
-    remaining_p, note = _remaining(found, first, remaining, case, detected=detected)
+    remaining_p, note = _remaining(found, remaining, case, left=left, misfit=misfit, detected=detected)
     return Diagnosis(
         verdict=verdict,
         gearbox=case.gearbox.name,
@@ -84,6 +87,7 @@ def assembled(
         holdout=_fits(case, predictions, "holdout"),
         noise_K=case.noise_K,
         floor=_floor(case, found),
+        misfit=misfit,
         remaining_p_value=remaining_p,
         remaining_note=note,
         ranking=_ranking(found),
@@ -119,8 +123,8 @@ def _floor(case: Case, found: Search) -> str:
 
 
 def _verdict(
-    found: Search, findings: Sequence[Finding], first: Sequence[LatentHeat], remaining: Sequence[LatentHeat],
-    unseen: Sequence[Unseen], *, detected: bool, catalogue: Mapping[str, Mechanism],
+    found: Search, findings: Sequence[Finding], unseen: Sequence[Unseen], *, left: bool, detected: bool,
+    catalogue: Mapping[str, Mechanism],
 ) -> Verdict:  # fmt: skip
     if not detected:
         physics = {s.hypothesis.name for s in found.stages[-1].scored if s.hypothesis.name in catalogue}
@@ -129,13 +133,19 @@ def _verdict(
     if not findings:
         return "unexplained"
     kinds = {f.kind for f in findings}
-    if any(f.family == "open form" for f in findings) or _much_is_left(first, remaining):
+    if left or any(f.family == "open form" for f in findings):
         return "unexplained"
     if kinds <= {"sensor"}:
         return "sensor_fault"
     if kinds <= {"parameter", "sensor"}:
         return "parameter_error"
     return "missing_physics"
+
+
+def _misfit(explanation: Explanation) -> float:
+    """Mean square of the whitened residuals of the training recordings."""
+    white = np.concatenate([part.white_residual for part in explanation.fit.parts])
+    return float(np.mean(np.square(white)))
 
 
 def _much_is_left(first: Sequence[LatentHeat], remaining: Sequence[LatentHeat]) -> bool:
@@ -146,7 +156,7 @@ def _much_is_left(first: Sequence[LatentHeat], remaining: Sequence[LatentHeat]) 
 
 
 def _remaining(
-    found: Search, first: Sequence[LatentHeat], remaining: Sequence[LatentHeat], case: Case, *, detected: bool
+    found: Search, remaining: Sequence[LatentHeat], case: Case, *, left: bool, misfit: float, detected: bool
 ) -> tuple[float, str]:
     log_e = found.stages[-1].log_e_value if found.stages[-1].accepted is None else 0.0
     p_value = float(min(1.0, np.exp(-max(log_e, 0.0))))
@@ -155,10 +165,13 @@ def _remaining(
     best = max(remaining, key=lambda h: h.log_bayes)
     steps = np.concatenate([piece.steps for piece in case.train.pieces])
     size = float(np.sqrt(np.average(np.concatenate(best.mean) ** 2, weights=steps)))
-    small = size < REMAINING_W_SHARE * case.loss_W and not _much_is_left(first, remaining)
+    small = size < REMAINING_W_SHARE * case.loss_W and not left
     if best.log_bayes < SECOND_GAIN or small:
         return p_value, "nothing that stands out of noise and structural floor"
-    return p_value, f"an unknown heat of about {size:.0f} W (rms) in {best.node} would still help"
+    note = f"an unknown heat of about {size:.0f} W (rms) in {best.node} would still help"
+    if misfit > MOST_MISFIT:
+        note += f"; what is left is {misfit:.1f} times what noise and structural floor allow (mean square)"
+    return p_value, note
 
 
 # ---------------------------------------------------------------------- where

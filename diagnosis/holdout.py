@@ -37,7 +37,7 @@ class Judge:
 
     def __init__(self, case: Case, base: Explanation, floor: float) -> None:
         self.case, self.base, self.floor = case, base, floor
-        self.rmse = cache(self._rmse)
+        self.rmse, self.gain = cache(self._rmse), cache(self._gain)
 
     @cached_property
     def _of_base(self) -> tuple[list[Whitening], float]:
@@ -55,7 +55,7 @@ class Judge:
         except (ArithmeticError, np.linalg.LinAlgError):
             return [None] * len(problem.pieces)
 
-    def gain(self, explanation: Explanation) -> float:
+    def _gain(self, explanation: Explanation) -> float:
         """Log density of the held-out readings over that of the base, predicted with what the training left unsure.
 
         What an explanation is unsure of widens its prediction: being a little off then costs little, and being

@@ -255,6 +255,9 @@ class Diagnosis:
         White noise of a temperature row
     floor : str
         What structural floor was assumed
+    misfit : float
+        Mean square of what is left in the training recordings, in multiples of what noise and structural floor make of
+        it; above 1 the recordings are not explained
     remaining_p_value : float
     remaining_note : str
     ranking : tuple of Ranked
@@ -286,6 +289,7 @@ class Diagnosis:
     holdout: Fits
     noise_K: float
     floor: str
+    misfit: float
     remaining_p_value: float
     remaining_note: str
     ranking: tuple[Ranked, ...]
@@ -329,7 +333,9 @@ class Diagnosis:
             ],
             "fit": {"train": _fits(self.train), "holdout": _fits(self.holdout), "noise_K": self.noise_K,
                     "floor": self.floor},
-            "remaining": {"p_value": self.remaining_p_value, "note": self.remaining_note},
+            "remaining": {
+                "p_value": self.remaining_p_value, "misfit": self.misfit, "note": self.remaining_note,
+            },
             "ranking": [
                 {"mechanism": r.mechanism, "place": r.place, "family": r.family, "log_bayes": r.log_bayes,
                  "probability": r.probability}

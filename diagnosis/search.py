@@ -35,6 +35,9 @@ LEAST_PROBABILITY = 0.05  # of what counts when it is asked whether anything of 
 SHARPENED, SHARPEN_FROM = 15, 2.0  # best hypotheses whose shapes are sought between the grid, from this score on
 FITTED, WORTH = 5, 0.12  # hypotheses that are fitted in earnest, and the share of the best score that they need
 MOST_FITTED, NEAR = 12, 0.6  # where more of them score about as well as the best: the scan is only linear
+# So strong an effect bends so much that what is best in a straight line may be far from best: other names from this
+# share of the best score are fitted as well.
+STRONG, WORTH_OF_STRONG = 200.0, 0.04
 # What was nearly as likely as what was accepted may be right beside a further effect: so many are seen, from this share
 # of its probability.
 OTHERS, LIKELY = 2, 0.1
@@ -319,6 +322,11 @@ def _worth(scored: Sequence[Scored]) -> list[Scored]:
     most = scored[0].log_bayes
     found = [s for s in scored[:FITTED] if s.log_bayes > WORTH * most]
     found += [s for s in scored[FITTED:MOST_FITTED] if s.log_bayes > NEAR * most]
+    if most > STRONG:
+        for s in scored:
+            new = s.hypothesis.name not in {f.hypothesis.name for f in found}
+            if new and s.log_bayes > WORTH_OF_STRONG * most and len(found) < MOST_FITTED:
+                found.append(s)
     return found if len(found) > 1 else list(scored[:2])
 
 
@@ -351,29 +359,30 @@ def _judged(judge: Judge, calibrated: Explanation, stage: Stage, needed: float) 
     """A look with what of its fits is accepted.
 
     What is too small to matter is accepted only to clear the way, as long as nothing that matters was found. What the
-    held-out recordings refuse before is no rival of what is accepted; what the training data hold for much less likely
-    than that is accepted only where the held-out recordings themselves speak for it. Where another strong effect is
-    still missing, the first one may make their error larger although it makes them far more probable: that one is
-    accepted tentatively.
+    held-out recordings refuse stays a rival of what is accepted only if they hold it for about as likely; what the
+    training data hold for much less likely than that is accepted only where the held-out recordings themselves speak
+    for it. Where another strong effect is still missing, the first one may make their error larger although it makes
+    them far more probable: that one is accepted tentatively.
     """
     case, base, probabilities = judge.case, judge.base, stage.probabilities()
     cleared = any(_matters(case, base, h) for h in base.found)
     matters, note = False, "the best explanation is hardly better than none"
-    refused: list[int] = []
+    refused: set[int] = set()
+    impossible: set[int] = set()
     by_name: dict[str, float] = {}  # another place of the same physics is no rival
     for fit, probability in zip(stage.fits, probabilities, strict=True):
         by_name[fit.found[-1].name] = by_name.get(fit.found[-1].name, 0.0) + float(probability)
     ahead = 0.0  # probability of what is more likely and too small
     promising: Explanation | None = None
     for index, (fit, gain, probability) in enumerate(zip(stage.fits, stage.gains, probabilities, strict=True)):
-        left = [i for i in range(len(stage.fits)) if i not in refused]
+        left = [i for i in range(len(stage.fits)) if i not in refused | impossible]
         if gain < needed or probability < LEAST_PROBABILITY * probabilities[left].sum():
             continue
         fit = replace(fit, fit=fit.problem.at(fit.fit))
         large = _matters(case, fit, fit.found[-1], 1.0 if gain > CERTAIN else 2.0)
         matters = matters or large
         if _drives_away(base, fit):
-            refused.append(index)
+            impossible.add(index)
             note = "the fault of an instrument would need a parameter of the gearbox where it cannot be"
             continue
         unlikely = by_name[fit.found[-1].name] < LEAST_SHARE * probabilities[0]
@@ -383,10 +392,12 @@ def _judged(judge: Judge, calibrated: Explanation, stage: Stage, needed: float) 
             ahead = max(ahead, float(probability))
             note = "what the data show is too small to matter"
         elif _holds_out(judge, calibrated, fit):
-            fits, gains = tuple(stage.fits[i] for i in left), tuple(stage.gains[i] for i in left)
+            as_likely = {i for i in refused if judge.gain(stage.fits[i]) > judge.gain(fit) + HOLDOUT_LOSS}
+            rivals = sorted(as_likely.union(left))
+            fits, gains = tuple(stage.fits[i] for i in rivals), tuple(stage.gains[i] for i in rivals)
             return replace(stage, fits=fits, gains=gains, accepted=fit, matters=large)
         else:
-            refused.append(index)
+            refused.add(index)
             note = "what would explain the training data makes the held-out data worse"
             if promising is None and large and not base.found and judge.gain(fit) > CERTAIN:
                 promising = fit

@@ -753,13 +753,17 @@ def test_another_place_of_the_same_physics_may_be_taken_where_the_best_one_fails
     monkeypatch.setattr(search, "_matters", lambda *_: True)
     monkeypatch.setattr(search, "_holds_out", lambda _judge, _start, fit: fit.found[-1].place != "first")
     base = explanation()
-    judge = _judge(base, -5.0)
+    judge = _judge(base, lambda fit: -20.0 if fit.found[-1].place == "first" else -5.0)
     fits = tuple(explanation(h) for h in (("feed", "first"), ("feed", "second"), ("tank", "oil")))
     stage = search.Stage(scored=(), log_e_value=90.0, fits=fits, gains=(120.0, 60.0, 55.0))
     found = search._judged(judge, base, stage, 10.0)
     assert found.accepted is not None and found.accepted.found[-1].label == "feed@second"
     assert [fit.found[-1].label for fit in found.fits] == ["feed@second", "tank@oil"]
     assert found.probabilities()[0] > 0.5
+    # What they hold for as likely, and whose error is a little too large, stays one.
+    close = search._judged(_judge(base, -5.0), base, stage, 10.0)
+    assert close.accepted is not None and close.accepted.labels == ("feed@second",)
+    assert [fit.found[-1].label for fit in close.fits] == ["feed@first", "feed@second", "tank@oil"]
     # But not where something else is far more probable than that place.
     rather = search._judged(
         judge, base, replace(stage, fits=(fits[0], fits[2], fits[1]), gains=(120.0, 55.0, 25.0)), 10.0
@@ -820,8 +824,22 @@ def test_what_remains_is_told_where_it_is_large_or_most_of_it(log_bayes: float, 
     found: Any = SimpleNamespace(stages=[search.Stage(scored=(), log_e_value=0.0)])
     train = SimpleNamespace(pieces=[SimpleNamespace(steps=np.full(9, 20.0))])
     case: Any = SimpleNamespace(loss_W=300.0, train=train)
-    _, note = assemble._remaining(found, [latent(1000.0, 80.0)], [latent(log_bayes, heat_W)], case, detected=True)
+    first, remaining = [latent(1000.0, 80.0)], [latent(log_bayes, heat_W)]
+    left = assemble._much_is_left(first, remaining)
+    _, note = assemble._remaining(found, remaining, case, left=left, misfit=0.6, detected=True)
     assert says in note
+
+
+@pytest.mark.parametrize(("residual", "verdict"), [(0.8, "missing_physics"), (1.2, "unexplained")])
+def test_what_leaves_more_than_noise_and_floor_is_no_explanation(residual: float, verdict: str) -> None:
+    parts = [SimpleNamespace(white_residual=sign * np.full(50, residual)) for sign in (1.0, -1.0)]
+    final: Any = SimpleNamespace(fit=SimpleNamespace(parts=parts))
+    misfit = assemble._misfit(final)
+    assert misfit == pytest.approx(residual**2)
+    nothing: Any = None
+    named: Any = SimpleNamespace(kind="source", family="heat path")
+    left = misfit > assemble.MOST_MISFIT
+    assert assemble._verdict(nothing, [named], (), left=left, detected=True, catalogue={}) == verdict
 
 
 def test_a_first_effect_whose_error_another_one_hides_stands_only_beside_that_one(
