@@ -14,10 +14,11 @@ from diagnosis.grid import Piece, stands_for
 from diagnosis.mapping import LOSS
 from diagnosis.observation import Sensors, reading_columns, readings
 from diagnosis.posterior import Problem
-from diagnosis.trajectory import Trajectory, free_running, simulate
+from diagnosis.trajectory import Trajectory, complete_start, free_running, simulate
 from models.types import Array
 
 START_S = 600.0
+LEFT_ALONE_SD_K = 2.0
 START_ROUNDS, START_SETTLED_K = 3, 0.01
 SETTLED_K, MOST_ROUNDS = 0.02, 30  # thick oil at a cold start takes many rounds
 
@@ -104,13 +105,15 @@ def _start(
     problem: Problem, index: int, z: Array, sensors: Sensors, until: float, *, as_delivered: bool
 ) -> Array:  # fmt: skip
     """Start temperatures of all parts, [degC]: as probable as can be by what the first minutes show."""
-    model, start = problem.model, np.array(problem.starts[index])
+    model = problem.model
+    likely, sd = _likely_start(problem, index)
+    start = likely
     early = problem.changed(pieces=[piece.until(until) if i == index else piece
                                     for i, piece in enumerate(problem.pieces)])  # fmt: skip
     piece, noise = early.pieces[index], problem.noise[index]
     temperatures = [i for i, name in enumerate(piece.channels) if name != LOSS]
     seen = np.isfinite(piece.measured[:, temperatures])
-    sd, precision = noise.channel_sd[temperatures], np.diag(1.0 / noise.start_sd**2)
+    channel_sd, precision = noise.channel_sd[temperatures], np.diag(1.0 / sd**2)
     values = problem.unknowns.network_values(model.network, z)
     trajectory: Trajectory | None = None
     for _ in range(START_ROUNDS):
@@ -120,15 +123,30 @@ def _start(
         except ArithmeticError:
             return np.array(problem.starts[index])
         read = readings(model, trajectory, sensors) if as_delivered else early.read(trajectory, sensors, z)
-        free = trajectory.response(np.zeros((len(piece.steps), model.n, model.n)), np.eye(model.n))
-        columns = reading_columns(model, trajectory, sensors, free, np.zeros((len(piece.steps), model.n)))
-        residual = ((piece.measured - read)[:, temperatures] / sd)[seen]
-        J = (columns[:, temperatures] / sd[:, None])[seen]
-        step = np.linalg.solve(precision + J.T @ J, J.T @ residual + precision @ (problem.starts[index] - start))
+        count = len(start)
+        free = trajectory.response(np.zeros((len(piece.steps), model.n, count)), np.eye(count))
+        columns = reading_columns(model, trajectory, sensors, free, np.zeros((len(piece.steps), count)))
+        residual = ((piece.measured - read)[:, temperatures] / channel_sd)[seen]
+        J = (columns[:, temperatures] / channel_sd[:, None])[seen]
+        step = np.linalg.solve(precision + J.T @ J, J.T @ residual + precision @ (likely - start))
         start = start + step
         if float(np.max(np.abs(step))) < START_SETTLED_K:
             break
     return start
+
+
+def _likely_start(problem: Problem, index: int) -> tuple[Array, Array]:
+    """Start temperatures before the first minutes have said anything, and their standard deviations, (unknown,) each.
+
+    What is solved with the temperatures, as oil in a tank, may have been left as it was declared or have gone along
+    with the gearbox.
+    """
+    model, parts = problem.model, problem.starts[index]
+    declared = complete_start(model, parts)[model.n :]
+    warm = float(np.mean(parts))
+    start = np.concatenate([parts, 0.5 * (declared + warm)])
+    sd = np.concatenate([problem.noise[index].start_sd, LEFT_ALONE_SD_K + 0.5 * np.abs(warm - declared)])
+    return start, sd
 
 
 def rmse(residuals: Array, weights: Array) -> Array:

@@ -91,7 +91,7 @@ class Trajectory:
         ----------
         heat : Array, shape (K, parts, columns) or (K, parts + coupled, columns)
             Extra heats, [W]; and extra rates of the states that are solved with the temperatures
-        initial : Array, shape (parts, columns), optional
+        initial : Array, shape (parts, columns) or (parts + coupled, columns), optional
             Change of the start temperatures, [K]
 
         Returns
@@ -105,7 +105,7 @@ class Trajectory:
             driven += self.gain[:, :, n:] @ heat[:, n:]
         result = np.zeros((len(heat) + 1, size, heat.shape[2]))
         if initial is not None:
-            result[0, :n] = initial
+            result[0, : len(initial)] = initial
         now = result[0]
         for k, decay in enumerate(self.decay):
             now = decay @ now
@@ -132,8 +132,8 @@ def simulate(
     piece : Piece
     values : Array, shape (parameters,)
         Values of the network's parameters
-    start : Array, shape (parts,)
-        Start temperatures, [degC]
+    start : Array, shape (parts,) or (parts + coupled,)
+        Start temperatures, [degC], and where they are known those of the states that are solved with them
     guess : Trajectory, or Array of shape (K + 1, parts), optional
         Where to linearise first; by default the start temperatures
     rounds : int
@@ -152,7 +152,7 @@ def simulate(
     elif guess is not None:
         T = guess
     else:
-        T = np.broadcast_to(start, (len(piece.time), model.n))
+        T = np.broadcast_to(start[: model.n], (len(piece.time), model.n))
     found, states = None, guess.memory if isinstance(guess, Trajectory) else None
     for _ in range(rounds):
         with np.errstate(over="ignore", invalid="ignore"):
@@ -185,8 +185,8 @@ def free_running(
     model : NetworkOnGrid
     piece : Piece
     values : Array, shape (parameters,)
-    start : Array, shape (parts,)
-        [degC]
+    start : Array, shape (parts,) or (parts + coupled,)
+        As for :func:`simulate`
     guess : Array, shape (K + 1, parts), optional
         Where to linearise first; by default the start temperatures
 
@@ -197,7 +197,7 @@ def free_running(
     """
     fine, at = piece.finer()
     count = len(fine.steps)
-    T = np.broadcast_to(start, (count + 1, model.n))
+    T = np.broadcast_to(start[: model.n], (count + 1, model.n))
     if guess is not None:
         T = np.stack([np.interp(fine.time, piece.time, course) for course in guess.T], axis=-1)
     tangent: LossTangent | None = None
@@ -264,7 +264,7 @@ def _stepped(
     table = np.concatenate([piece.middle[:, None], piece.inputs, middle, given, kept, power], axis=1).tolist()
     first = 1 + piece.inputs.shape[1]
     states = first + model.n + len(values)
-    n, now = model.n, _start(model, start)
+    n, now = model.n, complete_start(model, start)
     result, seen = np.empty((len(kept) + 1, len(now))), np.empty((len(kept) + 1, n))
     result[0] = now
     state = {index: model.network.states[index].start for index in (*switches, *actuated)}
@@ -304,8 +304,10 @@ def _between(
     return result
 
 
-def _start(model: NetworkOnGrid, start: Array) -> Array:
-    """Start temperatures, and the start of the states that are solved with them."""
+def complete_start(model: NetworkOnGrid, start: Array) -> Array:
+    """Start temperatures, and the start of the states that are solved with them: as given, else as declared."""
+    if len(start) > model.n:
+        return start
     return np.concatenate([start, [model.network.states[index].start for index in model.coupled]])
 
 
@@ -407,7 +409,7 @@ def _walked(
 ) -> tuple[_Solved, Array]:
     """The solution about temperatures at the middles; temperatures and states at the grid points."""
     solved = _linearised(model, piece, values, T, tangent, memory)
-    now = _start(model, start)
+    now = complete_start(model, start)
     result = np.empty((len(T) + 1, len(now)))
     result[0] = now
     for k in range(len(T)):

@@ -39,7 +39,7 @@ from diagnosis.recurrence import lagged
 from diagnosis.search import log_e_value
 from diagnosis.shapes import shape_terms
 from diagnosis.term_on_grid import TermOnGrid
-from diagnosis.trajectory import exponential, parameter_heats, settled_balance, simulate
+from diagnosis.trajectory import complete_start, exponential, parameter_heats, settled_balance, simulate
 from diagnosis.unknowns import Unknown, Unknowns, unknowns_of
 from diagnosis.whitening import Noise, Whitening, reading_variance
 from models.cycle import Cycle
@@ -272,6 +272,33 @@ def test_a_start_that_leads_nowhere_is_not_taken(monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr("diagnosis.predict.simulate", lambda *_, **__: (_ for _ in ()).throw(ArithmeticError("away")))
     with pytest.raises(ArithmeticError, match="away"):
         predict(moved, 0, np.zeros(len(problem.unknowns)))
+
+
+@pytest.mark.parametrize("tank_degC", [27.0, 62.0])
+def test_how_warm_a_tank_was_at_the_start_is_told_by_the_first_minutes(
+    fzg: Gearbox, piece: Piece, problem: Problem, tank_degC: float
+) -> None:
+    """A recording that begins hot: oil in the tank may have been left cold, or have gone along."""
+    network = fzg.network()
+    (placed,) = CATALOGUE["oil_tank"].placed(network, Scale.of(fzg, speed=2600.0, torque=150.0))
+    model = NetworkOnGrid(placed.apply(network), fzg.losses())
+    assert complete_start(model, np.zeros(model.n))[-1] == pytest.approx(27.0, abs=3.0)  # as declared: like the air
+    unknowns = unknowns_of(model.network, CHANNELS)
+    z, targets = np.zeros(len(unknowns)), [item.target for item in unknowns.items]
+    for name, value in (("strength", 4.0), ("lag", 900.0)):
+        index = targets.index(f"oil_tank_oil_{name}")
+        z[index] = unknowns.items[index].z(value)
+    start = np.append(np.full(model.n, 62.0), tank_degC)
+    values = unknowns.network_values(model.network, z)
+    truth = simulate(model, piece, values, start, rounds=20, settled_K=1e-4)
+    sensors = unknowns.sensors(piece.channels, z)
+    recorded = replace(piece, measured=readings(model, truth, sensors))
+    hot = problem.changed(model=model, unknowns=unknowns, pieces=[recorded], starts=[np.full(model.n, 62.0)])
+    found = predict(hot, 0, z)
+    late = piece.time > found.counts_from
+    assert np.abs(found.trajectory.T - truth.T)[late].max() < 0.3
+    declared = simulate(model, piece, values, np.full(model.n, 62.0), rounds=20, settled_K=1e-4)
+    assert (np.abs(declared.T - truth.T).max() > 3.0) == (tank_degC > 40.0)  # as it was taken before
 
 
 def test_noise_needs_no_floor(model: NetworkOnGrid, piece: Piece, problem: Problem) -> None:
