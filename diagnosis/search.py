@@ -8,7 +8,7 @@ follows the explanation, see :func:`diagnosis.case.floored`.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -90,6 +90,8 @@ class Stage:
     accepted : Explanation or None
     tentative : bool
         Whether what was accepted stands only if a further effect is found with which the held-out error does not grow
+    otherwise : Stage or None
+        The same look with what else is accepted then
     matters : bool
         Whether what was accepted, or else anything that would explain the data, is large enough to matter in practice
     note : str
@@ -102,6 +104,7 @@ class Stage:
     gains: tuple[float, ...] = ()
     accepted: Explanation | None = None
     tentative: bool = False
+    otherwise: Stage | None = None
     matters: bool = False
     note: str = ""
 
@@ -203,16 +206,17 @@ def search(
         judge = Judge(case, base, floor)
         stage = _look(judge, start, catalogue, needed, jobs, progress, others)
         if stage.accepted is None and stages and stages[-1].tentative:
-            stages[-1] = replace(stages[-1], accepted=None, tentative=False)
+            alone = stages.pop()
+            stage = alone.otherwise or replace(alone, accepted=None, tentative=False)
             base, floor = start, start_floor
-            break
+            judge = Judge(case, base, floor)
         stages.append(stage)
         if stage.accepted is None:
             break
         stages = _reconsidered(stages, base)
-        others = []
         if stage.tentative:
             base = stage.accepted
+            others = _others(base, stage)
             continue
         slim = _needed_of(judge, start, stage.accepted)
         raised, floor_after = floored(slim)
@@ -362,7 +366,7 @@ def _judged(judge: Judge, calibrated: Explanation, stage: Stage, needed: float) 
     held-out recordings refuse stays a rival of what is accepted only if they hold it for about as likely; what the
     training data hold for much less likely than that is accepted only where the held-out recordings themselves speak
     for it. Where another strong effect is still missing, the first one may make their error larger although it makes
-    them far more probable: that one is accepted tentatively.
+    them far more probable: that one is accepted tentatively, before anything less likely.
     """
     case, base, probabilities = judge.case, judge.base, stage.probabilities()
     cleared = any(_matters(case, base, h) for h in base.found)
@@ -374,6 +378,7 @@ def _judged(judge: Judge, calibrated: Explanation, stage: Stage, needed: float) 
         by_name[fit.found[-1].name] = by_name.get(fit.found[-1].name, 0.0) + float(probability)
     ahead = 0.0  # probability of what is more likely and too small
     promising: Explanation | None = None
+    promised = -1
     for index, (fit, gain, probability) in enumerate(zip(stage.fits, stage.gains, probabilities, strict=True)):
         left = [i for i in range(len(stage.fits)) if i not in refused | impossible]
         if gain < needed or probability < LEAST_PROBABILITY * probabilities[left].sum():
@@ -393,15 +398,23 @@ def _judged(judge: Judge, calibrated: Explanation, stage: Stage, needed: float) 
             note = "what the data show is too small to matter"
         elif _holds_out(judge, calibrated, fit):
             as_likely = {i for i in refused if judge.gain(stage.fits[i]) > judge.gain(fit) + HOLDOUT_LOSS}
-            rivals = sorted(as_likely.union(left))
-            fits, gains = tuple(stage.fits[i] for i in rivals), tuple(stage.gains[i] for i in rivals)
-            return replace(stage, fits=fits, gains=gains, accepted=fit, matters=large)
+            found = replace(_only(stage, as_likely.union(left)), accepted=fit, matters=large)
+            if promising is None or probability > LEAST_SHARE * probabilities[promised]:
+                return found
+            both = _only(stage, as_likely.union(left, [promised]))
+            return replace(both, accepted=promising, tentative=True, matters=True, otherwise=found)
         else:
             refused.add(index)
             note = "what would explain the training data makes the held-out data worse"
             if promising is None and large and not base.found and judge.gain(fit) > CERTAIN:
-                promising = fit
+                promising, promised = fit, index
     return replace(stage, matters=matters, note=note, accepted=promising, tentative=promising is not None)
+
+
+def _only(stage: Stage, indices: Iterable[int]) -> Stage:
+    """A look with some of its fits."""
+    chosen = sorted(indices)
+    return replace(stage, fits=tuple(stage.fits[i] for i in chosen), gains=tuple(stage.gains[i] for i in chosen))
 
 
 def _drives_away(base: Explanation, fit: Explanation) -> bool:

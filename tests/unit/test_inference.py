@@ -907,6 +907,28 @@ def test_a_first_effect_whose_error_another_one_hides_stands_only_beside_that_on
         assert found.detected and (found.final is base) == (not names)
 
 
+@pytest.mark.parametrize(("less", "at_once"), [(60.0, False), (119.0, True)])
+def test_what_promises_has_its_chance_before_anything_less_likely(
+    monkeypatch: pytest.MonkeyPatch, less: float, at_once: bool
+) -> None:
+    """An effect that needs a second one beside it, and a fault that does not: that one stands if none is found."""
+    base = Explanation(problem=NOTHING, fit=NOTHING, log_evidence=0.0)
+    wear, fault = (replace(base, found=(_scored(name, "x", 0.0).hypothesis,)) for name in ("wear", "fault"))
+    monkeypatch.setattr(search, "_matters", lambda *_: True)
+    monkeypatch.setattr(search, "_holds_out", lambda _judge, _start, fit: fit.labels == fault.labels)
+    stage = search.Stage(scored=(), log_e_value=90.0, fits=(wear, fault), gains=(120.0, less))
+    found = search._judged(_judge(base, 400.0), base, stage, 10.0)
+    assert found.accepted is not None and found.accepted.labels == (fault if at_once else wear).labels
+    assert found.tentative is not at_once and [fit.labels for fit in found.fits] == [wear.labels, fault.labels]
+    monkeypatch.setattr(search, "first", lambda _: (base, 1.0))
+    monkeypatch.setattr(search, "floored", lambda fit: (fit, 1.0))
+    monkeypatch.setattr(search, "_others", lambda *_: [])
+    nothing_more = search.Stage(scored=(), log_e_value=0.0)
+    coming = iter((found, nothing_more, nothing_more))
+    monkeypatch.setattr(search, "_look", lambda *_: next(coming))
+    assert search.search(NOTHING, {}).final.labels == fault.labels
+
+
 def test_what_is_likely_and_too_small_is_not_told_as_something_unlikely_and_large(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
