@@ -80,6 +80,13 @@ def test_a_twin_gets_true_torque_and_a_recording_the_recorded_one(file: Path) ->
     assert seen.subs({symbol("torque"): 100.0, symbol("torque_gain_torque_strength"): 0.02}) == pytest.approx(102.0)
 
 
+def test_in_half_a_sentence() -> None:
+    own = f"(correction {CORRECTION.summary()['sha256'][:12]})"
+    assert CORRECTION.words == f"corrected by {', '.join(CORRECTION.summary()['findings'])} {own}"
+    assert "windage" in CORRECTION.words
+    assert replace(CORRECTION, findings=()).words.startswith("corrected by calibration (correction ")
+
+
 def test_another_definition_is_refused(file: Path) -> None:
     other = RIG.with_values({"oil.volume_l": 1.0})
     with pytest.raises(InputError, match="made for .*use the definition it was made for, or diagnose again"):

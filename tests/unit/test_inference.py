@@ -488,7 +488,7 @@ def test_the_error_of_a_mean_heat_is_that_of_the_strength_and_of_what_goes_with_
     # The same by many draws from the posterior of the term's parameters.
     assert h.term is not None
     items, rng = found.fit.unknowns.items, np.random.default_rng(3)
-    own = [next(i for i, item in enumerate(items) if item.target == p.name) for p in h.term.parameters]
+    own = found.fit.unknowns.of(h.term.parameters)
     draws = rng.multivariate_normal(found.fit.z[own], found.fit.covariance[np.ix_(own, own)], 400)
     values = np.array([[items[i].value(x) for i, x in zip(own, draw, strict=True)] for draw in draws])
     heat = np.concatenate(search._heats_with(found, h, np.concatenate([values.mean(axis=0, keepdims=True), values])))
@@ -838,6 +838,20 @@ def test_what_is_barely_evident_has_to_be_larger(monkeypatch: pytest.MonkeyPatch
         stage = search.Stage(scored=(), log_e_value=gain, fits=(fit,), gains=(gain,))
         found = search._judged(_judge(base), base, stage, 10.0)
         assert found.matters is matters and found.accepted is not None  # what is small is taken to clear the way
+
+
+def test_the_ranking_holds_everything_that_was_scored() -> None:
+    """Fitted ones by their fits, the rest by the scan; of open forms those that were fitted."""
+    fan, tank, feed = (_scored(name, "x", score) for name, score in (("fan", 40.0), ("tank", 30.0), ("feed", -2.0)))
+    form = replace(fan, hypothesis=replace(fan.hypothesis, name="open form, speed", family="open form"))
+    fits = tuple(
+        Explanation(problem=NOTHING, fit=NOTHING, log_evidence=0.0, found=(s.hypothesis,)) for s in (tank, fan)
+    )
+    stage = search.Stage(scored=(fan, form, tank, feed), log_e_value=20.0, fits=fits, gains=(55.0, 35.0))
+    search_found: Any = SimpleNamespace(stages=[stage])
+    ranked = assemble._ranking(search_found)
+    assert [(r.mechanism, r.log_bayes) for r in ranked] == [("tank", 55.0), ("fan", 35.0), ("feed", -2.0)]
+    assert ranked[0].probability == pytest.approx(stage.probabilities()[0]) and ranked[2].probability == 0.0
 
 
 @pytest.mark.parametrize(
