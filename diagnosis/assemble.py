@@ -11,7 +11,8 @@ from diagnosis.case import Case, heat_over_time
 from diagnosis.evidence import Marginal
 from diagnosis.explain import Explanation
 from diagnosis.findings import finding_of, node_of, rivals_of
-from diagnosis.holdout import at_holdout
+from diagnosis.holdout import Judge, at_holdout
+from diagnosis.holdout import misfit as held_out_misfit
 from diagnosis.identifiable import scale_notes
 from diagnosis.latent import LatentHeat, knots_of, latent_heat
 from diagnosis.mapping import LOSS
@@ -65,7 +66,7 @@ def assembled(
     remaining = _latents(case, found.final) if detected else ()
     first = _latents(case, found.calibrated) if detected else ()
     unseen = _unseen(found.stages[-1], catalogue, found.threshold)
-    misfit = _misfit(found.final)
+    misfit = max(_misfit(found.final), held_out_misfit(Judge(case, found.final, found.floor)) if detected else 0.0)
     left = misfit > MOST_MISFIT or _much_is_left(first, remaining)
     verdict = _verdict(found, findings, unseen, left=left, detected=detected, catalogue=catalogue)
     location = _location(case, found, findings, first) if detected else ()
@@ -144,8 +145,9 @@ def _verdict(
 
 def _misfit(explanation: Explanation) -> float:
     """Mean square of the whitened residuals of the training recordings."""
-    white = np.concatenate([part.white_residual for part in explanation.fit.parts])
-    return float(np.mean(np.square(white)))
+    parts = explanation.fit.parts
+    rows = sum(int(np.isfinite(part.residual).sum()) for part in parts)
+    return float(sum(part.white_residual @ part.white_residual for part in parts)) / max(rows, 1)
 
 
 def _much_is_left(first: Sequence[LatentHeat], remaining: Sequence[LatentHeat]) -> bool:

@@ -86,10 +86,34 @@ def _linearised(problem: Problem, explanation: Explanation, courses: Sequence[Ar
     return [problem.linearise(i, explanation.fit.z, course, rounds=ROUNDS) for i, course in enumerate(courses)]
 
 
+def misfit(judge: Judge) -> float:
+    """How large the held-out residuals of a judge's base are, as switches that follow what was measured leave them.
+
+    Returns
+    -------
+    float
+        Mean square, in multiples of what noise, structural floor and what the training left unsure make of it; 0
+        without held-out recordings, infinite without a prediction
+    """
+    if not judge.case.holdout.pieces:
+        return 0.0
+    try:
+        parts = _linearised(with_floor(at_holdout(judge.case, judge.base), judge.floor), judge.base, judge._courses)
+    except (ArithmeticError, np.linalg.LinAlgError):
+        return np.inf
+    quadratic, _ = _spread(parts, judge.base)
+    return quadratic / max(sum(int(np.isfinite(part.residual).sum()) for part in parts), 1)
+
+
 def _log_density(parts: Sequence[Linearised], explanation: Explanation) -> float:
+    quadratic, log_determinant = _spread(parts, explanation)
+    return -0.5 * quadratic - 0.5 * log_determinant
+
+
+def _spread(parts: Sequence[Linearised], explanation: Explanation) -> tuple[float, float]:
     """Of the whitened residuals: the posterior of the training is the prior here, ``r ~ N(0, 1 + J C J^T)``."""
     residual = np.concatenate([part.white_residual for part in parts])
     X = np.concatenate([part.white_columns for part in parts]) @ np.linalg.cholesky(explanation.fit.covariance)
     inner, along = np.eye(X.shape[1]) + X.T @ X, X.T @ residual
     quadratic = float(residual @ residual - along @ np.linalg.solve(inner, along))
-    return -0.5 * quadratic - 0.5 * float(np.linalg.slogdet(inner)[1])
+    return quadratic, float(np.linalg.slogdet(inner)[1])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
@@ -256,8 +257,8 @@ class Diagnosis:
     floor : str
         What structural floor was assumed
     misfit : float
-        Mean square of what is left in the training recordings, in multiples of what noise and structural floor make of
-        it; above 1 the recordings are not explained
+        Mean square of what is left in the training recordings or, where something was found, in the held-out ones,
+        whichever is larger, in multiples of what noise and structural floor make of it; above 1 they are not explained
     remaining_p_value : float
     remaining_note : str
     ranking : tuple of Ranked
@@ -334,7 +335,8 @@ class Diagnosis:
             "fit": {"train": _fits(self.train), "holdout": _fits(self.holdout), "noise_K": self.noise_K,
                     "floor": self.floor},
             "remaining": {
-                "p_value": self.remaining_p_value, "misfit": self.misfit, "note": self.remaining_note,
+                "p_value": self.remaining_p_value, "note": self.remaining_note,
+                "misfit": self.misfit if math.isfinite(self.misfit) else None,
             },
             "ranking": [
                 {"mechanism": r.mechanism, "place": r.place, "family": r.family, "log_bayes": r.log_bayes,

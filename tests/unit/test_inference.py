@@ -27,7 +27,7 @@ from diagnosis.explain import (
 )
 from diagnosis.findings import finding_of
 from diagnosis.grid import Piece, pieces
-from diagnosis.holdout import Judge
+from diagnosis.holdout import Judge, misfit
 from diagnosis.hypotheses import Hypothesis, Scored, hypothesis_of, scan, sharpened
 from diagnosis.network_on_grid import NetworkOnGrid, named_values
 from diagnosis.noise import loss_noise, noise_of, start_guess
@@ -549,10 +549,13 @@ def test_judge_prefers_the_truth_and_survives_what_has_no_prediction(fzg: Gearbo
     wrong = replace(right, fit=replace(right.fit, z=shifted))
     assert judge.gain(wrong) < -10.0
     assert judge.rmse(wrong) > 2.0 * judge.rmse(right)
+    # Explained recordings have less than noise and structural floor allow; what is wrong has more.
+    assert misfit(judge) < 1.0 < 5.0 < misfit(Judge(case, wrong, 1.0))
+    assert misfit(Judge(replace(case, holdout=problem.changed(pieces=[])), right, 1.0)) == 0.0
     network = problem.model.network.with_source("oil", lambda s: 40.0 * s.T_oil, name="own_heat")
     none = replace(right, problem=problem.changed(model=NetworkOnGrid(network, problem.model.losses)))
     assert judge.gain(none) == -np.inf
-    assert judge.rmse(none) == np.inf
+    assert judge.rmse(none) == np.inf and misfit(Judge(case, none, 1.0)) == np.inf
 
 
 # ---------------------------------------------------------------------- bounds, shapes and far starts
@@ -873,7 +876,9 @@ def test_what_remains_is_told_where_it_is_large_or_most_of_it(log_bayes: float, 
 
 @pytest.mark.parametrize(("residual", "verdict"), [(0.8, "missing_physics"), (1.2, "unexplained")])
 def test_what_leaves_more_than_noise_and_floor_is_no_explanation(residual: float, verdict: str) -> None:
-    parts = [SimpleNamespace(white_residual=sign * np.full(50, residual)) for sign in (1.0, -1.0)]
+    # Rows without a reading have nothing to say: they are neither in the sum nor in the count.
+    white, read = np.append(np.full(50, residual), np.zeros(30)), np.append(np.ones(50), np.full(30, np.nan))
+    parts = [SimpleNamespace(white_residual=sign * white, residual=read) for sign in (1.0, -1.0)]
     final: Any = SimpleNamespace(fit=SimpleNamespace(parts=parts))
     misfit = assemble._misfit(final)
     assert misfit == pytest.approx(residual**2)
