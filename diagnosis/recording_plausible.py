@@ -33,12 +33,17 @@ WARM_FOR_DEGC = 45.0  # degC; temperatures that never fall below may be degF
 
 @dataclass(frozen=True, kw_only=True)
 class Slip:
-    """A unit that may have been mistaken: what it changes, from which value on it can be, and how it is told."""
+    """A unit that may have been mistaken: what it changes, from which value on it can be, and how it is told.
+
+    A torque a thousand times too large makes the model miss by hundreds of kelvin: `grossly` asks for that. Else a
+    recording without much load looks as if any misfit were the torque's.
+    """
 
     signal: str
     factor: float
     offset: float = 0.0
     lowest: float = -np.inf
+    grossly: bool = False
     says: str
 
 
@@ -46,7 +51,7 @@ SLIPS = (
     Slip(signal="speed", factor=30.0 / pi, says="speed seems to be in rad/s, not 1/min"),
     Slip(signal="speed", factor=60.0, says="speed seems to be in revolutions per second, not 1/min"),
     Slip(signal="torque", factor=1e3, says="torque seems to be in kN m, not N m"),
-    Slip(signal="torque", factor=1e-3, says="torque seems to be in N mm, not N m"),
+    Slip(signal="torque", factor=1e-3, grossly=True, says="torque seems to be in N mm, not N m"),
     Slip(
         signal="T",
         factor=5.0 / 9.0,
@@ -124,11 +129,12 @@ def _fault(recording: Recording, model: NetworkOnGrid) -> str:
     if abs(log(given.factor)) > log(SUSPECT_LOSS):
         seen.append(f"P_loss is {given.factor:.3g} times the model's")
     where = f"{recording.path}: over the rows of {thin.time[0]:.0f} ... {thin.time[-1]:.0f} s {' and '.join(seen)}"
-    possible = [slip for slip in SLIPS if _lowest(thin, slip) >= slip.lowest]
+    gross = given.beyond(GROSS_K, GROSS_SHARE, GROSS_LOSS)
+    possible = [slip for slip in SLIPS if _lowest(thin, slip) >= slip.lowest and (gross or not slip.grossly)]
     size, best = min(((_misfit(_slipped(thin, slip), model).size, slip) for slip in possible), key=lambda pair: pair[0])
     if size < CURED * given.size and size < 1.0:
         return f"{where}; {best.says}: convert it, or give its unit in a mapping file"
-    if not given.beyond(GROSS_K, GROSS_SHARE, GROSS_LOSS):
+    if not gross:
         return ""
     return (
         f"{where}, more than missing physics explains; is it of another gearbox, or are speed and torque those of "

@@ -10,9 +10,10 @@ import pandas as pd
 import pytest
 
 from diagnosis.mapping import RecordingMapping, dimension_of, read_mapping
+from diagnosis.network_on_grid import NetworkOnGrid
 from diagnosis.recording import Recording, check_holdout, read_recordings
 from diagnosis.recording_cleaning import bridged, dropouts, outliers, resolution_of, stuck_rows
-from diagnosis.recording_plausible import check_plausible
+from diagnosis.recording_plausible import SUSPECT_K, SUSPECT_LOSS, SUSPECT_SHARE, _misfit, _thinned, check_plausible
 from diagnosis.recording_time import part_of
 from models.errors import InputError
 from models.gearbox import Gearbox
@@ -392,6 +393,21 @@ def test_wrong_units_and_other_gearboxes_are_found_by_the_model(
     recordings = read_recordings([write(tmp_path / "run.csv", source)], fzg.network())
     with pytest.raises(InputError, match=f"run.csv: .*{says}"):
         check_plausible(recordings, fzg.network(), fzg.losses())
+
+
+def test_a_gearbox_that_stays_cooler_than_the_model_is_no_slip_of_the_torque(
+    tmp_path: Path, fzg: Gearbox, recordings_folder: Path
+) -> None:
+    """Without its torque the model would fit such a recording; but a torque in N mm would miss it by far more."""
+    source = pd.read_csv(recordings_folder / "fzg_open" / "rig_1" / "train_2.csv.gz").drop(columns="P_loss_W")
+    ambient = source["T_ambient_degC"].mean()
+    for column in source.columns.drop("T_ambient_degC"):
+        if column.startswith("T_"):
+            source[column] = ambient + 0.55 * (source[column] - ambient)
+    recordings = read_recordings([write(tmp_path / "run.csv", source)], fzg.network())
+    misfit = _misfit(_thinned(recordings[0]), NetworkOnGrid(fzg.network(), fzg.losses()))
+    assert misfit.beyond(SUSPECT_K, SUSPECT_SHARE, SUSPECT_LOSS)
+    check_plausible(recordings, fzg.network(), fzg.losses())
 
 
 MAPPING_OF_THE_WIND_TURBINES = """
