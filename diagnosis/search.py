@@ -35,8 +35,8 @@ LEAST_PROBABILITY = 0.05  # of what counts when it is asked whether anything of 
 SHARPENED, SHARPEN_FROM = 15, 2.0  # best hypotheses whose shapes are sought between the grid, from this score on
 FITTED, WORTH = 5, 0.12  # hypotheses that are fitted in earnest, and the share of the best score that they need
 MOST_FITTED, NEAR = 12, 0.6  # where more of them score about as well as the best: the scan is only linear
-# So strong an effect bends so much that what is best in a straight line may be far from best: other names from this
-# share of the best score are fitted as well.
+# So strong a first effect bends so much that what is best in a straight line may be far from best: other names from
+# this share of the best score are fitted as well.
 STRONG, WORTH_OF_STRONG = 200.0, 0.04
 # What was nearly as likely as what was accepted may be right beside a further effect: so many are seen, from this share
 # of its probability.
@@ -294,14 +294,15 @@ def _look(
     if log_e < needed:
         return Stage(scored=tuple(scored), log_e_value=log_e, note="nothing reaches the threshold")
     progress("fitting the best explanations in earnest")
-    chosen = [(base, s) for s in [*_worth(real), *opened[:2]]
+    first_look = not base.found
+    chosen = [(base, s) for s in [*_worth(real, strong=first_look), *opened[:2]]
               if s.hypothesis.family != "open form" or s.log_bayes > real[0].log_bayes + OPEN_PENALTY]  # fmt: skip
     views = list(others)
-    if distorted(base) and not base.found and (middle := in_the_middle(base)) is not None:
+    if distorted(base) and first_look and (middle := in_the_middle(base)) is not None:
         views.append(middle)
     for view in views:
         known = [h for h in hypotheses_of(case, view, catalogue) if h.family != "open form"]
-        chosen += [(view, s) for s in _worth(_scanned(view, known, jobs)[0])]
+        chosen += [(view, s) for s in _worth(_scanned(view, known, jobs)[0], strong=first_look)]
     fits = best_fits(base, chosen, jobs=jobs)
     if not fits:
         return Stage(scored=tuple(scored), log_e_value=log_e, note="no explanation has a solution")
@@ -321,12 +322,12 @@ def _scanned(base: Explanation, hypotheses: Sequence[Hypothesis], jobs: int) -> 
     return real, [s for s in scored if s.hypothesis.family == "open form"]
 
 
-def _worth(scored: Sequence[Scored]) -> list[Scored]:
-    """What of a scan is worth a fit, two at least."""
+def _worth(scored: Sequence[Scored], *, strong: bool) -> list[Scored]:
+    """What of a scan is worth a fit, two at least; more where an effect may be `strong`."""
     most = scored[0].log_bayes
     found = [s for s in scored[:FITTED] if s.log_bayes > WORTH * most]
     found += [s for s in scored[FITTED:MOST_FITTED] if s.log_bayes > NEAR * most]
-    if most > STRONG:
+    if strong and most > STRONG:
         for s in scored:
             new = s.hypothesis.name not in {f.hypothesis.name for f in found}
             if new and s.log_bayes > WORTH_OF_STRONG * most and len(found) < MOST_FITTED:
