@@ -843,6 +843,35 @@ def test_what_is_barely_evident_has_to_be_larger(monkeypatch: pytest.MonkeyPatch
         assert found.matters is matters and found.accepted is not None  # what is small is taken to clear the way
 
 
+def test_beside_a_strong_first_effect_more_names_are_fitted() -> None:
+    """What scores a tenth of the best in a straight line may be the best of all once it is fitted."""
+    scores = {
+        "wear": 1000.0,
+        "ageing": 950.0,
+        "decay": 700.0,
+        "flanks": 600.0,
+        "stuck": 500.0,
+        "loss": 100.0,
+        "fan": 9.0,
+    }
+    scored = [_scored(name, "x", score) for name, score in scores.items()]
+    again = _scored("wear", "y", 90.0)  # another place of a name that is fitted already
+    chosen = {
+        strong: [s.hypothesis.label for s in search._worth([*scored[:-1], again, scored[-1]], strong=strong)]
+        for strong in (True, False)
+    }
+    assert chosen[False] == [f"{name}@x" for name in best]
+    assert chosen[True] == [*chosen[False], "loss@x"]
+    weak = [_scored(name, "x", 0.1 * score) for name, score in scores.items()]
+    assert [s.hypothesis.name for s in search._worth(weak, strong=True)] == [
+        "wear",
+        "ageing",
+        "decay",
+        "flanks",
+        "stuck",
+    ]
+
+
 def test_the_ranking_holds_everything_that_was_scored() -> None:
     """Fitted ones by their fits, the rest by the scan; of open forms those that were fitted."""
     fan, tank, feed = (_scored(name, "x", score) for name, score in (("fan", 40.0), ("tank", 30.0), ("feed", -2.0)))
