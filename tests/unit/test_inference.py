@@ -845,15 +845,8 @@ def test_what_is_barely_evident_has_to_be_larger(monkeypatch: pytest.MonkeyPatch
 
 def test_beside_a_strong_first_effect_more_names_are_fitted() -> None:
     """What scores a tenth of the best in a straight line may be the best of all once it is fitted."""
-    scores = {
-        "wear": 1000.0,
-        "ageing": 950.0,
-        "decay": 700.0,
-        "flanks": 600.0,
-        "stuck": 500.0,
-        "loss": 100.0,
-        "fan": 9.0,
-    }
+    best = {"wear": 1000.0, "ageing": 950.0, "decay": 700.0, "flanks": 600.0, "stuck": 500.0}
+    scores = best | {"loss": 100.0, "fan": 9.0}
     scored = [_scored(name, "x", score) for name, score in scores.items()]
     again = _scored("wear", "y", 90.0)  # another place of a name that is fitted already
     chosen = {
