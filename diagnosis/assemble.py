@@ -168,12 +168,12 @@ def _remaining(
     steps = np.concatenate([piece.steps for piece in case.train.pieces])
     size = float(np.sqrt(np.average(np.concatenate(best.mean) ** 2, weights=steps)))
     small = size < REMAINING_W_SHARE * case.loss_W and not left
-    if best.log_bayes < SECOND_GAIN or small:
-        return p_value, "nothing that stands out of noise and structural floor"
-    note = f"an unknown heat of about {size:.0f} W (rms) in {best.node} would still help"
+    notes = []
+    if best.log_bayes >= SECOND_GAIN and not small:
+        notes.append(f"an unknown heat of about {size:.0f} W (rms) in {best.node} would still help")
     if misfit > MOST_MISFIT:
-        note += f"; what is left is {misfit:.1f} times what noise and structural floor allow (mean square)"
-    return p_value, note
+        notes.append(f"what is left is {misfit:.2g} times what noise and structural floor allow (mean square)")
+    return p_value, "; ".join(notes) or "nothing that stands out of noise and structural floor"
 
 
 # ---------------------------------------------------------------------- where

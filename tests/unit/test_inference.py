@@ -893,7 +893,10 @@ def test_what_remains_is_told_where_it_is_large_or_most_of_it(log_bayes: float, 
     first, remaining = [latent(1000.0, 80.0)], [latent(log_bayes, heat_W)]
     left = assemble._much_is_left(first, remaining)
     _, note = assemble._remaining(found, remaining, case, left=left, misfit=0.6, detected=True)
-    assert says in note
+    assert says in note and "allow" not in note
+    # What an unknown heat would not help, and is too large all the same, is never called nothing.
+    _, note = assemble._remaining(found, remaining, case, left=True, misfit=1.7, detected=True)
+    assert "1.7 times what noise and structural floor allow" in note and "nothing that" not in note
 
 
 @pytest.mark.parametrize(("residual", "verdict"), [(0.8, "missing_physics"), (1.2, "unexplained")])

@@ -222,17 +222,18 @@ def _thermostat() -> ThermalNetwork:
     ).apply(gearbox.network())
 
 
+def _steady_day() -> Piece:
+    """Ten-minute rows of one operating point, nothing measured."""
+    time = np.arange(0.0, 86400.0, 600.0)
+    inputs = np.array(np.broadcast_to([1500.0, 4000.0, 25.0, 12.0], (len(time) - 1, 5, 4)))
+    nothing = np.empty((len(time), 0))
+    return Piece(recording="", time=time, samples=inputs, channels=(), measured=nothing, counts=nothing, slow=True)
+
+
 def test_a_thermostat_runs_free_as_the_solver_has_it():
     gearbox, network = load_gearbox("la_haute_borne"), _thermostat()
     model = NetworkOnGrid(network, gearbox.loss_laws())
-    time = np.arange(0.0, 86400.0, 600.0)
-    inputs = np.broadcast_to([1500.0, 4000.0, 25.0, 12.0], (len(time) - 1, 5, 4))
-    nothing = np.empty((len(time), 0))
-    piece = Piece(
-        recording="", time=time, samples=np.array(inputs), channels=(), measured=nothing, counts=nothing, slow=True,
-        guided=True,
-    )  # fmt: skip
-    found = free_running(model, piece, model.start, np.full(model.n, 50.0))
+    found = free_running(model, replace(_steady_day(), guided=True), model.start, np.full(model.n, 50.0))
     oil = found.T[:, model.parts.index("oil")]
     fine = {
         "time_s": np.arange(0.0, 86400.0, 60.0), "speed_rpm": np.full(1440, 1500.0), "torque_Nm": np.full(1440, 4000.0),
@@ -255,15 +256,13 @@ def test_losses_linearised_in_the_cold_do_not_stay_so_when_it_runs():
     """Thick oil at the start: a few rounds leave a bearing many kelvin too cold for weeks."""
     gearbox, network = load_gearbox("la_haute_borne"), _thermostat()
     model = NetworkOnGrid(network, gearbox.loss_laws())
-    time = np.arange(0.0, 86400.0, 600.0)
-    inputs = np.array(np.broadcast_to([1500.0, 4000.0, 25.0, 12.0], (len(time) - 1, 5, 4)))
-    nothing = np.empty((len(time), 0))
-    piece = Piece(recording="", time=time, samples=inputs, channels=(), measured=nothing, counts=nothing, slow=True)
+    piece = _steady_day()
     steep = {"bearing_1_viscosity_exponent": 1.0}
     from_cold = free_running(model, piece, named_values(network, steep), np.full(model.n, 5.0))
+    count = len(piece.time)
     fine = {
-        "time_s": time, "speed_rpm": np.full(len(time), 1500.0), "torque_Nm": np.full(len(time), 4000.0),
-        "T_ambient_degC": np.full(len(time), 25.0), "T_outdoor": np.full(len(time), 12.0),
+        "time_s": piece.time, "speed_rpm": np.full(count, 1500.0), "torque_Nm": np.full(count, 4000.0),
+        "T_ambient_degC": np.full(count, 25.0), "T_outdoor": np.full(count, 12.0),
     }  # fmt: skip
     truth = network.simulate(fine, losses=gearbox.loss_laws(), initial=5.0, parameters=steep).columns()
     late = slice(60, None)
@@ -275,13 +274,10 @@ def test_a_switching_that_no_row_shows_does_not_send_learning_astray(monkeypatch
     """Means that never fall to where the cooler switches off: followed blindly, it would cool for hours."""
     gearbox, network = load_gearbox("la_haute_borne"), _thermostat()
     model = NetworkOnGrid(network, gearbox.loss_laws())
-    time = np.arange(0.0, 86400.0, 600.0)
-    inputs = np.array(np.broadcast_to([1500.0, 4000.0, 25.0, 12.0], (len(time) - 1, 5, 4)))
-    nothing = np.empty((len(time), 0))
-    piece = Piece(recording="", time=time, samples=inputs, channels=(), measured=nothing, counts=nothing, slow=True)
+    piece = _steady_day()
     start = np.full(model.n, 50.0)
     truth = free_running(model, piece, model.start, start).T[:, [model.parts.index("oil")]]
-    hidden = np.where(time[:, None] > 30000.0, np.maximum(truth, 57.0), truth)
+    hidden = np.where(piece.time[:, None] > 30000.0, np.maximum(truth, 57.0), truth)
     learnt = replace(piece, channels=("oil",), measured=hidden, counts=np.ones_like(hidden), guided=True)
 
     def farthest() -> float:
