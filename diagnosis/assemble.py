@@ -7,12 +7,13 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from diagnosis.acceptance import SECOND_GAIN
 from diagnosis.case import Case, heat_over_time
 from diagnosis.evidence import Marginal
 from diagnosis.explain import Explanation
 from diagnosis.findings import finding_of, node_of, rivals_of
-from diagnosis.holdout import Judge, at_holdout
-from diagnosis.holdout import misfit as held_out_misfit
+from diagnosis.heat import heats_of
+from diagnosis.holdout import at_holdout
 from diagnosis.identifiable import scale_notes
 from diagnosis.latent import LatentHeat, knots_of, latent_heat
 from diagnosis.mapping import LOSS
@@ -33,8 +34,9 @@ from diagnosis.result import (
     Unseen,
     Verdict,
 )  # fmt: skip
-from diagnosis.search import SECOND_GAIN, TEMPER, Search, Stage, heats_of, log_weights
+from diagnosis.search import Search
 from diagnosis.shapes import shape_terms
+from diagnosis.stage import TEMPER, Stage, log_weights
 from models.mechanisms import Mechanism
 from models.types import Array
 from models.version import project_version
@@ -66,7 +68,7 @@ def assembled(
     remaining = _latents(case, found.final) if detected else ()
     first = _latents(case, found.calibrated) if detected else ()
     unseen = _unseen(found.stages[-1], catalogue, found.threshold)
-    misfit = max(_misfit(found.final), held_out_misfit(Judge(case, found.final, found.floor)) if detected else 0.0)
+    misfit = max(found.final.misfit, found.judge.misfit if detected else 0.0)
     left = misfit > MOST_MISFIT or _much_is_left(first, remaining)
     verdict = _verdict(found, findings, unseen, left=left, detected=detected, catalogue=catalogue)
     location = _location(case, found, findings, first) if detected else ()
@@ -113,11 +115,11 @@ def assembled(
 
 def _floor(case: Case, found: Search) -> str:
     share = HEAT_FRACTION
-    text = f"in every part: {'assumed' if found.floor == 1.0 else 'raised because the remainder asks for it'}"
+    text = f"in every part: {'assumed' if found.judge.floor == 1.0 else 'raised because the remainder asks for it'}"
     if case.gearbox.is_parametric:  # watts are known but for a common factor
         share = PARAMETRIC_FRACTION
-        text += f"; of a part of little heat capacity {PARAMETRIC_K * found.floor:.1f} K"
-    return f"random heat of {100.0 * share * found.floor:.1f} % of the typical loss ({case.loss_W:.0f} W) {text}"
+        text += f"; of a part of little heat capacity {PARAMETRIC_K * found.judge.floor:.1f} K"
+    return f"random heat of {100.0 * share * found.judge.floor:.1f} % of the typical loss ({case.loss_W:.0f} W) {text}"
 
 
 # ---------------------------------------------------------------------- verdict
@@ -141,13 +143,6 @@ def _verdict(
     if kinds <= {"parameter", "sensor"}:
         return "parameter_error"
     return "missing_physics"
-
-
-def _misfit(explanation: Explanation) -> float:
-    """Mean square of the whitened residuals of the training recordings."""
-    parts = explanation.fit.parts
-    rows = sum(int(np.isfinite(part.residual).sum()) for part in parts)
-    return float(sum(part.white_residual @ part.white_residual for part in parts)) / max(rows, 1)
 
 
 def _much_is_left(first: Sequence[LatentHeat], remaining: Sequence[LatentHeat]) -> bool:

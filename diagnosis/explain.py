@@ -56,6 +56,13 @@ class Explanation:
         """What was found, by name and place."""
         return tuple(h.label for h in self.found)
 
+    @property
+    def misfit(self) -> float:
+        """Mean square of the whitened residuals, in multiples of what noise and structural floor make of it."""
+        parts = self.fit.parts
+        rows = sum(int(np.isfinite(part.residual).sum()) for part in parts)
+        return float(sum(part.white_residual @ part.white_residual for part in parts)) / max(rows, 1)
+
     def values_of(self, hypothesis: Hypothesis) -> dict[str, tuple[float, float]]:
         """Value and standard error of every parameter of something found, by name."""
         result = {}

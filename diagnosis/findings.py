@@ -8,9 +8,11 @@ import numpy as np
 
 from diagnosis.case import Case, heat_over_time
 from diagnosis.explain import Explanation
+from diagnosis.heat import heats_of, mean_heat_of
 from diagnosis.hypotheses import Hypothesis
 from diagnosis.result import Finding, ParameterValue, Rival
-from diagnosis.search import FORM_DOUBT, Stage, heats_of, mean_heat_of
+from diagnosis.search import FORM_DOUBT
+from diagnosis.stage import Stage
 from models.mechanisms import Mechanism, Placed
 
 LEAST_RIVAL = 0.01

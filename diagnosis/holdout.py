@@ -40,11 +40,28 @@ class Judge:
         self.rmse, self.gain = cache(self._rmse), cache(self._gain)
 
     @cached_property
-    def _of_base(self) -> tuple[list[Whitening], float]:
-        """Noise filters of the base, and its own log density."""
+    def misfit(self) -> float:
+        """How large the residuals of the base are, as switches that follow what was measured leave them.
+
+        Mean square, in multiples of what noise, structural floor and what the training left unsure make of it; 0
+        without held-out recordings, infinite without a prediction.
+        """
+        if not self.case.holdout.pieces:
+            return 0.0
+        try:
+            _, _, misfit = self._of_base
+        except (ArithmeticError, np.linalg.LinAlgError):
+            return np.inf
+        return misfit
+
+    @cached_property
+    def _of_base(self) -> tuple[list[Whitening], float, float]:
+        """Noise filters of the base, its own log density and its misfit."""
         problem = with_floor(at_holdout(self.case, self.base), self.floor)
         parts = _linearised(problem, self.base, self._courses)
-        return [part.whitening for part in parts], _log_density(parts, self.base)
+        quadratic, log_determinant = _spread(parts, self.base)
+        rows = sum(int(np.isfinite(part.residual).sum()) for part in parts)
+        return [part.whitening for part in parts], -0.5 * (quadratic + log_determinant), quadratic / max(rows, 1)
 
     @cached_property
     def _courses(self) -> list[Array | None]:
@@ -63,10 +80,11 @@ class Judge:
         measured, as in learning; the root mean square error is that of a free run. Minus infinity without a prediction.
         """
         try:
-            whitenings, own = self._of_base
+            whitenings, own, _ = self._of_base
             problem = at_holdout(self.case, explanation).with_whitenings(whitenings)
             parts = _linearised(problem, explanation, self._courses)
-            return _log_density(parts, explanation) - own
+            quadratic, log_determinant = _spread(parts, explanation)
+            return -0.5 * (quadratic + log_determinant) - own
         except (ArithmeticError, np.linalg.LinAlgError):
             return -np.inf
 
@@ -84,30 +102,6 @@ class Judge:
 
 def _linearised(problem: Problem, explanation: Explanation, courses: Sequence[Array | None]) -> list[Linearised]:
     return [problem.linearise(i, explanation.fit.z, course, rounds=ROUNDS) for i, course in enumerate(courses)]
-
-
-def misfit(judge: Judge) -> float:
-    """How large the held-out residuals of a judge's base are, as switches that follow what was measured leave them.
-
-    Returns
-    -------
-    float
-        Mean square, in multiples of what noise, structural floor and what the training left unsure make of it; 0
-        without held-out recordings, infinite without a prediction
-    """
-    if not judge.case.holdout.pieces:
-        return 0.0
-    try:
-        parts = _linearised(with_floor(at_holdout(judge.case, judge.base), judge.floor), judge.base, judge._courses)
-    except (ArithmeticError, np.linalg.LinAlgError):
-        return np.inf
-    quadratic, _ = _spread(parts, judge.base)
-    return quadratic / max(sum(int(np.isfinite(part.residual).sum()) for part in parts), 1)
-
-
-def _log_density(parts: Sequence[Linearised], explanation: Explanation) -> float:
-    quadratic, log_determinant = _spread(parts, explanation)
-    return -0.5 * quadratic - 0.5 * log_determinant
 
 
 def _spread(parts: Sequence[Linearised], explanation: Explanation) -> tuple[float, float]:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from diagnosis import assemble, explain, search
+from diagnosis import acceptance, assemble, explain, search
 from diagnosis.case import Case
 from diagnosis.evidence import Marginal, strength
 from diagnosis.explain import (
@@ -27,7 +27,8 @@ from diagnosis.explain import (
 )
 from diagnosis.findings import finding_of
 from diagnosis.grid import Piece, pieces
-from diagnosis.holdout import Judge, misfit
+from diagnosis.heat import _heats_with, heats_of, mean_heat_of
+from diagnosis.holdout import Judge
 from diagnosis.hypotheses import Hypothesis, Scored, hypothesis_of, scan, sharpened
 from diagnosis.network_on_grid import NetworkOnGrid, named_values
 from diagnosis.noise import loss_noise, noise_of, start_guess
@@ -36,8 +37,8 @@ from diagnosis.posterior import Problem, _gauss_newton
 from diagnosis.predict import START_S, predict
 from diagnosis.recording import Channel, Recording
 from diagnosis.recurrence import lagged
-from diagnosis.search import log_e_value
 from diagnosis.shapes import shape_terms
+from diagnosis.stage import Stage, log_e_value
 from diagnosis.term_on_grid import TermOnGrid
 from diagnosis.trajectory import complete_start, exponential, parameter_heats, settled_balance, simulate
 from diagnosis.unknowns import Unknown, Unknowns, unknowns_of
@@ -466,7 +467,7 @@ def test_what_is_not_needed_can_be_taken_out_again(fzg: Gearbox, piece: Piece, p
     assert without(start, two, 0).log_evidence < two.log_evidence - 3.0  # the first one does
     # A further effect may be what the form of the first one lacks, however far it is ahead of its rivals.
     case: Any = SimpleNamespace(nominal=network)
-    stages = [search.Stage(scored=(), log_e_value=30.0, fits=(e,), gains=(20.0,), accepted=e) for e in (one, two)]
+    stages = [Stage(scored=(), log_e_value=30.0, fits=(e,), gains=(20.0,), accepted=e) for e in (one, two)]
     stated = [finding_of(case, two, h, stage, ()).probability for h, stage in zip(two.found, stages, strict=True)]
     assert stated == pytest.approx([1.0, 0.7])
 
@@ -482,8 +483,8 @@ def test_the_error_of_a_mean_heat_is_that_of_the_strength_and_of_what_goes_with_
     found = fitted(start, scored)
     assert found is not None
     found = replace(found, fit=found.problem.at(found.fit))
-    mean, error = search.mean_heat_of(found, h)
-    heats, steps = np.concatenate(search.heats_of(found, h)), np.concatenate([p.steps for p in found.problem.pieces])
+    mean, error = mean_heat_of(found, h)
+    heats, steps = np.concatenate(heats_of(found, h)), np.concatenate([p.steps for p in found.problem.pieces])
     assert mean == pytest.approx(np.average(np.abs(heats), weights=steps))
     # The same by many draws from the posterior of the term's parameters.
     assert h.term is not None
@@ -491,7 +492,7 @@ def test_the_error_of_a_mean_heat_is_that_of_the_strength_and_of_what_goes_with_
     own = found.fit.unknowns.of(h.term.parameters)
     draws = rng.multivariate_normal(found.fit.z[own], found.fit.covariance[np.ix_(own, own)], 400)
     values = np.array([[items[i].value(x) for i, x in zip(own, draw, strict=True)] for draw in draws])
-    heat = np.concatenate(search._heats_with(found, h, np.concatenate([values.mean(axis=0, keepdims=True), values])))
+    heat = np.concatenate(_heats_with(found, h, np.concatenate([values.mean(axis=0, keepdims=True), values])))
     drawn = np.average(np.abs(heat[:, 1:]), axis=0, weights=steps)
     assert error == pytest.approx(drawn.std(), rel=0.2)
 
@@ -550,12 +551,12 @@ def test_judge_prefers_the_truth_and_survives_what_has_no_prediction(fzg: Gearbo
     assert judge.gain(wrong) < -10.0
     assert judge.rmse(wrong) > 2.0 * judge.rmse(right)
     # Explained recordings have less than noise and structural floor allow; what is wrong has more.
-    assert misfit(judge) < 1.0 < 5.0 < misfit(Judge(case, wrong, 1.0))
-    assert misfit(Judge(replace(case, holdout=problem.changed(pieces=[])), right, 1.0)) == 0.0
+    assert judge.misfit < 1.0 < 5.0 < Judge(case, wrong, 1.0).misfit
+    assert Judge(replace(case, holdout=problem.changed(pieces=[])), right, 1.0).misfit == 0.0
     network = problem.model.network.with_source("oil", lambda s: 40.0 * s.T_oil, name="own_heat")
     none = replace(right, problem=problem.changed(model=NetworkOnGrid(network, problem.model.losses)))
     assert judge.gain(none) == -np.inf
-    assert judge.rmse(none) == np.inf and misfit(Judge(case, none, 1.0)) == np.inf
+    assert judge.rmse(none) == np.inf and Judge(case, none, 1.0).misfit == np.inf
 
 
 # ---------------------------------------------------------------------- bounds, shapes and far starts
@@ -665,7 +666,7 @@ def test_a_clock_may_be_early_or_late(fzg: Gearbox, piece: Piece, problem: Probl
     found = replace(found, fit=found.problem.at(found.fit))
     for interval, matters in ((10.0, True), (150.0, False)):
         case: Any = SimpleNamespace(scale=SimpleNamespace(interval=interval), channels=CHANNELS, loss_W=250.0)
-        assert search._matters(case, found, scored.hypothesis) is matters
+        assert acceptance._matters(case, found, scored.hypothesis) is matters
 
 
 @pytest.mark.parametrize("late_s", [5.0, -5.0])
@@ -780,27 +781,27 @@ def test_another_place_of_the_same_physics_may_be_taken_where_the_best_one_fails
         hypotheses = tuple(_scored(name, place, 0.0).hypothesis for name, place in found)
         return Explanation(problem=NOTHING, fit=NOTHING, log_evidence=0.0, found=hypotheses)
 
-    monkeypatch.setattr(search, "_matters", lambda *_: True)
-    monkeypatch.setattr(search, "_holds_out", lambda _judge, _start, fit: fit.found[-1].place != "first")
+    monkeypatch.setattr(acceptance, "_matters", lambda *_: True)
+    monkeypatch.setattr(acceptance, "holds_out", lambda _judge, _start, fit: fit.found[-1].place != "first")
     base = explanation()
     judge = _judge(base, lambda fit: -20.0 if fit.found[-1].place == "first" else -5.0)
     fits = tuple(explanation(h) for h in (("feed", "first"), ("feed", "second"), ("tank", "oil")))
-    stage = search.Stage(scored=(), log_e_value=90.0, fits=fits, gains=(120.0, 60.0, 55.0))
-    found = search._judged(judge, base, stage, 10.0)
+    stage = Stage(scored=(), log_e_value=90.0, fits=fits, gains=(120.0, 60.0, 55.0))
+    found = acceptance.judged(judge, base, stage, 10.0)
     assert found.accepted is not None and found.accepted.found[-1].label == "feed@second"
     assert [fit.found[-1].label for fit in found.fits] == ["feed@second", "tank@oil"]
     assert found.probabilities()[0] > 0.5
     # What they hold for as likely, and whose error is a little too large, stays one.
-    close = search._judged(_judge(base, -5.0), base, stage, 10.0)
+    close = acceptance.judged(_judge(base, -5.0), base, stage, 10.0)
     assert close.accepted is not None and close.accepted.labels == ("feed@second",)
     assert [fit.found[-1].label for fit in close.fits] == ["feed@first", "feed@second", "tank@oil"]
     # But not where something else is far more probable than that place.
-    rather = search._judged(
+    rather = acceptance.judged(
         judge, base, replace(stage, fits=(fits[0], fits[2], fits[1]), gains=(120.0, 55.0, 25.0)), 10.0
     )
     assert rather.accepted is None
     others = replace(stage, fits=(fits[0], fits[2]), gains=(120.0, 55.0))
-    refused = search._judged(judge, base, others, 10.0)
+    refused = acceptance.judged(judge, base, others, 10.0)
     assert refused.accepted is None and "held-out data worse" in refused.note
 
 
@@ -831,15 +832,15 @@ def test_of_two_views_of_one_hypothesis_the_better_fit_counts(
 
 def test_what_is_barely_evident_has_to_be_larger(monkeypatch: pytest.MonkeyPatch) -> None:
     """Half of what matters may be hidden in what was calibrated, where the evidence is small."""
-    monkeypatch.setattr(search, "_holds_out", lambda *_: True)
-    monkeypatch.setattr(search, "_matters", lambda _case, _fit, _h, times=1.0: times < 1.5)
+    monkeypatch.setattr(acceptance, "holds_out", lambda *_: True)
+    monkeypatch.setattr(acceptance, "_matters", lambda _case, _fit, _h, times=1.0: times < 1.5)
     h = _scored("fan", "x", 0.0).hypothesis
     nothing = NOTHING
     fit = Explanation(problem=nothing, fit=nothing, log_evidence=0.0, found=(h,))
     base = replace(fit, found=())
     for gain, matters in ((40.0, False), (60.0, True)):
-        stage = search.Stage(scored=(), log_e_value=gain, fits=(fit,), gains=(gain,))
-        found = search._judged(_judge(base), base, stage, 10.0)
+        stage = Stage(scored=(), log_e_value=gain, fits=(fit,), gains=(gain,))
+        found = acceptance.judged(_judge(base), base, stage, 10.0)
         assert found.matters is matters and found.accepted is not None  # what is small is taken to clear the way
 
 
@@ -872,7 +873,7 @@ def test_the_ranking_holds_everything_that_was_scored() -> None:
     fits = tuple(
         Explanation(problem=NOTHING, fit=NOTHING, log_evidence=0.0, found=(s.hypothesis,)) for s in (tank, fan)
     )
-    stage = search.Stage(scored=(fan, form, tank, feed), log_e_value=20.0, fits=fits, gains=(55.0, 35.0))
+    stage = Stage(scored=(fan, form, tank, feed), log_e_value=20.0, fits=fits, gains=(55.0, 35.0))
     search_found: Any = SimpleNamespace(stages=[stage])
     ranked = assemble._ranking(search_found)
     assert [(r.mechanism, r.log_bayes) for r in ranked] == [("tank", 55.0), ("fan", 35.0), ("feed", -2.0)]
@@ -887,7 +888,7 @@ def test_what_remains_is_told_where_it_is_large_or_most_of_it(log_bayes: float, 
     def latent(log_bayes: float, heat_W: float) -> Any:
         return SimpleNamespace(log_bayes=log_bayes, mean=[np.full(9, heat_W)], node="oil")
 
-    found: Any = SimpleNamespace(stages=[search.Stage(scored=(), log_e_value=0.0)])
+    found: Any = SimpleNamespace(stages=[Stage(scored=(), log_e_value=0.0)])
     train = SimpleNamespace(pieces=[SimpleNamespace(steps=np.full(9, 20.0))])
     case: Any = SimpleNamespace(loss_W=300.0, train=train)
     first, remaining = [latent(1000.0, 80.0)], [latent(log_bayes, heat_W)]
@@ -904,8 +905,8 @@ def test_what_leaves_more_than_noise_and_floor_is_no_explanation(residual: float
     # Rows without a reading have nothing to say: they are neither in the sum nor in the count.
     white, read = np.append(np.full(50, residual), np.zeros(30)), np.append(np.ones(50), np.full(30, np.nan))
     parts = [SimpleNamespace(white_residual=sign * white, residual=read) for sign in (1.0, -1.0)]
-    final: Any = SimpleNamespace(fit=SimpleNamespace(parts=parts))
-    misfit = assemble._misfit(final)
+    fit: Any = SimpleNamespace(parts=parts)
+    misfit = Explanation(problem=NOTHING, fit=fit, log_evidence=0.0).misfit
     assert misfit == pytest.approx(residual**2)
     nothing: Any = None
     named: Any = SimpleNamespace(kind="source", family="heat path")
@@ -926,20 +927,20 @@ def test_a_first_effect_whose_error_another_one_hides_stands_only_beside_that_on
 
     base, wear, both = explanation(), explanation("wear"), explanation("wear", "rain")
     gain = {"wear": 400.0, "fan": 20.0}
-    monkeypatch.setattr(search, "_matters", lambda *_: True)
-    monkeypatch.setattr(search, "_holds_out", lambda *_: False)
+    monkeypatch.setattr(acceptance, "_matters", lambda *_: True)
+    monkeypatch.setattr(acceptance, "holds_out", lambda *_: False)
 
-    def judged(before: Explanation, fit: Explanation) -> search.Stage:
-        stage = search.Stage(scored=(), log_e_value=90.0, fits=(fit,), gains=(120.0,))
-        return search._judged(_judge(before, lambda fit: gain[fit.found[-1].name]), base, stage, 10.0)
+    def judged(before: Explanation, fit: Explanation) -> Stage:
+        stage = Stage(scored=(), log_e_value=90.0, fits=(fit,), gains=(120.0,))
+        return acceptance.judged(_judge(before, lambda fit: gain[fit.found[-1].name]), base, stage, 10.0)
 
     first = judged(base, wear)
     assert first.tentative and first.accepted is not None and first.accepted.found[-1].name == "wear"
     assert not judged(base, explanation("fan")).tentative  # hardly more probable
     assert judged(explanation("rain"), explanation("rain", "wear")).accepted is None  # one at a time
 
-    second = search.Stage(scored=(), log_e_value=50.0, fits=(both,), gains=(90.0,), accepted=both, matters=True)
-    end = search.Stage(scored=(), log_e_value=0.0)
+    second = Stage(scored=(), log_e_value=50.0, fits=(both,), gains=(90.0,), accepted=both, matters=True)
+    end = Stage(scored=(), log_e_value=0.0)
     monkeypatch.setattr(search, "first", lambda _: (base, 1.0))
     monkeypatch.setattr(search, "floored", lambda fit: (fit, 1.0))
     monkeypatch.setattr(search, "_needed_of", lambda _judge, _start, accepted: accepted)
@@ -958,16 +959,16 @@ def test_what_promises_has_its_chance_before_anything_less_likely(
     """An effect that needs a second one beside it, and a fault that does not: that one stands if none is found."""
     base = Explanation(problem=NOTHING, fit=NOTHING, log_evidence=0.0)
     wear, fault = (replace(base, found=(_scored(name, "x", 0.0).hypothesis,)) for name in ("wear", "fault"))
-    monkeypatch.setattr(search, "_matters", lambda *_: True)
-    monkeypatch.setattr(search, "_holds_out", lambda _judge, _start, fit: fit.labels == fault.labels)
-    stage = search.Stage(scored=(), log_e_value=90.0, fits=(wear, fault), gains=(120.0, less))
-    found = search._judged(_judge(base, 400.0), base, stage, 10.0)
+    monkeypatch.setattr(acceptance, "_matters", lambda *_: True)
+    monkeypatch.setattr(acceptance, "holds_out", lambda _judge, _start, fit: fit.labels == fault.labels)
+    stage = Stage(scored=(), log_e_value=90.0, fits=(wear, fault), gains=(120.0, less))
+    found = acceptance.judged(_judge(base, 400.0), base, stage, 10.0)
     assert found.accepted is not None and found.accepted.labels == (fault if at_once else wear).labels
     assert found.tentative is not at_once and [fit.labels for fit in found.fits] == [wear.labels, fault.labels]
     monkeypatch.setattr(search, "first", lambda _: (base, 1.0))
     monkeypatch.setattr(search, "floored", lambda fit: (fit, 1.0))
     monkeypatch.setattr(search, "_others", lambda *_: [])
-    nothing_more = search.Stage(scored=(), log_e_value=0.0)
+    nothing_more = Stage(scored=(), log_e_value=0.0)
     coming = iter((found, nothing_more, nothing_more))
     monkeypatch.setattr(search, "_look", lambda *_: next(coming))
     assert search.search(NOTHING, {}).final.labels == fault.labels
@@ -981,13 +982,13 @@ def test_what_is_likely_and_too_small_is_not_told_as_something_unlikely_and_larg
         Explanation(problem=nothing, fit=nothing, log_evidence=0.0, found=(_scored(name, place, 0.0).hypothesis,))
         for name, place in (("valve", "air"), ("valve", "outdoor"), ("cooler", "air"))
     )
-    monkeypatch.setattr(search, "_holds_out", lambda *_: True)
+    monkeypatch.setattr(acceptance, "holds_out", lambda *_: True)
     monkeypatch.setattr(
-        search, "_matters", lambda _case, _fit, h, _times=1.0: h.place == "outdoor" or h is before.found[0]
+        acceptance, "_matters", lambda _case, _fit, h, _times=1.0: h.place == "outdoor" or h is before.found[0]
     )
     for gains, accepted in (((120.0, 70.0), None), ((120.0, 119.0), there)):
-        stage = search.Stage(scored=(), log_e_value=90.0, fits=(here, there), gains=gains)
-        found = search._judged(_judge(before, 40.0), replace(before, found=()), stage, 10.0).accepted
+        stage = Stage(scored=(), log_e_value=90.0, fits=(here, there), gains=gains)
+        found = acceptance.judged(_judge(before, 40.0), replace(before, found=()), stage, 10.0).accepted
         assert (found.found if found is not None else None) == (accepted.found if accepted is not None else None)
 
 
@@ -1000,12 +1001,12 @@ def test_what_is_unlikely_is_named_after_a_refusal_only_where_held_out_recording
         Explanation(problem=nothing, fit=nothing, log_evidence=0.0, found=(_scored(n, "oil", 0.0).hypothesis,))
         for n in ("open form, standstill", "heater")
     )
-    monkeypatch.setattr(search, "_matters", lambda *_: True)
-    monkeypatch.setattr(search, "_holds_out", lambda _judge, _calibrated, fit: fit.found == other.found)
-    stage = search.Stage(scored=(), log_e_value=170.0, fits=(best, other), gains=(204.0, 193.0))
-    assert stage.probabilities()[1] < search.LEAST_SHARE * stage.probabilities()[0]
+    monkeypatch.setattr(acceptance, "_matters", lambda *_: True)
+    monkeypatch.setattr(acceptance, "holds_out", lambda _judge, _calibrated, fit: fit.found == other.found)
+    stage = Stage(scored=(), log_e_value=170.0, fits=(best, other), gains=(204.0, 193.0))
+    assert stage.probabilities()[1] < acceptance.LEAST_SHARE * stage.probabilities()[0]
     base = replace(best, found=())
-    accepted = search._judged(_judge(base, heldout_gain), base, stage, 10.0).accepted
+    accepted = acceptance.judged(_judge(base, heldout_gain), base, stage, 10.0).accepted
     assert (accepted.found[-1].name if accepted is not None else None) == named
 
 
@@ -1026,10 +1027,10 @@ def test_an_explanation_that_sends_a_capacity_away_is_none(
         return Explanation(problem=problem, fit=fit, log_evidence=0.0, found=found)
 
     base = explanation(())
-    assert search._drives_away(base, explanation((h,), ("C_oil", -z))) is away
-    assert not search._drives_away(explanation((), ("C_oil", -z)), explanation((h,), ("C_oil", -z - 1.0)))
+    assert acceptance._drives_away(base, explanation((h,), ("C_oil", -z))) is away
+    assert not acceptance._drives_away(explanation((), ("C_oil", -z)), explanation((h,), ("C_oil", -z - 1.0)))
     for item in own:
-        assert not search._drives_away(base, explanation((h,), (item.target, z)))
+        assert not acceptance._drives_away(base, explanation((h,), (item.target, z)))
 
 
 def test_what_a_first_look_held_for_less_likely_may_stand_beside_a_second_effect(
@@ -1051,13 +1052,13 @@ def test_what_a_first_look_held_for_less_likely_may_stand_beside_a_second_effect
     monkeypatch.setattr(explain, "_one_sided", lambda *_: 0.0)
     base = explanation(1000.0, cooler)
     fits = (base, explanation(995.0, other), explanation(700.0, far))
-    first = search.Stage(scored=(), log_e_value=900.0, fits=fits, gains=(900.0, 895.0, 600.0), accepted=base)
+    first = Stage(scored=(), log_e_value=900.0, fits=fits, gains=(900.0, 895.0, 600.0), accepted=base)
     (rival,) = search._others(base, first)  # what is far less likely is not looked at again
     assert rival.labels == ("cooler@air",) and rival.log_evidence == 77.0 and rival.fit.iterations == 0  # type: ignore[attr-defined]
     assert search._others(explanation(1000.0), first) == []  # nothing of the look is left
 
     beside_base, beside_other = explanation(1100.0, cooler, feed), explanation(1300.0, other, feed)
-    second = search.Stage(
+    second = Stage(
         scored=(), log_e_value=90.0, fits=(beside_other, beside_base), gains=(300.0, 100.0), accepted=beside_other
     )
     one, two = search._reconsidered([first, second], base)
