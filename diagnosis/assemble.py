@@ -37,7 +37,7 @@ from diagnosis.result import (
 from diagnosis.search import Search
 from diagnosis.shapes import shape_terms
 from diagnosis.stage import TEMPER, Stage, log_weights
-from models.mechanisms import Mechanism
+from models.mechanisms import OPEN_FORM, Mechanism
 from models.types import Array
 from models.version import project_version
 
@@ -136,7 +136,7 @@ def _verdict(
     if not findings:
         return "unexplained"
     kinds = {f.kind for f in findings}
-    if left or any(f.family == "open form" for f in findings):
+    if left or any(f.family == OPEN_FORM for f in findings):
         return "unexplained"
     if kinds <= {"sensor"}:
         return "sensor_fault"
@@ -379,7 +379,7 @@ def _ranking(found: Search) -> tuple[Ranked, ...]:
                log_bayes=fitted.get(s.hypothesis.label, (s.log_bayes, 0.0))[0],
                probability=fitted.get(s.hypothesis.label, (0.0, 0.0))[1])
         for s in stage.scored
-        if s.hypothesis.label in fitted or s.hypothesis.family != "open form"
+        if s.hypothesis.label in fitted or not s.hypothesis.is_open
     ]  # fmt: skip
     return tuple(sorted(rows, key=lambda r: (-r.probability, -r.log_bayes)))
 
@@ -387,7 +387,7 @@ def _ranking(found: Search) -> tuple[Ranked, ...]:
 def _unseen(stage: Stage, catalogue: Mapping[str, Mechanism], threshold: float) -> tuple[Unseen, ...]:
     """Mechanisms that would not have been seen at their typical strength, at their best place."""
     best: dict[str, tuple[float, str]] = {}
-    competing = [s for s in stage.scored if s.hypothesis.family != "open form"]
+    competing = [s for s in stage.scored if not s.hypothesis.is_open]
     for s, weight in zip(competing, log_weights(competing), strict=True):
         name, reached = s.hypothesis.name, s.expected + float(weight)
         if name in catalogue and reached > best.get(name, (-np.inf, ""))[0]:

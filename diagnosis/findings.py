@@ -124,10 +124,8 @@ def finding_of(case: Case, final: Explanation, h: Hypothesis, stage: Stage, riva
 def _says(h: Hypothesis, values: Mapping[str, tuple[float, float]]) -> str:
     if isinstance(h.term, Placed):
         return h.term.says
-    if h.term is None:
-        value = next(iter(values.values()), (float("nan"), 0.0))[0]
-        return f"The parameter {h.place} is {value:.3g}, far from what the definition allows."
-    return f"A heat in {h.place.replace('_', ' ')} goes with {h.name.removeprefix('open form, ')}; no known mechanism."
+    value = next(iter(values.values()), (float("nan"), 0.0))[0]
+    return f"The parameter {h.place} is {value:.3g}, far from what the definition allows."
 
 
 def _with_bias(final: Explanation, h: Hypothesis) -> dict[str, tuple[float, float]]:

@@ -21,7 +21,7 @@ from diagnosis.network_on_grid import NetworkOnGrid
 from diagnosis.observation import readings
 from diagnosis.posterior import Fit, Linearised, Problem
 from diagnosis.term_on_grid import TermOnGrid
-from models.mechanisms import Placed
+from models.mechanisms import OPEN_FORM, Placed
 from models.terms import Term
 from models.types import Array
 
@@ -61,6 +61,11 @@ class Hypothesis:
     def label(self) -> str:
         """Name and place."""
         return f"{self.name}@{self.place}"
+
+    @property
+    def is_open(self) -> bool:
+        """Whether it is a mere form, of something that no catalogue has."""
+        return self.family == OPEN_FORM
 
     @property
     def sign(self) -> int:

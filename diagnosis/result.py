@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from diagnosis.numbers import MINUS, with_error
+from models.mechanisms import OPEN_FORM
 from models.network import ThermalNetwork
 from models.terms import Term
 from models.types import Array
@@ -352,7 +353,7 @@ class Diagnosis:
     @property
     def verdict_text(self) -> str:
         """The verdict in a sentence."""
-        if self.verdict == "unexplained" and any(f.family != "open form" for f in self.findings):
+        if self.verdict == "unexplained" and any(f.family != OPEN_FORM for f in self.findings):
             return PARTLY
         return VERDICT_TEXT[self.verdict]
 

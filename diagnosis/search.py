@@ -19,14 +19,15 @@ from diagnosis.evidence import Marginal
 from diagnosis.explain import Explanation, best_fits, distorted, evidence_of, in_the_middle, without
 from diagnosis.holdout import Judge
 from diagnosis.hypotheses import Hypothesis, Scored, hypothesis_of, parameter_hypotheses, scan, sharpened, spread
-from diagnosis.open_form import open_hypotheses
+from diagnosis.mapping import LOSS
 from diagnosis.stage import Stage, log_e_value
-from models.mechanisms import Mechanism
+from models.mechanisms import OPEN_FORMS, Mechanism
 
 # All set on development cases (seed 1 of `conceal`) and by the four open ones; the proof draws others.
 THRESHOLD = 5.0  # log e-value at a false-alarm rate of 5 %
 OPEN_PENALTY = 10.0  # an open form has to beat the catalogue by this
-SHARPENED, SHARPEN_FROM = 15, 2.0  # best hypotheses whose shapes are sought between the grid, from this score on
+# Best hypotheses and best open forms whose shapes are sought between the grid, from this score on.
+SHARPENED, SHARPENED_FORMS, SHARPEN_FROM = 15, 4, 2.0
 FITTED, WORTH = 5, 0.12  # hypotheses that are fitted in earnest, and the share of the best score that they need
 MOST_FITTED, NEAR = 12, 0.6  # where more of them score about as well as the best: the scan is only linear
 # So strong a first effect bends so much that what is best in a straight line may be far from best: other names from
@@ -35,6 +36,7 @@ STRONG, WORTH_OF_STRONG = 200.0, 0.04
 # What was nearly as likely as what was accepted may be right beside a further effect: so many are seen, from this share
 # of its probability.
 OTHERS, LIKELY = 2, 0.1
+BETTER = 3.0  # log evidence of a calibration that replaces another one
 FORM_DOUBT = 0.3  # that a further effect is only what the form of the one before lacks
 MOST_EFFECTS = 4
 
@@ -82,16 +84,20 @@ def threshold_at(false_alarm_rate: float) -> float:
     return THRESHOLD + float(np.log(0.05 / false_alarm_rate))
 
 
-def hypotheses_of(case: Case, explanation: Explanation, catalogue: Mapping[str, Mechanism]) -> list[Hypothesis]:
-    """Everything that may be added to an explanation."""
-    taken = set(explanation.labels)
-    found = [
+def candidates_of(case: Case, catalogue: Mapping[str, Mechanism]) -> tuple[Hypothesis, ...]:
+    """Every mechanism and every open form at each of its places."""
+    forms = [form for form in OPEN_FORMS if LOSS in case.channels or not form.is_loss]
+    return tuple(
         hypothesis_of(placed)
-        for mechanism in catalogue.values()
+        for mechanism in (*catalogue.values(), *forms)
         for placed in mechanism.placed(case.train.model.network, case.scale, case.channels)
-        if f"{placed.name}@{placed.place}" not in taken
-    ]
-    found += open_hypotheses(case.train.model.network, case.scale, case.channels)
+    )
+
+
+def hypotheses_of(candidates: Sequence[Hypothesis], explanation: Explanation) -> list[Hypothesis]:
+    """Everything that may be added to an explanation: what it lacks of the candidates, and parameters."""
+    taken = set(explanation.labels)
+    found = list(candidates)
     own = {p.name for h in explanation.found if h.term is not None for p in h.term.parameters}
     found += [h for h in parameter_hypotheses(explanation.problem) if h.place not in own]
     return [h for h in found if h.label not in taken]
@@ -116,13 +122,18 @@ def search(
     progress("calibrating the model inside its priors")
     start, start_floor = base, floor = first(case)
     threshold = threshold_at(false_alarm_rate)
+    candidates = candidates_of(case, catalogue)
     stages: list[Stage] = []
     others: list[Explanation] = []
     for look in range(MOST_EFFECTS):
         progress("scoring everything that may be missing" if not look else "looking for a further effect")
         needed = SECOND_GAIN if look else threshold
         judge = Judge(case, base, floor)
-        stage = _look(judge, start, catalogue, needed, jobs, progress, others)
+        stage = _look(judge, start, candidates, needed, jobs, progress, others)
+        if not look and (better := _recalibrated(base, stage)) is not None:
+            start, start_floor = base, floor = floored(better)
+            judge = Judge(case, base, floor)
+            stage = _look(judge, start, candidates, needed, jobs, progress, others)
         if stage.accepted is None and stages and stages[-1].tentative:
             alone = stages.pop()
             stage = alone.otherwise or replace(alone, accepted=None, tentative=False)
@@ -147,6 +158,21 @@ def search(
     return Search(calibrated=start, final=base, stages=tuple(stages), threshold=threshold, judge=judge)
 
 
+def _recalibrated(base: Explanation, stage: Stage) -> Explanation | None:
+    """The calibration once more, from where the best fit of the first look left it, if that is better; else None.
+
+    From a false optimum anything looks as if it were missing that leads out of it.
+    """
+    if not stage.fits or not distorted(base):
+        return None
+    best = max(stage.fits, key=lambda fit: fit.log_evidence)
+    try:
+        again = without(base, replace(best, fit=best.problem.at(best.fit)), 0)
+    except ArithmeticError:
+        return None
+    return again if again.log_evidence > base.log_evidence + BETTER else None
+
+
 def _others(base: Explanation, stage: Stage) -> list[Explanation]:
     """What was nearly as likely as what a look accepted, judged by the same noise as the base that came of it."""
     accepted = stage.accepted
@@ -157,7 +183,7 @@ def _others(base: Explanation, stage: Stage) -> list[Explanation]:
     found = []
     for fit in stage.fits:
         last = fit.found[-1]
-        if last.label == accepted.found[-1].label or last.family == "open form" or probability[last.label] < likely:
+        if last.label == accepted.found[-1].label or last.is_open or probability[last.label] < likely:
             continue
         problem = fit.problem.changed(noise=base.problem.noise, whitenings=base.problem.whitenings)
         same = fit.problem.whitenings is base.problem.whitenings
@@ -202,26 +228,25 @@ def _needed_of(judge: Judge, calibrated: Explanation, accepted: Explanation) -> 
 
 
 def _look(
-    judge: Judge, calibrated: Explanation, catalogue: Mapping[str, Mechanism], needed: float, jobs: int,
+    judge: Judge, calibrated: Explanation, candidates: Sequence[Hypothesis], needed: float, jobs: int,
     progress: Callable[[str], None], others: Sequence[Explanation],
 ) -> Stage:  # fmt: skip
     """Look for one more effect than the judge's base has; it may be found beside one of `others` instead."""
-    case, base = judge.case, judge.base
-    hypotheses = hypotheses_of(case, base, catalogue)
-    real, opened = _scanned(base, hypotheses, jobs)
+    base = judge.base
+    real, opened = _scanned(base, hypotheses_of(candidates, base), jobs)
     scored = sorted([*real, *opened], key=lambda s: -s.log_bayes)
-    log_e = log_e_value(real)
+    # The penalty is more than the logarithm of how many forms there are: this stays an e-value.
+    log_e = max(log_e_value(real), opened[0].log_bayes - OPEN_PENALTY)
     if log_e < needed:
         return Stage(scored=tuple(scored), log_e_value=log_e, note="nothing reaches the threshold")
     progress("fitting the best explanations in earnest")
     first_look = not base.found
-    chosen = [(base, s) for s in [*_worth(real, strong=first_look), *opened[:2]]
-              if s.hypothesis.family != "open form" or s.log_bayes > real[0].log_bayes + OPEN_PENALTY]  # fmt: skip
+    chosen = [(base, s) for s in [*_worth(real, strong=first_look), *_worth_of_open(opened, real[0].log_bayes)]]
     views = list(others)
     if distorted(base) and first_look and (middle := in_the_middle(base)) is not None:
         views.append(middle)
     for view in views:
-        known = [h for h in hypotheses_of(case, view, catalogue) if h.family != "open form"]
+        known = [h for h in hypotheses_of(candidates, view) if not h.is_open]
         chosen += [(view, s) for s in _worth(_scanned(view, known, jobs)[0], strong=first_look)]
     fits = best_fits(base, chosen, jobs=jobs)
     if not fits:
@@ -235,11 +260,16 @@ def _scanned(base: Explanation, hypotheses: Sequence[Hypothesis], jobs: int) -> 
     """Scores of what is known and of open forms, each best first."""
     marginal = Marginal.of(base.fit)
     scored = scan(base.problem, base.fit, marginal, hypotheses, jobs=jobs)
-    real = [s for s in scored if s.hypothesis.family != "open form"]
-    near = [s for s in real[:SHARPENED] if s.log_bayes > SHARPEN_FROM]
+    real = [s for s in scored if not s.hypothesis.is_open]
+    opened = [s for s in scored if s.hypothesis.is_open]
+    near = [s for s in [*real[:SHARPENED], *opened[:SHARPENED_FORMS]] if s.log_bayes > SHARPEN_FROM]
     finer = spread(jobs, [delayed(sharpened)(base.problem, base.fit, marginal, s) for s in near])
-    real = sorted([*finer, *real[len(near) :]], key=lambda s: -s.log_bayes)
-    return real, [s for s in scored if s.hypothesis.family == "open form"]
+    by_label = {s.hypothesis.label: s for s in finer}
+    real, opened = (
+        sorted((by_label.get(s.hypothesis.label, s) for s in some), key=lambda s: -s.log_bayes)
+        for some in (real, opened)
+    )
+    return real, opened
 
 
 def _worth(scored: Sequence[Scored], *, strong: bool) -> list[Scored]:
@@ -255,5 +285,17 @@ def _worth(scored: Sequence[Scored], *, strong: bool) -> list[Scored]:
     return found if len(found) > 1 else list(scored[:2])
 
 
+def _worth_of_open(opened: Sequence[Scored], best_known: float) -> list[Scored]:
+    """What of the open forms is worth a fit: two at most, of two kinds where what they explain is strong.
+
+    They have to be ahead of the catalogue; not where the scan, being linear, tells little of who is.
+    """
+    found = [s for s in opened[:2] if s.log_bayes > best_known + OPEN_PENALTY]
+    if found or opened[0].log_bayes < max(STRONG, NEAR * best_known):
+        return found
+    other = next((s for s in opened if s.hypothesis.name != opened[0].hypothesis.name), opened[0])
+    return [opened[0], other]
+
+
 def _penalised(fit: Explanation) -> float:
-    return fit.log_evidence - (OPEN_PENALTY if fit.found[-1].family == "open form" else 0.0)
+    return fit.log_evidence - (OPEN_PENALTY if fit.found[-1].is_open else 0.0)

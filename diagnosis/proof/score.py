@@ -19,6 +19,7 @@ from scipy.stats import binomtest, quantile_test
 
 from diagnosis.proof.conceal import CONTROLS
 from models.gearbox import Gearbox
+from models.mechanisms import OPEN_FORM, OPEN_FORMS
 
 CONFIDENCE = 0.95
 TIE_PROBABILITY = 0.05  # from which a rival belongs to the tie set
@@ -26,7 +27,7 @@ STRENGTH_ERROR = 0.15
 EVIDENT = 10.0  # nats for an effect at its best place, as the diagnosis itself weighs it: less is lost in a catalogue
 SILENT = ("consistent", "insufficient_data", "refused", "failed")
 CANNOT_TELL = ("insufficient_data", "refused")
-OPEN = "open form"
+OPEN_NAMES = {form.name for form in OPEN_FORMS}
 FAR, OUTSIDE, NOTHING, TO_FIND = "parameter_far", "outside the catalogue", "nothing", "to find"
 # Strengths that mean the same in plant and catalogue, but for their sign; heats are compared as heats.
 SAME_STRENGTH = ("sensor_bias", "sensor_gain", "sensor_lag", "clock_offset", "torque_offset", "torque_gain",
@@ -190,7 +191,7 @@ class Answer:
     @property
     def unnamed(self) -> bool:
         """Whether something is amiss that is said to be none of the catalogue's."""
-        return not self.silent and (self.verdict == "unexplained" or all(c.family == OPEN for c in self.claims))
+        return not self.silent and (self.verdict == "unexplained" or all(c.family == OPEN_FORM for c in self.claims))
 
     @property
     def named(self) -> frozenset[str]:
@@ -619,7 +620,7 @@ def stated_probabilities(cases: Sequence[Judged]) -> list[tuple[float, bool]]:
 def _is_there(j: Judged, claim: Claim, name: str) -> bool:
     if name == "parameter":
         return j.truth["control"] == FAR and claim.place == j.far
-    return j.group == "outside" if name.startswith(OPEN) else name in j.names
+    return j.group == "outside" if name in OPEN_NAMES else name in j.names
 
 
 def reliability(stated: Sequence[tuple[float, bool]]) -> list[dict[str, Any]]:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 from models.mechanisms import ageing, heat_paths, losses, measurement, oil_circuit, surroundings
 from models.mechanisms.mechanism import Mechanism, Memory, Placed
+from models.mechanisms.open_forms import OPEN_FORM, OPEN_FORMS
 from models.mechanisms.scale import Scale
 from models.mechanisms.user_files import load_mechanisms
 
@@ -15,4 +16,4 @@ CATALOGUE: Mapping[str, Mechanism] = {
     for mechanism in family.MECHANISMS
 }
 
-__all__ = ["CATALOGUE", "Mechanism", "Memory", "Placed", "Scale", "load_mechanisms"]
+__all__ = ["CATALOGUE", "OPEN_FORM", "OPEN_FORMS", "Mechanism", "Memory", "Placed", "Scale", "load_mechanisms"]

@@ -8,18 +8,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cache, partial
 from typing import Literal, TypeAlias
 
 import sympy as sp
 
 from models.errors import InputError
-from models.laws import LawLike, Parameter, symbol, trace
+from models.laws import LawLike, NumericLaw, Parameter, symbol, trace
 from models.mechanisms.places import LOSS_CHANNEL, Spot, spots
 from models.mechanisms.scale import Scale
 from models.network import ExtraState, ThermalNetwork
 from models.terms import Form, Kind, Term, equation
 
 Parameters: TypeAlias = Callable[[Scale], tuple[Parameter, ...]]
+Traced: TypeAlias = Callable[[LawLike, tuple[str, ...]], tuple[sp.Expr, NumericLaw | None]]
 STRENGTH = "strength"
 GROUPS = ("housing", "bearings", "shafts", "gears")  # that a law may name; in a network without one it has no place
 OPTIONAL = ("T_outdoor",)  # inputs that not every network has; without one it has no place either
@@ -139,7 +141,8 @@ class Mechanism:
         if channels is None:
             channels = (*(part.name for part in network.parts), LOSS_CHANNEL)
         found = [spot for pattern in self.places for spot in spots(network, self.kind, pattern, channels)]
-        placed = [self._at(network, scale, spot) for spot in found]
+        common, traced = _aliases(network, scale), cache(partial(trace, stand_in=self.name))
+        placed = [self._at(network, scale, spot, common, traced) for spot in found]
         return tuple(
             p for p in placed if p.target and not any(ABSENT in law.free_symbols for law in p.written.values())
         )
@@ -148,14 +151,16 @@ class Mechanism:
         """The experiment that would tell this mechanism from another one."""
         return self.separate_by.get(other, self.experiment)
 
-    def _at(self, network: ThermalNetwork, scale: Scale, spot: Spot) -> Placed:
+    def _at(
+        self, network: ThermalNetwork, scale: Scale, spot: Spot, common: Mapping[str, sp.Expr], traced: Traced
+    ) -> Placed:  # fmt: skip
         label = f"{self.name}_{spot.name}"
         own = self.parameters(scale)
         if not own or own[0].name != STRENGTH:
             raise InputError(f"mechanism {self.name!r}: its first parameter must be called {STRENGTH!r}")
         local = {p.name: symbol(f"{label}_{p.name}") for p in own}
         local |= {memory.name: symbol(f"{label}_{memory.name}") for memory in self.states}
-        aliases = _aliases(network, scale, spot)
+        aliases = {**common, **_ends(spot)}
         clash = sorted(set(local) & (set(aliases) | set(network.signals)))
         if clash:
             raise InputError(f"mechanism {self.name!r}: {clash[0]!r} is a signal; name the parameter differently")
@@ -172,7 +177,7 @@ class Mechanism:
             target, weights = tuple(name for name, _ in kept), tuple(weight for _, weight in kept)
 
         def read(law: LawLike) -> sp.Expr:
-            expression, numeric = trace(law, [*network.signals, *local, *aliases], self.name)
+            expression, numeric = traced(law, (*network.signals, *local, *aliases))
             if numeric is not None:
                 raise InputError(f"mechanism {self.name!r}: a law must be an expression; write branches with Piecewise")
             return expression.xreplace({symbol(name): value for name, value in local.items()})
@@ -279,7 +284,7 @@ class Placed(Term):
         return r",\quad ".join(lines)
 
 
-def _aliases(network: ThermalNetwork, scale: Scale, spot: Spot) -> dict[str, sp.Expr]:
+def _aliases(network: ThermalNetwork, scale: Scale) -> dict[str, sp.Expr]:
     """What a law of the catalogue may use beside the network's own signals."""
     aliases = {
         "n": sp.Abs(symbol("speed")) / scale.speed,
@@ -293,11 +298,13 @@ def _aliases(network: ThermalNetwork, scale: Scale, spot: Spot) -> dict[str, sp.
     aliases |= {f"T_{group}": ABSENT for group in GROUPS}
     aliases |= {name: ABSENT for name in OPTIONAL if name not in network.signals}
     aliases |= {f"T_{group}": _mean(members) for group, members in network.groups.items()}
-    if spot.here:
-        aliases["T_here"] = _mean(spot.here)
-    if spot.there:
-        aliases["T_there"] = _mean(spot.there)
     return aliases
+
+
+def _ends(spot: Spot) -> dict[str, sp.Expr]:
+    """Temperatures of the place and of the other end."""
+    ends = {"T_here": spot.here, "T_there": spot.there}
+    return {name: _mean(nodes) for name, nodes in ends.items() if nodes}
 
 
 def _mean(nodes: Sequence[str]) -> sp.Expr:

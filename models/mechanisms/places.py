@@ -2,8 +2,8 @@
 
 A pattern is a name, a group (its members together), or ``each`` and a group (one place per member), by kind:
 
-- source, link: nodes. ``oil``, ``housing``, ``each bearings``; of a link also both ends, ``each bearings-returns``,
-  the other one a boundary or a group of one
+- source, link: nodes. ``oil``, ``housing``, ``each bearings``, ``each parts`` (of all there are); of a link also both
+  ends, ``each bearings-returns``, the other one a boundary or a group of one
 - loss_factor: sources. ``losses``, all that are mechanical; ``mesh_sliding``; the losses in a group of nodes,
   ``each bearings``; those in the nodes of a group that hang on one member of another, ``each shafts>bearings``; those
   that a factor of the network multiplies, ``factor seal``; several together, ``mesh_sliding+mesh_rolling``
@@ -26,7 +26,7 @@ from models.network import BASE_SIGNALS, ThermalNetwork
 from models.terms import Kind
 
 LOSS_CHANNEL = "P_loss"
-EACH, FACTOR, ALL_LOSSES = "each ", "factor ", "losses"
+EACH, FACTOR, ALL_LOSSES, ALL_PARTS = "each ", "factor ", "losses", "parts"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,6 +89,8 @@ def _apart(pattern: str) -> tuple[bool, str]:
 
 
 def _members(network: ThermalNetwork, name: str) -> tuple[str, ...]:
+    if name == ALL_PARTS:
+        return tuple(part.name for part in network.parts)
     return network.groups.get(name, (name,) if name in network.node_names else ())
 
 

@@ -711,7 +711,8 @@ def test_parameters_of_what_was_found_are_no_further_explanation(fzg: Gearbox, p
     nothing: Any = None
     before = Explanation(problem=problem, fit=nothing, log_evidence=0.0)
     after = Explanation(problem=explain._with(problem, found), fit=nothing, log_evidence=0.0, found=(found,))
-    labels = [{h.label for h in search.hypotheses_of(case, e, CATALOGUE)} for e in (before, after)]
+    candidates = search.candidates_of(case, CATALOGUE)
+    labels = [{h.label for h in search.hypotheses_of(candidates, e)} for e in (before, after)]
     assert len(after.problem.unknowns) > len(problem.unknowns)
     assert labels[1] == labels[0] - {found.label}
 
@@ -869,7 +870,7 @@ def test_beside_a_strong_first_effect_more_names_are_fitted() -> None:
 def test_the_ranking_holds_everything_that_was_scored() -> None:
     """Fitted ones by their fits, the rest by the scan; of open forms those that were fitted."""
     fan, tank, feed = (_scored(name, "x", score) for name, score in (("fan", 40.0), ("tank", 30.0), ("feed", -2.0)))
-    form = replace(fan, hypothesis=replace(fan.hypothesis, name="open form, speed", family="open form"))
+    form = replace(fan, hypothesis=replace(fan.hypothesis, name="open_speed", family="open form"))
     fits = tuple(
         Explanation(problem=NOTHING, fit=NOTHING, log_evidence=0.0, found=(s.hypothesis,)) for s in (tank, fan)
     )
@@ -999,7 +1000,7 @@ def test_what_is_unlikely_is_named_after_a_refusal_only_where_held_out_recording
     nothing = NOTHING
     best, other = (
         Explanation(problem=nothing, fit=nothing, log_evidence=0.0, found=(_scored(n, "oil", 0.0).hypothesis,))
-        for n in ("open form, standstill", "heater")
+        for n in ("open_standstill", "heater")
     )
     monkeypatch.setattr(acceptance, "_matters", lambda *_: True)
     monkeypatch.setattr(acceptance, "holds_out", lambda _judge, _calibrated, fit: fit.found == other.found)

@@ -200,7 +200,7 @@ def test_the_dominant_effect_comes_first() -> None:
 
 def test_outside_the_catalogue_is_said_or_forced() -> None:
     true = truth("outside", effect("stick_slip"))
-    opened = claim("open form, speed", family="open form")
+    opened = claim("open_speed", family="open form")
     assert by("outside", judged(true, "unexplained")) is True
     assert by("outside", judged(true, "missing_physics", opened)) is True
     assert by("outside", judged(true, "unexplained", claim("windage", 0.4))) is True
@@ -277,7 +277,7 @@ def test_stated_probabilities_are_counted_in_bins() -> None:
     j = judged(true, "missing_physics", claim("windage", 0.95, pump_heat=0.05))
     stated = score.stated_probabilities([j])
     assert sorted(stated) == [(0.05, False), (0.95, True)]
-    opened = claim("open form, speed", 0.9, family="open form")
+    opened = claim("open_speed", 0.9, family="open form")
     assert score.stated_probabilities([judged(truth("outside", effect("drying")), "unexplained", opened)]) == [
         (0.9, True)
     ]
