@@ -121,7 +121,7 @@ def holds_out(judge: Judge, calibrated: Explanation, fit: Explanation) -> bool:
     clearly = judge.case.holdout.slow and judge.rmse(fit) < CLEARLY_BETTER * judge.rmse(judge.base)
     if judge.gain(fit) < HOLDOUT_LOSS and not clearly:
         return False
-    term = fit.found[-1].term
+    term = fit.found[-1].term if fit.found else None
     slack = HOLDOUT_SLACK_INSTRUMENT if term is not None and term.of_measurement else HOLDOUT_SLACK
     after = judge.rmse(fit)
     before = judge.rmse(calibrated)

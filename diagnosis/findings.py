@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -16,6 +17,7 @@ from diagnosis.stage import Stage
 from models.mechanisms import Mechanism, Placed
 
 LEAST_RIVAL = 0.01
+FORM_ERROR = 0.1  # of a strength and its heat: laws of the literature are hardly known better
 
 
 def node_of(case: Case, h: Hypothesis) -> str:
@@ -83,11 +85,12 @@ def finding_of(case: Case, final: Explanation, h: Hypothesis, stage: Stage, riva
     """A finding with the values of the final explanation."""
     probabilities = dict(zip((f.found[-1].label for f in stage.fits), stage.probabilities(), strict=True))
     doubt = 0.0 if final.found[0].label == h.label else FORM_DOUBT
-    values = _with_bias(final, h)
+    values = _with_form(h, _with_bias(final, h))
     heats = heats_of(final, h)
     pieces = [part.trajectory.piece for part in final.fit.parts]
     together = np.abs(np.concatenate(heats)) if heats else np.zeros(1)
     mean, stderr = mean_heat_of(final, h)
+    stderr = math.hypot(stderr, FORM_ERROR * mean)
     term = h.term
     if term is not None:
         known = {name: value for name, (value, _) in values.items()}
@@ -126,6 +129,14 @@ def _says(h: Hypothesis, values: Mapping[str, tuple[float, float]]) -> str:
         return h.term.says
     value = next(iter(values.values()), (float("nan"), 0.0))[0]
     return f"The parameter {h.place} is {value:.3g}, far from what the definition allows."
+
+
+def _with_form(h: Hypothesis, values: Mapping[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:
+    """Values of what was found; the strength of a law with what its form may be wrong by."""
+    if h.term is None:
+        return dict(values)
+    value, sd = values[h.term.strength.name]
+    return {**values, h.term.strength.name: (value, math.hypot(sd, FORM_ERROR * value))}
 
 
 def _with_bias(final: Explanation, h: Hypothesis) -> dict[str, tuple[float, float]]:

@@ -65,8 +65,7 @@ class Finding:
     Attributes
     ----------
     mechanism : str
-        Name in the catalogue; ``parameter`` for a parameter out of its prior, ``open_form`` for a form that is none of
-        the catalogue's, ``unknown_heat`` for a heat without a form
+        Name in the catalogue; ``parameter`` for a parameter out of its prior; of an open form its name
     family, place, node, kind, says, reference : str
         `node`: the part of the network, or the channel, that it acts on
     equation : str

@@ -38,7 +38,7 @@ class Stage:
     scored : tuple of Scored
         Everything, best first
     log_e_value : float
-        Log of the mean Bayes factor over everything known that was scored, or of the best open form with its penalty
+        Log of the mean Bayes factor over everything known that was scored, or of the best open form less its handicap
     fits : tuple of Explanation
         The best few, fitted in earnest, best first
     gains : tuple of float

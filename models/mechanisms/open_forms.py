@@ -35,7 +35,7 @@ def _nothing(_: Scale) -> tuple[Parameter, ...]:
 def _ratio(name: str, *grid: float) -> Shapes:
     """A speed or torque in ratio to the reference."""
     middle = grid[len(grid) // 2]
-    return lambda _: (plain(name, middle, sd=0.3, lower=0.0, upper=2.0, grid=grid),)
+    return lambda _: (plain(name, middle, sd=0.3, lower=STANDING, upper=2.0, grid=grid),)
 
 
 def _temperature(name: str, *shares: float) -> Shapes:
