@@ -28,7 +28,7 @@ def diagnose(
     *,
     holdout: Source | Sequence[Source] = (),
     false_alarm_rate: float = 0.05,
-    catalogue: Mapping[str, Mechanism] = CATALOGUE,
+    catalogue: Mapping[str, Mechanism] | None = None,
     jobs: int = 1,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Diagnosis:
@@ -43,7 +43,7 @@ def diagnose(
         To judge by; without any, the last quarter of every recording is held out
     false_alarm_rate : float
         Probability with which consistent recordings may be called inconsistent, 1e-4 to 0.5
-    catalogue : mapping of str to Mechanism
+    catalogue : mapping of str to Mechanism, optional
         By default :data:`models.mechanisms.CATALOGUE`
     jobs : int
         Processes
@@ -62,6 +62,7 @@ def diagnose(
     """
     if not 1e-4 <= false_alarm_rate <= 0.5:
         raise InputError(f"a false-alarm rate of {false_alarm_rate:g} is not possible; 0.0001 to 0.5 is")
+    catalogue = CATALOGUE if catalogue is None else catalogue
     gearbox = gearbox if isinstance(gearbox, Gearbox) else load_gearbox(gearbox)
     train, held = _read(recordings, gearbox), _read(holdout, gearbox)
     if not train:

@@ -132,8 +132,8 @@ def _says(h: Hypothesis, values: Mapping[str, tuple[float, float]]) -> str:
 
 
 def _with_form(h: Hypothesis, values: Mapping[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:
-    """Values of what was found; the strength of a law with what its form may be wrong by."""
-    if h.term is None:
+    """Values of what was found; the strength of a law with what its form may be wrong by; a fault has none."""
+    if h.term is None or h.term.of_measurement:
         return dict(values)
     value, sd = values[h.term.strength.name]
     return {**values, h.term.strength.name: (value, math.hypot(sd, FORM_ERROR * value))}

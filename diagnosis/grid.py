@@ -61,6 +61,8 @@ class Piece:
         what was there, and that was measured. For learning only: a prediction runs free
     lags : Array, shape (channels,), or None
         Time constants of the sensors, [s]: switches feel what a slow sensor does not show yet
+    late_s : float
+        By how much the clock of the temperatures is behind that of the inputs: switches felt them so much earlier
     """
 
     recording: str
@@ -72,6 +74,7 @@ class Piece:
     slow: bool = False
     guided: bool = False
     lags: Array | None = None
+    late_s: float = 0.0
 
     @cached_property
     def steps(self) -> Array:
@@ -131,6 +134,9 @@ class Piece:
             if self.guided and name in parts:
                 lag = 0.0 if self.lags is None else float(self.lags[index])
                 found[:, list(parts).index(name)] = self._without_sensor(self.measured[:, index], lag)
+        if self.late_s:
+            moved = [np.interp(self.time + self.late_s, self.time, course, np.nan, np.nan) for course in found.T]
+            found = np.stack(moved, axis=1)
         return found
 
     def _without_sensor(self, measured: Array, lag: float) -> Array:

@@ -43,7 +43,7 @@ def white_columns(model: NetworkOnGrid, part: Linearised, heat: Array, loss: Arr
     Array, shape (M, columns)
     """
     T = part.trajectory.response(heat)
-    return part.whitening(reading_columns(model, part.trajectory, part.sensors, T, loss))
+    return part.whitening(part.shown(reading_columns(model, part.trajectory, part.sensors, T, loss)))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

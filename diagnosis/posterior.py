@@ -46,6 +46,8 @@ class Linearised:
     whitening : Whitening
     white_residual : Array, shape (M,)
     white_columns : Array, shape (M, unknowns)
+    faults : tuple of (TermOnGrid, Array)
+        Faults of sensors, with the values of their parameters
     """
 
     trajectory: Trajectory
@@ -55,6 +57,13 @@ class Linearised:
     whitening: Whitening
     white_residual: Array
     white_columns: Array
+    faults: tuple[tuple[TermOnGrid, Array], ...] = ()
+
+    def shown(self, changes: Array) -> Array:
+        """What faulty sensors show of changes of the readings, shape (K + 1, channels, ...)."""
+        for fault, values in self.faults:
+            changes = fault.passed_on(self.trajectory, self.sensors, changes, values)
+        return changes
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -157,6 +166,7 @@ class Problem:
         return Linearised(
             trajectory=trajectory, sensors=sensors, residual=residual, columns=columns, whitening=whitening,
             white_residual=white[:, 0], white_columns=white[:, 1:],
+            faults=tuple((d, self._own(d, z)) for d in self._distortions),
         )  # fmt: skip
 
     def _own(self, term: TermOnGrid, z: Array) -> Array:
@@ -167,7 +177,8 @@ class Problem:
         piece = self.unknowns.adjusted(self.pieces[index], self.inputs, z)
         for shift in self._shifts:
             piece = shift.adjusted(piece, self._own(shift, z), trajectory)
-        return piece
+        late = [d.constant(self._own(d, z)) for d in self._distortions if d.term.form == "clock"]
+        return replace(piece, late_s=sum(late)) if late else piece
 
     def read(self, trajectory: Trajectory, sensors: Sensors, z: Array) -> Array:
         """What the sensors read, faults included, shape (K + 1, channels)."""
@@ -202,17 +213,20 @@ class Problem:
             heats[:, : heat.shape[1], index], losses[:, index] = heat * scale, loss * scale
         columns = reading_columns(model, trajectory, sensors, trajectory.response(heats), losses)
         self._add_sensors(columns, trajectory, sensors, z)
+        for distortion in self._distortions:
+            columns = distortion.passed_on(trajectory, sensors, columns, self._own(distortion, z))
+        for index, item in enumerate(items):
+            if item.role == "term" and (fault := self._term_of(self._distortions, item)) is not None:
+                columns[:, :, index] += self._distortion(trajectory, sensors, fault, item, z) * scales[index]
         return columns
 
     def _add_sensors(self, columns: Array, trajectory: Trajectory, sensors: Sensors, z: Array) -> None:
-        """The columns of what the network does not feel."""
+        """The columns of what the network does not feel, faults apart."""
         model = self.model
         for index, item in enumerate(self.unknowns.items):
             scale = item.per_z(float(z[index]))
             if item.role == "bias":
                 columns[:, sensors.channels.index(item.target), index] = scale
-            elif item.role == "term" and (distortion := self._term_of(self._distortions, item)) is not None:
-                columns[:, :, index] += self._distortion(trajectory, sensors, distortion, item, z) * scale
             elif item.role == "loss_gain":
                 columns[:, sensors.channels.index(LOSS), index] = total_at_points(trajectory.loss) * scale
             elif item.role == "loss_delay":

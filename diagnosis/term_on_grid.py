@@ -16,7 +16,7 @@ from diagnosis.network_on_grid import NetworkOnGrid
 from diagnosis.observation import Sensors
 from diagnosis.recurrence import lagged
 from diagnosis.trajectory import Trajectory
-from models.laws import compile_function, function_source
+from models.laws import compile_function, function_source, symbol
 from models.network import BASE_SIGNALS
 from models.terms import FACTORS, Term
 from models.types import Array
@@ -91,6 +91,12 @@ class TermOnGrid:
         law, other = self._law(*rows, *own, *states)
         size = (len(values), len(T))
         return np.broadcast_to(np.asarray(law, float), size), np.broadcast_to(np.asarray(other, float), size)
+
+    def constant(self, values: Array) -> float:
+        """The law where it has nothing but the term's own parameters, of shape (parameters,); else nothing."""
+        given = {symbol(p.name): float(v) for p, v in zip(self.term.parameters, values, strict=True)}
+        law = sp.sympify(self.term.expression.xreplace(given))
+        return float(law) if law.is_number else 0.0
 
     # ------------------------------------------------------------------ heat
 
@@ -201,26 +207,38 @@ class TermOnGrid:
 
     def distorted(self, trajectory: Trajectory, sensors: Sensors, read: Array, values: Array) -> Array:
         """Readings with the fault of a term of kind ``sensor``; `values` of shape (parameters,)."""
-        term, time = self.term, trajectory.piece.time
-        law = self.law(trajectory, values[None, :], at_points=True)[0][0]
-        channels = [sensors.channels.index(name) for name in term.target]
+        if self.term.form != "shift":
+            return self.passed_on(trajectory, sensors, read, values)
         read = np.array(read)
-        if term.form == "shift":
-            for index in channels:
-                read[:, index] += law
-        elif term.form == "lag":
-            for index in channels:
-                read[:, index] = lagged(read[:, index], trajectory.piece.steps, float(law[0]))
-        elif term.form == "clock":
-            for index in channels:
-                read[:, index] = np.interp(time - law, time, read[:, index])
-        elif term.form == "stuck":
-            begin = int(np.argmax(law != 0.0))  # the reading is held as it was when the law set in
-            for index in channels:
-                read[:, index] += law * (read[begin, index] - read[:, index])
-        elif term.form == "swapped":
-            read[:, channels] += law[:, None] * (read[:, channels[::-1]] - read[:, channels])
+        law = self.law(trajectory, values[None, :], at_points=True)[0][0]
+        for name in self.term.target:
+            read[:, sensors.channels.index(name)] += law
         return read
+
+    def passed_on(self, trajectory: Trajectory, sensors: Sensors, changes: Array, values: Array) -> Array:
+        """What such a fault makes of changes of the readings, shape (K + 1, channels, ...): most of them are linear."""
+        term, time = self.term, trajectory.piece.time
+        if term.form == "shift":
+            return changes
+        law = self.law(trajectory, values[None, :], at_points=True)[0][0]
+        along = law.reshape(-1, *[1] * (changes.ndim - 2))
+        channels = [sensors.channels.index(name) for name in term.target]
+        changes = np.array(changes)
+        for index in channels:
+            before = changes[:, index]
+            if term.form == "lag":
+                changes[:, index] = lagged(before, trajectory.piece.steps, float(law[0]))
+            elif term.form == "clock":
+                at = np.interp(time - law, time, np.arange(len(time)))
+                low = np.minimum(at.astype(int), len(time) - 2)
+                share = (at - low).reshape(along.shape)
+                changes[:, index] = (1.0 - share) * before[low] + share * before[low + 1]
+            elif term.form == "stuck":
+                begin = int(np.argmax(law != 0.0))  # the reading is held as it was when the law set in
+                changes[:, index] = before + along * (before[begin] - before)
+        if term.form == "swapped":
+            changes[:, channels] += along[:, None] * (changes[:, channels[::-1]] - changes[:, channels])
+        return changes
 
 
 def input_slope(model: NetworkOnGrid, trajectory: Trajectory, name: str) -> tuple[Array, Array]:

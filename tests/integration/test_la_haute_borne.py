@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -90,3 +91,24 @@ def test_an_air_cooler_with_a_thermostat_is_found_and_holds_on_the_other_machine
                   for run in ("calibrated", "after")]  # fmt: skip
         assert errors[1] < 0.4 * errors[0]
     assert any("only ratios are identified" in note for note in found.notes)
+
+
+@pytest.mark.slow
+def test_air_that_was_not_recorded_is_missed_at_the_air(farm):
+    """The other way round: the nacelle's temperature is taken away, and the definition's constant stands in for it."""
+    constant = load_gearbox("la_haute_borne").network().inputs["T_ambient"]
+    train, holdout = (
+        replace(r, inputs={**r.inputs, "T_ambient": np.full(len(r.time), constant)}, assumed=(*r.assumed, "T_ambient"))
+        for r in (
+            *_read(farm, "R80736.csv.gz@2017-09-16..2017-10-07"),
+            *_read(farm, "R80736.csv.gz@2017-10-09..2017-10-21"),
+        )
+    )
+    found = diagnose(train, "la_haute_borne", holdout=holdout)
+    assert found.verdict == "unexplained"
+    assert found.location[0].node == "air" and found.location[0].probability > 0.5
+    assert any(r.mechanism == "ambient_swing" for f in found.findings for r in f.confusable_with)
+    # What is known of the air is gone; the cooler is found all the same, against the air outdoors, which is recorded.
+    first = found.findings[0]
+    assert first.mechanism == "cooler_air_thermostat" and first.place == "returns_outdoor"
+    assert found.holdout.after < 0.75 * found.holdout.calibrated

@@ -489,9 +489,12 @@ def test_the_error_of_a_mean_heat_is_that_of_the_strength_and_of_what_goes_with_
     assert h.term is not None
     value, own_error = found.values_of(h)[h.term.strength.name]
     told = _with_form(h, found.values_of(h))
-    # What is said adds that the form of a law is hardly known to a tenth; its other numbers have none of it.
+    # What is said adds that the form of a law is hardly known to a tenth; its other numbers have none of it, nor has
+    # the fault of an instrument, which has no law.
     assert told[h.term.strength.name] == (value, pytest.approx(np.hypot(own_error, 0.1 * value)))
     assert all(told[name] == pair for name, pair in found.values_of(h).items() if name != h.term.strength.name)
+    fault: Any = SimpleNamespace(of_measurement=True)
+    assert _with_form(replace(h, term=fault), found.values_of(h)) == found.values_of(h)
     # The same by many draws from the posterior of the term's parameters.
     items, rng = found.fit.unknowns.items, np.random.default_rng(3)
     own = found.fit.unknowns.of(h.term.parameters)
@@ -769,7 +772,7 @@ def test_air_that_nobody_recorded_is_less_certain(problem: Problem) -> None:
 
 
 # A fit without unknowns, and a problem that has no other.
-NOTHING: Any = SimpleNamespace(at=lambda fit: fit, unknowns=SimpleNamespace(items=()), z=())
+NOTHING: Any = SimpleNamespace(at=lambda fit: fit, unknowns=SimpleNamespace(items=()), z=(), slow=False)
 
 
 def _judge(base: Any, gain: Any = 0.0) -> Any:
@@ -948,6 +951,7 @@ def test_a_first_effect_whose_error_another_one_hides_stands_only_beside_that_on
     second = Stage(scored=(), log_e_value=50.0, fits=(both,), gains=(90.0,), accepted=both, matters=True)
     end = Stage(scored=(), log_e_value=0.0)
     monkeypatch.setattr(search, "first", lambda _: (base, 1.0))
+    monkeypatch.setattr(search, "candidates_of", lambda *_: ())
     monkeypatch.setattr(search, "floored", lambda fit: (fit, 1.0))
     monkeypatch.setattr(search, "_needed_of", lambda _judge, _start, accepted: accepted)
     for looks, names in (((first, second, end), ["wear", "rain"]), ((first, end), [])):
@@ -972,6 +976,7 @@ def test_what_promises_has_its_chance_before_anything_less_likely(
     assert found.accepted is not None and found.accepted.labels == (fault if at_once else wear).labels
     assert found.tentative is not at_once and [fit.labels for fit in found.fits] == [wear.labels, fault.labels]
     monkeypatch.setattr(search, "first", lambda _: (base, 1.0))
+    monkeypatch.setattr(search, "candidates_of", lambda *_: ())
     monkeypatch.setattr(search, "floored", lambda fit: (fit, 1.0))
     monkeypatch.setattr(search, "_others", lambda *_: [])
     nothing_more = Stage(scored=(), log_e_value=0.0)
@@ -1072,6 +1077,45 @@ def test_what_a_first_look_held_for_less_likely_may_stand_beside_a_second_effect
     assert one.gains[0] == pytest.approx(900.0 + 200.0) and one.probabilities()[0] > 0.9
     stands = replace(second, accepted=beside_base)
     assert search._reconsidered([first, stands], base) == [first, stands]
+
+
+@pytest.mark.parametrize("form", ["clock", "lag", "swapped", "stuck"])
+def test_faulty_sensors_show_every_change_as_they_show_the_truth(fzg: Gearbox, problem: Problem, form: str) -> None:
+    """Derivatives go through the fault as well: by a clock an hour late everything comes an hour late."""
+    scale = Scale.of(fzg)
+    name = {"clock": "clock_offset", "lag": "sensor_lag", "swapped": "swapped_channels", "stuck": "sensor_stuck"}[form]
+    term = CATALOGUE[name].placed(problem.model.network, scale, CHANNELS)[0]
+    size = {"clock": 700.0, "lag": 300.0, "swapped": 0.6, "stuck": 1.0}[form]
+    values = {term.strength.name: size}
+    faulty = explain._with(problem, hypothesis_of(term))
+    own = {p.name: values.get(p.name, p.grid[0] if p.grid else p.start) for p in term.parameters}
+    z = np.array([item.z(own[item.target]) if item.target in own else 0.0 for item in faulty.unknowns.items])
+    index = next(i for i, item in enumerate(faulty.unknowns.items) if item.target == "mesh")
+    part = faulty.linearise(0, z, None)
+    reads = []
+    for step in (-0.05, 0.05):
+        moved = np.array(z)
+        moved[index] += step
+        there = faulty.linearise(0, moved, part.trajectory)
+        reads.append(faulty.read(there.trajectory, there.sensors, moved))
+    difference = (reads[1] - reads[0]) / 0.1
+    largest = np.abs(difference).max(axis=0)
+    np.testing.assert_allclose(part.columns[:, :, index] / largest, difference / largest, atol=0.03)
+    # What the sensors show of a change of the readings is what the scan of hypotheses uses.
+    sound = problem.linearise(0, z[: len(problem.unknowns.items)], part.trajectory)
+    shown = part.shown(sound.columns[:, :, [index]])[:, :, 0]
+    np.testing.assert_allclose(shown / largest, difference / largest, atol=0.03)
+
+
+def test_switches_felt_what_a_late_clock_shows_later(piece: Piece) -> None:
+    late = replace(piece, guided=True, late_s=600.0)
+    parts_of = [name for name in piece.channels if name != "P_loss"]
+    before, after = replace(late, late_s=0.0).guide(parts_of), late.guide(parts_of)
+    inside = piece.time < piece.time[-1] - 600.0
+    assert np.isnan(after[piece.time > piece.time[-1] - 600.0]).all()  # nobody knows: there the simulated course counts
+    for column in range(len(parts_of)):
+        expected = np.interp(piece.time[inside] + 600.0, piece.time, before[:, column])
+        np.testing.assert_allclose(after[inside, column], expected)
 
 
 def _form(name: str, place: str, log_bayes: float) -> Scored:
