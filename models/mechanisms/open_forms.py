@@ -160,4 +160,6 @@ CONDUCTANCES = (
     _conductance("speed", "the speed", lambda s: s.n),
     _conductance("temperature", "the temperature", lambda s: _rise(s) / 50.0),
 )
-OPEN_FORMS = (*(form for both in HEATS for form in both if form.name != "open_standstill_loss"), *CONDUCTANCES)
+# A loss at standstill is none; one that goes with the power is the mesh's own, whose formula is never exactly right.
+NO_FORMS = ("open_standstill_loss", "open_power_loss")
+OPEN_FORMS = (*(form for both in HEATS for form in both if form.name not in NO_FORMS), *CONDUCTANCES)
