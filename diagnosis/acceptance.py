@@ -145,7 +145,7 @@ def _matters(case: Case, fit: Explanation, h: Hypothesis, times: float = 1.0) ->
         else:
             heat, loss = term.heat(part.trajectory, given[None, :])
             T = part.trajectory.response(heat)
-            changes.append(reading_columns(model, part.trajectory, part.sensors, T, loss)[:, :, 0])
+            changes.append(part.shown(reading_columns(model, part.trajectory, part.sensors, T, loss))[:, :, 0])
     change = np.sqrt(np.mean(np.concatenate(changes) ** 2, axis=0))
     least = times * np.array([SMALLEST_HEAT * case.loss_W if name == LOSS else SMALLEST_K for name in case.channels])
     heats = heats_of(fit, h)  # none of a fault of an instrument: there the error of the reading counts alone

@@ -15,7 +15,7 @@ import sympy as sp
 from models.laws import LawLike, Parameter
 from models.mechanisms.forms import plain, positive, share_between, strength
 from models.mechanisms.mechanism import Mechanism, Memory
-from models.mechanisms.scale import Scale
+from models.mechanisms.scale import TYPICAL_RISE, Scale
 
 OPEN_FORM = "open form"  # their family
 PLACES = ("each parts",)
@@ -76,7 +76,8 @@ def _peak(value: Any, at: Any, width: Any) -> sp.Expr:
 
 
 def _rise(s: Any) -> sp.Expr:
-    return s.T_here - s.ambient_ref
+    """Of the temperature above the surroundings, in ratio to a typical one."""
+    return (s.T_here - s.ambient_ref) / TYPICAL_RISE
 
 
 def _running(s: Any) -> sp.Expr:
@@ -132,13 +133,13 @@ HEATS = (
     _form("speed_squared", "the speed squared", lambda s: s.n**2),
     _form("torque", "the torque", lambda s: s.m),
     _form("power", "the power", lambda s: s.n * s.m),
-    _form("temperature", "the temperature", lambda s: _rise(s) / 50.0),
+    _form("temperature", "the temperature", _rise),
     _form("time", "the time", lambda s: s.x),
     _form("speed_above", "the speed above a limit", lambda s: sp.Max(s.n - s.limit, 0),
           _ratio("limit", 0.25, 0.5, 0.75)),
     _form("speed_below", "the speed below a limit", lambda s: sp.Max(1 - s.n / s.limit, 0) * _running(s),
           _ratio("limit", 0.15, 0.3, 0.6)),
-    _form("temperature_above", "the temperature above a limit", lambda s: sp.Max(s.T_here - s.limit, 0) / 50.0,
+    _form("temperature_above", "the temperature above a limit", lambda s: sp.Max(s.T_here - s.limit, 0) / TYPICAL_RISE,
           _temperature("limit", 0.25, 0.5, 0.75)),
     _form("speed_near", "one speed", lambda s: _peak(s.n, s.centre, s.width),
           _all(_ratio("centre", 0.15, 0.3, 0.45, 0.6, 0.75, 0.9, 1.05), _width(kelvin=False))),
@@ -152,13 +153,13 @@ HEATS = (
     _form("after_torque", "a change of the torque, for a while", lambda s: sp.Abs(s.m - s.recent), _later,
           _recent(lambda s: s.m)),
     _form("fading", "the time since the start, and fades", lambda s: sp.exp(-s.time / s.life), _life),
-    _form("fading_temperature", "the temperature, and fades", lambda s: _rise(s) / 50.0 * sp.exp(-s.time / s.life),
+    _form("fading_temperature", "the temperature, and fades", lambda s: _rise(s) * sp.exp(-s.time / s.life),
           _life),
     _form("day", "the time of day", lambda s: sp.sin(2 * sp.pi * (s.time / DAY_S + s.daytime)), _day),
 )  # fmt: skip
 CONDUCTANCES = (
     _conductance("speed", "the speed", lambda s: s.n),
-    _conductance("temperature", "the temperature", lambda s: _rise(s) / 50.0),
+    _conductance("temperature", "the temperature", _rise),
 )
 # A loss at standstill is none; one that goes with the power is the mesh's own, whose formula is never exactly right.
 NO_FORMS = ("open_standstill_loss", "open_power_loss")

@@ -1139,11 +1139,11 @@ def test_open_forms_are_fitted_where_they_lead_or_where_a_strong_effect_bends() 
 
 @pytest.mark.parametrize(("form", "seen"), [(26.0, False), (31.0, True)])
 def test_what_only_an_open_form_sees_has_a_handicap(monkeypatch: pytest.MonkeyPatch, form: float, seen: bool) -> None:
-    """Consistent recordings leave a form some 25 nats: formulas of mesh and bearings are not exactly the gearbox's."""
+    """Consistent recordings leave forms something: formulas of mesh and bearings are not exactly the gearbox's."""
     monkeypatch.setattr(
         search,
         "_scanned",
-        lambda *_: ([_scored("a", "x", 2.0), _scored("b", "x", 1.0)], [_form("power", "mesh", form)]),
+        lambda *_: ([_scored("a", "x", 2.0), _scored("b", "x", 1.0)], [_form("speed", "mesh", form)]),
     )
     monkeypatch.setattr(search, "best_fits", lambda *_, **__: [])
     base = Explanation(problem=NOTHING, fit=SimpleNamespace(z=np.zeros(1)), log_evidence=0.0)  # type: ignore[arg-type]
