@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import shutil
+import signal
 import subprocess
 import sys
 import threading
@@ -244,19 +245,22 @@ def test_nothing_goes_on_running_after_an_interruption(
 ) -> None:
     folder = tmp_path / "proof"
     shutil.copytree(recorded, folder)
-    # A test run in the background inherits an ignored SIGINT; a user's terminal does not.
-    heeding = "import signal, time; signal.signal(signal.SIGINT, signal.default_int_handler); time.sleep(600)"
-    sleeping = [sys.executable, "-c", heeding]
-    monkeypatch.setattr(driver, "_command", lambda _: sleeping)
+    listening = tmp_path / "listening"
+    listening.mkdir()
+    # A test run in the background inherits an ignored SIGINT; a user's terminal does not. And a signal that arrives
+    # while Python itself is still being loaded ends it with an ordinary failure.
+    heeding = (
+        "import os, pathlib, signal, time; signal.signal(signal.SIGINT, signal.default_int_handler); "
+        f"pathlib.Path({str(listening)!r}, str(os.getpid())).touch(); time.sleep(60)"
+    )
+    monkeypatch.setattr(driver, "_command", lambda _: [sys.executable, "-c", heeding])
     started: list[subprocess.Popen[str]] = []
 
     def interrupt() -> None:
-        while len(driver._running) < 2:
+        while min(len(list(listening.iterdir())), len(driver._running)) < 2:
             time.sleep(0.05)
         started.extend(driver._running)
-        while started[0].poll() is None:
-            started[0].send_signal(2)  # as a terminal does with all of them
-            time.sleep(0.1)
+        started[0].send_signal(signal.SIGINT)  # as a terminal does with all of them
 
     thread = threading.Thread(target=interrupt)
     thread.start()
