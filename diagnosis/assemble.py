@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+from joblib import delayed
 
 from diagnosis.acceptance import SECOND_GAIN
 from diagnosis.case import Case, heat_over_time
@@ -18,6 +19,7 @@ from diagnosis.identifiable import scale_notes
 from diagnosis.latent import LatentHeat, knots_of, latent_heat
 from diagnosis.mapping import LOSS
 from diagnosis.noise import HEAT_FRACTION, PARAMETRIC_FRACTION, PARAMETRIC_K
+from diagnosis.parallel import spread
 from diagnosis.posterior import Problem
 from diagnosis.predict import Prediction, overall_rmse, predict, rmse
 from diagnosis.recording import Recording
@@ -49,7 +51,7 @@ UNEXPLAINED_SHARE = 0.25  # of the evidence that is left when the catalogue has 
 
 def assembled(
     case: Case, found: Search, catalogue: Mapping[str, Mechanism], train: Sequence[Recording],
-    holdout: Sequence[Recording], *, false_alarm_rate: float,
+    holdout: Sequence[Recording], *, false_alarm_rate: float, jobs: int = 1,
 ) -> Diagnosis:  # fmt: skip
     """The result of a search.
 
@@ -60,13 +62,15 @@ def assembled(
     catalogue : mapping of str to Mechanism
     train, holdout : sequence of Recording
     false_alarm_rate : float
+    jobs : int
+        Processes
     """
     detected = found.detected
     findings = tuple(
         finding_of(case, found.final, h, stage, rivals_of(stage, catalogue)) for h, stage in found.findings if detected
     )
-    remaining = _latents(case, found.final) if detected else ()
-    first = _latents(case, found.calibrated) if detected else ()
+    both = [found.final, found.calibrated] if detected else []
+    remaining, first = spread(jobs, [delayed(_latents)(case, explanation) for explanation in both]) or ((), ())
     unseen = _unseen(found.stages[-1], catalogue, found.threshold)
     misfit = max(found.final.misfit, found.judge.misfit if detected else 0.0)
     left = misfit > MOST_MISFIT or _much_is_left(first, remaining)
@@ -74,7 +78,7 @@ def assembled(
     location = _location(case, found, findings, first) if detected else ()
     shown = _shown(findings, location)
     missing = _missing_heat(case, found, remaining if findings else first, shown) if detected else ()
-    predictions = _predictions(case, found)
+    predictions = _predictions(case, found, jobs)
     remaining_p, note = _remaining(found, remaining, case, left=left, misfit=misfit, detected=detected)
     return Diagnosis(
         verdict=verdict,
@@ -287,25 +291,29 @@ def _missing_heat(
 Predictions = dict[str, dict[str, list[Prediction]]]
 
 
-def _predictions(case: Case, found: Search) -> Predictions:
+def _predictions(case: Case, found: Search, jobs: int) -> Predictions:
     """Free-running predictions: as delivered, calibrated and after, of the training and held-out pieces."""
-    nothing = np.zeros(len(found.calibrated.problem.unknowns))
+    problems = {
+        "train": (case.train, found.calibrated.problem, found.final.problem),
+        "holdout": (case.holdout, at_holdout(case, found.calibrated), at_holdout(case, found.final)),
+    }
+    zs = (found.calibrated.fit.z, found.final.fit.z)
+    places = [(name, index) for name, (nominal, *_) in problems.items() for index in range(len(nominal.pieces))]
+    three = spread(jobs, [delayed(_predicted)(*problems[name], *zs, index) for name, index in places])
+    return {
+        name: {state: [them[which] for (one, _), them in zip(places, three, strict=True) if one == name]
+               for which, state in enumerate(("before", "calibrated", "after"))}
+        for name in problems
+    }  # fmt: skip
 
-    def of(
-        problem: Problem, z: Array, about: Sequence[Prediction] = (), *, as_delivered: bool = False
-    ) -> list[Prediction]:  # fmt: skip
-        return [predict(problem, i, z, as_delivered=as_delivered, guess=about[i].trajectory.T if about else None)
-                for i in range(len(problem.pieces))]  # fmt: skip
 
-    result = {}
-    for name, nominal, calibrated, final in (
-        ("train", case.train, found.calibrated.problem, found.final.problem),
-        ("holdout", case.holdout, at_holdout(case, found.calibrated), at_holdout(case, found.final)),
-    ):
-        before = of(nominal, nothing, as_delivered=True)
-        tuned = of(calibrated, found.calibrated.fit.z, before)
-        result[name] = {"before": before, "calibrated": tuned, "after": of(final, found.final.fit.z, tuned)}
-    return result
+def _predicted(
+    nominal: Problem, calibrated: Problem, final: Problem, z: Array, z_final: Array, index: int
+) -> tuple[Prediction, Prediction, Prediction]:
+    """One piece as delivered, calibrated and after; each starts from the one before."""
+    before = predict(nominal, index, np.zeros(len(nominal.unknowns)), as_delivered=True)
+    tuned = predict(calibrated, index, z, guess=before.trajectory.T)
+    return before, tuned, predict(final, index, z_final, guess=tuned.trajectory.T)
 
 
 def _fits(case: Case, predictions: Predictions, which: str) -> Fits:

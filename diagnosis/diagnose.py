@@ -78,7 +78,7 @@ def diagnose(
     try:
         found = search(case, catalogue, false_alarm_rate=false_alarm_rate, jobs=jobs, progress=progress)
         progress("predicting the recordings free-running")
-        return assembled(case, found, catalogue, train, held, false_alarm_rate=false_alarm_rate)
+        return assembled(case, found, catalogue, train, held, false_alarm_rate=false_alarm_rate, jobs=jobs)
     except ArithmeticError as error:
         if type(error) is not ArithmeticError:
             raise  # a division by zero is a fault of ours

@@ -14,8 +14,9 @@ from joblib import delayed
 from scipy.special import log_ndtr
 
 from diagnosis.evidence import Marginal
-from diagnosis.hypotheses import WIDE_PRIOR, Hypothesis, Scored, spread, white_column
+from diagnosis.hypotheses import WIDE_PRIOR, Hypothesis, Scored, white_column
 from diagnosis.network_on_grid import NetworkOnGrid
+from diagnosis.parallel import spread
 from diagnosis.posterior import Fit, Problem
 from diagnosis.reshape import reshaped
 from diagnosis.trajectory import Trajectory
@@ -24,6 +25,7 @@ from models.types import Array
 FIRST_ITERATIONS, ROUGH_ITERATIONS, ITERATIONS = 4, 3, 10
 RACE_SHARE, RACE_LEAD = 0.15, 15.0  # of the best gain, and log evidence: who is further behind can no longer win ...
 RACERS = 3  # ... but for the best few where a strong effect has bent the calibration: rough fits tell little there
+HOPE = 0.6  # of the best gain of a rough fit, below which such a racer is given up before its shapes are sought again
 DISTRESS, SLOW_SENSOR = 2.5, 1.3  # standard deviations: of a parameter, and of a sensor's lag
 START_SHARES = (0.6, 0.3, 0.1)
 AS_PROMISED = 0.8
@@ -215,10 +217,10 @@ def fitted(base: Explanation, scored: Scored, worth: float = -np.inf) -> Explana
     return replace(best, fit=best.fit.without_parts())
 
 
-def refined(rough: Explanation) -> Explanation:
-    """A rough fit, fitted to the end."""
+def refined(rough: Explanation, worth: float = -np.inf) -> Explanation:
+    """A rough fit, fitted to the end; where it stays below a log evidence, without seeking other shapes."""
     better = _better(rough, rough.fit.z, rough.fit.courses, ITERATIONS)
-    for _ in range(MOST_RESHAPED):
+    for _ in range(MOST_RESHAPED if better.log_evidence >= worth else 0):
         before = replace(better, fit=better.problem.at(better.fit))
         better = _reshaped(before, ITERATIONS)
         if better is before:
@@ -324,7 +326,8 @@ def best_fits(base: Explanation, chosen: Sequence[tuple[Explanation, Scored]], *
     if distorted(base) and not base.problem.slow:
         count = max(count, RACERS)
     racing, beaten = rough[:count], rough[count:]
-    done = spread(jobs, [delayed(refined)(e) for e in racing])
+    worth = base.log_evidence + HOPE * max(gains, default=0.0)
+    done = spread(jobs, [delayed(refined)(e, worth) for e in racing])
     return sorted(_elsewhere([*done, *beaten], jobs), key=lambda e: -e.log_evidence)
 
 

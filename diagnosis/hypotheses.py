@@ -10,15 +10,15 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
-from typing import Any
 
 import numpy as np
-from joblib import Parallel, delayed
+from joblib import delayed
 
 from diagnosis.evidence import Marginal, strength
 from diagnosis.latent import white_columns
 from diagnosis.network_on_grid import NetworkOnGrid
 from diagnosis.observation import readings
+from diagnosis.parallel import spread
 from diagnosis.posterior import Fit, Linearised, Problem
 from diagnosis.term_on_grid import TermOnGrid
 from models.mechanisms import OPEN_FORM, Placed
@@ -27,6 +27,7 @@ from models.types import Array
 
 MOST_VARIANTS = 24
 CHUNK, CHUNK_VALUES = 64, 250_000  # columns that go through the filter together, and values of one of them in all
+BUNDLES = 2  # of such chunks, per process
 FINER = 9  # values between the neighbours of the best one of a grid
 SHARPENED_FROM = 2  # variants of the grid, the best ones
 WIDE_PRIOR = 4.0  # standard deviations of a parameter that is out of its prior
@@ -150,14 +151,10 @@ def scan(
     """
     intervals = sum(len(piece.steps) for piece in problem.pieces)
     chunks = list(_chunks(hypotheses, max(8, min(CHUNK, CHUNK_VALUES // max(intervals, 1)))))
-    results = spread(jobs, [delayed(_scan_chunk)(problem, fit, marginal, chunk) for chunk in chunks])
+    work = [delayed(_scan_chunk)(problem, fit, marginal, chunk) for chunk in chunks]
+    results = spread(jobs, work, bundles=BUNDLES * jobs)
     scored = [one for result in results for one in result]
     return sorted(scored, key=lambda s: -s.log_bayes)
-
-
-def spread(jobs: int, work: Sequence[Any]) -> list[Any]:
-    """Results of ``joblib.delayed`` calls, in order: over processes, or here and now where there is one only."""
-    return list(Parallel(n_jobs=jobs)(work)) if jobs > 1 else [f(*a, **k) for f, a, k in work]
 
 
 def _chunks(hypotheses: Sequence[Hypothesis], most: int) -> Iterator[list[Hypothesis]]:

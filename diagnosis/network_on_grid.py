@@ -19,8 +19,9 @@ from models.types import Array
 
 STEADY = 0.01  # relative change of speed or torque within an interval
 LOSS_STEP_K = 2.0  # for the derivatives of the losses
-LOSS_NEAR_K = 0.7  # within it the straight lines are good to some 1e-4 of the loss
-LOSS_REACH_K = 15.0  # beyond it the derivatives are taken anew
+# Within this a loss is taken from its straight line: the jump when it is not must not make a fit stumble.
+LOSS_NEAR_K, TORQUE_NEAR = 0.1, 0.003
+LOSS_REACH_K, TORQUE_REACH = 3.0, 0.05  # beyond it the derivatives are taken anew
 TORQUE_STEP = 0.02  # relative
 HIGHEST_T, LOWEST_T = 400.0, -60.0  # a trajectory is held here while it settles
 
@@ -47,20 +48,22 @@ class Balance:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LossTangent:
-    """Losses of a piece as straight lines of the temperatures around a trajectory.
+    """Losses of a piece as straight lines of the temperatures and of the torque around a trajectory.
 
     Attributes
     ----------
     T : Array, shape (K, nodes)
         Temperatures they were computed at, [degC]
     power : Array, shape (K, components)
-        [W]
+        As computed, [W]
     slope : Array, shape (K, components, nodes)
         [W/K]
     torque_slope : Array, shape (K, components)
         Per relative change of the torque, [W]
     samples : Array
         Inputs that they were computed with, see :class:`diagnosis.grid.Piece`
+    stronger : Array, shape (K,)
+        Relative change of the torque since, up to :data:`TORQUE_NEAR`
     """
 
     T: Array
@@ -68,10 +71,12 @@ class LossTangent:
     slope: Array
     torque_slope: Array
     samples: Array
+    stronger: Array
 
     def at(self, T: Array) -> Array:
-        """Losses [W], shape (..., K, components), at temperatures of shape (..., K, nodes)."""
-        return np.asarray(self.power + np.einsum("kcn,...kn->...kc", self.slope, T - self.T))
+        """Losses [W], shape (K, components), at temperatures of shape (K, nodes)."""
+        along = self.slope @ (T - self.T)[:, :, None]
+        return np.asarray(self.power + along[:, :, 0] + self.stronger[:, None] * self.torque_slope)
 
 
 class NetworkOnGrid:
@@ -101,6 +106,7 @@ class NetworkOnGrid:
         self._varying = varying
         self._constant = np.array([i for i in range(len(network.links)) if i not in set(self.laws.varying)], dtype=int)
         self.loss_nodes = np.array([self.parts.index(name) for name in losses.temperature_nodes], dtype=int)
+        self._apart = _apart(losses)
         self.is_loss = np.array(self.laws.losses_of_sources, dtype=bool)
         self.start = np.array([p.start for p in network.parameters])
 
@@ -173,39 +179,63 @@ class NetworkOnGrid:
 
     # ------------------------------------------------------------------ losses and memories
 
-    def loss_at(self, piece: Piece, T: Array) -> Array:
-        """Nominal losses, mean over the samples of every interval, [W], shape (K, components)."""
-        mine, operation = T[:, self.loss_nodes], piece.samples[..., :2]
-        speed, torque = operation[..., 0], operation[..., 1]
-        power = self.losses.power(speed.mean(axis=1), torque.mean(axis=1), mine)
+    def loss_at(self, samples: Array, T: Array) -> Array:
+        """Nominal losses, mean over the samples of every interval, [W], shape (K, components).
+
+        Parameters
+        ----------
+        samples : Array, shape (K, S, inputs)
+            See :class:`diagnosis.grid.Piece`
+        T : Array, shape (K, parts)
+            [degC]
+        """
+        operation = samples[..., :2]
         # Where the operating point moves within an interval, the mean of the losses is not the loss at the mean.
-        moving = np.flatnonzero((np.ptp(operation, axis=1) > STEADY * np.abs(operation).max(axis=1)).any(axis=-1))
-        if len(moving):
-            count = operation.shape[1]
-            at = np.repeat(mine[moving], count, axis=0)
-            each = self.losses.power(speed[moving].ravel(), torque[moving].ravel(), at)
-            power[moving] = each.reshape(len(moving), count, -1).mean(axis=1)
-        return np.asarray(power)
+        moves = (np.ptp(operation, axis=1) > STEADY * np.abs(operation).max(axis=1)).any(axis=-1)
+        counts = np.where(moves, operation.shape[1], 1)
+        first = np.cumsum(counts) - counts
+        points = np.repeat(operation.mean(axis=1), counts, axis=0)
+        points[np.repeat(moves, counts)] = operation[moves].reshape(-1, 2)
+        at = np.repeat(T[:, self.loss_nodes], counts, axis=0)
+        power = self.losses.power(points[:, 0], points[:, 1], at)
+        return np.asarray(np.add.reduceat(power, first, axis=0) / counts[:, None])
 
     def loss_tangent(self, piece: Piece, T: Array, previous: LossTangent | None = None) -> LossTangent:
-        """Losses around a trajectory; derivatives of `previous` are kept where it is near enough."""
+        """Losses around a trajectory; of `previous` is kept what is near enough, interval by interval."""
         T = np.clip(T, LOWEST_T, HIGHEST_T)
-        mine = T[:, self.loss_nodes]
-        if previous is not None and previous.samples is piece.samples and np.max(
-            np.abs(mine - previous.T), initial=0.0) < LOSS_NEAR_K:  # fmt: skip
-            return previous
-        power = self.loss_at(piece, T)
-        if previous is not None and np.max(np.abs(mine - previous.T), initial=0.0) < LOSS_REACH_K:
-            return replace(previous, T=mine, power=power, samples=piece.samples)
-        slope = np.empty((len(T), power.shape[-1], len(self.loss_nodes)))
-        for index, node in enumerate(self.loss_nodes):
+        mine, samples = T[:, self.loss_nodes], piece.samples
+        if previous is None or previous.samples.shape != samples.shape:
+            power = self.loss_at(samples, T)
+            slope, torque_slope = self._loss_slopes(samples, T, power)
+            return LossTangent(T=mine, power=power, slope=slope, torque_slope=torque_slope, samples=samples,
+                               stronger=np.zeros(len(T)))  # fmt: skip
+        stronger, unlike = _stronger(samples, previous.samples)
+        apart = np.abs(mine - previous.T).max(axis=1, initial=0.0)
+        anew = np.flatnonzero((apart > LOSS_NEAR_K) | (unlike > TORQUE_NEAR))
+        far = np.flatnonzero((apart > LOSS_REACH_K) | (unlike > TORQUE_REACH))
+        if not len(anew):
+            return replace(previous, stronger=stronger)
+        # Copies: the tangent before may still be somebody's.
+        found = {name: np.array(getattr(previous, name)) for name in ("T", "power", "slope", "torque_slope", "samples")}
+        found["T"][anew], found["samples"][anew], stronger[anew] = mine[anew], samples[anew], 0.0
+        found["power"][anew] = self.loss_at(samples[anew], T[anew])
+        if len(far):
+            slopes = self._loss_slopes(samples[far], T[far], found["power"][far])
+            found["slope"][far], found["torque_slope"][far] = slopes
+        return LossTangent(**found, stronger=stronger)
+
+    def _loss_slopes(self, samples: Array, T: Array, power: Array) -> tuple[Array, Array]:
+        """Derivatives of losses with respect to temperatures, (K, components, nodes), and to the torque."""
+        slope = np.zeros((*power.shape, len(self.loss_nodes)))
+        for readers in self._apart:
             moved = T.copy()
-            moved[:, node] += LOSS_STEP_K
-            slope[..., index] = (self.loss_at(piece, moved) - power) / LOSS_STEP_K
-        stronger = np.array(piece.samples)
+            moved[:, self.loss_nodes[list(readers)]] += LOSS_STEP_K
+            change = (self.loss_at(samples, moved) - power) / LOSS_STEP_K
+            for node, components in readers.items():
+                slope[:, components, node] = change[:, components]
+        stronger = np.array(samples)
         stronger[..., 1] *= 1.0 + TORQUE_STEP
-        torque_slope = (self.loss_at(replace(piece, samples=stronger), T) - power) / TORQUE_STEP
-        return LossTangent(T=mine, power=power, slope=slope, torque_slope=torque_slope, samples=piece.samples)
+        return slope, (self.loss_at(stronger, T) - power) / TORQUE_STEP
 
     @cached_property
     def switches(self) -> list[int]:
@@ -321,6 +351,35 @@ class NetworkOnGrid:
         places = [index for index, name in enumerate(names) if name in used]  # few of dozens
         function = compile_function(function_source("laws", [names[i] for i in places], laws, vector=False), "laws")
         return lambda signals: function(*(signals[i] for i in places))
+
+
+def _apart(losses: Losses) -> list[dict[int, list[int]]]:
+    """Temperatures that can be moved together, since no component reads two of them; and which components read each.
+
+    References
+    ----------
+    Curtis, Powell, Reid, On the estimation of sparse Jacobian matrices, J. Inst. Maths Applics 13 (1974).
+    """
+    groups: list[dict[int, list[int]]] = []
+    for node, name in enumerate(losses.temperature_nodes):
+        readers = [index for index, nodes in enumerate(losses.reads) if name in nodes]
+        free = (group for group in groups if not any(set(readers) & set(others) for others in group.values()))
+        group = next(free, None)
+        if group is None:
+            groups.append(group := {})
+        group[node] = readers
+    return groups
+
+
+def _stronger(now: Array, before: Array) -> tuple[Array, Array]:
+    """Relative increase of the torque in every interval; and how unlike its samples are, at most; (K,) each.
+
+    Another speed is infinitely unlike.
+    """
+    torque, then = np.abs(now[..., 1]), np.abs(before[..., 1])
+    change = (torque - then).mean(axis=1) / np.maximum(then.mean(axis=1), 1e-9)
+    unlike = np.abs(torque - then).max(axis=1) / np.maximum(then.max(axis=1), 1e-9)
+    return change, np.where((now[..., 0] == before[..., 0]).all(axis=1), np.maximum(unlike, np.abs(change)), np.inf)
 
 
 def _one_each(values: Array) -> list[Array | float]:

@@ -18,8 +18,9 @@ from diagnosis.case import Case, first, floored
 from diagnosis.evidence import Marginal
 from diagnosis.explain import Explanation, best_fits, distorted, evidence_of, in_the_middle, without
 from diagnosis.holdout import Judge
-from diagnosis.hypotheses import Hypothesis, Scored, hypothesis_of, parameter_hypotheses, scan, sharpened, spread
+from diagnosis.hypotheses import Hypothesis, Scored, hypothesis_of, parameter_hypotheses, scan, sharpened
 from diagnosis.mapping import LOSS
+from diagnosis.parallel import spread, starting
 from diagnosis.stage import Stage, log_e_value
 from models.mechanisms import OPEN_FORMS, Mechanism
 
@@ -125,7 +126,8 @@ def search(
         Told what is being done
     """
     progress("calibrating the model inside its priors")
-    start, start_floor = base, floor = first(case)
+    with starting(jobs):
+        start, start_floor = base, floor = first(case)
     threshold = threshold_at(false_alarm_rate)
     candidates = candidates_of(case, catalogue)
     stages: list[Stage] = []
@@ -275,7 +277,7 @@ def _scanned(base: Explanation, hypotheses: Sequence[Hypothesis], jobs: int) -> 
     real = [s for s in scored if not s.hypothesis.is_open]
     opened = [s for s in scored if s.hypothesis.is_open]
     near = [s for s in [*real[:SHARPENED], *opened[:SHARPENED_FORMS]] if s.log_bayes > SHARPEN_FROM]
-    finer = spread(jobs, [delayed(sharpened)(base.problem, base.fit, marginal, s) for s in near])
+    finer = spread(jobs, [delayed(sharpened)(base.problem, base.fit, marginal, s) for s in near], bundles=jobs)
     by_label = {s.hypothesis.label: s for s in finer}
     real, opened = (
         sorted((by_label.get(s.hypothesis.label, s) for s in some), key=lambda s: -s.log_bayes)

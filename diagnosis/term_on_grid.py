@@ -256,7 +256,7 @@ def moved_heat(model: NetworkOnGrid, trajectory: Trajectory, moved: Piece) -> tu
     power = trajectory.tangent.at(T[:, model.loss_nodes])
     changed = power
     if not np.array_equal(moved.samples[..., :2], piece.samples[..., :2]):
-        changed = power + model.loss_at(moved, T) - model.loss_at(piece, T)
+        changed = power + model.loss_at(moved.samples, T) - model.loss_at(piece.samples, T)
     here = model.balance(piece, T, trajectory.values, power, trajectory.memory)
     there = model.balance(moved, T, trajectory.values, changed, trajectory.memory)
     return there.heat - here.heat, (there.sources - here.sources)[:, model.is_loss].sum(axis=-1)

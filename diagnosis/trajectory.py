@@ -202,10 +202,12 @@ def free_running(
         T = np.stack([np.interp(fine.time, piece.time, course) for course in guess.T], axis=-1)
     tangent: LossTangent | None = None
     states: Array | None = None
+    shift = np.inf  # of the mean temperatures in the last round, whatever the switches did meanwhile, K
     for done in range(MOST_FREE_ROUNDS):
         middle = np.clip(0.5 * (T[1:] + T[:-1]), LOWEST_T, HIGHEST_T)
         last, tangent = tangent, model.loss_tangent(fine, middle, tangent)
-        if done >= FREE_ROUNDS and last is not None and _arrived(model, last, tangent, middle):
+        still = shift < FREE_SETTLED_K and last is not None and _arrived(model, last, tangent, middle)
+        if done >= FREE_ROUNDS and still:
             break
         power = tangent.at(middle[:, model.loss_nodes])
         held = np.clip(T, LOWEST_T, HIGHEST_T)
@@ -214,6 +216,7 @@ def free_running(
         before, (T, _, states) = T, _stepped(model, fine, values, start, middle, tangent, memory, nothing)
         if not np.isfinite(T).all():
             raise ArithmeticError(f"the temperatures of {piece.recording} run away with these parameters")
+        shift = float(np.max(np.abs((T - before).mean(axis=0))))
         if float(np.max(np.abs(T - before))) < FREE_SETTLED_K:
             break
     # What rows minutes apart show are means, over as much around every grid point; at the ends over what there is.
@@ -350,7 +353,9 @@ def _linearised(
 def _moved(model: NetworkOnGrid, T: Array, tangent: LossTangent) -> tuple[Array, Array]:
     """Temperatures of which one part's is a little higher, and the losses there, for every part: (parts, K, ...)."""
     moved = T + TEMPERATURE_STEP_K * np.eye(model.n)[:, None, :]
-    return moved, tangent.at(moved[..., model.loss_nodes])
+    power = np.tile(tangent.at(T[:, model.loss_nodes]), (model.n, 1, 1))
+    power[model.loss_nodes] += TEMPERATURE_STEP_K * np.moveaxis(tangent.slope, -1, 0)
+    return moved, power
 
 
 def _with_states(

@@ -223,6 +223,14 @@ class LossModel:
         )
 
     @cached_property
+    def reads(self) -> tuple[frozenset[str], ...]:
+        """Which of the `temperature_nodes` each component reads: the mesh its gears, all others the oil."""
+        oil, *rest = self.temperature_nodes
+        gears, bearings = frozenset(rest[:2]), rest[2:]
+        no_load = [frozenset({oil})] * (1 + len(self.seals))
+        return (gears, gears, *no_load, *(frozenset({oil, name}) for name in bearings))
+
+    @cached_property
     def bearing_groups(self) -> tuple[tuple[int, ...], ...]:
         """Indices of bearings that are alike: one surrogate serves a group."""
         groups: dict[SkfRollerBearing, list[int]] = {}

@@ -40,6 +40,11 @@ class Losses(Protocol):
         """Nodes whose temperatures are read."""
         ...
 
+    @property
+    def reads(self) -> tuple[frozenset[str], ...]:
+        """Which of these nodes each component reads."""
+        ...
+
     def power(self, speed: ArrayLike, torque: ArrayLike, temperatures: ArrayLike) -> Array:
         """Losses [W], shape (..., components), at speed [1/min], torque [N m] and temperatures [degC]."""
         ...

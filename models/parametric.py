@@ -199,6 +199,11 @@ class ParametricLosses:
         """Parts that losses warm."""
         return tuple(dict.fromkeys(loss.part for loss in self.definition.loss))
 
+    @property
+    def reads(self) -> tuple[frozenset[str], ...]:
+        """Which of these each component reads: the part that it warms."""
+        return tuple(frozenset({loss.part}) for loss in self.definition.loss for _ in ("no_load", "load"))
+
     def power(self, speed: ArrayLike, torque: ArrayLike, temperatures: ArrayLike) -> Array:
         """Losses [W], shape (..., components), at speed [1/min], torque [N m] and temperatures [degC]."""
         reference, nodes = self.definition.reference, self.temperature_nodes

@@ -308,6 +308,13 @@ class SurrogateLosses:
         return replace(self, evaluators=evaluators)
 
     @cached_property
+    def reads(self) -> tuple[frozenset[str], ...]:
+        """Which of the `temperature_nodes` each component reads."""
+        nodes = frozenset(self.temperature_nodes)
+        found = {component: nodes.intersection(use.sources) for use in self.uses for component in use.components}
+        return tuple(found[component] for component in self.components)
+
+    @cached_property
     def _used_networks(self) -> tuple[Network, ...]:
         by_name = {network.name: network for network in self.networks}
         return tuple(by_name[use.network] for use in self.uses)

@@ -111,6 +111,26 @@ def test_trajectory_is_that_of_the_solver(
         assert np.abs(found.T[:, index] - solved).max() < (0.4 if part == "mesh" else 0.08), part
 
 
+def test_tangents_follow_the_losses_where_they_have_to(model: NetworkOnGrid, piece: Piece) -> None:
+    """What is kept of an earlier tangent, interval by interval, is off by less than a ten-thousandth."""
+    rng = np.random.default_rng(0)
+    T = np.full((len(piece.steps), model.n), 60.0)
+    tangent = model.loss_tangent(piece, T)
+    assert model.loss_tangent(piece, T + 0.05, tangent).power is tangent.power
+    for _ in range(4):
+        T = T + rng.choice([0.0, 0.05, 3.0, 9.0], size=(len(T), 1)) * rng.uniform(-1.0, 1.0, size=T.shape)
+        samples = np.array(piece.samples)
+        samples[..., 1] *= 1.0 + rng.choice([0.0, 0.002, 0.2], size=(len(T), 1)) * rng.uniform(-1.0, 1.0)
+        moved = replace(piece, samples=samples)
+        tangent = model.loss_tangent(moved, T, tangent)
+        losses = model.loss_at(samples, T)
+        error = np.abs(tangent.at(T[:, model.loss_nodes]) - losses).sum(axis=1)
+        assert (error <= 5e-5 * losses.sum(axis=1) + 1e-9).all()
+        anew = model.loss_tangent(moved, T)
+        unlike = np.abs(tangent.slope - anew.slope).sum(axis=(1, 2))
+        assert (unlike <= 0.2 * np.abs(anew.slope).sum(axis=(1, 2)) + 1e-9).all()
+
+
 def test_exponential_solves_the_linear_equation_exactly() -> None:
     rng = np.random.default_rng(0)
     root = rng.normal(size=(3, 5, 5))
@@ -829,7 +849,7 @@ def test_of_two_views_of_one_hypothesis_the_better_fit_counts(
         return replace(base, found=(scored.hypothesis,), log_evidence=120.0 if view is base else 180.0)
 
     monkeypatch.setattr(explain, "fitted", fit)
-    monkeypatch.setattr(explain, "refined", lambda rough: replace(rough, log_evidence=rough.log_evidence + 1.0))
+    monkeypatch.setattr(explain, "refined", lambda rough, _: replace(rough, log_evidence=rough.log_evidence + 1.0))
     fan, tank = _scored("fan", "x", 40.0), _scored("tank", "oil", 30.0)
     found = best_fits(base, [(base, fan), (middle, fan), (base, tank)])
     # What can no longer win is not fitted to the end; where the calibration is bent, it still may.
@@ -837,6 +857,16 @@ def test_of_two_views_of_one_hypothesis_the_better_fit_counts(
     assert [(e.found[-1].name, e.log_evidence) for e in found] == [("fan", 181.0), ("tank", ends)]
     # A second start is for what scores nearly as well as the best; another view is one already.
     assert tried[1] == np.inf and 0.5 * fan.log_bayes < tried[0] == tried[2] < fan.log_bayes
+
+
+def test_a_racer_without_hope_is_not_given_other_shapes(monkeypatch: pytest.MonkeyPatch) -> None:
+    whole: Any = SimpleNamespace(z=np.zeros(1), courses=(), parts=())
+    problem: Any = SimpleNamespace(at=lambda fit: fit)
+    rough = Explanation(problem=problem, fit=whole, log_evidence=50.0)
+    monkeypatch.setattr(explain, "_better", lambda there, *_: replace(there, log_evidence=60.0))
+    monkeypatch.setattr(explain, "_reshaped", lambda there, _: replace(there, log_evidence=there.log_evidence + 5.0))
+    assert explain.refined(rough, 60.1).log_evidence == 60.0
+    assert explain.refined(rough, 60.0).log_evidence == 75.0
 
 
 def test_what_is_barely_evident_has_to_be_larger(monkeypatch: pytest.MonkeyPatch) -> None:

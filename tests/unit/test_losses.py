@@ -36,6 +36,7 @@ def test_each_loss_reads_its_own_nodes(node: str) -> None:
     losses = gearbox.losses()
     before = losses.breakdown(speed=2000.0, torque=100.0, temperatures=T)
     after = losses.breakdown(speed=2000.0, torque=100.0, temperatures={**T, node: 75.0})
+    assert dict(zip(losses.components, losses.reads, strict=True)) == READS
     moved = {name for name in losses.components if before[name] != after[name]}
     assert moved == {name for name, nodes in READS.items() if node in nodes}
 

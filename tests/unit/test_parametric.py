@@ -88,6 +88,18 @@ def test_losses_are_what_the_definition_states_at_the_reference(gearbox):
     assert cold[0] > 1.3 * at["gears_no_load"] and cold[1] == at["gears_load"]
 
 
+def test_each_loss_reads_the_part_that_it_warms():
+    gearbox = load_gearbox("la_haute_borne").with_values({"loss.0.part": "bearing_1"})
+    losses = gearbox.loss_laws()
+    reads = dict(zip(losses.components, losses.reads, strict=True))
+    assert reads["gears_no_load"] == {"bearing_1"} and set(losses.temperature_nodes) == frozenset().union(*losses.reads)
+    T = np.full(len(losses.temperature_nodes), 60.0)
+    warmer = T + 10.0 * (np.array(losses.temperature_nodes) == "bearing_1")
+    changed = losses.power(1500.0, 9000.0, warmer) != losses.power(1500.0, 9000.0, T)
+    assert changed[losses.components.index("gears_no_load")]
+    assert all("bearing_1" in reads[name] for name, it in zip(losses.components, changed, strict=True) if it)
+
+
 def test_losses_take_arrays_of_any_shape(gearbox):
     losses = gearbox.loss_laws()
     speed, torque = np.linspace(0.0, 1800.0, 12).reshape(3, 4), np.linspace(0.0, 9000.0, 4)

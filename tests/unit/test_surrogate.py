@@ -46,6 +46,15 @@ def test_components_and_nodes_are_the_full_models(losses):
     assert losses.temperature_nodes == full.temperature_nodes
 
 
+def test_each_component_reads_the_nodes_it_says(losses):
+    T = np.full(NODES, 60.0)
+    before = losses.power(2000.0, 100.0, T)
+    moved = [losses.power(2000.0, 100.0, T + 15.0 * (np.arange(NODES) == node)) != before for node in range(NODES)]
+    changed = [{name for name, column in zip(losses.temperature_nodes, moved, strict=True) if column[index]}
+               for index in range(len(losses.components))]  # fmt: skip
+    assert changed == list(losses.reads)
+
+
 @settings(max_examples=50)
 @given(speed=speeds, torque=torques, T=temperatures)
 def test_only_magnitudes_count_and_losses_are_finite_and_never_negative(losses, speed, torque, T):
