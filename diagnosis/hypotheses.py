@@ -7,8 +7,9 @@ The scan is linear: one column per combination of shape parameters, judged with 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import product
 
 import numpy as np
@@ -28,7 +29,7 @@ from models.types import Array
 MOST_VARIANTS = 24
 CHUNK, CHUNK_VALUES = 64, 250_000  # columns that go through the filter together, and values of one of them in all
 BUNDLES = 2  # of such chunks, per process
-FINER = 9  # values between the neighbours of the best one of a grid
+FINER, FINER_ENDS = 9, 33  # values between the neighbours of the best one of a grid
 SHARPENED_FROM = 2  # variants of the grid, the best ones
 WIDE_PRIOR = 4.0  # standard deviations of a parameter that is out of its prior
 NEAR_ZERO = 1e-9
@@ -118,6 +119,43 @@ def hypothesis_of(placed: Placed) -> Hypothesis:
         name=placed.name, place=placed.place, family=placed.family, term=placed,
         variants=_both_ways(placed, np.concatenate([np.ones((len(grid), 1)), grid], axis=1)),
     )  # fmt: skip
+
+
+def two_point_columns(h: Hypothesis) -> tuple[int, int] | None:
+    """Which of a term's parameters are the set-point and the band of a two-point control, where it has one."""
+    if h.term is None or not any(memory.update is not None for memory in h.term.states):
+        return None
+    names = [p.name for p in h.term.parameters]
+    found = [[i for i, name in enumerate(names) if name.endswith(ending)] for ending in ("_set_point", "_band")]
+    return (found[0][0], found[1][0]) if all(found) else None
+
+
+def switched_elsewhere(h: Hypothesis, values: Array, moves: Array) -> list[Array]:
+    """Values of a term's parameters with one of its two switching temperatures moved; first the upper, then the lower.
+
+    Parameters
+    ----------
+    h : Hypothesis
+        With :func:`two_point_columns`
+    values : Array, shape (parameters,)
+    moves : Array, shape (V,)
+        [K]
+
+    Returns
+    -------
+    list of Array, shape (V, parameters)
+    """
+    columns = two_point_columns(h)
+    assert columns is not None  # noqa: S101 - the caller looked
+    assert h.term is not None  # noqa: S101 - it has columns
+    result = []
+    for sign in (1.0, -1.0):
+        rows = np.tile(values, (len(moves), 1))
+        for column, change in zip(columns, (0.5 * moves, sign * moves), strict=True):
+            p = h.term.parameters[column]
+            rows[:, column] = np.clip(values[column] + change, p.lower, p.upper)
+        result.append(rows)
+    return result
 
 
 def _both_ways(term: Term, variants: Array) -> Array:
@@ -217,18 +255,32 @@ def _finer(problem: Problem, fit: Fit, marginal: Marginal, scored: Scored, index
     """A variant moved between the values of the grid; with its strength and its log Bayes factor."""
     h = scored.hypothesis
     best, value, log_bayes = h.variants[index], float(scored.values[index]), float(scored.log_bayes_of[index])
-    for column in range(1, h.variants.shape[1]):
-        grid = np.unique(h.variants[:, column])
-        if len(grid) < 2:
-            continue
+    for line in _lines(h):
+        (finer,) = _scan_chunk(problem, fit, marginal, [replace(h, variants=line(best))])
+        if finer.log_bayes_of[finer.best] > log_bayes:
+            best, value = finer.hypothesis.variants[finer.best], float(finer.values[finer.best])
+            log_bayes = float(finer.log_bayes_of[finer.best])
+    return best, value, log_bayes
+
+
+def _lines(h: Hypothesis) -> list[Callable[[Array], Array]]:
+    """Ways through the shapes of a term from one of them, each up to the neighbours on the grid."""
+    grids = [np.unique(h.variants[:, column]) for column in range(h.variants.shape[1])]
+
+    def along(column: int, best: Array) -> Array:
+        grid = grids[column]
         at = int(np.searchsorted(grid, best[column]))
         variants = np.tile(best, (FINER, 1))
         variants[:, column] = np.linspace(grid[max(at - 1, 0)], grid[min(at + 1, len(grid) - 1)], FINER)
-        (finer,) = _scan_chunk(problem, fit, marginal, [replace(h, variants=variants)])
-        if finer.log_bayes_of[finer.best] > log_bayes:
-            best, value = variants[finer.best], float(finer.values[finer.best])
-            log_bayes = float(finer.log_bayes_of[finer.best])
-    return best, value, log_bayes
+        return variants
+
+    def switched(end: int, best: Array) -> Array:
+        assert ends is not None  # noqa: S101 - asked for only then
+        return switched_elsewhere(h, best, np.diff(grids[ends[0]]).max() * np.linspace(-1.0, 1.0, FINER_ENDS))[end]
+
+    ends = two_point_columns(h)
+    lines = [partial(along, column) for column in range(1, len(grids)) if len(grids[column]) > 1]
+    return [*lines, *(partial(switched, end) for end in (0, 1) if ends is not None and len(grids[ends[0]]) > 1)]
 
 
 def white_column(problem: Problem, fit: Fit, h: Hypothesis, variant: int) -> Array:

@@ -9,7 +9,7 @@ from itertools import product
 import numpy as np
 
 from diagnosis.evidence import Marginal, strength
-from diagnosis.hypotheses import Hypothesis
+from diagnosis.hypotheses import Hypothesis, switched_elsewhere, two_point_columns
 from diagnosis.latent import white_columns
 from diagnosis.posterior import Fit, Problem
 from diagnosis.term_on_grid import TermOnGrid
@@ -17,6 +17,7 @@ from diagnosis.unknowns import Unknown
 from models.types import Array
 
 LOCAL, ZOOM = 9, (1.0, 0.25, 0.06)  # shapes around those of a fit, within so many spacings of the grid
+ENDS, PAIRED = 33, 5  # where something switches: of each of its two temperatures alone, and of both parameters together
 SWEPT = 65  # values of a period, everything else as fitted
 LEAST_GAIN = 3.0  # log evidence for which a fit goes on with other shapes
 RUNAWAY_W = 1e9
@@ -110,17 +111,24 @@ def _prior(items: list[Unknown], shapes: Array) -> Array:
 
 
 def _around(h: Hypothesis, free: list[int], values: Array, zoom: float) -> Array:
-    """Values of a term's parameters around some, the strength 1: all pairs of its first two shapes, others alone."""
+    """Values of a term's parameters around some, the strength 1: all pairs of its first two shapes, others alone.
+
+    What a two-point control does hangs on the two temperatures at which it switches, each sharply and for itself.
+    """
     assert h.term is not None  # noqa: S101 - a term is asked for
-    axes = {}
+    axes, ends = {}, two_point_columns(h)
     for column in free:
         p, grid = h.term.parameters[column], np.unique(h.variants[:, column])
         if p.sweep:
             reach = zoom * values[column] * np.log(p.sweep[1] / p.sweep[0]) / (SWEPT - 1)
         else:
             reach = zoom * float(np.ptp(grid)) / (len(grid) - 1)
-        axes[column] = np.clip(values[column] + reach * np.linspace(-1.0, 1.0, LOCAL), p.lower, p.upper)
+        count = PAIRED if ends and column in ends else LOCAL
+        axes[column] = np.clip(values[column] + reach * np.linspace(-1.0, 1.0, count), p.lower, p.upper)
     blocks = []
+    if ends:
+        reach = 0.5 * float(np.ptp(axes[ends[0]]))
+        blocks += switched_elsewhere(h, values, reach * np.linspace(-1.0, 1.0, ENDS))
     for columns in (free[:2], *([column] for column in free[2:])):
         block = np.array(list(product(*(axes[column] for column in columns))))
         rows = np.tile(values, (len(block), 1))
