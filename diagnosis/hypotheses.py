@@ -121,22 +121,26 @@ def hypothesis_of(placed: Placed) -> Hypothesis:
     )  # fmt: skip
 
 
-def two_point_columns(h: Hypothesis) -> tuple[int, int] | None:
-    """Which of a term's parameters are the set-point and the band of a two-point control, where it has one."""
-    if h.term is None or not any(memory.update is not None for memory in h.term.states):
+def two_point_columns(h: Hypothesis, problem: Problem) -> tuple[int, int] | None:
+    """Which of a term's parameters are the set-point and the band of a two-point control.
+
+    None where it has no such control, and where rows are means over minutes, which blur when it switches.
+    """
+    if problem.slow or h.term is None or not any(memory.update is not None for memory in h.term.states):
         return None
     names = [p.name for p in h.term.parameters]
     found = [[i for i, name in enumerate(names) if name.endswith(ending)] for ending in ("_set_point", "_band")]
     return (found[0][0], found[1][0]) if all(found) else None
 
 
-def switched_elsewhere(h: Hypothesis, values: Array, moves: Array) -> list[Array]:
+def switched_elsewhere(h: Hypothesis, columns: tuple[int, int], values: Array, moves: Array) -> list[Array]:
     """Values of a term's parameters with one of its two switching temperatures moved; first the upper, then the lower.
 
     Parameters
     ----------
     h : Hypothesis
-        With :func:`two_point_columns`
+    columns : (int, int)
+        Of its :func:`two_point_columns`
     values : Array, shape (parameters,)
     moves : Array, shape (V,)
         [K]
@@ -145,9 +149,7 @@ def switched_elsewhere(h: Hypothesis, values: Array, moves: Array) -> list[Array
     -------
     list of Array, shape (V, parameters)
     """
-    columns = two_point_columns(h)
-    assert columns is not None  # noqa: S101 - the caller looked
-    assert h.term is not None  # noqa: S101 - it has columns
+    assert h.term is not None  # noqa: S101 - it has parameters
     result = []
     for sign in (1.0, -1.0):
         rows = np.tile(values, (len(moves), 1))
@@ -255,7 +257,7 @@ def _finer(problem: Problem, fit: Fit, marginal: Marginal, scored: Scored, index
     """A variant moved between the values of the grid; with its strength and its log Bayes factor."""
     h = scored.hypothesis
     best, value, log_bayes = h.variants[index], float(scored.values[index]), float(scored.log_bayes_of[index])
-    for line in _lines(h):
+    for line in _lines(h, problem):
         (finer,) = _scan_chunk(problem, fit, marginal, [replace(h, variants=line(best))])
         if finer.log_bayes_of[finer.best] > log_bayes:
             best, value = finer.hypothesis.variants[finer.best], float(finer.values[finer.best])
@@ -263,9 +265,13 @@ def _finer(problem: Problem, fit: Fit, marginal: Marginal, scored: Scored, index
     return best, value, log_bayes
 
 
-def _lines(h: Hypothesis) -> list[Callable[[Array], Array]]:
-    """Ways through the shapes of a term from one of them, each up to the neighbours on the grid."""
+def _lines(h: Hypothesis, problem: Problem) -> list[Callable[[Array], Array]]:
+    """Ways through the shapes of a term from one of them, each up to the neighbours on the grid.
+
+    What a two-point control does hangs on the two temperatures at which it switches, each sharply and for itself.
+    """
     grids = [np.unique(h.variants[:, column]) for column in range(h.variants.shape[1])]
+    ends = two_point_columns(h, problem)
 
     def along(column: int, best: Array) -> Array:
         grid = grids[column]
@@ -274,13 +280,17 @@ def _lines(h: Hypothesis) -> list[Callable[[Array], Array]]:
         variants[:, column] = np.linspace(grid[max(at - 1, 0)], grid[min(at + 1, len(grid) - 1)], FINER)
         return variants
 
-    def switched(end: int, best: Array) -> Array:
-        assert ends is not None  # noqa: S101 - asked for only then
-        return switched_elsewhere(h, best, np.diff(grids[ends[0]]).max() * np.linspace(-1.0, 1.0, FINER_ENDS))[end]
+    lines: list[Callable[[Array], Array]] = [
+        partial(along, column) for column in range(1, len(grids)) if len(grids[column]) > 1
+    ]
+    if ends is None or len(grids[ends[0]]) < 2:
+        return lines
+    moves = float(np.diff(grids[ends[0]]).max()) * np.linspace(-1.0, 1.0, FINER_ENDS)
 
-    ends = two_point_columns(h)
-    lines = [partial(along, column) for column in range(1, len(grids)) if len(grids[column]) > 1]
-    return [*lines, *(partial(switched, end) for end in (0, 1) if ends is not None and len(grids[ends[0]]) > 1)]
+    def switched(end: int, best: Array) -> Array:
+        return switched_elsewhere(h, ends, best, moves)[end]
+
+    return [*lines, partial(switched, 0), partial(switched, 1)]
 
 
 def white_column(problem: Problem, fit: Fit, h: Hypothesis, variant: int) -> Array:

@@ -17,7 +17,7 @@ from diagnosis.unknowns import Unknown
 from models.types import Array
 
 LOCAL, ZOOM = 9, (1.0, 0.25, 0.06)  # shapes around those of a fit, within so many spacings of the grid
-ENDS, PAIRED = 33, 5  # where something switches: of each of its two temperatures alone, and of both parameters together
+ENDS = 33  # values of each of the two temperatures at which something switches
 SWEPT = 65  # values of a period, everything else as fitted
 LEAST_GAIN = 3.0  # log evidence for which a fit goes on with other shapes
 RUNAWAY_W = 1e9
@@ -53,7 +53,7 @@ def reshaped(h: Hypothesis, problem: Problem, fit: Fit) -> Array | None:
     coarse = np.concatenate([np.ones((len(h.variants), 1)), h.variants[:, 1:]], axis=1)
     best, most, first, value = here[0], -np.inf, -np.inf, values[0]
     for look, zoom in enumerate(ZOOM):
-        shapes = _around(h, free, best, zoom)
+        shapes = _around(h, problem, free, best, zoom)
         if look == 0:
             shapes = np.concatenate([here, coarse, shapes, *_swept(h, best)])
         score = strength(*marginal.products(_columns(h, problem, fit, shapes, values)), h.term.strength.sd, h.sign)
@@ -110,25 +110,21 @@ def _prior(items: list[Unknown], shapes: Array) -> Array:
     return np.asarray(-0.5 * np.square(z).sum(axis=1))
 
 
-def _around(h: Hypothesis, free: list[int], values: Array, zoom: float) -> Array:
-    """Values of a term's parameters around some, the strength 1: all pairs of its first two shapes, others alone.
-
-    What a two-point control does hangs on the two temperatures at which it switches, each sharply and for itself.
-    """
+def _around(h: Hypothesis, problem: Problem, free: list[int], values: Array, zoom: float) -> Array:
+    """Values of a term's parameters around some, the strength 1: all pairs of its first two shapes, others alone."""
     assert h.term is not None  # noqa: S101 - a term is asked for
-    axes, ends = {}, two_point_columns(h)
+    axes, ends = {}, two_point_columns(h, problem)
     for column in free:
         p, grid = h.term.parameters[column], np.unique(h.variants[:, column])
         if p.sweep:
             reach = zoom * values[column] * np.log(p.sweep[1] / p.sweep[0]) / (SWEPT - 1)
         else:
             reach = zoom * float(np.ptp(grid)) / (len(grid) - 1)
-        count = PAIRED if ends and column in ends else LOCAL
-        axes[column] = np.clip(values[column] + reach * np.linspace(-1.0, 1.0, count), p.lower, p.upper)
+        axes[column] = np.clip(values[column] + reach * np.linspace(-1.0, 1.0, LOCAL), p.lower, p.upper)
     blocks = []
     if ends:
         reach = 0.5 * float(np.ptp(axes[ends[0]]))
-        blocks += switched_elsewhere(h, values, reach * np.linspace(-1.0, 1.0, ENDS))
+        blocks += switched_elsewhere(h, ends, values, reach * np.linspace(-1.0, 1.0, ENDS))
     for columns in (free[:2], *([column] for column in free[2:])):
         block = np.array(list(product(*(axes[column] for column in columns))))
         rows = np.tile(values, (len(block), 1))
