@@ -323,7 +323,7 @@ def best_fits(base: Explanation, chosen: Sequence[tuple[Explanation, Scored]], *
     gains = [e.log_evidence - base.log_evidence for e in rough]
     least = (1.0 - RACE_SHARE) * max(gains, default=0.0) - RACE_LEAD
     count = sum(gain >= least for gain in gains)
-    if distorted(base):
+    if distorted(base) and not base.problem.slow:
         count = max(count, RACERS)
     racing, beaten = rough[:count], rough[count:]
     worth = base.log_evidence + HOPE * max(gains, default=0.0)

@@ -29,7 +29,16 @@ from diagnosis.findings import _with_form, finding_of
 from diagnosis.grid import Piece, pieces
 from diagnosis.heat import _heats_with, heats_of, mean_heat_of
 from diagnosis.holdout import Judge
-from diagnosis.hypotheses import Hypothesis, Scored, hypothesis_of, scan, sharpened
+from diagnosis.hypotheses import (
+    Hypothesis,
+    Scored,
+    _lines,
+    hypothesis_of,
+    scan,
+    sharpened,
+    switched_elsewhere,
+    two_point_columns,
+)
 from diagnosis.network_on_grid import NetworkOnGrid, named_values
 from diagnosis.noise import loss_noise, noise_of, start_guess
 from diagnosis.observation import readings
@@ -644,6 +653,28 @@ def test_a_set_point_is_found_from_afar(fzg: Gearbox, piece: Piece, problem: Pro
     edge = found_at[f"{placed.label}_set_point"] + 0.5 * found_at[f"{placed.label}_band"]
     assert edge == pytest.approx(true + 1.0, abs=0.6)
     assert found.log_evidence > base.log_evidence + 20.0
+
+
+def test_each_temperature_of_a_two_point_control_is_sought_for_itself(fzg: Gearbox, problem: Problem) -> None:
+    scale = Scale.of(fzg, speed=2600.0, torque=150.0, duration=3600.0)
+    network, means = problem.model.network, problem.changed(pieces=[replace(problem.pieces[0], slow=True)])
+    cooler = hypothesis_of(CATALOGUE["cooler_thermostat"].placed(network, scale)[0])
+    columns = two_point_columns(cooler, problem)
+    assert columns is not None
+    names = [p.name.removeprefix("cooler_thermostat_oil_") for p in cooler.term.parameters]
+    assert [names[column] for column in columns] == ["set_point", "band"]
+    values = np.array([1.0, 70.0, 6.0, *cooler.variants[0, 3:]])
+    for end, rows in enumerate(switched_elsewhere(cooler, columns, values, np.array([-2.0, 1.0]))):
+        upper, lower = rows[:, 1] + 0.5 * rows[:, 2], rows[:, 1] - 0.5 * rows[:, 2]
+        moved, still = (upper, lower) if end == 0 else (lower, upper)
+        np.testing.assert_allclose(moved, (73.0 if end == 0 else 67.0) + np.array([-2.0, 1.0]))
+        np.testing.assert_allclose(still, 67.0 if end == 0 else 73.0)
+        np.testing.assert_array_equal(rows[:, 3:], np.tile(values[3:], (2, 1)))
+    # A band cannot turn round; a valve that opens in proportion switches nowhere; nor is anything sharp in means.
+    assert min(rows[:, 2].min() for rows in switched_elsewhere(cooler, columns, values, np.array([-9.0, 9.0]))) > 0.0
+    valve = hypothesis_of(CATALOGUE["cooler_proportional"].placed(network, scale)[0])
+    assert two_point_columns(valve, problem) is None and two_point_columns(cooler, means) is None
+    assert len(_lines(cooler, problem)) == len(_lines(cooler, means)) + 2
 
 
 def test_what_comes_again_and_again_is_found_with_its_period(fzg: Gearbox, piece: Piece, problem: Problem) -> None:
