@@ -6,6 +6,7 @@ import os
 
 import pytest
 from joblib import delayed
+from joblib.externals.loky import get_reusable_executor
 
 from diagnosis.parallel import spread, starting
 
@@ -28,6 +29,7 @@ def test_one_call_alone_stays_here() -> None:
 
 
 def test_processes_that_were_started_are_those_that_work() -> None:
+    get_reusable_executor().shutdown(wait=True)  # those of other tests may be ended any time, for their memory
     with starting(2):
         pass
     before = {process for _, process in spread(2, [delayed(_worked)(number) for number in range(8)])}
