@@ -195,12 +195,10 @@ def _location(
     """Places by probability: of what was found, by its rivals' places; else by the unknown heat alone."""
     weights: dict[str, float] = {}
     if findings:
-        for h, stage in found.findings:
+        for _, stage in found.findings:
             for fit, probability in zip(stage.fits, stage.probabilities(), strict=True):
                 node = node_of(case, fit.found[-1])
-                own = stage.accepted is not None and fit.found[-1] is stage.accepted.found[-1]
-                share = 0.0 if own and fit.found[-1] is not h else float(probability)
-                weights[node] = 1.0 - (1.0 - weights.get(node, 0.0)) * (1.0 - share)
+                weights[node] = 1.0 - (1.0 - weights.get(node, 0.0)) * (1.0 - float(probability))
     else:
         logs = np.array([h.log_bayes for h in first]) / TEMPER
         for latent, weight in zip(first, np.exp(logs - np.logaddexp.reduce(logs)), strict=True):

@@ -110,7 +110,7 @@ def finding_of(case: Case, final: Explanation, h: Hypothesis, stage: Stage, riva
         reference=h.term.mechanism.reference if isinstance(h.term, Placed) else "",
         equation=equation,
         probability=float(probabilities.get(h.label, 0.0)) * (1.0 - doubt),
-        log_bayes=next((g for f, g in zip(stage.fits, stage.gains, strict=True) if f.found[-1] is h), 0.0),
+        log_bayes=next((g for f, g in zip(stage.fits, stage.gains, strict=True) if f.labels[-1] == h.label), 0.0),
         parameters=tuple(
             ParameterValue(name=name.removeprefix(prefix), value=value, stderr=sd, unit=units.get(name, "1"))
             for name, (value, sd) in values.items()

@@ -499,6 +499,10 @@ def test_what_is_not_needed_can_be_taken_out_again(fzg: Gearbox, piece: Piece, p
     stages = [Stage(scored=(), log_e_value=30.0, fits=(e,), gains=(20.0,), accepted=e) for e in (one, two)]
     stated = [finding_of(case, two, h, stage, ()).probability for h, stage in zip(two.found, stages, strict=True)]
     assert stated == pytest.approx([1.0, 0.7])
+    # From another process come copies; the evidence is theirs all the same.
+    assert [finding_of(case, two, replace(h), s, ()).log_bayes for h, s in zip(two.found, stages, strict=True)] == [
+        20.0
+    ] * 2
 
 
 def test_the_error_of_a_mean_heat_is_that_of_the_strength_and_of_what_goes_with_it(
