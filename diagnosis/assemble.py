@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 from joblib import delayed
@@ -39,6 +39,7 @@ from diagnosis.result import (
 from diagnosis.search import Search
 from diagnosis.shapes import shape_terms
 from diagnosis.stage import TEMPER, Stage, log_weights
+from models.cycle import COLUMNS
 from models.mechanisms import OPEN_FORM, Mechanism
 from models.types import Array
 from models.version import project_version
@@ -99,7 +100,7 @@ def assembled(
         remaining_note=note,
         ranking=_ranking(found),
         unseen=unseen,
-        next_test=_next_test(verdict, findings, unseen, catalogue),
+        next_test=_next_test(verdict, findings, unseen, catalogue, {i for r in (*train, *holdout) for i in r.assumed}),
         missing_heat=missing,
         courses=_courses(case, predictions),
         network=case.nominal,
@@ -405,8 +406,11 @@ def _unseen(stage: Stage, catalogue: Mapping[str, Mechanism], threshold: float) 
 
 
 def _next_test(
-    verdict: Verdict, findings: Sequence[Finding], unseen: Sequence[Unseen], catalogue: Mapping[str, Mechanism]
-) -> str:
+    verdict: Verdict, findings: Sequence[Finding], unseen: Sequence[Unseen], catalogue: Mapping[str, Mechanism],
+    assumed: Collection[str],
+) -> str:  # fmt: skip
+    if verdict == "unexplained" and "T_ambient" in assumed:
+        return f"record {COLUMNS['T_ambient'][0]}: a constant stands for it, and what the air did is missed elsewhere"
     for finding in findings:
         if finding.confusable_with and finding.confusable_with[0].probability >= 0.05:
             return finding.confusable_with[0].separate_by

@@ -22,6 +22,7 @@ LOSS_STEP_K = 2.0  # for the derivatives of the losses
 # Within this a loss is taken from its straight line: the jump when it is not must not make a fit stumble.
 LOSS_NEAR_K, TORQUE_NEAR = 0.1, 0.003
 LOSS_REACH_K, TORQUE_REACH = 3.0, 0.05  # beyond it the derivatives are taken anew
+SLOW_NEAR_K, SLOW_REACH_K = 0.7, 15.0  # the same of a piece whose rows are means over minutes
 TORQUE_STEP = 0.02  # relative
 HIGHEST_T, LOWEST_T = 400.0, -60.0  # a trajectory is held here while it settles
 
@@ -211,8 +212,13 @@ class NetworkOnGrid:
                                stronger=np.zeros(len(T)))  # fmt: skip
         stronger, unlike = _stronger(samples, previous.samples)
         apart = np.abs(mine - previous.T).max(axis=1, initial=0.0)
-        anew = np.flatnonzero((apart > LOSS_NEAR_K) | (unlike > TORQUE_NEAR))
-        far = np.flatnonzero((apart > LOSS_REACH_K) | (unlike > TORQUE_REACH))
+        if piece.slow:  # all together or none: as laws these losses cost nothing, and weeks feel what is a little stale
+            largest = float(apart.max())
+            moved = samples is not previous.samples or largest >= SLOW_NEAR_K
+            anew, far = (np.arange(len(T) if it else 0) for it in (moved, largest >= SLOW_REACH_K))
+        else:
+            anew = np.flatnonzero((apart > LOSS_NEAR_K) | (unlike > TORQUE_NEAR))
+            far = np.flatnonzero((apart > LOSS_REACH_K) | (unlike > TORQUE_REACH))
         if not len(anew):
             return replace(previous, stronger=stronger)
         # Copies: the tangent before may still be somebody's.

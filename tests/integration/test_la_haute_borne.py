@@ -14,7 +14,7 @@ from diagnosis.case import prepare
 from diagnosis.explain import calibrated
 from diagnosis.identifiable import scale_direction, scale_notes
 from diagnosis.recording import Recording, read_recordings
-from diagnosis.result import Course
+from diagnosis.result import Course, Diagnosis
 from models.gearbox import load_gearbox
 
 
@@ -81,7 +81,11 @@ def test_an_air_cooler_with_a_thermostat_is_found_and_holds_on_the_other_machine
     assert after < 0.5 * calibrated_K < before
     assert after < 1.5
     further = [(f.mechanism, f.node) for f in found.findings[1:]]
-    assert further == [("bearing_fed_by_return", "bearing_1"), ("sensor_gain", "bearing_1")]
+    assert further == [
+        ("bearing_fed_by_return", "bearing_1"),
+        ("heater_thermostat", "oil"),
+        ("sensor_gain", "bearing_1"),
+    ]
     for machine in ("R80736", "R80721"):  # on each of them
         errors = [_oil_rmse([c for c in found.courses if c.held_out and c.recording.startswith(machine)], run)
                   for run in ("calibrated", "after")]  # fmt: skip
@@ -89,13 +93,8 @@ def test_an_air_cooler_with_a_thermostat_is_found_and_holds_on_the_other_machine
     assert any("only ratios are identified" in note for note in found.notes)
 
 
-@pytest.mark.slow
-@pytest.mark.xfail(
-    strict=True,
-    reason="where watts are known but for a factor fits end where their path leads: since losses are linearised "
-    "interval by interval a second cooler is named here, and the air no longer pointed at",
-)
-def test_air_that_was_not_recorded_is_missed_at_the_air(farm):
+@pytest.fixture(scope="module")
+def without_air(farm: Path) -> Diagnosis:
     """The other way round: the nacelle's temperature is taken away, and the definition's constant stands in for it."""
     constant = load_gearbox("la_haute_borne").network().inputs["T_ambient"]
     train, holdout = (
@@ -105,11 +104,24 @@ def test_air_that_was_not_recorded_is_missed_at_the_air(farm):
             *_read(farm, "R80736.csv.gz@2017-10-09..2017-10-21"),
         )
     )
-    found = diagnose(train, "la_haute_borne", holdout=holdout)
-    assert found.verdict == "unexplained"
-    assert found.location[0].node == "air" and found.location[0].probability > 0.5
-    assert any(r.mechanism == "ambient_swing" for f in found.findings for r in f.confusable_with)
-    # What is known of the air is gone; the cooler is found all the same, against the air outdoors, which is recorded.
-    first = found.findings[0]
+    return diagnose(train, "la_haute_borne", holdout=holdout)
+
+
+@pytest.mark.slow
+def test_without_the_nacelles_air_the_cooler_is_found_against_the_air_outdoors(without_air):
+    assert without_air.verdict == "unexplained"
+    assert "ambient_degC" in without_air.next_test
+    # What is known of the air is gone; the cooler is found all the same, against the air that is recorded.
+    first = without_air.findings[0]
     assert first.mechanism == "cooler_air_thermostat" and first.place == "returns_outdoor"
-    assert found.holdout.after < 0.75 * found.holdout.calibrated
+    assert without_air.holdout.after < 0.75 * without_air.holdout.calibrated
+
+
+@pytest.mark.slow
+@pytest.mark.xfail(
+    reason="rounding decides here: in means over minutes switches follow the temperatures by jumps, so fits end where "
+    "their path leads; an earlier version pointed at the air, this one names a second cooler"
+)
+def test_air_that_was_not_recorded_is_missed_at_the_air(without_air):
+    assert without_air.location[0].node == "air" and without_air.location[0].probability > 0.5
+    assert any(r.mechanism == "ambient_swing" for f in without_air.findings for r in f.confusable_with)

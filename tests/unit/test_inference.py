@@ -16,6 +16,7 @@ from diagnosis.case import Case
 from diagnosis.evidence import Marginal, strength
 from diagnosis.explain import (
     DISTORTED,
+    HOPE,
     Explanation,
     best_fits,
     calibrated,
@@ -500,9 +501,8 @@ def test_what_is_not_needed_can_be_taken_out_again(fzg: Gearbox, piece: Piece, p
     stated = [finding_of(case, two, h, stage, ()).probability for h, stage in zip(two.found, stages, strict=True)]
     assert stated == pytest.approx([1.0, 0.7])
     # From another process come copies; the evidence is theirs all the same.
-    assert [finding_of(case, two, replace(h), s, ()).log_bayes for h, s in zip(two.found, stages, strict=True)] == [
-        20.0
-    ] * 2
+    copies = [finding_of(case, two, replace(h), stage, ()) for h, stage in zip(two.found, stages, strict=True)]
+    assert [copy.log_bayes for copy in copies] == [20.0, 20.0]
 
 
 def test_the_error_of_a_mean_heat_is_that_of_the_strength_and_of_what_goes_with_it(
@@ -884,12 +884,19 @@ def test_of_two_views_of_one_hypothesis_the_better_fit_counts(
         return replace(base, found=(scored.hypothesis,), log_evidence=120.0 if view is base else 180.0)
 
     monkeypatch.setattr(explain, "fitted", fit)
-    monkeypatch.setattr(explain, "refined", lambda rough, _: replace(rough, log_evidence=rough.log_evidence + 1.0))
+    worths: list[float] = []
+
+    def to_the_end(rough: Explanation, worth: float) -> Explanation:
+        worths.append(worth)
+        return replace(rough, log_evidence=rough.log_evidence + 1.0)
+
+    monkeypatch.setattr(explain, "refined", to_the_end)
     fan, tank = _scored("fan", "x", 40.0), _scored("tank", "oil", 30.0)
     found = best_fits(base, [(base, fan), (middle, fan), (base, tank)])
     # What can no longer win is not fitted to the end; where the calibration is bent, it still may.
     ends = 121.0 if shift > DISTORTED and not slow else 120.0
     assert [(e.found[-1].name, e.log_evidence) for e in found] == [("fan", 181.0), ("tank", ends)]
+    assert set(worths) == {100.0 + HOPE * 80.0}  # of the best rough gain, over the base
     # A second start is for what scores nearly as well as the best; another view is one already.
     assert tried[1] == np.inf and 0.5 * fan.log_bayes < tried[0] == tried[2] < fan.log_bayes
 
@@ -1274,3 +1281,13 @@ def test_what_one_place_found_is_tried_at_the_others(monkeypatch: pytest.MonkeyP
     found = explain._elsewhere(fits, 1)
     assert [e.log_evidence for e in found] == [50.0, 70.0, 20.0]
     assert tried == [("rain@lower", ("course",))]
+
+
+@pytest.mark.parametrize(("verdict", "assumed", "said"), [
+    ("unexplained", {"T_ambient", "air_speed"}, "record ambient_degC"),
+    ("unexplained", {"air_speed"}, "repeat the operation"),
+    ("missing_physics", {"T_ambient"}, ""),
+])  # fmt: skip
+def test_an_ambient_that_was_not_recorded_is_the_first_thing_to_record(verdict, assumed, said) -> None:
+    text = assemble._next_test(verdict, (), (), {}, assumed)
+    assert text.startswith(said) and bool(text) == bool(said)
