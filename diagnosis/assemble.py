@@ -298,7 +298,11 @@ def _predictions(case: Case, found: Search, jobs: int) -> Predictions:
     }
     zs = (found.calibrated.fit.z, found.final.fit.z)
     places = [(name, index) for name, (nominal, *_) in problems.items() for index in range(len(nominal.pieces))]
-    three = spread(jobs, [delayed(_predicted)(*problems[name], *zs, index) for name, index in places])
+    fitted = found.final.fit.without_parts().courses
+    near = {"train": fitted, "holdout": (None,) * len(case.holdout.pieces)}
+    three = spread(
+        jobs, [delayed(_predicted)(*problems[name], *zs, index, near[name][index]) for name, index in places]
+    )
     return {
         name: {state: [them[which] for (one, _), them in zip(places, three, strict=True) if one == name]
                for which, state in enumerate(("before", "calibrated", "after"))}
@@ -307,12 +311,12 @@ def _predictions(case: Case, found: Search, jobs: int) -> Predictions:
 
 
 def _predicted(
-    nominal: Problem, calibrated: Problem, final: Problem, z: Array, z_final: Array, index: int
+    nominal: Problem, calibrated: Problem, final: Problem, z: Array, z_final: Array, index: int, near: Array | None
 ) -> tuple[Prediction, Prediction, Prediction]:
-    """One piece as delivered, calibrated and after; each starts from the one before."""
+    """One piece as delivered, calibrated and after; each starts from the one before, or the last from one `near` it."""
     before = predict(nominal, index, np.zeros(len(nominal.unknowns)), as_delivered=True)
     tuned = predict(calibrated, index, z, guess=before.trajectory.T)
-    return before, tuned, predict(final, index, z_final, guess=tuned.trajectory.T)
+    return before, tuned, predict(final, index, z_final, guess=tuned.trajectory.T if near is None else near)
 
 
 def _fits(case: Case, predictions: Predictions, which: str) -> Fits:

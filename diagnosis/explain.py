@@ -225,7 +225,7 @@ def refined(rough: Explanation, worth: float = -np.inf) -> Explanation:
         better = _reshaped(before, ITERATIONS)
         if better is before:
             break
-    return replace(better, fit=better.fit.without_parts()) if better.fit.parts else better
+    return replace(better, fit=better.fit.without_parts())
 
 
 def _better(there: Explanation, z: Array, guesses: Sequence[Trajectory | Array], iterations: int) -> Explanation:
@@ -349,4 +349,4 @@ def _elsewhere(fits: Sequence[Explanation], jobs: int) -> list[Explanation]:
 def _started_from(there: Explanation, other: Explanation) -> Explanation:
     """An explanation fitted anew from where another one with the same unknowns ended, if that is better."""
     better = _better(there, other.fit.z, other.fit.courses, ITERATIONS)
-    return replace(better, fit=better.fit.without_parts()) if better.fit.parts else better
+    return replace(better, fit=better.fit.without_parts())

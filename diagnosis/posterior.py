@@ -93,7 +93,7 @@ class Fit:
 
     def without_parts(self) -> Fit:
         """The same without its linearisation, which is a hundred times larger; :meth:`Problem.at` brings it back."""
-        return replace(self, parts=(), courses=tuple(part.trajectory.T for part in self.parts))
+        return replace(self, parts=(), courses=tuple(part.trajectory.T for part in self.parts)) if self.parts else self
 
     @property
     def white_residual(self) -> Array:

@@ -110,7 +110,7 @@ def without_air(farm: Path) -> Diagnosis:
 @pytest.mark.slow
 def test_without_the_nacelles_air_the_cooler_is_found_against_the_air_outdoors(without_air):
     assert without_air.verdict == "unexplained"
-    assert "ambient_degC" in without_air.next_test
+    assert "T_ambient_degC" in without_air.next_test
     # What is known of the air is gone; the cooler is found all the same, against the air that is recorded.
     first = without_air.findings[0]
     assert first.mechanism == "cooler_air_thermostat" and first.place == "returns_outdoor"

@@ -1284,7 +1284,7 @@ def test_what_one_place_found_is_tried_at_the_others(monkeypatch: pytest.MonkeyP
 
 
 @pytest.mark.parametrize(("verdict", "assumed", "said"), [
-    ("unexplained", {"T_ambient", "air_speed"}, "record ambient_degC"),
+    ("unexplained", {"T_ambient", "air_speed"}, "record T_ambient_degC"),
     ("unexplained", {"air_speed"}, "repeat the operation"),
     ("missing_physics", {"T_ambient"}, ""),
 ])  # fmt: skip
