@@ -310,6 +310,8 @@ def best_fits(base: Explanation, chosen: Sequence[tuple[Explanation, Scored]], *
     :meth:`Problem.at`: a dozen of them would fill the memory.
     """
     most = max((s.log_bayes for view, s in chosen if view is base), default=0.0)
+    # What remembers takes longest to fit; so it comes first, and no process waits for another one at the end.
+    chosen = sorted(chosen, key=lambda pair: -len(pair[1].hypothesis.term.states) if pair[1].hypothesis.term else 0)
     # The base seen from elsewhere is a further start already.
     again = [view is not base and view.labels == base.labels for view, _ in chosen]
     work = [delayed(fitted)(view, s, np.inf if it else AS_PROMISED * most)

@@ -539,7 +539,7 @@ def test_the_error_of_a_mean_heat_is_that_of_the_strength_and_of_what_goes_with_
 
 
 def _scored(name: str, place: str, log_bayes: float) -> Scored:
-    term: Any = None if name == "parameter" else SimpleNamespace(of_measurement=False, parameters=())
+    term: Any = None if name == "parameter" else SimpleNamespace(of_measurement=False, parameters=(), states=())
     h = Hypothesis(name=name, place=place, family="", variants=np.ones((1, 1)), term=term)
     return Scored(
         hypothesis=h, log_bayes=log_bayes, best=0, values=np.zeros(1), log_bayes_of=np.array([log_bayes]), expected=0.0
