@@ -902,7 +902,7 @@ def test_of_two_views_of_one_hypothesis_the_better_fit_counts(
 
 
 def test_a_racer_without_hope_is_not_given_other_shapes(monkeypatch: pytest.MonkeyPatch) -> None:
-    whole: Any = SimpleNamespace(z=np.zeros(1), courses=(), parts=())
+    whole: Any = SimpleNamespace(z=np.zeros(1), courses=(), without_parts=lambda: whole)
     problem: Any = SimpleNamespace(at=lambda fit: fit)
     rough = Explanation(problem=problem, fit=whole, log_evidence=50.0)
     monkeypatch.setattr(explain, "_better", lambda there, *_: replace(there, log_evidence=60.0))
