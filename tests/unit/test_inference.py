@@ -1263,7 +1263,7 @@ def test_a_false_optimum_of_the_calibration_is_left(
 
 def test_what_one_place_found_is_tried_at_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
     nothing: Any = None
-    fit: Any = SimpleNamespace(z=np.array([1.0, 2.0]), courses=("course",), parts=())
+    fit: Any = SimpleNamespace(z=np.array([1.0, 2.0]), courses=("course",), without_parts=lambda: fit)
 
     def explanation(name: str, place: str, log_evidence: float) -> Explanation:
         h = replace(_scored(name, place, 0.0).hypothesis, variants=np.ones((3, 2)))
