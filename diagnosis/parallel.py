@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from importlib import import_module
@@ -25,7 +26,10 @@ def spread(jobs: int, work: Sequence[Any], *, bundles: int = 0) -> list[Any]:
     if jobs < 2 or len(work) < 2:
         return [function(*given, **named) for function, given, named in work]
     size = -(-len(work) // bundles) if bundles else 1
-    return list(Parallel(n_jobs=jobs, batch_size=size, pre_dispatch=2 * jobs * size)(work))
+    with warnings.catch_warnings():
+        # A process that has grown, as weeks of rows make it, is replaced between two calls: nothing is lost.
+        warnings.filterwarnings("ignore", "A worker stopped while some jobs were given to the executor")
+        return list(Parallel(n_jobs=jobs, batch_size=size, pre_dispatch=2 * jobs * size)(work))
 
 
 @contextmanager
