@@ -206,19 +206,13 @@ class NetworkOnGrid:
         T = np.clip(T, LOWEST_T, HIGHEST_T)
         mine, samples = T[:, self.loss_nodes], piece.samples
         if previous is None or previous.samples.shape != samples.shape:
-            power = self.loss_at(samples, T)
-            slope, torque_slope = self._loss_slopes(samples, T, power)
-            return LossTangent(T=mine, power=power, slope=slope, torque_slope=torque_slope, samples=samples,
-                               stronger=np.zeros(len(T)))  # fmt: skip
+            return self._tangent(samples, T)
+        if piece.slow:
+            return self._slow_tangent(samples, T, previous)
         stronger, unlike = _stronger(samples, previous.samples)
         apart = np.abs(mine - previous.T).max(axis=1, initial=0.0)
-        if piece.slow:  # all together or none: as laws these losses cost nothing, and weeks feel what is a little stale
-            largest = float(apart.max())
-            moved = samples is not previous.samples or largest >= SLOW_NEAR_K
-            anew, far = (np.arange(len(T) if it else 0) for it in (moved, largest >= SLOW_REACH_K))
-        else:
-            anew = np.flatnonzero((apart > LOSS_NEAR_K) | (unlike > TORQUE_NEAR))
-            far = np.flatnonzero((apart > LOSS_REACH_K) | (unlike > TORQUE_REACH))
+        anew = np.flatnonzero((apart > LOSS_NEAR_K) | (unlike > TORQUE_NEAR))
+        far = np.flatnonzero((apart > LOSS_REACH_K) | (unlike > TORQUE_REACH))
         if not len(anew):
             return replace(previous, stronger=stronger)
         # Copies: the tangent before may still be somebody's.
@@ -229,6 +223,23 @@ class NetworkOnGrid:
             slopes = self._loss_slopes(samples[far], T[far], found["power"][far])
             found["slope"][far], found["torque_slope"][far] = slopes
         return LossTangent(**found, stronger=stronger)
+
+    def _tangent(self, samples: Array, T: Array) -> LossTangent:
+        """Losses around temperatures, everything anew."""
+        power = self.loss_at(samples, T)
+        slope, torque_slope = self._loss_slopes(samples, T, power)
+        return LossTangent(T=T[:, self.loss_nodes], power=power, slope=slope, torque_slope=torque_slope,
+                           samples=samples, stronger=np.zeros(len(T)))  # fmt: skip
+
+    def _slow_tangent(self, samples: Array, T: Array, previous: LossTangent) -> LossTangent:
+        """All rows anew or none: where switches follow means over minutes, fits end elsewhere if few rows are."""
+        mine = T[:, self.loss_nodes]
+        apart = float(np.abs(mine - previous.T).max(initial=0.0))
+        if samples is previous.samples and apart < SLOW_NEAR_K:
+            return previous
+        if apart >= SLOW_REACH_K:
+            return self._tangent(samples, T)
+        return replace(previous, T=mine, power=self.loss_at(samples, T), samples=samples)
 
     def _loss_slopes(self, samples: Array, T: Array, power: Array) -> tuple[Array, Array]:
         """Derivatives of losses with respect to temperatures, (K, components, nodes), and to the torque."""

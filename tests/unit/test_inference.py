@@ -40,7 +40,7 @@ from diagnosis.hypotheses import (
     switched_elsewhere,
     two_point_columns,
 )
-from diagnosis.network_on_grid import NetworkOnGrid, named_values
+from diagnosis.network_on_grid import SLOW_NEAR_K, SLOW_REACH_K, NetworkOnGrid, named_values
 from diagnosis.noise import loss_noise, noise_of, start_guess
 from diagnosis.observation import readings
 from diagnosis.posterior import Problem, _gauss_newton
@@ -139,6 +139,27 @@ def test_tangents_follow_the_losses_where_they_have_to(model: NetworkOnGrid, pie
         anew = model.loss_tangent(moved, T)
         unlike = np.abs(tangent.slope - anew.slope).sum(axis=(1, 2))
         assert (unlike <= 0.2 * np.abs(anew.slope).sum(axis=(1, 2)) + 1e-9).all()
+
+
+def test_tangents_of_slow_rows_are_anew_all_together_or_not_at_all(model: NetworkOnGrid, piece: Piece) -> None:
+    slow = replace(piece, slow=True)
+    T = np.full((len(slow.steps), model.n), 60.0)
+    first = model.loss_tangent(slow, T)
+
+    def moved(by: float) -> Array:
+        found = T.copy()
+        found[3] += by
+        return found
+
+    assert model.loss_tangent(slow, moved(0.9 * SLOW_NEAR_K), first) is first
+    near = model.loss_tangent(slow, moved(2.0), first)
+    np.testing.assert_array_equal(near.power, model.loss_at(slow.samples, moved(2.0)))
+    assert near.slope is first.slope
+    assert model.loss_tangent(slow, moved(2.0 + 0.9 * SLOW_NEAR_K), near) is near  # also of one that was anew before
+    far = model.loss_tangent(slow, moved(1.1 * SLOW_REACH_K), first)
+    np.testing.assert_array_equal(far.slope, model.loss_tangent(slow, moved(1.1 * SLOW_REACH_K)).slope)
+    other = replace(slow, samples=1.001 * slow.samples)
+    np.testing.assert_array_equal(model.loss_tangent(other, T, first).power, model.loss_at(other.samples, T))
 
 
 def test_exponential_solves_the_linear_equation_exactly() -> None:
@@ -899,6 +920,27 @@ def test_of_two_views_of_one_hypothesis_the_better_fit_counts(
     assert set(worths) == {100.0 + HOPE * 80.0}  # of the best rough gain, over the base
     # A second start is for what scores nearly as well as the best; another view is one already.
     assert tried[1] == np.inf and 0.5 * fan.log_bayes < tried[0] == tried[2] < fan.log_bayes
+
+
+def test_what_remembers_is_fitted_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    order: list[str] = []
+
+    def fit(_view: Explanation, scored: Scored, _worth: float) -> None:
+        order.append(scored.hypothesis.name)
+
+    monkeypatch.setattr(explain, "fitted", fit)
+    problem: Any = SimpleNamespace(slow=False)
+    calibration: Any = SimpleNamespace(z=np.zeros(1))
+    base = Explanation(problem=problem, fit=calibration, log_evidence=0.0)
+    chosen = []
+    for name, states in (("parameter", 0), ("link", 0), ("tank", 1), ("thermostat", 2)):
+        scored = _scored(name, "x", 1.0)
+        term: Any = scored.hypothesis.term
+        if term is not None:
+            term.states = (None,) * states
+        chosen.append((base, scored))
+    assert best_fits(base, chosen) == []
+    assert order == ["thermostat", "tank", "parameter", "link"]
 
 
 def test_a_racer_without_hope_is_not_given_other_shapes(monkeypatch: pytest.MonkeyPatch) -> None:

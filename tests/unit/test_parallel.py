@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import os
+import warnings
+from uuid import uuid4
 
 import pytest
 from joblib import delayed
 from joblib.externals.loky import get_reusable_executor
 
+from diagnosis import parallel
 from diagnosis.parallel import spread, starting
 
 
@@ -42,3 +45,45 @@ def test_processes_that_were_started_are_those_that_work() -> None:
 def test_what_fails_meanwhile_is_told() -> None:
     with pytest.raises(ArithmeticError, match="no solution"), starting(2):
         raise ArithmeticError("no solution")
+
+
+class _Shared:
+    """Something that tells how often it travelled."""
+
+    def __init__(self) -> None:
+        self.arrived = "never"
+
+    def __setstate__(self, state: dict[str, str]) -> None:
+        self.__dict__.update(state)
+        self.arrived = uuid4().hex
+
+
+def _arrived(shared: _Shared) -> str:
+    return shared.arrived
+
+
+@pytest.mark.parametrize("bundles", [0, 2])
+def test_what_a_bundle_has_in_common_travels_once(bundles: int) -> None:
+    shared = _Shared()
+    arrivals = set(spread(2, [delayed(_arrived)(shared) for _ in range(24)], bundles=bundles))
+    assert len(arrivals) == (bundles or 24)
+
+
+@pytest.mark.parametrize(("text", "shown"), [("A worker stopped while some jobs were given to the executor.", False),
+                                             ("something else", True)])  # fmt: skip
+def test_only_the_warning_of_a_replaced_process_is_kept_quiet(
+    monkeypatch: pytest.MonkeyPatch, text: str, shown: bool
+) -> None:
+    class Stub:
+        def __init__(self, **_: object) -> None:
+            pass
+
+        def __call__(self, work: list[object]) -> list[int]:
+            warnings.warn(text, UserWarning, stacklevel=1)
+            return list(range(len(work)))
+
+    monkeypatch.setattr(parallel, "Parallel", Stub)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        assert spread(2, [delayed(_worked)(number) for number in range(3)]) == [0, 1, 2]
+    assert bool(caught) is shown
