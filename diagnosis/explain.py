@@ -159,7 +159,12 @@ def _with(problem: Problem, h: Hypothesis) -> Problem:
 
 
 def without(start: Explanation, explanation: Explanation, index: int) -> Explanation:
-    """An explanation without one of the things it found, fitted anew from where it was.
+    """An explanation without one of the things it found, fitted anew from where it was; see :func:`instead`."""
+    return instead(start, explanation, index, None)
+
+
+def instead(start: Explanation, explanation: Explanation, index: int, other: Explanation | None) -> Explanation:
+    """An explanation with something else in place of one of the things it found, fitted anew from where it was.
 
     Parameters
     ----------
@@ -168,22 +173,31 @@ def without(start: Explanation, explanation: Explanation, index: int) -> Explana
     explanation : Explanation
     index : int
         Which of what was found
+    other : Explanation or None
+        What it found last comes in its place, from the values that it has there; None for nothing
 
     Raises
     ------
     ArithmeticError
-        If there is no solution without it.
+        If there is no solution.
     """
     found = tuple(h for i, h in enumerate(explanation.found) if i != index)
+    values = _values_of(explanation)
+    if other is not None:
+        found = (*found, other.found[-1])
+        values = _values_of(other) | values
     problem, old = start.problem, explanation.problem
     for h in found:
         problem = _with(problem, h)
     problem = problem.changed(noise=old.noise, whitenings=old.whitenings)
-    values = {(item.role, item.target): item.value(float(z))
-              for item, z in zip(old.unknowns.items, explanation.fit.z, strict=True)}  # fmt: skip
     z = np.array([item.z(values[item.role, item.target]) for item in problem.unknowns.items])
     fit = problem.fit(z, [part.trajectory.T for part in explanation.fit.parts], iterations=ITERATIONS)
     return _explanation(found, problem, fit)
+
+
+def _values_of(explanation: Explanation) -> dict[tuple[str, str], float]:
+    items = explanation.problem.unknowns.items
+    return {(i.role, i.target): i.value(float(z)) for i, z in zip(items, explanation.fit.z, strict=True)}
 
 
 def fitted(base: Explanation, scored: Scored, worth: float = -np.inf) -> Explanation | None:

@@ -13,10 +13,9 @@ from diagnosis.heat import heats_of, mean_heat_of
 from diagnosis.hypotheses import Hypothesis
 from diagnosis.result import Finding, ParameterValue, Rival
 from diagnosis.search import FORM_DOUBT
-from diagnosis.stage import Stage
+from diagnosis.stage import LEAST_RIVAL, Stage
 from models.mechanisms import Mechanism, Placed
 
-LEAST_RIVAL = 0.01
 FORM_ERROR = 0.1  # of a strength and its heat: laws of the literature are hardly known better
 
 

@@ -14,6 +14,7 @@ import numpy as np
 from joblib import delayed
 
 from diagnosis.acceptance import SECOND_GAIN, holds_out, judged
+from diagnosis.beside import Found, ranked_beside
 from diagnosis.case import Case, first, floored
 from diagnosis.evidence import Marginal
 from diagnosis.explain import Explanation, best_fits, distorted, evidence_of, in_the_middle, without
@@ -21,15 +22,14 @@ from diagnosis.holdout import Judge
 from diagnosis.hypotheses import Hypothesis, Scored, hypothesis_of, parameter_hypotheses, scan, sharpened
 from diagnosis.mapping import LOSS
 from diagnosis.parallel import spread, starting
-from diagnosis.stage import Stage, log_e_value
+from diagnosis.stage import OPEN_PENALTY, Stage, log_e_value, penalised
 from models.mechanisms import OPEN_FORMS, Mechanism
 
 # Set on development cases (seed 1 of `conceal`) and by the four open ones, what is about open forms and the calibration
 # on opened proofs (seeds 2033 and 2034); a proof draws others.
 THRESHOLD = 5.0  # log e-value at a false-alarm rate of 5 %
-OPEN_PENALTY = 10.0  # an open form has to beat the catalogue by this
-# ... and alone, where the catalogue sees nothing, has this taken off: consistent recordings leave up to 14 nats, since
-# formulas are a little wrong. It is more than the logarithm of how many forms there are, so an e-value stays one.
+# An open form alone, where the catalogue sees nothing, has this taken off: consistent recordings leave up to 14 nats,
+# since formulas are a little wrong. It is more than the logarithm of how many forms there are, so an e-value stays one.
 OPEN_ALONE = 25.0
 # Best hypotheses and best open forms whose shapes are sought between the grid, from this score on.
 SHARPENED, SHARPENED_FORMS, SHARPEN_FROM = 15, 4, 2.0
@@ -56,6 +56,8 @@ class Search:
     calibrated, final : Explanation
     stages : tuple of Stage
         The last one found nothing more, unless the search ended at its greatest number of effects
+    findings : tuple of (Hypothesis, Stage)
+        What is left of what was found, each ranked beside all the others; what hardly matters comes last
     threshold : float
         Log e-value that the first stage had to reach
     judge : Judge
@@ -65,6 +67,7 @@ class Search:
     calibrated: Explanation
     final: Explanation
     stages: tuple[Stage, ...]
+    findings: tuple[Found, ...]
     threshold: float
     judge: Judge
 
@@ -72,13 +75,6 @@ class Search:
     def detected(self) -> bool:
         """Whether anything is amiss that matters: found, or sought in vain."""
         return any(stage.matters for stage in self.stages)
-
-    @property
-    def findings(self) -> tuple[tuple[Hypothesis, Stage], ...]:
-        """What is left of what was found, with the look that found it; what hardly matters comes last."""
-        by = {stage.accepted.found[-1].label: stage for stage in self.stages if stage.accepted is not None}
-        pairs = [(h, by[h.label]) for h in self.final.found]
-        return tuple(sorted(pairs, key=lambda pair: not pair[1].matters))
 
 
 def threshold_at(false_alarm_rate: float) -> float:
@@ -162,7 +158,15 @@ def search(
         others = _others(base, stage)
     if judge.base is not base:
         judge = Judge(case, base, floor)
-    return Search(calibrated=start, final=base, stages=tuple(stages), threshold=threshold, judge=judge)
+    found = ranked_beside(start, base, _left(base, stages), jobs=jobs)
+    return Search(calibrated=start, final=base, stages=tuple(stages), findings=tuple(found), threshold=threshold,
+                  judge=judge)  # fmt: skip
+
+
+def _left(final: Explanation, stages: Sequence[Stage]) -> list[Found]:
+    """What is left of what was found, with the look that found it; what hardly matters comes last."""
+    by = {stage.accepted.found[-1].label: stage for stage in stages if stage.accepted is not None}
+    return sorted(((h, by[h.label]) for h in final.found), key=lambda pair: not pair[1].matters)
 
 
 def _rests_of_forms(stages: Sequence[Stage]) -> list[float]:
@@ -265,7 +269,7 @@ def _look(
     fits = best_fits(base, chosen, jobs=jobs)
     if not fits:
         return Stage(scored=tuple(scored), log_e_value=log_e, note="no explanation has a solution")
-    gains = [_penalised(fit) - base.log_evidence for fit in fits]
+    gains = [penalised(fit) - base.log_evidence for fit in fits]
     stage = Stage(scored=tuple(scored), log_e_value=log_e, fits=tuple(fits), gains=tuple(gains)).ranked()
     return judged(judge, calibrated, stage, needed)
 
@@ -310,7 +314,3 @@ def _worth_of_open(real: Sequence[Scored], opened: Sequence[Scored]) -> list[Sco
         return found
     other = next((s for s in opened if s.hypothesis.name != opened[0].hypothesis.name), opened[0])
     return [opened[0], other]
-
-
-def _penalised(fit: Explanation) -> float:
-    return fit.log_evidence - (OPEN_PENALTY if fit.found[-1].is_open else 0.0)

@@ -15,6 +15,8 @@ from models.types import Array
 # Log evidences are divided by a temperature before they become probabilities, because no model is exactly true: a
 # constant, and a share of the whole evidence, since the form of an effect is known no better than that.
 TEMPER, TEMPER_SHARE = 3.0, 0.03
+OPEN_PENALTY = 10.0  # log evidence by which an open form has to beat the catalogue
+LEAST_RIVAL = 0.01  # probability of what is told as a rival
 # Log odds of what is rarer than a piece of missing physics or a biased sensor.
 RARITY = {
     "sensor_gain": -2.0,
@@ -100,3 +102,8 @@ def log_weights(scored: Sequence[Scored]) -> Array:
 def log_e_value(scored: Sequence[Scored]) -> float:
     """Log of the mean Bayes factor, see :func:`log_weights`."""
     return float(np.logaddexp.reduce(np.array([s.log_bayes for s in scored]) + log_weights(scored)))
+
+
+def penalised(fit: Explanation) -> float:
+    """Log evidence of a fit, less what an open form has to be ahead of the catalogue."""
+    return fit.log_evidence - (OPEN_PENALTY if fit.found[-1].is_open else 0.0)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from diagnosis import acceptance, assemble, explain, search
+from diagnosis import acceptance, assemble, beside, explain, search
 from diagnosis.case import Case
 from diagnosis.evidence import Marginal, strength
 from diagnosis.explain import (
@@ -23,6 +23,7 @@ from diagnosis.explain import (
     distorted,
     fitted,
     in_the_middle,
+    instead,
     refined,
     without,
 )
@@ -48,7 +49,7 @@ from diagnosis.predict import START_S, predict
 from diagnosis.recording import Channel, Recording
 from diagnosis.recurrence import lagged
 from diagnosis.shapes import shape_terms
-from diagnosis.stage import Stage, log_e_value
+from diagnosis.stage import OPEN_PENALTY, Stage, log_e_value
 from diagnosis.term_on_grid import TermOnGrid
 from diagnosis.trajectory import complete_start, exponential, parameter_heats, settled_balance, simulate
 from diagnosis.unknowns import Unknown, Unknowns, unknowns_of
@@ -516,6 +517,10 @@ def test_what_is_not_needed_can_be_taken_out_again(fzg: Gearbox, piece: Piece, p
     assert alone.log_evidence > one.log_evidence - 0.5  # as good as if it had never been added
     assert two.log_evidence < alone.log_evidence + 3.0  # the second one explains nothing
     assert without(start, two, 0).log_evidence < two.log_evidence - 3.0  # the first one does
+    other = added(start, "windage")
+    exchanged, known = instead(start, two, 1, other), added(one, "windage")
+    assert exchanged.labels == known.labels  # the same as if it had been added at once
+    assert exchanged.log_evidence == pytest.approx(known.log_evidence, abs=0.5)
     # A further effect may be what the form of the first one lacks, however far it is ahead of its rivals.
     case: Any = SimpleNamespace(nominal=network)
     stages = [Stage(scored=(), log_e_value=30.0, fits=(e,), gains=(20.0,), accepted=e) for e in (one, two)]
@@ -1191,6 +1196,50 @@ def test_what_a_first_look_held_for_less_likely_may_stand_beside_a_second_effect
     assert one.gains[0] == pytest.approx(900.0 + 200.0) and one.probabilities()[0] > 0.9
     stands = replace(second, accepted=beside_base)
     assert search._reconsidered([first, stands], base) == [first, stands]
+
+
+def test_what_was_found_is_ranked_beside_all_the_rest(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A late clock that a first look took for a cooler: with the cooler in place nothing but the clock explains it."""
+    clock, valve, form, cooler = (
+        _scored(name, place, 0.0).hypothesis
+        for name, place in (("clock", "clock"), ("valve", "oil"), ("open_speed", "oil"), ("cooler", "air"))
+    )
+
+    form = replace(form, family=OPEN_FORM)
+
+    def explanation(log_evidence: float, *found: Any) -> Explanation:
+        fit: Any = SimpleNamespace()
+        fit.without_parts = lambda: fit
+        return Explanation(problem=NOTHING, fit=fit, log_evidence=log_evidence, found=found)
+
+    alone = [explanation(900.0, valve), explanation(890.0, clock), explanation(100.0, form)]
+    first = Stage(scored=(), log_e_value=900.0, fits=tuple(alone), gains=(900.0, 890.0, 880.0), accepted=alone[1])
+    final = explanation(2000.0, clock, cooler)
+    second = Stage(scored=(), log_e_value=900.0, fits=(final,), gains=(1110.0,), accepted=final)
+    evidence = {None: 1000.0, valve.label: 1400.0, form.label: 1200.0}
+
+    def instead(_start: Any, explained: Explanation, index: int, other: Explanation | None) -> Explanation:
+        rest = tuple(h for i, h in enumerate(explained.found) if i != index)
+        if other is None:
+            return explanation(evidence[None], *rest)
+        if other.found[-1] is form and "unsolvable" in unsolvable:
+            raise ArithmeticError
+        return explanation(evidence[other.found[-1].label], *rest, other.found[-1])
+
+    unsolvable: list[str] = []
+    monkeypatch.setattr(beside, "instead", instead)
+    found = [(clock, first), (cooler, second)]
+    assert first.probabilities()[1] < 0.5
+    (_, again), (_, last) = beside.ranked_beside(NOTHING, final, found)
+    assert last is second  # it was found beside the clock already
+    assert again.accepted is not None and again.accepted.labels == ("cooler@air", "clock@clock")
+    assert [fit.labels[-1] for fit in again.fits] == ["clock@clock", "valve@oil", "open_speed@oil"]
+    assert again.gains == (1000.0, 400.0, 200.0 - OPEN_PENALTY) and again.probabilities()[0] > 0.99
+    unsolvable.append("unsolvable")
+    (_, again), _ = beside.ranked_beside(NOTHING, final, found)
+    assert [fit.labels[-1] for fit in again.fits] == ["clock@clock", "valve@oil"]
+    # One effect alone is not ranked again.
+    assert beside.ranked_beside(NOTHING, alone[1], found[:1]) == found[:1]
 
 
 @pytest.mark.parametrize("form", ["clock", "lag", "swapped", "stuck"])
