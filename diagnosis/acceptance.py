@@ -39,22 +39,11 @@ CERTAIN = 50.0  # log evidence below which it has to be the whole of it
 def judged(judge: Judge, calibrated: Explanation, stage: Stage, needed: float) -> Stage:
     """A look with what of its fits is accepted.
 
-    What is too small to matter is accepted only to clear the way: as long as nothing that matters was found, and later
-    tentatively, where it is ahead of something that matters and has another name.
-    """
-    found = _first_to_hold(judge, calibrated, stage, needed)
-    if found.accepted is None and (small := _in_the_way(judge, calibrated, stage, needed)) is not None:
-        return replace(found, accepted=small, tentative=True, matters=False)
-    return found
-
-
-def _first_to_hold(judge: Judge, calibrated: Explanation, stage: Stage, needed: float) -> Stage:
-    """A look with the most likely of its fits that nothing speaks against.
-
-    What the held-out recordings refuse stays a rival of what is accepted only if they hold it for about as likely; what
-    the training data hold for much less likely than that is accepted only where the held-out recordings themselves
-    speak for it. Where another strong effect is still missing, the first one may make their error larger although it
-    makes them far more probable: that one is accepted tentatively, before anything less likely.
+    What is too small to matter is accepted only to clear the way, as long as nothing that matters was found. What the
+    held-out recordings refuse stays a rival of what is accepted only if they hold it for about as likely; what the
+    training data hold for much less likely than that is accepted only where the held-out recordings themselves speak
+    for it. Where another strong effect is still missing, the first one may make their error larger although it makes
+    them far more probable: that one is accepted tentatively, before anything less likely.
     """
     case, base, probabilities = judge.case, judge.base, stage.probabilities()
     cleared = any(_matters(case, base, h) for h in base.found)
@@ -72,7 +61,7 @@ def _first_to_hold(judge: Judge, calibrated: Explanation, stage: Stage, needed: 
         if gain < needed or probability < LEAST_PROBABILITY * probabilities[left].sum():
             continue
         fit = replace(fit, fit=fit.problem.at(fit.fit))
-        large = _matters_surely(case, fit, gain)
+        large = _matters(case, fit, fit.found[-1], 1.0 if gain > CERTAIN else 2.0)
         matters = matters or large
         if _drives_away(base, fit):
             impossible.add(index)
@@ -97,32 +86,6 @@ def _first_to_hold(judge: Judge, calibrated: Explanation, stage: Stage, needed: 
             if promising is None and large and not base.found and judge.gain(fit) > CERTAIN:
                 promising, promised = fit, index
     return replace(stage, matters=matters, note=note, accepted=promising, tentative=promising is not None)
-
-
-def _in_the_way(judge: Judge, calibrated: Explanation, stage: Stage, needed: float) -> Explanation | None:
-    """What is most likely of a look, where it is too small to matter and something that would matter is not."""
-    case, base = judge.case, judge.base
-    if stage.gains[0] < needed or not any(_matters(case, base, h) for h in base.found):
-        return None
-    most, own = stage.fits[0], stage.fits[0].found[-1].name
-    small = replace(most, fit=most.problem.at(most.fit))
-    if _matters_surely(case, small, stage.gains[0]) or _drives_away(base, small):
-        return None
-    if not holds_out(judge, calibrated, small):
-        return None
-    # One after another: with their linearisations all of them would fill the memory.
-    hides = any(
-        gain >= needed
-        and fit.found[-1].name != own
-        and _matters_surely(case, replace(fit, fit=fit.problem.at(fit.fit)), gain)
-        for fit, gain in zip(stage.fits, stage.gains, strict=True)
-    )
-    return small if hides else None
-
-
-def _matters_surely(case: Case, fit: Explanation, gain: float) -> bool:
-    """Whether what was found last matters: clearly, where the recordings say little of it."""
-    return _matters(case, fit, fit.found[-1], 1.0 if gain > CERTAIN else 2.0)
 
 
 def _only(stage: Stage, indices: Iterable[int]) -> Stage:

@@ -44,7 +44,7 @@ OTHERS, LIKELY = 2, 0.1
 BETTER = 3.0  # log evidence of a calibration that replaces another one
 FORM_REST = 0.25  # of the log evidence of an open form
 FORM_DOUBT = 0.3  # that a further effect is only what the form of the one before lacks
-MOST_EFFECTS, MOST_LOOKS = 4, 6  # looks that only clear the way are no effects
+MOST_EFFECTS = 4
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -123,32 +123,31 @@ def search(
     """
     progress("calibrating the model inside its priors")
     with starting(jobs):
-        start, _ = base, floor = first(case)
+        start, start_floor = base, floor = first(case)
     threshold = threshold_at(false_alarm_rate)
     candidates = candidates_of(case, catalogue)
     stages: list[Stage] = []
     others: list[Explanation] = []
-    judge = before = Judge(case, base, floor)
-    while _goes_on(stages):
-        look = len(stages)
-        progress("looking for a further effect" if look else "scoring everything that may be missing")
+    for look in range(MOST_EFFECTS):
+        progress("scoring everything that may be missing" if not look else "looking for a further effect")
         needed = max([SECOND_GAIN, *_rests_of_forms(stages)]) if look else threshold
         judge = Judge(case, base, floor)
         stage = _look(judge, start, candidates, needed, jobs, progress, others)
         if not look and (better := _recalibrated(judge, stage)) is not None:
-            start, _ = base, floor = floored(better)
+            start, start_floor = base, floor = floored(better)
             judge = Judge(case, base, floor)
             stage = _look(judge, start, candidates, needed, jobs, progress, others)
-        if stages and stages[-1].tentative and (stage.accepted is None or stage.tentative):
+        if stage.accepted is None and stages and stages[-1].tentative:
             alone = stages.pop()
             stage = alone.otherwise or replace(alone, accepted=None, tentative=False)
-            judge, base, floor = before, before.base, before.floor
+            base, floor = start, start_floor
+            judge = Judge(case, base, floor)
         stages.append(stage)
         if stage.accepted is None:
             break
         stages = _reconsidered(stages, base)
         if stage.tentative:
-            before, base = judge, stage.accepted
+            base = stage.accepted
             others = _others(base, stage)
             continue
         slim = _needed_of(judge, start, stage.accepted)
@@ -162,12 +161,6 @@ def search(
     found = ranked_beside(start, base, _left(base, stages), jobs=jobs)
     return Search(calibrated=start, final=base, stages=tuple(stages), findings=tuple(found), threshold=threshold,
                   judge=judge)  # fmt: skip
-
-
-def _goes_on(stages: Sequence[Stage]) -> bool:
-    """Whether there is to be another look: what was accepted tentatively always gets one."""
-    few = sum(stage.matters for stage in stages) < MOST_EFFECTS and len(stages) < MOST_LOOKS
-    return few or stages[-1].tentative
 
 
 def _left(final: Explanation, stages: Sequence[Stage]) -> list[Found]:

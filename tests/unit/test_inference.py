@@ -1104,51 +1104,6 @@ def test_what_promises_has_its_chance_before_anything_less_likely(
     assert search.search(NOTHING, {}).final.labels == fault.labels
 
 
-@pytest.mark.parametrize(("gain", "known", "clears"), [(20.0, True, True), (9.0, True, False), (20.0, False, False)])
-def test_what_is_too_small_makes_way_for_what_it_hides(
-    monkeypatch: pytest.MonkeyPatch, gain: float, known: bool, clears: bool
-) -> None:
-    """A lag that nobody would notice hides a heater: it is taken in if the heater is found beside it, and only then."""
-    cooler, lag, heater = (_scored(n, n, 0.0).hypothesis for n in ("cooler", "lag", "heater"))
-    nothing = Explanation(problem=NOTHING, fit=NOTHING, log_evidence=0.0)
-    base = replace(nothing, found=(cooler,))
-    small, large = (replace(nothing, found=(cooler, h)) for h in (lag, heater))
-    monkeypatch.setattr(acceptance, "holds_out", lambda *_: True)
-    monkeypatch.setattr(
-        acceptance, "_matters",
-        lambda _case, fit, h, _times=1.0: h is heater or (known and h is cooler),
-    )  # fmt: skip
-    stage = Stage(scored=(), log_e_value=90.0, fits=(small, large), gains=(300.0, gain))
-    found = acceptance.judged(_judge(base, 40.0), nothing, stage, 10.0)
-    assert found.tentative is clears and not found.matters
-    if not known:  # nothing that matters was found before: it clears the way in any case
-        assert found.accepted is not None and found.accepted.labels == small.labels
-    assert (found.accepted is not None) == (clears or not known)
-    if not clears:
-        return
-
-    monkeypatch.setattr(search, "first", lambda _: (nothing, 1.0))
-    monkeypatch.setattr(search, "candidates_of", lambda *_: ())
-    monkeypatch.setattr(search, "floored", lambda fit: (fit, 1.0))
-    monkeypatch.setattr(search, "_others", lambda *_: [])
-    monkeypatch.setattr(search, "_needed_of", lambda _judge, _start, fit: fit)
-    monkeypatch.setattr(search, "ranked_beside", lambda _start, _final, left, jobs: left)
-    first_look = Stage(scored=(), log_e_value=90.0, fits=(base,), gains=(900.0,), accepted=base, matters=True)
-    all_three = replace(nothing, found=(cooler, lag, heater))
-    beside = Stage(scored=(), log_e_value=9.0, fits=(all_three,), gains=(50.0,), accepted=all_three, matters=True)
-    none = Stage(scored=(), log_e_value=0.0)
-    for looks, labels in (
-        ((first_look, found, beside, none), ["cooler@cooler", "heater@heater", "lag@lag"]),
-        ((first_look, found, none), ["cooler@cooler"]),
-        ((first_look, found, found), ["cooler@cooler"]),  # the way is not cleared twice
-    ):
-        coming = iter(looks)
-        monkeypatch.setattr(search, "_look", lambda *_, coming=coming: next(coming))
-        ended = search.search(NOTHING, {})
-        assert [h.label for h, _ in ended.findings] == labels  # what hardly matters comes last
-        assert next(coming, None) is None
-
-
 def test_what_is_likely_and_too_small_is_not_told_as_something_unlikely_and_large(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
