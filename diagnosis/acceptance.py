@@ -53,7 +53,7 @@ def judged(judge: Judge, calibrated: Explanation, stage: Stage, needed: float) -
     by_name: dict[str, float] = {}  # another place of the same physics is no rival
     for fit, probability in zip(stage.fits, probabilities, strict=True):
         by_name[fit.found[-1].name] = by_name.get(fit.found[-1].name, 0.0) + float(probability)
-    ahead = 0.0  # probability of what is more likely and too small
+    ahead = 0.0  # probability of what is more likely, holds and is too small
     promising: Explanation | None = None
     promised = -1
     for index, (fit, gain, probability) in enumerate(zip(stage.fits, stage.gains, probabilities, strict=True)):
@@ -70,21 +70,21 @@ def judged(judge: Judge, calibrated: Explanation, stage: Stage, needed: float) -
         unlikely = by_name[fit.found[-1].name] < LEAST_SHARE * probabilities[0]
         if probability < LEAST_SHARE * ahead or (unlikely and judge.gain(fit) < SECOND_GAIN):
             continue
-        if not large and cleared:
+        if not holds_out(judge, calibrated, fit):
+            refused.add(index)
+            note = "what would explain the training data makes the held-out data worse"
+            if promising is None and large and not base.found and judge.gain(fit) > CERTAIN:
+                promising, promised = fit, index
+        elif not large and cleared:
             ahead = max(ahead, float(probability))
             note = "what the data show is too small to matter"
-        elif holds_out(judge, calibrated, fit):
+        else:
             as_likely = {i for i in refused if judge.gain(stage.fits[i]) > judge.gain(fit) + HOLDOUT_LOSS}
             found = replace(_only(stage, as_likely.union(left)), accepted=fit, matters=large)
             if promising is None or probability > LEAST_SHARE * probabilities[promised]:
                 return found
             both = _only(stage, as_likely.union(left, [promised]))
             return replace(both, accepted=promising, tentative=True, matters=True, otherwise=found)
-        else:
-            refused.add(index)
-            note = "what would explain the training data makes the held-out data worse"
-            if promising is None and large and not base.found and judge.gain(fit) > CERTAIN:
-                promising, promised = fit, index
     return replace(stage, matters=matters, note=note, accepted=promising, tentative=promising is not None)
 
 

@@ -1122,6 +1122,23 @@ def test_what_is_likely_and_too_small_is_not_told_as_something_unlikely_and_larg
         assert (found.found if found is not None else None) == (accepted.found if accepted is not None else None)
 
 
+@pytest.mark.parametrize(("holds", "named"), [(True, None), (False, "heater@oil")])
+def test_what_is_too_small_and_refused_hides_nothing(
+    monkeypatch: pytest.MonkeyPatch, *, holds: bool, named: str | None
+) -> None:
+    """A lag that nobody would notice is ahead of a heater: only if the held-out recordings hold it is that the end."""
+    cooler, lag, heater = (_scored(n, "oil", 0.0).hypothesis for n in ("cooler", "lag", "heater"))
+    base, small, large = (
+        Explanation(problem=NOTHING, fit=NOTHING, log_evidence=0.0, found=found)
+        for found in ((cooler,), (cooler, lag), (cooler, heater))
+    )
+    monkeypatch.setattr(acceptance, "holds_out", lambda _judge, _start, fit: holds or fit.found[-1] is not lag)
+    monkeypatch.setattr(acceptance, "_matters", lambda _case, _fit, h, _times=1.0: h is not lag)
+    stage = Stage(scored=(), log_e_value=90.0, fits=(small, large), gains=(300.0, 217.0))
+    accepted = acceptance.judged(_judge(base, 40.0), replace(base, found=()), stage, 10.0).accepted
+    assert (accepted.labels[-1] if accepted is not None else None) == named
+
+
 @pytest.mark.parametrize(("heldout_gain", "named"), [(11.0, "heater"), (9.0, None)])
 def test_what_is_unlikely_is_named_after_a_refusal_only_where_held_out_recordings_speak_for_it(
     monkeypatch: pytest.MonkeyPatch, heldout_gain: float, named: str | None
