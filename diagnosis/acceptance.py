@@ -25,7 +25,8 @@ HOLDOUT_LOSS = -3.0  # log predictive density that what is found may cost on hel
 HOLDOUT_SLACK = 1.05  # of the calibrated model's error there ...
 HOLDOUT_SLACK_K = 0.04  # ... or this much more, which is nothing beside the noise of a reading
 FURTHER_SLACK = 1.3  # of the error with what was found before
-CLEARLY_BETTER = 0.97  # of that error, where rows are means over minutes
+CLEARLY_BETTER = 0.97  # of that error, where rows are means over minutes ...
+MUCH_BETTER = 0.9  # ... and for what the training data hold for unlikely
 HOLDOUT_SLACK_INSTRUMENT = 1.3  # its fault says little about temperatures to come, and calibration swallows half of it
 # Of the typical loss, and of temperature: half of what matters in practice, since that much of it may be hidden in what
 # was calibrated.
@@ -68,7 +69,7 @@ def judged(judge: Judge, calibrated: Explanation, stage: Stage, needed: float) -
             note = "the fault of an instrument would need a parameter of the gearbox where it cannot be"
             continue
         unlikely = by_name[fit.found[-1].name] < LEAST_SHARE * probabilities[0]
-        if probability < LEAST_SHARE * ahead or (unlikely and judge.gain(fit) < SECOND_GAIN):
+        if probability < LEAST_SHARE * ahead or (unlikely and not _spoken_for(judge, fit)):
             continue
         if not holds_out(judge, calibrated, fit):
             refused.add(index)
@@ -109,6 +110,19 @@ def _drives_away(base: Explanation, fit: Explanation) -> bool:
     )
 
 
+def _spoken_for(judge: Judge, fit: Explanation) -> bool:
+    """Whether held-out recordings themselves say that something is there which the training data hold for unlikely."""
+    return judge.gain(fit) >= SECOND_GAIN or _runs_better(judge, fit, MUCH_BETTER)
+
+
+def _runs_better(judge: Judge, fit: Explanation, share: float) -> bool:
+    """Whether the free-running error falls below a share of that of the base, where only the free run tells.
+
+    Means over minutes do not show when a switch acted; where that goes wrong the predictive density suffers.
+    """
+    return judge.case.holdout.slow and judge.rmse(fit) < share * judge.rmse(judge.base)
+
+
 def holds_out(judge: Judge, calibrated: Explanation, fit: Explanation) -> bool:
     """Whether the held-out recordings support what was found, and the free-running error does not grow by it.
 
@@ -117,9 +131,7 @@ def holds_out(judge: Judge, calibrated: Explanation, fit: Explanation) -> bool:
     """
     if not judge.case.holdout.pieces:
         return True
-    # Means over minutes do not show when a switch acted: where that goes wrong only the free run tells.
-    clearly = judge.case.holdout.slow and judge.rmse(fit) < CLEARLY_BETTER * judge.rmse(judge.base)
-    if judge.gain(fit) < HOLDOUT_LOSS and not clearly:
+    if judge.gain(fit) < HOLDOUT_LOSS and not _runs_better(judge, fit, CLEARLY_BETTER):
         return False
     term = fit.found[-1].term if fit.found else None
     slack = HOLDOUT_SLACK_INSTRUMENT if term is not None and term.of_measurement else HOLDOUT_SLACK

@@ -193,13 +193,16 @@ def _latents(case: Case, explanation: Explanation) -> tuple[LatentHeat, ...]:
 def _location(
     case: Case, found: Search, findings: Sequence[Finding], first: Sequence[LatentHeat]
 ) -> tuple[Location, ...]:
-    """Places by probability: of what was found, by its rivals' places; else by the unknown heat alone."""
+    """Places by probability: of what was found, with its rivals' places; else by the unknown heat alone."""
     weights: dict[str, float] = {}
     if findings:
         for _, stage in found.findings:
+            own: dict[str, float] = {}  # rivals exclude one another, findings do not
             for fit, probability in zip(stage.fits, stage.probabilities(), strict=True):
                 node = node_of(case, fit.found[-1])
-                weights[node] = 1.0 - (1.0 - weights.get(node, 0.0)) * (1.0 - float(probability))
+                own[node] = own.get(node, 0.0) + float(probability)
+            for node, weight in own.items():
+                weights[node] = 1.0 - (1.0 - weights.get(node, 0.0)) * (1.0 - min(weight, 1.0))
     else:
         logs = np.array([h.log_bayes for h in first]) / TEMPER
         for latent, weight in zip(first, np.exp(logs - np.logaddexp.reduce(logs)), strict=True):

@@ -16,6 +16,7 @@ from models.types import Array
 
 SCHEMA = 1
 FAR_SD, MOST_FAR = 3.0, 3  # standard deviations of a prior, beyond which the summary tells of a parameter; how many
+LIKELY = 0.5  # probability from which a further place is told
 Verdict = Literal[
     "consistent", "parameter_error", "missing_physics", "sensor_fault", "unexplained", "insufficient_data"
 ]
@@ -362,8 +363,10 @@ class Diagnosis:
         for finding in self.findings:
             lines += _lines(finding)
         if self.location and self.verdict not in ("consistent", "insufficient_data"):
-            place = self.location[0]
-            lines.append(f"Where: {place.node} ({place.probability:.2f}); {place.regime}")
+            first, *further = self.location
+            places = [first, *(place for place in further if place.probability >= LIKELY)]
+            told = ", ".join(f"{place.node} ({place.probability:.2f})" for place in places)
+            lines.append(f"Where: {told}; {first.regime}")
         for name, fits in (("training", self.train), ("held-out", self.holdout)):
             if fits.before == fits.before:
                 lines.append(

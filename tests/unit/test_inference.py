@@ -858,7 +858,7 @@ NOTHING: Any = SimpleNamespace(at=lambda fit: fit, unknowns=SimpleNamespace(item
 
 def _judge(base: Any, gain: Any = 0.0) -> Any:
     """A judge by held-out recordings that gain so much, or what a function of an explanation says."""
-    case: Any = SimpleNamespace()
+    case: Any = SimpleNamespace(holdout=SimpleNamespace(slow=False))
     return SimpleNamespace(case=case, base=base, floor=1.0, gain=gain if callable(gain) else lambda _: gain)
 
 
@@ -1120,6 +1120,26 @@ def test_what_is_likely_and_too_small_is_not_told_as_something_unlikely_and_larg
         stage = Stage(scored=(), log_e_value=90.0, fits=(here, there), gains=gains)
         found = acceptance.judged(_judge(before, 40.0), replace(before, found=()), stage, 10.0).accepted
         assert (found.found if found is not None else None) == (accepted.found if accepted is not None else None)
+
+
+@pytest.mark.parametrize(
+    ("slow", "rmse", "named"), [(True, 0.89, "heater@oil"), (True, 0.91, None), (False, 0.89, None)]
+)
+def test_of_means_over_minutes_a_free_run_may_speak_for_what_is_unlikely(
+    monkeypatch: pytest.MonkeyPatch, *, slow: bool, rmse: float, named: str | None
+) -> None:
+    """Predictive densities suffer there from moments of switching that no row shows."""
+    lag, heater = (_scored(n, "oil", 0.0).hypothesis for n in ("lag", "heater"))
+    base = Explanation(problem=NOTHING, fit=NOTHING, log_evidence=0.0)
+    monkeypatch.setattr(acceptance, "_matters", lambda *_: True)
+    monkeypatch.setattr(acceptance, "holds_out", lambda _judge, _start, fit: fit.found[-1] is heater)
+    judge = _judge(base, -300.0)
+    judge.case.holdout.slow = slow
+    judge.rmse = lambda fit: rmse * 3.0 if fit.found else 3.0
+    fits = tuple(replace(base, found=(h,)) for h in (lag, heater))
+    stage = Stage(scored=(), log_e_value=90.0, fits=fits, gains=(300.0, 217.0))
+    accepted = acceptance.judged(judge, base, stage, 10.0).accepted
+    assert (accepted.labels[-1] if accepted is not None else None) == named
 
 
 @pytest.mark.parametrize(("holds", "named"), [(True, None), (False, "heater@oil")])
