@@ -357,16 +357,19 @@ class Diagnosis:
             return PARTLY
         return VERDICT_TEXT[self.verdict]
 
+    @property
+    def places(self) -> tuple[Location, ...]:
+        """The most probable place, and every other one that is likely: several effects have several."""
+        return (*self.location[:1], *(place for place in self.location[1:] if place.probability >= LIKELY))
+
     def summary(self) -> list[str]:
         """The diagnosis in about ten lines."""
         lines = [f"{self.verdict.replace('_', ' ')}: {self.verdict_text}"]
         for finding in self.findings:
             lines += _lines(finding)
         if self.location and self.verdict not in ("consistent", "insufficient_data"):
-            first, *further = self.location
-            places = [first, *(place for place in further if place.probability >= LIKELY)]
-            told = ", ".join(f"{place.node} ({place.probability:.2f})" for place in places)
-            lines.append(f"Where: {told}; {first.regime}")
+            told = ", ".join(f"{place.node} ({place.probability:.2f})" for place in self.places)
+            lines.append(f"Where: {told}; {self.location[0].regime}")
         for name, fits in (("training", self.train), ("held-out", self.holdout)):
             if fits.before == fits.before:
                 lines.append(

@@ -116,6 +116,14 @@ def test_errors_are_told_for_every_sensor_of_both_sets() -> None:
     assert "No recording was held out" in nothing_held_out
 
 
+def test_every_likely_place_stands_at_the_top() -> None:
+    base = missing_physics()
+    first, other = base.location
+    told = page(replace(base, location=(first, replace(other, node="bearing_1", probability=0.52), other)))
+    top = told[: told.index("What was found</h2>")]
+    assert re.search(r"Also bearing 1, .*probability.* 0.52", top) and "Also mesh" not in top
+
+
 def test_without_a_finding_nothing_is_said_to_be_found(pages: dict[str, str]) -> None:
     for name in ("consistent", "insufficient_data"):
         text = Text(pages[name][: pages[name].index('<section id="words">')]).told

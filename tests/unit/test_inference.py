@@ -1235,6 +1235,23 @@ def test_what_a_first_look_held_for_less_likely_may_stand_beside_a_second_effect
     assert search._reconsidered([first, stands], base) == [first, stands]
 
 
+def test_places_of_rivals_add_up_and_those_of_findings_do_not_exclude_one_another(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def look(*hypotheses: tuple[str, float]) -> Any:
+        fits = [SimpleNamespace(found=[place]) for place, _ in hypotheses]
+        return None, SimpleNamespace(fits=fits, probabilities=lambda: [p for _, p in hypotheses])
+
+    monkeypatch.setattr(assemble, "node_of", lambda _case, place: place)
+    monkeypatch.setattr(assemble, "_place", lambda _case, _found, _first, node, weight: (node, pytest.approx(weight)))
+    two_coolers = look(("inlet", 0.6), ("inlet", 0.4))
+    found: Any = SimpleNamespace(findings=[two_coolers, look(("air", 0.9), ("inlet", 0.09), ("oil", 0.01))])
+    something: Any = [None]
+    assert assemble._location(NOTHING, found, something, ()) == (("inlet", 1.0), ("air", 0.9))
+    found.findings = [look(("inlet", 0.5), ("air", 0.5)), look(("air", 0.5), ("oil", 0.5))]
+    assert assemble._location(NOTHING, found, something, ()) == (("air", 0.75), ("inlet", 0.5), ("oil", 0.5))
+
+
 def test_what_was_found_is_ranked_beside_all_the_rest(monkeypatch: pytest.MonkeyPatch) -> None:
     """A late clock that a first look took for a cooler: with the cooler in place nothing but the clock explains it."""
     clock, valve, form, cooler = (

@@ -47,3 +47,13 @@ def test_a_notebook_shows_the_same_lines_escaped() -> None:
     shown = found._repr_html_()
     assert "hold &lt;20&gt; m/s &amp; wait" in shown
     assert shown.count("<li>") == len(found.summary()) - 1
+
+
+def test_every_likely_place_is_told_with_what_the_first_one_does() -> None:
+    """A cooler at the inlet, and air that was not recorded: both are true."""
+    base = missing_physics()
+    first, other = base.location
+    both = replace(
+        base, location=(first, replace(other, node="air", probability=0.52), replace(other, probability=0.48))
+    )
+    assert "Where: oil (0.96), air (0.52); speed above 2900 1/min" in str(both).splitlines()
