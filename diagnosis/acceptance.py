@@ -26,7 +26,7 @@ HOLDOUT_SLACK = 1.05  # of the calibrated model's error there ...
 HOLDOUT_SLACK_K = 0.04  # ... or this much more, which is nothing beside the noise of a reading
 FURTHER_SLACK = 1.3  # of the error with what was found before
 CLEARLY_BETTER = 0.97  # of that error, where rows are means over minutes ...
-MUCH_BETTER = 0.9  # ... and for what the training data hold for unlikely
+MUCH_BETTER = 0.9  # ... and for what the training data hold for unlikely; set on two months of a wind turbine
 HOLDOUT_SLACK_INSTRUMENT = 1.3  # its fault says little about temperatures to come, and calibration swallows half of it
 # Of the typical loss, and of temperature: half of what matters in practice, since that much of it may be hidden in what
 # was calibrated.
@@ -40,7 +40,8 @@ CERTAIN = 50.0  # log evidence below which it has to be the whole of it
 def judged(judge: Judge, calibrated: Explanation, stage: Stage, needed: float) -> Stage:
     """A look with what of its fits is accepted.
 
-    What is too small to matter is accepted only to clear the way, as long as nothing that matters was found. What the
+    What is too small to matter is accepted only to clear the way, as long as nothing that matters was found; later it
+    hides what is less likely, unless the held-out recordings refuse it. What the
     held-out recordings refuse stays a rival of what is accepted only if they hold it for about as likely; what the
     training data hold for much less likely than that is accepted only where the held-out recordings themselves speak
     for it. Where another strong effect is still missing, the first one may make their error larger although it makes
