@@ -19,12 +19,30 @@ if TYPE_CHECKING:
     from models.mechanisms import Mechanism
 
 
-@click.command("diagnose")
-@click.argument("recordings", nargs=-1, required=True, metavar="RECORDING...")
+class _HoldoutOfMany(click.Command):
+    """A command whose ``--holdout`` takes every word up to the next option, as its usage line says."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Give every held-out recording an option of its own, which is what click can read."""
+        words: list[str] = []
+        held_out = False
+        for place, word in enumerate(args):
+            if word == "--":
+                return super().parse_args(ctx, words + args[place:])
+            if word.startswith("-"):
+                held_out = word == "--holdout"
+            elif held_out and words[-1] != "--holdout":
+                words.append("--holdout")
+            words.append(word)
+        return super().parse_args(ctx, words)
+
+
+@click.command("diagnose", cls=_HoldoutOfMany, options_metavar="")
+@click.argument("recordings", nargs=-1, metavar="RECORDING... [OPTIONS]")
 @click.option("--gearbox", default="fzg", show_default=True, metavar="NAME|FILE",
               help=f"Name ({', '.join(known_gearboxes())}) or definition file (TOML).")  # fmt: skip
-@click.option("--holdout", multiple=True, metavar="RECORDING",
-              help="To judge by; may be given several times.  [default: the last quarter of each]")  # fmt: skip
+@click.option("--holdout", multiple=True, metavar="RECORDING...",
+              help="To judge by: all up to the next option.  [default: the last quarter of each]")  # fmt: skip
 @click.option("--mapping", type=click.Path(path_type=Path, dir_okay=False), default=None, metavar="FILE",
               help="What the columns mean.  [default: <stem>.toml or mapping.toml beside each]")  # fmt: skip
 @click.option("--mechanisms", type=click.Path(path_type=Path, dir_okay=False), multiple=True,
@@ -102,6 +120,9 @@ def _check_options(
     if not fleet and dask_address is not None:
         raise InputError("--dask spreads the gearboxes of a fleet; give --fleet with it, or --jobs for one gearbox")
     check_workers(jobs, dask_address)
+    if not recordings:
+        order = "; --holdout takes all up to the next option, so name what to learn from before it" if holdout else ""
+        raise InputError(f"diagnose has no RECORDING to learn from{order}")
     if fleet and (len(recordings) != 1 or holdout):
         raise InputError("--fleet takes one folder, with a folder per gearbox; what is named hold* in it is held out")
 
