@@ -1,0 +1,64 @@
+"""Which recordings ``diagnose`` learns from and which it holds out."""
+
+from __future__ import annotations
+
+import pytest
+from click.testing import CliRunner
+
+import diagnosis.recording
+from builder.diagnose_command import diagnose
+from models.errors import InputError
+
+
+class _ReadError(Exception):
+    """Ends the command where it would read the recordings."""
+
+
+@pytest.fixture
+def asked_for(monkeypatch: pytest.MonkeyPatch) -> list[tuple[tuple[str, ...], tuple[str, ...]]]:
+    """What the command would read: (to learn from, held out)."""
+    asked: list[tuple[tuple[str, ...], tuple[str, ...]]] = []
+
+    def read(train: tuple[str, ...], held: tuple[str, ...], *_: object, **__: object) -> None:
+        asked.append((train, held))
+        raise _ReadError
+
+    monkeypatch.setattr(diagnosis.recording, "read_train_and_holdout", read)
+    return asked
+
+
+@pytest.mark.parametrize(
+    ("words", "train", "held"),
+    [
+        ("a b", ("a", "b"), ()),
+        ("a --holdout b", ("a",), ("b",)),
+        ("a --holdout b c --jobs 1", ("a",), ("b", "c")),
+        ("a --holdout b --holdout c", ("a",), ("b", "c")),
+        ("a --holdout b c --holdout d e", ("a",), ("b", "c", "d", "e")),
+        ("--holdout b c --jobs 1 a", ("a",), ("b", "c")),
+        ("--holdout=b a c", ("a", "c"), ("b",)),
+        ("--holdout b c -- a --holdout", ("a", "--holdout"), ("b", "c")),
+    ],
+)
+def test_all_up_to_the_next_option_is_held_out(
+    words: str, train: tuple[str, ...], held: tuple[str, ...], asked_for: list[tuple[tuple[str, ...], tuple[str, ...]]]
+) -> None:
+    done = CliRunner().invoke(diagnose, words.split())
+    assert isinstance(done.exception, _ReadError), done.output
+    assert asked_for == [(train, held)]
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [("", "no RECORDING to learn from"), ("--holdout a b", "name what to learn from before it")],
+)
+def test_nothing_to_learn_from_is_said(words: str, message: str) -> None:
+    done = CliRunner().invoke(diagnose, words.split())
+    assert isinstance(done.exception, InputError)
+    assert message in str(done.exception)
+
+
+def test_holdout_without_a_recording_is_an_error_of_usage() -> None:
+    done = CliRunner().invoke(diagnose, ["a", "--holdout"])
+    assert done.exit_code == 2
+    assert "'--holdout' requires an argument" in done.output
