@@ -9,7 +9,7 @@ import numpy as np
 from joblib import delayed
 
 from diagnosis.acceptance import SECOND_GAIN
-from diagnosis.case import Case, heat_over_time
+from diagnosis.case import FLOORS, Case, heat_over_time
 from diagnosis.evidence import Marginal
 from diagnosis.explain import Explanation
 from diagnosis.findings import finding_of, node_of, rivals_of
@@ -119,12 +119,12 @@ def assembled(
 
 
 def _floor(case: Case, found: Search) -> str:
-    share = HEAT_FRACTION
-    text = f"in every part: {'assumed' if found.judge.floor == 1.0 else 'raised because the remainder asks for it'}"
+    share, floor = HEAT_FRACTION, found.final.problem.floor
+    text = f"in every part: {'assumed' if floor == FLOORS[0] else 'raised because the remainder asks for it'}"
     if case.gearbox.is_parametric:  # watts are known but for a common factor
         share = PARAMETRIC_FRACTION
-        text += f"; of a part of little heat capacity {PARAMETRIC_K * found.judge.floor:.1f} K"
-    return f"random heat of {100.0 * share * found.judge.floor:.1f} % of the typical loss ({case.loss_W:.0f} W) {text}"
+        text += f"; of a part of little heat capacity {PARAMETRIC_K * floor:.1f} K"
+    return f"random heat of {100.0 * share * floor:.1f} % of the typical loss ({case.loss_W:.0f} W) {text}"
 
 
 # ---------------------------------------------------------------------- verdict

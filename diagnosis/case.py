@@ -170,13 +170,7 @@ def _wider_capacities(unknowns: Unknowns) -> Unknowns:
 # ---------------------------------------------------------------------- the structural floor
 
 
-def with_floor(problem: Problem, times: float) -> Problem:
-    """The same problem with the random heats of its noise multiplied."""
-    noise = [replace(n, heat_sd=n.heat_sd * times) for n in problem.noise]
-    return problem.changed(noise=noise, whitenings=None)
-
-
-def floored(explanation: Explanation) -> tuple[Explanation, float]:
+def floored(explanation: Explanation) -> Explanation:
     """The explanation judged by the structural floor that its own remainder asks for.
 
     A formula that is a little wrong leaves a remainder like any other effect. How large such remainders are on this
@@ -185,19 +179,19 @@ def floored(explanation: Explanation) -> tuple[Explanation, float]:
 
     Returns
     -------
-    explanation, times : Explanation, float
+    Explanation
         Fitted anew where the floor changed
     """
-    base = explanation.problem
     evidences = [_evidence(explanation, times) for times in FLOORS]
     best = int(np.argmax(evidences))
-    if best == 0 or evidences[best] - evidences[0] < FLOOR_GAIN:
-        return explanation, 1.0
-    problem = with_floor(base, FLOORS[best])
+    times = FLOORS[best] if evidences[best] - evidences[0] >= FLOOR_GAIN else FLOORS[0]
+    if times == explanation.problem.floor:
+        return explanation
+    problem = explanation.problem.changed(floor=times, whitenings=None)
     fit = problem.fit(explanation.fit.z, [part.trajectory for part in explanation.fit.parts], iterations=2)
     again = settled(problem, fit)
     found = explanation.found
-    return replace(again, found=found, log_evidence=evidence_of(found, again.fit)), FLOORS[best]
+    return replace(again, found=found, log_evidence=evidence_of(found, again.fit))
 
 
 def _evidence(explanation: Explanation, times: float) -> float:
@@ -205,9 +199,7 @@ def _evidence(explanation: Explanation, times: float) -> float:
     problem, fit = explanation.problem, explanation.fit
     residuals, columns, determinant = [], [], 0.0
     for part, noise in zip(fit.parts, problem.noise, strict=True):
-        whitening = Whitening(
-            problem.model, part.trajectory, part.sensors, replace(noise, heat_sd=noise.heat_sd * times)
-        )
+        whitening = Whitening(problem.model, part.trajectory, part.sensors, noise.with_floor(times))
         white = whitening(np.concatenate([part.residual[:, :, None], part.columns], axis=2))
         residuals.append(white[:, 0])
         columns.append(white[:, 1:])
@@ -219,8 +211,8 @@ def _evidence(explanation: Explanation, times: float) -> float:
     return -0.5 * (quadratic + float(np.linalg.slogdet(normal)[1]) + determinant)
 
 
-def first(case: Case) -> tuple[Explanation, float]:
-    """The calibrated model, and the floor it was judged by."""
+def first(case: Case) -> Explanation:
+    """The calibrated model, judged by the floor that it asks for."""
     return floored(calibrated(case.train))
 
 

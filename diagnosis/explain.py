@@ -189,7 +189,7 @@ def instead(start: Explanation, explanation: Explanation, index: int, other: Exp
     problem, old = start.problem, explanation.problem
     for h in found:
         problem = _with(problem, h)
-    problem = problem.changed(noise=old.noise, whitenings=old.whitenings)
+    problem = problem.changed(floor=old.floor, whitenings=old.whitenings)
     z = np.array([item.z(values[item.role, item.target]) for item in problem.unknowns.items])
     fit = problem.fit(z, [part.trajectory.T for part in explanation.fit.parts], iterations=ITERATIONS)
     return _explanation(found, problem, fit)

@@ -7,7 +7,7 @@ from functools import cache, cached_property
 
 import numpy as np
 
-from diagnosis.case import Case, with_floor
+from diagnosis.case import Case
 from diagnosis.explain import Explanation
 from diagnosis.mapping import LOSS
 from diagnosis.posterior import Linearised, Problem
@@ -18,9 +18,11 @@ from models.types import Array
 
 
 def at_holdout(case: Case, explanation: Explanation) -> Problem:
-    """The held-out recordings with everything that an explanation found; its terms, its model, its noise."""
+    """The held-out recordings with everything that an explanation found; its terms, its model, its floor."""
     problem = explanation.problem
-    return case.holdout.changed(model=problem.model, unknowns=problem.unknowns, terms=problem.terms)
+    return case.holdout.changed(
+        model=problem.model, unknowns=problem.unknowns, terms=problem.terms, floor=problem.floor
+    )
 
 
 class Judge:
@@ -31,12 +33,10 @@ class Judge:
     case : Case
     base : Explanation
         With what the others are compared; its noise filters judge them all
-    floor : float
-        Structural floor of `base`, in multiples of the least
     """
 
-    def __init__(self, case: Case, base: Explanation, floor: float) -> None:
-        self.case, self.base, self.floor = case, base, floor
+    def __init__(self, case: Case, base: Explanation) -> None:
+        self.case, self.base = case, base
         self.rmse, self.gain = cache(self._rmse), cache(self._gain)
 
     @cached_property
@@ -57,7 +57,7 @@ class Judge:
     @cached_property
     def _of_base(self) -> tuple[list[Whitening], float, float]:
         """Noise filters of the base, its own log density and its misfit."""
-        problem = with_floor(at_holdout(self.case, self.base), self.floor)
+        problem = at_holdout(self.case, self.base)
         parts = _linearised(problem, self.base, self._courses)
         quadratic, log_determinant = _spread(parts, self.base)
         rows = sum(int(np.isfinite(part.residual).sum()) for part in parts)

@@ -122,14 +122,17 @@ class Problem:
         Filters of an earlier fit of the same pieces: with them the evidences of two fits can be compared
     terms : sequence of Term
         What shifts an input or distorts a reading; terms inside the network are in `model`
+    floor : float
+        Structural floor, in multiples of the random heats of `noise`
     """
 
     def __init__(
         self, model: NetworkOnGrid, pieces: Sequence[Piece], unknowns: Unknowns, noise: Sequence[Noise],
         starts: Sequence[Array], whitenings: Sequence[Whitening] | None = None, terms: Sequence[Term] = (),
+        floor: float = 1.0,
     ) -> None:  # fmt: skip
         self.model, self.pieces, self.unknowns, self.noise, self.starts = model, pieces, unknowns, noise, starts
-        self.whitenings, self.terms = whitenings, tuple(terms)
+        self.whitenings, self.terms, self.floor = whitenings, tuple(terms), floor
         self._shifts = [TermOnGrid(model, term) for term in terms if term.kind == "signal"]
         self._distortions = [TermOnGrid(model, term) for term in terms if term.kind == "sensor"]
         self.inputs = model.laws.inputs
@@ -140,9 +143,9 @@ class Problem:
         return any(piece.slow for piece in self.pieces)
 
     def changed(self, **changes: Any) -> Problem:
-        """The same problem with another `model`, `pieces`, `unknowns` or `terms`."""
-        given: dict[str, Any] = {name: getattr(self, name) for name in
-                                 ("model", "pieces", "unknowns", "noise", "starts", "whitenings", "terms")}  # fmt: skip
+        """The same problem with another `model`, `pieces`, `unknowns`, `terms` or `floor`."""
+        names = ("model", "pieces", "unknowns", "noise", "starts", "whitenings", "terms", "floor")
+        given: dict[str, Any] = {name: getattr(self, name) for name in names}
         return Problem(**(given | changes))
 
     def with_whitenings(self, whitenings: Sequence[Whitening]) -> Problem:
@@ -151,23 +154,35 @@ class Problem:
 
     def linearise(self, index: int, z: Array, guess: Trajectory | Array | None, *, rounds: int = 2) -> Linearised:
         """Simulate one piece at `z` and linearise there."""
-        model, unknowns = self.model, self.unknowns
-        piece = self.adjusted(index, z, guess if isinstance(guess, Trajectory) else None)
-        values = unknowns.network_values(model.network, z)
-        sensors = unknowns.sensors(piece.channels, z)
-        trajectory = simulate(model, piece, values, self.starts[index], guess=guess, rounds=rounds, settled_K=0.01)
+        model = self.model
+        trajectory = self._simulated(index, z, guess, rounds)
+        piece = trajectory.piece
+        sensors = self.unknowns.sensors(piece.channels, z)
         residual = piece.measured - self.read(trajectory, sensors, z)
         columns = self._columns(trajectory, sensors, z)
         if not np.isfinite(columns).all():
             raise ArithmeticError(f"the laws of {piece.recording} have no derivative with these parameters")
-        given = self.whitenings
-        whitening = Whitening(model, trajectory, sensors, self.noise[index]) if given is None else given[index]
+        if self.whitenings is None:
+            whitening = Whitening(model, trajectory, sensors, self.noise[index].with_floor(self.floor))
+        else:
+            whitening = self.whitenings[index]
         white = whitening(np.concatenate([residual[:, :, None], columns], axis=2))
         return Linearised(
             trajectory=trajectory, sensors=sensors, residual=residual, columns=columns, whitening=whitening,
             white_residual=white[:, 0], white_columns=white[:, 1:],
             faults=tuple((d, self._own(d, z)) for d in self._distortions),
         )  # fmt: skip
+
+    def _simulated(self, index: int, z: Array, guess: Trajectory | Array | None, rounds: int) -> Trajectory:
+        """One piece at `z`; twice where an input may follow temperatures that no trajectory tells yet."""
+        values = self.unknowns.network_values(self.model.network, z)
+        known = guess if isinstance(guess, Trajectory) else None
+        for again in (True, False) if known is None and self._shifts else (False,):
+            piece = self.adjusted(index, z, known)
+            found = simulate(self.model, piece, values, self.starts[index], guess=guess, rounds=rounds, settled_K=0.01)
+            if again:
+                guess = known = found
+        return found
 
     def _own(self, term: TermOnGrid, z: Array) -> Array:
         return self.unknowns.term_values([p.name for p in term.term.parameters], z)
@@ -357,14 +372,11 @@ class Problem:
             given = self.whitenings
             if given is None:
                 raise ValueError("an objective alone needs given filters")
-            piece = self.adjusted(index, z, guess if isinstance(guess, Trajectory) else None)
-            values = self.unknowns.network_values(self.model.network, z)
             try:
-                trajectory = simulate(
-                    self.model, piece, values, self.starts[index], guess=guess, rounds=2, settled_K=0.01
-                )
+                trajectory = self._simulated(index, z, guess, rounds=2)
             except (InputError, ArithmeticError, np.linalg.LinAlgError):
                 return np.inf
+            piece = trajectory.piece
             sensors = self.unknowns.sensors(piece.channels, z)
             residual = piece.measured - self.read(trajectory, sensors, z)
             white = given[index](residual[:, :, None])

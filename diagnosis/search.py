@@ -123,7 +123,7 @@ def search(
     """
     progress("calibrating the model inside its priors")
     with starting(jobs):
-        start, start_floor = base, floor = first(case)
+        start = base = first(case)
     threshold = threshold_at(false_alarm_rate)
     candidates = candidates_of(case, catalogue)
     stages: list[Stage] = []
@@ -131,17 +131,17 @@ def search(
     for look in range(MOST_EFFECTS):
         progress("scoring everything that may be missing" if not look else "looking for a further effect")
         needed = max([SECOND_GAIN, *_rests_of_forms(stages)]) if look else threshold
-        judge = Judge(case, base, floor)
+        judge = Judge(case, base)
         stage = _look(judge, start, candidates, needed, jobs, progress, others)
         if not look and (better := _recalibrated(judge, stage)) is not None:
-            start, start_floor = base, floor = floored(better)
-            judge = Judge(case, base, floor)
+            start = base = floored(better)
+            judge = Judge(case, base)
             stage = _look(judge, start, candidates, needed, jobs, progress, others)
         if stage.accepted is None and stages and stages[-1].tentative:
             alone = stages.pop()
             stage = alone.otherwise or replace(alone, accepted=None, tentative=False)
-            base, floor = start, start_floor
-            judge = Judge(case, base, floor)
+            base = start
+            judge = Judge(case, base)
         stages.append(stage)
         if stage.accepted is None:
             break
@@ -151,13 +151,14 @@ def search(
             others = _others(base, stage)
             continue
         slim = _needed_of(judge, start, stage.accepted)
-        raised, floor_after = floored(slim)
-        if floor_after > 1.0 and not holds_out(judge, start, raised):
-            raised, floor_after = slim, 1.0  # fitted anew with a higher floor it went astray
-        base, floor = raised, floor_after
+        base = floored(slim)
+        if base is not slim and not holds_out(judge, start, base):
+            base = slim  # fitted anew with another floor it went astray
         others = _others(base, stage)
+    if not any(stage.matters for stage in stages):
+        base = start  # what is too small to matter is not told; so nothing else may hang on it
     if judge.base is not base:
-        judge = Judge(case, base, floor)
+        judge = Judge(case, base)
     found = ranked_beside(start, base, _left(base, stages), jobs=jobs)
     return Search(calibrated=start, final=base, stages=tuple(stages), findings=tuple(found), threshold=threshold,
                   judge=judge)  # fmt: skip
@@ -204,7 +205,9 @@ def _others(base: Explanation, stage: Stage) -> list[Explanation]:
         last = fit.found[-1]
         if last.label == accepted.found[-1].label or last.is_open or probability[last.label] < likely:
             continue
-        problem = fit.problem.changed(noise=base.problem.noise, whitenings=base.problem.whitenings)
+        if fit.labels[:-1] != accepted.labels[:-1]:
+            continue  # found beside something else than the base has: no rival of it
+        problem = fit.problem.changed(floor=base.problem.floor, whitenings=base.problem.whitenings)
         same = fit.problem.whitenings is base.problem.whitenings
         try:
             again = problem.fit(fit.fit.z, fit.fit.courses, iterations=0 if same else 2)

@@ -59,6 +59,10 @@ class Noise:
     start_sd: Array
     capacity: float = 0.0
 
+    def with_floor(self, times: float) -> Noise:
+        """The same with its random heats multiplied."""
+        return replace(self, heat_sd=self.heat_sd * times)
+
 
 class Whitening:
     """The Kalman filter of one trajectory: its gains depend on the noise and the linearisation, not on the data.

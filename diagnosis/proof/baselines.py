@@ -75,7 +75,7 @@ def baselines(case: Case, even: Case) -> dict[str, Any]:
         Of every method of :data:`METHODS` but the calibration something like ``diagnosis.json``; None of ``sparse``
         where pysindy is not installed
     """
-    base, _ = first(case)
+    base = first(case)
     candidates = [
         hypothesis_of(placed)
         for mechanism in CATALOGUE.values()

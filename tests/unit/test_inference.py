@@ -610,7 +610,7 @@ def test_judge_prefers_the_truth_and_survives_what_has_no_prediction(fzg: Gearbo
         gearbox=fzg, nominal=fzg.network(), losses=fzg.losses(), scale=Scale.of(fzg), channels=CHANNELS, train=problem,
         holdout=problem, loss_W=250.0, noise_K=0.2,
     )  # fmt: skip
-    judge = Judge(case, right, 1.0)
+    judge = Judge(case, right)
     assert judge.gain(right) == pytest.approx(0.0, abs=1e-6)
     shifted = np.array(right.fit.z)
     shifted[next(i for i, item in enumerate(right.fit.unknowns.items) if item.target == "mesh")] += 2.0
@@ -618,12 +618,12 @@ def test_judge_prefers_the_truth_and_survives_what_has_no_prediction(fzg: Gearbo
     assert judge.gain(wrong) < -10.0
     assert judge.rmse(wrong) > 2.0 * judge.rmse(right)
     # Explained recordings have less than noise and structural floor allow; what is wrong has more.
-    assert judge.misfit < 1.0 < 5.0 < Judge(case, wrong, 1.0).misfit
-    assert Judge(replace(case, holdout=problem.changed(pieces=[])), right, 1.0).misfit == 0.0
+    assert judge.misfit < 1.0 < 5.0 < Judge(case, wrong).misfit
+    assert Judge(replace(case, holdout=problem.changed(pieces=[])), right).misfit == 0.0
     network = problem.model.network.with_source("oil", lambda s: 40.0 * s.T_oil, name="own_heat")
     none = replace(right, problem=problem.changed(model=NetworkOnGrid(network, problem.model.losses)))
     assert judge.gain(none) == -np.inf
-    assert judge.rmse(none) == np.inf and Judge(case, none, 1.0).misfit == np.inf
+    assert judge.rmse(none) == np.inf and Judge(case, none).misfit == np.inf
 
 
 # ---------------------------------------------------------------------- bounds, shapes and far starts
@@ -1069,9 +1069,9 @@ def test_a_first_effect_whose_error_another_one_hides_stands_only_beside_that_on
 
     second = Stage(scored=(), log_e_value=50.0, fits=(both,), gains=(90.0,), accepted=both, matters=True)
     end = Stage(scored=(), log_e_value=0.0)
-    monkeypatch.setattr(search, "first", lambda _: (base, 1.0))
+    monkeypatch.setattr(search, "first", lambda _: base)
     monkeypatch.setattr(search, "candidates_of", lambda *_: ())
-    monkeypatch.setattr(search, "floored", lambda fit: (fit, 1.0))
+    monkeypatch.setattr(search, "floored", lambda fit: fit)
     monkeypatch.setattr(search, "_needed_of", lambda _judge, _start, accepted: accepted)
     for looks, names in (((first, second, end), ["wear", "rain"]), ((first, end), [])):
         coming = iter(looks)
@@ -1094,9 +1094,9 @@ def test_what_promises_has_its_chance_before_anything_less_likely(
     found = acceptance.judged(_judge(base, 400.0), base, stage, 10.0)
     assert found.accepted is not None and found.accepted.labels == (fault if at_once else wear).labels
     assert found.tentative is not at_once and [fit.labels for fit in found.fits] == [wear.labels, fault.labels]
-    monkeypatch.setattr(search, "first", lambda _: (base, 1.0))
+    monkeypatch.setattr(search, "first", lambda _: base)
     monkeypatch.setattr(search, "candidates_of", lambda *_: ())
-    monkeypatch.setattr(search, "floored", lambda fit: (fit, 1.0))
+    monkeypatch.setattr(search, "floored", lambda fit: fit)
     monkeypatch.setattr(search, "_others", lambda *_: [])
     nothing_more = Stage(scored=(), log_e_value=0.0)
     coming = iter((found, nothing_more, nothing_more))
@@ -1204,7 +1204,7 @@ def test_what_a_first_look_held_for_less_likely_may_stand_beside_a_second_effect
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """A cooler at two places, nearly tied; the bearing's feed fits beside the second one far better."""
-    problem: Any = SimpleNamespace(noise=(), whitenings=object())
+    problem: Any = SimpleNamespace(floor=1.0, whitenings=object())
     problem.changed = lambda **_: problem
     problem.fit = lambda z, courses, iterations: SimpleNamespace(iterations=iterations, log_evidence=77.0)
     cooler, other, feed, far = (
