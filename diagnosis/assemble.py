@@ -12,9 +12,10 @@ from diagnosis.acceptance import SECOND_GAIN
 from diagnosis.case import FLOORS, Case, heat_over_time
 from diagnosis.evidence import Marginal
 from diagnosis.explain import Explanation
-from diagnosis.findings import finding_of, node_of, rivals_of
+from diagnosis.findings import finding_of, node_of
 from diagnosis.heat import heats_of
 from diagnosis.holdout import at_holdout
+from diagnosis.hypotheses import Hypothesis
 from diagnosis.identifiable import scale_notes
 from diagnosis.latent import LatentHeat, knots_of, latent_heat
 from diagnosis.mapping import LOSS
@@ -67,14 +68,12 @@ def assembled(
         Processes
     """
     detected = found.detected
-    findings = tuple(
-        finding_of(case, found.final, h, stage, rivals_of(stage, catalogue)) for h, stage in found.findings if detected
-    )
+    findings = tuple(finding_of(case, found.final, h, stage, catalogue) for h, stage in found.findings if detected)
     both = [found.final, found.calibrated] if detected else []
     remaining, first = spread(jobs, [delayed(_latents)(case, explanation) for explanation in both]) or ((), ())
     unseen = _unseen(found.stages[-1], catalogue, found.threshold)
     misfit = max(found.final.misfit, found.judge.misfit if detected else 0.0)
-    left = misfit > MOST_MISFIT or _much_is_left(first, remaining)
+    left = _much_is_left(misfit, first, remaining)
     verdict = _verdict(found, findings, unseen, left=left, detected=detected, catalogue=catalogue)
     location = _location(case, found, findings, first) if detected else ()
     shown = _shown(findings, location)
@@ -90,7 +89,7 @@ def assembled(
         false_alarm_rate=false_alarm_rate,
         location=location,
         findings=findings,
-        calibration=_calibration(found.final),
+        calibration=_calibration(case, found.final),
         train=_fits(case, predictions, "train"),
         holdout=_fits(case, predictions, "holdout"),
         noise_K=case.noise_K,
@@ -150,8 +149,10 @@ def _verdict(
     return "missing_physics"
 
 
-def _much_is_left(first: Sequence[LatentHeat], remaining: Sequence[LatentHeat]) -> bool:
-    """Whether an unknown heat explains the remainder about as well as it explained the whole."""
+def _much_is_left(misfit: float, first: Sequence[LatentHeat], remaining: Sequence[LatentHeat]) -> bool:
+    """Whether residuals are too large, or an unknown heat explains them about as well as it explained the whole."""
+    if misfit > MOST_MISFIT:
+        return True
     before = max((h.log_bayes for h in first), default=0.0)
     after = max((h.log_bayes for h in remaining), default=0.0)
     return after > SECOND_GAIN and after > UNEXPLAINED_SHARE * before
@@ -160,8 +161,8 @@ def _much_is_left(first: Sequence[LatentHeat], remaining: Sequence[LatentHeat]) 
 def _remaining(
     found: Search, remaining: Sequence[LatentHeat], case: Case, *, left: bool, misfit: float, detected: bool
 ) -> tuple[float, str]:
-    log_e = found.stages[-1].log_e_value if found.stages[-1].accepted is None else 0.0
-    p_value = float(min(1.0, np.exp(-max(log_e, 0.0))))
+    last = found.stages[-1]
+    p_value = float(min(1.0, np.exp(-max(last.log_e_value, 0.0)))) if last.accepted is None else float("nan")
     if not detected:
         return p_value, ""
     best = max(remaining, key=lambda h: h.log_bayes)
@@ -212,11 +213,11 @@ def _location(
 
 
 def _place(case: Case, found: Search, first: Sequence[LatentHeat], node: str, weight: float) -> Location:
-    own = next((h for h in found.final.found if node_of(case, h) == node), None)
-    heats = list(heats_of(found.final, own)) if own is not None else []
+    own = [h for h in found.final.found if node_of(case, h) == node]
+    heats = _summed(found.final, own)
     if not heats:
         candidates = [h for h in first if h.node == node]
-        if own is not None or not candidates:
+        if own or not candidates:
             return Location(node=node, probability=min(weight, 1.0), heat_mean_W=0.0, heat_max_W=0.0, when=(),
                             regime="always")  # fmt: skip
         heats = list(max(candidates, key=lambda h: h.log_bayes).mean)
@@ -240,6 +241,12 @@ def _place(case: Case, found: Search, first: Sequence[LatentHeat], node: str, we
         node=node, probability=min(weight, 1.0), heat_mean_W=float(np.average(together, weights=steps)),
         heat_max_W=float(together[np.argmax(np.abs(together))]), when=tuple(when), regime=words,
     )  # fmt: skip
+
+
+def _summed(final: Explanation, found: Sequence[Hypothesis]) -> list[Array]:
+    """Heats of several things that were found, together, of every piece, [W]; empty where none of them is a heat."""
+    laws = [heats for h in found if (heats := heats_of(final, h))]
+    return [np.sum(values, axis=0) for values in zip(*laws, strict=True)]
 
 
 def p_index(case: Case, node: str) -> int:
@@ -267,13 +274,10 @@ def _missing_heat(
         if not candidates:
             continue
         latent = max(candidates, key=lambda h: h.log_bayes)
-        own = [h for h in found.final.found if node_of(case, h) == node]
-        laws = [heats_of(found.final, h) for h in own]
-        laws = [law for law in laws if law]
-        summed = [np.sum(values, axis=0) for values in zip(*laws, strict=True)] if laws else None
-        lacking = latent.mean if summed is None else [a + b for a, b in zip(summed, latent.mean, strict=True)]
+        summed = _summed(found.final, [h for h in found.final.found if node_of(case, h) == node])
+        lacking = [a + b for a, b in zip(summed, latent.mean, strict=True)] if summed else latent.mean
         mean, sd = heat_over_time(pieces, lacking), heat_over_time(pieces, latent.sd)
-        law = heat_over_time(pieces, summed) if summed is not None else None
+        law = heat_over_time(pieces, summed) if summed else None
         index = p_index(case, node)
         T = heat_over_time(pieces, [p.trajectory.middle[:, index] for p in found.final.fit.parts])
         speed, torque = (heat_over_time(pieces, [np.abs(p.inputs[:, i]) for p in pieces]) for i in (0, 1))
@@ -362,7 +366,9 @@ def _unmeasured(case: Case, prediction: Prediction) -> dict[str, Array]:
     return {name: prediction.trajectory.T[:, i] for i, name in enumerate(names)}
 
 
-def _calibration(final: Explanation) -> tuple[Calibrated, ...]:
+def _calibration(case: Case, final: Explanation) -> tuple[Calibrated, ...]:
+    """Every parameter, how far it is from its prior as the definition has it: that of one found far off is wider."""
+    stated = {(item.role, item.target): item for item in case.train.unknowns.items}
     sd = np.sqrt(np.diag(final.fit.covariance))
     taken = {p.name for h in final.found if h.term is not None for p in h.term.parameters}
     result = []
@@ -373,7 +379,7 @@ def _calibration(final: Explanation) -> tuple[Calibrated, ...]:
         per_z = value * p.sd if p.log else p.sd
         result.append(Calibrated(
             parameter=item.target if item.role == "network" else p.name, prior=p.start, value=value,
-            stderr=float(abs(per_z) * sd[index]), shift_in_sd=float(final.fit.z[index]), unit=p.unit,
+            stderr=float(abs(per_z) * sd[index]), shift_in_sd=stated[item.role, item.target].z(value), unit=p.unit,
         ))  # fmt: skip
     return tuple(result)
 
@@ -382,18 +388,19 @@ def _calibration(final: Explanation) -> tuple[Calibrated, ...]:
 
 
 def _ranking(found: Search) -> tuple[Ranked, ...]:
-    """Everything of the first look: fitted in earnest with its probability, the rest by the scan."""
+    """Everything of the first look: by its fit where it was fitted in earnest, the rest by the scan.
+
+    Probabilities are those of what was compared in the end; what the held-out recordings refused has none.
+    """
     stage = found.stages[0]
-    fitted = {
-        fit.found[-1].label: (gain, float(p))
-        for fit, gain, p in zip(stage.fits, stage.gains, stage.probabilities() if stage.fits else (), strict=True)
-    }
+    left = [fit.found[-1].label for fit in stage.fits]
+    probability = dict(zip(left, stage.probabilities() if left else (), strict=True))
     rows = [
         Ranked(mechanism=s.hypothesis.name, place=s.hypothesis.place, family=s.hypothesis.family,
-               log_bayes=fitted.get(s.hypothesis.label, (s.log_bayes, 0.0))[0],
-               probability=fitted.get(s.hypothesis.label, (0.0, 0.0))[1])
+               log_bayes=stage.fitted.get(s.hypothesis.label, s.log_bayes),
+               probability=float(probability.get(s.hypothesis.label, 0.0)))
         for s in stage.scored
-        if s.hypothesis.label in fitted or not s.hypothesis.is_open
+        if s.hypothesis.label in stage.fitted or not s.hypothesis.is_open
     ]  # fmt: skip
     return tuple(sorted(rows, key=lambda r: (-r.probability, -r.log_bayes)))
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -51,18 +51,27 @@ def _node_of_parameter(case: Case, name: str) -> str:
     return network.parts[0].name
 
 
-def rivals_of(stage: Stage, catalogue: Mapping[str, Mechanism]) -> tuple[Rival, ...]:
-    """What else would explain it, with what would separate it from what was accepted."""
+def rivals_of(stage: Stage, catalogue: Mapping[str, Mechanism], doubt: float = 0.0) -> tuple[Rival, ...]:
+    """What else would explain it, with what would separate it from what was accepted.
+
+    Parameters
+    ----------
+    stage : Stage
+    catalogue : mapping of str to Mechanism
+    doubt : float
+        Probability that all of them are only what the form of an earlier finding lacks
+    """
     if stage.accepted is None:
         return ()
     own = stage.accepted.found[-1]
     result = []
     for fit, probability in zip(stage.fits, stage.probabilities(), strict=True):
         other = fit.found[-1]
-        if other is own or probability < LEAST_RIVAL:
+        told = float(probability) * (1.0 - doubt)
+        if other is own or told < LEAST_RIVAL:
             continue
         result.append(Rival(
-            mechanism=other.name, place=other.place, probability=float(probability),
+            mechanism=other.name, place=other.place, probability=told,
             separate_by=_separation(own, other, catalogue),
         ))  # fmt: skip
     return tuple(sorted(result, key=lambda r: -r.probability))
@@ -80,7 +89,9 @@ def _separation(own: Hypothesis, other: Hypothesis, catalogue: Mapping[str, Mech
     return "a second recording with other speeds and torques"
 
 
-def finding_of(case: Case, final: Explanation, h: Hypothesis, stage: Stage, rivals: Sequence[Rival]) -> Finding:
+def finding_of(
+    case: Case, final: Explanation, h: Hypothesis, stage: Stage, catalogue: Mapping[str, Mechanism]
+) -> Finding:
     """A finding with the values of the final explanation."""
     probabilities = dict(zip((f.found[-1].label for f in stage.fits), stage.probabilities(), strict=True))
     doubt = 0.0 if final.found[0].label == h.label else FORM_DOUBT
@@ -114,7 +125,7 @@ def finding_of(case: Case, final: Explanation, h: Hypothesis, stage: Stage, riva
             ParameterValue(name=name.removeprefix(prefix), value=value, stderr=sd, unit=units.get(name, "1"))
             for name, (value, sd) in values.items()
         ),
-        confusable_with=tuple(rivals),
+        confusable_with=rivals_of(stage, catalogue, doubt),
         heat_mean_W=mean,
         heat_stderr_W=stderr,
         heat_max_W=float(together.max()),

@@ -28,6 +28,7 @@ ITERATIONS = 8
 SETTLED = 0.05  # of a prior standard deviation
 PARAMETER_STEP = 0.02  # of its prior standard deviation, for derivatives
 FARTHEST_STEP = 3.0  # of the z numbers in one iteration
+PASSES = 3  # each leaves about a twentieth of what an input was off by
 SLOW_PATIENCE = 3  # times as many iterations where switches follow slow measurements: steps are small there
 
 
@@ -142,6 +143,11 @@ class Problem:
         """Whether the rows of any piece lie minutes apart."""
         return any(piece.slow for piece in self.pieces)
 
+    @property
+    def passes(self) -> int:
+        """How often a piece is simulated where no trajectory tells yet what its inputs follow."""
+        return PASSES if any(shift.follows for shift in self._shifts) else 1
+
     def changed(self, **changes: Any) -> Problem:
         """The same problem with another `model`, `pieces`, `unknowns`, `terms` or `floor`."""
         names = ("model", "pieces", "unknowns", "noise", "starts", "whitenings", "terms", "floor")
@@ -174,15 +180,15 @@ class Problem:
         )  # fmt: skip
 
     def _simulated(self, index: int, z: Array, guess: Trajectory | Array | None, rounds: int) -> Trajectory:
-        """One piece at `z`; twice where an input may follow temperatures that no trajectory tells yet."""
+        """One piece at `z`; again where an input follows temperatures that no trajectory told yet."""
         values = self.unknowns.network_values(self.model.network, z)
         known = guess if isinstance(guess, Trajectory) else None
-        for again in (True, False) if known is None and self._shifts else (False,):
+        for _ in range(self.passes if known is None else 1):
             piece = self.adjusted(index, z, known)
-            found = simulate(self.model, piece, values, self.starts[index], guess=guess, rounds=rounds, settled_K=0.01)
-            if again:
-                guess = known = found
-        return found
+            known = simulate(self.model, piece, values, self.starts[index], guess=guess, rounds=rounds, settled_K=0.01)
+            guess = known
+        assert known is not None  # noqa: S101 - one pass at least
+        return known
 
     def _own(self, term: TermOnGrid, z: Array) -> Array:
         return self.unknowns.term_values([p.name for p in term.term.parameters], z)

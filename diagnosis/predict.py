@@ -89,8 +89,7 @@ def _free_run(problem: Problem, index: int, z: Array, start: Array, guess: Array
     """The trajectory of a whole piece that nothing measured guides."""
     model, values = problem.model, problem.unknowns.network_values(problem.model.network, z)
     trajectory: Trajectory | None = None
-    follows = any(term.kind == "signal" for term in problem.terms)  # an input that is shifted by temperatures
-    for _ in range(2 if follows else 1):
+    for _ in range(problem.passes):
         piece = replace(problem.adjusted(index, z, trajectory), guided=False)
         if any(state.update is not None for state in model.network.states):
             trajectory = free_running(model, piece, values, start, guess=guess)

@@ -261,6 +261,7 @@ class Diagnosis:
         Mean square of what is left in the training recordings or, where something was found, in the held-out ones,
         whichever is larger, in multiples of what noise and structural floor make of it; above 1 they are not explained
     remaining_p_value : float
+        Of a further effect, if nothing more is missing; NaN where no further look was taken
     remaining_note : str
     ranking : tuple of Ranked
     unseen : tuple of Unseen
@@ -315,7 +316,7 @@ class Diagnosis:
                 "log_e_value": self.log_e_value,
                 "threshold": self.threshold,
                 "false_alarm_rate": self.false_alarm_rate,
-                "test": "mean Bayes factor over the catalogue, all parameters marginalised (an e-value)",
+                "test": "mean Bayes factor over the catalogue, all parameters marginalised (nominally an e-value)",
             },
             "location": [
                 {
@@ -336,7 +337,8 @@ class Diagnosis:
             "fit": {"train": _fits(self.train), "holdout": _fits(self.holdout), "noise_K": self.noise_K,
                     "floor": self.floor},
             "remaining": {
-                "p_value": self.remaining_p_value, "note": self.remaining_note,
+                "p_value": self.remaining_p_value if math.isfinite(self.remaining_p_value) else None,
+                "note": self.remaining_note,
                 "misfit": self.misfit if math.isfinite(self.misfit) else None,
             },
             "ranking": [

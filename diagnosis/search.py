@@ -273,7 +273,8 @@ def _look(
     if not fits:
         return Stage(scored=tuple(scored), log_e_value=log_e, note="no explanation has a solution")
     gains = [penalised(fit) - base.log_evidence for fit in fits]
-    stage = Stage(scored=tuple(scored), log_e_value=log_e, fits=tuple(fits), gains=tuple(gains)).ranked()
+    fitted = {fit.found[-1].label: gain for fit, gain in zip(fits, gains, strict=True)}
+    stage = Stage(scored=tuple(scored), log_e_value=log_e, fits=tuple(fits), gains=tuple(gains), fitted=fitted).ranked()
     return judged(judge, calibrated, stage, needed)
 
 

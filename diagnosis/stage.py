@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -45,6 +45,8 @@ class Stage:
         The best few, fitted in earnest, best first
     gains : tuple of float
         Their log evidence over the explanation before
+    fitted : mapping of str to float
+        The same of everything that was fitted, by label, whatever became of it
     accepted : Explanation or None
     tentative : bool
         Whether what was accepted stands only if a further effect is found with which the held-out error does not grow
@@ -60,6 +62,7 @@ class Stage:
     log_e_value: float
     fits: tuple[Explanation, ...] = ()
     gains: tuple[float, ...] = ()
+    fitted: Mapping[str, float] = field(default_factory=dict)
     accepted: Explanation | None = None
     tentative: bool = False
     otherwise: Stage | None = None

@@ -55,6 +55,10 @@ class TermOnGrid:
         laws = [law.xreplace(model.boundary) for law in (term.expression, other)]
         self._law = compile_function(function_source("law", arguments, laws, vector=True), "law")
         self._memories = Memories(term.states, [*given, *own], model.parts, model.boundary)
+        heard = {f"T_{part.name}" for part in network.parts} | {f"P_{c}" for c in network.components}
+        heard |= {s.name for s in network.states}
+        #: Whether the law asks what the gearbox does, not only what is done to it.
+        self.follows = any(s.name in heard for s in laws[0].free_symbols)
 
     # ------------------------------------------------------------------ the law
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from diagnosis import acceptance, assemble, beside, explain, search
-from diagnosis.case import Case
+from diagnosis.case import Case, floored
 from diagnosis.evidence import Marginal, strength
 from diagnosis.explain import (
     DISTORTED,
@@ -30,7 +30,7 @@ from diagnosis.explain import (
 from diagnosis.findings import _with_form, finding_of
 from diagnosis.grid import Piece, pieces
 from diagnosis.heat import _heats_with, heats_of, mean_heat_of
-from diagnosis.holdout import Judge
+from diagnosis.holdout import Judge, at_holdout
 from diagnosis.hypotheses import (
     Hypothesis,
     Scored,
@@ -626,6 +626,49 @@ def test_judge_prefers_the_truth_and_survives_what_has_no_prediction(fzg: Gearbo
     assert judge.rmse(none) == np.inf and Judge(case, none).misfit == np.inf
 
 
+def test_the_structural_floor_rises_and_falls_with_what_is_left(problem: Problem, piece: Piece) -> None:
+    """It is told from the least there is, however often; and a held-out recording is judged by the same."""
+    clean = calibrated(problem)
+    assert clean.problem.floor == 1.0 and floored(clean) is clean
+    wander = 1.5 * np.sin(piece.time / 400.0)[:, None] * np.array([0.6, 1.0, 0.8, 0.0])
+    disturbed = calibrated(problem.changed(pieces=[replace(piece, measured=piece.measured + wander)]))
+    raised = floored(disturbed)
+    assert raised.problem.floor == 4.0
+    assert floored(raised) is raised
+    z = np.zeros(len(problem.unknowns))
+    part = problem.changed(floor=4.0).linearise(0, z, None)
+    noise = replace(problem.noise[0], heat_sd=4.0 * problem.noise[0].heat_sd)
+    white = Whitening(problem.model, part.trajectory, part.sensors, noise)(part.residual[:, :, None])[:, 0]
+    np.testing.assert_allclose(part.white_residual, white, atol=1e-9)
+    case: Any = SimpleNamespace(holdout=problem)
+    assert at_holdout(case, raised).floor == 4.0
+    explained = raised.problem.changed(pieces=problem.pieces)
+    fallen = floored(replace(raised, problem=explained, fit=explained.fit(raised.fit.z)))
+    assert fallen.problem.floor == 1.0
+    assert fallen.log_evidence == pytest.approx(clean.log_evidence, abs=0.5)
+
+
+def test_an_input_that_follows_a_temperature_is_seen_alike_from_temperatures_alone(
+    fzg: Gearbox, problem: Problem
+) -> None:
+    (warmed, *_) = CATALOGUE["ambient_probe_heated"].placed(fzg.network(), Scale.of(fzg), CHANNELS)
+    shifted = problem.changed(unknowns=problem.unknowns.with_parameters("term", warmed.parameters), terms=(warmed,))
+    z = np.zeros(len(shifted.unknowns))
+    z[-len(warmed.parameters)] = shifted.unknowns.items[-len(warmed.parameters)].z(-0.1)
+    once = shifted.linearise(0, z, None, rounds=8).trajectory
+    for _ in range(4):
+        once = shifted.linearise(0, z, once, rounds=8).trajectory
+    known, told = (shifted.linearise(0, z, guess, rounds=8) for guess in (once, once.T))
+    ambient = problem.model.laws.inputs.index("T_ambient")
+    moved = [part.trajectory.piece.samples[..., ambient] - problem.pieces[0].samples[..., ambient]
+             for part in (known, told)]  # fmt: skip
+    assert np.abs(moved[0]).max() > 1.0
+    np.testing.assert_allclose(moved[1], moved[0], atol=0.02)
+    np.testing.assert_allclose(told.residual, known.residual, atol=0.02)
+    filters = shifted.with_whitenings([known.whitening])
+    assert filters.objective(z, [once.T]) == pytest.approx(filters.objective(z, [once]), rel=0.01)
+
+
 # ---------------------------------------------------------------------- bounds, shapes and far starts
 
 
@@ -995,17 +1038,23 @@ def test_beside_a_strong_first_effect_more_names_are_fitted() -> None:
 
 
 def test_the_ranking_holds_everything_that_was_scored() -> None:
-    """Fitted ones by their fits, the rest by the scan; of open forms those that were fitted."""
-    fan, tank, feed = (_scored(name, "x", score) for name, score in (("fan", 40.0), ("tank", 30.0), ("feed", -2.0)))
+    """Fitted ones by their fits, also where those were refused; the rest by the scan; of open forms those fitted."""
+    scores = (("fan", 40.0), ("tank", 30.0), ("wear", 9.0), ("feed", -2.0))
+    fan, tank, wear, feed = (_scored(name, "x", score) for name, score in scores)
     form = replace(fan, hypothesis=replace(fan.hypothesis, name="open_speed", family="open form"))
     fits = tuple(
         Explanation(problem=NOTHING, fit=NOTHING, log_evidence=0.0, found=(s.hypothesis,)) for s in (tank, fan)
     )
-    stage = Stage(scored=(fan, form, tank, feed), log_e_value=20.0, fits=fits, gains=(55.0, 35.0))
+    stage = Stage(
+        scored=(fan, form, tank, wear, feed), log_e_value=20.0, fits=fits, gains=(55.0, 35.0),
+        fitted={"tank@x": 55.0, "fan@x": 35.0, "wear@x": 44.0},
+    )  # fmt: skip
     search_found: Any = SimpleNamespace(stages=[stage])
     ranked = assemble._ranking(search_found)
-    assert [(r.mechanism, r.log_bayes) for r in ranked] == [("tank", 55.0), ("fan", 35.0), ("feed", -2.0)]
-    assert ranked[0].probability == pytest.approx(stage.probabilities()[0]) and ranked[2].probability == 0.0
+    told = [(r.mechanism, r.log_bayes) for r in ranked]
+    assert told == [("tank", 55.0), ("fan", 35.0), ("wear", 44.0), ("feed", -2.0)]
+    assert ranked[0].probability == pytest.approx(stage.probabilities()[0])
+    assert ranked[2].probability == ranked[3].probability == 0.0
 
 
 @pytest.mark.parametrize(
@@ -1020,7 +1069,7 @@ def test_what_remains_is_told_where_it_is_large_or_most_of_it(log_bayes: float, 
     train = SimpleNamespace(pieces=[SimpleNamespace(steps=np.full(9, 20.0))])
     case: Any = SimpleNamespace(loss_W=300.0, train=train)
     first, remaining = [latent(1000.0, 80.0)], [latent(log_bayes, heat_W)]
-    left = assemble._much_is_left(first, remaining)
+    left = assemble._much_is_left(0.6, first, remaining)
     _, note = assemble._remaining(found, remaining, case, left=left, misfit=0.6, detected=True)
     assert says in note and "allow" not in note
     # What an unknown heat would not help, and is too large all the same, is never called nothing.
@@ -1038,7 +1087,7 @@ def test_what_leaves_more_than_noise_and_floor_is_no_explanation(residual: float
     assert misfit == pytest.approx(residual**2)
     nothing: Any = None
     named: Any = SimpleNamespace(kind="source", family="heat path")
-    left = misfit > assemble.MOST_MISFIT
+    left = assemble._much_is_left(misfit, (), ())
     assert assemble._verdict(nothing, [named], (), left=left, detected=True, catalogue={}) == verdict
 
 
@@ -1224,6 +1273,11 @@ def test_what_a_first_look_held_for_less_likely_may_stand_beside_a_second_effect
     assert rival.labels == ("cooler@air",) and rival.log_evidence == 77.0 and rival.fit.iterations == 0  # type: ignore[attr-defined]
     assert search._others(explanation(1000.0), first) == []  # nothing of the look is left
 
+    elsewhere = explanation(990.0, other, feed)  # found beside another one than the base has: no rival of its last
+    assert [
+        e.labels for e in search._others(base, replace(first, fits=(*fits, elsewhere), gains=(*first.gains, 893.0)))
+    ] == [rival.labels]
+
     beside_base, beside_other = explanation(1100.0, cooler, feed), explanation(1300.0, other, feed)
     second = Stage(
         scored=(), log_e_value=90.0, fits=(beside_other, beside_base), gains=(300.0, 100.0), accepted=beside_other
@@ -1250,6 +1304,56 @@ def test_places_of_rivals_add_up_and_those_of_findings_do_not_exclude_one_anothe
     assert assemble._location(NOTHING, found, something, ()) == (("inlet", 1.0), ("air", 0.9))
     found.findings = [look(("inlet", 0.5), ("air", 0.5)), look(("air", 0.5), ("oil", 0.5))]
     assert assemble._location(NOTHING, found, something, ()) == (("air", 0.75), ("inlet", 0.5), ("oil", 0.5))
+
+
+def test_a_place_tells_the_heat_of_all_that_was_found_there(monkeypatch: pytest.MonkeyPatch) -> None:
+    hours = np.arange(40) * 360.0
+    piece: Any = SimpleNamespace(
+        inputs=np.zeros((40, 2)), middle=hours, steps=np.full(40, 360.0), recording="made", segment=0
+    )
+    part = SimpleNamespace(trajectory=SimpleNamespace(piece=piece, middle=np.full((40, 1), 60.0)))
+    heats = {"rain": [np.full(40, -2.0)], "fan": [np.full(40, 35.0)], "bias": []}
+    monkeypatch.setattr(assemble, "node_of", lambda _case, _h: "oil")
+    monkeypatch.setattr(assemble, "heats_of", lambda _final, h: heats[h])
+    case: Any = SimpleNamespace(nominal=SimpleNamespace(parts=[SimpleNamespace(name="oil")]))
+    for found, heat in ((["rain", "fan"], 33.0), (["rain", "bias"], -2.0), (["bias"], 0.0)):
+        final: Any = SimpleNamespace(found=found, fit=SimpleNamespace(parts=[part]))
+        place = assemble._place(case, SimpleNamespace(final=final), (), "oil", 1.0)  # type: ignore[arg-type]
+        assert place.heat_mean_W == pytest.approx(heat)
+
+
+def test_a_parameter_found_far_off_is_told_by_the_prior_of_the_definition(fzg: Gearbox, problem: Problem) -> None:
+    """It was fitted under a wider one."""
+    index = next(i for i, item in enumerate(problem.unknowns.items) if item.target == "h_air")
+    item = problem.unknowns.items[index]
+    wide = problem.unknowns.with_prior(index, 4.0 * item.parameter.sd)
+    z = np.zeros(len(wide))
+    z[index] = 1.5
+    fit: Any = SimpleNamespace(z=z, unknowns=wide, covariance=np.eye(len(z)))
+    case: Any = SimpleNamespace(train=problem)
+    final = Explanation(problem=problem, fit=fit, log_evidence=0.0)
+    told = {c.parameter: c for c in assemble._calibration(case, final)}
+    assert told["h_air"].value == pytest.approx(float(np.exp(6.0 * item.parameter.sd)))
+    assert told["h_air"].shift_in_sd == pytest.approx(6.0)
+    assert told["mesh"].shift_in_sd == 0.0
+
+
+def test_what_is_too_small_to_matter_shapes_nothing_that_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    base = Explanation(problem=NOTHING, fit=NOTHING, log_evidence=0.0)
+    small = replace(base, found=(_scored("lag", "oil", 0.0).hypothesis,))
+    first = Stage(scored=(), log_e_value=90.0, fits=(small,), gains=(120.0,), accepted=small, matters=False)
+    end = Stage(scored=(), log_e_value=0.0)
+    monkeypatch.setattr(search, "first", lambda _: base)
+    monkeypatch.setattr(search, "candidates_of", lambda *_: ())
+    monkeypatch.setattr(search, "floored", lambda fit: fit)
+    monkeypatch.setattr(search, "_needed_of", lambda _judge, _start, accepted: accepted)
+    for matters in (True, False):
+        coming = iter((replace(first, matters=matters), end))
+        monkeypatch.setattr(search, "_look", lambda *_, coming=coming: next(coming))
+        found = search.search(NOTHING, {})
+        assert found.detected is matters
+        assert (found.final is small) is matters and (found.final is found.calibrated) is not matters
+        assert found.judge.base is found.final and len(found.findings) == int(matters)
 
 
 def test_what_was_found_is_ranked_beside_all_the_rest(monkeypatch: pytest.MonkeyPatch) -> None:
