@@ -104,7 +104,8 @@ def prove(
     protocol.seal_verdicts(output, tasks, code)
     truths = protocol.open_truth(settings, gearbox, output, lambda done, of: tell("opening the truth", done, of))
     records = {t: json.loads(protocol.verdict_file(output, t).read_text(encoding="utf-8")) for t in tasks}
-    found = outcome(settings, gearbox, truths, records, code=code, hashes=protocol.hash_of_hashes(output))
+    found = outcome(settings, gearbox, truths, records, code=code, hashes=protocol.hash_of_hashes(output),
+                    scored_as_begun=protocol.scored_as_begun(output))  # fmt: skip
     with staging(output) as stage:
         (stage / NUMBERS).write_text(json.dumps(found, indent=1, allow_nan=False) + "\n", encoding="utf-8")
         (stage / PAGE).write_text(page(found), encoding="utf-8", newline="\n")

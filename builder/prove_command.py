@@ -19,8 +19,8 @@ LINES = 20  # of progress where there is no terminal
 @click.command("prove")
 @click.option("--cases", type=click.IntRange(min=1, max=10_000), default=None, metavar="N",
               help="How many cases, in the proportions of the whole mix.  [default: the whole mix, 247]")  # fmt: skip
-@click.option("--seed", type=click.IntRange(min=0, max=2**32 - 1), default=2026, show_default=True, metavar="N",
-              help="Seed of the cases.")  # fmt: skip
+@click.option("--seed", type=click.IntRange(min=0, max=2**32 - 1), default=None, metavar="N",
+              help="Seed of the cases.  [default: that of the published proof, 2039]")  # fmt: skip
 @click.option(
     "--gearbox", default="fzg", show_default=True, metavar="NAME|FILE", help="Name or definition file (TOML)."
 )
@@ -37,7 +37,7 @@ LINES = 20  # of progress where there is no terminal
               help="Folder of the proof; one that was interrupted goes on.")  # fmt: skip
 def prove(
     cases: int | None,
-    seed: int,
+    seed: int | None,
     gearbox: str,
     cells_every: int,
     baselines: bool,
@@ -51,11 +51,11 @@ def prove(
     """
     from builder.prove import NUMBERS, PAGE
     from builder.prove import prove as run
-    from diagnosis.proof.protocol import WHOLE, Settings
+    from diagnosis.proof.protocol import PUBLISHED_SEED, WHOLE, Settings
 
     check_workers(jobs, dask_address)
-    settings = Settings(seed=seed, cases=WHOLE if cases is None else cases, gearbox=gearbox, cells_every=cells_every,
-                        baselines=baselines)  # fmt: skip
+    settings = Settings(seed=PUBLISHED_SEED if seed is None else seed, cases=WHOLE if cases is None else cases,
+                        gearbox=gearbox, cells_every=cells_every, baselines=baselines)  # fmt: skip
     with _told() as tell:
         found = run(settings, output, jobs=processes(jobs), dask_address=dask_address,
                     tell=tell)  # fmt: skip
@@ -77,7 +77,9 @@ def show(found: Mapping[str, Any]) -> None:
     console.table("Proof", ["rule", "cases", "share", "95 % limits", "asked", "met"], rows)
     protocol = found["protocol"]
     if protocol["on_development_seed"]:
-        console.out.print(f"Seed {protocol['seed']} served to set the thresholds: this is no proof.")
+        console.out.print(f"Seed {protocol['seed']} was opened while the diagnosis was developed: this is no proof.")
+    if not protocol["scored_as_begun"]:
+        console.out.print("The rules of judging were changed after these cases were made.")
     if "sparse" not in found["methods"] and "naive" in found["methods"]:
         console.out.print("Sparse regression is left out: pysindy is not installed (extra 'proof').")
     if protocol["failed"]:

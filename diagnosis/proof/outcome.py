@@ -9,7 +9,17 @@ from typing import Any
 
 from diagnosis.proof import score
 from diagnosis.proof.baselines import METHODS, NAMING
-from diagnosis.proof.protocol import DATA, DEVELOPMENT_SEEDS, FIRST, SENSORS, Settings, Task, kept_columns, mix_of
+from diagnosis.proof.protocol import (
+    DATA,
+    DEVELOPMENT_SEEDS,
+    FIRST,
+    SENSORS,
+    Settings,
+    Task,
+    kept_columns,
+    mix_of,
+    scoring_hash,
+)
 from diagnosis.proof.score import REMOVED_RULES, RULES, Answer, Count, Judged, Rule
 from models.gearbox import Gearbox
 from models.version import project_version
@@ -27,6 +37,7 @@ def outcome(
     *,
     code: str,
     hashes: str,
+    scored_as_begun: bool,
 ) -> dict[str, Any]:
     """All numbers of a proof.
 
@@ -40,6 +51,8 @@ def outcome(
         Hash of the code that was tried
     hashes : str
         SHA-256 of the list of verdict hashes
+    scored_as_begun : bool
+        Whether the rules of judging were not changed since the cases were made
 
     Returns
     -------
@@ -80,6 +93,8 @@ def outcome(
             "diagnoses": len(answers),
             "cells_every": settings.cells_every,
             "code_sha256": code,
+            "scoring_sha256": scoring_hash(),
+            "scored_as_begun": scored_as_begun,
             "gearbox_sha256": gearbox.hash,
             "verdicts_sha256": hashes,
             "version": project_version(),

@@ -30,7 +30,10 @@ from models.version import project_version
 # The whole proof: every mechanism of the catalogue twice as a single.
 MIX = {"control": 60, "single": 2 * len(PHYSICS), "double": 30, "messy": 30, "outside": 30, "sensor": 15}
 WHOLE = sum(MIX.values())
-DEVELOPMENT_SEEDS = (1,)  # on which the thresholds of the diagnosis were set
+# Opened while the diagnosis was developed: thresholds were set on the first, open forms, the search for thermostats and
+# some rules made while looking at others.
+DEVELOPMENT_SEEDS = (1, *range(2026, 2038))
+PUBLISHED_SEED = 2039
 # Start of a diagnosis: an import of the plant, or of anything else of the proof, is an ImportError there.
 BLIND = "import sys; sys.modules['diagnosis.proof'] = None; from builder.__main__ import main; main()"
 
@@ -53,6 +56,7 @@ RECORDINGS, VERDICTS, TRUTH = "recordings", "verdicts", "truth"
 SETTINGS, HASHES = "settings.json", "verdicts.sha256"
 JUDGED = ("models", "diagnosis")  # packages whose code the verdicts depend on
 NOT_JUDGED = ("diagnosis/proof/", "diagnosis/report/")
+SCORING = ("score.py", "outcome.py")  # modules of this package that say what counts as right
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -243,6 +247,17 @@ def code_hash() -> str:
     return digest.hexdigest()
 
 
+def scoring_hash() -> str:
+    """SHA-256 over the rules by which verdicts are judged."""
+    here = Path(str(resources.files("diagnosis.proof")))
+    return hashlib.sha256(b"\0".join((here / name).read_bytes() for name in SCORING)).hexdigest()
+
+
+def scored_as_begun(folder: Path) -> bool:
+    """Whether the rules of judging are those that stood when the cases were made."""
+    return bool(json.loads((folder / SETTINGS).read_text(encoding="utf-8")).get("scoring_sha256") == scoring_hash())
+
+
 def begin(
     settings: Settings, gearbox: Gearbox, folder: Path, progress: Callable[[int, int], None] | None = None
 ) -> str:
@@ -262,7 +277,7 @@ def begin(
     # Of the seed only a hash is written, so that the folder does not tell what the truth can be made from.
     whole = json.dumps({**asdict(settings), "gearbox": gearbox.hash}, sort_keys=True)
     about = {"settings_sha256": hashlib.sha256(whole.encode()).hexdigest(), "code_sha256": code,
-             "version": project_version()}  # fmt: skip
+             "scoring_sha256": scoring_hash(), "version": project_version()}  # fmt: skip
     file = folder / SETTINGS
     if file.exists():
         try:

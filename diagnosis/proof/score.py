@@ -27,7 +27,9 @@ STRENGTH_ERROR = 0.15
 EVIDENT = 10.0  # nats for an effect at its best place, as the diagnosis itself weighs it: less is lost in a catalogue
 SILENT = ("consistent", "insufficient_data", "refused", "failed")
 CANNOT_TELL = ("insufficient_data", "refused")
+NO_ANSWER = ("refused", "failed")
 OPEN_NAMES = {form.name for form in OPEN_FORMS}
+PARAMETER = "parameter"  # one of the definition, out of its prior
 FAR, OUTSIDE, NOTHING, TO_FIND = "parameter_far", "outside the catalogue", "nothing", "to find"
 # Strengths that mean the same in plant and catalogue, but for their sign; heats are compared as heats.
 SAME_STRENGTH = ("sensor_bias", "sensor_gain", "sensor_lag", "clock_offset", "torque_offset", "torque_gain",
@@ -114,6 +116,8 @@ class Claim:
     mechanism, place, node, family : str
     odds : mapping of mechanism to float
         Its own probability and its rivals', places of the same mechanism together
+    parameters : mapping of str to float
+        The same of parameters out of their priors, each of which is a claim of its own
     heat_W, heat_sd_W : float
         Mean magnitude, and its stated standard error
     strength, strength_sd : float
@@ -125,6 +129,7 @@ class Claim:
     node: str
     family: str
     odds: Mapping[str, float]
+    parameters: Mapping[str, float] = field(default_factory=dict)
     heat_W: float
     heat_sd_W: float = math.nan
     strength: float
@@ -190,8 +195,18 @@ class Answer:
 
     @property
     def unnamed(self) -> bool:
-        """Whether something is amiss that is said to be none of the catalogue's."""
-        return not self.silent and (self.verdict == "unexplained" or all(c.family == OPEN_FORM for c in self.claims))
+        """Whether something is amiss, and no name of the catalogue (nor a parameter) is given for it."""
+        return not self.silent and not self.known
+
+    @property
+    def partly(self) -> bool:
+        """Whether a name is given, and said that it does not explain everything."""
+        return bool(self.known) and self.verdict == "unexplained"
+
+    @property
+    def known(self) -> frozenset[str]:
+        """What is named, of all claims, but for open forms."""
+        return frozenset(claim.mechanism for claim in self.claims if claim.family != OPEN_FORM)
 
     @property
     def named(self) -> frozenset[str]:
@@ -205,14 +220,18 @@ class Answer:
 
 
 def _claim(finding: Mapping[str, Any]) -> Claim:
-    odds: Counter[str] = Counter({finding["mechanism"]: finding["probability"]})
-    for rival in finding.get("confusable_with", []):
-        odds[rival["mechanism"]] += rival["probability"]
+    odds: Counter[str] = Counter()
+    off: Counter[str] = Counter()
+    for one in (finding, *finding.get("confusable_with", [])):
+        odds[one["mechanism"]] += one["probability"]
+        if one["mechanism"] == PARAMETER:
+            off[one["place"]] += one["probability"]
     parameters, heat = finding.get("parameters", []), finding.get("heat_W", {})
     first = parameters[0] if parameters else {}
     return Claim(
         mechanism=finding["mechanism"], place=finding["place"], node=finding["node"], family=finding["family"],
-        odds=dict(odds), heat_W=heat.get("mean", math.nan), heat_sd_W=heat.get("stderr", math.nan),
+        odds=dict(odds), parameters=dict(off),
+        heat_W=heat.get("mean", math.nan), heat_sd_W=heat.get("stderr", math.nan),
         strength=first.get("value", math.nan), strength_sd=first.get("stderr", math.nan),
     )  # fmt: skip
 
@@ -248,6 +267,11 @@ class Judged:
         return str(self.truth["group"])
 
     @property
+    def answered(self) -> bool:
+        """Whether there is an answer at all."""
+        return self.answer.verdict not in NO_ANSWER
+
+    @property
     def names(self) -> tuple[str, ...]:
         """Of the effects, the dominant one first."""
         return tuple(effect["name"] for effect in self.truth["effects"])
@@ -257,7 +281,7 @@ class Judged:
         return self.truth["practical"][k] is not False
 
     def evident(self) -> bool:
-        """Whether these data speak for the dominant effect, whoever looks at them with the same priors."""
+        """Whether these data speak for the dominant effect, as the diagnosis itself weighs it in its first look."""
         return bool(self.names) and self.answer.evidence.get(self.names[0], math.inf) >= EVIDENT
 
     def right(self) -> bool | None:
@@ -281,7 +305,7 @@ def control_consistent(j: Judged) -> bool | None:
 
 def false_alarm(j: Judged) -> bool | None:
     """Of the same cases: anything is claimed to be amiss."""
-    if j.group != "control" or j.truth["control"] == FAR:
+    if j.group != "control" or j.truth["control"] == FAR or not j.answered:
         return None
     return not j.answer.silent
 
@@ -290,7 +314,7 @@ def far_parameter(j: Judged) -> bool | None:
     """A parameter five standard deviations off, nothing else: a parameter error, that parameter among those named."""
     if j.group != "control" or j.truth["control"] != FAR:
         return None
-    places = {claim.place for claim in j.answer.claims if claim.mechanism == "parameter"}
+    places = {claim.place for claim in j.answer.claims if claim.mechanism == PARAMETER}
     return j.answer.verdict == "parameter_error" and j.far in places
 
 
@@ -316,15 +340,15 @@ def single_answered(j: Judged) -> bool | None:
 
 
 def single_evident(j: Judged) -> bool | None:
-    """One effect of practical size for which these data speak with 10 nats or more: named, or in the tie set."""
+    """One effect of practical size that the first look itself scored with 10 nats or more: named, or in the tie set."""
     return single_tied(j) if j.evident() else None
 
 
 def single_small(j: Judged) -> bool | None:
-    """One effect too small to matter: no other is named."""
-    if j.group != "single" or j.practical():
+    """One effect too small to matter: nothing of the catalogue is named without it."""
+    if j.group != "single" or j.practical() or not j.answered:
         return None
-    return j.answer.silent or j.names[0] in j.answer.tied or j.answer.unnamed
+    return all(j.names[0] in claim.tied for claim in j.answer.claims if claim.family != OPEN_FORM)
 
 
 def near_place(j: Judged) -> bool | None:
@@ -373,13 +397,6 @@ def strength_as_stated(j: Judged) -> bool | None:
     return None if said is None or not math.isfinite(said[1]) else abs(said[0] - said[2]) <= 2.0 * said[1]
 
 
-def strength_certain(j: Judged) -> bool | None:
-    """Of the same cases those whose stated standard error is below half of 15 %: within 15 % of the truth."""
-    said = _strengths(j)
-    sure = said is not None and 2.0 * said[1] <= STRENGTH_ERROR * said[0]
-    return strength(j) if sure else None
-
-
 def both_of_two(j: Judged) -> bool | None:
     """Two effects, both of practical size: both named or tied."""
     if j.group != "double" or not (j.practical(0) and j.practical(1)):
@@ -409,26 +426,31 @@ def sensor_named(j: Judged) -> bool | None:
 
 
 def sensor_evident(j: Judged) -> bool | None:
-    """A fault of measurement for which these data speak with 10 nats or more: named or tied."""
+    """A fault of measurement that the first look itself scored with 10 nats or more: named or tied."""
     return sensor_named(j) if j.evident() else None
 
 
 def outside_unnamed(j: Judged) -> bool | None:
-    """Practical size, in no catalogue: unexplained, or an open form."""
+    """Practical size, in no catalogue: called unexplained or an open form, and nothing of the catalogue named."""
     if j.group != "outside" or not j.practical():
         return None
     return j.answer.unnamed
 
 
 def outside_forced(j: Judged) -> bool | None:
-    """In no catalogue, of any size: a verdict that names something of the catalogue."""
-    if j.group != "outside":
+    """In no catalogue, of any size: something of the catalogue is named, or a parameter."""
+    if j.group != "outside" or not j.answered:
         return None
-    return not j.answer.silent and not j.answer.unnamed
+    return bool(j.answer.known)
+
+
+def outside_partly(j: Judged) -> bool | None:
+    """Of these: said as well that it does not explain everything."""
+    return j.answer.partly if outside_forced(j) else None
 
 
 def removed_unnamed(j: Judged) -> bool | None:
-    """Practical size, its entry removed: unexplained, or an open form."""
+    """Practical size, its entry removed: called unexplained or an open form, and nothing of the catalogue named."""
     return j.answer.unnamed if j.practical() else None
 
 
@@ -436,12 +458,17 @@ def removed_kin(j: Judged) -> bool | None:
     """Practical size, its entry removed: only what the whole catalogue does not rule out on these recordings either."""
     if not j.practical():
         return None
-    return not j.answer.silent and not j.answer.unnamed and j.answer.named <= j.kin
+    return bool(j.answer.known) and j.answer.known <= j.kin
 
 
 def removed_forced(j: Judged) -> bool | None:
-    """Its entry removed, of any size: a verdict that names something else of the catalogue, and no kin."""
-    return not j.answer.silent and not j.answer.unnamed and not j.answer.named <= j.kin
+    """Its entry removed, of any size: something else of the catalogue is named, and no kin."""
+    return not j.answer.known <= j.kin if j.answered else None
+
+
+def removed_partly(j: Judged) -> bool | None:
+    """Of these: said as well that it does not explain everything."""
+    return j.answer.partly if removed_forced(j) else None
 
 
 def heldout_better(j: Judged) -> bool | None:
@@ -487,23 +514,23 @@ RULES = (
     Rule(key="single_exact", text="single effect named exactly", judge=single_exact, needed=0.85),
     Rule(key="single_answered", text="single effect named, tied, or said to be invisible in these data",
          judge=single_answered),
-    Rule(key="single_evident", text="single effect for which the data speak: named or in the tie set",
+    Rule(key="single_evident", text="single effect that the first look scores with 10 nats: named or in the tie set",
          judge=single_evident),
     Rule(key="single_small", text="single effect too small to matter: no other named", judge=single_small),
     Rule(key="place", text="place right, or next to it", judge=near_place, needed=0.95),
     Rule(key="place_exact", text="place right exactly", judge=exact_place),
     Rule(key="strength", text="strength within 15 %", judge=strength, needed=0.90),
     Rule(key="strength_as_stated", text="strength within twice the stated error", judge=strength_as_stated),
-    Rule(key="strength_certain", text="strength within 15 %, where that is claimed", judge=strength_certain),
     Rule(key="both", text="two effects: both", judge=both_of_two, needed=0.75),
     Rule(key="one", text="two effects: at least one", judge=one_of_two, needed=0.95),
     Rule(key="messy", text="one dominant, six minor: the dominant one first", judge=dominant_first),
     Rule(key="sensor", text="fault of measurement named or in the tie set", judge=sensor_named, needed=0.90),
-    Rule(key="sensor_evident", text="fault of measurement for which the data speak: named or in the tie set",
-         judge=sensor_evident),
+    Rule(key="sensor_evident", judge=sensor_evident,
+         text="fault of measurement that the first look scores with 10 nats: named or in the tie set"),
     Rule(key="outside", text="outside the catalogue: said to be so", judge=outside_unnamed),
     Rule(key="outside_forced", text="outside the catalogue: forced into a name", judge=outside_forced, needed=0.0,
          at_most=True),
+    Rule(key="outside_partly", text="of those: said as well that more is missing", judge=outside_partly),
     Rule(key="heldout", text="held-out error improves on calibration", judge=heldout_better),
 )  # fmt: skip
 REMOVED_RULES = (
@@ -511,6 +538,8 @@ REMOVED_RULES = (
     Rule(key="removed_kin", text="entry removed: only a kin named that was tied before", judge=removed_kin),
     Rule(key="removed_forced", text="entry removed: forced into another name", judge=removed_forced, needed=0.0,
          at_most=True),
+    Rule(key="removed_partly", text="entry removed, of those: said as well that more is missing",
+         judge=removed_partly),
 )  # fmt: skip
 
 
@@ -609,17 +638,15 @@ def stated_probabilities(cases: Sequence[Judged]) -> list[tuple[float, bool]]:
     A mechanism is right if it is among the case's effects, a parameter if it is the one that is far off, an open form
     if what is hidden is in no catalogue.
     """
-    return [
-        (min(probability, 1.0), _is_there(j, claim, name))
-        for j in cases
-        for claim in j.answer.claims
-        for name, probability in claim.odds.items()
-    ]
+    stated: list[tuple[float, bool]] = []
+    for j in cases:
+        for claim in j.answer.claims:
+            stated += [(p, _is_there(j, name)) for name, p in claim.odds.items() if name != PARAMETER]
+            stated += [(p, j.truth["control"] == FAR and name == j.far) for name, p in claim.parameters.items()]
+    return [(min(probability, 1.0), right) for probability, right in stated]
 
 
-def _is_there(j: Judged, claim: Claim, name: str) -> bool:
-    if name == "parameter":
-        return j.truth["control"] == FAR and claim.place == j.far
+def _is_there(j: Judged, name: str) -> bool:
     return j.group == "outside" if name in OPEN_NAMES else name in j.names
 
 

@@ -167,7 +167,7 @@ def test_a_process_gets_recordings_and_nothing_else(recorded: Path) -> None:
     }  # fmt: skip
     assert str(SETTINGS.seed) not in work.arguments
     about = json.loads((recorded / "settings.json").read_text())
-    assert set(about) == {"settings_sha256", "code_sha256", "version"}
+    assert set(about) == {"settings_sha256", "code_sha256", "scoring_sha256", "version"}
 
 
 def test_a_diagnosis_cannot_import_the_plant() -> None:

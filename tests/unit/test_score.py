@@ -38,8 +38,9 @@ def truth(group: str, *effects: dict[str, Any], control: str | None = None, prac
 
 def claim(name: str, probability: float = 0.9, *, heat: float = 50.0, heat_sd: float = math.nan, strength: float = 1.0,
           family: str = "oil circuit", place: str = "oil", **rivals: float) -> Claim:  # fmt: skip
+    off = {place: probability} if name == "parameter" else {}
     return Claim(mechanism=name, place=place, node="oil", family=family, odds={name: probability, **rivals},
-                 heat_W=heat, heat_sd_W=heat_sd, strength=strength)  # fmt: skip
+                 parameters=off, heat_W=heat, heat_sd_W=heat_sd, strength=strength)  # fmt: skip
 
 
 def judged(true: dict[str, Any], verdict: str, *claims: Claim, node: str = "oil", kin: frozenset[str] = frozenset(),
@@ -155,17 +156,15 @@ def test_strength_is_heat_within_15_percent(heat: float, right: bool) -> None:
 
 
 @pytest.mark.parametrize(
-    ("heat", "sd", "as_stated", "certain"),
-    [(57.0, 3.6, True, True), (57.0, 3.4, False, True), (60.0, 4.0, False, False), (60.0, 6.0, True, None)],
+    ("heat", "sd", "as_stated"),
+    [(57.0, 3.6, True), (57.0, 3.4, False), (60.0, 4.0, False), (60.0, 6.0, True)],
 )  # fmt: skip
-def test_stated_errors_of_strengths_are_judged(heat: float, sd: float, as_stated: bool, certain: bool | None) -> None:
+def test_stated_errors_of_strengths_are_judged(heat: float, sd: float, as_stated: bool) -> None:
     true = truth("single", effect("windage", heat=50.0))
     j = judged(true, "missing_physics", claim("windage", heat=heat, heat_sd=sd))
     assert by("strength_as_stated", j) is as_stated
-    assert by("strength_certain", j) is certain
     silent = judged(true, "missing_physics", claim("windage", heat=heat))  # of an answer without errors
     assert by("strength_as_stated", silent) is None
-    assert by("strength_certain", silent) is None
 
 
 def test_what_the_data_do_not_speak_for_is_counted_apart() -> None:
@@ -203,10 +202,17 @@ def test_outside_the_catalogue_is_said_or_forced() -> None:
     opened = claim("open_speed", family="open form")
     assert by("outside", judged(true, "unexplained")) is True
     assert by("outside", judged(true, "missing_physics", opened)) is True
-    assert by("outside", judged(true, "unexplained", claim("windage", 0.4))) is True
-    assert by("outside", judged(true, "consistent")) is False
-    assert by("outside_forced", judged(true, "missing_physics", claim("windage"))) is True
-    assert by("outside_forced", judged(true, "consistent")) is False
+    # A name is a name, also where it is said that more is missing.
+    partly = judged(true, "unexplained", opened, claim("windage", 0.4))
+    assert by("outside", partly) is False
+    assert by("outside_forced", partly) is True and by("outside_partly", partly) is True
+    forced = judged(true, "missing_physics", claim("windage"))
+    assert by("outside_forced", forced) is True and by("outside_partly", forced) is False
+    assert by("outside_forced", judged(true, "parameter_error", claim("parameter"))) is True
+    silent = judged(true, "consistent")
+    assert by("outside", silent) is False and by("outside_forced", silent) is False
+    assert by("outside_partly", silent) is None
+    assert by("outside_forced", judged(true, "failed")) is None  # no answer is none, and no merit
 
 
 def test_a_removed_entry_its_kin_and_a_forced_name() -> None:
@@ -215,10 +221,27 @@ def test_a_removed_entry_its_kin_and_a_forced_name() -> None:
     forced = judged(true, "missing_physics", claim("pump_heat"), kin=kin)
     near = judged(true, "missing_physics", claim("churning_swirl"), kin=kin)
     open_form = judged(true, "unexplained", kin=kin)
+    partly = judged(true, "unexplained", claim("churning_swirl"), claim("pump_heat"), kin=kin)
     rules = {rule.key: rule.judge for rule in score.REMOVED_RULES}
-    assert [rules["removed"](j) for j in (forced, near, open_form)] == [False, False, True]
-    assert [rules["removed_kin"](j) for j in (forced, near, open_form)] == [False, True, False]
-    assert [rules["removed_forced"](j) for j in (forced, near, open_form)] == [True, False, False]
+    said = (forced, near, open_form, partly)
+    assert [rules["removed"](j) for j in said] == [False, False, True, False]
+    assert [rules["removed_kin"](j) for j in said] == [False, True, False, False]
+    assert [rules["removed_forced"](j) for j in said] == [True, False, False, True]
+    assert [rules["removed_partly"](j) for j in said] == [False, None, None, True]
+
+
+def test_of_an_effect_too_small_to_matter_nothing_else_is_named() -> None:
+    true = truth("single", effect("windage"), practical=False)
+    fine = [
+        judged(true, "consistent"),
+        judged(true, "unexplained"),
+        judged(true, "missing_physics", claim("windage")),
+        judged(true, "missing_physics", claim("pump_heat", 0.6, windage=0.3)),
+    ]
+    assert [by("single_small", j) for j in fine] == [True] * 4
+    extra = judged(true, "missing_physics", claim("windage"), claim("pump_heat"))
+    partly = judged(true, "unexplained", claim("pump_heat"))
+    assert [by("single_small", j) for j in (extra, partly, judged(true, "failed"))] == [False, False, None]
 
 
 def test_held_out_error_counts_where_something_is_claimed() -> None:
@@ -285,6 +308,11 @@ def test_stated_probabilities_are_counted_in_bins() -> None:
     far = truth("control", control="parameter_far")
     off = [claim("parameter", place=place) for place in ("h_air", "seal")]
     assert score.stated_probabilities([judged(far, "parameter_error", *off)]) == [(0.9, True), (0.9, False)]
+    # Another parameter is another claim, wherever it stands.
+    said = {"mechanism": "parameter", "place": "seal", "node": "oil", "family": "parameter", "probability": 0.5,
+            "confusable_with": [{"mechanism": "parameter", "place": "h_air", "probability": 0.4}]}  # fmt: skip
+    rival = Answer.of({"verdict": "parameter_error", "findings": [said]}).claims[0]
+    assert sorted(score.stated_probabilities([judged(far, "parameter_error", rival)])) == [(0.4, True), (0.5, False)]
     bins = score.reliability([*stated, (1.0, False)])
     last = bins[-1]
     assert (last["right"]["hits"], last["right"]["of"]) == (1, 2)
@@ -395,7 +423,7 @@ def numbers(fzg: Gearbox) -> dict[str, Any]:
         if task.data != "600 s" else {"status": "refused", "seconds": 1.0, "said": None, "message": "too short"}
         for task in tasks_of(settings, plans)
     }  # fmt: skip
-    return outcome(settings, fzg, truths, records, code="c0de", hashes="4a54")
+    return outcome(settings, fzg, truths, records, code="c0de", hashes="4a54", scored_as_begun=True)
 
 
 def test_numbers_are_json_and_say_how_many(numbers: dict[str, Any]) -> None:
@@ -432,6 +460,12 @@ def test_the_page_needs_nothing_else_and_says_everything(numbers: dict[str, Any]
 def test_a_development_seed_is_no_proof(numbers: dict[str, Any]) -> None:
     told = {**numbers, "protocol": {**numbers["protocol"], "on_development_seed": True}}
     assert "they prove nothing" in page(told)
+
+
+def test_rules_that_were_changed_on_the_way_are_told(numbers: dict[str, Any]) -> None:
+    words = "rules of judging were changed"
+    assert words not in page(numbers)
+    assert words in page({**numbers, "protocol": {**numbers["protocol"], "scored_as_begun": False}})
 
 
 # ---------------------------------------------------------------------- what a process gets to see
