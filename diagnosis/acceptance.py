@@ -90,6 +90,12 @@ def judged(judge: Judge, calibrated: Explanation, stage: Stage, needed: float) -
     return replace(stage, matters=matters, note=note, accepted=promising, tentative=promising is not None)
 
 
+def stands(judge: Judge, calibrated: Explanation, fit: Explanation) -> bool:
+    """Whether what an explanation found last is possible, large enough to matter, and not refused by held-out data."""
+    possible = not _drives_away(judge.base, fit) and _matters(judge.case, fit, fit.found[-1])
+    return possible and holds_out(judge, calibrated, fit)
+
+
 def _only(stage: Stage, indices: Iterable[int]) -> Stage:
     """A look with some of its fits."""
     chosen = sorted(indices)

@@ -430,7 +430,8 @@ def _next_test(
             return finding.confusable_with[0].separate_by
     if verdict in ("consistent", "insufficient_data") and unseen:
         wanted = Counter(u.needed for u in unseen).most_common(1)[0][0]
-        return f"{wanted} (it would show {sum(u.needed == wanted for u in unseen)} effect(s) these data cannot)"
+        shown = sum(u.needed == wanted for u in unseen)
+        return f"{wanted} (it would show {shown} effect{'s' if shown > 1 else ''} that these data cannot)"
     if verdict == "unexplained":
         return "repeat the operation in which the heat is missing with one input changed at a time"
     if findings and findings[0].mechanism in catalogue:

@@ -402,7 +402,7 @@ def _lines(finding: Finding) -> list[str]:
     lines = [f"{finding.says} [{finding.mechanism} at {finding.place}, probability {finding.probability:.2f}]"]
     values = [(p.name, p.value, p.stderr, p.unit) for p in finding.parameters]
     if finding.heat_mean_W > 0.0:
-        values.append(("mean heat", finding.heat_mean_W, finding.heat_stderr_W, "W"))
+        values.append(("mean |heat|", finding.heat_mean_W, finding.heat_stderr_W, "W"))
     if values:
         told = (
             f"{name} = {with_error(value, stderr).replace(MINUS, '-')}" + (f" {unit}" if unit != "1" else "")

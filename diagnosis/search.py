@@ -14,7 +14,7 @@ import numpy as np
 from joblib import delayed
 
 from diagnosis.acceptance import SECOND_GAIN, holds_out, judged
-from diagnosis.beside import Found, ranked_beside
+from diagnosis.beside import Found, settled_beside
 from diagnosis.case import Case, first, floored
 from diagnosis.evidence import Marginal
 from diagnosis.explain import Explanation, best_fits, distorted, evidence_of, in_the_middle, without
@@ -159,8 +159,9 @@ def search(
         base = start  # what is too small to matter is not told; so nothing else may hang on it
     if judge.base is not base:
         judge = Judge(case, base)
-    found = ranked_beside(start, base, _left(base, stages), jobs=jobs)
-    return Search(calibrated=start, final=base, stages=tuple(stages), findings=tuple(found), threshold=threshold,
+    progress("comparing what was found once more")
+    judge, found = settled_beside(judge, start, _left(base, stages), jobs=jobs)
+    return Search(calibrated=start, final=judge.base, stages=tuple(stages), findings=tuple(found), threshold=threshold,
                   judge=judge)  # fmt: skip
 
 

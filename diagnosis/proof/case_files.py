@@ -30,6 +30,27 @@ def keep_apart(recordings: Path, truth: Path) -> None:
         raise InputError(f"{truth}: the truth must not lie among the recordings in {recordings}; name another folder")
 
 
+def keep_what_is_sealed(made: Path, recordings: Path) -> None:
+    """Refuse to put cases where others are sealed: their truth would be lost. The same case may be made again.
+
+    Parameters
+    ----------
+    made : Path
+        Folder with the new cases
+    recordings : Path
+        Folder that they shall go to
+
+    Raises
+    ------
+    InputError
+        If another case is sealed there.
+    """
+    for seal in sorted(made.rglob(SEAL)):
+        there = recordings / seal.relative_to(made)
+        if there.exists() and there.read_bytes() != seal.read_bytes():
+            raise InputError(f"{there.parent}: another case is sealed here already; choose another output")
+
+
 def write_case(
     folder: Path,
     truth_file: Path | None,

@@ -24,19 +24,20 @@ WORDS: Mapping[str, str] = {
     "calibrated": "The same model with its existing parameters tuned to the recordings, each inside its prior. What a "
     "correction is worth counts against this, not against the model as delivered.",
     "with what was found": "The calibrated model with the found physics added.",
-    "held out": "Recordings that served for nothing but judging: the model got their inputs and no measured "
-    "temperature beyond the first minutes, which do not count.",
+    "held out": "Recordings that nothing was fitted to: their error is that of a model that got their inputs and no "
+    "measured temperature beyond the first minutes, which do not count. They may refuse an effect that the others would "
+    "name; so the error is that of a choice, and a little smaller than on recordings that had no say at all.",
     "free-running": "Simulated from the start temperatures on with the recorded inputs alone, never corrected by a "
     "measurement on the way.",
     "RMSE": "Root mean square of simulated less measured: the typical size of the error.",
-    "probability": "Share of the belief among all explanations that were compared, before them equally likely; not the "
-    "chance that a thing of this name is in the gearbox if the true cause is none of them.",
+    "probability": "Share of the belief among all explanations that were compared, weighed before by how usual each "
+    "is; not the chance that a thing of this name is in the gearbox if the true cause is none of them.",
     "evidence": "Natural logarithm of how many times better the data are predicted with the effect than without it, "
     "averaged over all values of all parameters (log Bayes factor), in nat: 1 nat is a factor of 2.7, 5 nat are 150, "
     "10 nat are 22 000.",
     "threshold": "Evidence that has to be reached before anything is claimed; set by the false-alarm rate asked for.",
     "false-alarm rate": "In how many of 100 healthy cases a mismatch would be claimed at most.",
-    "p": "Bound on the chance to reach this evidence although nothing is missing.",
+    "p": "Nominal bound on the chance to reach this evidence although nothing is missing.",
     "standard error": "68 % of such estimates lie within ± this of the truth, if the form of the law is right.",
     "prior": "What the definition states about a parameter before any recording: a value, and how far off it may be.",
     "shift": "How far the calibration moved a parameter, in standard deviations of its prior. Beyond ±2 it is in "

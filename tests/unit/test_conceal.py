@@ -221,6 +221,12 @@ def test_verb_writes_a_case(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
     assert (tmp_path / "recordings" / "train_1.csv.gz").is_file()
     assert seal_holds(tmp_path / "recordings", tmp_path / "truth" / "case_001.json")
     assert "sealed" in capsys.readouterr().out
+    # The same case may be made again, another one must not take its place.
+    made = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
+    assert run("conceal", "--effect", "sensor_stuck", "--strength", 1, "--seed", 5, "--output", tmp_path) == 0
+    assert run("conceal", "--effect", "sensor_bias", "--seed", 5, "--output", tmp_path) == 2
+    assert "another case is sealed here already; choose another output" in " ".join(capsys.readouterr().err.split())
+    assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()} == made
 
 
 @pytest.mark.parametrize(

@@ -1122,6 +1122,7 @@ def test_a_first_effect_whose_error_another_one_hides_stands_only_beside_that_on
     monkeypatch.setattr(search, "candidates_of", lambda *_: ())
     monkeypatch.setattr(search, "floored", lambda fit: fit)
     monkeypatch.setattr(search, "_needed_of", lambda _judge, _start, accepted: accepted)
+    monkeypatch.setattr(search, "settled_beside", lambda judge, _start, found, **_: (judge, found))
     for looks, names in (((first, second, end), ["wear", "rain"]), ((first, end), [])):
         coming = iter(looks)
         monkeypatch.setattr(search, "_look", lambda *_, coming=coming: next(coming))
@@ -1540,3 +1541,41 @@ def test_what_one_place_found_is_tried_at_the_others(monkeypatch: pytest.MonkeyP
 def test_an_ambient_that_was_not_recorded_is_the_first_thing_to_record(verdict, assumed, said) -> None:
     text = assemble._next_test(verdict, (), (), {}, assumed)
     assert text.startswith(said) and bool(text) == bool(said)
+
+
+def test_what_is_more_probable_beside_all_the_rest_takes_the_place(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Rain and a fan for what one open form explains: it takes the place of one, and the other is not needed any more.
+
+    Unless the held-out recordings refuse it.
+    """
+    rain, fan, form = (_scored(name, "housing", 0.0).hypothesis for name in ("rain", "fan", "open_temperature_near"))
+    log_evidence = {(): 0.0, ("rain",): 300.0, ("fan",): 500.0, ("rain", "fan"): 700.0,
+                    ("open_temperature_near",): 2000.0, ("fan", "open_temperature_near"): 2004.0,
+                    ("rain", "open_temperature_near"): 2003.0}  # fmt: skip
+
+    def explanation(*found: Hypothesis) -> Explanation:
+        fit: Any = SimpleNamespace(parts=())
+        fit.without_parts = lambda: fit
+        problem: Any = SimpleNamespace(at=lambda fit: fit)
+        order = ("rain", "fan", "open_temperature_near")
+        names = tuple(sorted((h.name for h in found), key=order.index))
+        return Explanation(problem=problem, fit=fit, log_evidence=log_evidence[names], found=found)
+
+    def instead(_start: Any, explained: Explanation, index: int, other: Explanation | None) -> Explanation:
+        rest = tuple(h for i, h in enumerate(explained.found) if i != index)
+        return explanation(*rest, *(other.found[-1:] if other is not None else ()))
+
+    monkeypatch.setattr(beside, "instead", instead)
+    monkeypatch.setattr(beside, "without", lambda start, explained, index: instead(start, explained, index, None))
+    monkeypatch.setattr(beside, "Judge", lambda case, base: SimpleNamespace(case=case, base=base))
+    monkeypatch.setattr(beside, "holds_out", lambda *_: True)
+    first = Stage(scored=(), log_e_value=290.0, fits=(explanation(rain), explanation(form)), gains=(300.0, 290.0),
+                  accepted=explanation(rain))  # fmt: skip
+    both = explanation(rain, fan)
+    second = Stage(scored=(), log_e_value=390.0, fits=(both,), gains=(400.0,), accepted=both)
+    judge: Any = SimpleNamespace(case=None, base=both)
+    for held, names in ((True, ["open_temperature_near"]), (False, ["rain", "fan"])):
+        monkeypatch.setattr(beside, "stands", lambda *_, held=held: held)
+        settled, found = beside.settled_beside(judge, explanation(), [(rain, first), (fan, second)])
+        assert [h.name for h in settled.base.found] == [h.name for h, _ in found] == names
+    assert found[0][1].probabilities()[0] > 0.99 and found[0][1].fits[0].labels[-1] == form.label  # told, not taken

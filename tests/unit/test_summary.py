@@ -12,7 +12,7 @@ def test_what_was_found_where_and_how_well_it_fits() -> None:
     lines = missing_physics().summary()
     assert lines[0] == f"missing physics: {VERDICT_TEXT['missing_physics']}"
     assert "[windage at oil, probability 0.9" in lines[1]
-    assert "strength = 18.4 ± 1.1 W, " in lines[2] and lines[2].endswith(", mean heat = 21.0 ± 1.3 W")
+    assert "strength = 18.4 ± 1.1 W, " in lines[2] and lines[2].endswith(", mean |heat| = 21.0 ± 1.3 W")
     assert any(line.strip().startswith("not ruled out: pocketing at ") for line in lines)
     assert "Where: oil (0.96); speed above 2900 1/min" in lines
     assert "RMSE held-out: 5.21 K as delivered, 3.62 K calibrated, 0.52 K with what was found (noise 0.20 K)" in lines
