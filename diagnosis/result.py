@@ -28,6 +28,8 @@ VERDICT_TEXT: Mapping[str, str] = {
     "unexplained": "Something is missing, and it is none of the physics in the catalogue.",
     "insufficient_data": "These recordings are too short or too calm to decide.",
 }
+AHEAD_FROM = 0.5  # of its probability: a rival farther ahead would stand in this place, were it not refused
+AHEAD = "more probable by what was learnt from, and refused by the held-out recordings"
 PARTLY = "Part of what is missing was found; the rest is none of the physics in the catalogue."
 
 
@@ -410,9 +412,11 @@ def _lines(finding: Finding) -> list[str]:
         )
         lines.append(f"    {', '.join(told)}")
     rivals = [r for r in finding.confusable_with if r.probability >= 0.01]
-    if rivals:
-        named = ", ".join(f"{r.mechanism} at {r.place} ({r.probability:.2f})" for r in rivals)
-        lines.append(f"    not ruled out: {named}; {rivals[0].separate_by}")
+    ahead = [r for r in rivals if finding.probability < AHEAD_FROM * r.probability]
+    for words, some in (("not ruled out", [r for r in rivals if r not in ahead]), (AHEAD, ahead)):
+        if some:
+            named = ", ".join(f"{r.mechanism} at {r.place} ({r.probability:.2f})" for r in some)
+            lines.append(f"    {words}: {named}; {some[0].separate_by}")
     return lines
 
 

@@ -48,7 +48,8 @@ WORDS: Mapping[str, str] = {
     "missing heat": "Heat that the calibrated model would need at this place to follow the recordings; negative where "
     "it has too much. Tuning the parameters swallows part of an effect that is missing, so the law that was found may "
     "be larger.",
-    "not ruled out": "Explanations that these data cannot tell from the one that is named.",
+    "not ruled out": "Explanations that these data cannot tell from the one that is named; one that is more than twice "
+    "as probable was refused by the held-out recordings.",
 }
 
 

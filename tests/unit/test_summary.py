@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from diagnosis.result import VERDICT_TEXT
+from diagnosis.result import AHEAD, VERDICT_TEXT
 from tests.unit.diagnosis_example import consistent, missing_physics, two_effects
 
 
@@ -18,6 +18,17 @@ def test_what_was_found_where_and_how_well_it_fits() -> None:
     assert "RMSE held-out: 5.21 K as delivered, 3.62 K calibrated, 0.52 K with what was found (noise 0.20 K)" in lines
     assert lines[-1].startswith("Next: Hold 20 m/s")
     assert len(lines) <= 10
+
+
+def test_a_rival_that_the_held_out_recordings_refused_is_not_told_as_one_among_others() -> None:
+    found = missing_physics()
+    (finding,) = found.findings
+    first, *rest = finding.confusable_with
+    told = replace(finding, probability=0.1, confusable_with=(replace(first, probability=0.21), *rest))
+    lines = [line.strip() for line in replace(found, findings=(told,)).summary()]
+    assert any(line.startswith(f"{AHEAD}: {first.mechanism} at {first.place} (0.21)") for line in lines)
+    near = replace(told, confusable_with=(replace(first, probability=0.19), *rest))
+    assert AHEAD not in str(replace(found, findings=(near,)))
 
 
 def test_two_effects_are_both_told() -> None:
