@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -10,11 +10,15 @@ from typing import TYPE_CHECKING
 import click
 
 from builder import console
+from builder.files import refuse_to_replace
 from builder.workers import check_workers, processes
 from models.errors import InputError, did_you_mean
 from models.gearbox import known_gearboxes, load_gearbox
 
+MOST_NOTES = 8  # on the terminal
+
 if TYPE_CHECKING:
+    from diagnosis.recording import Recording
     from models.gearbox import Gearbox
     from models.mechanisms import Mechanism
 
@@ -81,16 +85,18 @@ def diagnose(
     """
     from builder.build import staging
     from diagnosis import diagnose as run
-    from diagnosis.files import write_files
+    from diagnosis.files import names_of_files, write_files
     from diagnosis.recording import read_train_and_holdout
     from models.mechanisms import CATALOGUE
-    from models.mechanisms.user_files import load_mechanisms
+    from models.mechanisms.user_files import check_placeable, load_mechanisms
 
     _check_options(recordings, holdout, jobs, dask_address, fleet=fleet)
     definition = load_gearbox(gearbox)
     catalogue = dict(CATALOGUE)
     for file in mechanisms:
-        for mechanism in load_mechanisms(file):
+        own = load_mechanisms(file)
+        check_placeable(own, definition, file)
+        for mechanism in own:
             if mechanism.name in catalogue:
                 raise InputError(f"{file}: a mechanism {mechanism.name!r} exists already; give yours another name")
             catalogue[mechanism.name] = mechanism
@@ -102,6 +108,9 @@ def diagnose(
                         false_alarm_rate=false_alarm_rate, jobs=processes(jobs), dask_address=dask_address)  # fmt: skip
         return
     train, held = read_train_and_holdout(recordings, holdout, definition.network(), mapping=mapping)
+    given = [*(r.path for r in (*train, *held)), *mechanisms, Path(gearbox), *([mapping] if mapping else [])]
+    refuse_to_replace(given, [output / name for name in names_of_files((*train, *held))])
+    _tell_notes((*train, *held))
     with staging(output) as stage, _told() as tell:
         found = run(train, definition, holdout=held, false_alarm_rate=false_alarm_rate, catalogue=catalogue,
                     jobs=processes(jobs), progress=tell)  # fmt: skip
@@ -112,6 +121,15 @@ def diagnose(
     console.out.print()
     for name in names:
         console.out.print(f"wrote {output / name}")
+
+
+def _tell_notes(recordings: Sequence[Recording]) -> None:
+    """What was cleaned, assumed or not used; all of it stands in the report."""
+    notes = [f"{recording.name}: {note}" for recording in recordings for note in recording.notes]
+    for note in notes[:MOST_NOTES]:
+        console.err.print(f"note: {note}", markup=False)
+    if len(notes) > MOST_NOTES:
+        console.err.print(f"{len(notes) - MOST_NOTES} more notes stand in the report")
 
 
 def _check_options(

@@ -6,24 +6,89 @@ import contextlib
 import gzip
 import os
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
 from models.cycle import Cycle
 from models.errors import InputError
+from models.simulation import HOTTEST_START, can_start, kelvin_hint
 from models.table_file import kind_of, read_table
 
-HOTTEST_START = 250.0  # degC
 DECIMALS = 6  # of results: a millionth of a kelvin or a watt
+
+
+@dataclass(frozen=True)
+class RecordedStart:
+    """The first temperature of every node that a cycle's file holds beside the inputs.
+
+    Attributes
+    ----------
+    path : Path
+    temperatures : mapping of node name to float
+        [degC]
+    rows : mapping of node name to int
+        Where they stand, counted from 1
+    """
+
+    path: Path
+    temperatures: Mapping[str, float]
+    rows: Mapping[str, int]
+
+    def of(self, nodes: Iterable[str]) -> dict[str, float]:
+        """Start temperatures [degC] of all `nodes`: as recorded; of nodes that were not recorded the others' mean.
+
+        Raises
+        ------
+        InputError
+            If no node of these was recorded, or a gearbox cannot start at a temperature.
+        """
+        nodes = tuple(nodes)
+        known = {name: T for name, T in self.temperatures.items() if name in nodes}
+        if not known:
+            raise InputError(
+                f"{self.path}: --initial recorded needs a column T_<node>_degC with a temperature, of the nodes "
+                f"{', '.join(nodes)}; give a temperature (--initial 20) or another file instead"
+            )
+        faults = [
+            f"{self.path}: T_{name}_degC is {T:g} at row {self.rows[name]}; to start from, a number above -273.15 "
+            f"and up to {HOTTEST_START:g} degC is needed{kelvin_hint(T)}"
+            for name, T in known.items()
+            if not can_start(T)
+        ]
+        if faults:
+            raise InputError("\n".join(faults))
+        mean = sum(known.values()) / len(known)
+        return {name: known.get(name, mean) for name in nodes}
 
 
 def read_cycle(path: Path, extra: tuple[str, ...] = ()) -> Cycle:
     """Read a cycle; see :meth:`models.cycle.Cycle.from_columns`."""
+    return read_cycle_and_start(path, extra)[0]
+
+
+def read_cycle_and_start(path: Path, extra: tuple[str, ...] = ()) -> tuple[Cycle, RecordedStart]:
+    """Read a cycle, and the node temperatures (columns ``T_<node>_degC``) that its file holds beside the inputs.
+
+    Raises
+    ------
+    InputError
+        See :meth:`models.cycle.Cycle.from_columns` and :func:`models.table_file.read_table`.
+    """
     table = read_table(path)
-    return Cycle.from_columns({str(c): table[c].to_numpy() for c in table.columns}, name=str(path), extra=extra)
+    cycle = Cycle.from_columns({str(c): table[c].to_numpy() for c in table.columns}, name=str(path), extra=extra)
+    numbers = {name: pd.to_numeric(table[name], errors="coerce") for name in _temperature_columns(table)}
+    temperatures, rows = {}, {}
+    for name in numbers:
+        known = np.flatnonzero(numbers[name].notna().to_numpy())
+        if len(known):
+            node, row = name[2:-5], int(known[0])
+            temperatures[node], rows[node] = float(numbers[name].iloc[row]), row + 1
+    return cycle, RecordedStart(path, temperatures, rows)
 
 
 def read_initial(value: str) -> float | dict[str, float]:
@@ -45,28 +110,66 @@ def read_initial(value: str) -> float | dict[str, float]:
         T = float(value)
     except ValueError:
         return _last_row(Path(value))
-    if not -273.15 < T <= HOTTEST_START:
+    if not can_start(T):
         raise InputError(
             f"--initial {value}: must be a finite number above -273.15 degC and up to {HOTTEST_START:g} degC"
-            + (f"; if kelvin are meant, give {T - 273.15:g}" if HOTTEST_START < T < 1000.0 else "")
+            + kelvin_hint(T)
         )
     return T
 
 
 def _last_row(path: Path) -> dict[str, float]:
     table = read_table(path)
-    columns = [str(c) for c in table.columns if str(c).startswith("T_") and str(c).endswith("_degC")]
-    last = {c: table[c].iloc[-1] for c in columns if c != "T_ambient_degC" and len(table)}
+    last = {c: table[c].iloc[-1] for c in _temperature_columns(table) if len(table)}
     if not last:
         raise InputError(f"{path}: has no T_<node>_degC columns with values to start from")
     numbers = pd.to_numeric(pd.Series(last), errors="coerce")
     for name, T in numbers.items():
-        if not -273.15 < T <= HOTTEST_START:
+        if not can_start(T):
             raise InputError(
                 f"{path}: {name} is {last[str(name)]} in the last row, row {len(table)}; to start from, a number above "
-                f"-273.15 and up to {HOTTEST_START:g} degC is needed"
+                f"-273.15 and up to {HOTTEST_START:g} degC is needed{kelvin_hint(T)}"
             )
     return {str(name)[2:-5]: float(T) for name, T in numbers.items()}
+
+
+def _temperature_columns(table: pd.DataFrame) -> list[str]:
+    """Columns of nodes; that of the surroundings is an input."""
+    names = [str(c) for c in table.columns if str(c).startswith("T_") and str(c).endswith("_degC")]
+    return [name for name in names if name != "T_ambient_degC"]
+
+
+def refuse_to_replace(inputs: Iterable[Path], outputs: Iterable[Path]) -> None:
+    """Refuse, before any work, to write over what is read or over a folder; links to a file count as the file.
+
+    Raises
+    ------
+    InputError
+        All such outputs.
+    """
+    read = list(inputs)
+    faults = []
+    for out in outputs:
+        if _is_folder(out):
+            faults.append(f"{out}: is a folder; name a file")
+        elif any(_same_file(path, out) for path in read):
+            faults.append(f"{out}: is read as well and would be replaced; choose another output")
+    if faults:
+        raise InputError("\n".join(faults))
+
+
+def _is_folder(path: Path) -> bool:
+    try:
+        return path.is_dir()
+    except (OSError, ValueError):  # a name that cannot be; who opens it says so
+        return False
+
+
+def _same_file(a: Path, b: Path) -> bool:
+    try:
+        return a.samefile(b)
+    except (OSError, ValueError):  # one of them is not there
+        return False
 
 
 def write_table(path: Path, columns: Mapping[str, ArrayLike]) -> None:

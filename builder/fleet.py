@@ -19,9 +19,9 @@ from threadpoolctl import threadpool_limits
 from builder import console
 from builder.build import staging
 from builder.doe import on_dask
-from builder.files import write_table
+from builder.files import refuse_to_replace, write_table
 from diagnosis import diagnose
-from diagnosis.files import write_files
+from diagnosis.files import names_of_files, write_files
 from diagnosis.recording import Recording, read_train_and_holdout
 from diagnosis.recording_file import RECORDING_KINDS
 from diagnosis.result import Diagnosis
@@ -226,6 +226,8 @@ def diagnose_fleet(
                 if member.fault:
                     raise InputError(member.fault)
                 train, held = read_train_and_holdout(member.train, member.holdout, network, mapping=mapping)
+                files = names_of_files((*train, *held))
+                refuse_to_replace([r.path for r in (*train, *held)], [output / member.name / name for name in files])
             except InputError as error:
                 outcomes[member.name] = _refused(member.name, str(error))
             else:

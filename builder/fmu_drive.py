@@ -90,6 +90,17 @@ def fmu_inputs(path: Path) -> tuple[str, ...]:
     return tuple(input_column(name) for name in inputs if input_column(name) == name.strip("'"))
 
 
+def fmu_nodes(path: Path) -> tuple[str, ...]:
+    """Nodes of an FMU that have a start temperature.
+
+    Raises
+    ------
+    InputError
+        If the file is not an FMU of this project.
+    """
+    return tuple(_starts({v.name: v for v in _description(Path(path)).modelVariables}))
+
+
 @dataclass
 class LoadedFmu:
     """An FMU that is instantiated, its variables by their meaning, and what it has said."""
@@ -165,7 +176,7 @@ class LoadedFmu:
 
     def set_initial(self, initial: float | Mapping[str, float]) -> None:
         """Set start temperatures, [degC]: one for all nodes, or all parts by name."""
-        starts = {n.removesuffix(".T_start").strip("'"): v for n, v in self.variables.items() if n.endswith(".T_start")}
+        starts = _starts(self.variables)
         if not isinstance(initial, Mapping):
             self._set_real(self.variables["initial.T"], initial)
             return
@@ -307,10 +318,21 @@ def _input_table(fmu: LoadedFmu, cycle: Cycle) -> Array:
     return np.stack([cycle.inputs.get(name, np.full(len(cycle), start)) for name, start in starts], axis=-1)
 
 
+def _starts(variables: Mapping[str, Any]) -> dict[str, Any]:
+    """Variables of start temperatures by node."""
+    return {n.removesuffix(".T_start").strip("'"): v for n, v in variables.items() if n.endswith(".T_start")}
+
+
 def _description(path: Path) -> Any:
     """The model description of an FMU of this project."""
-    if not path.is_file():
-        raise InputError(f"{path}: no such file")
+    try:
+        if path.is_dir():
+            inside = sorted(path.glob("*.fmu"))
+            raise InputError(f"{path}: is not a file but a folder; name an FMU{f', as {inside[0]}' if inside else ''}")
+        if not path.is_file():
+            raise InputError(f"{path}: no such file")
+    except OSError as error:  # a name that is too long, a folder that may not be read
+        raise InputError(f"{path}: cannot be read ({error.strerror})") from error
     try:
         with path.open("rb") as file:  # which fmpy would leave open where it fails
             description = fmpy.read_model_description(file, validate=False)

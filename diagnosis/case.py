@@ -175,7 +175,7 @@ def floored(explanation: Explanation) -> Explanation:
 
     A formula that is a little wrong leaves a remainder like any other effect. How large such remainders are on this
     gearbox is not known beforehand; so the floor is raised where the data ask for it, by the evidence under the present
-    explanation, and falls again when a better one has been found.
+    explanation, and falls again when a better one has been found (not where rows are means over minutes).
 
     Returns
     -------
@@ -185,6 +185,10 @@ def floored(explanation: Explanation) -> Explanation:
     evidences = [_evidence(explanation, times) for times in FLOORS]
     best = int(np.argmax(evidences))
     times = FLOORS[best] if evidences[best] - evidences[0] >= FLOOR_GAIN else FLOORS[0]
+    if explanation.problem.slow:
+        # Means over minutes do not show when a switch acted. What that leaves is no small random heat, and stays,
+        # whatever explains the rest: with a floor that falls, looks took it for effects (seen on wind turbines).
+        times = max(times, explanation.problem.floor)
     if times == explanation.problem.floor:
         return explanation
     problem = explanation.problem.changed(floor=times, whitenings=None)

@@ -16,6 +16,12 @@ from models.correction import Correction, Estimate, Finding, write_correction
 from models.gearbox import Gearbox
 
 SHAPE = "shape_"
+REPORT, NUMBERS, CORRECTION = "report.html", "diagnosis.json", "correction.toml"
+
+
+def names_of_files(recordings: Sequence[Recording]) -> tuple[str, ...]:
+    """Names of the files of a diagnosis, the report first."""
+    return REPORT, NUMBERS, CORRECTION, *(f"{recording.name}.csv" for recording in recordings)
 
 
 def correction_of(diagnosis: Diagnosis, gearbox: Gearbox) -> Correction:
@@ -80,13 +86,10 @@ def write_files(
     """
     from diagnosis.report import write_report
 
-    report, numbers, correction = (folder / name for name in ("report.html", "diagnosis.json", "correction.toml"))
+    report, numbers, correction, *predictions = (folder / name for name in names_of_files(recordings))
     write_report(diagnosis, report)
     numbers.write_text(json.dumps(diagnosis.to_dict(), indent=2, allow_nan=False) + "\n", encoding="utf-8")
     write_correction(correction_of(diagnosis, gearbox), correction)
-    predictions = []
-    for recording in recordings:
-        path = folder / f"{recording.name}.csv"
+    for recording, path in zip(recordings, predictions, strict=True):
         prediction_table(diagnosis, recording).to_csv(path, index=False, float_format="%.3f", lineterminator="\n")
-        predictions.append(path)
     return report, numbers, correction, *predictions

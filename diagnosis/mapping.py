@@ -25,14 +25,15 @@ A gearbox definition may bring one along (table ``[recording]``), for recordings
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from math import pi
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, field_validator
 
 from models import toml_file
+from models.cycle import COLUMNS
 from models.definition import Name, Section
 from models.errors import InputError, did_you_mean
 from models.faults import validated
@@ -43,6 +44,7 @@ FOLDER_FILE = "mapping.toml"
 DEFINITION_KEYS = ("stage", "part")  # of a gearbox definition, which is TOML as well
 LOSS = "P_loss"  # the measured total loss, beside the temperatures ``T_<node>``
 AUXILIARY, IGNORE = "auxiliary", "ignore"
+CERTAINLY_KELVIN = (200.0, 600.0)  # temperatures that no gearbox has in degC
 
 # dimension -> unit as files write it -> (factor, offset) to the unit inside. The first unit is that inside.
 UNITS: Mapping[str, Mapping[str, tuple[float, float]]] = {
@@ -110,15 +112,17 @@ class Column(Section):
             raise ValueError(f"the first number must be below the second, not {value[0]:g}, {value[1]:g}")
         return value
 
-    @model_validator(mode="after")
-    def _unit_fits(self) -> Column:
+    def relations(self) -> tuple[Iterator[str], ...]:
+        """See :meth:`models.definition.Section.relations`."""
+        return (self._unit_faults(),)
+
+    def _unit_faults(self) -> Iterator[str]:
         dimension = dimension_of(self.quantity)
         if dimension is None or self.quantity in (AUXILIARY, IGNORE):
-            return self
+            return
         units = UNITS[dimension]
         if self.unit is not None and self.unit not in units:
-            raise ValueError(f"unit {self.unit!r} is no unit of {dimension}{did_you_mean(self.unit, units)}")
-        return self
+            yield f"unit {self.unit!r} is no unit of {dimension}{did_you_mean(self.unit, units)}"
 
     def conversion(self, unit_of_file: str | None) -> tuple[float, float]:
         """Factor and offset from the numbers of the file to the unit inside; `scale` comes first."""
@@ -148,11 +152,13 @@ class Csv(Section):
             raise ValueError(f"{value!r} cannot separate columns; use ',', ';', a tab or '|'")
         return value
 
-    @model_validator(mode="after")
-    def _different(self) -> Csv:
+    def relations(self) -> tuple[Iterator[str], ...]:
+        """See :meth:`models.definition.Section.relations`."""
+        return (self._sign_faults(),)
+
+    def _sign_faults(self) -> Iterator[str]:
         if self.separator == self.decimal:
-            raise ValueError("separator and decimal are the same sign; with decimal ',' columns are separated by ';'")
-        return self
+            yield "separator and decimal are the same sign; with decimal ',' columns are separated by ';'"
 
 
 class RecordingMapping(Section):
@@ -167,23 +173,46 @@ class RecordingMapping(Section):
     constants: dict[Name, float] = Field(default_factory=dict)
     columns: dict[str, Column] = Field(default_factory=dict)
 
-    @model_validator(mode="after")
-    def _each_quantity_once(self) -> RecordingMapping:
+    @field_validator("constants")
+    @classmethod
+    def _in_their_unit(cls, values: dict[str, float]) -> dict[str, float]:
+        faults = [fault for name, value in values.items() for fault in _constant_faults(name, value)]
+        if faults:
+            raise ValueError("; ".join(faults))
+        return values
+
+    def relations(self) -> tuple[Iterator[str], ...]:
+        """See :meth:`models.definition.Section.relations`."""
+        return (self._quantity_faults(),)
+
+    def _quantity_faults(self) -> Iterator[str]:
         by_quantity: dict[str, str] = {}
         for name, column in self.columns.items():
             quantity = column.quantity
             if quantity in self.constants:
-                raise ValueError(f"{quantity} is a constant and the column {name!r}; keep one")
+                yield f"{quantity} is a constant and the column {name!r}; keep one"
             if quantity in by_quantity:
-                raise ValueError(f"columns {by_quantity[quantity]!r} and {name!r} are both {quantity}; keep one")
-            if quantity not in (AUXILIARY, IGNORE):
+                yield f"columns {by_quantity[quantity]!r} and {name!r} are both {quantity}; keep one"
+            elif quantity not in (AUXILIARY, IGNORE):
                 by_quantity[quantity] = name
-        return self
 
     @property
     def text_form(self) -> TextForm:
         """How its CSV files are written."""
-        return TextForm(separator=self.csv.separator, decimal=self.csv.decimal, missing=self.missing)
+        return TextForm(separator=self.csv.separator, decimal=self.csv.decimal, missing=self.missing, by_mapping=True)
+
+
+def _constant_faults(name: str, value: float) -> Iterator[str]:
+    if dimension_of(name) == "temperature" and CERTAINLY_KELVIN[0] < value < CERTAINLY_KELVIN[1]:
+        yield f"{name} = {value:g} is kelvin by its size, but constants are in degC; write {value - 273.15:g}"
+    elif name in COLUMNS:
+        _, low, high, text = COLUMNS[name]
+        unit = text.partition(";")[0]
+        if not low <= value <= high:
+            yield (
+                f"{name} = {value:g} {unit} is not possible; {low:g} to {high:g} {unit} is, and constants have that "
+                "unit"
+            )
 
 
 def read_mapping(path: Path) -> RecordingMapping:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pandas.util import hash_array
 
-from diagnosis.mapping import LOSS, dimension_of
+from diagnosis.mapping import CERTAINLY_KELVIN, LOSS, dimension_of
 from diagnosis.recording_cleaning import rows_text
 from models.cycle import COLUMNS
 from models.errors import InputError
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 LOWEST_T = COLUMNS["T_ambient"][1]
 HOTTEST_T = 250.0  # degC; oil and steel of a gearbox are long destroyed
 MOST_LOSS = 1e7  # W
-CERTAINLY_KELVIN = (200.0, 600.0)  # of all values
 FEW = 0.01  # share of rows that may be implausible
 CODES, CODED = 3, 0.5  # so many different implausible values, in up to this share of rows, are codes of a logger
 # Loss over power through the gearbox at high power: below, it is kW; above, the power is not what it seems.
@@ -76,7 +75,7 @@ def without_impossible(
         return values
     good = values[np.isfinite(values)]
     if not len(good):
-        faults.append(f"{column} has no value in any of its {len(values)} rows; remove the column, or mend it")
+        faults.append(_nothing_left(column, len(values), notes))
         return values
     dimension = dimension_of(quantity)
     if dimension == "temperature" and good.min() > CERTAINLY_KELVIN[0] and good.max() < CERTAINLY_KELVIN[1]:
@@ -109,6 +108,17 @@ def without_impossible(
         return values
     notes.append(f"{column}: {where} outside {possible.low:g} ... {possible.high:g} {possible.unit} taken as missing")
     return np.where(wrong, np.nan, values)
+
+
+def _nothing_left(column: str, rows: int, notes: Sequence[str]) -> str:
+    """Why a column has no value: its mapping file may have taken them all, which is noted by then."""
+    taken = [note for note in notes if note.startswith(f"{column}: ") and note.endswith("left out")]
+    if not taken:
+        return f"{column} has no value in any of its {rows} rows; remove the column, or mend it"
+    return (
+        f"{taken[-1]}, so that none is left: the limits 'valid' of its mapping file are in the column's own unit, as "
+        "the numbers stand in the file; correct them"
+    )
 
 
 def power_faults(inputs: Mapping[str, Array], loss: Array, names: Mapping[str, str]) -> list[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta
 from difflib import get_close_matches
@@ -35,6 +36,9 @@ SHORTEST_GAP_S, GAP_STEPS = 60.0, 3.0  # a gap is what is longer than both, unle
 SLOW_GAPS = 10.0  # ambient temperature and air speed change slowly: holes so many times longer are bridged
 LEAST_USABLE = 0.1  # share of the rows
 NEAR = 0.85  # likeness of names that makes one a slip of the other
+KIND_WORDS = frozenset({"t", "temp", "temperature", "p", "power"})
+UNIT_WORDS = frozenset({"degc", "c", "k", "degf", "f", "celsius", "kelvin", "w", "kw", "rpm", "nm", "m", "s"})
+MOST_NAMED = 12  # unused columns in a note
 
 
 @dataclass(kw_only=True, eq=False)
@@ -81,7 +85,7 @@ def read_columns(file: RecordingFile, network: ThermalNetwork, *, max_gap_s: flo
     """
     columns = RecordedColumns(seconds=file.seconds, rows=np.asarray(file.table.index) + 1, start=file.start)
     faults = list(file.faults)
-    roles = _roles(file, network, faults)
+    roles = _roles(file, network, faults, columns.notes)
     for name, column in roles.items():
         _take(file, name, column, network, columns, faults)
     _add_constants(file, network, columns, faults)
@@ -122,47 +126,81 @@ def _standard_names(network: ThermalNetwork) -> dict[str, str]:
     return names | {q: f"{q}_degC" if q.startswith("T_") else f"{q}_W" for q in _measurable(network)}
 
 
-def _roles(file: RecordingFile, network: ThermalNetwork, faults: list[str]) -> dict[str, Column]:
+def _roles(file: RecordingFile, network: ThermalNetwork, faults: list[str], notes: list[str]) -> dict[str, Column]:
     """What every column of the file is; faults where a column is missing or its name is a slip."""
     present = [str(column) for column in file.table.columns]
-    known = {*_inputs(network), *_measurable(network)}
-    roles: dict[str, Column] = {}
-    for name, column in file.mapping.columns.items():
-        if name not in present:
-            faults.append(f"column {name} of its mapping file is missing{did_you_mean(name, present)}")
-        elif column.quantity not in {*known, AUXILIARY, IGNORE}:
-            hint = did_you_mean(column.quantity, {*known, AUXILIARY, IGNORE})
+    roles = _mapped(file, network, present, faults)
+    constants = set(file.mapping.constants)
+    for signal, name in _standard_names(network).items():
+        if signal in constants and name in present and name not in file.mapping.columns:
             faults.append(
-                f"column {name} is {column.quantity!r} in its mapping file, which this gearbox does not have{hint}"
+                f"{signal} is a constant of its mapping file, and column {name} is there as well; leave the constant "
+                f'out, or name the column in the mapping file with quantity = "{IGNORE}"'
             )
-        else:
-            roles[name] = column
-    taken = {column.quantity for column in file.mapping.columns.values()} | set(file.mapping.constants)
+    taken = {column.quantity for column in file.mapping.columns.values()} | constants
     standard = {quantity: name for quantity, name in _standard_names(network).items() if quantity not in taken}
     for quantity, name in standard.items():
         if name in present and name not in file.mapping.columns:
             roles[name] = Column(quantity=quantity)
-    lacking = [name for name in standard.values() if name not in present]
     clock = file.clock.column if file.clock is not None else None
     rest = [name for name in present if name not in roles and name not in file.mapping.columns and name != clock]
-    for name in rest:
-        slip = _slip(name, lacking)
-        if slip:
-            faults.append(
-                f"column {name[:80]} is not known; did you mean {slip!r}? Rename it, or name it in a mapping file "
-                f'(quantity = "{AUXILIARY}" if it is something else)'
-            )
-        roles[name] = Column(quantity=AUXILIARY)
+    _set_aside(rest, [name for name in standard.values() if name not in present], faults, notes)
+    roles |= {name: Column(quantity=AUXILIARY) for name in rest}
     for signal in REQUIRED:
         if signal not in taken and standard[signal] not in present:
             faults.append(f"column {standard[signal]} is missing; it has: {', '.join(sorted(present)[:20])}")
     return roles
 
 
+def _mapped(file: RecordingFile, network: ThermalNetwork, present: list[str], faults: list[str]) -> dict[str, Column]:
+    """Columns that a mapping file names."""
+    known = {*_inputs(network), *_measurable(network), AUXILIARY, IGNORE}
+    roles: dict[str, Column] = {}
+    for name, column in file.mapping.columns.items():
+        if name not in present:
+            faults.append(f"column {name} of its mapping file is missing{did_you_mean(name, present)}")
+        elif column.quantity not in known:
+            hint = did_you_mean(column.quantity, known)
+            faults.append(
+                f"column {name} is {column.quantity!r} in its mapping file, which this gearbox does not have{hint}"
+            )
+        else:
+            roles[name] = column
+    return roles
+
+
+def _set_aside(rest: list[str], lacking: list[str], faults: list[str], notes: list[str]) -> None:
+    """Columns that nothing asks for: told, so that none is lost by its name alone."""
+    slips = {name: slip for name in rest if (slip := _slip(name, lacking))}
+    for name, slip in slips.items():
+        faults.append(
+            f"column {name[:80]} is not known; did you mean {slip!r}? Rename it, or name it in a mapping file "
+            f'(quantity = "{AUXILIARY}" if it is something else)'
+        )
+    unused = [name[:80] for name in rest if name not in slips]
+    if unused:
+        more = f" and {len(unused) - MOST_NAMED} more" if len(unused) > MOST_NAMED else ""
+        notes.append(f"not used, being no input and no node of this gearbox: {', '.join(unused[:MOST_NAMED])}{more}")
+
+
 def _slip(name: str, lacking: list[str]) -> str:
+    """The missing column that a name stands for by all appearance: nearly alike, or the same in other words."""
     by_small = {other.lower(): other for other in lacking}
     close = get_close_matches(name.lower(), by_small, n=1, cutoff=NEAR)
-    return by_small[close[0]] if close else ""
+    if close:
+        return by_small[close[0]]
+    words = _words(name)
+    return next((other for other in lacking if words and words == _words(other)), "") if _is_told(name) else ""
+
+
+def _is_told(name: str) -> bool:
+    """Whether a name says what kind of quantity it is; a column called ``oil`` alone may be anything."""
+    return bool(set(re.split(r"[\W_]+", name.lower())) & (KIND_WORDS | UNIT_WORDS))
+
+
+def _words(name: str) -> frozenset[str]:
+    """What a name says beside kind and unit: ``oil`` of ``T_oil``, ``Temp_Oil_C`` and ``T_oil_degC``."""
+    return frozenset(re.split(r"[\W_]+", name.lower())) - KIND_WORDS - UNIT_WORDS - {""}
 
 
 # ---------------------------------------------------------------------- numbers

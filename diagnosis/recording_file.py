@@ -84,6 +84,7 @@ def read_recording_file(
         If the file or its mapping cannot be read, or it has no rows.
     """
     path, named = split_path(text)
+    _check_part_syntax(path)
     kind = kind_of(path, RECORDING_KINDS)
     stem = path.name[: -len(kind)]
     if named:  # only the rows of the part are kept, so that the file itself may be larger
@@ -126,6 +127,21 @@ def read_recording_file(
         units=units,
         faults=tuple(faults),
     )
+
+
+def _check_part_syntax(path: Path) -> None:
+    """Refuse what was meant as a part of a recording, but is not written so and would be taken for a name.
+
+    Raises
+    ------
+    InputError
+    """
+    file, at, part = str(path).rpartition("@")
+    if at and file.lower().endswith(RECORDING_KINDS) and not path.name.lower().endswith(RECORDING_KINDS):
+        raise InputError(
+            f"{path}: {part!r} after the @ names no part; write FILE@start..end, e.g. {Path(file).name}@0..3600 "
+            "(seconds) or @2017-09-01..2017-10-31"
+        )
 
 
 def name_parts(text: str | Path) -> tuple[str, str, str]:

@@ -52,6 +52,9 @@ SLIPS = (
     Slip(signal="speed", factor=60.0, says="speed seems to be in revolutions per second, not 1/min"),
     Slip(signal="torque", factor=1e3, says="torque seems to be in kN m, not N m"),
     Slip(signal="torque", factor=1e-3, grossly=True, says="torque seems to be in N mm, not N m"),
+    Slip(signal="time", factor=60.0, grossly=True, says="time seems to be in minutes, not s"),
+    Slip(signal="time", factor=3600.0, grossly=True, says="time seems to be in hours, not s"),
+    Slip(signal="time", factor=1e-3, grossly=True, says="time seems to be in milliseconds, not s"),
     Slip(
         signal="T",
         factor=5.0 / 9.0,
@@ -176,7 +179,8 @@ def _slipped(thin: _Thin, slip: Slip) -> _Thin:
     def mended(arrays: Mapping[str, Array]) -> Mapping[str, Array]:
         return {name: v * slip.factor + slip.offset if name in touched else v for name, v in arrays.items()}
 
-    return replace(thin, inputs=mended(thin.inputs), measured=mended(thin.measured))
+    time = thin.time * slip.factor if slip.signal == "time" else thin.time
+    return replace(thin, time=time, inputs=mended(thin.inputs), measured=mended(thin.measured))
 
 
 def _misfit(thin: _Thin, model: NetworkOnGrid) -> _Misfit:

@@ -23,6 +23,7 @@ _ISO = re.compile(
     rf"{_DATE}(?:[T ]\d{{2}}:\d{{2}}(?::\d{{2}}(?:[.,]\d{{1,9}})?)?)?(?P<zone>Z|[+-]\d{{2}}(?::?\d{{2}})?)?"
 )
 SHORTEST_STEP = 1e-3  # s; no temperature is recorded faster, so smaller steps are another unit
+LONGEST_STEP = 1800.0  # s; a gearbox warms within an hour or two, of which rows so far apart tell nothing
 LONGEST_TIME = 1e11  # s since 1970 or since the start: 3000 years
 
 
@@ -230,13 +231,18 @@ def time_faults(values: pd.Series, seconds: Array, clock: Clock) -> list[str]:
             f"{name} is {values.iloc[row]} at row {rows[row]} and again at row {rows[row + 1]} ({len(same)} times in "
             "all); it must increase from row to row: remove the repeated rows"
         )
-    if not faults and not clock.is_date and len(steps):
-        faults += _unit_faults(name, seconds, steps)
+    if not faults and len(steps):
+        faults += _unit_faults(name, seconds, steps, clock)
     return faults
 
 
-def _unit_faults(name: str, seconds: Array, steps: Array) -> list[str]:
+def _unit_faults(name: str, seconds: Array, steps: Array, clock: Clock) -> list[str]:
     step = float(np.median(steps))
+    if step > LONGEST_STEP:
+        told = f"{name} advances by {step:.4g} s from row to row (median); at most {LONGEST_STEP:g} s tell how it warms"
+        return [told if clock.is_date else f"{told}; were milliseconds meant? Give [time] unit in a mapping file"]
+    if clock.is_date:
+        return []
     if np.abs(seconds).max() > LONGEST_TIME:
         return [
             f"{name} reaches {np.abs(seconds).max():.4g} s; were milliseconds meant? Give [time] unit in a mapping file"

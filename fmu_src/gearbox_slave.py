@@ -64,9 +64,12 @@ class GearboxSlave(Fmi2Slave):  # type: ignore[misc,unused-ignore]
     def exit_initialization_mode(self) -> None:
         """Take over the start temperatures."""
         try:
-            self._twin.initialize()
+            warning = self._twin.initialize()
         except Refused as refusal:
             self._complain(refusal)
+        else:
+            if warning is not None:
+                self.log(warning, Fmi2Status.warning)
 
     def do_step(self, current_time: float, step_size: float) -> bool:
         """Simulate one step; False (Discard) if it cannot be done."""

@@ -66,7 +66,8 @@ class Slot:
         slack = BOUND_TOLERANCE * abs(value)  # a bound converted from another unit is a rounding off
         if self.minimum - slack <= value <= self.maximum + slack:
             return None
-        text = f"{self.name} is {value:g} {self.unit}; {self.minimum:g} to {self.maximum:g} {self.unit} is possible"
+        unit = "" if self.unit in ("", "1") else f" {self.unit}"
+        text = f"{self.name} is {value:g}{unit}; {self.minimum:g} to {self.maximum:g}{unit} is possible"
         if self.unit == "K" and self.minimum <= value + 273.15 <= self.maximum:
             text += f". It is given in kelvin: if {value:g} degC is meant, set {value + 273.15:g}"
         elif self.unit == "rad/s":
@@ -215,8 +216,8 @@ class Twin:
         self.time = time
         self._fresh = False
 
-    def initialize(self) -> None:
-        """End the initialization: the start temperatures are taken over.
+    def initialize(self) -> str | None:
+        """End the initialization: the start temperatures are taken over; gives a warning, or None.
 
         Raises
         ------
@@ -226,6 +227,19 @@ class Twin:
         self._asked_to_start = True
         _, _, self._state = self._prepared()
         self.initialized = True
+        return self._unused_starts()
+
+    def _unused_starts(self) -> str | None:
+        """A warning about start temperatures that were given but are not used."""
+        common = self.values[self._single["initial_temperature"]]
+        given = [i for i in self._starts if self.values[i] not in (self.slots[i].start, common)]
+        if self.values[self._single["initial_uniform"]] == 0.0 or not given:
+            return None
+        more = f" (and {len(given) - 1} more such temperatures are given)" if len(given) > 1 else ""
+        return (
+            f"{self.slots[given[0]].name} is {self.values[given[0]]:g} K{more}, but initial.uniform is true: all parts "
+            f"start at initial.T = {common:g} K. Set initial.uniform to false to start each part at its own"
+        )
 
     def step(self, time: float, duration: float) -> str | None:
         """Simulate one communication step with the inputs held; gives a warning, or None.
@@ -251,24 +265,32 @@ class Twin:
                 f"the step starts at {time:g} s, but the last one ended at {self.time:g} s; "
                 "to go back, restore an FMU state saved there"
             )
-        if not self.initialized:
-            self.initialize()
-        system, inputs, state = self._prepared()
+        warnings = [] if self.initialized else [self.initialize()]
+        system, inputs, before = self._prepared()
+        was_outside = self._outside
         try:
             with np.errstate(all="ignore"):
-                state = solver.advance(system, state, time, duration, inputs, inputs)
+                at_once = not was_outside and self._is_outside(time, system, inputs, before.states)
+                state = solver.advance(system, before, time, duration, inputs, inputs)
+                outside = self._is_outside(time + duration, system, inputs, state.states)
         except Exception as error:  # whatever it is, the host gets an answer and keeps its simulation
             raise Refused(f"the heat balance cannot be solved from {time:g} s on: {error}") from error
-        self._state, self.time, self._fresh = state, time + duration, False
-        return self._excursion(*system.operating(self.time, inputs, state.states), state.states)
+        self._state, self.time, self._fresh, self._outside = state, time + duration, False, outside
+        # One warning when the range is left, of the first moment that it was seen; none while it stays outside.
+        if at_once:
+            warnings.append(self._excursion(time, system, inputs, before.states))
+        elif outside and not was_outside:
+            warnings.append(self._excursion(self.time, system, inputs, state.states))
+        return ". ".join(text for text in warnings if text is not None) or None
 
-    def _excursion(self, speed: Any, torque: Any, states: Array) -> str | None:
-        """A warning when the operating point leaves the range of training; none while it stays outside."""
+    def _is_outside(self, time: float, system: NetworkSystem, inputs: Array, states: Array) -> bool:
+        operating = system.operating(time, inputs, states)
+        return float(self._losses.domain_distance(*operating, states[self._loss_nodes])) > 0.0
+
+    def _excursion(self, time: float, system: NetworkSystem, inputs: Array, states: Array) -> str:
+        """A warning of the operating point that was found outside the range of training at `time`."""
+        speed, torque = system.operating(time, inputs, states)
         T = states[self._loss_nodes]
-        outside = float(self._losses.domain_distance(speed, torque, T)) > 0.0
-        left, self._outside = outside and not self._outside, outside
-        if not left:
-            return None
         losses = self._losses
         point = [
             ("speed", speed, losses.speed_bounds[1], "1/min"),
@@ -282,7 +304,7 @@ class Twin:
             if not low <= value <= high
         ]
         return (
-            f"at {self.time:g} s the operating point leaves the range that the networks were trained on: "
+            f"at {time:g} s the operating point is outside the range that the networks were trained on: "
             f"{', '.join(texts)}. Losses are held at the edge of the range; in_domain and domain_distance show how long"
         )
 

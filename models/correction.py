@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -19,7 +19,7 @@ from pydantic import Field, StringConstraints
 from models.definition import Name, Section, Text
 from models.errors import InputError, did_you_mean
 from models.expressions import expression_text, parse_expression
-from models.faults import validated
+from models.faults import as_written, validated
 from models.laws import Parameter
 from models.network import ExtraState, ThermalNetwork
 from models.terms import FACTORS, Form, Kind, Term
@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from models.gearbox import Gearbox
 
 SCHEMA = 1
+BOUND_TOLERANCE = 1e-9  # a bound that a fit ends at is a rounding off
 Sha256 = Annotated[str, StringConstraints(pattern=r"^[0-9a-f]{64}$")]
 NotNegative = Annotated[float, Field(ge=0.0)]
 
@@ -150,13 +151,12 @@ class Correction:
         Raises
         ------
         InputError
-            If the network lacks a parameter, place or signal.
+            If the network lacks a parameter, place or signal, or a calibrated value is outside a parameter's limits.
         """
+        faults = list(_calibration_faults(self.calibration, network))
+        if faults:
+            raise InputError("\n".join(f"the correction calibrates {fault}" for fault in faults))
         values = {estimate.name: estimate.value for estimate in self.calibration}
-        known = [p.name for p in network.parameters]
-        for name in values:
-            if name not in known:
-                raise InputError(f"the correction calibrates {name!r}, not of this network{did_you_mean(name, known)}")
         calibrated = (replace(p, start=values.get(p.name, p.start)) for p in network.parameters)
         network = replace(network, parameters=tuple(calibrated))
         for finding in self.findings:
@@ -186,6 +186,20 @@ class Correction:
         """
         _check_made_for(gearbox, self.gearbox, self.gearbox_sha256)
         return self.apply(gearbox.network(), as_recorded=as_recorded)
+
+
+def _calibration_faults(calibration: Iterable[Estimate], network: ThermalNetwork) -> Iterator[str]:
+    """What is wrong with calibrated values; the limits are those that the fit of a diagnosis has, and an FMU's."""
+    known = {p.name: p for p in network.parameters}
+    for estimate in calibration:
+        p = known.get(estimate.name)
+        if p is None:
+            yield f"{estimate.name!r}, not of this network{did_you_mean(estimate.name, known)}"
+            continue
+        slack = BOUND_TOLERANCE * abs(estimate.value)
+        if not p.lower - slack <= estimate.value <= p.upper + slack:
+            unit = "" if p.unit == "1" else f" {p.unit}"
+            yield f"{p.name!r} to {estimate.value:g}{unit}; {p.lower:g} to {p.upper:g}{unit} is possible"
 
 
 def corrected_network(gearbox: Gearbox, correction: Correction | None) -> ThermalNetwork:
@@ -288,8 +302,8 @@ def read_correction(path: str | Path, network: ThermalNetwork, *, made_for: Gear
     Raises
     ------
     InputError
-        If the file cannot be read, is not a correction, was made for another gearbox, or a law in it cannot be used;
-        with file, key and reason.
+        If the file cannot be read, is not a correction, was made for another gearbox, or a calibrated value or a law
+        in it cannot be used; with file, key and reason.
     """
     file = str(path)
     table = parse(read_text(Path(path)), file=file)
@@ -300,10 +314,16 @@ def read_correction(path: str | Path, network: ThermalNetwork, *, made_for: Gear
     content = validated(_File, table, file=file)
     if made_for is not None:
         _check_made_for(made_for, content.gearbox.name, content.gearbox.sha256, f"{file}: ")
+    calibration = tuple(
+        Estimate(name=c.name, value=c.value, stderr=c.stderr, unit=c.unit, prior=c.prior) for c in content.calibrated
+    )
+    faults = list(_calibration_faults(calibration, network))
+    if faults:
+        raise InputError("\n".join(f"{file}: the correction calibrates {fault}" for fault in faults))
     signals = list(network.signals)
     findings = []
     for index, entry in enumerate(content.finding):
-        finding = _finding(entry, signals, f"{file}: finding.{index}")
+        finding = _finding(entry, signals, f"{file}: {as_written(f'finding.{index}', table)}")
         findings.append(finding)
         # A later finding may lean on an earlier one's memories and boundary.
         signals += [p.name for p in finding.term.parameters] + [s.name for s in finding.term.states]
@@ -313,10 +333,7 @@ def read_correction(path: str | Path, network: ThermalNetwork, *, made_for: Gear
         gearbox=content.gearbox.name,
         gearbox_sha256=content.gearbox.sha256,
         findings=tuple(findings),
-        calibration=tuple(
-            Estimate(name=c.name, value=c.value, stderr=c.stderr, unit=c.unit, prior=c.prior)
-            for c in content.calibrated
-        ),
+        calibration=calibration,
         recordings={recording.name: recording.sha256 for recording in content.recording},
         version=content.version,
     )

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from difflib import SequenceMatcher
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,6 +21,18 @@ COLUMNS: dict[str, tuple[str, float, float, str]] = {
     "air_speed": ("air_speed_m_s", 0.0, 200.0, "m/s"),
 }
 REQUIRED = ("speed", "torque")
+
+MOST_ROWS = 5_000_000  # of a refined cycle, as of a table that is read
+SHORTEST_INTERVAL_S = 1e-5  # times in files have six decimals
+NEAR, NEAR_STEM = (
+    0.9,
+    0.8,
+)  # likeness of names, and of what they say beside the unit, that makes one a slip of the other
+UNIT_WORDS = frozenset(
+    {"deg", "degc", "c", "celsius", "k", "kelvin", "degf", "f", "m", "s", "ms", "mps", "km", "h", "kmh"}
+)
+KIND_WORDS = frozenset({"t", "temp", "temperature"})
+AMBIENT_WORDS = frozenset({"amb", "tamb", "tambient"})
 
 
 @dataclass(frozen=True)
@@ -54,8 +68,9 @@ class Cycle:
         Raises
         ------
         InputError
-            All faults at once: missing columns, no rows, columns of different lengths, values that are not finite or
-            not plausible, time that does not increase; with the row numbers (the first row of data is 1).
+            All faults at once: missing columns, columns that seem to be an optional one under another name, no rows,
+            columns of different lengths, values that are not finite or not plausible, time that does not increase;
+            with the row numbers (the first row of data is 1).
 
         Examples
         --------
@@ -70,6 +85,10 @@ class Cycle:
         faults += [f"column {c} is missing; it has: {', '.join(sorted(have))}" for c in needed if c not in have]
         arrays: dict[str, Array] = {}
         wanted = {"time": "time_s"} | {signal: spec[0] for signal, spec in COLUMNS.items()} | {c: c for c in extra}
+        optional = [column for column in wanted.values() if column not in needed]
+        faults += _slips(
+            [c for c in map(str, columns) if c not in wanted.values()], [c for c in optional if c not in have]
+        )
         for signal, column in wanted.items():
             if column in have:
                 values = _numbers(columns[column], column, faults)
@@ -91,6 +110,73 @@ class Cycle:
 
     def __len__(self) -> int:
         return len(self.time)
+
+    def refined(self, interval: float) -> Cycle:
+        """The same straight lines with more rows: its own, and one every `interval` from the first row on.
+
+        Parameters
+        ----------
+        interval : float
+            [s]
+
+        Raises
+        ------
+        InputError
+            If the interval is shorter than 1e-5 s, not finite, or gives more than 5 million rows.
+
+        Examples
+        --------
+        >>> cycle = Cycle.from_columns({"time_s": [0, 5, 8], "speed_rpm": [0, 100, 100], "torque_Nm": [3, 3, 0]})
+        >>> cycle.refined(2.0).time.tolist()
+        [0.0, 2.0, 4.0, 5.0, 6.0, 8.0]
+        >>> cycle.refined(2.0).inputs["speed"].tolist()
+        [0.0, 40.0, 80.0, 100.0, 100.0, 100.0]
+        """
+        if not SHORTEST_INTERVAL_S <= interval < np.inf:
+            raise InputError(
+                f"an output interval of {interval:g} s is not possible; {SHORTEST_INTERVAL_S:g} s or more is"
+            )
+        first, last = float(self.time[0]), float(self.time[-1])
+        rows = len(self) + (last - first) / interval
+        if rows > MOST_ROWS:
+            longer = _rounded_up((last - first) / max(MOST_ROWS - len(self), 1))
+            raise InputError(
+                f"an output interval of {interval:g} s gives {rows:.3g} rows over {last - first:g} s; up to "
+                f"{MOST_ROWS} are possible: choose {longer} s or more"
+            )
+        grid = first + interval * np.arange(1, int((last - first) / interval) + 1)
+        # What rounding alone sets apart from a row of its own, in the cycle or in a file, is that row.
+        same = max(1e-6 * interval, 0.2 * SHORTEST_INTERVAL_S, 4.0 * float(np.spacing(np.abs(self.time).max())))
+        after = np.searchsorted(self.time, grid).clip(1, len(self) - 1)
+        distance = np.minimum(np.abs(grid - self.time[after - 1]), np.abs(self.time[after] - grid))
+        time = np.union1d(self.time, grid[(distance > same) & (grid < last)])
+        return Cycle(time, {name: np.interp(time, self.time, values) for name, values in self.inputs.items()})
+
+
+def _rounded_up(seconds: float) -> str:
+    """Two digits, not below the number."""
+    unit = 10.0 ** (np.floor(np.log10(seconds)) - 1.0)
+    return f"{np.ceil(seconds / unit) * unit:g}"
+
+
+def _slips(unused: Iterable[str], absent: Iterable[str]) -> list[str]:
+    """Faults for columns that seem to be an absent optional one, which would otherwise silently have its default."""
+    return [
+        f"column {name[:80]} is not known; is {column} meant? rename it, or remove it"
+        for name in unused
+        for column in absent
+        if _alike(name.lower(), column.lower()) >= NEAR or _alike(_stem(name), _stem(column)) >= NEAR_STEM
+    ]
+
+
+def _alike(a: str, b: str) -> float:
+    return SequenceMatcher(None, a, b).ratio() if a and b else 0.0
+
+
+def _stem(name: str) -> str:
+    """What a name says beside kind and unit: ``ambient`` of ``T_ambient``, ``Temp_amb_C`` and ``ambient_degC``."""
+    words = [word for word in re.split(r"[\W_]+", name.lower()) if word not in UNIT_WORDS | KIND_WORDS]
+    return "".join("ambient" if word in AMBIENT_WORDS else word for word in words)
 
 
 def _time_faults(time: Array) -> list[str]:

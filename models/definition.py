@@ -7,10 +7,13 @@ in :mod:`models.consistency`; :mod:`models.gearbox` reads the file and reports a
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from collections.abc import Iterator
+from math import pi
+from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints, model_validator
 
+from models.errors import InputError
 from models.geometry import GearPair, gear_pair
 from models.quantity import InSI, between, in_si, optional_pair_in_si, pair_in_si
 
@@ -18,7 +21,8 @@ SCHEMA = 1
 
 Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")]
 Text = Annotated[str, StringConstraints(min_length=1)]
-Teeth = Annotated[int, between(5, 400)]
+# A whole number of hundreds of digits, which no float holds, is refused before anything is calculated with it.
+Teeth = Annotated[int, Field(ge=-(10**9), le=10**9), between(5, 400)]
 ThermalConductivity = Annotated[float, between(0.1, 500.0)]
 SolidDensity = Annotated[float, between(900.0, 12000.0)]
 SolidHeat = Annotated[float, between(100.0, 2500.0)]
@@ -26,6 +30,14 @@ HeatCapacity = Annotated[float, between(0.01, 1e8)]
 FluidTemperature = Annotated[float, between(-60.0, 250.0, unit="_degC")]
 Viscosity = Annotated[float, between(0.5, 1e5, unit="_mm2_s")]
 Coefficient = Annotated[float, between(1e-4, 0.5)]
+
+# Outside diameter over bore: the largest of ISO 15, from memory, is 4 (634: 16 over 4 mm).
+LARGEST_RING_RATIO = 5.0
+# Width over the height between bore and outside diameter: 0.8 of an NU 406, about 4 of four-row roller bearings.
+RING_SECTION = (0.1, 10.0)
+# Mass over that of a solid steel ring of the same envelope: 0.70 to 0.74 of NU 207, 210 and 406; sleeves may add to it.
+RING_MASS = (0.1, 2.0)
+STEEL_KG_M3 = 7830.0
 
 
 class Section(BaseModel):
@@ -39,6 +51,21 @@ class Section(BaseModel):
         hide_input_in_errors=True,
         ignored_types=(InSI,),
     )
+
+    def relations(self) -> tuple[Iterator[str], ...]:
+        """What is wrong between values of this table: texts by independent check.
+
+        Where some values are not valid on their own, :mod:`models.faults` goes through the checks that need the others
+        only, so that one reading tells all faults.
+        """
+        return ()
+
+    @model_validator(mode="after")
+    def _values_fit_together(self) -> Self:
+        faults = [fault for check in self.relations() for fault in check]
+        if faults:
+            raise ValueError("; ".join(faults))
+        return self
 
 
 class Ambient(Section):
@@ -68,15 +95,17 @@ class Modulus(Section):
     b2_per_K: Annotated[float, between(-0.01, 0.01)]
     nu_40_mm2_s: Annotated[float, between(1.0, 2000.0)]
 
-    @model_validator(mode="after")
-    def _plausible(self) -> Modulus:
+    def relations(self) -> tuple[Iterator[str], ...]:
+        """See :meth:`Section.relations`."""
+        return (self._stiffness_faults(),)
+
+    def _stiffness_faults(self) -> Iterator[str]:
         stiffness = self.a1_Pa + self.a2_Pa_per_K * 333.15
         if not 1.5e7 <= stiffness <= 2.5e8:
-            raise ValueError(
+            yield (
                 f"a1 + a2 T is {stiffness:.3g} Pa at 60 degC, but 1.5e7 to 2.5e8 Pa (pressure-viscosity coefficients "
                 "of 4 to 67 1/GPa) is plausible: check the signs, and that T is in K"
             )
-        return self
 
 
 class Gold(Section):
@@ -85,14 +114,16 @@ class Gold(Section):
     s: float
     t: float
 
-    @model_validator(mode="after")
-    def _not_swapped(self) -> Gold:
+    def relations(self) -> tuple[Iterator[str], ...]:
+        """See :meth:`Section.relations`."""
+        return (self._swap_faults(),)
+
+    def _swap_faults(self) -> Iterator[str]:
         if not (2.0 <= self.s <= 20.0 and 0.05 <= self.t <= 0.3):
-            raise ValueError(
+            yield (
                 f"s = {self.s:g}, t = {self.t:g} is outside s = 2 to 20, t = 0.05 to 0.3: a pair such as s = 0.139, "
                 "t = 0.9904 circulates swapped, and means s = 9.904, t = 0.139"
             )
-        return self
 
 
 class Fluid(Section):
@@ -113,26 +144,30 @@ class Fluid(Section):
     limiting_shear_coefficient: Annotated[float, between(0.005, 0.2)]
     schlenk_X_L: Annotated[float, between(0.3, 2.0)]
 
-    @model_validator(mode="after")
-    def _complete(self) -> Fluid:
-        faults = []
+    def relations(self) -> tuple[Iterator[str], ...]:
+        """See :meth:`Section.relations`."""
+        return self._viscosity_faults(), self._pressure_faults(), self._point_faults()
+
+    def _viscosity_faults(self) -> Iterator[str]:
         if (self.viscosity_points is None) == (self.d341 is None):
-            faults.append("needs either viscosity_points or d341, and not both")
+            yield "needs either viscosity_points or d341, and not both"
+
+    def _pressure_faults(self) -> Iterator[str]:
         needed = "modulus" if self.pressure_viscosity == "modulus" else "gold"
         if getattr(self, needed) is None:
-            faults.append(f"pressure_viscosity = '{self.pressure_viscosity}' needs the table '{needed}'")
-        if self.viscosity_points is not None:
-            (cold, nu_cold), (hot, nu_hot) = sorted(self.viscosity_points)
-            if cold == hot:
-                faults.append(f"viscosity_points are both at {hot:g} degC; two different temperatures are needed")
-            elif nu_hot >= nu_cold:
-                faults.append(
-                    f"viscosity_points: {nu_hot:g} mm2/s at {hot:g} degC is not below {nu_cold:g} mm2/s at "
-                    f"{cold:g} degC; the hotter oil must be the thinner one"
-                )
-        if faults:
-            raise ValueError("; ".join(faults))
-        return self
+            yield f"pressure_viscosity = '{self.pressure_viscosity}' needs the table '{needed}'"
+
+    def _point_faults(self) -> Iterator[str]:
+        if self.viscosity_points is None:
+            return
+        (cold, nu_cold), (hot, nu_hot) = sorted(self.viscosity_points)
+        if cold == hot:
+            yield f"viscosity_points are both at {hot:g} degC; two different temperatures are needed"
+        elif nu_hot >= nu_cold:
+            yield (
+                f"viscosity_points: {nu_hot:g} mm2/s at {hot:g} degC is not below {nu_cold:g} mm2/s at "
+                f"{cold:g} degC; the hotter oil must be the thinner one"
+            )
 
 
 class Oil(Fluid):
@@ -253,19 +288,31 @@ class Stage(Section):
             r_a=None if self.tip_diameter is None else (self.tip_diameter[0] / 2.0, self.tip_diameter[1] / 2.0),
         )
 
-    @model_validator(mode="after")
-    def _is_a_gear_pair(self) -> Stage:
-        if self.helix_angle_deg != 0.0:
-            raise ValueError(
-                f"helix_angle_deg = {self.helix_angle_deg:g}: helical gears are not supported yet; only 0 (spur) is"
-            )
+    def relations(self) -> tuple[Iterator[str], ...]:
+        """See :meth:`Section.relations`."""
+        return self._shaft_faults(), self._pair_faults(), self._bore_faults()
+
+    def _shaft_faults(self) -> Iterator[str]:
         if self.driver == self.driven:
-            raise ValueError(f"driver and driven are both '{self.driver}'; a stage joins two shafts")
-        pair = self.pair()
+            yield f"driver and driven are both '{self.driver}'; a stage joins two shafts"
+
+    def _pair_faults(self) -> Iterator[str]:
+        if self.helix_angle_deg != 0.0:
+            yield f"helix_angle_deg = {self.helix_angle_deg:g}: helical gears are not supported yet; only 0 (spur) is"
+            return
+        try:
+            self.pair()
+        except InputError as error:
+            yield str(error)
+
+    def _bore_faults(self) -> Iterator[str]:
+        try:
+            pair = self.pair()
+        except InputError:
+            return
         for name, bore, r_f in zip(self.names, self.bore_mm, pair.r_f, strict=True):
             if bore >= 2e3 * r_f:
-                raise ValueError(f"bore_mm of '{name}' is {bore:g}, not below its root diameter {2e3 * r_f:.4g} mm")
-        return self
+                yield f"bore_mm of '{name}' is {bore:g}, not below its root diameter {2e3 * r_f:.4g} mm"
 
 
 class Bearing(Section):
@@ -310,13 +357,42 @@ class Bearing(Section):
             return self.oil_level_mm
         return max(0.0, 0.3 * (self.bore_mm + self.outside_diameter_mm) - level_below_axis_mm)
 
-    @model_validator(mode="after")
-    def _is_a_ring(self) -> Bearing:
-        if self.outside_diameter_mm <= self.bore_mm:
-            raise ValueError(
-                f"outside_diameter_mm = {self.outside_diameter_mm:g} is not above bore_mm = {self.bore_mm:g}"
+    def relations(self) -> tuple[Iterator[str], ...]:
+        """See :meth:`Section.relations`."""
+        return self._ring_faults(), self._mass_faults()
+
+    def _ring_faults(self) -> Iterator[str]:
+        bore, outside = self.bore_mm, self.outside_diameter_mm
+        if outside <= bore:
+            yield f"outside_diameter_mm = {outside:g} is not above bore_mm = {bore:g}"
+            return
+        if outside > LARGEST_RING_RATIO * bore:
+            yield (
+                f"outside_diameter_mm = {outside:g} is {outside / bore:.3g} times bore_mm = {bore:g}; rolling bearings "
+                f"have up to 4 times, above {LARGEST_RING_RATIO:g} is refused: correct one of them"
             )
-        return self
+            return
+        ratio = 2.0 * self.width_mm / (outside - bore)
+        if not RING_SECTION[0] <= ratio <= RING_SECTION[1]:
+            yield (
+                f"width_mm = {self.width_mm:g} is {ratio:.3g} times the height of its section, "
+                f"{0.5 * (outside - bore):g} mm between bore_mm and outside_diameter_mm; {RING_SECTION[0]:g} to "
+                f"{RING_SECTION[1]:g} times is possible: correct one of them"
+            )
+
+    def _mass_faults(self) -> Iterator[str]:
+        if any(self._ring_faults()):
+            return  # there is no ring to compare with
+        mass = self.mass_kg
+        area = 0.25e-6 * pi * (self.outside_diameter_mm**2 - self.bore_mm**2)
+        solid = STEEL_KG_M3 * area * 1e-3 * self.width_mm
+        low, high = RING_MASS[0] * solid, RING_MASS[1] * solid
+        if not low <= mass <= high:
+            meant = ": were grams meant?" if low <= 1e-3 * mass <= high else ""
+            yield (
+                f"mass_kg = {mass:g} does not fit its size: a solid steel ring of its bore_mm, outside_diameter_mm and "
+                f"width_mm has {solid:.3g} kg, so {low:.2g} to {high:.2g} kg is possible{meant}"
+            )
 
 
 class Seal(Section):
@@ -355,17 +431,21 @@ class Housing(Section):
     joint_conductance_W_K: Annotated[float, between(0.0, 1e5)]
     part: Annotated[tuple[HousingPart, ...], Field(min_length=1)]
 
-    @model_validator(mode="after")
-    def _is_whole(self) -> Housing:
+    def relations(self) -> tuple[Iterator[str], ...]:
+        """See :meth:`Section.relations`."""
+        return self._share_faults(), self._foundation_faults()
+
+    def _share_faults(self) -> Iterator[str]:
         total = sum(part.area_fraction for part in self.part)
         if abs(total - 1.0) > 1e-6:
-            raise ValueError(f"the area_fraction of its parts sum to {total:g}, not to 1")
+            yield f"the area_fraction of its parts sum to {total:g}, not to 1"
+
+    def _foundation_faults(self) -> Iterator[str]:
         if self.foundation_conductance_W_K > 0.0 and not any(part.foundation for part in self.part):
-            raise ValueError(
+            yield (
                 "foundation_conductance_W_K is above 0, but no part stands on the foundation; "
                 "set foundation = true for one of them"
             )
-        return self
 
 
 class Node(Section):
@@ -382,13 +462,14 @@ class Training(Section):
     torque_Nm: tuple[Annotated[float, between(1e-6, 1e6)], Annotated[float, between(1e-6, 1e6)]]
     temperature_degC: tuple[Annotated[float, between(-60.0, 300.0)], Annotated[float, between(-60.0, 300.0)]]
 
-    @model_validator(mode="after")
-    def _in_order(self) -> Training:
-        for key in ("speed_rpm", "torque_Nm", "temperature_degC"):
-            low, high = getattr(self, key)
-            if low >= high:
-                raise ValueError(f"{key}: the lower bound {low:g} is not below the upper bound {high:g}")
-        return self
+    def relations(self) -> tuple[Iterator[str], ...]:
+        """See :meth:`Section.relations`."""
+        return tuple(self._order_faults(key) for key in ("speed_rpm", "torque_Nm", "temperature_degC"))
+
+    def _order_faults(self, key: str) -> Iterator[str]:
+        low, high = getattr(self, key)
+        if low >= high:
+            yield f"{key}: the lower bound {low:g} is not below the upper bound {high:g}"
 
 
 class Definition(Section):

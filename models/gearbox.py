@@ -19,7 +19,7 @@ from models.annotated import Annotations, join, strip
 from models.consistency import consistency_faults, factor_names
 from models.definition import SCHEMA, Ambient, Bearing, Definition, Housing, Node, Oil, Seal, Shaft, Stage, Training
 from models.errors import InputError, did_you_mean
-from models.faults import shown, validated
+from models.faults import as_written, shown, validated
 from models.named_oils import lubricant, read_oil
 from models.oil import Oil as Lubricant
 from models.parametric import (
@@ -237,7 +237,7 @@ class Gearbox:
             except LookupError:
                 faults.append(f"{path} is not a value of this gearbox{did_you_mean(path, self.leaves)}")
         faults += consistency_faults(values)
-        definition = _checked(values, file=self.file, faults=faults)
+        definition = _checked(values, file=self.file, faults=faults, numbered=True)
         changed = dict.fromkeys(changes, CHANGED_SOURCE)
         notes = Annotations(sources={**self.sources, **changed}, priors=dict(self.priors))
         given = {leaf for leaf, _ in _leaves(values) if any(f"{leaf}.".startswith(f"{path}.") for path in changes)}
@@ -350,14 +350,17 @@ def read_gearbox(text: str, *, file: str) -> Gearbox:
     gearbox = Gearbox(definition, notes, frozenset(path for path, _ in _leaves(values)), file)
     whole = [path for path in notes.priors if isinstance(gearbox.leaves[path], int)]
     if whole:
-        raise InputError("\n".join(f"{file}: {path} is a whole number and cannot have an sd" for path in whole))
+        lines = (as_written(f"{path} is a whole number and cannot have an sd", values) for path in whole)
+        raise InputError("\n".join(f"{file}: {line}" for line in lines))
     return gearbox
 
 
-def _checked(values: Mapping[str, Any], *, file: str, faults: Sequence[str]) -> Definition | ParametricDefinition:
+def _checked(
+    values: Mapping[str, Any], *, file: str, faults: Sequence[str], numbered: bool = False
+) -> Definition | ParametricDefinition:
     if KEY in values:
-        return validated(ParametricDefinition, values, file=file, faults=faults)
-    return validated(Definition, values, file=file, faults=faults)
+        return validated(ParametricDefinition, values, file=file, faults=faults, numbered=numbered)
+    return validated(Definition, values, file=file, faults=faults, numbered=numbered)
 
 
 def _alike(tables: Any, key: str, notes: Annotations) -> Any:

@@ -24,6 +24,7 @@ from models.laws import LawLike, NumericLaw, Parameter, Signals, symbol, trace
 from models.types import Array
 
 if TYPE_CHECKING:
+    from models.definition import Training
     from models.simulation import Result
 
 
@@ -443,12 +444,15 @@ class ThermalNetwork:
         losses: Losses,
         initial: float | Mapping[str, float] | None = None,
         parameters: Mapping[str, ArrayLike] | None = None,
+        trained: Training | None = None,
         progress: Callable[[int, int], None] | None = None,
     ) -> Result:
         """Temperatures and losses over a cycle; see :func:`models.simulation.simulate`."""
         from models.simulation import simulate
 
-        return simulate(self, cycle, losses=losses, initial=initial, parameters=parameters, progress=progress)
+        return simulate(
+            self, cycle, losses=losses, initial=initial, parameters=parameters, trained=trained, progress=progress
+        )
 
     def steady_state(
         self,

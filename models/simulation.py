@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,6 +17,10 @@ from models.network import Losses, ThermalNetwork
 from models.runtime import NetworkSystem, efficiency, torque_loss
 from models.types import Array
 
+if TYPE_CHECKING:
+    from models.definition import Training
+
+HOTTEST_START = 250.0  # degC; above it kelvin are meant, or a gearbox that is long destroyed
 STEADY_TOLERANCE_K, STEADY_DISTANCE_K = 1e-9, 1e-6
 FIRST_PSEUDO_STEP_S, LARGEST_PSEUDO_STEP_S, SHORTEST_PSEUDO_STEP_S = 1e5, 1e10, 10.0
 SETTLING = (
@@ -63,13 +68,30 @@ def network_system(
         raise InputError(str(error)) from error
 
 
+def can_start(T: float) -> bool:
+    """Whether a gearbox can start at a temperature [degC]."""
+    return -273.15 < T <= HOTTEST_START
+
+
+def kelvin_hint(T: float) -> str:
+    """What to give instead of a start temperature that is too hot for degC, if kelvin may be meant; else empty.
+
+    Examples
+    --------
+    >>> kelvin_hint(293.15), kelvin_hint(20.0)
+    ('; if kelvin are meant, give 20', '')
+    """
+    return f"; if kelvin are meant, give {T - 273.15:g}" if HOTTEST_START < T < 1000.0 else ""
+
+
 def initial_states(network: ThermalNetwork, initial: float | Mapping[str, float]) -> Array:
     """States at the start, from one temperature [degC] or one per node (all parts must be given), shape (n,).
 
     Raises
     ------
     InputError
-        If nodes are missing or unknown, or a temperature is not finite or below absolute zero.
+        If nodes are missing or unknown, a temperature is not finite or below absolute zero, or one for all nodes is
+        above 250 degC; single nodes may be hotter, as those of a result that is continued.
     """
     part_names = [part.name for part in network.parts]
     if isinstance(initial, Mapping):
@@ -85,6 +107,11 @@ def initial_states(network: ThermalNetwork, initial: float | Mapping[str, float]
         temperatures = np.array([initial[name] for name in part_names], dtype=float)
     else:
         temperatures = np.full(len(part_names), float(initial))
+        if initial > HOTTEST_START:
+            raise InputError(
+                f"an initial temperature of all nodes is possible up to {HOTTEST_START:g} degC, not {initial:g}"
+                + kelvin_hint(initial)
+            )
     if not (np.isfinite(temperatures).all() and (temperatures > -273.15).all()):
         raise InputError(f"initial temperatures must be finite and above -273.15 degC, not {temperatures.tolist()}")
     return np.concatenate((temperatures, [state.start for state in network.states]))
@@ -106,7 +133,7 @@ class Result:
     extra_heat : mapping of source to Array, shape (..., N)
         Sources that are no losses, [W]
     domain_distance : Array, shape (..., N)
-        How far outside the loss model's domain, as a fraction of its range; 0 inside
+        How far outside the loss model's domain, or the range that was named, as a fraction of its range; 0 inside
     heat_in, heat_out, heat_stored : Array, shape (..., N)
         Heat brought in by all sources, given to the boundaries and stored since the start, [J]
     """
@@ -161,6 +188,7 @@ def simulate(
     losses: Losses,
     initial: float | Mapping[str, float] | None = None,
     parameters: Mapping[str, ArrayLike] | None = None,
+    trained: Training | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Result:
     """Temperatures and losses over a cycle.
@@ -176,6 +204,9 @@ def simulate(
         Temperatures at the first row, [degC]; by default the first ambient temperature
     parameters : mapping of name to ArrayLike, shape () or (B,), or None
         Values of tunable parameters; arrays simulate B variants at once
+    trained : Training or None
+        Range that the definition names; outside it the result's `domain_distance` is above 0 also where the losses
+        have no domain of their own, as the full model
     progress : callable or None
         Called with (rows done, rows in all) now and then
 
@@ -212,7 +243,9 @@ def simulate(
         heat[0, ..., row + 1], heat[1, ..., row + 1] = state.heat_in, state.heat_out
         if progress is not None and (row % 50 == 49 or row == n_rows - 2):
             progress(row + 1, n_rows - 1)
-    return evaluate(network, losses, parameters, time=cycle.time, table=table, states=states, heat=heat)
+    return evaluate(
+        network, losses, parameters, time=cycle.time, table=table, states=states, heat=heat, trained=trained
+    )
 
 
 def evaluate(
@@ -224,6 +257,7 @@ def evaluate(
     table: Array,
     states: Array,
     heat: Array,
+    trained: Training | None = None,
 ) -> Result:
     """All results that follow from inputs and states, over whole arrays at once.
 
@@ -238,6 +272,8 @@ def evaluate(
     states : Array, shape (..., N, n)
     heat : Array, shape (2, ..., N)
         Heat brought in and given off since the start, [J]
+    trained
+        As for :func:`simulate`
     """
     along_time = {name: np.asarray(value, dtype=float)[..., None] for name, value in (parameters or {}).items()}
     system = network_system(network, losses, along_time, vector=True)
@@ -247,17 +283,45 @@ def evaluate(
     n_parts = system.n_parts
     part, given = iter(np.moveaxis(states[..., :n_parts], -1, 0)), iter(np.moveaxis(boundary, -1, 0))
     loss_nodes = [system.laws.parts.index(name) for name in losses.temperature_nodes]
+    point = (*system.operating(time, wide, states), states[..., loss_nodes])
+    distance = losses.domain_distance(*point)
+    if trained is not None:
+        distance = np.maximum(distance, range_distance(trained, *point))
     return Result(
         time=time,
         inputs=dict(zip(system.laws.inputs, np.moveaxis(table, -1, 0), strict=True)),
         temperatures={n.name: next(part) if n.temperature is None else next(given) for n in network.nodes},
         losses={s.name: heats[..., i] for i, s in enumerate(network.sources) if s.is_loss},
         extra_heat={s.name: heats[..., i] for i, s in enumerate(network.sources) if not s.is_loss},
-        domain_distance=losses.domain_distance(*system.operating(time, wide, states), states[..., loss_nodes]),
+        domain_distance=distance,
         heat_in=heat[0],
         heat_out=heat[1],
         heat_stored=((states - states[..., :1, :])[..., :n_parts] * system.capacities).sum(axis=-1),
     )
+
+
+def range_distance(trained: Training, speed: ArrayLike, torque: ArrayLike, temperatures: ArrayLike) -> Array:
+    """How far an operating point lies outside the range that a definition names, as surrogates trained on it say.
+
+    Parameters
+    ----------
+    trained : Training
+    speed, torque : ArrayLike, shape (...)
+        As the losses see them, [1/min] and [N m], signed; below the lower bounds is inside
+    temperatures : ArrayLike, shape (..., nodes)
+        That the losses read, [degC]
+
+    Returns
+    -------
+    Array, shape (...)
+        0 inside, else the largest excess as a fraction of the range, [-];
+        see :meth:`models.surrogate.SurrogateLosses.domain_distance`
+    """
+    T, (T_low, T_high) = np.asarray(temperatures, dtype=float), trained.temperature_degC
+    loads = ((speed, trained.speed_rpm), (torque, trained.torque_Nm))
+    beyond = [(np.abs(value) - high) / (high - low) for value, (low, high) in loads]
+    off = np.maximum(T - T_high, T_low - T).max(axis=-1) / (T_high - T_low)
+    return np.asarray(np.maximum(np.maximum(np.maximum(*beyond), off), 0.0))
 
 
 def steady_state(

@@ -5,6 +5,8 @@ from __future__ import annotations
 import codecs
 import csv
 import gzip
+import io
+import re
 import warnings
 import zlib
 from collections.abc import Callable, Iterator
@@ -21,6 +23,11 @@ KINDS = (".csv", ".csv.gz", ".parquet")
 CHUNK_ROWS = 100_000
 CHUNK_BYTES = 1 << 20
 LONGEST_HEADER = 1 << 20  # bytes
+MOST_HEAD_ROWS = 3  # rows of units or remarks below a header that are recognised as such
+SHOWN = 3  # cells of such a row in a message
+# Texts that head a column ("s", "1/min", "m3/h") have no two digits in a row; dates, times and misspelt numbers do.
+_DIGITS = re.compile(r"\d{2}|\d[.,]\d")
+_PANDAS_UNEVEN = re.compile(r"Expected \d+ fields in line|Length of header or names does not match length of data")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,11 +49,22 @@ class Limits:
 
 @dataclass(frozen=True, kw_only=True)
 class TextForm:
-    """How a CSV file is written: `separator` of columns, `decimal` sign, and further texts for a `missing` value."""
+    """How a CSV file is written.
+
+    Attributes
+    ----------
+    separator, decimal : str
+        Between columns, and in numbers
+    missing : tuple of str
+        Further texts for a missing value
+    by_mapping : bool
+        Whether a mapping file can say all this, which messages then advise
+    """
 
     separator: str = ","
     decimal: str = "."
     missing: tuple[str, ...] = ()
+    by_mapping: bool = False
 
 
 LIMITS = Limits()
@@ -65,12 +83,21 @@ def kind_of(path: Path, kinds: tuple[str, ...] = KINDS) -> str:
     Raises
     ------
     InputError
-        If it is another one.
+        If it is another one, or a folder.
     """
+    if _is_folder(path):
+        raise InputError(f"{path}: is not a file but a folder; name a file in it ({', '.join(kinds)})")
     for kind in kinds:
         if path.name.lower().endswith(kind):
             return kind
     raise InputError(f"{path}: the ending says nothing; use one of {', '.join(kinds)}")
+
+
+def _is_folder(path: Path) -> bool:
+    try:
+        return path.is_dir()
+    except (OSError, ValueError):  # a name that is too long, or holds NUL: check_file says so
+        return False
 
 
 def check_file(path: Path, limits: Limits = LIMITS) -> None:
@@ -84,7 +111,7 @@ def check_file(path: Path, limits: Limits = LIMITS) -> None:
         if not path.exists():
             raise InputError(f"{path}: no such file")
         if not path.is_file():
-            raise InputError(f"{path}: is not a file")
+            raise InputError(f"{path}: is not a file but {'a folder' if path.is_dir() else 'a device or pipe'}")
         size = path.stat().st_size
     except (OSError, ValueError) as error:  # a name that is too long, or holds NUL
         raise InputError(f"{path}: cannot be read ({getattr(error, 'strerror', None) or error})") from error
@@ -139,7 +166,9 @@ def read_table(
 def _together(path: Path, parts: Iterator[pd.DataFrame], limits: Limits, keep: Keep | None) -> pd.DataFrame:
     kept: list[pd.DataFrame] = []
     rows = 0
-    for part in parts:
+    for number, part in enumerate(parts):
+        if number == 0:
+            _check_first_rows(path, part)
         wanted = part if keep is None else keep(part)
         rows += len(wanted)
         if rows > limits.rows:
@@ -149,6 +178,34 @@ def _together(path: Path, parts: Iterator[pd.DataFrame], limits: Limits, keep: K
     # Parts of no rows have no types of their own.
     filled = [part for part in kept if len(part)] or kept[:1]
     return pd.concat(filled) if len(filled) > 1 else filled[0]
+
+
+def _check_first_rows(path: Path, table: pd.DataFrame) -> None:
+    """Refuse rows of units or remarks between header and numbers, as exports of test benches have them.
+
+    Raises
+    ------
+    InputError
+        If no cell of the first rows is a number, and those of the next one are.
+    """
+    heads: list[list[str]] = []
+    for row in range(min(len(table), MOST_HEAD_ROWS + 1)):
+        cells = [str(cell).strip() for cell in table.iloc[row] if not pd.isna(cell)]
+        if any(_is_number(cell) for cell in cells):
+            break
+        if not any(cells) or any(_DIGITS.search(cell) for cell in cells):
+            return
+        heads.append(cells)
+    else:
+        return
+    if heads:
+        rows, them = ("row 1", "it") if len(heads) == 1 else (f"rows 1-{len(heads)}", "them")
+        first = ", ".join(repr(cell[:20]) for cell in heads[0][:SHOWN]) + (", ..." if len(heads[0]) > SHOWN else "")
+        verb = "holds" if len(heads) == 1 else "hold"
+        raise InputError(
+            f"{path}: {rows} (below the header) {verb} units or texts ({first}) and no number; remove {them}, or begin "
+            f"{'its line' if len(heads) == 1 else 'their lines'} with '#'"
+        )
 
 
 def _too_large(size: int, limits: Limits) -> str:
@@ -226,7 +283,7 @@ def _check_header(path: Path, header: str, form: TextForm, limits: Limits) -> No
         raise InputError(f"{path}: its header line cannot be read: {error}") from error
     for other, word in ((";", "';'"), ("\t", "tabs"), (",", "','")):
         if len(names) == 1 and other in names[0]:
-            raise InputError(f"{path}: its columns are separated by {word}; write it with ',' and decimal points")
+            raise InputError(f"{path}: its columns are separated by {word}; {_advice(other, form)}")
     if len(names) > limits.columns:
         raise InputError(f"{path}: has {len(names)} columns, more than the {limits.columns} that are read; drop some")
     if all(_is_number(name) for name in names):
@@ -234,6 +291,20 @@ def _check_header(path: Path, header: str, form: TextForm, limits: Limits) -> No
     repeated = sorted({name for name in names if name and names.count(name) > 1})
     if repeated:
         raise InputError("\n".join(f"{path}: column {name[:80]} is there twice; remove one" for name in repeated[:10]))
+
+
+def _advice(separator: str, form: TextForm) -> str:
+    """What to do with a file of another separator."""
+    plain = "write it with ',' and decimal points"
+    if not form.by_mapping:
+        return plain
+    if separator == ",":
+        return 'give csv = { separator = "," } in a mapping file'
+    shown = "\\t" if separator == "\t" else separator
+    return (
+        f'give csv = {{ separator = "{shown}", decimal = "," }} in a mapping file (decimal = "." where its numbers '
+        f"have points), or {plain}"
+    )
 
 
 def _is_number(text: str) -> bool:
@@ -265,8 +336,40 @@ def _text_parts(path: Path, form: TextForm, limits: Limits) -> Iterator[pd.DataF
             low_memory=False,
         )
         with closing(reader):
-            for part in reader:
-                yield part.rename(columns=lambda name: str(name).strip())
+            try:
+                for part in reader:
+                    yield part.rename(columns=lambda name: str(name).strip())
+            except (pd.errors.ParserError, pd.errors.ParserWarning) as error:
+                uneven = _uneven_row(path, form, scan) if _PANDAS_UNEVEN.search(str(error)) else None
+                if uneven is None:
+                    raise
+                raise InputError(f"{path}: cannot be read as csv: {uneven}") from error
+
+
+def _uneven_row(path: Path, form: TextForm, scan: _Scan) -> str | None:
+    """The first row with more fields than the header, which pandas names by halves; None if there is none."""
+    with _opened(path) as file, io.TextIOWrapper(file, encoding="utf-8-sig", newline="") as text:
+        at = 0
+
+        def lines() -> Iterator[str]:
+            nonlocal at
+            for at, line in enumerate(text, start=1):
+                if at > scan.before and not (scan.comments and line.startswith("#")):
+                    yield line
+
+        try:
+            rows = csv.reader(lines(), delimiter=form.separator, skipinitialspace=True)
+            filled = (fields for fields in rows if len(fields) > 1 or any(field.strip() for field in fields))
+            names = len(next(filled))
+            for row, fields in enumerate(filled, start=1):
+                if len(fields) > names:
+                    return (
+                        f"row {row} (line {at}) has {len(fields)} fields, but the header names {names} columns; remove "
+                        f"what is too much, e.g. a {form.separator!r} at its end or within a number"
+                    )
+        except (csv.Error, StopIteration):
+            return None
+    return None
 
 
 # ---------------------------------------------------------------------- Parquet

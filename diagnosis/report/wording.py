@@ -25,8 +25,8 @@ WORDS: Mapping[str, str] = {
     "correction is worth counts against this, not against the model as delivered.",
     "with what was found": "The calibrated model with the found physics added.",
     "held out": "Recordings that nothing was fitted to: their error is that of a model that got their inputs and no "
-    "measured temperature beyond the first minutes, which do not count. They may refuse an effect that the others would "
-    "name; so the error is that of a choice, and a little smaller than on recordings that had no say at all.",
+    "measured temperature beyond the first minutes, which do not count. They may refuse an effect that the others "
+    "would name; so the error is that of a choice, and a little smaller than on recordings that had no say at all.",
     "free-running": "Simulated from the start temperatures on with the recorded inputs alone, never corrected by a "
     "measurement on the way.",
     "RMSE": "Root mean square of simulated less measured: the typical size of the error.",

@@ -94,10 +94,11 @@ static int usable(const Variable *variable, double value) {
 
 /* Why a value cannot be used, and what was probably meant. Gives the length. */
 static int describe(const Variable *v, double value, char *text, size_t size) {
+    const char *unit = strcmp(v->unit, "1") ? v->unit : "", *space = *unit ? " " : "";
     int length;
     if (!isfinite(value)) return snprintf(text, size, "%s is %g; a finite number is needed", v->name, value);
-    length = snprintf(text, size, "%s is %g %s; %g to %g %s is possible", v->name, value, v->unit, v->minimum,
-                      v->maximum, v->unit);
+    length = snprintf(text, size, "%s is %g%s%s; %g to %g%s%s is possible", v->name, value, space, unit, v->minimum,
+                      v->maximum, space, unit);
     if (length < 0 || (size_t)length >= size) return length;
     text += length, size -= (size_t)length;
     if (!strcmp(v->unit, "K") && value + KELVIN >= v->minimum && value + KELVIN <= v->maximum)
@@ -237,7 +238,9 @@ fmi2Status fmi2ExitInitializationMode(fmi2Component c) {
     if (status >= MODEL_REFUSED)
         return report(self, fmi2Error, "the initialization cannot end: %s", self->model.message);
     self->mode = STEP_COMPLETE;
-    return status == MODEL_WARNING ? report(self, fmi2Warning, "%s", self->model.message) : fmi2OK;
+    /* Told, but not returned: there are hosts that take all but fmi2OK for a failed initialization. */
+    if (status == MODEL_WARNING) report(self, fmi2Warning, "%s", self->model.message);
+    return fmi2OK;
 }
 
 fmi2Status fmi2Terminate(fmi2Component c) {

@@ -55,14 +55,6 @@ static ModelStatus prepare(Model *model) {
     return MODEL_OK;
 }
 
-ModelStatus model_start(Model *model) {
-    State *state = model->state;
-    if (prepare(model) != MODEL_OK) return MODEL_REFUSED;
-    start_values(model, &state->thermal);
-    state->started = 1.0;
-    return MODEL_OK;
-}
-
 /* Add to a message; what does not fit is cut off. */
 static void append(char *message, const char *format, ...) {
     const size_t length = strlen(message);
@@ -72,17 +64,45 @@ static void append(char *message, const char *format, ...) {
     va_end(arguments);
 }
 
-/* A warning when the operating point leaves the range of training; none while it stays outside. */
-static ModelStatus excursion(Model *model, State *state, double time, const double *inputs) {
-    const double was_outside = state->outside;
+/* A warning about start temperatures that were given but are not used; else no message. */
+static ModelStatus unused_starts(Model *model) {
+    const double common = model->values[INITIAL_TEMPERATURE.reference];
+    int first = -1, count = 0;
+    if (model->values[INITIAL_UNIFORM] == 0.0) return MODEL_OK;
+    for (int i = 0; i < N_PARTS; i++) {
+        const double value = model->values[START[i].reference];
+        if (value == model_variables[START[i].reference].start || value == common) continue;
+        if (first < 0) first = i;
+        count++;
+    }
+    if (!count) return MODEL_OK;
+    model->message[0] = '\0';
+    append(model->message, "%s is %g K", model_variables[START[first].reference].name,
+           model->values[START[first].reference]);
+    if (count > 1) append(model->message, " (and %d more such temperatures are given)", count - 1);
+    append(model->message, ", but initial.uniform is true: all parts start at initial.T = %g K. "
+           "Set initial.uniform to false to start each part at its own", common);
+    return MODEL_WARNING;
+}
+
+ModelStatus model_start(Model *model) {
+    State *state = model->state;
+    if (prepare(model) != MODEL_OK) return MODEL_REFUSED;
+    start_values(model, &state->thermal);
+    state->started = 1.0;
+    return unused_starts(model);
+}
+
+static void loss_temperatures(const ThermalState *thermal, double *T) {
+    for (int i = 0; i < N_LOSS_NODES; i++) T[i] = thermal->T[LOSS_NODE[i]];
+}
+
+/* A warning of the operating point that was found outside the range of training at `time`. */
+static ModelStatus excursion(Model *model, double time, const double *inputs, const double *T) {
     const char *separator = " ";
-    double T[N_LOSS_NODES];
     char *text = model->message;
-    for (int i = 0; i < N_LOSS_NODES; i++) T[i] = state->thermal.T[LOSS_NODE[i]];
-    state->outside = loss_domain_distance(inputs[0], inputs[1], T) > 0.0;
-    if (!state->outside || was_outside) return MODEL_OK;
     text[0] = '\0';
-    append(text, "at %g s the operating point leaves the range that the networks were trained on:", time);
+    append(text, "at %g s the operating point is outside the range that the networks were trained on:", time);
     if (fabs(inputs[0]) > SPEED_HIGH) {
         append(text, "%sspeed %g 1/min (to %g)", separator, inputs[0], SPEED_HIGH);
         separator = ", ";
@@ -104,13 +124,17 @@ ModelStatus model_step(Model *model, double duration) {
     State *state = model->state;
     Scratch *scratch = model->scratch;
     ThermalState thermal = state->thermal;
-    double inputs[N_INPUTS], slopes[N_INPUTS], failed_at;
+    const int was_outside = state->outside != 0.0;
+    double inputs[N_INPUTS], before[N_INPUTS], slopes[N_INPUTS], T[N_LOSS_NODES], T_before[N_LOSS_NODES], failed_at;
     const char *fault;
+    int at_once;
     if (prepare(model) != MODEL_OK) return MODEL_REFUSED;
     for (int i = 0; i < N_INPUTS; i++) {
-        inputs[i] = inner(model, INPUTS[i]);
+        before[i] = inputs[i] = inner(model, INPUTS[i]);
         slopes[i] = model->slopes[INPUTS[i].reference] * INPUTS[i].scale;
     }
+    loss_temperatures(&thermal, T_before);
+    at_once = !was_outside && loss_domain_distance(before[0], before[1], T_before) > 0.0;
     fault = network_advance(&scratch->network, &thermal, model->time, duration, inputs, slopes, &failed_at);
     if (fault) {
         snprintf(model->message, MESSAGE_SIZE, "the heat balance cannot be solved from %g s on: %s at %g s",
@@ -122,7 +146,12 @@ ModelStatus model_step(Model *model, double duration) {
         model->values[INPUTS[i].reference] += model->slopes[INPUTS[i].reference] * duration;
         inputs[i] = inner(model, INPUTS[i]);
     }
-    return excursion(model, state, model->time + duration, inputs);
+    loss_temperatures(&thermal, T);
+    state->outside = loss_domain_distance(inputs[0], inputs[1], T) > 0.0;
+    /* One warning when the range is left, of the first moment that it was seen; none while it stays outside. */
+    if (at_once) return excursion(model, model->time, before, T_before);
+    if (state->outside != 0.0 && !was_outside) return excursion(model, model->time + duration, inputs, T);
+    return MODEL_OK;
 }
 
 ModelStatus model_outputs(Model *model) {
@@ -134,7 +163,7 @@ ModelStatus model_outputs(Model *model) {
     if (prepare(model) != MODEL_OK) return MODEL_REFUSED;
     if (state->started == 0.0) start_values(model, &thermal);
     for (int i = 0; i < N_INPUTS; i++) inputs[i] = inner(model, INPUTS[i]);
-    for (int i = 0; i < N_LOSS_NODES; i++) T[i] = thermal.T[LOSS_NODE[i]];
+    loss_temperatures(&thermal, T);
     balance = network_balance(&scratch->network, model->time, inputs, &thermal);
     for (int i = 0; i < N_PARTS; i++) show(model, PART_TEMPERATURE[i], thermal.T[i]);
     for (int i = 0; i < N_BOUNDARIES; i++) show(model, BOUNDARY_TEMPERATURE[i], balance->T_boundary[i]);

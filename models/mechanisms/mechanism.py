@@ -143,6 +143,8 @@ class Mechanism:
         found = [spot for pattern in self.places for spot in spots(network, self.kind, pattern, channels)]
         common, traced = _aliases(network, scale), cache(partial(trace, stand_in=self.name))
         placed = [self._at(network, scale, spot, common, traced) for spot in found]
+        if any(symbol(p.strength.name) not in p.expression.free_symbols for p in placed):
+            raise InputError(f"mechanism {self.name!r}: its law must hold {STRENGTH!r}, which says how large it is")
         return tuple(
             p for p in placed if p.target and not any(ABSENT in law.free_symbols for law in p.written.values())
         )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -15,9 +15,11 @@ from models.definition import Name, Section, Text
 from models.errors import InputError
 from models.expressions import parse_expression
 from models.faults import validated
+from models.gearbox import Gearbox
 from models.laws import Parameter
 from models.mechanisms.forms import LARGEST, strength
 from models.mechanisms.mechanism import STRENGTH, Mechanism, Memory
+from models.mechanisms.scale import Scale
 from models.terms import Form, Kind
 from models.toml_file import parse, read_text
 
@@ -93,6 +95,33 @@ def load_mechanisms(path: str | Path) -> tuple[Mechanism, ...]:
         if names.count(name) > 1:
             raise InputError(f"{path}: mechanism {name!r} is there {names.count(name)} times; give each its own name")
     return found
+
+
+def check_placeable(mechanisms: Iterable[Mechanism], gearbox: Gearbox, file: str | Path) -> None:
+    """See that every mechanism of a file can be placed in a gearbox, whatever is measured.
+
+    Raises
+    ------
+    InputError
+        If one cannot be placed, or has no place there.
+    """
+    network, scale = gearbox.network(), Scale.of(gearbox)
+    for mechanism in mechanisms:
+        try:
+            placed = mechanism.placed(network, scale)
+            told = [place.says for place in placed]
+        except InputError as error:
+            raise InputError(f"{file}: {error}") from error
+        except Exception as error:  # a user's own code runs here
+            raise InputError(
+                f"{file}: mechanism {mechanism.name!r} fails with {type(error).__name__}: {error}"
+            ) from error
+        if not told:
+            places = ", ".join(repr(place) for place in mechanism.places)
+            raise InputError(
+                f"{file}: mechanism {mechanism.name!r} has no place in this gearbox; its places are {places}, the "
+                f"parts are {', '.join(part.name for part in network.parts)}"
+            )
 
 
 def _from_toml(path: Path) -> tuple[Mechanism, ...]:

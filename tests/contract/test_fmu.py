@@ -295,6 +295,83 @@ def test_one_warning_per_excursion(host: Host) -> None:
         assert host.get("in_domain")[0] == 1
 
 
+@pytest.mark.parametrize("duration", [100.0, 1.0])
+def test_the_warning_tells_the_moment_at_which_the_range_was_left(path: Path, duration: float) -> None:
+    """Held inputs are outside from the start of the step on, whatever its length; temperatures only drift out."""
+    with hosted(path, {"speed": 1000.0}) as host:
+        host.step(duration)
+        (said,) = host.said
+        assert said[1].startswith("at 0 s the operating point is outside the range")
+        host.set(speed=300.0)
+        host.step(duration)
+        assert host.said == []
+        host.set(torque=400.0)
+        host.step(duration)
+        ((status, text),) = host.said
+        assert (status, text.partition(" s ")[0]) == (WARNING, f"at {2.0 * duration:g}")
+        assert "torque 400 N m (to 350)" in text
+    with hosted(path, {"initial.T": 473.0, "T_ambient": 473.0, "torque": 300.0}) as host:
+        host.step(100.0)
+        ((_, text),) = host.said
+        assert text.startswith("at 100 s the operating point is outside")
+        assert "pinion" in text
+
+
+def test_a_step_that_is_refused_does_not_count_as_warned(host: Host) -> None:
+    host.set(speed=1000.0)
+    host.refused(-1.0)
+    host.step(1.0)
+    assert [text for _, text in host.said if text.startswith("at 0 s the operating point is outside")]
+
+
+def test_every_kind_says_the_same(fzg_fmu: Path, fzg_native: Path) -> None:
+    def said(path: Path) -> list[str]:
+        with hosted(path, {"speed": 1000.0, "oil.T_start": 350.0, "mesh.T_start": 351.25}) as host:
+            host.step(5.0)
+            host.set(speed=300.0, torque=400.0)
+            host.step(5.0)
+            texts = [text for _, text in host.said]
+            host.set_all({"factor.mesh": 0.0, "T_ambient": 20.0})
+            return [*texts, host.refused()]
+
+    one, other = said(fzg_fmu), said(fzg_native)
+    assert one == other
+    assert len(one) == 3  # start temperatures, one excursion (it stays outside), one refusal
+
+
+def test_a_number_without_unit_is_told_without(host: Host) -> None:
+    host.set_all({"factor.mesh": 0.0})
+    assert "factor.mesh is 0; 0.05 to 20 is possible" in host.refused()
+
+
+# ---------------------------------------------------------------------- start temperatures that are not used
+
+
+def test_start_temperatures_that_are_not_used_are_told_once(path: Path) -> None:
+    with hosted(path, {"oil.T_start": 353.15, "initial.T": 300.0}) as host:
+        assert host.said == [(
+            WARNING,
+            "oil.T_start is 353.15 K, but initial.uniform is true: all parts start at initial.T = 300 K. "
+            "Set initial.uniform to false to start each part at its own",
+        )]  # fmt: skip
+        assert host.get("oil.T") == pytest.approx([300.0])
+        host.step(1.0)
+        assert host.said == []
+    with hosted(path, {"oil.T_start": 353.15, "mesh.T_start": 310.0, "wheel.T_start": 310.0}) as host:
+        ((_, text),) = host.said
+        assert text.startswith("oil.T_start is 353.15 K (and 2 more such temperatures are given), but")
+
+
+@pytest.mark.parametrize(
+    "values",
+    [{"initial.T": 350.0}, {"oil.T_start": 350.0, "initial.T": 350.0}, {"oil.T_start": 293.15},
+     {"oil.T_start": 350.0, "initial.uniform": 0.0}],
+)  # fmt: skip
+def test_start_temperatures_that_change_nothing_are_not_told(path: Path, values: dict[str, float]) -> None:
+    with hosted(path, values) as host:
+        assert host.said == []
+
+
 # ---------------------------------------------------------------------- the whole state
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from builder.drive_cycle import reference_cycle
-from builder.fmu_drive import drive_fmu, fmu_inputs
+from builder.fmu_drive import drive_fmu, fmu_inputs, fmu_nodes
 from builder.train import TrainingResult
 from models.cycle import Cycle
 from models.errors import InputError
@@ -101,15 +101,39 @@ def test_warnings_of_the_fmu_are_passed_on(fzg_fmu: Path, caplog: pytest.LogCapt
     assert driven["in_domain"].tolist() == [True, False, False]
 
 
-def test_extra_inputs_of_an_fmu_are_known(fzg_fmu: Path) -> None:
+def test_extra_inputs_and_nodes_of_an_fmu_are_known(fzg_fmu: Path, fzg: Gearbox) -> None:
     assert fmu_inputs(fzg_fmu) == ()
+    assert fmu_nodes(fzg_fmu) == tuple(part.name for part in fzg.network().parts)
+
+
+@pytest.mark.parametrize("kind", ["fzg_fmu", "fzg_native"])
+@pytest.mark.parametrize("interval", [20.0, 2.0, 0.3])
+def test_more_rows_bring_the_old_ones_no_further_from_the_truth(
+    kind: str, interval: float, request: pytest.FixtureRequest, fzg: Gearbox, fzg_training: TrainingResult,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    path = request.getfixturevalue(kind)
+    ramps = reference_cycle(fzg, step_s=60.0)
+    fine = ramps.refined(interval)
+    own = np.isin(fine.time, ramps.time)
+    assert own.sum() == len(ramps) < len(fine)
+    monkeypatch.setattr("models.solver.TOLERANCE_K", 1e-4)
+    truth = fzg.network().simulate(ramps, losses=fzg_training.losses, initial=20.0).columns()
+    coarse, dense = (drive_fmu(path, c, initial=20.0) for c in (ramps, fine))
+    names = [name for name in truth if name.startswith("T_")]
+    # 0.01 K: other steps of the solver, which holds 0.03 K in each, make chance differences.
+    for name in names:
+        before, after = np.abs(coarse[name] - truth[name]).max(), np.abs(dense[name][own] - truth[name]).max()
+        assert after < before + 0.01, name
+    before, after = (np.abs(d - truth["P_loss_W"]).max() for d in (coarse["P_loss_W"], dense["P_loss_W"][own]))
+    assert after < before + 0.01
 
 
 # ---------------------------------------------------------------------- what is wrong is said
 
 
 def test_refused_values_end_with_the_words_of_the_fmu(fzg_fmu: Path) -> None:
-    with pytest.raises(InputError, match=r"factor\.churning is -1 1; 0\.05 to 20 1 is possible"):
+    with pytest.raises(InputError, match=r"factor\.churning is -1; 0\.05 to 20 is possible"):
         drive_fmu(fzg_fmu, cycle(), parameters={"churning": -1.0})
     with pytest.raises(InputError, match=r"initial\.T is 2273\.15 K"):
         drive_fmu(fzg_fmu, cycle(), initial=2000.0)
@@ -124,6 +148,8 @@ def test_initial_temperatures_must_be_complete_and_known(fzg_fmu: Path) -> None:
 def test_file_must_be_an_fmu(fzg_fmu: Path, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no such file"):
         drive_fmu(tmp_path / "absent.fmu", cycle())
+    with pytest.raises(InputError, match="is not a file but a folder; name an FMU, as .*fzg.fmu"):
+        drive_fmu(fzg_fmu.parent, cycle())
     (tmp_path / "text.fmu").write_text("not a zip")
     with pytest.raises(InputError, match="is not an FMU, or is damaged"):
         drive_fmu(tmp_path / "text.fmu", cycle())

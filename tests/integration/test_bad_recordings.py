@@ -255,9 +255,16 @@ def plain() -> bytes:
     return text_of({}).encode()
 
 
+def with_rows(*rows: bytes) -> bytes:
+    """The sound recording with rows between its header and its numbers."""
+    header, *numbers = plain().splitlines()
+    return b"\n".join([header, *rows, *numbers])
+
+
 def files() -> Iterator[Case]:
     yield Case("missing", lambda folder: folder / "run.csv", ("no such file",))
-    yield Case("a folder", lambda folder: folder_named(folder / "run.csv"), ("is not a file",))
+    yield Case("a folder", lambda folder: folder_named(folder / "run.csv"), ("is not a file but a folder",))
+    yield Case("a folder of recordings", lambda folder: folder_named(folder / "runs"), ("is not a file but a folder",))
     yield Case("a name too long", lambda folder: folder / ("run.csv" + "x" * 300 + ".csv"), ("cannot be read",))
     for file in ("run.xlsx", "run.txt", "run", "run.csv.zip", "run.mat", "run.tdms"):
         yield content(f"ending of {file}", plain, "the ending says nothing", ".mf4", file=file)
@@ -267,8 +274,13 @@ def files() -> Iterator[Case]:
     yield content("comments only", lambda: b"# a\n# b\n", "is empty")
     yield content("header only", lambda: plain().splitlines()[0], "has no rows")
     yield content("no header", lambda: b"\n".join(plain().splitlines()[1:]), "first line holds numbers")
-    yield content("semicolons", lambda: plain().replace(b",", b";"), "separated by ';'")
-    yield content("tabs", lambda: plain().replace(b",", b"\t"), "separated by tabs")
+    yield content(
+        "semicolons", lambda: plain().replace(b",", b";"), "separated by ';'", "or write it with ','",
+        'csv = { separator = ";", decimal = "," } in a mapping file',
+    )  # fmt: skip
+    yield content(
+        "tabs", lambda: plain().replace(b",", b"\t"), "separated by tabs", r'csv = { separator = "\t", decimal = "," }'
+    )
     for place in (0, 300, 2000):
         yield content(f"NUL at {place}", lambda p=place: plain()[:p] + b"\0" + plain()[p:], "NUL byte in line")
     yield content("zeros", lambda: bytes(5000), "NUL byte in line 1")
@@ -285,6 +297,21 @@ def files() -> Iterator[Case]:
     yield content(
         "all rows too long", lambda: b"\n".join([header, *(row + b",1" for row in rows)]), "cannot be read as csv"
     )
+    row = plain().splitlines()[20]
+    for name, longer in (("one field too many", row + b","), ("a comma within a number", row.replace(b".", b",", 1))):
+        yield content(
+            name, lambda o=row, n=longer: b"# a remark\n" + plain().replace(o, n), "cannot be read as csv",
+            "row 20 (line 22) has 9 fields, but the header names 8 columns",
+        )  # fmt: skip
+    units = b"s,1/min,Nm,degC,degC,degC,degC,W"
+    yield content(
+        "a row of units", lambda: with_rows(units),
+        "row 1 (below the header) holds units or texts ('s', '1/min', 'Nm', ...) and no number; remove it",
+    )  # fmt: skip
+    yield content(
+        "units and remarks", lambda: with_rows(units, b",rig,rig,,sump,,,"),
+        "rows 1-2 (below the header) hold units or texts", "remove them, or begin their lines with '#'",
+    )  # fmt: skip
     yield content("an open quote", lambda: plain().replace(b"\n20.0,", b'\n"20.0,'), "cannot be read as csv")
     yield content("an open quote in the header", lambda: b'"' + plain(), "run.csv")
     yield content("a million columns", lambda: b",".join(b"c%d" % i for i in range(100_000)) + b"\n", "100000 columns")
@@ -380,6 +407,18 @@ def mappings() -> Iterator[Case]:
     yield mapped(
         "unknown key of a column", column('quantity = "T_oil"\nlag = 5'), "columns.T_oil_degC.lag is not a known key"
     )
+    yield mapped(
+        "misspelt quantity", column('quanity = "T_oil"'), "columns.T_oil_degC.quanity is not a known key",
+        "did you mean 'quantity'?",
+    )  # fmt: skip
+    yield mapped(
+        "key like none of a column", column('quantity = "T_oil"\nzz = 5'), "columns.T_oil_degC.zz is not a known key",
+        "known are: bias_sd, lag_s, lag_sd_s, noise, quantity, resolution, rows, scale, unit, valid",
+    )  # fmt: skip
+    yield mapped(
+        "a key and a unit of one column", column('quantity = "T_oil"\nunit = "Celsius"\nlag = 5'),
+        "columns.T_oil_degC.lag is not a known key", "columns.T_oil_degC: unit 'Celsius' is no unit of temperature",
+    )  # fmt: skip
     yield mapped("no quantity", column('unit = "K"'), "columns.T_oil_degC.quantity is missing")
     yield mapped("unknown quantity", column('quantity = "T_oill"'), "T_oil_degC", "'T_oill'", "did you mean 'T_oil'")
     yield mapped("unknown unit", column('quantity = "T_oil"\nunit = "Celsius"'), "'Celsius' is no unit of temperature")
@@ -389,7 +428,13 @@ def mappings() -> Iterator[Case]:
     yield mapped(
         "valid the wrong way", column('quantity = "T_oil"\nvalid = [90, 10]'), "columns.T_oil_degC.valid", "90, 10"
     )
-    yield mapped("valid for nothing", column('quantity = "T_oil"\nvalid = [200, 210]'), "T_oil_degC has no value")
+    yield mapped(
+        "valid for nothing",
+        column('quantity = "T_oil"\nvalid = [200, 210]'),
+        "T_oil_degC: 60 values outside 200 ... 210",
+        "none is left",
+        "'valid' of its mapping file are in the column's own unit",
+    )
     yield mapped("rows of nothing", column('quantity = "T_oil"\nrows = ["9000.."]'), "T_oil_degC has no value")
     yield mapped(
         "rows that are none", column('quantity = "T_oil"\nrows = ["morning"]'), "rows of column T_oil_degC", "'morning'"
@@ -407,8 +452,13 @@ def mappings() -> Iterator[Case]:
     )
     yield mapped("unknown constant", "schema = 1\n[constants]\nT_room = 5.0\n", "constant 'T_room'")
     yield mapped(
-        "constant in kelvin", "schema = 1\n[constants]\nair_speed = 2.0\nT_ambient = 293.15\n", "T_ambient", "kelvin"
-    )
+        "constant in kelvin", "schema = 1\n[constants]\nair_speed = 2.0\nT_ambient = 293.15\n", "T_ambient", "kelvin",
+        "constants are in degC; write 20",
+    )  # fmt: skip
+    yield mapped(
+        "constant beyond belief", "schema = 1\n[constants]\nair_speed = -2.0\n",
+        "constants: air_speed = -2 m/s is not possible; 0 to 200 m/s is, and constants have that unit",
+    )  # fmt: skip
     yield mapped("time column missing", 'schema = 1\ntime = { column = "zeit" }', "column zeit of [time]", "missing")
     yield mapped(
         "time of unknown unit", 'schema = 1\ntime = { column = "time_s", unit = "weeks" }', "time.unit", "'weeks'"
@@ -444,7 +494,9 @@ def parts() -> Iterator[Case]:
     yield part("2017-09-01..2017-10-31", "time_s tells seconds")
     yield part("2017-02-30..", "is no date")
     yield part("nan..5", "neither seconds nor a date")
-    yield part("100", "the ending says nothing")
+    yield part("100", "'100' after the @ names no part; write FILE@start..end, e.g. run.csv@0..3600")
+    yield part("0-3600", "'0-3600' after the @ names no part", "run.csv@0..3600")
+    yield part("", "'' after the @ names no part")
 
 
 CASES = [*cells(), *columns(), *units(), *times(), *files(), *mappings(), *parts()]

@@ -67,6 +67,104 @@ def test_simulate_with_an_fmu_gives_the_same_columns(cycle: Path, tmp_path: Path
     assert (tmp_path / "p.svg").read_text().startswith("<?xml")
 
 
+# ---------------------------------------------------------------------- rows, means and starts of simulate
+
+
+def means(shown: str) -> dict[str, float]:
+    """Mean losses of the printed table."""
+    _, _, table = shown.partition("mean over time")
+    rows = (line.split() for line in table.splitlines()[1:])
+    return {row[0]: float(row[1]) for row in rows if len(row) == 3 and row[0] != "wrote"}
+
+
+@pytest.mark.parametrize("kind", ["full", "fmu"])
+def test_rows_between_those_of_the_cycle(
+    kind: str, tmp_path: Path, request: pytest.FixtureRequest, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Rows weigh by their time, and what peaks between rows is found: sliding, while torque comes and speed goes."""
+    cycle, coarse, fine = (tmp_path / name for name in ("cycle.csv", "coarse.csv", "fine.csv"))
+    cycle.write_text("time_s,speed_rpm,torque_Nm,T_ambient_degC\n0,500,20,20\n300,500,20,20\n304,3000,20,20\n"
+                     "324,300,250,20\n326,500,20,20\n600,500,20,20\n")  # fmt: skip
+    driver = ["--gearbox", "fzg"] if kind == "full" else [request.getfixturevalue("fzg_native")]
+    assert run("simulate", *driver, cycle, "--output", coarse) == 0
+    first = means(capsys.readouterr().out)
+    assert (
+        run("simulate", *driver, cycle, "--output", fine, "--output-interval", "0.5", "--plot", tmp_path / "p.png") == 0
+    )
+    second = means(capsys.readouterr().out)
+    few, many = pd.read_csv(coarse), pd.read_csv(fine)
+    assert len(few) == 6
+    assert many["time_s"].tolist() == [0.5 * i for i in range(1201)]
+    at_rows = many[many["time_s"].isin(few["time_s"])]
+    for name in few.columns:
+        tolerance = {"abs": 0.1} if name.startswith("T_") else {"rel": 1e-3}
+        assert at_rows[name].tolist() == pytest.approx(few[name].tolist(), **tolerance), name
+    assert many["P_loss_mesh_sliding_W"].max() > 1.5 * few["P_loss_mesh_sliding_W"].max()
+    for shown, table in ((first, few), (second, many)):
+        for name, column in (("total", "P_loss_W"), ("mesh_sliding", "P_loss_mesh_sliding_W")):
+            mean = np.trapezoid(table[column], table["time_s"]) / 600.0
+            assert shown[name] == pytest.approx(mean, abs=0.051), name
+    assert few["P_loss_W"].mean() > 1.5 * first["total"], "rows alone would say far more"
+
+
+RECORDED = (
+    "time_s,speed_rpm,torque_Nm,T_ambient_degC,T_oil_degC,T_pinion_degC,T_air_degC,T_cover_degC,P_loss_W\n"
+    + "".join(f"{t},1500,80,20,{85.5 if t else ''},{90.5 - t},20,99,400\n" for t in (0, 20, 60))
+)
+
+
+@pytest.mark.parametrize("kind", ["full", "fmu"])
+def test_a_recording_starts_as_recorded_or_a_warning_says_that_it_does_not(
+    kind: str, tmp_path: Path, request: pytest.FixtureRequest, capsys: pytest.CaptureFixture[str]
+) -> None:
+    recording, out = tmp_path / "run.csv", tmp_path / "result.csv"
+    recording.write_text(RECORDED)
+    driver = ["--gearbox", "fzg"] if kind == "full" else [request.getfixturevalue("fzg_fmu")]
+    assert run("simulate", *driver, recording, "--output", out) == 0
+    shown = " ".join(capsys.readouterr().err.split())
+    assert "warning: " in shown
+    assert (
+        "run.csv: T_pinion_degC is 90.5 at row 1, but all nodes start at the first ambient temperature, 20.0 degC; "
+        "--initial recorded starts as recorded" in shown
+    )
+    assert run("simulate", *driver, recording, "--output", out, "--initial", "recorded") == 0
+    assert "warning" not in capsys.readouterr().err
+    first = pd.read_csv(out).iloc[0]
+    assert first[["T_oil_degC", "T_pinion_degC", "T_air_degC"]].tolist() == [85.5, 90.5, 20.0]
+    for name in ("mesh", "housing_upper", "bearing_4"):  # no column: the mean of those of nodes
+        assert first[f"T_{name}_degC"] == pytest.approx(88.0)
+
+
+def test_a_start_that_is_told_or_near_needs_no_warning(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    recording, result = tmp_path / "run.csv", tmp_path / "result.csv"
+    recording.write_text(RECORDED)
+    assert run("simulate", "--gearbox", "fzg", recording, "--output", result, "--initial", "20") == 0
+    assert run("simulate", "--gearbox", "fzg", result, "--output", tmp_path / "again.csv") == 0
+    assert "warning" not in capsys.readouterr().err
+    assert pd.read_csv(tmp_path / "again.csv").equals(pd.read_csv(result)), "a result is a cycle as well"
+
+
+@pytest.mark.parametrize(
+    ("kind", "words"),
+    [
+        (
+            "full",
+            "are outside the range that the definition names (speed to 6500 1/min, torque to 350 N m, temperatures",
+        ),
+        ("fmu", "are outside the surrogate's training domain"),
+    ],
+)
+def test_what_lies_outside_the_range_is_told(
+    kind: str, words: str, tmp_path: Path, request: pytest.FixtureRequest, capsys: pytest.CaptureFixture[str]
+) -> None:
+    cycle, out = tmp_path / "cycle.csv", tmp_path / "result.csv"
+    cycle.write_text("time_s,speed_rpm,torque_Nm,T_ambient_degC\n0,500,100,20\n20,500,400,20\n40,500,400,20\n")
+    driver = ["--gearbox", "fzg"] if kind == "full" else [request.getfixturevalue("fzg_fmu")]
+    assert run("simulate", *driver, cycle, "--output", out) == 0
+    assert f"2 of 3 rows {words}" in " ".join(capsys.readouterr().err.split())
+    assert pd.read_csv(out)["in_domain"].tolist() == [True, False, False]
+
+
 FAULTY = [
     (["simulate", "--gearbox", "fgz", "CYCLE", "--output", "r.csv"], "no gearbox named 'fgz'; did you mean 'fzg'?"),
     (["simulate", "--gearbox", "missing.toml", "CYCLE", "--output", "r.csv"], "missing.toml"),
@@ -88,6 +186,7 @@ FAULTY = [
         ["build-fmu", "--target", "native", "--platforms", "win46"],
         "platform 'win46' is not known; did you mean 'win64'?",
     ),
+    (["simulate", "FMU", "CYCLE", "--output", "CYCLE"], "cycle.csv: is read as well and would be replaced"),
     (["fly"], "No such command 'fly'"),
 ]
 

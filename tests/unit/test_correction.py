@@ -11,9 +11,10 @@ import sympy as sp
 from models.correction import Correction, Estimate, Finding, correction_text, read_correction, write_correction
 from models.errors import InputError
 from models.expressions import LONGEST, expression_text, parse_expression
-from models.gearbox import load_gearbox
+from models.gearbox import Gearbox, load_gearbox
 from models.laws import Parameter, symbol
-from models.mechanisms import CATALOGUE, Scale, load_mechanisms
+from models.mechanisms import CATALOGUE, Mechanism, Scale, load_mechanisms
+from models.mechanisms.user_files import check_placeable
 from models.network import ExtraState
 from models.terms import Term
 
@@ -119,18 +120,22 @@ FAULTS = [
     ("schema = 1", "schema = 2", "schema is 2; this program reads corrections of schema 1"),
     ("schema = 1", "", "schema is None"),
     ("schema = 1", "schema = [", "is not valid TOML"),
-    ('kind = "source"', 'kind = "sauce"', "finding.0.kind"),
+    ('kind = "source"', 'kind = "sauce"', "finding 'windage_oil'.kind"),
     ('mechanism = "windage"', 'mechanisme = "windage"', "mechanisme is not a known key; did you mean 'mechanism'"),
-    ("value = 9.5", 'value = "9.5"', "finding.0.parameter.0.value: must be a number"),
+    ("value = 9.5", 'value = "9.5"', "finding 'windage_oil'.parameter 'windage_oil_strength'.value: must be a number"),
     ("value = 9.5", "value = 1e9", "windage_oil_strength is 1e"),
     ("value = 9.5", "value = nan", "must be finite"),
     ("stderr = 0.5", "stderr = -0.5", "stderr"),
-    ("Abs(speed)", "Abs(sped)", "finding.0.law: 'sped' is not a signal; did you mean 'speed'"),
-    ("Abs(speed)", "open('x')", "finding.0.law: 'open' is not a function"),
-    ("Abs(speed)", "speed.real", "finding.0.law: .* has no place in a law"),
-    ("weights = [", "weights = [1.0, ", "finding.3.weights: 9 weights for 8 targets of a loss_factor"),
-    ('target = ["oil"]', 'target = ["oil"]\nweights = [1.0]', "finding.0.weights: 1 weights for 1 targets of a source"),
-    ('target = ["oil"]', "target = []", "finding.0.target: has too few entries"),
+    ("Abs(speed)", "Abs(sped)", "finding 'windage_oil'.law: 'sped' is not a signal; did you mean 'speed'"),
+    ("Abs(speed)", "open('x')", "finding 'windage_oil'.law: 'open' is not a function"),
+    ("Abs(speed)", "speed.real", "finding 'windage_oil'.law: .* has no place in a law"),
+    ("weights = [", "weights = [1.0, ", "'oil_ageing_losses'.weights: 9 weights for 8 targets of a loss_factor"),
+    (
+        'target = ["oil"]',
+        'target = ["oil"]\nweights = [1.0]',
+        "'windage_oil'.weights: 1 weights for 1 targets of a source",
+    ),
+    ('target = ["oil"]', "target = []", "finding 'windage_oil'.target: has too few entries"),
     ('sha256 = "0000', 'sha256 = "zz00', "sha256"),
 ]
 
@@ -283,13 +288,13 @@ def test_a_mechanism_from_python(tmp_path: Path) -> None:
     ("old", "new", "says"),
     [
         ("schema = 1", "schema = 3", "schema is 3"),
-        ('kind = "source"', 'kind = "spring"', "mechanism.0.kind"),
+        ('kind = "source"', 'kind = "spring"', "mechanism 'belt_guard'.kind"),
         ('name = "strength"', 'name = "size"', "the first parameter is 'size'; it must be 'strength'"),
         ("start = 2.0", "", "belt_guard.parameter exponent: start is missing"),
         ("grid = [1.5, 2.5]", "grid = [1.5, 99.0]", "99 of the grid is not within"),
         ("grid = [1.5, 2.5]", "upper = 1.0", "start 2 is not within"),
         ("grid = [1.5, 2.5]", "sweep = [3.0, 1.0]", "the sweep from 3 to 1 does not rise within"),
-        ("grid = [1.5, 2.5]", "sweep = [1.0]", "mechanism.0.parameter.1.sweep"),
+        ("grid = [1.5, 2.5]", "sweep = [1.0]", "mechanism 'belt_guard'.parameter 'exponent'.sweep #2 is missing"),
         ("start = 2.0", "start = -2.0\nlog = true", "a log-normal parameter is positive"),
         ("exp(-worn)", "exec(worn)", "'exec' is not a function"),
         ("exp(-worn)", "exp(-worn", "is not an expression"),
@@ -326,6 +331,39 @@ def test_faults_of_a_python_file(tmp_path: Path, content: str, says: str) -> Non
     path.write_text(content, encoding="utf-8")
     with pytest.raises(InputError, match=says):
         load_mechanisms(path)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ("strength * n**exponent", "20 * n**exponent", "its law must hold 'strength'"),
+        ('places = ["oil", "each bearings"]', 'places = ["oill"]', "no place in this gearbox.*'oill'.*oil"),
+        ("({place})", "({ort})", "'belt_guard' fails with KeyError: 'ort'"),
+        ("n**exponent", "sped**exponent", "'belt_guard' uses 'sped'"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_placed_is_told_at_once(tmp_path: Path, fzg: Gearbox, old: str, new: str, says: str) -> None:
+    path = tmp_path / "own.toml"
+    assert old in OWN
+    check_placeable(load_mechanisms_from(path, OWN), fzg, path)
+    with pytest.raises(InputError, match=f"own.toml: .*{says}"):
+        check_placeable(load_mechanisms_from(path, OWN.replace(old, new, 1)), fzg, path)
+
+
+def test_parameters_of_a_python_file_that_fail_are_told(tmp_path: Path, fzg: Gearbox) -> None:
+    path = tmp_path / "own.py"
+    path.write_text(
+        "from dataclasses import replace\nfrom models.mechanisms import CATALOGUE\n"
+        "MECHANISMS = [replace(CATALOGUE['windage'], name='mine', parameters=lambda scale: 1 / 0)]\n",
+        encoding="utf-8",
+    )
+    with pytest.raises(InputError, match="own.py: mechanism 'mine' fails with ZeroDivisionError"):
+        check_placeable(load_mechanisms(path), fzg, path)
+
+
+def load_mechanisms_from(path: Path, content: str) -> tuple[Mechanism, ...]:
+    path.write_text(content, encoding="utf-8")
+    return load_mechanisms(path)
 
 
 def test_names_are_unique(tmp_path: Path) -> None:

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
 import pytest
 from click.testing import CliRunner
 
@@ -56,6 +60,21 @@ def test_nothing_to_learn_from_is_said(words: str, message: str) -> None:
     done = CliRunner().invoke(diagnose, words.split())
     assert isinstance(done.exception, InputError)
     assert message in str(done.exception)
+
+
+def test_a_recording_is_never_replaced_by_its_prediction(tmp_path: Path) -> None:
+    time = np.arange(0.0, 3600.0, 20.0)
+    columns = {"time_s": time, "speed_rpm": 1500.0, "torque_Nm": 80.0, "T_oil_degC": 22.0 + time / 200.0}
+    for name in ("run", "hold"):
+        pd.DataFrame(columns).to_csv(tmp_path / f"{name}.csv", index=False)
+        columns["T_oil_degC"] = columns["T_oil_degC"] + 0.5
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    for words in (["run.csv"], ["run.csv@0..3000"], ["run.csv", "--holdout", "hold.csv"]):
+        given = [str(tmp_path / word) if word.startswith(("run", "hold")) else word for word in words]
+        done = CliRunner().invoke(diagnose, [*given, "--output", str(tmp_path)])
+        assert isinstance(done.exception, InputError), done.output
+        assert "is read as well and would be replaced" in str(done.exception)
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
 
 
 def test_holdout_without_a_recording_is_an_error_of_usage() -> None:

@@ -5,9 +5,17 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
-from builder.files import appearing_whole, read_cycle, read_initial, write_table
+from builder.files import (
+    appearing_whole,
+    read_cycle,
+    read_cycle_and_start,
+    read_initial,
+    refuse_to_replace,
+    write_table,
+)
 from models.errors import InputError
 from models.table_file import read_table
 
@@ -108,3 +116,68 @@ def test_initial_temperatures_from_the_last_row_of_a_result(tmp_path: Path) -> N
     write_table(path, {"time_s": [0.0]})
     with pytest.raises(InputError, match="has no T_<node>_degC columns"):
         read_initial(str(path))
+
+
+def test_a_folder_is_no_table(tmp_path: Path) -> None:
+    for read in (read_cycle, lambda path: read_initial(str(path))):
+        with pytest.raises(InputError, match="is not a file but a folder; name a file in it"):
+            read(tmp_path)
+
+
+# ---------------------------------------------------------------------- what is read is never replaced
+
+
+def test_an_output_that_is_read_as_well_is_refused(tmp_path: Path) -> None:
+    read, other, linked = (tmp_path / name for name in ("run.csv", "other.csv", "linked.csv"))
+    read.write_text("a")
+    other.write_text("b")
+    linked.symlink_to(read)
+    around = tmp_path / "folder" / ".." / "run.csv"
+    (tmp_path / "folder").mkdir()
+    refuse_to_replace([read], [other, tmp_path / "new.csv"])
+    with pytest.raises(InputError, match="folder: is a folder; name a file"):
+        refuse_to_replace([read], [tmp_path / "folder"])
+    for out in (read, linked, around):
+        with pytest.raises(InputError, match=f"{out.name}: is read as well and would be replaced; choose another"):
+            refuse_to_replace([other, read], [tmp_path / "new.csv", out])
+    with pytest.raises(InputError) as raised:
+        refuse_to_replace(iter([read, other]), iter([other, read]))
+    assert len(str(raised.value).splitlines()) == 2
+
+
+def test_names_that_cannot_be_files_are_left_to_who_opens_them(tmp_path: Path) -> None:
+    impossible = [tmp_path / "missing.csv", tmp_path / ("x" * 300), Path("a\0b")]
+    refuse_to_replace(impossible, impossible)
+
+
+# ---------------------------------------------------------------------- starts as recorded
+
+
+def recorded(path: Path, **columns: list[object]) -> Path:
+    given = {"time_s": [0.0, 1.0, 2.0], "speed_rpm": [0.0] * 3, "torque_Nm": [0.0] * 3}
+    pd.DataFrame(given | columns).to_csv(path, index=False)
+    return path
+
+
+def test_a_recorded_start_is_the_first_temperature_of_every_node(tmp_path: Path) -> None:
+    path = recorded(
+        tmp_path / "run.csv", T_oil_degC=[None, 60.0, 61.0], T_mesh_degC=[None, None, 80.0],
+        T_air_degC=["off", 20.0, 20.0], T_pinion_degC=[None, 70.0, 71.0], T_ambient_degC=[10.0] * 3,
+    )  # fmt: skip
+    cycle, start = read_cycle_and_start(path)
+    assert len(cycle) == 3
+    assert start.temperatures == {"oil": 60.0, "mesh": 80.0, "air": 20.0, "pinion": 70.0}
+    assert start.rows == {"oil": 2, "mesh": 3, "air": 2, "pinion": 2}
+    assert start.of(["pinion", "wheel", "oil"]) == {"pinion": 70.0, "wheel": 65.0, "oil": 60.0}
+
+
+def test_a_recorded_start_that_is_missing_or_impossible(tmp_path: Path) -> None:
+    path = recorded(tmp_path / "run.csv", T_ambient_degC=[10.0] * 3, T_air_degC=[10.0] * 3)
+    with pytest.raises(InputError, match="run.csv: --initial recorded needs a column T_<node>_degC .* oil, mesh; give"):
+        read_cycle_and_start(path)[1].of(["oil", "mesh"])
+    empty = recorded(tmp_path / "empty.csv", T_oil_degC=[None] * 3)
+    with pytest.raises(InputError, match="needs a column"):
+        read_cycle_and_start(empty)[1].of(["oil"])
+    kelvin = recorded(tmp_path / "kelvin.csv", T_oil_degC=[300.0] * 3)
+    with pytest.raises(InputError, match="kelvin.csv: T_oil_degC is 300 at row 1; .* if kelvin are meant, give 26.85"):
+        read_cycle_and_start(kelvin)[1].of(["oil"])

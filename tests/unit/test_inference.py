@@ -626,7 +626,9 @@ def test_judge_prefers_the_truth_and_survives_what_has_no_prediction(fzg: Gearbo
     assert judge.rmse(none) == np.inf and Judge(case, none).misfit == np.inf
 
 
-def test_the_structural_floor_rises_and_falls_with_what_is_left(problem: Problem, piece: Piece) -> None:
+def test_the_structural_floor_rises_and_falls_with_what_is_left(
+    monkeypatch: pytest.MonkeyPatch, problem: Problem, piece: Piece
+) -> None:
     """It is told from the least there is, however often; and a held-out recording is judged by the same."""
     clean = calibrated(problem)
     assert clean.problem.floor == 1.0 and floored(clean) is clean
@@ -646,6 +648,8 @@ def test_the_structural_floor_rises_and_falls_with_what_is_left(problem: Problem
     fallen = floored(replace(raised, problem=explained, fit=explained.fit(raised.fit.z)))
     assert fallen.problem.floor == 1.0
     assert fallen.log_evidence == pytest.approx(clean.log_evidence, abs=0.5)
+    monkeypatch.setattr(Problem, "slow", True)  # means over minutes
+    assert floored(replace(raised, problem=explained, fit=explained.fit(raised.fit.z))).problem.floor == 4.0
 
 
 def test_an_input_that_follows_a_temperature_is_seen_alike_from_temperatures_alone(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -112,6 +113,51 @@ def test_iso_times_and_their_start(tmp_path: Path, network: ThermalNetwork) -> N
     assert (part.start, len(part.time)) == (datetime(2017, 9, 1, 6, 1, 40, tzinfo=UTC), 10)
     parquet = source.assign(time_utc=pd.to_datetime(source["time_utc"]))
     assert read(write(tmp_path / "run.parquet", parquet), network).start == recording.start
+
+
+@pytest.mark.parametrize(
+    ("given", "meant"),
+    [
+        ("T_oil", "T_oil_degC"),
+        ("T_oil_C", "T_oil_degC"),
+        ("oil_temp", "T_oil_degC"),
+        ("Temperature oil [K]", "T_oil_degC"),
+        ("P_loss", "P_loss_W"),
+        ("T_ambient_K", "T_ambient_degC"),
+    ],
+)
+def test_a_column_under_another_name_is_not_lost(
+    tmp_path: Path, network: ThermalNetwork, given: str, meant: str
+) -> None:
+    with pytest.raises(InputError, match=rf"column {re.escape(given)} is not known; did you mean '{meant}'"):
+        read(write(tmp_path / "run.csv", table().rename(columns={meant: given})), network)
+
+
+def test_columns_that_nothing_asks_for_are_noted(tmp_path: Path, network: ThermalNetwork) -> None:
+    extra = table().assign(T_cover_degC=20.0, oil=1.0, flow=3.0)
+    recording = read(write(tmp_path / "run.csv", extra), network)
+    assert "not used, being no input and no node of this gearbox: T_cover_degC, oil, flow" in recording.notes
+    many = table().assign(**{f"x{i}": 1.0 for i in range(15)})
+    (note,) = (n for n in read(write(tmp_path / "many.csv", many), network).notes if "not used" in n)
+    assert note.endswith("x11 and 3 more")
+
+
+def test_a_constant_beside_a_recorded_column_is_refused(tmp_path: Path, network: ThermalNetwork) -> None:
+    path = write(tmp_path / "run.csv", table())
+    with pytest.raises(InputError, match="T_ambient is a constant of its mapping file, and column T_ambient_degC is"):
+        read(path, network, "constants = { T_ambient = 20.0 }")
+    ignored = 'constants = { T_ambient = 20.0 }\n[columns.T_ambient_degC]\nquantity = "ignore"'
+    assert (read(path, network, ignored).inputs["T_ambient"] == 20.0).all()
+
+
+def test_rows_too_far_apart_are_another_unit(tmp_path: Path, network: ThermalNetwork) -> None:
+    late = table()
+    late["time_s"] *= 1000.0
+    with pytest.raises(InputError, match="advances by 1e\\+04 s from row to row.*at most 1800 s.*milliseconds meant"):
+        read(write(tmp_path / "run.csv", late), network)
+    late["time_s"] = pd.to_datetime(late["time_s"], unit="s").dt.strftime("%Y-%m-%dT%H:%M:%SZ")
+    with pytest.raises(InputError, match="at most 1800 s tell how it warms$"):
+        read(write(tmp_path / "dated.csv", late), network)
 
 
 def test_parts_of_a_file(tmp_path: Path, network: ThermalNetwork) -> None:
@@ -382,6 +428,8 @@ def test_recordings_of_a_foreign_plant_are_read_and_plausible(fzg: Gearbox, reco
     ({"T_ambient_degC": (1.8, 32.0)}, "T_ambient seems to be in degF"),
     ({"T": (1.8, 32.0)}, "temperatures seem to be in degF"),
     ({"speed_rpm": (0.05, 0.0)}, "is it of another gearbox"),
+    ({"time_s": (1.0 / 60.0, 0.0)}, "time seems to be in minutes"),
+    ({"time_s": (1.0 / 3600.0, 0.0)}, "time seems to be in hours"),
 ])  # fmt: skip
 def test_wrong_units_and_other_gearboxes_are_found_by_the_model(
     tmp_path: Path, fzg: Gearbox, recordings_folder: Path, changes: dict[str, tuple[float, float]], says: str

@@ -7,12 +7,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from builder.train import TrainingResult
 from models.cycle import Cycle
 from models.errors import InputError
 from models.gearbox import load_gearbox
 from models.network import Node, ThermalNetwork
 from models.runtime import efficiency, torque_loss
-from models.simulation import initial_states, input_table, network_system
+from models.simulation import initial_states, input_table, network_system, range_distance
 
 GEARBOX = load_gearbox("fzg")
 NETWORK, LOSSES = GEARBOX.network(), GEARBOX.losses()
@@ -105,12 +106,21 @@ def test_torque_loss_and_efficiency() -> None:
         ({"initial": {"oill": 20.0}}, "unknown node 'oill'; did you mean 'oil'"),
         ({"initial": np.nan}, "must be finite and above -273.15"),
         ({"initial": -300.0}, "must be finite and above -273.15"),
+        ({"initial": 293.15}, "all nodes is possible up to 250 degC, not 293.15; if kelvin are meant, give 20$"),
+        ({"initial": 5000.0}, "up to 250 degC, not 5000$"),
+        ({"initial": {part.name: np.inf for part in NETWORK.parts}}, "must be finite and above -273.15"),
         ({"losses": load_gearbox("conveyor").losses()}, "the losses belong to another gearbox"),
     ],
 )
 def test_refusals(arguments: dict[str, Any], says: str) -> None:
     with pytest.raises(InputError, match=says):
         NETWORK.simulate(CYCLE, **{"losses": LOSSES, "initial": 20.0, **arguments})
+
+
+def test_single_nodes_may_be_hot_as_those_of_a_result_that_is_continued() -> None:
+    hot = {part.name: 20.0 for part in NETWORK.parts} | {"mesh": 350.0}
+    result = NETWORK.simulate(CYCLE, losses=LOSSES, initial=hot)
+    assert result.temperatures["mesh"][0] == 350.0
 
 
 def test_losses_need_their_nodes() -> None:
@@ -138,3 +148,39 @@ def test_steady_state_refusals() -> None:
 def test_memories_start_where_they_are_told() -> None:
     network = NETWORK.with_state("age", start=4.0, rate=1.0)
     assert initial_states(network, 20.0)[-1] == 4.0
+
+
+# ---------------------------------------------------------------------- the range that the definition names
+
+
+def test_range_of_the_full_model_is_that_of_its_surrogate(fzg_training: TrainingResult) -> None:
+    rng = np.random.default_rng(3)
+    speed, torque = rng.uniform(-9000.0, 9000.0, 200), rng.uniform(-500.0, 500.0, 200)
+    T = rng.uniform(-60.0, 260.0, (200, len(LOSSES.temperature_nodes)))
+    T[:150] = rng.uniform(0.0, 150.0, (150, 1))
+    found = range_distance(GEARBOX.training, speed, torque, T)
+    assert found == pytest.approx(fzg_training.losses.domain_distance(speed, torque, T), rel=1e-12)
+    assert 20 < np.count_nonzero(found == 0.0) < 180
+
+
+def test_a_full_model_outside_the_named_range_says_so() -> None:
+    cycle = {**CYCLE, "speed_rpm": [0.0, 500.0, 500.0], "torque_Nm": [0.0, 100.0, 9000.0]}
+    told = NETWORK.simulate(cycle, losses=LOSSES, initial=20.0, trained=GEARBOX.training)
+    assert told.columns()["in_domain"].tolist() == [True, True, False]
+    assert told.domain_distance[2] == pytest.approx((9000.0 - 350.0) / 349.0)
+    cold = NETWORK.simulate(CYCLE, losses=LOSSES, initial=-30.0, trained=GEARBOX.training)
+    assert not cold.columns()["in_domain"][0]
+    assert NETWORK.simulate(cycle, losses=LOSSES, initial=20.0).columns()["in_domain"].all()
+
+
+def test_more_rows_do_not_change_the_results_at_the_old_ones() -> None:
+    cycle = Cycle.from_columns(CYCLE)
+    fine = cycle.refined(2.5)
+    own = np.isin(fine.time, cycle.time)
+    coarse, dense = (NETWORK.simulate(c, losses=LOSSES, initial=20.0).columns() for c in (cycle, fine))
+    assert len(dense["time_s"]) == 25
+    for name, values in coarse.items():
+        if name.startswith("T_"):  # the solver's error is 0.03 K per step at most
+            assert dense[name][own] == pytest.approx(values, abs=0.1), name
+        elif name.startswith("P_"):
+            assert dense[name][own] == pytest.approx(values, rel=5e-4), name
