@@ -55,7 +55,7 @@ def conceal(
     6 h to judge by (hold_1, hold_2). seal.json holds the SHA-256 of the truth.
     """
     from builder.build import staging
-    from diagnosis.proof.case_files import keep_apart, keep_what_is_sealed
+    from diagnosis.proof.case_files import keep_apart, keep_other_cases
     from diagnosis.proof.conceal import Plan, conceal_set, random_plans  # imports scipy.signal
 
     if (effect is None) == (not random):
@@ -74,6 +74,7 @@ def conceal(
         names = conceal_set(
             definition, plans, seed=seed, recordings=stage, truth=sealed, flat=cases is None, progress=progress
         )
-        keep_what_is_sealed(stage, recordings)
+        keep_other_cases(stage, recordings)
+        keep_other_cases(sealed, apart)
     for name in names:
         console.out.print(f"wrote {recordings / ('' if cases is None else name)}, sealed {apart / name}.json")

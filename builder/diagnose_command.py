@@ -15,12 +15,12 @@ from builder.workers import check_workers, processes
 from models.errors import InputError, did_you_mean
 from models.gearbox import known_gearboxes, load_gearbox
 
-MOST_NOTES = 8  # on the terminal
-
 if TYPE_CHECKING:
     from diagnosis.recording import Recording
     from models.gearbox import Gearbox
     from models.mechanisms import Mechanism
+
+MOST_NOTES = 8  # on the terminal
 
 
 class _HoldoutOfMany(click.Command):

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from models.cycle import Cycle
 from models.errors import InputError
 from models.simulation import HOTTEST_START, can_start, kelvin_hint
-from models.table_file import kind_of, read_table
+from models.table_file import is_folder, kind_of, read_table
 
 DECIMALS = 6  # of results: a millionth of a kelvin or a watt
 
@@ -150,19 +150,12 @@ def refuse_to_replace(inputs: Iterable[Path], outputs: Iterable[Path]) -> None:
     read = list(inputs)
     faults = []
     for out in outputs:
-        if _is_folder(out):
+        if is_folder(out):
             faults.append(f"{out}: is a folder; name a file")
         elif any(_same_file(path, out) for path in read):
             faults.append(f"{out}: is read as well and would be replaced; choose another output")
     if faults:
         raise InputError("\n".join(faults))
-
-
-def _is_folder(path: Path) -> bool:
-    try:
-        return path.is_dir()
-    except (OSError, ValueError):  # a name that cannot be; who opens it says so
-        return False
 
 
 def _same_file(a: Path, b: Path) -> bool:

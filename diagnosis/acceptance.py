@@ -14,13 +14,12 @@ from diagnosis.holdout import Judge
 from diagnosis.hypotheses import Hypothesis
 from diagnosis.mapping import LOSS
 from diagnosis.observation import reading_columns, readings
-from diagnosis.stage import Stage
+from diagnosis.stage import LEAST_SHARE, Stage
 from diagnosis.term_on_grid import TermOnGrid
 
 # All set on development cases (seed 1 of `conceal`) and by the four open ones; the proof draws others.
 SECOND_GAIN = 10.0  # log evidence that each further effect has to bring
-LEAST_SHARE = 0.5  # of the best probability, of what may be taken where that fails on held-out data
-LEAST_PROBABILITY = 0.05  # of what counts when it is asked whether anything of a size that matters is there
+LEAST_PROBABILITY = 0.05  # of what counts when it is asked whether anything matters, and of a name that is given
 HOLDOUT_LOSS = -3.0  # log predictive density that what is found may cost on held-out data
 HOLDOUT_SLACK = 1.05  # of the calibrated model's error there ...
 HOLDOUT_SLACK_K = 0.04  # ... or this much more, which is nothing beside the noise of a reading
@@ -41,20 +40,17 @@ def judged(judge: Judge, calibrated: Explanation, stage: Stage, needed: float) -
     """A look with what of its fits is accepted.
 
     What is too small to matter is accepted only to clear the way, as long as nothing that matters was found; later it
-    hides what is less likely, unless the held-out recordings refuse it. What the
-    held-out recordings refuse stays a rival of what is accepted only if they hold it for about as likely; what the
-    training data hold for much less likely than that is accepted only where the held-out recordings themselves speak
-    for it. Where another strong effect is still missing, the first one may make their error larger although it makes
-    them far more probable: that one is accepted tentatively, before anything less likely.
+    hides what is less likely, unless the held-out recordings refuse it. What they refuse stays a rival of what is
+    accepted only if they hold it for about as likely; a name that is next to impossible beside such an open form is not
+    given. What the training data hold for much less likely is accepted only where the held-out recordings themselves
+    speak for it. Where another strong effect is still missing, the first one may make their error larger although it
+    makes them far more probable: that one is accepted tentatively, before anything less likely.
     """
     case, base, probabilities = judge.case, judge.base, stage.probabilities()
     cleared = any(_matters(case, base, h) for h in base.found)
     matters, note = False, "the best explanation is hardly better than none"
     refused: set[int] = set()
     impossible: set[int] = set()
-    by_name: dict[str, float] = {}  # another place of the same physics is no rival
-    for fit, probability in zip(stage.fits, probabilities, strict=True):
-        by_name[fit.found[-1].name] = by_name.get(fit.found[-1].name, 0.0) + float(probability)
     ahead = 0.0  # probability of what is more likely, holds and is too small
     promising: Explanation | None = None
     promised = -1
@@ -69,7 +65,7 @@ def judged(judge: Judge, calibrated: Explanation, stage: Stage, needed: float) -
             impossible.add(index)
             note = "the fault of an instrument would need a parameter of the gearbox where it cannot be"
             continue
-        unlikely = by_name[fit.found[-1].name] < LEAST_SHARE * probabilities[0]
+        unlikely = stage.probability_of(fit.found[-1].name) < LEAST_SHARE * probabilities[0]
         if probability < LEAST_SHARE * ahead or (unlikely and not _spoken_for(judge, fit)):
             continue
         if not holds_out(judge, calibrated, fit):
@@ -83,6 +79,9 @@ def judged(judge: Judge, calibrated: Explanation, stage: Stage, needed: float) -
         else:
             as_likely = {i for i in refused if judge.gain(stage.fits[i]) > judge.gain(fit) + HOLDOUT_LOSS}
             found = replace(_only(stage, as_likely.union(left)), accepted=fit, matters=large)
+            if _has_no_name(found, fit.found[-1]):
+                note = "what is far more probable has no name, and makes the held-out data worse"
+                continue
             if promising is None or probability > LEAST_SHARE * probabilities[promised]:
                 return found
             both = _only(stage, as_likely.union(left, [promised]))
@@ -100,6 +99,15 @@ def _only(stage: Stage, indices: Iterable[int]) -> Stage:
     """A look with some of its fits."""
     chosen = sorted(indices)
     return replace(stage, fits=tuple(stage.fits[i] for i in chosen), gains=tuple(stage.gains[i] for i in chosen))
+
+
+def _has_no_name(stage: Stage, h: Hypothesis) -> bool:
+    """Whether open forms are so far ahead of something of the catalogue that what is missing is none of it."""
+    opened = sum(
+        stage.probability_of(name) for name in {fit.found[-1].name for fit in stage.fits if fit.found[-1].is_open}
+    )
+    named = stage.probability_of(h.name)
+    return not h.is_open and named < LEAST_PROBABILITY * (named + opened)
 
 
 def _drives_away(base: Explanation, fit: Explanation) -> bool:

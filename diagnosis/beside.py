@@ -8,12 +8,12 @@ from dataclasses import replace
 import numpy as np
 from joblib import delayed
 
-from diagnosis.acceptance import LEAST_SHARE, SECOND_GAIN, holds_out, stands
+from diagnosis.acceptance import SECOND_GAIN, holds_out, stands
 from diagnosis.explain import Explanation, instead, without
 from diagnosis.holdout import Judge
 from diagnosis.hypotheses import Hypothesis
 from diagnosis.parallel import spread
-from diagnosis.stage import LEAST_RIVAL, Stage, penalised
+from diagnosis.stage import LEAST_RIVAL, LEAST_SHARE, Stage, penalised
 
 Found = tuple[Hypothesis, Stage]
 MOST_CHANGES = 3  # of what was found

@@ -75,7 +75,7 @@ def without_impossible(
         return values
     good = values[np.isfinite(values)]
     if not len(good):
-        faults.append(_nothing_left(column, len(values), notes))
+        faults.append(f"{column} has no value in any of its {len(values)} rows; remove the column, or mend it")
         return values
     dimension = dimension_of(quantity)
     if dimension == "temperature" and good.min() > CERTAINLY_KELVIN[0] and good.max() < CERTAINLY_KELVIN[1]:
@@ -108,17 +108,6 @@ def without_impossible(
         return values
     notes.append(f"{column}: {where} outside {possible.low:g} ... {possible.high:g} {possible.unit} taken as missing")
     return np.where(wrong, np.nan, values)
-
-
-def _nothing_left(column: str, rows: int, notes: Sequence[str]) -> str:
-    """Why a column has no value: its mapping file may have taken them all, which is noted by then."""
-    taken = [note for note in notes if note.startswith(f"{column}: ") and note.endswith("left out")]
-    if not taken:
-        return f"{column} has no value in any of its {rows} rows; remove the column, or mend it"
-    return (
-        f"{taken[-1]}, so that none is left: the limits 'valid' of its mapping file are in the column's own unit, as "
-        "the numbers stand in the file; correct them"
-    )
 
 
 def power_faults(inputs: Mapping[str, Array], loss: Array, names: Mapping[str, str]) -> list[str]:

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta
-from difflib import get_close_matches
 
 import numpy as np
 import pandas as pd
@@ -27,6 +25,7 @@ from diagnosis.recording_cleaning import (
 )
 from diagnosis.recording_file import FEWEST_ROWS, RecordingFile
 from diagnosis.recording_time import inside, part_of
+from models.column_names import meant
 from models.cycle import COLUMNS, REQUIRED
 from models.errors import InputError, did_you_mean
 from models.network import ThermalNetwork
@@ -36,8 +35,6 @@ SHORTEST_GAP_S, GAP_STEPS = 60.0, 3.0  # a gap is what is longer than both, unle
 SLOW_GAPS = 10.0  # ambient temperature and air speed change slowly: holes so many times longer are bridged
 LEAST_USABLE = 0.1  # share of the rows
 NEAR = 0.85  # likeness of names that makes one a slip of the other
-KIND_WORDS = frozenset({"t", "temp", "temperature", "p", "power"})
-UNIT_WORDS = frozenset({"degc", "c", "k", "degf", "f", "celsius", "kelvin", "w", "kw", "rpm", "nm", "m", "s"})
 MOST_NAMED = 12  # unused columns in a note
 
 
@@ -171,7 +168,7 @@ def _mapped(file: RecordingFile, network: ThermalNetwork, present: list[str], fa
 
 def _set_aside(rest: list[str], lacking: list[str], faults: list[str], notes: list[str]) -> None:
     """Columns that nothing asks for: told, so that none is lost by its name alone."""
-    slips = {name: slip for name in rest if (slip := _slip(name, lacking))}
+    slips = {name: slip for name in rest if (slip := meant(name, lacking, near=NEAR))}
     for name, slip in slips.items():
         faults.append(
             f"column {name[:80]} is not known; did you mean {slip!r}? Rename it, or name it in a mapping file "
@@ -181,26 +178,6 @@ def _set_aside(rest: list[str], lacking: list[str], faults: list[str], notes: li
     if unused:
         more = f" and {len(unused) - MOST_NAMED} more" if len(unused) > MOST_NAMED else ""
         notes.append(f"not used, being no input and no node of this gearbox: {', '.join(unused[:MOST_NAMED])}{more}")
-
-
-def _slip(name: str, lacking: list[str]) -> str:
-    """The missing column that a name stands for by all appearance: nearly alike, or the same in other words."""
-    by_small = {other.lower(): other for other in lacking}
-    close = get_close_matches(name.lower(), by_small, n=1, cutoff=NEAR)
-    if close:
-        return by_small[close[0]]
-    words = _words(name)
-    return next((other for other in lacking if words and words == _words(other)), "") if _is_told(name) else ""
-
-
-def _is_told(name: str) -> bool:
-    """Whether a name says what kind of quantity it is; a column called ``oil`` alone may be anything."""
-    return bool(set(re.split(r"[\W_]+", name.lower())) & (KIND_WORDS | UNIT_WORDS))
-
-
-def _words(name: str) -> frozenset[str]:
-    """What a name says beside kind and unit: ``oil`` of ``T_oil``, ``Temp_Oil_C`` and ``T_oil_degC``."""
-    return frozenset(re.split(r"[\W_]+", name.lower())) - KIND_WORDS - UNIT_WORDS - {""}
 
 
 # ---------------------------------------------------------------------- numbers
@@ -217,7 +194,10 @@ def _take(
     values = _numbers(file.table[name], name, columns.rows, faults)
     if values is None:
         return
-    values = _used(file, name, column, values, columns, faults)
+    used = _used(file, name, column, values, columns, faults)
+    if used is None:
+        return
+    values = used
     dimension = dimension_of(column.quantity)
     unit = file.units.get(name) if column.unit is None else column.unit
     if unit and dimension is not None and unit not in UNITS[dimension]:
@@ -244,16 +224,24 @@ def _take_auxiliary(cells: pd.Series, name: str, column: Column, columns: Record
 
 def _used(
     file: RecordingFile, name: str, column: Column, values: Array, columns: RecordedColumns, faults: list[str]
-) -> Array:
-    """Values in the valid range and in the rows that the mapping file names for the column; others are NaN."""
+) -> Array | None:
+    """Values in the valid range and in the rows that the mapping file names for the column; others are NaN.
+
+    None, and a fault, where the range leaves nothing.
+    """
     if column.valid is not None:
         low, high = column.valid
         outside = (values < low) | (values > high)
         if outside.any():
             where = rows_text(columns.rows[outside])
-            columns.notes.append(
-                f"{name}: {int(outside.sum())} values outside {low:g} ... {high:g} in {where} left out"
-            )
+            told = f"{name}: {int(outside.sum())} values outside {low:g} ... {high:g} in {where} left out"
+            if not np.isfinite(values[~outside]).any():
+                faults.append(
+                    f"{told}, so that none is left: the limits 'valid' of its mapping file are in the column's own "
+                    "unit, as the numbers stand in the file; correct them"
+                )
+                return None
+            columns.notes.append(told)
         values = np.where(outside, np.nan, values)
     if column.rows is not None and file.clock is not None:
         try:

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from diagnosis.numbers import MINUS, with_error
+from diagnosis.stage import LEAST_RIVAL, LEAST_SHARE
 from models.mechanisms import OPEN_FORM
 from models.network import ThermalNetwork
 from models.terms import Term
@@ -28,8 +29,9 @@ VERDICT_TEXT: Mapping[str, str] = {
     "unexplained": "Something is missing, and it is none of the physics in the catalogue.",
     "insufficient_data": "These recordings are too short or too calm to decide.",
 }
-AHEAD_FROM = 0.5  # of its probability: a rival farther ahead would stand in this place, were it not refused
-AHEAD = "more probable by what was learnt from, and refused by the held-out recordings"
+AHEAD = (
+    "more probable by what was learnt from, but refused (by the held-out recordings, as impossible, or as too small)"
+)
 PARTLY = "Part of what is missing was found; the rest is none of the physics in the catalogue."
 
 
@@ -411,8 +413,8 @@ def _lines(finding: Finding) -> list[str]:
             for name, value, stderr, unit in values
         )
         lines.append(f"    {', '.join(told)}")
-    rivals = [r for r in finding.confusable_with if r.probability >= 0.01]
-    ahead = [r for r in rivals if finding.probability < AHEAD_FROM * r.probability]
+    rivals = [r for r in finding.confusable_with if r.probability >= LEAST_RIVAL]
+    ahead = [r for r in rivals if finding.probability < LEAST_SHARE * r.probability]
     for words, some in (("not ruled out", [r for r in rivals if r not in ahead]), (AHEAD, ahead)):
         if some:
             named = ", ".join(f"{r.mechanism} at {r.place} ({r.probability:.2f})" for r in some)

@@ -17,6 +17,7 @@ from models.types import Array
 TEMPER, TEMPER_SHARE = 3.0, 0.03
 OPEN_PENALTY = 10.0  # log evidence by which an open form has to beat the catalogue
 LEAST_RIVAL = 0.01  # probability of what is told as a rival
+LEAST_SHARE = 0.5  # of the best probability, of what may stand although something is more probable
 # Log odds of what is rarer than a piece of missing physics or a biased sensor.
 RARITY = {
     "sensor_gain": -2.0,
@@ -75,6 +76,11 @@ class Stage:
         weights += np.array([RARITY.get(fit.found[-1].name, 0.0) for fit in self.fits])
         weights = np.exp(weights - weights.max())
         return np.asarray(weights / weights.sum())
+
+    def probability_of(self, name: str) -> float:
+        """Of a physics, among the fits; its places are no rivals of one another."""
+        named = [fit.found[-1].name == name for fit in self.fits]
+        return float(self.probabilities()[named].sum())
 
     def ranked(self) -> Stage:
         """The same, the most probable fit first."""

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from difflib import SequenceMatcher
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from models.column_names import meant
 from models.errors import InputError
 from models.types import Array
 
@@ -24,15 +23,7 @@ REQUIRED = ("speed", "torque")
 
 MOST_ROWS = 5_000_000  # of a refined cycle, as of a table that is read
 SHORTEST_INTERVAL_S = 1e-5  # times in files have six decimals
-NEAR, NEAR_STEM = (
-    0.9,
-    0.8,
-)  # likeness of names, and of what they say beside the unit, that makes one a slip of the other
-UNIT_WORDS = frozenset(
-    {"deg", "degc", "c", "celsius", "k", "kelvin", "degf", "f", "m", "s", "ms", "mps", "km", "h", "kmh"}
-)
-KIND_WORDS = frozenset({"t", "temp", "temperature"})
-AMBIENT_WORDS = frozenset({"amb", "tamb", "tambient"})
+NEAR = 0.9  # likeness of names: T_cabinet_degC is no slip of T_ambient_degC
 
 
 @dataclass(frozen=True)
@@ -159,24 +150,13 @@ def _rounded_up(seconds: float) -> str:
     return f"{np.ceil(seconds / unit) * unit:g}"
 
 
-def _slips(unused: Iterable[str], absent: Iterable[str]) -> list[str]:
+def _slips(unused: Iterable[str], absent: Sequence[str]) -> list[str]:
     """Faults for columns that seem to be an absent optional one, which would otherwise silently have its default."""
     return [
         f"column {name[:80]} is not known; is {column} meant? rename it, or remove it"
         for name in unused
-        for column in absent
-        if _alike(name.lower(), column.lower()) >= NEAR or _alike(_stem(name), _stem(column)) >= NEAR_STEM
+        if (column := meant(name, absent, near=NEAR))
     ]
-
-
-def _alike(a: str, b: str) -> float:
-    return SequenceMatcher(None, a, b).ratio() if a and b else 0.0
-
-
-def _stem(name: str) -> str:
-    """What a name says beside kind and unit: ``ambient`` of ``T_ambient``, ``Temp_amb_C`` and ``ambient_degC``."""
-    words = [word for word in re.split(r"[\W_]+", name.lower()) if word not in UNIT_WORDS | KIND_WORDS]
-    return "".join("ambient" if word in AMBIENT_WORDS else word for word in words)
 
 
 def _time_faults(time: Array) -> list[str]:

@@ -15,6 +15,7 @@ from models.cycle import COLUMNS, Cycle
 from models.errors import InputError, did_you_mean
 from models.network import Losses, ThermalNetwork
 from models.runtime import NetworkSystem, efficiency, torque_loss
+from models.surrogate import range_distance
 from models.types import Array
 
 if TYPE_CHECKING:
@@ -286,7 +287,8 @@ def evaluate(
     point = (*system.operating(time, wide, states), states[..., loss_nodes])
     distance = losses.domain_distance(*point)
     if trained is not None:
-        distance = np.maximum(distance, range_distance(trained, *point))
+        bounds = trained.speed_rpm, trained.torque_Nm, trained.temperature_degC
+        distance = np.maximum(distance, range_distance(*point, *bounds))
     return Result(
         time=time,
         inputs=dict(zip(system.laws.inputs, np.moveaxis(table, -1, 0), strict=True)),
@@ -298,30 +300,6 @@ def evaluate(
         heat_out=heat[1],
         heat_stored=((states - states[..., :1, :])[..., :n_parts] * system.capacities).sum(axis=-1),
     )
-
-
-def range_distance(trained: Training, speed: ArrayLike, torque: ArrayLike, temperatures: ArrayLike) -> Array:
-    """How far an operating point lies outside the range that a definition names, as surrogates trained on it say.
-
-    Parameters
-    ----------
-    trained : Training
-    speed, torque : ArrayLike, shape (...)
-        As the losses see them, [1/min] and [N m], signed; below the lower bounds is inside
-    temperatures : ArrayLike, shape (..., nodes)
-        That the losses read, [degC]
-
-    Returns
-    -------
-    Array, shape (...)
-        0 inside, else the largest excess as a fraction of the range, [-];
-        see :meth:`models.surrogate.SurrogateLosses.domain_distance`
-    """
-    T, (T_low, T_high) = np.asarray(temperatures, dtype=float), trained.temperature_degC
-    loads = ((speed, trained.speed_rpm), (torque, trained.torque_Nm))
-    beyond = [(np.abs(value) - high) / (high - low) for value, (low, high) in loads]
-    off = np.maximum(T - T_high, T_low - T).max(axis=-1) / (T_high - T_low)
-    return np.asarray(np.maximum(np.maximum(np.maximum(*beyond), off), 0.0))
 
 
 def steady_state(

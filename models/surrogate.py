@@ -31,6 +31,34 @@ Evaluator = Callable[[Array], Array]
 """Rows of one network's inputs, shape (N, inputs), to its outputs, shape (N, outputs)."""
 
 
+def range_distance(
+    speed: ArrayLike, torque: ArrayLike, temperatures: ArrayLike, speed_bounds: tuple[float, float],
+    torque_bounds: tuple[float, float], temperature_bounds: tuple[float, float],
+) -> Array:  # fmt: skip
+    """How far an operating point lies outside a range of training; below its lowest speed and torque is inside.
+
+    Parameters
+    ----------
+    speed, torque : ArrayLike, shape (...)
+        [1/min] and [N m], signed
+    temperatures : ArrayLike, shape (..., nodes)
+        [degC]
+    speed_bounds, torque_bounds, temperature_bounds : (float, float)
+        Lowest and highest
+
+    Returns
+    -------
+    Array, shape (...)
+        0 inside, else the largest excess of an input as a fraction of that input's range, [-]
+    """
+    T, (T_low, T_high) = np.asarray(temperatures, dtype=float), temperature_bounds
+    (n_low, n_high), (t_low, t_high) = speed_bounds, torque_bounds
+    fast = (np.abs(speed) - n_high) / (n_high - n_low)
+    heavy = (np.abs(torque) - t_high) / (t_high - t_low)
+    off = np.maximum(T - T_high, T_low - T).max(axis=-1) / (T_high - T_low)
+    return np.asarray(np.maximum(np.maximum(np.maximum(fast, heavy), off), 0.0))
+
+
 def feature_values(kind: Feature, x: Array, viscosity: tuple[float, float]) -> Array:
     r"""Return one kind of feature of physical inputs.
 
@@ -416,16 +444,8 @@ class SurrogateLosses:
         Array, shape (...)
             0 inside, else the largest excess of an input as a fraction of that input's trained range, [-]
         """
-        T = np.asarray(temperatures, dtype=float)
-        (n_low, n_high), (t_low, t_high), (T_low, T_high) = (
-            self.speed_bounds,
-            self.torque_bounds,
-            self.temperature_bounds,
-        )
-        fast = (np.abs(speed) - n_high) / (n_high - n_low)
-        heavy = (np.abs(torque) - t_high) / (t_high - t_low)
-        off = np.maximum(T - T_high, T_low - T).max(axis=-1) / (T_high - T_low)
-        return np.asarray(np.maximum(np.maximum(np.maximum(fast, heavy), off), 0.0))
+        bounds = self.speed_bounds, self.torque_bounds, self.temperature_bounds
+        return range_distance(speed, torque, temperatures, *bounds)
 
     def in_domain(self, speed: ArrayLike, torque: ArrayLike, temperatures: ArrayLike) -> Any:
         """Return whether operating points lie inside the range of training, bool, shape (...)."""

@@ -85,7 +85,7 @@ def kind_of(path: Path, kinds: tuple[str, ...] = KINDS) -> str:
     InputError
         If it is another one, or a folder.
     """
-    if _is_folder(path):
+    if is_folder(path):
         raise InputError(f"{path}: is not a file but a folder; name a file in it ({', '.join(kinds)})")
     for kind in kinds:
         if path.name.lower().endswith(kind):
@@ -93,10 +93,11 @@ def kind_of(path: Path, kinds: tuple[str, ...] = KINDS) -> str:
     raise InputError(f"{path}: the ending says nothing; use one of {', '.join(kinds)}")
 
 
-def _is_folder(path: Path) -> bool:
+def is_folder(path: Path) -> bool:
+    """Whether it is a folder; a name that cannot be is none, and who opens it says so."""
     try:
         return path.is_dir()
-    except (OSError, ValueError):  # a name that is too long, or holds NUL: check_file says so
+    except (OSError, ValueError):  # too long, or with NUL in it
         return False
 
 

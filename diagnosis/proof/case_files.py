@@ -30,25 +30,25 @@ def keep_apart(recordings: Path, truth: Path) -> None:
         raise InputError(f"{truth}: the truth must not lie among the recordings in {recordings}; name another folder")
 
 
-def keep_what_is_sealed(made: Path, recordings: Path) -> None:
-    """Refuse to put cases where others are sealed: their truth would be lost. The same case may be made again.
+def keep_other_cases(made: Path, output: Path) -> None:
+    """Refuse to replace anything of another case, recordings or truth; the same case may be made again.
 
     Parameters
     ----------
     made : Path
-        Folder with the new cases
-    recordings : Path
+        Folder with new files
+    output : Path
         Folder that they shall go to
 
     Raises
     ------
     InputError
-        If another case is sealed there.
+        If a file of other content is there.
     """
-    for seal in sorted(made.rglob(SEAL)):
-        there = recordings / seal.relative_to(made)
-        if there.exists() and there.read_bytes() != seal.read_bytes():
-            raise InputError(f"{there.parent}: another case is sealed here already; choose another output")
+    for file in sorted(path for path in made.rglob("*") if path.is_file()):
+        there = output / file.relative_to(made)
+        if there.is_file() and there.read_bytes() != file.read_bytes():
+            raise InputError(f"{there}: is of another case, which would be lost; choose another output")
 
 
 def write_case(

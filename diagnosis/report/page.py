@@ -12,10 +12,10 @@ from markupsafe import Markup
 from diagnosis import numbers
 from diagnosis.report import equation, figures, network_drawing, wording
 from diagnosis.result import Calibrated, Diagnosis, Finding, Fits
+from diagnosis.stage import LEAST_RIVAL
 
 PACKAGE = "diagnosis.report"
 SHOWN_RANKS, MOST_RANKS = 10, 300
-LIKELY = 0.01  # probability from which a rival is named
 DISTRESS = 2.0  # standard deviations of a prior
 BAR_SD = 4.0  # at the end of a bar
 
@@ -91,7 +91,7 @@ def _finding(finding: Finding, shown: set[str]) -> dict[str, Any]:
             (wording.name(p.name.removeprefix(prefix)), numbers.with_error(p.value, p.stderr), wording.unit(p.unit))
             for p in finding.parameters
         ],
-        "rivals": [rival for rival in finding.confusable_with if rival.probability >= LIKELY],
+        "rivals": [rival for rival in finding.confusable_with if rival.probability >= LEAST_RIVAL],
         "heat": figures.found_heat(finding) if finding.node not in shown else [],
     }
 

@@ -49,7 +49,7 @@ WORDS: Mapping[str, str] = {
     "it has too much. Tuning the parameters swallows part of an effect that is missing, so the law that was found may "
     "be larger.",
     "not ruled out": "Explanations that these data cannot tell from the one that is named; one that is more than twice "
-    "as probable was refused by the held-out recordings.",
+    "as probable was refused: by the held-out recordings, as impossible, or as too small to matter.",
 }
 
 

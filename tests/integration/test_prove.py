@@ -15,9 +15,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from click.testing import CliRunner
 
 from builder import prove as driver
 from builder.prove import Work, prove, run_task, work_of
+from builder.prove_command import prove as verb
 from diagnosis.proof import cycles, protocol
 from diagnosis.proof.protocol import BLIND, Settings, Task, plans_of, tasks_of
 from models.errors import InputError
@@ -286,6 +288,13 @@ def test_a_cluster_does_the_same(recorded: Path, tmp_path: Path) -> None:
 
 
 # ---------------------------------------------------------------------- the verb
+
+
+def test_help_names_the_defaults_that_hold() -> None:
+    told = " ".join(CliRunner().invoke(verb, ["--help"]).output.split())
+    assert f"the whole mix, {protocol.WHOLE}]" in told
+    assert f"that of the published proof, {protocol.PUBLISHED_SEED}]" in told
+    assert protocol.PUBLISHED_SEED not in protocol.DEVELOPMENT_SEEDS
 
 
 def test_the_verb_says_what_is_wrong(tmp_path: Path) -> None:

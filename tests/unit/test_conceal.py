@@ -224,8 +224,10 @@ def test_verb_writes_a_case(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
     # The same case may be made again, another one must not take its place.
     made = {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()}
     assert run("conceal", "--effect", "sensor_stuck", "--strength", 1, "--seed", 5, "--output", tmp_path) == 0
-    assert run("conceal", "--effect", "sensor_bias", "--seed", 5, "--output", tmp_path) == 2
-    assert "another case is sealed here already; choose another output" in " ".join(capsys.readouterr().err.split())
+    for other in (("--effect", "sensor_bias"), ("--effect", "sensor_bias", "--cases", 1)):  # both have a case_001.json
+        assert run("conceal", *other, "--seed", 5, "--output", tmp_path) == 2
+        told = " ".join(capsys.readouterr().err.split())
+        assert "is of another case, which would be lost; choose another output" in told
     assert {path: path.read_bytes() for path in tmp_path.rglob("*") if path.is_file()} == made
 
 

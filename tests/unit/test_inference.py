@@ -49,7 +49,7 @@ from diagnosis.predict import START_S, predict
 from diagnosis.recording import Channel, Recording
 from diagnosis.recurrence import lagged
 from diagnosis.shapes import shape_terms
-from diagnosis.stage import OPEN_PENALTY, Stage, log_e_value
+from diagnosis.stage import LEAST_SHARE, OPEN_PENALTY, Stage, log_e_value
 from diagnosis.term_on_grid import TermOnGrid
 from diagnosis.trajectory import complete_start, exponential, parameter_heats, settled_balance, simulate
 from diagnosis.unknowns import Unknown, Unknowns, unknowns_of
@@ -566,7 +566,8 @@ def test_the_error_of_a_mean_heat_is_that_of_the_strength_and_of_what_goes_with_
 
 def _scored(name: str, place: str, log_bayes: float) -> Scored:
     term: Any = None if name == "parameter" else SimpleNamespace(of_measurement=False, parameters=(), states=())
-    h = Hypothesis(name=name, place=place, family="", variants=np.ones((1, 1)), term=term)
+    family = OPEN_FORM if name.startswith("open_") else ""
+    h = Hypothesis(name=name, place=place, family=family, variants=np.ones((1, 1)), term=term)
     return Scored(
         hypothesis=h, log_bayes=log_bayes, best=0, values=np.zeros(1), log_bayes_of=np.array([log_bayes]), expected=0.0
     )
@@ -932,6 +933,18 @@ def test_another_place_of_the_same_physics_may_be_taken_where_the_best_one_fails
     close = acceptance.judged(_judge(base, -5.0), base, stage, 10.0)
     assert close.accepted is not None and close.accepted.labels == ("feed@second",)
     assert [fit.found[-1].label for fit in close.fits] == ["feed@first", "feed@second", "tank@oil"]
+    # An open form beside which a name is next to impossible: it has none.
+    for ahead, of_ahead, given in (
+        ("feed", 13.0, True),
+        ("open_standstill", -20.0, True),
+        ("open_standstill", 13.0, False),
+    ):
+        held = {"first": of_ahead, "oil": 15.0}
+        speaks = _judge(base, lambda fit, held=held: held[fit.found[-1].place])
+        two = replace(stage, fits=(explanation((ahead, "first")), fits[2]), gains=(120.0, 55.0))
+        tank = acceptance.judged(speaks, base, two, 10.0)
+        assert (tank.accepted is not None) is given
+        assert given or "has no name" in tank.note
     # But not where something else is far more probable than that place.
     rather = acceptance.judged(
         judge, base, replace(stage, fits=(fits[0], fits[2], fits[1]), gains=(120.0, 55.0, 25.0)), 10.0
@@ -1225,7 +1238,7 @@ def test_what_is_unlikely_is_named_after_a_refusal_only_where_held_out_recording
     monkeypatch.setattr(acceptance, "_matters", lambda *_: True)
     monkeypatch.setattr(acceptance, "holds_out", lambda _judge, _calibrated, fit: fit.found == other.found)
     stage = Stage(scored=(), log_e_value=170.0, fits=(best, other), gains=(204.0, 193.0))
-    assert stage.probabilities()[1] < acceptance.LEAST_SHARE * stage.probabilities()[0]
+    assert stage.probabilities()[1] < LEAST_SHARE * stage.probabilities()[0]
     base = replace(best, found=())
     accepted = acceptance.judged(_judge(base, heldout_gain), base, stage, 10.0).accepted
     assert (accepted.found[-1].name if accepted is not None else None) == named

@@ -13,7 +13,8 @@ from models.errors import InputError
 from models.gearbox import load_gearbox
 from models.network import Node, ThermalNetwork
 from models.runtime import efficiency, torque_loss
-from models.simulation import initial_states, input_table, network_system, range_distance
+from models.simulation import initial_states, input_table, network_system
+from models.surrogate import range_distance
 
 GEARBOX = load_gearbox("fzg")
 NETWORK, LOSSES = GEARBOX.network(), GEARBOX.losses()
@@ -158,7 +159,8 @@ def test_range_of_the_full_model_is_that_of_its_surrogate(fzg_training: Training
     speed, torque = rng.uniform(-9000.0, 9000.0, 200), rng.uniform(-500.0, 500.0, 200)
     T = rng.uniform(-60.0, 260.0, (200, len(LOSSES.temperature_nodes)))
     T[:150] = rng.uniform(0.0, 150.0, (150, 1))
-    found = range_distance(GEARBOX.training, speed, torque, T)
+    named = GEARBOX.training
+    found = range_distance(speed, torque, T, named.speed_rpm, named.torque_Nm, named.temperature_degC)
     assert found == pytest.approx(fzg_training.losses.domain_distance(speed, torque, T), rel=1e-12)
     assert 20 < np.count_nonzero(found == 0.0) < 180
 
