@@ -25,6 +25,7 @@ Losses = Callable[[Array], Array]
 BLOCK_ROWS = 256  # operating points per task, fixed: the blocks must not depend on the number of processes
 EDGE = 0.03  # share of the dense points that is moved up to the lower edge
 GRID = 4001  # support points of the inverse of a spacing
+CONNECT_S = 10.0  # within which a scheduler has to answer
 
 
 def latin_hypercube(count: int, lower: ArrayLike, upper: ArrayLike, *, seed: int) -> Array:
@@ -161,7 +162,7 @@ def on_dask(address: str) -> Iterator[None]:
     except ImportError as error:
         raise InputError("a dask address is given but dask is not installed; install the extra 'dask'") from error
     try:
-        client = Client(address, timeout=10)
+        client = Client(address, timeout=CONNECT_S)
     except (OSError, ValueError) as error:  # a TimeoutError is an OSError
         raise InputError(
             f"no dask scheduler answers at {address} ({error}); is it running, is the port open?"

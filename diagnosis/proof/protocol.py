@@ -271,9 +271,9 @@ def begin(
     Raises
     ------
     InputError
-        If the folder holds another proof, or one of other code.
+        If the settings cannot be met, or the folder holds another proof, or one of other code.
     """
-    code = code_hash()
+    code, plans = code_hash(), list(plans_of(settings).values())
     # Of the seed only a hash is written, so that the folder does not tell what the truth can be made from.
     whole = json.dumps({**asdict(settings), "gearbox": gearbox.hash}, sort_keys=True)
     about = {"settings_sha256": hashlib.sha256(whole.encode()).hexdigest(), "code_sha256": code,
@@ -294,7 +294,7 @@ def begin(
     if not (folder / RECORDINGS).exists():
         unfinished = Path(tempfile.mkdtemp(prefix=".unfinished-", dir=folder))
         try:
-            conceal_set(gearbox, list(plans_of(settings).values()), seed=settings.seed,
+            conceal_set(gearbox, plans, seed=settings.seed,
                         recordings=unfinished / RECORDINGS, truth=None, progress=progress)  # fmt: skip
             (unfinished / RECORDINGS).replace(folder / RECORDINGS)
         finally:

@@ -18,6 +18,7 @@ import pytest
 from click.testing import CliRunner
 
 from builder import prove as driver
+from builder.__main__ import main
 from builder.prove import Work, prove, run_task, work_of
 from builder.prove_command import prove as verb
 from diagnosis.proof import cycles, protocol
@@ -297,16 +298,21 @@ def test_help_names_the_defaults_that_hold() -> None:
     assert protocol.PUBLISHED_SEED not in protocol.DEVELOPMENT_SEEDS
 
 
-def test_the_verb_says_what_is_wrong(tmp_path: Path) -> None:
-    def run(*arguments: str) -> subprocess.CompletedProcess[str]:
-        return subprocess.run([sys.executable, "-m", "builder", *arguments], capture_output=True, text=True)
-
-    few = run("prove", "--cases", "3", "--output", str(tmp_path / "few"))
-    assert (few.returncode, few.stdout) == (2, "")
-    assert "3 cases are too few" in few.stderr
-    both = run("prove", "--jobs", "1", "--dask", "tcp://127.0.0.1:1")
-    assert both.returncode == 2
-    assert "exclude each other" in both.stderr
-    unknown = run("diagnose", str(tmp_path / "a.csv"), "--without-mechanism", "windag")
-    assert unknown.returncode == 2
-    assert "did you mean 'windage'" in unknown.stderr
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ("prove --cases 3 --output OUT", "3 cases are too few"),
+        ("prove --jobs 1 --dask tcp://127.0.0.1:1 --output OUT", "exclude each other"),
+        ("diagnose OUT.csv --without-mechanism windag", "did you mean 'windage'"),
+    ],
+)
+def test_the_verb_says_what_is_wrong(
+    words: str, message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys, "argv", ["builder", *words.replace("OUT", str(tmp_path / "out")).split()])
+    with pytest.raises(SystemExit) as end:
+        main()
+    shown = capsys.readouterr()
+    assert (end.value.code, shown.out) == (2, "")
+    assert message in shown.err
+    assert list(tmp_path.iterdir()) == []

@@ -136,7 +136,7 @@ DRIVER = shutil.which("chromedriver")
 WIDE, PHONE = (1440, 900), (390, 844)
 
 
-@pytest.fixture(params=[WIDE, PHONE], ids=["wide", "phone"])
+@pytest.fixture(scope="module", params=[WIDE, PHONE], ids=["wide", "phone"])
 def browser(request: pytest.FixtureRequest, report: Report, folder: Path) -> Iterator[Any]:
     """The report, opened without a network and fully drawn."""
     if CHROMIUM is None or DRIVER is None:
