@@ -103,6 +103,14 @@ def test_recordings_of_one_name_get_a_prediction_each(diagnosed: tuple[Path, int
     assert not judged.isna().to_numpy().any()
 
 
+def test_several_processes_give_the_bytes_of_one(diagnosed: tuple[Path, int], folder: Path, tmp_path: Path) -> None:
+    """Each of a fleet is diagnosed by one process."""
+    learnt, held = folder / "biased/train.csv", folder / "biased/holdout"
+    assert run("diagnose", learnt, "--holdout", held / "train.csv", "--jobs", 2, "--output", tmp_path) == 0
+    ours = json.loads((diagnosed[0] / "biased/diagnosis.json").read_text())
+    assert json.loads((tmp_path / "diagnosis.json").read_text()) == ours
+
+
 def test_the_table_is_shown_and_the_faults_are_told(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
