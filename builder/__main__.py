@@ -21,7 +21,7 @@ def main() -> None:
     try:
         sys.exit(commands(standalone_mode=False) or 0)
     except InputError as error:
-        err.print(str(error), style="red", markup=False)
+        err.print(str(error), style="red")
         sys.exit(2)
     except click.ClickException as error:
         error.show()

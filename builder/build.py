@@ -18,9 +18,9 @@ from builder import console
 from builder.drive_cycle import COLD_START, reference_cycle
 from builder.files import write_table
 from builder.fmu import build_python_fmu
-from builder.fmu_drive import drive_fmu
+from builder.fmu_drive import drive_fmu, runs_here
 from builder.native import build_native_fmu
-from builder.native_compile import host_platform, plan_for
+from builder.native_compile import plan_for
 from builder.onnx_export import export_onnx
 from builder.plots import plot_cycle
 from builder.train import TrainingResult, train_surrogate
@@ -62,8 +62,8 @@ class BuildReport:
     cycles : mapping of FMU file name to CycleErrors
     seconds : mapping of step to float
     files : tuple of Path
-    note : str
-        On platforms that were left out, or ``""``
+    notes : tuple of str
+        On platforms that were left out, and what could not be tried here
     correction : mapping or None
         Of the correction that the FMU carries, see :meth:`models.correction.Correction.summary`
     """
@@ -73,7 +73,7 @@ class BuildReport:
     cycles: Mapping[str, CycleErrors]
     seconds: Mapping[str, float]
     files: tuple[Path, ...]
-    note: str = ""
+    notes: tuple[str, ...] = ()
     correction: Mapping[str, Any] | None = None
 
     def as_dict(self) -> dict[str, Any]:
@@ -104,6 +104,15 @@ class BuildReport:
             ["loss", "R²", "median %", "p95 %", "corner median %", "corner p95 %"],
             rows,
         )
+        if self.cycles:
+            self._show_cycles()
+        console.table("Time", ["step", "s"], [[step, f"{value:.2f}"] for step, value in self.seconds.items()])
+        for file in self.files:
+            console.out.print(f"wrote {file}")
+        for note in self.notes:
+            console.err.print(f"note: {note}", style="yellow")
+
+    def _show_cycles(self) -> None:
         worst = [max(cycle.temperature_K.items(), key=lambda item: item[1]) for cycle in self.cycles.values()]
         cycles = self.cycles.values()
         console.table(
@@ -116,11 +125,6 @@ class BuildReport:
                 ["total loss, worst", *(f"{100.0 * cycle.loss_worst:.2f} %" for cycle in cycles)],
             ],
         )
-        console.table("Time", ["step", "s"], [[step, f"{value:.2f}"] for step, value in self.seconds.items()])
-        for file in self.files:
-            console.out.print(f"wrote {file}")
-        if self.note:
-            console.err.print(f"note: native FMU {self.note}", style="yellow", markup=False)
 
 
 def build(
@@ -169,7 +173,9 @@ def build(
     kinds = {"python": ("python",), "native": ("native",), "both": ("python", "native")}.get(target)
     if kinds is None:
         raise InputError(f"target {target!r} is not known; python, native and both are")
-    note = plan_for(platforms).note if "native" in kinds else ""  # a missing compiler is told before the training
+    notes = []
+    if "native" in kinds and (note := plan_for(platforms).note):  # a missing compiler is told before the training
+        notes.append(f"native FMU {note}")
     network = corrected_network(gearbox, correction)
     seconds: dict[str, float] = {}
     with staging(folder) as stage:
@@ -193,8 +199,11 @@ def build(
             full = network.simulate(cycle, losses=losses, initial=COLD_START, progress=progress).columns()
         cycles = {}
         for kind, path in fmus.items():
-            if kind == "native" and (host_platform() or "") not in plan_for(platforms).platforms:
-                continue  # built for other machines: it cannot be tried here
+            if not runs_here(path):
+                notes.append(
+                    f"the {kind} FMU has no binary for this machine, so the reference cycle is not driven with it"
+                )
+                continue
             label = f"{kind} FMU in FMPy"
             with _timed(f"reference cycle, {label}", seconds), console.progress_bar(label) as progress:
                 driven = drive_fmu(path, cycle, initial=COLD_START, progress=progress)
@@ -204,7 +213,7 @@ def build(
             plot = stage / f"drive_cycle{SUFFIX[kind]}.png"
             plot_cycle(plot, driven, title=title, groups=network.groups, reference=full)
         report = BuildReport(
-            gearbox=gearbox.name, training=training, cycles=cycles, seconds=seconds, files=(), note=note,
+            gearbox=gearbox.name, training=training, cycles=cycles, seconds=seconds, files=(), notes=tuple(notes),
             correction=None if correction is None else correction.summary(),
         )  # fmt: skip
         (stage / "report.json").write_text(json.dumps(report.as_dict(), indent=2) + "\n", encoding="utf-8")
@@ -232,7 +241,8 @@ def staging(folder: Path) -> Iterator[Path]:
     Raises
     ------
     InputError
-        If `folder` cannot be made or written to, or a file would replace a folder.
+        If `folder` cannot be made or written to, a file would replace a folder, or one that stands there cannot be
+        replaced.
     """
     made = [parent for parent in (folder, *folder.parents) if not parent.exists()]
     try:
@@ -243,18 +253,35 @@ def staging(folder: Path) -> Iterator[Path]:
     try:
         yield stage
         files = sorted(path for path in stage.rglob("*") if path.is_file())
-        for path in files:
-            if (folder / path.relative_to(stage)).is_dir():
-                raise InputError(f"{folder / path.relative_to(stage)}: is a folder; remove it or choose another output")
-        for path in files:
-            goal = folder / path.relative_to(stage)
-            goal.parent.mkdir(parents=True, exist_ok=True)
-            path.replace(goal)
+        _move_up(stage, {path: folder / path.relative_to(stage) for path in files})
     finally:
         shutil.rmtree(stage, ignore_errors=True)
         for parent in made:  # deepest first; with files in it the folder stays
             with suppress(OSError):
                 parent.rmdir()
+
+
+def _move_up(stage: Path, goals: Mapping[Path, Path]) -> None:
+    """Move files to their goals, all or none: what stood there before is put back if one of them cannot be moved."""
+    for goal in goals.values():
+        if goal.is_dir():
+            raise InputError(f"{goal}: is a folder; remove it or choose another output")
+    replaced = Path(tempfile.mkdtemp(prefix="replaced-", dir=stage))
+    moved: list[tuple[Path, Path]] = []
+    try:
+        for path, goal in goals.items():
+            goal.parent.mkdir(parents=True, exist_ok=True)
+            old = [(goal, replaced / str(len(moved)))] if goal.exists() else []
+            for source, target in (*old, (path, goal)):
+                source.replace(target)
+                moved.append((source, target))
+    except OSError as error:
+        for source, target in reversed(moved):
+            target.replace(source)
+        raise InputError(
+            f"{error.filename}: cannot be written ({error.strerror}); nothing was replaced. Close what holds it open, "
+            "or choose another output"
+        ) from error
 
 
 @contextmanager

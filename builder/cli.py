@@ -15,6 +15,7 @@ from builder.reproduce.command import reproduce
 from builder.simulate_command import simulate
 from builder.workers import check_workers
 from models.correction import read_correction
+from models.errors import InputError
 from models.gearbox import known_gearboxes, load_gearbox
 
 GEARBOX_HELP = f"Name ({', '.join(known_gearboxes())}) or definition file (TOML)."
@@ -37,8 +38,9 @@ def commands() -> None:
 @click.option("--target", type=click.Choice(["python", "native", "both"]), default="python", show_default=True,
               help="Kind of FMU: python (pythonfmu, ONNX networks in onnxruntime), native (C; no Python where it "
                    "runs), or both.")  # fmt: skip
-@click.option("--platforms", default="all", show_default=True, metavar="all|host|LIST",
-              help="Of a native FMU: all (with ziglang, else this machine's), host, e.g. win64,win32.")  # fmt: skip
+@click.option("--platforms", default=None, metavar="all|host|LIST",
+              help="Of a native FMU: all (with ziglang, else this machine's), host, e.g. win64,win32.  "
+                   "[default: all]")  # fmt: skip
 @click.option("--output", type=click.Path(path_type=Path, file_okay=False), default=None, metavar="DIR",
               help="Folder for the FMU and what belongs to it.  [default: out/<gearbox>]")  # fmt: skip
 @click.option("--correction", type=click.Path(path_type=Path, dir_okay=False), default=None, metavar="FILE",
@@ -56,7 +58,7 @@ def commands() -> None:
 def build_fmu(
     gearbox: str,
     target: str,
-    platforms: str,
+    platforms: str | None,
     output: Path | None,
     correction: Path | None,
     preset: str,
@@ -69,6 +71,8 @@ def build_fmu(
     from builder.build import build  # imports scikit-learn and onnx, which the other verbs need not wait for
 
     check_workers(jobs, dask_address)
+    if platforms is not None and target == "python":
+        raise InputError("--platforms is about native FMUs: give it with --target native or both")
     definition = load_gearbox(gearbox)
     found = None if correction is None else read_correction(correction, definition.network(), made_for=definition)
     folder = output if output is not None else Path("out") / Path(gearbox).stem
@@ -77,7 +81,7 @@ def build_fmu(
         folder,
         name=Path(gearbox).stem,
         target=target,
-        platforms=platforms,
+        platforms=platforms or "all",
         preset=preset,
         samples=samples,
         seed=seed,

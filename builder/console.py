@@ -10,10 +10,10 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-# In a pipe rich would assume 80 columns and cut the tables.
+# No markup: names of files and gearboxes may hold brackets. In a pipe rich would assume 80 columns and cut the tables.
 PIPE_WIDTH = 160
-out = Console(soft_wrap=True, highlight=False, width=None if sys.stdout.isatty() else PIPE_WIDTH)
-err = Console(stderr=True, soft_wrap=True, highlight=False)
+out = Console(soft_wrap=True, highlight=False, markup=False, width=None if sys.stdout.isatty() else PIPE_WIDTH)
+err = Console(stderr=True, soft_wrap=True, highlight=False, markup=False)
 
 Report = Callable[[int, int], None]
 

@@ -34,7 +34,7 @@ class _HoldoutOfMany(click.Command):
             if word == "--":
                 return super().parse_args(ctx, words + args[place:])
             if word.startswith("-"):
-                held_out = word == "--holdout"
+                held_out = word.partition("=")[0] == "--holdout"
             elif held_out and words[-1] != "--holdout":
                 words.append("--holdout")
             words.append(word)
@@ -117,7 +117,7 @@ def diagnose(
         tell("writing the report")
         names = [path.name for path in write_files(found, definition, [*train, *held], stage)]
     for line in found.summary():
-        console.out.print(line, markup=False)
+        console.out.print(line)
     console.out.print()
     for name in names:
         console.out.print(f"wrote {output / name}")
@@ -127,7 +127,7 @@ def _tell_notes(recordings: Sequence[Recording]) -> None:
     """What was cleaned, assumed or not used; all of it stands in the report."""
     notes = [f"{recording.name}: {note}" for recording in recordings for note in recording.notes]
     for note in notes[:MOST_NOTES]:
-        console.err.print(f"note: {note}", markup=False)
+        console.err.print(f"note: {note}")
     if len(notes) > MOST_NOTES:
         console.err.print(f"{len(notes) - MOST_NOTES} more notes stand in the report")
 
@@ -158,12 +158,12 @@ def _diagnose_fleet(
     found.show()
     console.out.print(f"wrote {output / SUMMARY}, and a folder for each that was diagnosed")
     for name, fault in found.faults.items():
-        console.err.print(f"{name}:\n{fault}", style="red", markup=False)
+        console.err.print(f"{name}:\n{fault}", style="red")
     failed = [f"{row.gearbox}: {row.error}" for row in found.rows if row.error]
     if failed:
         message = "\n".join([f"{len(failed)} of {len(found.rows)} gearboxes could not be diagnosed:", *failed])
         if found.faults:
-            console.err.print(message, style="red", markup=False)
+            console.err.print(message, style="red")
             raise SystemExit(1)
         raise InputError(message)
 

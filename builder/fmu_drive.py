@@ -17,12 +17,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
+from zipfile import ZipFile
 
 import fmpy
 import numpy as np
 from fmpy import fmi2
 from fmpy.fmi1 import FMICallException
 
+from builder.native_compile import host_platform
 from builder.signals import input_column, result_column
 from builder.units import UNITS
 from models.cycle import Cycle
@@ -78,6 +80,12 @@ def drive_fmu(
         return _driven(fmu, cycle.time, table, progress)
 
 
+def runs_here(path: Path) -> bool:
+    """Whether an FMU has a binary for this machine."""
+    with ZipFile(path) as archive:
+        return any(name.startswith(f"binaries/{host_platform()}/") for name in archive.namelist())
+
+
 def fmu_inputs(path: Path) -> tuple[str, ...]:
     """Columns of a cycle that an FMU takes beside the usual ones (for :func:`builder.files.read_cycle`).
 
@@ -109,6 +117,7 @@ class LoadedFmu:
     description: Any
     slave: Any = None
     messages: list[tuple[int, str]] = field(default_factory=list)
+    doing: str = ""  # for a fault that the FMU tells
 
     def __post_init__(self) -> None:
         """Find the variables."""
@@ -180,7 +189,7 @@ class LoadedFmu:
         if not isinstance(initial, Mapping):
             self._set_real(self.variables["initial.T"], initial)
             return
-        nodes = {name.removesuffix(".T").strip("'") for name in self.variables if name.endswith(".T")}
+        nodes = {v.name.removesuffix(".T").strip("'") for v in self._outputs if v.name.endswith(".T")}
         unknown = [name for name in initial if name not in nodes]
         faults = [f"{name!r} is not a node of this FMU{did_you_mean(name, nodes)}" for name in unknown]
         missing = [name for name in starts if name not in initial]
@@ -257,8 +266,9 @@ def loaded(path: Path) -> Iterator[LoadedFmu]:
             yield fmu
         except FMICallException as error:
             dead = error.status > DISCARD + 1
-            fmu.hear(error.function)
-            raise InputError(f"{path}: {error}") from error
+            doing = fmu.doing or error.function
+            fmu.hear(doing)
+            raise InputError(f"{path}: {doing}: {error}") from error
         finally:
             if not dead:
                 with suppress(FMICallException):
@@ -279,6 +289,7 @@ def _driven(fmu: LoadedFmu, time: Array, table: Array, progress: Callable[[int, 
     for row in range(n_rows - 1):
         begin, end = float(time[row]), float(time[row + 1])
         change = table[row + 1] - table[row]
+        fmu.doing = f"between {begin:g} and {end:g} s"
         pieces = _pieces(fmu.inputs, end - begin, table[row], table[row + 1])
         if fmu.interpolates:
             fmu.set_inputs(table[row].tolist())

@@ -195,7 +195,11 @@ def _zig() -> Compiler | None:
 
 def _own_compiler() -> Compiler | None:
     named = os.environ.get("CC")
-    for command in [shlex.split(named)] if named else [["cc"], ["gcc"], ["clang"]]:
+    try:
+        own = [shlex.split(named)] if named else [["cc"], ["gcc"], ["clang"]]
+    except ValueError as error:
+        raise InputError(f"CC is {named!r}, which cannot be read ({error}); correct it or unset it") from error
+    for command in own:
         if command and shutil.which(command[0]):
             return Compiler(tuple(command), _output([*command, "--version"]), is_zig=False)
     if named:
@@ -212,7 +216,10 @@ def _library(sources: Mapping[str, bytes], compiler: Compiler, target: Platform)
     folder = _cache_folder()
     if folder is None:
         return _compiled(sources, compiler, options, target)
-    digest = hashlib.sha256(repr((compiler.version, options, sorted(sources.items()))).encode()).hexdigest()
+    # zig is the same in every virtual environment, and another compiler's own options are part of its command.
+    command = compiler.command[1:] if compiler.is_zig else compiler.command
+    made_of = (compiler.version, command, options, sorted(sources.items()))
+    digest = hashlib.sha256(repr(made_of).encode()).hexdigest()
     kept = folder / f"{digest}{target.suffix}"
     try:
         return kept.read_bytes()

@@ -99,6 +99,6 @@ def _told() -> Iterator[Callable[[str, int, int], None]]:
         part = LINES * done // max(of, 1)
         if last.get(what) != part:
             last[what] = part
-            console.err.print(f"{what}: {done} of {of}, {(time.perf_counter() - begin) / 60.0:.0f} min", markup=False)
+            console.err.print(f"{what}: {done} of {of}, {(time.perf_counter() - begin) / 60.0:.0f} min")
 
     yield tell

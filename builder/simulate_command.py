@@ -72,10 +72,8 @@ def _full_model(name_or_file: str, correction: Path | None) -> Model:
     trained = None if gearbox.is_parametric else gearbox.training
 
     def run(cycle: Cycle, initial: Initial, progress: console.Report) -> dict[str, Array]:
-        # A result that is continued also has temperatures of boundaries.
-        start = {name: initial[name] for name in nodes} if isinstance(initial, Mapping) else initial
         losses = gearbox.loss_laws()
-        return network.simulate(cycle, losses=losses, initial=start, trained=trained, progress=progress).columns()
+        return network.simulate(cycle, losses=losses, initial=initial, trained=trained, progress=progress).columns()
 
     return Model(
         title=f"{gearbox.name}, full model",
@@ -155,6 +153,7 @@ def simulate(
     start = recorded.of(model.nodes) if initial == RECORDED else given
     if isinstance(start, Mapping):
         _check_complete(start, model.nodes, str(initial))
+        start = {name: start[name] for name in model.nodes}  # a result also has temperatures of boundaries
     if output_interval is not None:
         cycle = cycle.refined(output_interval)
     with console.progress_bar("simulating") as progress:
@@ -166,6 +165,7 @@ def simulate(
             plot_cycle(picture, columns, title=f"{model.title}: {files[-1].name}", groups=model.groups)
         write_table(output, columns)
     _show(columns)
+    _tell_assumed(columns, cycle)
     _warn_of_domain(columns, model.domain)
     if initial is None:
         _warn_of_start(columns, recorded, model.nodes)
@@ -218,6 +218,12 @@ def _mean_over_time(time: Array, values: Array) -> float:
     return float(np.trapezoid(values, time) / span if span > 0.0 else values[0])
 
 
+def _tell_assumed(columns: Mapping[str, Array], cycle: Cycle) -> None:
+    for name, (column, *_) in COLUMNS.items():
+        if name not in cycle.inputs and column in columns:
+            console.err.print(f"note: the cycle has no column {column}; {columns[column][0]:g} is assumed")
+
+
 def _warn_of_domain(columns: Mapping[str, Array], domain: str) -> None:
     outside = int((~columns["in_domain"].astype(bool)).sum())
     if outside:
@@ -238,4 +244,4 @@ def _warn_of_start(columns: Mapping[str, Array], recorded: RecordedStart, nodes:
 
 
 def _warn(text: str) -> None:
-    console.err.print(f"warning: {text}", style="yellow", markup=False)
+    console.err.print(f"warning: {text}", style="yellow")

@@ -63,7 +63,7 @@ class Slot:
         """Why `value` cannot be used, or None."""
         if not math.isfinite(value):
             return f"{self.name} is {value}; a finite number is needed"
-        slack = BOUND_TOLERANCE * abs(value)  # a bound converted from another unit is a rounding off
+        slack = BOUND_TOLERANCE * max(1.0, abs(value))  # a bound converted from another unit is a rounding off
         if self.minimum - slack <= value <= self.maximum + slack:
             return None
         unit = "" if self.unit in ("", "1") else f" {self.unit}"
@@ -342,8 +342,8 @@ class Twin:
         return [fault for fault in found if fault is not None]
 
     def _inner(self, index: int) -> float:
-        scale, offset = self._affine[index]
-        return self.values[index] * scale + offset
+        slot, (scale, offset) = self.slots[index], self._affine[index]
+        return min(max(self.values[index], slot.minimum), slot.maximum) * scale + offset
 
     def _evaluate(self) -> None:
         system, inputs, state = self._prepared()

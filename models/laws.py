@@ -359,7 +359,7 @@ def c_function_source(name: str, arguments: Mapping[str, str], expressions: Sequ
         If an expression uses a function that C lacks.
     """
     printer = _CPrinter(arguments)
-    common, reduced = sp.cse(list(expressions), symbols=sp.numbered_symbols("x", real=True))
+    common, reduced = sp.cse(list(expressions), symbols=sp.numbered_symbols("_x", real=True))
     try:
         lines = [f"const double {variable} = {printer.doprint(value)};" for variable, value in common]
         lines += [f"y[{index}] = {printer.doprint(value)};" for index, value in enumerate(reduced)]

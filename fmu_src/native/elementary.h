@@ -3,9 +3,17 @@
 #ifndef ELEMENTARY_H
 #define ELEMENTARY_H
 
+#include <float.h>
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
+
+#ifdef __FAST_MATH__
+#error "these functions count on exact rounding: compile without -ffast-math"
+#endif
+#if FLT_EVAL_METHOD == 2 && !defined __STRICT_ANSI__
+#error "the x87 unit rounds too late for these functions: compile with -std=c99 or for SSE2 (-msse2 -mfpmath=sse)"
+#endif
 
 #define LARGEST_EXPONENT 700.0
 

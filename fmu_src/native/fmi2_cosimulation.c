@@ -13,7 +13,7 @@
 #include <string.h>
 
 #define LONGEST_STEP_S 1e9
-#define BOUND_TOLERANCE 1e-9 /* a bound converted from another unit is a rounding off */
+#define BOUND_TOLERANCE 1e-9 /* a bound converted from another unit, or reached by a ramp, is a rounding off */
 #define TIME_TOLERANCE 1e-6  /* of the time itself, where the host's clock and ours are compared */
 #define KELVIN 273.15
 
@@ -87,7 +87,7 @@ fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean loggingOn, size_t nC
 /* ---------------------------------------------------------------------------------------------------- usable values */
 
 static int usable(const Variable *variable, double value) {
-    const double slack = BOUND_TOLERANCE * fabs(value);
+    const double slack = BOUND_TOLERANCE * fmax(1.0, fabs(value));
     return variable->access == CALCULATED
         || (isfinite(value) && value >= variable->minimum - slack && value <= variable->maximum + slack);
 }

@@ -23,9 +23,11 @@ typedef struct {
 
 const size_t model_state_size = sizeof(State), model_scratch_size = sizeof(Scratch);
 
-static double inner(const Model *model, Place place) {
-    return model->values[place.reference] * place.scale + place.offset;
+static double inner_after(const Model *model, Place place, double elapsed) {
+    return value_after(model, place.reference, elapsed) * place.scale + place.offset;
 }
+
+static double inner(const Model *model, Place place) { return inner_after(model, place, 0.0); }
 
 static void show(Model *model, Place place, double value) {
     model->values[place.reference] = (value - place.offset) / place.scale;
@@ -125,27 +127,25 @@ ModelStatus model_step(Model *model, double duration) {
     Scratch *scratch = model->scratch;
     ThermalState thermal = state->thermal;
     const int was_outside = state->outside != 0.0;
-    double inputs[N_INPUTS], before[N_INPUTS], slopes[N_INPUTS], T[N_LOSS_NODES], T_before[N_LOSS_NODES], failed_at;
+    double before[N_INPUTS], inputs[N_INPUTS], T[N_LOSS_NODES], T_before[N_LOSS_NODES], failed_at;
     const char *fault;
     int at_once;
     if (prepare(model) != MODEL_OK) return MODEL_REFUSED;
     for (int i = 0; i < N_INPUTS; i++) {
-        before[i] = inputs[i] = inner(model, INPUTS[i]);
-        slopes[i] = model->slopes[INPUTS[i].reference] * INPUTS[i].scale;
+        before[i] = inner(model, INPUTS[i]);
+        inputs[i] = inner_after(model, INPUTS[i], duration);
     }
     loss_temperatures(&thermal, T_before);
     at_once = !was_outside && loss_domain_distance(before[0], before[1], T_before) > 0.0;
-    fault = network_advance(&scratch->network, &thermal, model->time, duration, inputs, slopes, &failed_at);
+    fault = network_advance(&scratch->network, &thermal, model->time, duration, before, inputs, &failed_at);
     if (fault) {
         snprintf(model->message, MESSAGE_SIZE, "the heat balance cannot be solved from %g s on: %s at %g s",
                  model->time, fault, failed_at);
         return MODEL_REFUSED;
     }
     state->thermal = thermal;
-    for (int i = 0; i < N_INPUTS; i++) {
-        model->values[INPUTS[i].reference] += model->slopes[INPUTS[i].reference] * duration;
-        inputs[i] = inner(model, INPUTS[i]);
-    }
+    for (int i = 0; i < N_INPUTS; i++)
+        model->values[INPUTS[i].reference] = value_after(model, INPUTS[i].reference, duration);
     loss_temperatures(&thermal, T);
     state->outside = loss_domain_distance(inputs[0], inputs[1], T) > 0.0;
     /* One warning when the range is left, of the first moment that it was seen; none while it stays outside. */

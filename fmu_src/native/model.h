@@ -2,7 +2,7 @@
 
    Values stand in one array of doubles, one per variable in the order of the table; the place in the table is the FMI
    value reference. The FMI layer guards them: whenever the model is called, all inputs and parameters are finite and
-   within their bounds, fixed parameters have not changed since the start, and the calls come in an allowed order. */
+   within their bounds but for rounding, fixed parameters have not changed since the start, and the calls come in an allowed order. */
 #ifndef MODEL_H
 #define MODEL_H
 
@@ -46,6 +46,13 @@ typedef enum {
 extern const char model_guid[];
 extern const unsigned model_variable_count;
 extern const Variable model_variables[];
+
+/* A settable value `elapsed` s into the next step, within its bounds to the last bit: laws may take roots of it. */
+static inline double value_after(const Model *model, unsigned reference, double elapsed) {
+    const Variable *variable = &model_variables[reference];
+    const double value = model->values[reference] + model->slopes[reference] * elapsed;
+    return value < variable->minimum ? variable->minimum : value > variable->maximum ? variable->maximum : value;
+}
 
 /* Written with the model */
 extern const size_t model_state_size, model_scratch_size;

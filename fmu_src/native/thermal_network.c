@@ -64,8 +64,8 @@ const Balance *network_balance(Network *network, double time, const double *inpu
     return &network->now;
 }
 
-const char *network_advance(Network *network, ThermalState *state, double time, double duration, const double *inputs,
-                            const double *slopes, double *failed_at) {
+const char *network_advance(Network *network, ThermalState *state, double time, double duration, const double *begin,
+                            const double *end, double *failed_at) {
     Balance *const now = &network->now, *const then = &network->then;
     const double *const capacity = network->capacity;
     double elapsed = 0.0;
@@ -76,12 +76,13 @@ const char *network_advance(Network *network, ThermalState *state, double time, 
         double factors[N_FACTORS], now_inputs[N_INPUTS], then_inputs[N_INPUTS];
         double k_1[N_PARTS], k_2[N_PARTS], both[N_PARTS];
         double rate_1[AT_LEAST_ONE(N_MEMORY)], rate_2[AT_LEAST_ONE(N_MEMORY)];
+        const double share = elapsed / duration, later_share = smaller((elapsed + h) / duration, 1.0);
         double error = 0.0, sum = 0.0, next_step;
         ThermalState later = *state;
         *failed_at = time + elapsed;
         for (int i = 0; i < N_INPUTS; i++) {
-            now_inputs[i] = inputs[i] + slopes[i] * elapsed;
-            then_inputs[i] = inputs[i] + slopes[i] * (elapsed + h);
+            now_inputs[i] = begin[i] + (end[i] - begin[i]) * share;
+            then_inputs[i] = begin[i] + (end[i] - begin[i]) * later_share;
         }
         find_balance(network, now, time + elapsed, now_inputs, state);
         find_gain(now);

@@ -96,7 +96,6 @@ ModelStatus model_start(Model *model) {
 
 ModelStatus model_step(Model *model, double duration) {
     double *v = model->values;
-    const double *slopes = model->slopes;
     State state = *(State *)model->state;
     /* A little more room: masters that add up their steps give 0.1 s as 0.1000000001 s now and then. */
     const double parts = ceil(fmin(duration, LONGEST_STEP_S) / LONGEST_INNER_STEP_S - 1e-3);
@@ -109,17 +108,17 @@ ModelStatus model_step(Model *model, double duration) {
     }
     for (long i = 0; i < steps; i++) {
         const double t = ((double)i + 0.5) * h;
-        drive(v, v[SPEED_DEMAND] + slopes[SPEED_DEMAND] * t, h, &state);
-        move(v, h, v[TORQUE_LOSS] + slopes[TORQUE_LOSS] * t, v[SLOPE] + slopes[SLOPE] * t, &state);
+        drive(v, value_after(model, SPEED_DEMAND, t), h, &state);
+        move(v, h, value_after(model, TORQUE_LOSS, t), value_after(model, SLOPE, t), &state);
     }
     if (!isfinite(state.speed)) {
         snprintf(model->message, MESSAGE_SIZE, "the motion cannot be followed with these parameters; check mass and inertia");
         return MODEL_REFUSED;
     }
     *(State *)model->state = state;
-    v[SPEED_DEMAND] += slopes[SPEED_DEMAND] * duration;
-    v[TORQUE_LOSS] += slopes[TORQUE_LOSS] * duration;
-    v[SLOPE] += slopes[SLOPE] * duration;
+    v[SPEED_DEMAND] = value_after(model, SPEED_DEMAND, duration);
+    v[TORQUE_LOSS] = value_after(model, TORQUE_LOSS, duration);
+    v[SLOPE] = value_after(model, SLOPE, duration);
     return MODEL_OK;
 }
 

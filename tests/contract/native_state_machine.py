@@ -78,7 +78,8 @@ def bounds(variable: Any) -> tuple[float, float]:
 
 def usable(reference: int, value: float) -> bool:
     low, high = SUBJECT.valid[reference]
-    return math.isfinite(value) and low <= value <= high
+    slack = 1e-9 * max(1.0, abs(value)) if math.isfinite(value) else 0.0
+    return math.isfinite(value) and low - slack <= value <= high + slack
 
 
 def doubles(values: list[float]) -> Any:

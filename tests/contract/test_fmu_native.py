@@ -161,6 +161,22 @@ def test_a_set_input_is_held_and_a_refused_step_keeps_the_rates(host: Host) -> N
     assert host.get("T_ambient")[0] == LOADED["T_ambient"] - 10.0
 
 
+def test_an_input_may_ramp_to_its_bound(host: Host) -> None:
+    """Sums of rounded numbers end a little beyond it; a law that takes a root of the air's speed must not see that."""
+    rng = np.random.default_rng(0)
+    below = 0
+    for value, duration in rng.uniform((0.5, 1.0), (10.0, 9.0), (40, 2)):
+        host.set(air_speed=value)
+        below += value + (-value / duration) * duration < 0.0
+        set_rates(host, air_speed=-value / duration)
+        host.step(duration)
+        assert 0.0 <= host.get("air_speed")[0] < 1e-14
+        assert np.isfinite(list(host.outputs().values())).all()
+    assert below > 0
+    host.set(air_speed=-1e-6)
+    assert "air_speed is -1e-06 m/s; 0 to 200 m/s is possible" in host.refused()
+
+
 @pytest.mark.parametrize(("name", "order", "value"), [("oil.T", 1, 1.0), ("speed", 2, 1.0), ("speed", 1, np.nan)])
 def test_impossible_rates_are_refused(host: Host, name: str, order: int, value: float) -> None:
     arrays = (c_uint * 1)(reference(host, name)), (c_int * 1)(order), (c_double * 1)(value)
@@ -477,6 +493,17 @@ def test_cache_is_used_and_follows_the_sources(compiled: list[str], tmp_path: Pa
     assert len(list((tmp_path / "cache").iterdir())) == 2
 
 
+def test_cache_knows_the_compilers_own_options(compiled: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    own = native_compile._own_compiler()
+    if own is None:
+        pytest.skip("no compiler of the machine's own")
+    libraries = []
+    for number in (1, 2):
+        monkeypatch.setenv("CC", f"{own.command[0]} -DNUMBER={number}")
+        libraries.append(compile_libraries({"one.c": b"int one(void) { return NUMBER; }\n"}, "host").libraries)
+    assert libraries[0] != libraries[1] and len(compiled) == 2
+
+
 def test_cache_that_cannot_be_written_is_done_without(
     compiled: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -534,6 +561,9 @@ def test_without_any_compiler_it_is_told_how_to_get_one(monkeypatch: pytest.Monk
 def test_compiler_of_the_environment_is_taken_or_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("CC", "no-such-compiler -m64")
     with pytest.raises(InputError, match="no-such-compiler"):
+        plan_for("host")
+    monkeypatch.setenv("CC", "gcc 'x")
+    with pytest.raises(InputError, match="cannot be read .*correct it or unset it"):
         plan_for("host")
 
 

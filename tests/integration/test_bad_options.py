@@ -182,6 +182,7 @@ BUILD = {
     "--gearbox missing.toml": f"missing.toml: cannot be read ({FAR})",
     "--target native --platforms vax": "platform 'vax' is not known",
     "--target both --platforms ,": "no platform is named",
+    "--platforms host": "--platforms is about native FMUs",
     "--output file": "'file' is a file",
     "--output file/out": "file/out: cannot be written",
     "--dask nonsense": "no dask scheduler answers at nonsense",

@@ -59,6 +59,25 @@ def test_a_result_can_be_continued(cycle: Path, tmp_path: Path) -> None:
         assert begin[f"T_{node}_degC"] == pytest.approx(end[f"T_{node}_degC"], abs=1e-5)
 
 
+def test_what_is_assumed_is_told_and_names_are_as_given(
+    tmp_path: Path, fzg_fmu: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bare, warm, out = tmp_path / "bare.csv", tmp_path / "warm.csv", tmp_path / "run[v2][/b].csv"
+    bare.write_text("time_s,speed_rpm,torque_Nm\n0,1500,80\n10,1500,80\n")
+    assert run("simulate", "--gearbox", "fzg", bare, "--output", warm, "--initial", 40) == 0
+    table = pd.read_csv(warm)
+    table["T_cabinet_degC"] = 31.0  # is no node, and of a start no harm
+    table.to_csv(warm, index=False)
+    for driver in (("--gearbox", "fzg"), (fzg_fmu,)):
+        capsys.readouterr()
+        assert run("simulate", *driver, bare, "--initial", warm, "--output", out) == 0
+        shown = capsys.readouterr()
+        assert f"wrote {out}" in shown.out
+        told = [line for line in shown.err.splitlines() if line.startswith("note: ")]
+        assert told == [f"note: the cycle has no column {name}; {value} is assumed"
+                        for name, value in (("T_ambient_degC", 27), ("air_speed_m_s", 2))]  # fmt: skip
+
+
 def test_simulate_with_an_fmu_gives_the_same_columns(cycle: Path, tmp_path: Path, fzg_fmu: Path) -> None:
     full, driven = tmp_path / "full.csv", tmp_path / "fmu.csv"
     assert run("simulate", "--gearbox", "fzg", cycle, "--output", full) == 0

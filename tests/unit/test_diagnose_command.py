@@ -40,7 +40,7 @@ def asked_for(monkeypatch: pytest.MonkeyPatch) -> list[tuple[tuple[str, ...], tu
         ("a --holdout b --holdout c", ("a",), ("b", "c")),
         ("a --holdout b c --holdout d e", ("a",), ("b", "c", "d", "e")),
         ("--holdout b c --jobs 1 a", ("a",), ("b", "c")),
-        ("--holdout=b a c", ("a", "c"), ("b",)),
+        ("a --holdout=b c", ("a",), ("b", "c")),
         ("--holdout b c -- a --holdout", ("a", "--holdout"), ("b", "c")),
     ],
 )

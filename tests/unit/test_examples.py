@@ -20,7 +20,7 @@ EXAMPLES = Path(__file__).parents[2] / "examples"
 def test_the_mapping_of_the_examples_reads_a_recording_from_a_bench(tmp_path: Path, fzg: Gearbox) -> None:
     minutes = np.arange(0.0, 150.0, 0.25)
     table = pd.DataFrame({
-        "Zeit": minutes, "n Antrieb": 100.0 + minutes, "M Antrieb": 80.0, "Raum": 295.15,
+        "Zeit": minutes, "n Antrieb": 100.0 + minutes, "M Abtrieb": 120.0, "Raum": 295.15,
         "Sumpf": 22.0 + minutes / 5.0, "Bemerkung": "ruhig",
     })  # fmt: skip
     text = table.astype({"Sumpf": object})
@@ -30,6 +30,7 @@ def test_the_mapping_of_the_examples_reads_a_recording_from_a_bench(tmp_path: Pa
     (recording,) = read_recordings([tmp_path / "run.csv"], fzg.network())
     assert recording.time[-1] == pytest.approx(7185.0) and len(recording.time) == 480  # rows = 0..7200
     np.testing.assert_allclose(recording.inputs["speed"], (100.0 + minutes[:480]) * 30.0 / np.pi)
+    np.testing.assert_allclose(recording.inputs["torque"], 120.0 * 0.667)
     np.testing.assert_allclose(recording.inputs["T_ambient"], 22.0)
     assert (recording.inputs["air_speed"] == 2.0).all()
     (oil,) = recording.channels

@@ -139,6 +139,18 @@ def test_expressions_in_c_give_what_sympy_gives(library: Library) -> None:
         np.testing.assert_allclose(called(function, np.array([x, y]), out=len(LAWS)), expected, rtol=2e-14, atol=1e-15)
 
 
+def test_a_signal_may_have_any_name(library: Library) -> None:
+    """As have the common parts of laws that C names for itself."""
+    names = ["x0", "x1", "x2"]
+    a, b, c = map(symbol, names)
+    laws = [sp.sqrt(1 + (a + b) ** 2) * c, sp.sqrt(1 + (a + b) ** 2) + a, (a + b) ** 2 + c]
+    source = c_function_source("test", {name: f"s[{i}]" for i, name in enumerate(names)}, laws)
+    assert "const double" in source
+    function = library(f'#include "elementary.h"\n{source}').law_test
+    expected = [float(law.subs({a: 1.5, b: -0.7, c: 2.5})) for law in laws]
+    np.testing.assert_allclose(called(function, np.array([1.5, -0.7, 2.5]), out=3), expected, rtol=1e-15)
+
+
 def test_function_that_c_lacks_is_refused() -> None:
     with pytest.raises(InputError, match="cannot be written in C"):
         c_function_source("test", {"x": "s[0]"}, [sp.zeta(X)])
