@@ -10,7 +10,6 @@ from __future__ import annotations
 import argparse
 import itertools
 import json
-import os
 import subprocess
 import sys
 import tempfile
@@ -119,7 +118,7 @@ def measured(train: Sequence[Path], holdout: Sequence[Path], *, jobs: int, share
     """A diagnosis in a process of its own, watched from outside."""
     given = {"train": [*map(str, train)], "holdout": [*map(str, holdout)], "share": share, "jobs": jobs}
     code = f"from benchmarks.diagnose import once; once(**{given!r})"
-    load, begin = os.getloadavg()[0], time.perf_counter()
+    load, begin = psutil.getloadavg()[0], time.perf_counter()
     process = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True)
     cpu: dict[int, float] = {}
     peak = 0.0
