@@ -18,6 +18,7 @@ from models.types import Array
 SCHEMA = 1
 FAR_SD, MOST_FAR = 3.0, 3  # standard deviations of a prior, beyond which the summary tells of a parameter; how many
 LIKELY = 0.5  # probability from which a further place is told
+NEAREST, MOST_NEAREST = 0.1, 3  # probability from which what was not accepted is told, and of how many
 Verdict = Literal[
     "consistent", "parameter_error", "missing_physics", "sensor_fault", "unexplained", "insufficient_data"
 ]
@@ -29,9 +30,9 @@ VERDICT_TEXT: Mapping[str, str] = {
     "unexplained": "Something is missing, and it is none of the physics in the catalogue.",
     "insufficient_data": "These recordings are too short or too calm to decide.",
 }
-AHEAD = (
-    "more probable by what was learnt from, but refused (by the held-out recordings, as impossible, or as too small)"
-)
+REFUSED = "refused (by the held-out recordings, as impossible, or as too small)"
+AHEAD = f"more probable by what was learnt from, but {REFUSED}"
+NOT_ACCEPTED = f"by what was learnt from, but it was {REFUSED}"
 PARTLY = "Part of what is missing was found; the rest is none of the physics in the catalogue."
 
 
@@ -368,6 +369,13 @@ class Diagnosis:
         """The most probable place, and every other one that is likely: several effects have several."""
         return (*self.location[:1], *(place for place in self.location[1:] if place.probability >= LIKELY))
 
+    @property
+    def nearest(self) -> tuple[Ranked, ...]:
+        """What would explain the training data best, most probable first, where nothing was accepted."""
+        if self.findings or self.verdict in ("consistent", "insufficient_data"):
+            return ()
+        return tuple(one for one in self.ranking[:MOST_NEAREST] if one.probability >= NEAREST)
+
     def summary(self) -> list[str]:
         """The diagnosis in about ten lines."""
         lines = [f"{self.verdict.replace('_', ' ')}: {self.verdict_text}"]
@@ -376,6 +384,9 @@ class Diagnosis:
         if self.location and self.verdict not in ("consistent", "insufficient_data"):
             told = ", ".join(f"{place.node} ({place.probability:.2f})" for place in self.places)
             lines.append(f"Where: {told}; {self.location[0].regime}")
+        if self.nearest:
+            told = ", ".join(f"{one.mechanism} at {one.place} ({one.probability:.2f})" for one in self.nearest)
+            lines.append(f"Most like: {told}; {NOT_ACCEPTED}")
         for name, fits in (("training", self.train), ("held-out", self.holdout)):
             if fits.before == fits.before:
                 lines.append(

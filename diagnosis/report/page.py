@@ -11,7 +11,7 @@ from markupsafe import Markup
 
 from diagnosis import numbers
 from diagnosis.report import equation, figures, network_drawing, wording
-from diagnosis.result import Calibrated, Diagnosis, Finding, Fits
+from diagnosis.result import NOT_ACCEPTED, Calibrated, Diagnosis, Finding, Fits
 from diagnosis.stage import LEAST_RIVAL
 
 PACKAGE = "diagnosis.report"
@@ -42,6 +42,7 @@ def page(diagnosis: Diagnosis) -> str:
         script=Markup(_text("report.js")),  # noqa: S704 - our own file
         words=wording.WORDS,
         verdict_text=diagnosis.verdict_text,
+        not_accepted=NOT_ACCEPTED,
         claims=diagnosis.verdict not in network_drawing.NO_CLAIM,
         evidence=_evidence(diagnosis),
         findings=[_finding(finding, with_law) for finding in diagnosis.findings],

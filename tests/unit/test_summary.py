@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from diagnosis.result import AHEAD, VERDICT_TEXT
-from tests.unit.diagnosis_example import consistent, missing_physics, two_effects
+from diagnosis.report.page import page
+from diagnosis.result import AHEAD, NOT_ACCEPTED, VERDICT_TEXT, Ranked
+from tests.unit.diagnosis_example import consistent, missing_physics, two_effects, unexplained
 
 
 def test_what_was_found_where_and_how_well_it_fits() -> None:
@@ -29,6 +30,23 @@ def test_a_rival_that_the_held_out_recordings_refused_is_not_told_as_one_among_o
     assert any(line.startswith(f"{AHEAD}: {first.mechanism} at {first.place} (0.21)") for line in lines)
     near = replace(told, confusable_with=(replace(first, probability=0.19), *rest))
     assert AHEAD not in str(replace(found, findings=(near,)))
+
+
+def test_what_is_nearest_to_something_without_a_name_is_told() -> None:
+    ranking = tuple(
+        Ranked(mechanism=name, place="mesh", family="", log_bayes=log_bayes, probability=probability)
+        for name, log_bayes, probability in (
+            ("open_after_faster_loss", 190.0, 0.65), ("open_torque_loss", 170.0, 0.33), ("bearing_preload", 70.0, 0.02)
+        )
+    )  # fmt: skip
+    nameless = replace(unexplained(), findings=(), ranking=ranking)
+    told = f"Most like: open_after_faster_loss at mesh (0.65), open_torque_loss at mesh (0.33); {NOT_ACCEPTED}"
+    assert told in nameless.summary()
+    shown = page(nameless)
+    assert "<b>Most like:</b> open form (after faster, a loss) at mesh (0.65)" in shown
+    assert NOT_ACCEPTED in shown
+    for other in (unexplained(), replace(consistent(), ranking=ranking)):
+        assert other.nearest == () and "Most like" not in str(other) and "<b>Most like" not in page(other)
 
 
 def test_two_effects_are_both_told() -> None:
