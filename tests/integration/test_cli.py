@@ -269,6 +269,8 @@ def test_build_fmu_from_a_definition(tmp_path: Path, capsys: pytest.CaptureFixtu
     }
     python, native = (report["reference_cycle"][f"conveyor{suffix}.fmu"] for suffix in ("", "_native"))
     assert native["loss_difference_mean"] == pytest.approx(python["loss_difference_mean"], rel=0.1)
+    assert 1e-5 < python["loss_difference_mean"] < 0.02
+    assert 1e-4 < max(python["largest_temperature_difference_K"].values()) < 1.0
     shown = capsys.readouterr().out
     for row in ("mesh_sliding", "worst node", "conveyor.fmu", "conveyor_native.fmu"):
         assert row in shown

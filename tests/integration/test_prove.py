@@ -25,6 +25,7 @@ from diagnosis.proof import cycles, protocol
 from diagnosis.proof.protocol import BLIND, Settings, Task, plans_of, tasks_of
 from models.errors import InputError
 from models.gearbox import Gearbox
+from models.mechanisms import CATALOGUE
 
 ROOT = Path(__file__).parents[2]
 SETTINGS = Settings(seed=77, cases=6, cells_every=0, baselines=False)
@@ -76,7 +77,14 @@ def test_every_case_has_an_answer_and_the_score_counts_them(proof: dict[str, Any
     assert found["protocol"]["failed"] == 0
     assert found["protocol"]["refused"] == 0
     assert len(found["cases"]) == 6
-    assert len(found["removed"]) == 1
+    (removed,) = found["removed"]
+    (file,) = (proof["folder"] / protocol.VERDICTS).glob("*removed*.json")
+    said = json.loads(file.read_text())["said"]
+    ranked = {row["mechanism"] for row in said["ranking"]}
+    assert len(ranked) > 20
+    gone = removed["truth"][0].split(" at ")[0]
+    told = {f["mechanism"] for f in said["findings"]} | {u["mechanism"] for u in said["not_visible"]}
+    assert gone in CATALOGUE and gone not in ranked | told
     assert {case["group"] for case in found["cases"]} == {"control", "single", "double", "messy", "outside", "sensor"}
     consistent = next(rule for rule in found["rules"] if rule["key"] == "consistent")
     assert consistent["count"]["of"] + sum(c["truth"][0].startswith("parameter far") for c in found["cases"]) == 1

@@ -319,13 +319,15 @@ def test_thermostat_with_hysteresis() -> None:
 
 
 def test_state_that_decays() -> None:
-    """Running-in: an extra loss of 60 W that fades with 1800 s; the state is exact, its heat 60 W times 1800 s."""
+    """Running-in: an extra loss of 60 W that fades with 1800 s; in 2 h it gives all of 60 W times 1800 s but e^-4."""
     network = NETWORK.with_state("wear", start=1.0, rate=lambda s: -s.wear / 1800.0).with_source(
         "oil", lambda s: 60.0 * s.wear, name="run_in", is_loss=True
     )
     result = long_run(network, end=7200.0)
     wear = result.losses["run_in"] / 60.0
-    assert wear == pytest.approx(np.exp(-result.time / 1800.0), abs=2e-3)
+    assert wear == pytest.approx(np.exp(-result.time / 1800.0), abs=3e-5)
+    given = np.trapezoid(result.losses["run_in"], result.time)
+    assert given == pytest.approx(60.0 * 1800.0 * (1.0 - np.exp(-4.0)), rel=3e-4)
     assert closed(result) < 1e-6
     without = long_run(NETWORK, end=7200.0)
     assert np.max(result.temperatures["oil"] - without.temperatures["oil"]) > 2.0

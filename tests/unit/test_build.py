@@ -5,11 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 from zipfile import ZipFile
 
+import numpy as np
 import pytest
 
 from builder import build as builder_build
 from builder import fmu_drive
-from builder.build import build, staging
+from builder.build import build, cycle_errors, staging
 from builder.fmu_drive import runs_here
 from builder.native_compile import host_platform
 from builder.train import TrainingResult
@@ -65,6 +66,17 @@ def test_a_file_in_the_place_of_a_folder_is_told(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="networks: cannot be written"):
         make(tmp_path, "a.csv", "networks/mesh.onnx")
     assert written(tmp_path) == {"networks": "mine"}
+
+
+def test_errors_over_a_cycle_are_those_of_the_fmu_against_the_model() -> None:
+    model = {"time_s": [0.0, 1.0, 2.0], "T_ambient_degC": [20.0, 20.0, 20.0], "T_oil_degC": [20.0, 30.0, 40.0],
+             "T_mesh_degC": [20.0, 50.0, 60.0], "P_loss_W": [100.0, 200.0, 400.0]}  # fmt: skip
+    fmu = model | {"T_oil_degC": [20.0, 30.5, 40.25], "T_mesh_degC": [20.0, 47.0, 61.0],
+                   "P_loss_W": [101.0, 196.0, 400.0]}  # fmt: skip
+    errors = cycle_errors(*({name: np.array(values) for name, values in table.items()} for table in (fmu, model)))
+    assert errors.temperature_K == {"oil": 0.5, "mesh": 3.0}
+    assert errors.loss_mean == pytest.approx(0.01)
+    assert errors.loss_worst == pytest.approx(0.02)
 
 
 def test_an_fmu_that_cannot_run_here_is_built_and_that_is_told(

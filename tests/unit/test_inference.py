@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import sympy as sp
 
 from diagnosis import acceptance, assemble, beside, explain, search
 from diagnosis.case import Case, floored
@@ -41,6 +42,7 @@ from diagnosis.hypotheses import (
     switched_elsewhere,
     two_point_columns,
 )
+from diagnosis.latent import knots_of, latent_heat
 from diagnosis.network_on_grid import SLOW_NEAR_K, SLOW_REACH_K, NetworkOnGrid, named_values
 from diagnosis.noise import loss_noise, noise_of, start_guess
 from diagnosis.observation import readings
@@ -49,7 +51,7 @@ from diagnosis.predict import START_S, predict
 from diagnosis.recording import Channel, Recording
 from diagnosis.recurrence import lagged
 from diagnosis.shapes import shape_terms
-from diagnosis.stage import LEAST_SHARE, OPEN_PENALTY, Stage, log_e_value
+from diagnosis.stage import LEAST_SHARE, OPEN_PENALTY, Stage, log_e_value, log_weights
 from diagnosis.term_on_grid import TermOnGrid
 from diagnosis.trajectory import complete_start, exponential, parameter_heats, settled_balance, simulate
 from diagnosis.unknowns import Unknown, Unknowns, unknowns_of
@@ -224,6 +226,31 @@ def test_innovations_of_the_noise_are_white(model: NetworkOnGrid, piece: Piece, 
     assert temperatures.std() == pytest.approx(1.0, abs=0.02)
     lagged_product = np.mean(temperatures[1:] * temperatures[:-1])
     assert abs(lagged_product) < 0.03
+
+
+def test_an_unknown_heat_is_seen_where_it_is_and_told_with_its_size(
+    fzg: Gearbox, model: NetworkOnGrid, ride: dict[str, Array], problem: Problem
+) -> None:
+    """60 W that come to the oil after 20 min; beside readings of the model itself there is none."""
+    nodes, watts = ("oil", "housing_lower", "bearing_1"), 60.0
+    network = fzg.network().with_source("oil", lambda s: watts / (1.0 + sp.exp((1200.0 - s.time) / 60.0)), name="extra")
+    cycle = Cycle.from_columns(ride | {"air_speed_m_s": np.full(len(ride["time_s"]), 2.0)})
+    heated = network.simulate(cycle, losses=fzg.losses(), initial=25.0).columns()
+    channels = {n: heated["P_loss_W" if n == "P_loss" else f"T_{n}_degC"] for n in CHANNELS}
+    (read,) = pieces([recording_of(ride, channels)], model.laws.inputs, CHANNELS, even=True)
+    found = {}
+    for which, those in (("none", problem), ("heated", problem.changed(pieces=[read]))):
+        fit = those.fit()
+        found[which] = [
+            latent_heat(model, fit, Marginal.of(fit), node, loss_W=250.0, is_loss=False, knots=knots_of(those.pieces))
+            for node in nodes
+        ]
+    assert all(heat.log_bayes < 0.0 and np.abs(heat.mean[0]).max() < 2.0 for heat in found["none"])
+    oil, *others = found["heated"]
+    assert oil.log_bayes > 5.0 + max(heat.log_bayes for heat in others)
+    late, sd = float(oil.mean[0][-5]), float(oil.sd[0][-5])
+    assert abs(late - watts) < 2.0 * sd < 0.8 * watts
+    assert late > oil.mean[0][5] + 20.0
 
 
 def test_missing_readings_say_nothing(model: NetworkOnGrid, piece: Piece, problem: Problem) -> None:
@@ -908,6 +935,64 @@ def _judge(base: Any, gain: Any = 0.0) -> Any:
     """A judge by held-out recordings that gain so much, or what a function of an explanation says."""
     case: Any = SimpleNamespace(holdout=SimpleNamespace(slow=False))
     return SimpleNamespace(case=case, base=base, floor=1.0, gain=gain if callable(gain) else lambda _: gain)
+
+
+@pytest.mark.parametrize(
+    ("gain", "before", "after", "slow", "instrument", "supported"),
+    [
+        (-2.9, 1.0, 1.0, False, False, True),  # nats of predictive density that may be lost
+        (-3.1, 1.0, 1.0, False, False, False),
+        (-90.0, 1.0, 0.96, True, False, True),  # of means over minutes a better free run makes up for them
+        (-90.0, 1.0, 0.98, True, False, False),
+        (-90.0, 1.0, 0.96, False, False, False),
+        (50.0, 2.0, 2.09, False, False, True),  # 5 % of the calibrated model's error
+        (50.0, 2.0, 2.11, False, False, False),
+        (50.0, 0.2, 0.239, False, False, True),  # or 0.04 K
+        (50.0, 0.2, 0.241, False, False, False),
+        (50.0, 2.0, 2.59, False, True, True),  # 30 % for faults of instruments
+        (50.0, 2.0, 2.61, False, True, False),
+    ],
+)
+def test_what_held_out_recordings_allow(
+    *, gain: float, before: float, after: float, slow: bool, instrument: bool, supported: bool
+) -> None:
+    start = Explanation(problem=NOTHING, fit=NOTHING, log_evidence=0.0)
+    hypothesis = _scored("x", "oil", 0.0).hypothesis
+    term: Any = SimpleNamespace(of_measurement=instrument, parameters=(), states=())
+    fit = replace(start, found=(replace(hypothesis, term=term),))
+    judge = _judge(start, gain)
+    judge.case.holdout = SimpleNamespace(pieces=[1], slow=slow)
+    judge.rmse = lambda e: after if e is fit else before
+    assert acceptance.holds_out(judge, start, fit) is supported
+    judge.case.holdout.pieces = []
+    assert acceptance.holds_out(judge, start, fit)
+
+
+@pytest.mark.parametrize(("after", "supported"), [(0.77, True), (0.79, False)])
+def test_from_one_effect_to_the_next_the_held_out_error_grows_by_30_percent_at_most(
+    after: float, supported: bool
+) -> None:
+    start = Explanation(problem=NOTHING, fit=NOTHING, log_evidence=0.0)
+    one, two = (replace(start, found=start.found), replace(start, found=(_scored("x", "oil", 0.0).hypothesis,)))
+    judge = _judge(one, 50.0)
+    judge.case.holdout = SimpleNamespace(pieces=[1], slow=False)
+    judge.rmse = lambda e: {id(start): 1.0, id(one): 0.6, id(two): after}[id(e)]
+    assert acceptance.holds_out(judge, start, two) is supported
+
+
+def test_a_rate_of_false_alarms_sets_the_threshold() -> None:
+    assert search.threshold_at(0.05) == pytest.approx(5.0)
+    assert search.threshold_at(0.005) - search.threshold_at(0.05) == pytest.approx(np.log(10.0))
+
+
+def test_what_formulas_leave_in_consistent_recordings_needs_more_evidence() -> None:
+    for name, more in (("misalignment", 4.0), ("bearing_seat_contact", 4.0), ("churning_load", 5.0)):
+        pair = [_scored(name, "oil", 0.0), _scored("windage", "oil", 0.0)]
+        odd, usual = log_weights(pair)
+        assert usual - odd == pytest.approx(more)
+        fits = tuple(Explanation(problem=NOTHING, fit=NOTHING, log_evidence=0.0, found=(s.hypothesis,)) for s in pair)
+        odds = np.log(Stage(scored=(), log_e_value=0.0, fits=fits, gains=(20.0, 20.0)).probabilities())
+        assert odds[1] - odds[0] == pytest.approx(more)
 
 
 def test_another_place_of_the_same_physics_may_be_taken_where_the_best_one_fails(

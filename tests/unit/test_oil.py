@@ -11,7 +11,6 @@ from scipy.integrate import quad
 from models.errors import InputError
 from models.gearbox import load_gearbox
 from models.oil import (
-    D341_CONSTANT,
     T_HIGHEST,
     T_LOWEST,
     Oil,
@@ -164,7 +163,3 @@ def test_finite_and_positive_at_any_temperature(oil: Oil) -> None:
 def test_properties_are_held_outside_the_liquid_range() -> None:
     assert OIL.kinematic_viscosity(-200.0) == OIL.kinematic_viscosity(T_LOWEST)
     assert OIL.density(1000.0) == OIL.density(T_HIGHEST)
-
-
-def test_d341_holds_for_thin_oils_only_by_its_constant() -> None:
-    assert float(OIL.kinematic_viscosity(T_HIGHEST)) > 1.0 - D341_CONSTANT

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from diagnosis.mapping import RecordingMapping, dimension_of, read_mapping
+from diagnosis.mapping import UNITS, RecordingMapping, dimension_of, read_mapping
 from diagnosis.network_on_grid import NetworkOnGrid
 from diagnosis.recording import Recording, check_holdout, read_recordings
 from diagnosis.recording_cleaning import bridged, dropouts, outliers, resolution_of, stuck_rows
@@ -277,6 +277,27 @@ def test_the_own_mapping_comes_before_that_of_the_folder_and_a_definition_is_non
     assert "sump" in read(path, network).auxiliary
     (tmp_path / "run.toml").write_text('schema = 1\n[columns.sump]\nquantity = "T_oil"\n')
     assert "oil" in {c.name for c in read(path, network).channels}
+
+
+# What a number of 10 in each unit is inside: s, 1/min, N m, degC, m/s, W.
+TEN = {
+    "time": {"s": 10.0, "ms": 0.01, "min": 600.0, "h": 36_000.0, "d": 864_000.0},
+    "speed": {"1/min": 10.0, "rpm": 10.0, "min^-1": 10.0, "rad/s": 95.492965855, "1/s": 600.0, "Hz": 600.0,
+              "deg/s": 1.6666666667},
+    "torque": {"N m": 10.0, "N.m": 10.0, "Nm": 10.0, "kN m": 1e4, "kN.m": 1e4, "kNm": 1e4, "N mm": 0.01,
+               "lbf ft": 13.558179483, "lbf in": 1.1298482903},
+    "temperature": {"degC": 10.0, "°C": 10.0, "C": 10.0, "K": -263.15, "degF": -12.222222222, "°F": -12.222222222,
+                    "F": -12.222222222},
+    "air speed": {"m/s": 10.0, "km/h": 2.7777777778, "mph": 4.4704, "ft/s": 3.048},
+    "power": {"W": 10.0, "kW": 1e4, "MW": 1e7, "mW": 0.01, "hp": 7456.9987},
+}  # fmt: skip
+
+
+def test_every_unit_is_what_it_says() -> None:
+    found = {d: {u: 10.0 * factor + offset for u, (factor, offset) in units.items()} for d, units in UNITS.items()}
+    assert found.keys() == TEN.keys()
+    for dimension, values in TEN.items():
+        assert found[dimension] == pytest.approx(values, rel=1e-9), dimension
 
 
 def test_every_unit_of_a_mapping_converts_one_way_and_back(tmp_path: Path) -> None:

@@ -21,9 +21,9 @@ TINY = {"max_iter": 3, "starts": 1, "judged": 20, "hidden": dict.fromkeys(("mesh
 def test_default_preset_reaches_its_targets(seed):
     for row in train_surrogate(FZG, seed=seed, jobs=-1).report:
         assert row.r_squared >= 0.9999, row
-        assert row.median <= 0.003, row
-        assert row.percentile_95 <= 0.015, row
-        assert row.corner_percentile_95 <= 0.05, row
+        assert row.median <= 0.0025, row
+        assert row.percentile_95 <= 0.008, row
+        assert row.corner_percentile_95 <= 0.025, row
 
 
 def test_paper_preset_has_the_papers_r_squared_and_the_papers_flaw():
@@ -49,6 +49,29 @@ def test_judging_the_full_model_against_itself_finds_no_error():
     for row in judge(Itself(), full, count=50, seed=0):
         assert (row.r_squared, row.median, row.percentile_95, row.corner_percentile_95) == (1.0, 0.0, 0.0, 0.0)
     assert max(row.median for row in judge(surrogate, full, count=50, seed=0)) > 0.0
+
+
+def test_errors_that_are_known_are_what_is_told():
+    """A tenth of the points is 8 % off, the rest 1 %: in the middle 1 %, at the 95th percentile 8 %."""
+    full = FZG.losses()
+
+    class Off:
+        components, temperature_nodes = full.components, full.temperature_nodes
+        speed_bounds, torque_bounds, temperature_bounds = (1.0, 6500.0), (1.0, 350.0), (-20.0, 200.0)
+
+        def power(self, speed, torque, temperatures):
+            far = np.arange(len(speed)) % 10 == 0
+            return full.power(speed, torque, temperatures) * np.where(far, 1.08, 1.01)[:, None]
+
+    for row in judge(Off(), full, count=400, seed=0):
+        found = (row.median, row.percentile_95, row.corner_median, row.corner_percentile_95)
+        assert found == pytest.approx((0.01, 0.08, 0.01, 0.08), rel=1e-6), row.component
+        assert 0.99 < row.r_squared < 0.9999, row.component
+
+
+def test_quick_networks_of_the_tests_are_as_good_as_their_fixture_says(fzg_training):
+    assert max(row.median for row in fzg_training.report) < 0.015
+    assert min(row.r_squared for row in fzg_training.report) > 0.995
 
 
 def test_bounds_come_from_the_definition_above_the_full_models_floors():
