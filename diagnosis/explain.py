@@ -357,7 +357,9 @@ def _elsewhere(fits: Sequence[Explanation], jobs: int) -> list[Explanation]:
     best = max(fits, key=lambda e: e.log_evidence)
     own = best.found[-1]
     shaped = own.variants.shape[1] > 1
-    again = [shaped and e is not best and e.found[-1].name == own.name for e in fits]
+    # What was found beside another explanation has other unknowns.
+    beside = best.labels[:-1]
+    again = [shaped and e is not best and e.found[-1].name == own.name and e.labels[:-1] == beside for e in fits]
     better = iter(spread(jobs, [delayed(_started_from)(e, best) for e, it in zip(fits, again, strict=True) if it]))
     return [next(better) if it else e for e, it in zip(fits, again, strict=True)]
 

@@ -1633,6 +1633,10 @@ def test_what_one_place_found_is_tried_at_the_others(monkeypatch: pytest.MonkeyP
     found = explain._elsewhere(fits, 1)
     assert [e.log_evidence for e in found] == [50.0, 70.0, 20.0]
     assert tried == [("rain@lower", ("course",))]
+    # Beside another explanation there are other unknowns: nothing to start from.
+    elsewhere = replace(fits[1], found=(fits[2].found[-1], fits[1].found[-1]))
+    assert [e.log_evidence for e in explain._elsewhere([fits[0], elsewhere], 1)] == [50.0, 10.0]
+    assert len(tried) == 1
 
 
 @pytest.mark.parametrize(("verdict", "assumed", "said"), [
