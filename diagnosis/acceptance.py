@@ -103,9 +103,7 @@ def _only(stage: Stage, indices: Iterable[int]) -> Stage:
 
 def _has_no_name(stage: Stage, h: Hypothesis) -> bool:
     """Whether open forms are so far ahead of something of the catalogue that what is missing is none of it."""
-    opened = sum(
-        stage.probability_of(name) for name in {fit.found[-1].name for fit in stage.fits if fit.found[-1].is_open}
-    )
+    opened = float(stage.probabilities()[[fit.found[-1].is_open for fit in stage.fits]].sum())
     named = stage.probability_of(h.name)
     return not h.is_open and named < LEAST_PROBABILITY * (named + opened)
 

@@ -168,7 +168,7 @@ def _mapped(file: RecordingFile, network: ThermalNetwork, present: list[str], fa
 
 def _set_aside(rest: list[str], lacking: list[str], faults: list[str], notes: list[str]) -> None:
     """Columns that nothing asks for: told, so that none is lost by its name alone."""
-    slips = {name: slip for name in rest if (slip := meant(name, lacking, near=NEAR))}
+    slips = {name: slip for name in rest if (slip := meant(name, lacking, near=NEAR, told=True))}
     for name, slip in slips.items():
         faults.append(
             f"column {name[:80]} is not known; did you mean {slip!r}? Rename it, or name it in a mapping file "

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
-from difflib import get_close_matches
+from difflib import SequenceMatcher, get_close_matches
 
 KIND_WORDS = frozenset({"t", "temp", "temperature", "p", "power"})
 UNIT_WORDS = frozenset({
@@ -14,18 +14,18 @@ UNIT_WORDS = frozenset({
 SHORT_FOR = {"amb": "ambient", "tamb": "ambient", "tambient": "ambient"}
 
 
-def meant(name: str, lacking: Iterable[str], *, near: float) -> str:
+def meant(name: str, lacking: Iterable[str], *, near: float, near_stem: float = 1.0, told: bool = False) -> str:
     """The missing column that a name stands for by all appearance: nearly alike, or the same in other words.
-
-    A word alone, as ``oil``, may be anything; with a kind or a unit, or a second word, it is told well enough.
 
     Parameters
     ----------
     name : str
     lacking : iterable of str
         Columns that are asked for and not there
-    near : float
-        Likeness of the whole names (0 to 1) that makes one a slip of the other
+    near, near_stem : float
+        Likeness (0 to 1) of whole names, and of what they say beside kind and unit, that makes one a slip of the other
+    told : bool
+        Whether other words count only beside a kind or a unit: a column called ``oil`` alone may be anything
 
     Returns
     -------
@@ -36,22 +36,26 @@ def meant(name: str, lacking: Iterable[str], *, near: float) -> str:
     --------
     >>> meant("Temp_oil [K]", ["T_oil_degC", "T_ambient_degC"], near=0.9)
     'T_oil_degC'
-    >>> meant("oil", ["T_oil_degC"], near=0.9)
-    ''
+    >>> meant("oil", ["T_oil_degC"], near=0.9), meant("oil", ["T_oil_degC"], near=0.9, told=True)
+    ('T_oil_degC', '')
     """
     by_small = {other.lower(): other for other in lacking}
     close = get_close_matches(name.lower(), by_small, n=1, cutoff=near)
     if close:
         return by_small[close[0]]
-    if len(_words(name)) < 2:
+    if told and not _words(name) & (KIND_WORDS | UNIT_WORDS):
         return ""
-    return next((other for other in by_small.values() if _stem(name) and _stem(name) == _stem(other)), "")
+    return next((other for other in by_small.values() if _alike(_stem(name), _stem(other)) >= near_stem), "")
 
 
-def _words(name: str) -> list[str]:
-    return [word for word in re.split(r"[\W_]+", name.lower()) if word]
+def _alike(a: str, b: str) -> float:
+    return SequenceMatcher(None, a, b).ratio() if a and b else 0.0
+
+
+def _words(name: str) -> frozenset[str]:
+    return frozenset(re.split(r"[\W_]+", name.lower())) - {""}
 
 
 def _stem(name: str) -> str:
     """What a name says beside kind and unit: ``ambient`` of ``T_ambient``, ``Temp_amb_C`` and ``ambient_degC``."""
-    return "".join(SHORT_FOR.get(word, word) for word in _words(name) if word not in KIND_WORDS | UNIT_WORDS)
+    return "".join(sorted(SHORT_FOR.get(word, word) for word in _words(name) - KIND_WORDS - UNIT_WORDS))

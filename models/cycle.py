@@ -23,7 +23,8 @@ REQUIRED = ("speed", "torque")
 
 MOST_ROWS = 5_000_000  # of a refined cycle, as of a table that is read
 SHORTEST_INTERVAL_S = 1e-5  # times in files have six decimals
-NEAR = 0.9  # likeness of names: T_cabinet_degC is no slip of T_ambient_degC
+# Likeness of names (T_cabinet_degC is no slip of T_ambient_degC), and of what they say beside the unit.
+NEAR, NEAR_STEM = 0.9, 0.8
 
 
 @dataclass(frozen=True)
@@ -155,7 +156,7 @@ def _slips(unused: Iterable[str], absent: Sequence[str]) -> list[str]:
     return [
         f"column {name[:80]} is not known; is {column} meant? rename it, or remove it"
         for name in unused
-        if (column := meant(name, absent, near=NEAR))
+        if (column := meant(name, absent, near=NEAR, near_stem=NEAR_STEM))
     ]
 
 

@@ -43,7 +43,8 @@ const char *network_set(Network *network, const double *parameters);
 /* Sources, boundaries and losses at a moment. */
 const Balance *network_balance(Network *network, double time, const double *inputs, const ThermalState *state);
 
-/* Integrate over `duration`, the inputs going straight from `begin` to `end`; gives NULL, or why it cannot be done, and *failed_at. */
+/* Integrate over `duration`, the inputs going straight from `begin` to `end`; gives NULL, or why it cannot be done, and
+   *failed_at. */
 const char *network_advance(Network *network, ThermalState *state, double time, double duration, const double *begin,
                             const double *end, double *failed_at);
 
