@@ -6,7 +6,7 @@ import json
 import shutil
 import tempfile
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -253,7 +253,7 @@ def staging(folder: Path) -> Iterator[Path]:
     try:
         yield stage
         files = sorted(path for path in stage.rglob("*") if path.is_file())
-        _move_up(stage, {path: folder / path.relative_to(stage) for path in files})
+        _move_up(folder, {path: folder / path.relative_to(stage) for path in files})
     finally:
         shutil.rmtree(stage, ignore_errors=True)
         for parent in made:  # deepest first; with files in it the folder stays
@@ -261,27 +261,50 @@ def staging(folder: Path) -> Iterator[Path]:
                 parent.rmdir()
 
 
-def _move_up(stage: Path, goals: Mapping[Path, Path]) -> None:
-    """Move files to their goals, all or none: what stood there before is put back if one of them cannot be moved."""
+def _move_up(folder: Path, goals: Mapping[Path, Path]) -> None:
+    """Move files to their goals, all or none: what stood there is put back if one cannot be moved, or on an interrupt.
+
+    What stood there waits beside the goals, in a hidden folder of `folder` that goes only when nothing is left in it.
+    """
     for goal in goals.values():
         if goal.is_dir():
             raise InputError(f"{goal}: is a folder; remove it or choose another output")
-    replaced = Path(tempfile.mkdtemp(prefix="replaced-", dir=stage))
-    moved: list[tuple[Path, Path]] = []
+    before = Path(tempfile.mkdtemp(prefix=".replaced-", dir=folder))
+    moves: list[tuple[Path, Path]] = []
     try:
         for path, goal in goals.items():
             goal.parent.mkdir(parents=True, exist_ok=True)
-            old = [(goal, replaced / str(len(moved)))] if goal.exists() else []
+            old = [(goal, before / str(len(moves)))] if goal.exists() else []
             for source, target in (*old, (path, goal)):
+                moves.append((source, target))  # first, so that an interrupt finds it
                 source.replace(target)
-                moved.append((source, target))
-    except OSError as error:
-        for source, target in reversed(moved):
-            target.replace(source)
+    except BaseException as error:
+        kept = _put_back(moves)
+        with suppress(OSError):
+            before.rmdir()
+        if not isinstance(error, OSError):
+            raise
+        told = f"could not be put back: {kept}" if kept else "nothing was replaced"
         raise InputError(
-            f"{error.filename}: cannot be written ({error.strerror}); nothing was replaced. Close what holds it open, "
+            f"{error.filename}: cannot be written ({error.strerror}); {told}. Close what holds it open, "
             "or choose another output"
         ) from error
+    shutil.rmtree(before, ignore_errors=True)
+
+
+def _put_back(moves: Sequence[tuple[Path, Path]]) -> str:
+    """Undo moves, the last one first; gives where what cannot be moved back is, or nothing."""
+    left = []
+    for source, target in reversed(moves):
+        if not target.exists():  # not reached
+            continue
+        try:
+            if source.exists():  # what took its place could not be moved away
+                raise FileExistsError
+            target.replace(source)
+        except OSError:
+            left.append(f"{source} (it is {target})")
+    return ", ".join(left)
 
 
 @contextmanager

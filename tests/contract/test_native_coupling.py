@@ -97,7 +97,7 @@ def test_brakes_keep_their_limit(vehicle: Path) -> None:
     most = 6.0 * VALUES["mass"] + VALUES["engine.torque_braking"] * PER_SPEED + road
     slower = -np.diff(run["speed"][600:]) / 0.1
     moving = run["speed"][600:-1] > 1.0
-    assert 0.9 * most / MASS < slower[moving].max() < 1.001 * most / MASS
+    assert 0.97 * most / MASS < slower[moving].max() < 1.001 * most / MASS
 
 
 def test_steps_of_communication_do_not_matter_with_inputs_held(vehicle: Path) -> None:

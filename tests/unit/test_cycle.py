@@ -66,8 +66,10 @@ def test_all_faults_at_once_with_the_name_of_the_file() -> None:
     ("name", "meant"),
     [
         *((name, "T_ambient_degC") for name in ("T_amb_degC", "T_ambient", "T_ambient_C", "T_ambient_K", "ambient_degC",
-                                                "Tamb_degC", "t_ambient_degc", "T_ambiant_degC", "Temp_ambient [K]")),
-        *((name, "air_speed_m_s") for name in ("air_speed", "airspeed_m_s", "air_speed_mps", "Air_Speed_m_s")),
+                                                "Tamb_degC", "t_ambient_degc", "T_ambiant_degC", "Temp_ambient [K]",
+                                                "amb", "Tamb", "ambient", "ambint")),
+        *((name, "air_speed_m_s") for name in ("air_speed", "airspeed", "airspeed_m_s", "air_speed_mps",
+                                               "Air_Speed_m_s")),
         *((name, "valve_opening") for name in ("valve_openning", "Valve_opening", "valve_opening_m")),
     ],
 )  # fmt: skip

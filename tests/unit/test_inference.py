@@ -956,16 +956,18 @@ def _judge(base: Any, gain: Any = 0.0) -> Any:
 def test_what_held_out_recordings_allow(
     *, gain: float, before: float, after: float, slow: bool, instrument: bool, supported: bool
 ) -> None:
-    start = Explanation(problem=NOTHING, fit=NOTHING, log_evidence=0.0)
+    calibrated = Explanation(problem=NOTHING, fit=NOTHING, log_evidence=0.0)
     hypothesis = _scored("x", "oil", 0.0).hypothesis
     term: Any = SimpleNamespace(of_measurement=instrument, parameters=(), states=())
-    fit = replace(start, found=(replace(hypothesis, term=term),))
-    judge = _judge(start, gain)
+    fit = replace(calibrated, found=(replace(hypothesis, term=term),))
+    base = replace(calibrated)  # with a larger error, so that the limit from one effect to the next is not met
+    judge = _judge(base, gain)
     judge.case.holdout = SimpleNamespace(pieces=[1], slow=slow)
-    judge.rmse = lambda e: after if e is fit else before
-    assert acceptance.holds_out(judge, start, fit) is supported
+    errors = {id(fit): after, id(calibrated): before, id(base): before if slow else 10.0 * before}
+    judge.rmse = lambda e: errors[id(e)]
+    assert acceptance.holds_out(judge, calibrated, fit) is supported
     judge.case.holdout.pieces = []
-    assert acceptance.holds_out(judge, start, fit)
+    assert acceptance.holds_out(judge, calibrated, fit)
 
 
 @pytest.mark.parametrize(("after", "supported"), [(0.77, True), (0.79, False)])

@@ -122,6 +122,7 @@ def test_iso_times_and_their_start(tmp_path: Path, network: ThermalNetwork) -> N
         ("T_oil_C", "T_oil_degC"),
         ("oil_temp", "T_oil_degC"),
         ("Temperature oil [K]", "T_oil_degC"),
+        ("upper_housing_temp", "T_housing_upper_degC"),
         ("P_loss", "P_loss_W"),
         ("T_ambient_K", "T_ambient_degC"),
     ],
@@ -129,8 +130,9 @@ def test_iso_times_and_their_start(tmp_path: Path, network: ThermalNetwork) -> N
 def test_a_column_under_another_name_is_not_lost(
     tmp_path: Path, network: ThermalNetwork, given: str, meant: str
 ) -> None:
+    source = table().assign(T_housing_upper_degC=30.0)
     with pytest.raises(InputError, match=rf"column {re.escape(given)} is not known; did you mean '{meant}'"):
-        read(write(tmp_path / "run.csv", table().rename(columns={meant: given})), network)
+        read(write(tmp_path / "run.csv", source.rename(columns={meant: given})), network)
 
 
 def test_columns_that_nothing_asks_for_are_noted(tmp_path: Path, network: ThermalNetwork) -> None:
