@@ -218,7 +218,16 @@ def build(
         )  # fmt: skip
         (stage / "report.json").write_text(json.dumps(report.as_dict(), indent=2) + "\n", encoding="utf-8")
         made = sorted(path.relative_to(stage) for path in stage.rglob("*") if path.is_file())
-    return replace(report, files=tuple(folder / path for path in made))
+    files = tuple(folder / path for path in made)
+    return replace(report, files=files, notes=(*report.notes, *_left_from_before(folder, files)))
+
+
+def _left_from_before(folder: Path, files: Sequence[Path]) -> list[str]:
+    return [
+        f"{path} is of an earlier build: report.json and networks/ no longer tell about it"
+        for path in sorted(folder.glob("*.fmu"))
+        if path not in files
+    ]
 
 
 def cycle_errors(driven: Mapping[str, Array], reference: Mapping[str, Array]) -> CycleErrors:

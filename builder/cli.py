@@ -17,6 +17,7 @@ from builder.workers import check_workers
 from models.correction import read_correction
 from models.errors import InputError
 from models.gearbox import known_gearboxes, load_gearbox
+from models.version import DISTRIBUTION, project_version
 
 GEARBOX_HELP = f"Name ({', '.join(known_gearboxes())}) or definition file (TOML)."
 
@@ -27,7 +28,7 @@ def _stop(_number: int, _frame: FrameType | None) -> None:
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
-@click.version_option(package_name="gearbox-thermal-twin")
+@click.version_option(project_version(), prog_name=DISTRIBUTION)
 def commands() -> None:
     """Power loss and temperatures of cylindrical gearboxes: full model, surrogate and FMU."""
     signal.signal(signal.SIGTERM, _stop)

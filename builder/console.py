@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -12,6 +13,9 @@ from rich.table import Table
 
 # No markup: names of files and gearboxes may hold brackets. In a pipe rich would assume 80 columns and cut the tables.
 PIPE_WIDTH = 160
+for stream in (sys.stdout, sys.stderr):  # a finished job must not end with what the console's encoding cannot show
+    if isinstance(stream, io.TextIOWrapper):
+        stream.reconfigure(errors="backslashreplace")
 out = Console(soft_wrap=True, highlight=False, markup=False, width=None if sys.stdout.isatty() else PIPE_WIDTH)
 err = Console(stderr=True, soft_wrap=True, highlight=False, markup=False)
 

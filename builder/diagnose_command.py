@@ -31,6 +31,8 @@ class _HoldoutOfMany(click.Command):
         words: list[str] = []
         held_out = False
         for place, word in enumerate(args):
+            if word.startswith("-") and words[-1:] == ["--holdout"]:
+                raise click.UsageError(f"--holdout names no recording; {word} follows it", ctx)
             if word == "--":
                 return super().parse_args(ctx, words + args[place:])
             if word.startswith("-"):

@@ -180,9 +180,7 @@ def write_table(path: Path, columns: Mapping[str, ArrayLike]) -> None:
             try:
                 table.to_parquet(partial)
             except ImportError as error:
-                raise InputError(
-                    f"{path}: writing Parquet needs pyarrow; install gearbox-thermal-twin[parquet]"
-                ) from error
+                raise InputError(f"{path}: writing Parquet needs pyarrow; python -m pip install pyarrow") from error
         else:
             text = table.round(DECIMALS).to_csv(index=False, lineterminator="\n").encode()
             # Neither name nor time go into the archive, so that the same table gives the same bytes.

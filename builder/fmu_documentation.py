@@ -67,7 +67,7 @@ def _index(gearbox: Gearbox, table: SignalTable, identity: Identity, training: T
         f"{training.seed}. Made by {identity.generation_tool}."
     )
     template, of_kind = ((files("fmu_src") / name).read_text(encoding="utf-8") for name in (TEMPLATE, f"{kind}.html"))
-    stepping, needs = of_kind.replace("$identifier", escape(identity.model_identifier)).split("<!-- needs -->\n")
+    stepping, needs = of_kind.split("<!-- needs -->\n")
     return Template(template).substitute(
         stepping=stepping.rstrip(),
         needs=needs.rstrip(),
@@ -77,7 +77,6 @@ def _index(gearbox: Gearbox, table: SignalTable, identity: Identity, training: T
         validity=_table(validity),
         errors=_table(errors),
         step=f"{STEP_S:g}",
-        identifier=escape(identity.model_identifier),
         variables=_table(nomenclature(table)),
     )
 

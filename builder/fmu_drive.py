@@ -134,11 +134,6 @@ class LoadedFmu:
         self._orders = (c_int * len(self._inputs))(*(1 for _ in self._inputs))
         self._to_si = [UNITS[v.unit].column[1:] if v.unit in UNITS else (1.0, 0.0) for v in self._inputs]
 
-    @property
-    def output_columns(self) -> list[str]:
-        """Columns of the outputs, in order."""
-        return [str(result_column(v.name)) for v in self._outputs]
-
     def defaults(self) -> list[float]:
         """Start values of the inputs in the units of file columns."""
         return [_to_column(v, float(v.start)) for v in self._inputs]

@@ -24,7 +24,7 @@ from pathlib import Path
 from models.errors import InputError, did_you_mean
 
 CACHE_VARIABLE = "GEARBOX_TWIN_CACHE"
-GET_ZIG = "install ziglang: pip install 'gearbox-thermal-twin[native]'"
+GET_ZIG = "install ziglang: python -m pip install ziglang"
 # NaN and infinity keep their meaning: no -ffast-math. Nobody reads errno or floating-point exceptions.
 OPTIONS = (
     "-std=c99", "-O3", "-fno-unroll-loops", "-fno-math-errno", "-fno-trapping-math", "-ffp-contract=fast",

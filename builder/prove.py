@@ -22,7 +22,7 @@ from builder.build import staging
 from builder.doe import on_dask
 from diagnosis.proof import protocol
 from diagnosis.proof.protocol import BLIND, Settings, Task
-from models.gearbox import load_gearbox
+from models.gearbox import load_gearbox, names_a_file
 
 PAGE, NUMBERS = "proof.html", "proof.json"
 REFUSED = 2  # exit status of a diagnosis that does not accept its recordings
@@ -177,7 +177,7 @@ def work_of(recordings: Path, task: Task, gearbox: str) -> Work:
         Name or file of the definition; a file travels along
     """
     files, arguments = protocol.files_of(recordings, task)
-    if Path(gearbox).is_file():
+    if names_a_file(gearbox):
         files["gearbox.toml"] = Path(gearbox).read_bytes()
         gearbox = "gearbox.toml"
     return Work(kind=task.kind, files=files, arguments=(*arguments, "--gearbox", gearbox))

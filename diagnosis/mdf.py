@@ -60,7 +60,7 @@ def read_mdf(path: Path, *, base: str, limits: Limits = LIMITS) -> MdfTable:
     """
     check_file(path, limits)
     if find_spec("asammdf") is None:
-        raise InputError(f"{path}: reading MDF4 needs asammdf; install gearbox-thermal-twin[mdf]")
+        raise InputError(f"{path}: reading MDF4 needs asammdf; python -m pip install asammdf")
     header, channels = _in_own_process(path, limits)
     names = [channel["name"] for channel in header["channels"]]
     repeated = sorted({name for name in names if names.count(name) > 1})

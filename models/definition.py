@@ -190,9 +190,28 @@ class Shaft(Section):
     conductivity_W_mK: ThermalConductivity = 46.0
     heat_capacity_J_K: HeatCapacity | None = None
     surface_to_air: bool = False
+    length_in_air_mm: Annotated[float, between(0.1, 5000.0)] | None = None
 
     length = in_si("length_mm")
     diameter = in_si("diameter_mm")
+
+    @property
+    def length_in_air(self) -> float:
+        """Length that the surrounding air cools, [m]; the whole one where none is given, nothing without a surface."""
+        given = self.length_mm if self.length_in_air_mm is None else self.length_in_air_mm
+        return 1e-3 * given if self.surface_to_air else 0.0
+
+    def relations(self) -> tuple[Iterator[str], ...]:
+        """See :meth:`Section.relations`."""
+        return (self._air_faults(),)
+
+    def _air_faults(self) -> Iterator[str]:
+        if self.length_in_air_mm is None:
+            return
+        if not self.surface_to_air:
+            yield f"length_in_air_mm is {self.length_in_air_mm:g}, but surface_to_air is false; set it to true"
+        if self.length_in_air_mm > self.length_mm:
+            yield f"length_in_air_mm is {self.length_in_air_mm:g}, more than length_mm, which is {self.length_mm:g}"
 
 
 class Material(Section):
@@ -258,7 +277,6 @@ class Stage(Section):
 
     module = in_si("module_mm")
     pressure_angle = in_si("pressure_angle_deg")
-    helix_angle = in_si("helix_angle_deg")
     face_width = in_si("face_width_mm")
     center_distance = in_si("center_distance_mm")
     tip_diameter = optional_pair_in_si("tip_diameter_mm")

@@ -293,6 +293,18 @@ def known_gearboxes() -> tuple[str, ...]:
     return known_names(FOLDER)
 
 
+def names_a_file(name_or_path: str | Path) -> bool:
+    """Whether a definition file is named, by its ending or a folder, and not a gearbox that comes with the package.
+
+    Examples
+    --------
+    >>> names_a_file("fzg"), names_a_file("fzg.toml"), names_a_file("mine/fzg")
+    (False, True, True)
+    """
+    path = Path(name_or_path)
+    return not isinstance(name_or_path, str) or path.name != name_or_path or bool(path.suffix)
+
+
 def load_gearbox(name_or_path: str | Path) -> Gearbox:
     """Read a gearbox definition.
 
@@ -313,7 +325,7 @@ def load_gearbox(name_or_path: str | Path) -> Gearbox:
     (14.0, 0.014)
     """
     path = Path(name_or_path)
-    if not isinstance(name_or_path, str) or path.name != name_or_path or path.suffix:
+    if names_a_file(name_or_path):
         return read_gearbox(read_text(path), file=path.name)
     if name_or_path not in known_gearboxes():
         hint = did_you_mean(name_or_path, known_gearboxes())

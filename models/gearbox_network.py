@@ -255,7 +255,7 @@ class _Builder:
 
     def _shaft_links(self) -> Iterator[Link]:
         for shaft in self.gearbox.shaft:
-            if shaft.surface_to_air:
+            if shaft.length_in_air:
                 yield self._link(shaft.name, AIR, self._shaft_to_air(shaft))
             for bearing in self.gearbox.bearing:
                 if bearing.shaft == shaft.name:
@@ -270,7 +270,7 @@ class _Builder:
         omega = self.speed * RPM * self.gearbox.speed_ratio[shaft.name]
         Re = omega * shaft.diameter**2 / (2.0 * nu)
         h = 0.133 * Re ** sp.Float(2 / 3) * ht.PRANDTL_AIR ** (1 / 3) * k / shaft.diameter
-        return sp.Max(h, 5.0) * np.pi * shaft.diameter * shaft.length
+        return sp.Max(h, 5.0) * np.pi * shaft.diameter * shaft.length_in_air
 
     def _bearing_links(self) -> Iterator[Link]:
         for bearing in self.gearbox.bearing:

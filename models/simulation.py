@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -28,6 +28,8 @@ SETTLING = (
     0.7  # a change this much smaller than the one before; without a margin rounding can keep a cycle of two alive
 )
 RUNAWAY_K = 1e6
+ITERATIONS_WITHOUT_LOSSES = 60  # that all but nearly unstable states need no more than
+DIFFERENCE_K = 0.01  # of slopes; the networks' rounding is far below it
 
 
 def network_system(
@@ -340,7 +342,9 @@ def steady_state(
     Notes
     -----
     Implicit Euler in pseudo-time with the conductance matrix as Jacobian: an iteration that the stiff network damps by
-    itself. It ends when no node moves by more than 1e-9 K in a step, and by no more than 1e-6 K in an infinite one.
+    itself. Where it does not settle, because losses rise with temperature about as fast as heat leaves, their slopes
+    join the Jacobian. It ends when no node moves by more than 1e-9 K in a step, and by no more than 1e-6 K in an
+    infinite one.
     """
     if network.states:
         raise InputError("a network with laws that have a memory has no steady state; simulate a long cycle instead")
@@ -360,8 +364,12 @@ def steady_state(
     system = network_system(network, losses, wide, vector=True)
     T = np.repeat(table[:, 2 + list(network.inputs).index("T_ambient")][:, None], system.n_parts, axis=1)
     step, previous, moved = FIRST_PSEUDO_STEP_S, np.inf, np.inf
-    for _ in range(max_iterations):
+    for iteration in range(max_iterations):
         balance = system.balance(0.0, table, T)
+        if iteration == ITERATIONS_WITHOUT_LOSSES:  # from here on Newton's method, damped where it overshoots
+            step, previous = LARGEST_PSEUDO_STEP_S, np.inf
+        if iteration >= ITERATIONS_WITHOUT_LOSSES:
+            balance = replace(balance, matrix=_jacobian(system, table, T, balance))
         inverse = np.linalg.inv(np.eye(system.n_parts) / step - balance.matrix)
         change = (inverse @ balance.derivative[..., None])[..., 0]
         moved = float(np.max(np.abs(change)))
@@ -378,8 +386,19 @@ def steady_state(
         step = min(step * 3.0, LARGEST_PSEUDO_STEP_S) if settling else max(step / 4.0, SHORTEST_PSEUDO_STEP_S)
         previous = moved
     raise ArithmeticError(
-        f"no steady state found (a node still moves by {moved:.3g} K): is there a node without cooling?"
+        f"no steady state found (a node still moves by {moved:.3g} K): is there a node without cooling, or do losses "
+        "rise with temperature faster than heat leaves?"
     )
+
+
+def _jacobian(system: NetworkSystem, table: Array, T: Array, balance: solver.Balance) -> Array:
+    """Slopes of the nodes' temperatures per second over all temperatures by differences, those of losses included."""
+    columns = []
+    for part in range(system.n_parts):
+        moved = T.copy()
+        moved[:, part] += DIFFERENCE_K
+        columns.append((system.balance(0.0, table, moved).derivative - balance.derivative) / DIFFERENCE_K)
+    return np.stack(columns, axis=-1)
 
 
 def _distance(balance: solver.Balance) -> float:

@@ -154,7 +154,7 @@ def read_table(
     except InputError:
         raise
     except ImportError as error:
-        raise InputError(f"{path}: reading Parquet needs pyarrow; install gearbox-thermal-twin[parquet]") from error
+        raise InputError(f"{path}: reading Parquet needs pyarrow; python -m pip install pyarrow") from error
     except pd.errors.EmptyDataError as error:
         raise InputError(f"{path}: is empty; a header line with column names and rows are needed") from error
     except UnicodeDecodeError as error:

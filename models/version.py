@@ -6,6 +6,7 @@ import tomllib
 from functools import cache
 from importlib import metadata
 from pathlib import Path
+from typing import Any
 
 DISTRIBUTION = "gearbox-thermal-twin"
 CHECKOUT = Path(__file__).resolve().parents[1]
@@ -20,10 +21,15 @@ def project_version() -> str:
     >>> project_version().count(".")
     2
     """
-    project = CHECKOUT / "pyproject.toml"
-    if project.is_file():
-        return str(tomllib.loads(project.read_text(encoding="utf-8"))["project"]["version"])
-    return metadata.version(DISTRIBUTION)
+    project = _checkout()
+    return str(project["version"]) if project else metadata.version(DISTRIBUTION)
+
+
+def _checkout() -> dict[str, Any]:
+    """The table of the project that this runs from; empty where it is installed, whatever lies beside it there."""
+    file = CHECKOUT / "pyproject.toml"
+    project = tomllib.loads(file.read_text(encoding="utf-8")).get("project", {}) if file.is_file() else {}
+    return project if project.get("name") == DISTRIBUTION else {}
 
 
 def license_text(distribution: str = DISTRIBUTION) -> str:
@@ -34,9 +40,8 @@ def license_text(distribution: str = DISTRIBUTION) -> str:
     FileNotFoundError
         If it comes with none.
     """
-    own = CHECKOUT / "LICENSE"
-    if distribution == DISTRIBUTION and own.is_file():
-        return own.read_text(encoding="utf-8")
+    if distribution == DISTRIBUTION and _checkout():
+        return (CHECKOUT / "LICENSE").read_text(encoding="utf-8")
     for file in metadata.files(distribution) or ():
         if file.name.upper().startswith("LICEN"):
             return file.read_text(encoding="utf-8")

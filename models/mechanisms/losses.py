@@ -62,8 +62,9 @@ churning_swirl = Mechanism(
     law=lambda s: s.strength * s.n**s.exponent * rises(s.n / s.nu, at=s.switch, power=8),
     says="Beyond a critical speed the gears swirl the sump and churning jumps; warm, thin oil at lower speed "
     "({place}).",
-    reference="Changenet, Velex, J. Mech. Des. 129 (2007) and 133 (2011): regimes at Re = 6000 to 9000, loss above ~ "
-    "n^1.8; switch in speed over viscosity, both in ratio to the reference; from memory",
+    reference="Changenet, Velex, J. Mech. Des. 129 (2007) and 133 (2011): regimes at Re = 6000 to 9000 (their loss "
+    "beyond ~ n^1.2; the exponent here is assumed); switch in speed over viscosity, both in ratio to the reference; "
+    "from memory",
     experiment="raise the speed in small steps at two oil temperatures: the kink moves to lower speed as the oil warms",
     separate_by={
         "windage": TWO_OIL_TEMPERATURES,

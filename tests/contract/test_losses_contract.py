@@ -182,6 +182,7 @@ TOGETHER: dict[str, Mapping[str, Any]] = {
 OPTIONAL: list[Mapping[str, Any]] = [
     {"shaft.0.heat_capacity_J_K": 400.0},
     {"shaft.0.surface_to_air": True},
+    {"shaft.0.surface_to_air": True, "shaft.0.length_in_air_mm": 50.0},
     {"bearing.0.oil_level_mm": 20.0},
     {"stage.0.tip_diameter_mm": (82.0, 118.0)},
     {"stage.0.tip_shortening": False},

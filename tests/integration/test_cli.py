@@ -50,6 +50,15 @@ def test_simulate_with_the_full_model(cycle: Path, tmp_path: Path, capsys: pytes
     assert str(out) in capsys.readouterr().out
 
 
+def test_a_console_that_cannot_show_a_name_does_not_end_the_work(cycle: Path, tmp_path: Path) -> None:
+    out = tmp_path / "Öl Ω.csv"
+    command = [sys.executable, "-m", "builder", "simulate", "--gearbox", "fzg", str(cycle), "--output", str(out)]
+    environment = {**os.environ, "PYTHONIOENCODING": "ascii"}
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    assert (done.returncode, "Traceback" in done.stderr) == (0, False)
+    assert out.is_file() and "wrote" in done.stdout and "\\xd6l \\u03a9.csv" in done.stdout
+
+
 def test_a_result_can_be_continued(cycle: Path, tmp_path: Path) -> None:
     first, second = tmp_path / "first.parquet", tmp_path / "second.csv"
     assert run("simulate", "--gearbox", "fzg", cycle, "--output", first, "--initial", "55") == 0

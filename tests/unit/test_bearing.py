@@ -81,6 +81,19 @@ def test_drag_viscosity_is_held_where_the_formula_ends() -> None:
     assert drag(deep, nu=5000.0) == drag(deep, nu=250.0)
 
 
+@pytest.mark.parametrize("n", [100.0, 1500.0, 3000.0, 6500.0])
+def test_oil_beyond_the_limit_starves_a_bearing_no_further(n: float) -> None:
+    """Its rolling moment grows with nu^0.6 from there on; below, the catalogue's formula to the letter."""
+
+    def rolling(nu: float, **changed: float) -> float:
+        return float(replace(NU_406, **changed).friction_moments(n_rpm=n, F_r=4463.0, nu=nu)[0])
+
+    assert rolling(5000.0) / rolling(500.0) == pytest.approx(10.0**0.6, rel=1e-12)
+    assert rolling(499.0) < rolling(499.0, K_rs=0.0)
+    replenished = np.exp(-3e-8 * 400.0 * n * 120.0 * np.sqrt(5.1 / 120.0))
+    assert rolling(400.0) / rolling(400.0, K_rs=0.0) == pytest.approx(replenished, rel=1e-12)
+
+
 def test_own_weight_is_the_least_load() -> None:
     assert watts(NU_406, 1000.0, 0.0, 60.0, 60.0) == watts(NU_406, 1000.0, 2 * 0.75 * 9.80665, 60.0, 60.0) > 0.0
 

@@ -139,3 +139,8 @@ def test_an_fmu_that_cannot_run_here_is_built_and_that_is_told(
     assert (tmp_path / "fzg.fmu").is_file() and not (tmp_path / "drive_cycle.csv").exists()
     assert "reference cycle from 20" not in shown.out
     assert "note: the python FMU has no binary for this machine" in " ".join(shown.err.split())
+    assert "earlier build" not in shown.err
+    again = build(fzg, tmp_path, name="other")
+    assert [note for note in again.notes if "earlier" in note] == [
+        f"{tmp_path / 'fzg.fmu'} is of an earlier build: report.json and networks/ no longer tell about it"
+    ]

@@ -62,6 +62,14 @@ def test_nothing_to_learn_from_is_said(words: str, message: str) -> None:
     assert message in str(done.exception)
 
 
+@pytest.mark.parametrize("words", ["a --holdout --jobs 1", "a --holdout", "a --holdout -- b"])
+def test_held_out_recordings_that_are_not_named_are_missed(words: str) -> None:
+    """As an empty pattern of the shell leaves them; the next option is no recording."""
+    done = CliRunner().invoke(diagnose, words.split())
+    assert done.exit_code == 2
+    assert "--holdout" in done.output and "Traceback" not in done.output
+
+
 def test_a_recording_is_never_replaced_by_its_prediction(tmp_path: Path) -> None:
     time = np.arange(0.0, 3600.0, 20.0)
     columns = {"time_s": time, "speed_rpm": 1500.0, "torque_Nm": 80.0, "T_oil_degC": 22.0 + time / 200.0}

@@ -59,6 +59,14 @@ ONE_FAULT = [
     (("z = [16, 24]", "z = [16]"), "stage.z #2 is missing"),
     (("z = [16, 24]", "z = [16, 24, 40]"), "stage.z: has too many entries"),
     (("z = [16, 24]", "z = 16"), "stage.z: must be a list, not 16"),
+    (
+        ("surface_to_air = false", "length_in_air_mm = 50.0"),
+        "shaft 'shaft_1': length_in_air_mm is 50, but surface_to_air is false; set it to true",
+    ),
+    (
+        ("surface_to_air = false", "surface_to_air = true\nlength_in_air_mm = 300.0"),
+        "shaft 'shaft_1': length_in_air_mm is 300, more than length_mm, which is 223",
+    ),
     (("surface_to_air = false", "surface_to_air = 0"), "shaft 'shaft_1'.surface_to_air: must be true or false, not 0"),
     (('designation = "NU 406"', "designation = 406"), "bearing 'bearing_1'.designation: must be a text, not 406"),
     (

@@ -38,6 +38,24 @@ def test_capacities_of_the_rig() -> None:
     assert capacity["oil"] == pytest.approx(1568, rel=0.02)
 
 
+@pytest.mark.parametrize(("changes", "length"), [({}, 0.05), ({"shaft.0.length_in_air_mm": None}, 0.15)])
+def test_a_shaft_is_cooled_where_it_stands_out_of_the_box(changes: dict[str, None], length: float) -> None:
+    """5 W/(m2 K) at rest; at 1500 1/min Nu = 0.133 Re^(2/3) Pr^(1/3) in air of 20 degC."""
+    links = {link.name: link for link in load_gearbox("conveyor").with_values(changes).network().links}
+    given = {symbol("T_air"): 20.0, symbol("T_ambient"): 20.0}
+
+    def conductance(speed: float) -> float:
+        law = sp.sympify(links["input-air"].conductance)
+        return float(law.subs({**given, symbol("speed"): speed}))
+
+    area = np.pi * 0.035 * length
+    assert conductance(0.0) == pytest.approx(5.0 * area)
+    Re = 1500.0 * np.pi / 30.0 * 0.035**2 / (2.0 * 15.1e-6)
+    assert conductance(1500.0) == pytest.approx(
+        0.133 * Re ** (2 / 3) * 0.71 ** (1 / 3) * 0.0257 / 0.035 * area, rel=0.02
+    )
+
+
 def test_extending_leaves_the_original_alone() -> None:
     sources, links = len(NETWORK.sources), len(NETWORK.links)
     NETWORK.with_source("oil", 1.0, name="x").with_link("oil", "frame", 1.0).with_node("tank", 100.0)
