@@ -327,10 +327,11 @@ def load_gearbox(name_or_path: str | Path) -> Gearbox:
     path = Path(name_or_path)
     if names_a_file(name_or_path):
         return read_gearbox(read_text(path), file=path.name)
-    if name_or_path not in known_gearboxes():
-        hint = did_you_mean(name_or_path, known_gearboxes())
-        raise InputError(f"there is no gearbox named '{name_or_path}'{hint} (a file is named with its ending, .toml)")
-    source = packaged(FOLDER, name_or_path)
+    name = str(name_or_path)
+    if name not in known_gearboxes():
+        hint = did_you_mean(name, known_gearboxes())
+        raise InputError(f"there is no gearbox named '{name}'{hint} (a file is named with its ending, .toml)")
+    source = packaged(FOLDER, name)
     return read_gearbox(read_text(source), file=source.name)
 
 
