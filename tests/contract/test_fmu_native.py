@@ -403,9 +403,9 @@ def test_archive_is_complete(fzg_native: Path) -> None:
     } <= set(names)  # fmt: skip
     assert not [name for name in names if name.startswith("resources/") or "pythonfmu" in name]
     assert "Modelica Association" in licence
-    for text in ("loss.mesh_sliding", "fmi2SetRealInputDerivatives", "fmpy compile fzg.fmu", "in_domain"):
+    for text in ("loss.mesh_sliding", "fmi2SetRealInputDerivatives", "fmpy compile FILE.fmu", "in_domain"):
         assert text in page
-    assert "onnxruntime" not in page
+    assert "onnx" not in page.lower()
 
 
 def test_only_fmi_functions_are_exported_and_only_libc_is_needed(fzg_native: Path, tmp_path: Path) -> None:
@@ -547,14 +547,14 @@ def test_without_zig_this_machine_is_built_for_and_the_rest_named(monkeypatch: p
     assert "aarch64-windows" in plan.note
     assert "pip install ziglang" in plan.note
     foreign = next(name for name in PLATFORMS if name not in plan.platforms)
-    with pytest.raises(InputError, match=r"cannot build for .*gearbox-thermal-twin\[native\]"):
+    with pytest.raises(InputError, match=r"cannot build for .*pip install ziglang"):
         plan_for(foreign)
 
 
 def test_without_any_compiler_it_is_told_how_to_get_one(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(native_compile, "_zig", lambda: None)
     monkeypatch.setattr(native_compile, "_own_compiler", lambda: None)
-    with pytest.raises(InputError, match=r"needs a C compiler.*gearbox-thermal-twin\[native\]"):
+    with pytest.raises(InputError, match=r"needs a C compiler.*pip install ziglang"):
         plan_for("host")
 
 
