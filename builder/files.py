@@ -33,11 +33,14 @@ class RecordedStart:
         [degC]
     rows : mapping of node name to int
         Where they stand, counted from 1
+    columns : mapping of node name to str
+        What the file calls them
     """
 
     path: Path
     temperatures: Mapping[str, float]
     rows: Mapping[str, int]
+    columns: Mapping[str, str]
 
     def of(self, nodes: Iterable[str]) -> dict[str, float]:
         """Start temperatures [degC] of all `nodes`: as recorded; of nodes that were not recorded the others' mean.
@@ -55,8 +58,8 @@ class RecordedStart:
                 f"{', '.join(nodes)}; give a temperature (--initial 20) or another file instead"
             )
         faults = [
-            f"{self.path}: T_{name}_degC is {T:g} at row {self.rows[name]}; to start from, a number above -273.15 "
-            f"and up to {HOTTEST_START:g} degC is needed{kelvin_hint(T)}"
+            f"{self.path}: {self.columns[name]} is {T:g} at row {self.rows[name]}; to start from, a number above "
+            f"-273.15 and up to {HOTTEST_START:g} degC is needed{kelvin_hint(T)}"
             for name, T in known.items()
             if not can_start(T)
         ]
@@ -88,7 +91,7 @@ def read_cycle_and_start(path: Path, extra: tuple[str, ...] = ()) -> tuple[Cycle
         if len(known):
             node, row = name[2:-5], int(known[0])
             temperatures[node], rows[node] = float(numbers[name].iloc[row]), row + 1
-    return cycle, RecordedStart(path, temperatures, rows)
+    return cycle, RecordedStart(path, temperatures, rows, {node: f"T_{node}_degC" for node in temperatures})
 
 
 def read_initial(value: str) -> float | dict[str, float]:

@@ -43,8 +43,8 @@ class Model:
     ----------
     title : str
         Its name, for a plot
-    extra : tuple of str
-        Columns of a cycle that it takes beside the usual ones
+    read : callable
+        From the file of a cycle, as named, to the cycle, its recorded start, and notes of what was read how
     nodes : tuple of str
         Nodes that have a start temperature
     domain : str
@@ -56,14 +56,16 @@ class Model:
     """
 
     title: str
-    extra: tuple[str, ...]
+    read: Callable[[Path], tuple[Cycle, RecordedStart, tuple[str, ...]]]
     nodes: tuple[str, ...]
     domain: str
     run: Callable[[Cycle, Initial, console.Report], dict[str, Array]]
     groups: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
 
-def _full_model(name_or_file: str, correction: Path | None) -> Model:
+def _full_model(name_or_file: str, correction: Path | None, mapping: Path | None) -> Model:
+    from builder.recorded_cycle import read_cycle_or_recording  # imports the diagnosis; an FMU need not wait for it
+
     gearbox = load_gearbox(name_or_file)
     network = gearbox.network()
     if correction is not None:
@@ -77,7 +79,7 @@ def _full_model(name_or_file: str, correction: Path | None) -> Model:
 
     return Model(
         title=f"{gearbox.name}, full model",
-        extra=tuple(name for name in network.inputs if name not in COLUMNS),
+        read=lambda file: read_cycle_or_recording(file, network, mapping=mapping),
         nodes=nodes,
         domain="the domain of the losses" if trained is None else _range_of(trained),
         run=run,
@@ -96,12 +98,14 @@ def _range_of(trained: Training) -> str:
 def _fmu(path: Path) -> Model:
     from builder.fmu_drive import drive_fmu, fmu_inputs, fmu_nodes  # imports fmpy; the full model need not wait for it
 
+    extra = fmu_inputs(path)
+
     def run(cycle: Cycle, initial: Initial, progress: console.Report) -> dict[str, Array]:
         return drive_fmu(path, cycle, initial=initial, progress=progress)
 
     return Model(
         title=path.name,
-        extra=fmu_inputs(path),
+        read=lambda file: (*read_cycle_and_start(file, extra), ()),
         nodes=fmu_nodes(path),
         domain="the surrogate's training domain",
         run=run,
@@ -122,6 +126,9 @@ def _fmu(path: Path) -> Model:
                    "T_<node>_degC columns, their mean for nodes without a column; or a file with such columns of all "
                    "nodes, whose last row counts (a result to be continued).  [default: first ambient temperature]",
               )  # fmt: skip
+@click.option("--mapping", type=click.Path(path_type=Path, dir_okay=False), default=None, metavar="FILE",
+              help="What the columns of a recording mean, with --gearbox.  [default: <stem>.toml or mapping.toml "
+                   "beside it]")  # fmt: skip
 @click.option("--correction", type=click.Path(path_type=Path, dir_okay=False), default=None,
               metavar="FILE", help="What diagnose found: the full model carries it.")  # fmt: skip
 @click.option("--plot", type=click.Path(path_type=Path), default=None, metavar="FILE", help="Plot: .png, .pdf or .svg.")
@@ -131,25 +138,24 @@ def simulate(
     output: Path,
     output_interval: float | None,
     initial: str | None,
+    mapping: Path | None,
     correction: Path | None,
     plot: Path | None,
 ) -> None:
     """Drive a CYCLE with an FMU, or with the full model of a gearbox (--gearbox).
 
     CYCLE is a table (.csv, .csv.gz, .parquet) with the columns time_s, speed_rpm, torque_Nm and, where known,
-    T_ambient_degC and air_speed_m_s.
+    T_ambient_degC and air_speed_m_s. With --gearbox it may be a recording that diagnose reads as well, or a part of
+    one (FILE@start..end).
     """
-    if len(files) > 2 or (len(files) == 2) == (gearbox is not None):
-        raise InputError("simulate takes FMU CYCLE, or --gearbox NAME|FILE and CYCLE")
-    if correction is not None and gearbox is None:
-        raise InputError(
-            "--correction goes with --gearbox; an FMU is built with its correction (build-fmu --correction)"
-        )
-    named = [Path(name) for name in (gearbox, initial, correction) if name is not None]
-    _check_outputs(output, plot, inputs=[*files, *named])
+    _check_options(files, gearbox, mapping, correction)
+    named = [Path(name) for name in (gearbox, initial, mapping, correction) if name is not None]
+    _check_outputs(output, plot, inputs=[*_read_as_files(files, gearbox), *named])
     given = None if initial in (None, RECORDED) else read_initial(str(initial))
-    model = _fmu(files[0]) if gearbox is None else _full_model(gearbox, correction)
-    cycle, recorded = read_cycle_and_start(files[-1], model.extra)
+    model = _fmu(files[0]) if gearbox is None else _full_model(gearbox, correction, mapping)
+    cycle, recorded, notes = model.read(files[-1])
+    for note in notes:
+        console.err.print(f"note: {files[-1]}: {note}")
     start = recorded.of(model.nodes) if initial == RECORDED else given
     if isinstance(start, Mapping):
         _check_complete(start, model.nodes, str(initial))
@@ -173,6 +179,31 @@ def simulate(
         if file is not None:
             console.out.print(f"wrote {file}")
     sys.stdout.flush()
+
+
+def _check_options(files: tuple[Path, ...], gearbox: str | None, mapping: Path | None, correction: Path | None) -> None:
+    if len(files) > 2 or (len(files) == 2) == (gearbox is not None):
+        raise InputError("simulate takes FMU CYCLE, or --gearbox NAME|FILE and CYCLE")
+    if gearbox is not None:
+        return
+    if correction is not None:
+        raise InputError(
+            "--correction goes with --gearbox; an FMU is built with its correction (build-fmu --correction)"
+        )
+    if mapping is not None:
+        raise InputError(
+            "--mapping goes with --gearbox; an FMU takes plain cycles: simulate the recording with --gearbox, and give "
+            "the result to the FMU"
+        )
+
+
+def _read_as_files(files: tuple[Path, ...], gearbox: str | None) -> tuple[Path, ...]:
+    """What is read, a part of a recording as its file."""
+    if gearbox is None:
+        return files
+    from builder.recorded_cycle import file_of
+
+    return tuple(file_of(file) for file in files)
 
 
 def _check_outputs(output: Path, plot: Path | None, inputs: list[Path]) -> None:
@@ -238,7 +269,7 @@ def _warn_of_start(columns: Mapping[str, Array], recorded: RecordedStart, nodes:
         return
     T, row, start = recorded.temperatures[worst], recorded.rows[worst], columns[f"T_{worst}_degC"][0]
     _warn(
-        f"{recorded.path}: T_{worst}_degC is {T:.1f} at row {row}, but all nodes start at the first ambient "
+        f"{recorded.path}: {recorded.columns[worst]} is {T:.1f} at row {row}, but all nodes start at the first ambient "
         f"temperature, {start:.1f} degC; --initial {RECORDED} starts as recorded"
     )
 

@@ -72,8 +72,10 @@ class RecordedColumns:
     notes: list[str] = field(default_factory=list)
 
 
-def read_columns(file: RecordingFile, network: ThermalNetwork, *, max_gap_s: float | None = None) -> RecordedColumns:
-    """The columns of a file, ready to be simulated and compared.
+def read_columns(
+    file: RecordingFile, network: ThermalNetwork, *, max_gap_s: float | None = None, to_compare: bool = True
+) -> RecordedColumns:
+    """The columns of a file, ready to be simulated and compared; only `to_compare` needs a temperature.
 
     Raises
     ------
@@ -86,9 +88,10 @@ def read_columns(file: RecordingFile, network: ThermalNetwork, *, max_gap_s: flo
     for name, column in roles.items():
         _take(file, name, column, network, columns, faults)
     _add_constants(file, network, columns, faults)
-    if not columns.measured and not any(
+    are_temperatures = [
         column.quantity.startswith("T_") for column in roles.values() if column.quantity in _measurable(network)
-    ):
+    ]
+    if to_compare and not columns.measured and not any(are_temperatures):
         faults.append(
             "no temperature was measured: a column T_<node>_degC is needed, of the nodes "
             + ", ".join(part.name for part in network.parts)

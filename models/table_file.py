@@ -122,6 +122,24 @@ def check_file(path: Path, limits: Limits = LIMITS) -> None:
         raise InputError(f"{path}: {_too_large(size, limits)}")
 
 
+def column_names(path: Path, separator: str = PLAIN.separator) -> tuple[str, ...]:
+    """Names of the columns of a CSV, CSV.gz or Parquet file, of which no row is read.
+
+    None where they cannot be told: who reads the table says why.
+    """
+    try:
+        check_file(path)
+        if kind_of(path) == ".parquet":
+            from pyarrow import parquet
+
+            return tuple(parquet.read_schema(path).names)
+        with _opened(path) as file:
+            head = file.read(LONGEST_HEADER)
+        return tuple(_names_in(_header(path, head.removeprefix(codecs.BOM_UTF8))[1], separator))
+    except (InputError, ImportError, csv.Error, StopIteration, *UNREADABLE):
+        return ()
+
+
 def read_table(
     path: Path, *, form: TextForm = PLAIN, limits: Limits = LIMITS, keep: Keep | None = None
 ) -> pd.DataFrame:
@@ -277,9 +295,13 @@ def _header(path: Path, head: bytes) -> tuple[int, str]:
     raise InputError(f"{path}: is empty; a header line with column names and rows are needed")
 
 
+def _names_in(header: str, separator: str) -> list[str]:
+    return [name.strip() for name in next(csv.reader([header], delimiter=separator, skipinitialspace=True))]
+
+
 def _check_header(path: Path, header: str, form: TextForm, limits: Limits) -> None:
     try:
-        names = [name.strip() for name in next(csv.reader([header], delimiter=form.separator, skipinitialspace=True))]
+        names = _names_in(header, form.separator)
     except (csv.Error, StopIteration) as error:
         raise InputError(f"{path}: its header line cannot be read: {error}") from error
     for other, word in ((";", "';'"), ("\t", "tabs"), (",", "','")):

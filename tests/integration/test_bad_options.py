@@ -139,6 +139,14 @@ SIMULATE = {
     "cycle.csv --plot file/p.png": "file/p.png: cannot be written",
     "cycle.csv --plot p.png --output file/r.csv": "file/r.csv: cannot be written",
     "cycle.csv --initial missing.csv": "missing.csv: no such file",
+    "cycle.csv@0..9": "cycle.csv: has 1 rows in the part that is named; a recording has 3 or more",
+    "cycle.csv@9..0": "cycle.csv@9..0: '9..0' ends before it starts",
+    "train.csv@0..900 --output train.csv": "train.csv: is read as well and would be replaced",
+    "train.csv@2020-01-01..": "train.csv: a part is named by date, but column time_s tells seconds; name seconds",
+    "train.csv --mapping missing.toml": f"missing.toml: cannot be read ({FAR})",
+    "train.csv --mapping no.toml": "no.toml: is not valid TOML",
+    "train.csv --mapping found.toml": "found.toml: gearbox is not a known key",
+    "cycle.mf4": "cycle.mf4: no such file",
     "cycle.csv --initial T_none.csv": "T_none.csv: has no T_<node>_degC columns",
     "cycle.csv --initial T_some.csv": "initial temperatures are missing for: housing_lower",
     "cycle.csv --initial ./T_some.csv": "one temperature for all (--initial 20), or --initial recorded",
@@ -170,6 +178,7 @@ DRIVE = {
     "FMU cycle.csv --initial T_some.csv": "initial temperatures are missing for: housing_lower",
     "FMU cycle.csv --initial T_text.csv": "T_text.csv: T_oil_degC is warm in the last row",
     "FMU cycle.csv --correction found.toml": "--correction goes with --gearbox",
+    "FMU train.csv --mapping empty.toml": "--mapping goes with --gearbox; an FMU takes plain cycles",
     "FMU gap.csv": "gap.csv: T_ambient_degC is nan at row 1",
 }
 BUILD = {

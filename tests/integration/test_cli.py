@@ -163,6 +163,33 @@ def test_a_recording_starts_as_recorded_or_a_warning_says_that_it_does_not(
         assert first[f"T_{name}_degC"] == pytest.approx(88.0)
 
 
+def test_a_recording_that_needs_a_mapping_is_driven_as_the_plain_one(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    plain, mapped, farm = tmp_path / "run.csv", tmp_path / "lauf.csv", tmp_path / "farm.csv"
+    results = [tmp_path / name for name in ("of_plain.csv", "of_mapped.csv", "of_part.csv", "of_farm.csv")]
+    plain.write_text(RECORDED)
+    table = pd.read_csv(plain).drop(columns=["T_air_degC", "T_cover_degC", "P_loss_W"])
+    table.rename(columns={"T_oil_degC": "Sumpf"}).to_csv(mapped, sep=";", decimal=",", index=False)
+    (tmp_path / "lauf.toml").write_text(
+        'schema = 1\ncsv = { separator = ";", decimal = "," }\ncolumns.Sumpf = { quantity = "T_oil" }\n'
+    )
+    for recording, result in zip((plain, mapped, f"{mapped}@0..100"), results, strict=False):
+        assert run("simulate", "--gearbox", "fzg", recording, "--output", result, "--initial", "recorded") == 0
+        told = f"note: {recording}: air_speed_m_s was not recorded" in " ".join(capsys.readouterr().err.split())
+        assert told == (recording is not plain)
+    for result in results[1:3]:
+        assert pd.read_csv(result).equals(pd.read_csv(results[0]))
+    farm.write_text("time_utc,Ds_avg,Cm_avg,Gost_avg,Git_avg\n" + "".join(
+        f"2017-09-16T0{hour}:00:00Z,1700,5000,{55 + hour},40\n2017-09-16T0{hour}:30:00Z,1700,5000,55,40\n"
+        for hour in range(3)))  # fmt: skip
+    assert run("simulate", "--gearbox", "la_haute_borne", farm, "--output", results[3]) == 0
+    shown = " ".join(capsys.readouterr().err.split())
+    assert "note: " in shown and "time_utc = 2017-09-16T00:00:00Z" in shown
+    assert "Gost_avg is 55.0 at row 1, but all nodes start at the first ambient temperature, 20.0 degC" in shown
+    assert pd.read_csv(results[3])["time_s"].tolist() == [1800.0 * i for i in range(6)]
+
+
 def test_a_start_that_is_told_or_near_needs_no_warning(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     recording, result = tmp_path / "run.csv", tmp_path / "result.csv"
     recording.write_text(RECORDED)
