@@ -125,7 +125,7 @@ def check_file(path: Path, limits: Limits = LIMITS) -> None:
 def column_names(path: Path, separator: str = PLAIN.separator) -> tuple[str, ...]:
     """Names of the columns of a CSV, CSV.gz or Parquet file, of which no row is read.
 
-    None where they cannot be told: who reads the table says why.
+    Empty where they cannot be told: who reads the table says why.
     """
     try:
         check_file(path)

@@ -189,6 +189,14 @@ def test_the_columns_that_a_definition_names(tmp_path: Path, turbine: ThermalNet
     assert start.rows["oil"] == 7
 
 
+def test_columns_that_a_definition_names_count_with_any_clock(tmp_path: Path, turbine: ThermalNetwork) -> None:
+    given = {"speed_rpm": "Ds_avg", "torque_Nm": "Cm_avg", "T_oil_degC": "Gost_avg"}
+    path = plain(tmp_path / "farm.csv", table().rename(columns=given))
+    cycle, start, _ = read_cycle_or_recording(path, turbine)
+    assert cycle.inputs["speed"].tolist() == table()["speed_rpm"].tolist()
+    assert start.columns == {"oil": "Gost_avg"}
+
+
 def test_dates_need_no_mapping(tmp_path: Path, network: ThermalNetwork) -> None:
     stamps = [f"2024-05-01T08:{i:02d}:00Z" for i in range(ROWS)]
     path = plain(tmp_path / "run.csv", table().drop(columns="time_s").assign(timestamp=stamps))
