@@ -20,7 +20,7 @@ LINES = 20  # of progress where there is no terminal
 @click.option("--cases", type=click.IntRange(min=1, max=10_000), default=None, metavar="N",
               help="How many cases, in the proportions of the whole mix.  [default: the whole mix, 247]")  # fmt: skip
 @click.option("--seed", type=click.IntRange(min=0, max=2**32 - 1), default=None, metavar="N",
-              help="Seed of the cases.  [default: that of the published proof, 2041]")  # fmt: skip
+              help="Seed of the cases.  [default: 2041, which nobody has opened]")  # fmt: skip
 @click.option(
     "--gearbox", default="fzg", show_default=True, metavar="NAME|FILE", help="Name or definition file (TOML)."
 )
@@ -51,10 +51,10 @@ def prove(
     """
     from builder.prove import NUMBERS, PAGE
     from builder.prove import prove as run
-    from diagnosis.proof.protocol import PUBLISHED_SEED, WHOLE, Settings
+    from diagnosis.proof.protocol import UNOPENED_SEED, WHOLE, Settings
 
     check_workers(jobs, dask_address)
-    settings = Settings(seed=PUBLISHED_SEED if seed is None else seed, cases=WHOLE if cases is None else cases,
+    settings = Settings(seed=UNOPENED_SEED if seed is None else seed, cases=WHOLE if cases is None else cases,
                         gearbox=gearbox, cells_every=cells_every, baselines=baselines)  # fmt: skip
     with _told() as tell:
         found = run(settings, output, jobs=processes(jobs), dask_address=dask_address,

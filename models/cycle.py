@@ -77,9 +77,8 @@ class Cycle:
         faults += [f"column {c} is missing; it has: {', '.join(sorted(have))}" for c in needed if c not in have]
         arrays: dict[str, Array] = {}
         wanted = {"time": "time_s"} | {signal: spec[0] for signal, spec in COLUMNS.items()} | {c: c for c in extra}
-        optional = [column for column in wanted.values() if column not in needed]
         faults += _slips(
-            [c for c in map(str, columns) if c not in wanted.values()], [c for c in optional if c not in have]
+            [c for c in map(str, columns) if c not in wanted.values()], [c for c in wanted.values() if c not in have]
         )
         for signal, column in wanted.items():
             if column in have:
@@ -152,7 +151,7 @@ def _rounded_up(seconds: float) -> str:
 
 
 def _slips(unused: Iterable[str], absent: Sequence[str]) -> list[str]:
-    """Faults for columns that seem to be an absent optional one, which would otherwise silently have its default."""
+    """Faults for columns that seem to be an absent one; an optional one would otherwise silently have its default."""
     return [
         f"column {name[:80]} is not known; is {column} meant? rename it, or remove it"
         for name in unused

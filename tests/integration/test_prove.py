@@ -302,8 +302,8 @@ def test_a_cluster_does_the_same(recorded: Path, tmp_path: Path) -> None:
 def test_help_names_the_defaults_that_hold() -> None:
     told = " ".join(CliRunner().invoke(verb, ["--help"]).output.split())
     assert f"the whole mix, {protocol.WHOLE}]" in told
-    assert f"that of the published proof, {protocol.PUBLISHED_SEED}]" in told
-    assert protocol.PUBLISHED_SEED not in protocol.DEVELOPMENT_SEEDS
+    assert f"{protocol.UNOPENED_SEED}, which nobody has opened]" in told
+    assert protocol.UNOPENED_SEED not in protocol.DEVELOPMENT_SEEDS
 
 
 @pytest.mark.parametrize(

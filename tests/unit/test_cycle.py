@@ -81,6 +81,13 @@ def test_an_optional_column_under_another_name_is_not_lost(name: str, meant: str
     assert [3.0, 4.0] in [values.tolist() for values in beside.inputs.values()]
 
 
+@pytest.mark.parametrize(("name", "meant"), [("Time_s", "time_s"), ("Speed", "speed_rpm"), ("torque_NM", "torque_Nm")])
+def test_a_needed_column_under_another_name_is_told(name: str, meant: str) -> None:
+    says = rf"run.csv: column {name} is not known; is {meant} meant\? rename it, or remove it"
+    with pytest.raises(InputError, match=says):
+        Cycle.from_columns({name if column == meant else column: v for column, v in GOOD.items()}, name="run.csv")
+
+
 @pytest.mark.parametrize("gearbox", ["fzg", "la_haute_borne"])
 def test_results_and_recordings_are_cycles(gearbox: str) -> None:
     definition = load_gearbox(gearbox)
