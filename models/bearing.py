@@ -144,8 +144,8 @@ class SkfRollerBearing:
         SKF "Rolling bearings", 2016, pp. 104-106: inlet-shear starvation, kinematic replenishment, mixed friction and
         oil-bath drag. The viscosity in the drag moment is held at 500 mm^2/s, where the formula ends (250 for a bearing
         more than half in oil; limits from memory). In the two factors of starvation it is held there too, which is our
-        choice: to the letter they leave a bearing in oil of -20 degC a millionth of its rolling friction. K_roll is
-        1e-12 of the catalogue's digits, by its worked magnitudes.
+        choice: to the letter they leave an NU 207 at 1500 1/min in oil VG 150 of -20 degC a millionth of its rolling
+        friction. K_roll is 1e-12 of the catalogue's digits, by its worked magnitudes.
 
         Examples
         --------

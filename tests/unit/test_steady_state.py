@@ -25,7 +25,7 @@ def test_every_convection_law_settles_and_balances(convection: str, torque: floa
 
 
 def test_losses_that_rise_about_as_fast_as_heat_leaves() -> None:
-    """The conveyor's churning changes its regime near 75 degC: 9 W/K against as much that leaves."""
+    """The conveyor's churning changes its regime from 71 to 84 degC, where it rises by 6 to 8 W/K."""
     gearbox = load_gearbox("conveyor")
     network, losses = gearbox.network(), gearbox.losses()
     for T_ambient in TEMPERATURES:
