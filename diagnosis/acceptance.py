@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from diagnosis.case import Case
-from diagnosis.explain import Explanation
+from diagnosis.explain import Explanation, linearised
 from diagnosis.heat import heats_of
 from diagnosis.holdout import Judge
 from diagnosis.hypotheses import Hypothesis
@@ -58,13 +58,15 @@ def judged(judge: Judge, calibrated: Explanation, stage: Stage, needed: float) -
         left = [i for i in range(len(stage.fits)) if i not in refused | impossible]
         if gain < needed or probability < LEAST_PROBABILITY * probabilities[left].sum():
             continue
-        fit = replace(fit, fit=fit.problem.at(fit.fit))
-        large = _matters(case, fit, fit.found[-1], 1.0 if gain > CERTAIN else 2.0)
+        whole = linearised(fit)
+        large = whole is not None and _matters(case, whole, fit.found[-1], 1.0 if gain > CERTAIN else 2.0)
         matters = matters or large
-        if _drives_away(base, fit):
+        if whole is None or _drives_away(base, whole):
             impossible.add(index)
-            note = "the fault of an instrument would need a parameter of the gearbox where it cannot be"
+            note = "the fault of an instrument would need a parameter of the gearbox where it cannot be" if whole else \
+                   "what would explain the training data cannot be simulated a second time"  # fmt: skip
             continue
+        fit = whole
         unlikely = stage.probability_of(fit.found[-1].name) < LEAST_SHARE * probabilities[0]
         if probability < LEAST_SHARE * ahead or (unlikely and not _spoken_for(judge, fit)):
             continue

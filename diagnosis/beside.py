@@ -9,7 +9,7 @@ import numpy as np
 from joblib import delayed
 
 from diagnosis.acceptance import SECOND_GAIN, holds_out, stands
-from diagnosis.explain import Explanation, instead, without
+from diagnosis.explain import Explanation, instead, linearised, without
 from diagnosis.holdout import Judge
 from diagnosis.hypotheses import Hypothesis
 from diagnosis.parallel import spread
@@ -66,11 +66,8 @@ def _replaced(judge: Judge, start: Explanation, found: Sequence[Found]) -> tuple
         h, stage = found[index]
         if set(stage.fits[0].labels[:-1]) != set(judge.base.labels) - {h.label}:
             continue  # compared beside something else
-        try:
-            fit = replace(stage.fits[0], fit=stage.fits[0].problem.at(stage.fits[0].fit))
-        except ArithmeticError:
-            continue
-        if stands(judge, start, fit):
+        fit = linearised(stage.fits[0])
+        if fit is not None and stands(judge, start, fit):
             rival = fit.found[-1]
             final = replace(fit, found=tuple(rival if one.label == h.label else one for one in judge.base.found))
             changed = (rival, replace(stage, accepted=fit))

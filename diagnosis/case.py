@@ -180,7 +180,7 @@ def floored(explanation: Explanation) -> Explanation:
     Returns
     -------
     Explanation
-        Fitted anew where the floor changed
+        Fitted anew where the floor changed, and where that has a solution
     """
     evidences = [_evidence(explanation, times) for times in FLOORS]
     best = int(np.argmax(evidences))
@@ -192,8 +192,11 @@ def floored(explanation: Explanation) -> Explanation:
     if times == explanation.problem.floor:
         return explanation
     problem = explanation.problem.changed(floor=times, whitenings=None)
-    fit = problem.fit(explanation.fit.z, [part.trajectory for part in explanation.fit.parts], iterations=2)
-    again = settled(problem, fit)
+    try:
+        fit = problem.fit(explanation.fit.z, [part.trajectory for part in explanation.fit.parts], iterations=2)
+        again = settled(problem, fit)
+    except ArithmeticError:  # at the edge of what can be simulated
+        return explanation
     found = explanation.found
     return replace(again, found=found, log_evidence=evidence_of(found, again.fit))
 

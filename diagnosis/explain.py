@@ -83,6 +83,17 @@ class Explanation:
         return result
 
 
+def linearised(explanation: Explanation) -> Explanation | None:
+    """An explanation with the linearisation of its fit; None where it cannot be simulated a second time.
+
+    A strong control runs at the edge of what has a solution: from another guess the same numbers may have none.
+    """
+    try:
+        return replace(explanation, fit=explanation.problem.at(explanation.fit))
+    except ArithmeticError:
+        return None
+
+
 def distorted(explanation: Explanation) -> bool:
     """Whether a calibration went so far that nothing said about its neighbourhood can be trusted.
 
@@ -235,7 +246,9 @@ def refined(rough: Explanation, worth: float = -np.inf) -> Explanation:
     """A rough fit, fitted to the end; where it stays below a log evidence, without seeking other shapes."""
     better = _better(rough, rough.fit.z, rough.fit.courses, ITERATIONS)
     for _ in range(MOST_RESHAPED if better.log_evidence >= worth else 0):
-        before = replace(better, fit=better.problem.at(better.fit))
+        before = linearised(better)
+        if before is None:
+            break
         better = _reshaped(before, ITERATIONS)
         if better is before:
             break

@@ -17,9 +17,17 @@ from diagnosis.acceptance import SECOND_GAIN, holds_out, judged
 from diagnosis.beside import Found, settled_beside
 from diagnosis.case import Case, first, floored
 from diagnosis.evidence import Marginal
-from diagnosis.explain import Explanation, best_fits, distorted, evidence_of, in_the_middle, without
+from diagnosis.explain import Explanation, best_fits, distorted, evidence_of, in_the_middle, linearised, without
 from diagnosis.holdout import Judge
-from diagnosis.hypotheses import Hypothesis, Scored, hypothesis_of, parameter_hypotheses, scan, sharpened
+from diagnosis.hypotheses import (
+    Hypothesis,
+    Scored,
+    hypothesis_of,
+    parameter_hypotheses,
+    scan,
+    sharpened,
+    two_point_columns,
+)
 from diagnosis.mapping import LOSS
 from diagnosis.parallel import spread, starting
 from diagnosis.stage import OPEN_PENALTY, Stage, log_e_value, penalised
@@ -185,9 +193,11 @@ def _recalibrated(judge: Judge, stage: Stage) -> Explanation | None:
     base = judge.base
     if not stage.fits or not distorted(base) or base.problem.slow:  # weeks under wide priors have no one optimum
         return None
-    best = max(stage.fits, key=lambda fit: fit.log_evidence)
+    best = linearised(max(stage.fits, key=lambda fit: fit.log_evidence))
+    if best is None:
+        return None
     try:
-        again = without(base, replace(best, fit=best.problem.at(best.fit)), 0)
+        again = without(base, best, 0)
     except ArithmeticError:
         return None
     better = again.log_evidence > base.log_evidence + BETTER and holds_out(judge, base, again)
@@ -265,8 +275,11 @@ def _look(
     first_look = not base.found
     chosen = [(base, s) for s in [*_worth(real, strong=first_look), *_worth_of_open(real, opened)]]
     views = list(others)
-    if distorted(base) and first_look and (middle := in_the_middle(base)) is not None:
-        views.append(middle)
+    if distorted(base) and first_look:
+        seen = {s.hypothesis.name for _, s in chosen}
+        chosen += [(base, s) for s in _controls(real, base) if s.hypothesis.name not in seen]
+        if (middle := in_the_middle(base)) is not None:
+            views.append(middle)
     for view in views:
         known = [h for h in hypotheses_of(candidates, view) if not h.is_open]
         chosen += [(view, s) for s in _worth(_scanned(view, known, jobs)[0], strong=first_look)]
@@ -306,6 +319,18 @@ def _worth(scored: Sequence[Scored], *, strong: bool) -> list[Scored]:
             if new and s.log_bayes > WORTH_OF_STRONG * most and len(found) < MOST_FITTED:
                 found.append(s)
     return found if len(found) > 1 else list(scored[:2])
+
+
+def _controls(scored: Sequence[Scored], base: Explanation) -> list[Scored]:
+    """Two-point controls, each at its best place.
+
+    What a strong one does is so far from a straight line that the scan may hold it for next to nothing.
+    """
+    best: dict[str, Scored] = {}
+    for s in scored:
+        if two_point_columns(s.hypothesis, base.problem) is not None:
+            best.setdefault(s.hypothesis.name, s)
+    return list(best.values())
 
 
 def _worth_of_open(real: Sequence[Scored], opened: Sequence[Scored]) -> list[Scored]:

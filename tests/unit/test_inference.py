@@ -1095,6 +1095,50 @@ def test_what_remembers_is_fitted_first(monkeypatch: pytest.MonkeyPatch) -> None
     assert order == ["thermostat", "tank", "parameter", "link"]
 
 
+@pytest.mark.parametrize("bent", [True, False])
+def test_a_strong_control_is_tried_that_the_scan_cannot_see(monkeypatch: pytest.MonkeyPatch, bent: bool) -> None:
+    """A fan that moved all by 22 K scored 23 where the best scored 4700, and gained 15 600 once it was fitted."""
+    best, other = _scored("ageing", "oil", 4700.0), _scored("decay", "torque", 900.0)
+    fans = [_scored("fan", "housing", 23.0), _scored("fan", "housing_upper", 5.0)]
+    real = [best, other, _scored("rain", "housing", 100.0), *fans]
+    monkeypatch.setattr(search, "_scanned", lambda *_: (real, [_form("speed", "mesh", 30.0)]))
+    monkeypatch.setattr(search, "two_point_columns", lambda h, _: (1, 2) if h.name == "fan" else None)
+    monkeypatch.setattr(search, "distorted", lambda _: bent)
+    monkeypatch.setattr(search, "in_the_middle", lambda _: None)
+    monkeypatch.setattr(search, "hypotheses_of", lambda *_: [])
+    tried: list[str] = []
+
+    def fits(_base: Explanation, chosen: Any, **_: Any) -> list[Explanation]:
+        tried.extend(s.hypothesis.label for _, s in chosen)
+        return []
+
+    monkeypatch.setattr(search, "best_fits", fits)
+    base = Explanation(problem=NOTHING, fit=NOTHING, log_evidence=0.0)
+    search._look(_judge(base), base, (), 5.0, 1, lambda _: None, ())
+    assert tried == ["ageing@oil", "decay@torque", *(["fan@housing"] if bent else [])]
+
+
+def test_a_fit_that_cannot_be_simulated_again_ends_no_diagnosis(monkeypatch: pytest.MonkeyPatch) -> None:
+    """At the edge of what has a solution the same numbers may have none from another guess."""
+
+    def none(*_: Any, **__: Any) -> Any:
+        raise ArithmeticError("no solution")
+
+    whole: Any = SimpleNamespace(z=np.zeros(1), courses=(), parts=(), without_parts=lambda: whole)
+    h = _scored("fan", "x", 0.0).hypothesis
+    lost = Explanation(problem=SimpleNamespace(at=none), fit=whole, log_evidence=90.0, found=(h,))  # type: ignore[arg-type]
+    monkeypatch.setattr(explain, "_better", lambda there, *_: there)
+    assert explain.refined(lost).log_evidence == 90.0
+    good = replace(lost, problem=SimpleNamespace(at=lambda fit: fit), log_evidence=60.0)  # type: ignore[arg-type]
+    monkeypatch.setattr(acceptance, "holds_out", lambda *_: True)
+    monkeypatch.setattr(acceptance, "_matters", lambda *_: True)
+    base = replace(good, found=(), log_evidence=0.0)
+    stage = Stage(scored=(), log_e_value=90.0, fits=(lost, good), gains=(90.0, 60.0))
+    assert acceptance.judged(_judge(base, 60.0), base, stage, 10.0).accepted is not None
+    alone = acceptance.judged(_judge(base), base, replace(stage, fits=(lost,), gains=(90.0,)), 10.0)
+    assert alone.accepted is None and "a second time" in alone.note
+
+
 def test_a_racer_without_hope_is_not_given_other_shapes(monkeypatch: pytest.MonkeyPatch) -> None:
     whole: Any = SimpleNamespace(z=np.zeros(1), courses=(), without_parts=lambda: whole)
     problem: Any = SimpleNamespace(at=lambda fit: fit)
