@@ -20,7 +20,7 @@ LINES = 20  # of progress where there is no terminal
 @click.option("--cases", type=click.IntRange(min=1, max=10_000), default=None, metavar="N",
               help="How many cases, in the proportions of the whole mix.  [default: the whole mix, 247]")  # fmt: skip
 @click.option("--seed", type=click.IntRange(min=0, max=2**32 - 1), default=None, metavar="N",
-              help="Seed of the cases.  [default: 2041, which nobody has opened]")  # fmt: skip
+              help="Seed of the cases.  [default: 2042, which nobody has opened]")  # fmt: skip
 @click.option(
     "--gearbox", default="fzg", show_default=True, metavar="NAME|FILE", help="Name or definition file (TOML)."
 )
