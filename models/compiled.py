@@ -11,15 +11,15 @@ import sympy as sp
 
 from models.errors import InputError
 from models.laws import NumericLaw, Signals, c_function_source, compile_function, function_source, symbol
-from models.network import BASE_SIGNALS, ThermalNetwork
+from models.network_structure import BASE_SIGNALS, Network
 from models.runtime import Laws
 from models.types import Array
 
 FUNCTIONS = ("boundary", "exchange", "heat", "fixed")
-_compiled: WeakKeyDictionary[ThermalNetwork, dict[bool, Laws]] = WeakKeyDictionary()
+_compiled: WeakKeyDictionary[Network, dict[bool, Laws]] = WeakKeyDictionary()
 
 
-def compile_laws(network: ThermalNetwork, *, vector: bool) -> Laws:
+def compile_laws(network: Network, *, vector: bool) -> Laws:
     """The laws of `network` on arrays (`vector`) or on plain numbers; kept for the next call with the same network."""
     kept = _compiled.setdefault(network, {})
     if vector not in kept:
@@ -30,7 +30,7 @@ def compile_laws(network: ThermalNetwork, *, vector: bool) -> Laws:
     return kept[vector]
 
 
-def laws_of(network: ThermalNetwork, functions: Mapping[str, Callable[..., tuple[Any, ...]]]) -> Laws:
+def laws_of(network: Network, functions: Mapping[str, Callable[..., tuple[Any, ...]]]) -> Laws:
     """Everything the runtime needs of `network`, with its law functions by name."""
     laplacian, to_boundary, injection = structure(network)
     return Laws(
@@ -52,7 +52,7 @@ def laws_of(network: ThermalNetwork, functions: Mapping[str, Callable[..., tuple
     )
 
 
-def law_source(network: ThermalNetwork, *, vector: bool) -> dict[str, str]:
+def law_source(network: Network, *, vector: bool) -> dict[str, str]:
     """Python source of the functions of :class:`~models.runtime.Laws` by name; the FMU carries the plain-number form.
 
     Raises
@@ -66,12 +66,12 @@ def law_source(network: ThermalNetwork, *, vector: bool) -> dict[str, str]:
     }
 
 
-def c_law_source(network: ThermalNetwork, places: Mapping[str, str]) -> dict[str, str]:
+def c_law_source(network: Network, places: Mapping[str, str]) -> dict[str, str]:
     """C source of the same functions by name, each ``void law_<name>(const double *s, double *y)``.
 
     Parameters
     ----------
-    network : ThermalNetwork
+    network : Network
         Without numeric laws
     places : mapping of str to str
         C expression of every argument
@@ -93,7 +93,7 @@ def c_law_source(network: ThermalNetwork, places: Mapping[str, str]) -> dict[str
     }
 
 
-def law_expressions(network: ThermalNetwork) -> dict[str, tuple[list[str], list[sp.Expr]]]:
+def law_expressions(network: Network) -> dict[str, tuple[list[str], list[sp.Expr]]]:
     """Arguments, in order, and expressions of the functions of :class:`~models.runtime.Laws` by name.
 
     ``operating`` is there only where speed or torque is shifted.
@@ -132,7 +132,7 @@ def law_expressions(network: ThermalNetwork) -> dict[str, tuple[list[str], list[
     return functions
 
 
-def structure(network: ThermalNetwork) -> tuple[Array, Array, Array]:
+def structure(network: Network) -> tuple[Array, Array, Array]:
     """Matrices of a network; see :class:`~models.runtime.Laws` for `laplacian`, `to_boundary` and `injection`."""
     part = {node.name: index for index, node in enumerate(network.parts)}
     boundaries = [node.name for node in network.nodes if node.temperature is not None]
@@ -152,7 +152,7 @@ def structure(network: ThermalNetwork) -> tuple[Array, Array, Array]:
     return laplacian, to_boundary, injection
 
 
-def _varying(network: ThermalNetwork) -> list[bool]:
+def _varying(network: Network) -> list[bool]:
     parameters = {parameter.name for parameter in network.parameters}
     return [bool({s.name for s in link.conductance.free_symbols} - parameters) for link in network.links]
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,34 +11,31 @@ from numpy.typing import ArrayLike
 from models import solver
 from models.compiled import compile_laws
 from models.cycle import COLUMNS, Cycle
+from models.definition import Training
 from models.errors import InputError, did_you_mean
-from models.network import Losses, ThermalNetwork
+from models.network_structure import Losses, Network
 from models.runtime import NetworkSystem, efficiency, torque_loss
 from models.surrogate import range_distance
 from models.types import Array
 
-if TYPE_CHECKING:
-    from models.definition import Training
-
 HOTTEST_START = 250.0  # degC; above it kelvin are meant, or a gearbox that is long destroyed
 STEADY_TOLERANCE_K, STEADY_DISTANCE_K = 1e-9, 1e-6
 FIRST_PSEUDO_STEP_S, LARGEST_PSEUDO_STEP_S, SHORTEST_PSEUDO_STEP_S = 1e5, 1e10, 10.0
-SETTLING = (
-    0.7  # a change this much smaller than the one before; without a margin rounding can keep a cycle of two alive
-)
+# A change this much smaller than the one before; without a margin rounding can keep a cycle of two alive.
+SETTLING = 0.7
 RUNAWAY_K = 1e6
 ITERATIONS_WITHOUT_LOSSES = 60  # that all but nearly unstable states need no more than
 DIFFERENCE_K = 0.01  # of slopes; the networks' rounding is far below it
 
 
 def network_system(
-    network: ThermalNetwork, losses: Losses, parameters: Mapping[str, ArrayLike] | None = None, *, vector: bool = False
+    network: Network, losses: Losses, parameters: Mapping[str, ArrayLike] | None = None, *, vector: bool = False
 ) -> NetworkSystem:
     """A network with its losses and parameter values, ready for the solver.
 
     Parameters
     ----------
-    network : ThermalNetwork
+    network : Network
     losses : Losses
     parameters : mapping of str to ArrayLike, shape () or (B,), or None
         Values of parameters that differ from their start; arrays run B variants at once
@@ -87,7 +83,7 @@ def kelvin_hint(T: float) -> str:
     return f"; if kelvin are meant, give {T - 273.15:g}" if HOTTEST_START < T < 1000.0 else ""
 
 
-def initial_states(network: ThermalNetwork, initial: float | Mapping[str, float]) -> Array:
+def initial_states(network: Network, initial: float | Mapping[str, float]) -> Array:
     """States at the start, from one temperature [degC] or one per node (all parts must be given), shape (n,).
 
     Raises
@@ -177,7 +173,7 @@ class Result:
         return table | {"in_domain": np.asarray(self.domain_distance <= 0.0)}
 
 
-def input_table(network: ThermalNetwork, cycle: Cycle) -> Array:
+def input_table(network: Network, cycle: Cycle) -> Array:
     """Inputs of a cycle as one table, defaults filled in, shape (N, 2 + inputs): speed, torque, further inputs."""
     columns = [cycle.inputs["speed"], cycle.inputs["torque"]]
     columns += [cycle.inputs.get(name, np.full(len(cycle), default)) for name, default in network.inputs.items()]
@@ -185,7 +181,7 @@ def input_table(network: ThermalNetwork, cycle: Cycle) -> Array:
 
 
 def simulate(
-    network: ThermalNetwork,
+    network: Network,
     cycle: Cycle | Mapping[str, ArrayLike],
     *,
     losses: Losses,
@@ -198,7 +194,7 @@ def simulate(
 
     Parameters
     ----------
-    network : ThermalNetwork
+    network : Network
     cycle : Cycle or mapping of column name to ArrayLike, shape (N,)
         Inputs; straight lines between the rows
     losses : Losses
@@ -252,7 +248,7 @@ def simulate(
 
 
 def evaluate(
-    network: ThermalNetwork,
+    network: Network,
     losses: Losses,
     parameters: Mapping[str, ArrayLike] | None,
     *,
@@ -305,7 +301,7 @@ def evaluate(
 
 
 def steady_state(
-    network: ThermalNetwork,
+    network: Network,
     *,
     losses: Losses,
     speed: ArrayLike,
@@ -318,7 +314,7 @@ def steady_state(
 
     Parameters
     ----------
-    network : ThermalNetwork
+    network : Network
     losses : Losses
     speed, torque : ArrayLike, shape () or (B,)
         Of the input shaft, [1/min] and [N m]
