@@ -14,7 +14,6 @@ from numpy.typing import ArrayLike
 from models.atomic_write import atomic_file
 from models.cycle import Cycle
 from models.errors import InputError
-from models.simulation import HOTTEST_START, can_start, kelvin_hint
 from models.table_file import is_folder, kind_of, read_table
 
 DECIMALS = 6  # of results: a millionth of a kelvin or a watt
@@ -46,7 +45,7 @@ class RecordedStart:
         Raises
         ------
         InputError
-            If no node of these was recorded, or a gearbox cannot start at a temperature.
+            If no node of these was recorded.
         """
         nodes = tuple(nodes)
         known = {name: T for name, T in self.temperatures.items() if name in nodes}
@@ -55,14 +54,6 @@ class RecordedStart:
                 f"{self.path}: --initial recorded needs a column T_<node>_degC with a temperature, of the nodes "
                 f"{', '.join(nodes)}; give a temperature (--initial 20) or another file instead"
             )
-        faults = [
-            f"{self.path}: {self.columns[name]} is {T:g} at row {self.rows[name]}; to start from, a number above "
-            f"-273.15 and up to {HOTTEST_START:g} degC is needed{kelvin_hint(T)}"
-            for name, T in known.items()
-            if not can_start(T)
-        ]
-        if faults:
-            raise InputError("\n".join(faults))
         mean = sum(known.values()) / len(known)
         return {name: known.get(name, mean) for name in nodes}
 
@@ -95,12 +86,13 @@ def read_cycle_and_start(path: Path, extra: tuple[str, ...] = ()) -> tuple[Cycle
 def read_initial(value: str) -> float | dict[str, float]:
     """Initial temperatures: a number in degC, or a file whose ``T_<node>_degC`` columns end with them.
 
-    The last row counts, so that a result can be continued.
+    The last row counts, so that a result can be continued. :func:`models.start_temperatures.start_temperatures` checks
+    the temperatures.
 
     Raises
     ------
     InputError
-        If it is neither.
+        If it is neither a number nor such a file.
 
     Examples
     --------
@@ -108,30 +100,17 @@ def read_initial(value: str) -> float | dict[str, float]:
     20.0
     """
     try:
-        T = float(value)
+        return float(value)
     except ValueError:
-        return _last_row(Path(value))
-    if not can_start(T):
-        raise InputError(
-            f"--initial {value}: must be a finite number above -273.15 degC and up to {HOTTEST_START:g} degC"
-            + kelvin_hint(T)
-        )
-    return T
-
-
-def _last_row(path: Path) -> dict[str, float]:
-    table = read_table(path)
-    last = {c: table[c].iloc[-1] for c in _temperature_columns(table) if len(table)}
+        table = read_table(Path(value))
+    last = {column: table[column].iloc[-1] for column in _temperature_columns(table) if len(table)}
     if not last:
-        raise InputError(f"{path}: has no T_<node>_degC columns with values to start from")
-    numbers = pd.to_numeric(pd.Series(last), errors="coerce")
-    for name, T in numbers.items():
-        if not can_start(T):
-            raise InputError(
-                f"{path}: {name} is {last[str(name)]} in the last row, row {len(table)}; to start from, a number above "
-                f"-273.15 and up to {HOTTEST_START:g} degC is needed{kelvin_hint(T)}"
-            )
-    return {str(name)[2:-5]: float(T) for name, T in numbers.items()}
+        raise InputError(f"{value}: has no T_<node>_degC columns with values to start from")
+    try:
+        return {column[2:-5]: float(T) for column, T in last.items() if pd.notna(T)}
+    except ValueError as error:
+        texts = [f"{column} is {T!r}" for column, T in last.items() if isinstance(T, str)]
+        raise InputError(f"{value}: {', '.join(texts)} in the last row; numbers are needed to start from") from error
 
 
 def _temperature_columns(table: pd.DataFrame) -> list[str]:
