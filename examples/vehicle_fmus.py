@@ -1,19 +1,18 @@
-"""What the gearbox FMU is coupled with in the examples: a light vehicle and a drive cycle as native FMUs, and an SSP.
+"""Partners of the gearbox FMU in the examples: a light vehicle and a drive cycle as native FMUs, and an SSP.
 
 They show that the gearbox works in a loop (the loss torque goes back into the driveline) and that the FMI layer serves
-other models as well. The hand-written C is in ``fmu_src/vehicle``.
+other models as well. The hand-written C is in ``examples/vehicle``.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from builder.fmu import AUTHOR, model_identifier, write_archive
+from builder.fmu_package import AUTHOR, model_identifier, write_archive
 from builder.model_description import Identity
 from builder.native import FLAGS, NativeBuild, build_native_archive
 from builder.native_data import number
@@ -188,7 +187,7 @@ def _output(name: str, unit: str, text: str, *, kind: str | None = None, initial
 
 
 def _source(name: str) -> str:
-    return (files("fmu_src") / "vehicle" / name).read_text(encoding="utf-8")
+    return (Path(__file__).parent / "vehicle" / name).read_text(encoding="utf-8")
 
 
 def _build(
