@@ -372,7 +372,6 @@ def _uri(resources: Path) -> bytes:
     return (unquote(uri) if (resources / "slavemodule.txt").is_file() else uri).encode()
 
 
-@fmi2.fmi2CallbackLoggerTYPE  # type: ignore[misc,unused-ignore]
 def _log(environment: int | None, instance: bytes, status: int, category: bytes, message: bytes) -> None:
     """Add a message to the list of its instance; messages of instances that others made go to FMPy's own logger.
 
@@ -385,11 +384,14 @@ def _log(environment: int | None, instance: bytes, status: int, category: bytes,
         messages.append((status, message.decode("utf-8", "replace").strip()))
 
 
+_LOGGER = fmi2.fmi2CallbackLoggerTYPE(_log)
+
+
 @contextmanager
 def _logged_to(messages: list[tuple[int, str]]) -> Iterator[Any]:
     """Callbacks for one instance, whose messages are added to a list."""
     callbacks = fmi2.fmi2CallbackFunctions()
-    callbacks.logger = _log
+    callbacks.logger = _LOGGER
     callbacks.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(fmpy.calloc)
     callbacks.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(fmpy.free)
     callbacks.componentEnvironment = next(_environments)
