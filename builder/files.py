@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
 import gzip
-import os
-import tempfile
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,9 +11,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
+from models.atomic_write import atomic_file
 from models.cycle import Cycle
 from models.errors import InputError
-from models.simulation import HOTTEST_START, can_start, kelvin_hint
 from models.table_file import is_folder, kind_of, read_table
 
 DECIMALS = 6  # of results: a millionth of a kelvin or a watt
@@ -48,7 +45,7 @@ class RecordedStart:
         Raises
         ------
         InputError
-            If no node of these was recorded, or a gearbox cannot start at a temperature.
+            If no node of these was recorded.
         """
         nodes = tuple(nodes)
         known = {name: T for name, T in self.temperatures.items() if name in nodes}
@@ -57,14 +54,6 @@ class RecordedStart:
                 f"{self.path}: --initial recorded needs a column T_<node>_degC with a temperature, of the nodes "
                 f"{', '.join(nodes)}; give a temperature (--initial 20) or another file instead"
             )
-        faults = [
-            f"{self.path}: {self.columns[name]} is {T:g} at row {self.rows[name]}; to start from, a number above "
-            f"-273.15 and up to {HOTTEST_START:g} degC is needed{kelvin_hint(T)}"
-            for name, T in known.items()
-            if not can_start(T)
-        ]
-        if faults:
-            raise InputError("\n".join(faults))
         mean = sum(known.values()) / len(known)
         return {name: known.get(name, mean) for name in nodes}
 
@@ -97,12 +86,13 @@ def read_cycle_and_start(path: Path, extra: tuple[str, ...] = ()) -> tuple[Cycle
 def read_initial(value: str) -> float | dict[str, float]:
     """Initial temperatures: a number in degC, or a file whose ``T_<node>_degC`` columns end with them.
 
-    The last row counts, so that a result can be continued.
+    The last row counts, so that a result can be continued. :func:`models.start_temperatures.start_temperatures` checks
+    the temperatures.
 
     Raises
     ------
     InputError
-        If it is neither.
+        If it is neither a number nor such a file.
 
     Examples
     --------
@@ -110,30 +100,17 @@ def read_initial(value: str) -> float | dict[str, float]:
     20.0
     """
     try:
-        T = float(value)
+        return float(value)
     except ValueError:
-        return _last_row(Path(value))
-    if not can_start(T):
-        raise InputError(
-            f"--initial {value}: must be a finite number above -273.15 degC and up to {HOTTEST_START:g} degC"
-            + kelvin_hint(T)
-        )
-    return T
-
-
-def _last_row(path: Path) -> dict[str, float]:
-    table = read_table(path)
-    last = {c: table[c].iloc[-1] for c in _temperature_columns(table) if len(table)}
+        table = read_table(Path(value))
+    last = {column: table[column].iloc[-1] for column in _temperature_columns(table) if len(table)}
     if not last:
-        raise InputError(f"{path}: has no T_<node>_degC columns with values to start from")
-    numbers = pd.to_numeric(pd.Series(last), errors="coerce")
-    for name, T in numbers.items():
-        if not can_start(T):
-            raise InputError(
-                f"{path}: {name} is {last[str(name)]} in the last row, row {len(table)}; to start from, a number above "
-                f"-273.15 and up to {HOTTEST_START:g} degC is needed{kelvin_hint(T)}"
-            )
-    return {str(name)[2:-5]: float(T) for name, T in numbers.items()}
+        raise InputError(f"{value}: has no T_<node>_degC columns with values to start from")
+    try:
+        return {column[2:-5]: float(T) for column, T in last.items() if pd.notna(T)}
+    except ValueError as error:
+        texts = [f"{column} is {T!r}" for column, T in last.items() if isinstance(T, str)]
+        raise InputError(f"{value}: {', '.join(texts)} in the last row; numbers are needed to start from") from error
 
 
 def _temperature_columns(table: pd.DataFrame) -> list[str]:
@@ -178,7 +155,7 @@ def write_table(path: Path, columns: Mapping[str, ArrayLike]) -> None:
     """
     kind = kind_of(path)
     table = pd.DataFrame(dict(columns))
-    with appearing_whole(path) as partial:
+    with atomic_file(path) as partial:
         if kind == ".parquet":
             try:
                 table.to_parquet(partial)
@@ -188,32 +165,3 @@ def write_table(path: Path, columns: Mapping[str, ArrayLike]) -> None:
             text = table.round(DECIMALS).to_csv(index=False, lineterminator="\n").encode()
             # Neither name nor time go into the archive, so that the same table gives the same bytes.
             partial.write_bytes(gzip.compress(text, mtime=0) if kind == ".csv.gz" else text)
-
-
-@contextlib.contextmanager
-def appearing_whole(path: Path) -> Iterator[Path]:
-    """A temporary name beside `path` that becomes `path` when the block ends well, and vanishes otherwise.
-
-    It has the ending of `path`, so that who writes by the ending may write to it.
-
-    Raises
-    ------
-    InputError
-        If the folder cannot be made or written to.
-    """
-    folder = path.parent
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=path.suffix, dir=folder)
-        os.close(handle)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror}); choose another output") from error
-    partial = Path(name)
-    try:
-        yield partial
-        if path.is_dir():
-            raise InputError(f"{path}: is a folder; name a file")
-        partial.chmod(0o644)
-        partial.replace(path)
-    finally:
-        partial.unlink(missing_ok=True)

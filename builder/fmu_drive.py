@@ -8,11 +8,12 @@ at which they are read. An FMU that interpolates its inputs (a native one) is gi
 
 from __future__ import annotations
 
+import itertools
 import logging
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from ctypes import byref, c_double, c_int, c_uint
+from ctypes import byref
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -29,6 +30,7 @@ from builder.signals import input_column, result_column
 from builder.units import UNITS
 from models.cycle import Cycle
 from models.errors import InputError, did_you_mean
+from models.start_temperatures import start_temperatures
 from models.types import Array
 
 logger = logging.getLogger(__name__)
@@ -38,6 +40,9 @@ LARGEST_CHANGE = {"speed": 25.0, "torque": 5.0}  # [1/min], [N m]: a slower ramp
 NEEDED = {"speed": "input", "torque": "input", "T_ambient": "input", "loss.total": "output", "initial.T": "parameter"}
 WARNING, DISCARD = 1, 2
 PROGRESS_ROWS = 50
+
+_messages: dict[int | None, list[tuple[int, str]]] = {}  # of every instance, by its component environment
+_environments = itertools.count(1)
 
 
 def drive_fmu(
@@ -111,13 +116,24 @@ def fmu_nodes(path: Path) -> tuple[str, ...]:
 
 @dataclass
 class LoadedFmu:
-    """An FMU that is instantiated, its variables by their meaning, and what it has said."""
+    """An FMU that is instantiated, its variables by their meaning, and the messages that it has logged.
+
+    Attributes
+    ----------
+    path : Path
+    description : fmpy.model_description.ModelDescription
+    slave : fmpy.fmi2.FMU2Slave
+    messages : list of (int, str)
+        Status and text, not shown yet
+    doing : str
+        Part of the simulation, for error messages
+    """
 
     path: Path
     description: Any
     slave: Any = None
     messages: list[tuple[int, str]] = field(default_factory=list)
-    doing: str = ""  # for a fault that the FMU tells
+    doing: str = ""
 
     def __post_init__(self) -> None:
         """Find the variables."""
@@ -126,12 +142,11 @@ class LoadedFmu:
         self._inputs = [v for v in variables if v.causality == "input"]
         self.inputs = [v.name.strip("'") for v in self._inputs]
         self._outputs = [v for v in variables if v.causality == "output" and result_column(v.name) is not None]
-        self._reals = [v for v in self._outputs if v.type == "Real"]
-        self._booleans = [v for v in self._outputs if v.type == "Boolean"]
-        self._input_buffer = (c_uint * len(self._inputs))(*(v.valueReference for v in self._inputs))
-        self._real_buffer = (c_uint * len(self._reals))(*(v.valueReference for v in self._reals))
-        self._boolean_buffer = (c_uint * len(self._booleans))(*(v.valueReference for v in self._booleans))
-        self._orders = (c_int * len(self._inputs))(*(1 for _ in self._inputs))
+        self._references = {
+            kind: [v.valueReference for v in self._outputs if v.type == kind] for kind in ("Real", "Boolean")
+        }
+        self._input_references = [v.valueReference for v in self._inputs]
+        self._orders = [1] * len(self._inputs)
         self._to_si = [UNITS[v.unit].column[1:] if v.unit in UNITS else (1.0, 0.0) for v in self._inputs]
 
     def defaults(self) -> list[float]:
@@ -140,33 +155,29 @@ class LoadedFmu:
 
     def set_inputs(self, values: Sequence[float]) -> None:
         """Set all inputs, given in the units of file columns."""
-        count = len(values)
-        si = (c_double * count)(*((v - b) / a for v, (a, b) in zip(values, self._to_si, strict=True)))
-        self.slave.fmi2SetReal(self.slave.component, self._input_buffer, count, si)
+        self.slave.setReal(self._input_references, [(v - b) / a for v, (a, b) in zip(values, self._to_si, strict=True)])
 
     @property
     def interpolates(self) -> bool:
-        """Whether inputs can go linearly through a step."""
+        """True if inputs can change linearly through a step."""
         return bool(self.description.coSimulation.canInterpolateInputs)
 
     def set_rates(self, values: Sequence[float]) -> None:
         """Set the rates of all inputs during the next step, given in the units of file columns per second."""
-        count = len(values)
-        si = (c_double * count)(*(v / a for v, (a, _) in zip(values, self._to_si, strict=True)))
-        self.slave.fmi2SetRealInputDerivatives(self.slave.component, self._input_buffer, count, self._orders, si)
+        rates = [v / a for v, (a, _) in zip(values, self._to_si, strict=True)]
+        self.slave.setRealInputDerivatives(self._input_references, self._orders, rates)
 
     def outputs(self) -> tuple[list[float], list[int]]:
         """Reals in the FMU's own units, and Booleans."""
-        reals, booleans = (c_double * len(self._reals))(), (c_int * len(self._booleans))()
-        self.slave.fmi2GetReal(self.slave.component, self._real_buffer, len(reals), reals)
-        self.slave.fmi2GetBoolean(self.slave.component, self._boolean_buffer, len(booleans), booleans)
-        return list(reals), list(booleans)
+        return self.slave.getReal(self._references["Real"]), self.slave.getBoolean(self._references["Boolean"])
 
-    def columns(self, reals: Array, booleans: Array) -> dict[str, Array]:
-        """Output columns of rows of :meth:`outputs`, in the order of the FMU."""
-        table: dict[str, Array] = {v.name: _to_column(v, reals[:, i]) for i, v in enumerate(self._reals)}
-        table |= {v.name: booleans[:, i].astype(bool) for i, v in enumerate(self._booleans)}
-        return {str(result_column(v.name)): table[v.name] for v in self._outputs}
+    def columns(self, rows: Sequence[tuple[list[float], list[int]]]) -> dict[str, Array]:
+        """Columns of rows of :meth:`outputs`, in the order of the FMU."""
+        reals, booleans = (iter(np.array(values).T) for values in zip(*rows, strict=True))
+        return {
+            str(result_column(v.name)): _to_column(v, next(reals)) if v.type == "Real" else next(booleans).astype(bool)
+            for v in self._outputs
+        }
 
     def set_parameters(self, parameters: Mapping[str, float]) -> None:
         """Set tunable factors."""
@@ -181,40 +192,32 @@ class LoadedFmu:
     def set_initial(self, initial: float | Mapping[str, float]) -> None:
         """Set start temperatures, [degC]: one for all nodes, or all parts by name."""
         starts = _starts(self.variables)
+        nodes = [v.name.removesuffix(".T").strip("'") for v in self._outputs if v.name.endswith(".T")]
+        temperatures = start_temperatures(initial, list(starts), known=nodes, source=str(self.path))
+        self.slave.setBoolean([self.variables["initial.uniform"].valueReference], [not isinstance(initial, Mapping)])
         if not isinstance(initial, Mapping):
             self._set_real(self.variables["initial.T"], initial)
             return
-        nodes = {v.name.removesuffix(".T").strip("'") for v in self._outputs if v.name.endswith(".T")}
-        unknown = [name for name in initial if name not in nodes]
-        faults = [f"{name!r} is not a node of this FMU{did_you_mean(name, nodes)}" for name in unknown]
-        missing = [name for name in starts if name not in initial]
-        if missing:
-            faults.append(
-                f"initial temperatures are missing for: {', '.join(missing)}; give one of every node, or one for all"
-            )
-        if faults:
-            raise InputError("\n".join(f"{self.path}: {fault}" for fault in faults))
-        self.slave.setBoolean([self.variables["initial.uniform"].valueReference], [False])
         for name, variable in starts.items():
-            self._set_real(variable, initial[name])
+            self._set_real(variable, temperatures[name])
 
     def _set_real(self, variable: Any, value: float) -> None:
         scale, offset = UNITS[variable.unit].column[1:]
         self.slave.setReal([variable.valueReference], [(float(value) - offset) / scale])
 
-    def hear(self, when: str) -> None:
+    def report_messages(self, when: str) -> None:
         """Pass the FMU's warnings on.
 
         Raises
         ------
         InputError
-            If it has said that something is wrong.
+            If it has logged an error.
         """
-        heard, self.messages[:] = list(self.messages), []
-        faults = [text for status, text in heard if status > WARNING]
+        messages, self.messages[:] = list(self.messages), []
+        faults = [text for status, text in messages if status > WARNING]
         if faults:
             raise InputError(f"{self.path}: {when}: " + "; ".join(faults))
-        for status, text in heard:
+        for status, text in messages:
             if status == WARNING:
                 logger.warning("%s: %s", self.path, text)
 
@@ -231,7 +234,7 @@ def loaded(path: Path) -> Iterator[LoadedFmu]:
     """
     path = Path(path)
     fmu = LoadedFmu(path, _description(path))
-    with tempfile.TemporaryDirectory(prefix="twin-fmu-") as folder:
+    with tempfile.TemporaryDirectory(prefix="twin-fmu-") as folder, _logged_to(fmu.messages) as callbacks:
         _extract(path, Path(folder))
         identifier = fmu.description.coSimulation.modelIdentifier
         # FMI 2.0 names the folders of ARM as FMI 3.0 does; FMPy alone would take those of x86.
@@ -240,7 +243,6 @@ def loaded(path: Path) -> Iterator[LoadedFmu]:
         binary = next((name for name in names if name.is_file()), names[-1])
         if not binary.is_file():
             raise InputError(f"{path}: has no binary for {fmpy.platform}; build the FMU for this machine")
-        callbacks = _callbacks(fmu.messages)
         try:
             fmu.slave = fmi2.FMU2Slave(
                 guid=fmu.description.guid, modelIdentifier=identifier, unzipDirectory=folder, instanceName=path.stem,
@@ -254,7 +256,7 @@ def loaded(path: Path) -> Iterator[LoadedFmu]:
         )  # fmt: skip
         if not fmu.slave.component:
             fmu.slave.freeLibrary()
-            fmu.hear("it cannot be instantiated")
+            fmu.report_messages("it cannot be instantiated")
             raise InputError(f"{path}: it cannot be instantiated, and does not say why; build the FMU again")
         dead = False
         try:
@@ -262,7 +264,7 @@ def loaded(path: Path) -> Iterator[LoadedFmu]:
         except FMICallException as error:
             dead = error.status > DISCARD + 1
             doing = fmu.doing or error.function
-            fmu.hear(doing)
+            fmu.report_messages(doing)
             raise InputError(f"{path}: {doing}: {error}") from error
         finally:
             if not dead:
@@ -277,9 +279,9 @@ def _driven(fmu: LoadedFmu, time: Array, table: Array, progress: Callable[[int, 
     slave.enterInitializationMode()
     fmu.set_inputs(table[0].tolist())
     slave.exitInitializationMode()
-    fmu.hear("its start values")
+    fmu.report_messages("its start values")
     outputs = [fmu.outputs()]
-    fmu.hear(f"at {time[0]:g} s")
+    fmu.report_messages(f"at {time[0]:g} s")
     component, do_step = slave.component, slave.fmi2DoStep
     for row in range(n_rows - 1):
         begin, end = float(time[row]), float(time[row + 1])
@@ -304,12 +306,11 @@ def _driven(fmu: LoadedFmu, time: Array, table: Array, progress: Callable[[int, 
             do_step(component, end - half, half, 1)
         outputs.append(fmu.outputs())
         if fmu.messages:
-            fmu.hear(f"at {end:g} s")
+            fmu.report_messages(f"at {end:g} s")
         if progress is not None and (row % PROGRESS_ROWS == PROGRESS_ROWS - 1 or row == n_rows - 2):
             progress(row + 1, n_rows - 1)
     columns = {"time_s": time} | {input_column(name): table[:, i] for i, name in enumerate(fmu.inputs)}
-    reals, booleans = (np.array([row[i] for row in outputs]) for i in (0, 1))
-    return columns | fmu.columns(reals, booleans)
+    return columns | fmu.columns(outputs)
 
 
 def _pieces(names: Sequence[str], duration: float, begin: Array, end: Array) -> int:
@@ -371,16 +372,35 @@ def _uri(resources: Path) -> bytes:
     return (unquote(uri) if (resources / "slavemodule.txt").is_file() else uri).encode()
 
 
-def _callbacks(messages: list[tuple[int, str]]) -> Any:
-    def log(environment: Any, instance: bytes, status: int, category: bytes, message: bytes) -> None:  # noqa: ARG001
+def _log(environment: int | None, instance: bytes, status: int, category: bytes, message: bytes) -> None:
+    """Add a message to the list of its instance; messages of instances that others made go to FMPy's own logger.
+
+    FMPy's C part keeps one logger for the whole process, so this one is never freed.
+    """
+    messages = _messages.get(environment)
+    if messages is None:
+        fmi2.printLogMessage(environment, instance, status, category, message)
+    else:
         messages.append((status, message.decode("utf-8", "replace").strip()))
 
+
+_LOGGER = fmi2.fmi2CallbackLoggerTYPE(_log)
+
+
+@contextmanager
+def _logged_to(messages: list[tuple[int, str]]) -> Iterator[Any]:
+    """Callbacks for one instance, whose messages are added to a list."""
     callbacks = fmi2.fmi2CallbackFunctions()
-    callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(log)
+    callbacks.logger = _LOGGER
     callbacks.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(fmpy.calloc)
     callbacks.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(fmpy.free)
+    callbacks.componentEnvironment = next(_environments)
     fmi2.addLoggerProxy(byref(callbacks))
-    return callbacks
+    _messages[callbacks.componentEnvironment] = messages
+    try:
+        yield callbacks
+    finally:
+        del _messages[callbacks.componentEnvironment]
 
 
 def _to_column(variable: Any, value: Any) -> Any:

@@ -45,7 +45,7 @@ def reference_run(
     gearbox, network, table, losses
         What the FMU is made of
     data : mapping
-        As the FMU carries it (:func:`builder.fmu.twin_data`)
+        As the FMU carries it (:func:`builder.twin_data.twin_data`)
     """
     cycle = reference_cycle(gearbox, step_s=STEP_S)
     twin = Twin(data, _functions(network), losses)

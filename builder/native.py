@@ -14,14 +14,14 @@ from importlib.resources import files
 from pathlib import Path
 from sys import float_info
 
-from builder.files import appearing_whole
-from builder.fmu import gearbox_identity, gearbox_pages, refuse_mismatch, write_archive
+from builder.fmu_package import gearbox_identity, gearbox_pages, package_fmu, refuse_mismatch
 from builder.model_description import Identity, guid_of, model_description
 from builder.native_compile import PLATFORMS, compile_libraries
 from builder.native_data import gearbox_sources, number
 from builder.onnx_export import read_network
 from builder.signals import Signal, SignalTable, signal_table
 from builder.train import TrainingResult
+from builder.twin_data import twin_data
 from models.correction import Correction, corrected_network
 from models.gearbox import Gearbox
 from models.network import ThermalNetwork
@@ -115,13 +115,14 @@ def build_native_fmu(
     )
     table = signal_table(gearbox, network, losses)
     identity = gearbox_identity(gearbox, output, FLAGS, correction)
+    data = twin_data(table, network, training.losses, definition=gearbox.hash)
     written = {name: native_source(name) for name in GEARBOX_MODEL}
     return build_native_archive(
         output,
         table=table,
         identity=identity,
         sources=written | gearbox_sources(table, network, losses),
-        pages=gearbox_pages(gearbox, network, table, identity, training, kind="native"),
+        pages=gearbox_pages(gearbox, network, table, identity, training, data, kind="native"),
         platforms=platforms,
     )
 
@@ -168,18 +169,13 @@ def build_native_archive(
     sources["model_variables.c"] = variables_source(table, guid_of(xml))
     encoded = {name: text.encode() for name, text in sources.items()}
     binaries = compile_libraries(encoded, platforms)
-    content = {
-        **pages,
-        "modelDescription.xml": xml,
-        "documentation/licenses/fmi2_headers.txt": native_source(HEADERS_LICENSE).encode(),
-        **{f"sources/{name}": text for name, text in encoded.items()},
-        **{
-            f"binaries/{folder}/{identity.model_identifier}{PLATFORMS[folder].suffix}": library
-            for folder, library in binaries.libraries.items()
-        },
+    inside = {f"sources/{name}": text for name, text in encoded.items()}
+    inside |= {
+        f"binaries/{folder}/{identity.model_identifier}{PLATFORMS[folder].suffix}": library
+        for folder, library in binaries.libraries.items()
     }
-    with appearing_whole(output) as partial:
-        write_archive(partial, content)
+    licence = {"documentation/licenses/fmi2_headers.txt": native_source(HEADERS_LICENSE).encode()}
+    package_fmu(output, xml, pages, licence, inside)
     return NativeBuild(output, tuple(binaries.libraries), binaries.note)
 
 

@@ -11,7 +11,7 @@ from typing import Any
 import click
 
 from builder import console
-from builder.workers import check_workers, processes
+from builder.workers import worker_options
 
 LINES = 20  # of progress where there is no terminal
 
@@ -28,10 +28,7 @@ LINES = 20  # of progress where there is no terminal
               help="Every N-th case is also diagnosed with fewer sensors and shorter recordings; 0: none.")  # fmt: skip
 @click.option("--baselines/--no-baselines", default=True, show_default=True,
               help="Try other methods on the same recordings.")  # fmt: skip
-@click.option("--jobs", type=click.IntRange(min=1), default=None, metavar="N",
-              help="Processes on this machine.  [default: all cores]")  # fmt: skip
-@click.option("--dask", "dask_address", default=None, metavar="ADDRESS",
-              help="Scheduler of a Dask cluster to work on instead, e.g. tcp://host:8786.")  # fmt: skip
+@worker_options()
 @click.option("--output", type=click.Path(path_type=Path, file_okay=False), default=Path("out/proof"),
               show_default=True, metavar="DIR",
               help="Folder of the proof; one that was interrupted goes on.")  # fmt: skip
@@ -41,8 +38,8 @@ def prove(
     gearbox: str,
     cells_every: int,
     baselines: bool,
-    jobs: int | None,
-    dask_address: str | None,
+    jobs: int,
+    dask: str | None,
     output: Path,
 ) -> None:
     """Try the diagnosis on sealed cases: hide effects, diagnose blindly, hash the verdicts, open the truth, score.
@@ -53,12 +50,10 @@ def prove(
     from builder.prove import prove as run
     from diagnosis.proof.protocol import UNOPENED_SEED, WHOLE, Settings
 
-    check_workers(jobs, dask_address)
     settings = Settings(seed=UNOPENED_SEED if seed is None else seed, cases=WHOLE if cases is None else cases,
                         gearbox=gearbox, cells_every=cells_every, baselines=baselines)  # fmt: skip
     with _told() as tell:
-        found = run(settings, output, jobs=processes(jobs), dask_address=dask_address,
-                    tell=tell)  # fmt: skip
+        found = run(settings, output, jobs=jobs, dask_address=dask, tell=tell)
     show(found)
     for name in (PAGE, NUMBERS):
         console.out.print(f"wrote {output / name}")

@@ -14,17 +14,18 @@ import numpy as np
 from builder import console
 from builder.files import (
     RecordedStart,
-    appearing_whole,
     read_cycle_and_start,
     read_initial,
     refuse_to_replace,
     write_table,
 )
+from models.atomic_write import atomic_file
 from models.correction import read_correction
 from models.cycle import COLUMNS, Cycle
 from models.definition import Training
 from models.errors import InputError
 from models.gearbox import known_gearboxes, load_gearbox
+from models.start_temperatures import start_temperatures
 from models.table_file import kind_of
 from models.types import Array
 
@@ -157,14 +158,16 @@ def simulate(
     for note in notes:
         console.err.print(f"note: {files[-1]}: {note}")
     start = recorded.of(model.nodes) if initial == RECORDED else given
-    if isinstance(start, Mapping):
-        _check_complete(start, model.nodes, str(initial))
-        start = {name: start[name] for name in model.nodes}  # a result also has temperatures of boundaries
+    if start is not None:
+        if isinstance(start, Mapping):  # a result also has temperatures of boundaries
+            start = {name: T for name, T in start.items() if name in model.nodes}
+        source = str(recorded.path) if initial == RECORDED else f"--initial {initial}"
+        start = start_temperatures(start, model.nodes, source=source)
     if output_interval is not None:
         cycle = cycle.refined(output_interval)
     with console.progress_bar("simulating") as progress:
         columns = model.run(cycle, start, progress)
-    with nullcontext() if plot is None else appearing_whole(plot) as picture:
+    with nullcontext() if plot is None else atomic_file(plot) as picture:
         if picture is not None:
             from builder.plots import plot_cycle
 
@@ -213,16 +216,6 @@ def _check_outputs(output: Path, plot: Path | None, inputs: list[Path]) -> None:
     outputs = [output] if plot is None else [output, plot]
     refuse_to_replace(inputs, outputs)
     kind_of(output)
-
-
-def _check_complete(start: Mapping[str, float], nodes: tuple[str, ...], file: str) -> None:
-    missing = [name for name in nodes if name not in start]
-    if missing:
-        raise InputError(
-            f"{file}: initial temperatures are missing for: {', '.join(missing)}; give a file with T_<node>_degC of "
-            f"all nodes (a result of simulate), one temperature for all (--initial 20), or --initial {RECORDED} if "
-            "the cycle's own file has such columns"
-        )
 
 
 def _show(columns: Mapping[str, Array]) -> None:

@@ -18,11 +18,11 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 from fmpy.ssp.simulation import simulate_ssp
+from vehicle_fmus import build_cycle_fmu, build_vehicle_fmu, write_system
 
 from builder.native import build_native_fmu
 from builder.onnx_export import export_onnx
 from builder.train import train_surrogate
-from builder.vehicle import build_cycle_fmu, build_vehicle_fmu, write_system
 from models.gearbox import load_gearbox
 from models.version import project_version
 
@@ -53,7 +53,7 @@ def build_system(folder: Path, gearbox_fmu: Path) -> Path:
 def build_gearbox(folder: Path) -> Path:
     """Train the FZG rig's networks and build its native FMU for this machine."""
     gearbox = load_gearbox("fzg")
-    training = train_surrogate(gearbox, jobs=-1)
+    training = train_surrogate(gearbox, jobs=2)
     networks = export_onnx(training, folder / "networks", version=project_version())
     return build_native_fmu(gearbox, training, networks, folder / "gearbox.fmu", platforms="host").path
 

@@ -15,10 +15,10 @@ from models.definition import Training
 from models.errors import InputError, did_you_mean
 from models.network_structure import Losses, Network
 from models.runtime import NetworkSystem, efficiency, torque_loss
+from models.start_temperatures import start_temperatures
 from models.surrogate import range_distance
 from models.types import Array
 
-HOTTEST_START = 250.0  # degC; above it kelvin are meant, or a gearbox that is long destroyed
 STEADY_TOLERANCE_K, STEADY_DISTANCE_K = 1e-9, 1e-6
 FIRST_PSEUDO_STEP_S, LARGEST_PSEUDO_STEP_S, SHORTEST_PSEUDO_STEP_S = 1e5, 1e10, 10.0
 # A change this much smaller than the one before; without a margin rounding can keep a cycle of two alive.
@@ -67,53 +67,16 @@ def network_system(
         raise InputError(str(error)) from error
 
 
-def can_start(T: float) -> bool:
-    """Whether a gearbox can start at a temperature [degC]."""
-    return -273.15 < T <= HOTTEST_START
-
-
-def kelvin_hint(T: float) -> str:
-    """What to give instead of a start temperature that is too hot for degC, if kelvin may be meant; else empty.
-
-    Examples
-    --------
-    >>> kelvin_hint(293.15), kelvin_hint(20.0)
-    ('; if kelvin are meant, give 20', '')
-    """
-    return f"; if kelvin are meant, give {T - 273.15:g}" if HOTTEST_START < T < 1000.0 else ""
-
-
 def initial_states(network: Network, initial: float | Mapping[str, float]) -> Array:
-    """States at the start, from one temperature [degC] or one per node (all parts must be given), shape (n,).
+    """States at the start, shape (n,); see :func:`models.start_temperatures.start_temperatures`.
 
     Raises
     ------
     InputError
-        If nodes are missing or unknown, a temperature is not finite or below absolute zero, or one for all nodes is
-        above 250 degC; single nodes may be hotter, as those of a result that is continued.
     """
-    part_names = [part.name for part in network.parts]
-    if isinstance(initial, Mapping):
-        for name in initial:
-            if name not in network.node_names:
-                hint = did_you_mean(name, network.node_names)
-                raise InputError(f"initial temperature of unknown node {name!r}{hint}")
-        missing = [name for name in part_names if name not in initial]
-        if missing:
-            raise InputError(
-                f"initial temperatures are missing for: {', '.join(missing)}; give one of every node, or one for all"
-            )
-        temperatures = np.array([initial[name] for name in part_names], dtype=float)
-    else:
-        temperatures = np.full(len(part_names), float(initial))
-        if initial > HOTTEST_START:
-            raise InputError(
-                f"an initial temperature of all nodes is possible up to {HOTTEST_START:g} degC, not {initial:g}"
-                + kelvin_hint(initial)
-            )
-    if not (np.isfinite(temperatures).all() and (temperatures > -273.15).all()):
-        raise InputError(f"initial temperatures must be finite and above -273.15 degC, not {temperatures.tolist()}")
-    return np.concatenate((temperatures, [state.start for state in network.states]))
+    parts = [part.name for part in network.parts]
+    temperatures = start_temperatures(initial, parts, known=network.node_names)
+    return np.array([*temperatures.values(), *(state.start for state in network.states)])
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,6 +1,6 @@
 """Random sequences of FMI calls to a native FMU, beside an oracle that knows which of them are allowed.
 
-    python -m tests.contract.native_state_machine FOLDER [EXAMPLES]
+    python -m tests.contract.native_state_machine FOLDER [EXAMPLES] [SEED]
 
 FOLDER is an unpacked FMU. A program of its own, so that a crash of the FMU is an exit status. The oracle is the state
 machine of FMI 2.0 for co-simulation, and where that leaves a choice what this project promises: inputs and parameters
@@ -18,6 +18,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import hypothesis
 from fmpy import fmi2
 from hypothesis import HealthCheck, settings, stateful
 from hypothesis import strategies as st
@@ -427,11 +428,12 @@ class Calls(stateful.RuleBasedStateMachine):
         self.call("FreeFMUstate", None, expect=OK)
 
 
-def main(folder: str, examples: str = "100") -> None:
+def main(folder: str, examples: str = "100", seed: str = "0") -> None:
     global SUBJECT
     SUBJECT = Subject(Path(folder))
+    hypothesis.seed(int(seed))(Calls)
     chosen = settings(
-        max_examples=int(examples), stateful_step_count=50, deadline=None, derandomize=True, database=None,
+        max_examples=int(examples), stateful_step_count=50, deadline=None, database=None,
         suppress_health_check=list(HealthCheck),
     )  # fmt: skip
     stateful.run_state_machine_as_test(Calls, settings=chosen)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import logging
+import subprocess
+import sys
 import zipfile
 from pathlib import Path
 
@@ -101,6 +103,42 @@ def test_warnings_of_the_fmu_are_passed_on(fzg_fmu: Path, caplog: pytest.LogCapt
     assert driven["in_domain"].tolist() == [True, False, False]
 
 
+NESTED = """
+import gc, sys
+from pathlib import Path
+import fmpy
+from builder.fmu_drive import drive_fmu, loaded
+from models.cycle import Cycle
+
+fmu = Path(sys.argv[1])
+fast = Cycle.from_columns({"time_s": [0, 1], "speed_rpm": [1000, 1e5], "torque_Nm": [50, 50]})
+for _ in range(50):
+    with loaded(fmu) as first:
+        drive_fmu(fmu, fast)
+        gc.collect()
+        first.slave.setupExperiment(startTime=0.0)
+        first.slave.enterInitializationMode()
+        first.slave.setReal([first.variables["speed"].valueReference], [float("nan")])
+        try:
+            first.slave.exitInitializationMode()
+        except fmpy.fmi1.FMICallException:
+            pass
+        ((_, text),) = first.messages
+        assert "speed is nan" in text
+    try:
+        fmpy.simulate_fmu(str(fmu), stop_time=1.0, start_values={"factor.churning": -1.0}, validate=False)
+    except fmpy.fmi1.FMICallException:
+        print("refused")
+"""
+
+
+def test_an_fmu_may_log_after_another_one_is_gone(fzg_native: Path) -> None:
+    """FMPy keeps one logger for the process: a freed one crashed the process as soon as another instance logged."""
+    done = subprocess.run([sys.executable, "-c", NESTED, str(fzg_native)], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.count("refused") == done.stdout.count("factor.churning is -1") == 50
+
+
 def test_extra_inputs_and_nodes_of_an_fmu_are_known(fzg_fmu: Path, fzg: Gearbox) -> None:
     assert fmu_inputs(fzg_fmu) == ()
     assert fmu_nodes(fzg_fmu) == tuple(part.name for part in fzg.network().parts)
@@ -135,14 +173,12 @@ def test_more_rows_bring_the_old_ones_no_further_from_the_truth(
 def test_refused_values_end_with_the_words_of_the_fmu(fzg_fmu: Path) -> None:
     with pytest.raises(InputError, match=r"factor\.churning is -1; 0\.05 to 20 is possible"):
         drive_fmu(fzg_fmu, cycle(), parameters={"churning": -1.0})
-    with pytest.raises(InputError, match=r"initial\.T is 2273\.15 K"):
-        drive_fmu(fzg_fmu, cycle(), initial=2000.0)
 
 
 def test_initial_temperatures_must_be_complete_and_known(fzg_fmu: Path) -> None:
-    with pytest.raises(InputError, match="'oli' is not a node of this FMU; did you mean 'oil'") as raised:
+    with pytest.raises(InputError, match="unknown node 'oli'; did you mean 'oil'") as raised:
         drive_fmu(fzg_fmu, cycle(), initial={"oli": 20.0})
-    assert "initial temperatures are missing for: housing_lower" in str(raised.value)
+    assert "start temperatures are missing for: housing_lower" in str(raised.value)
 
 
 def test_file_must_be_an_fmu(fzg_fmu: Path, tmp_path: Path) -> None:

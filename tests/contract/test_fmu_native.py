@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import os
+import random
 import shutil
 import subprocess
 import sys
@@ -10,31 +10,29 @@ import threading
 import zipfile
 from collections.abc import Callable
 from contextlib import ExitStack
-from ctypes import byref, c_char_p, c_double, c_int, c_size_t, c_uint, c_void_p, create_string_buffer
+from ctypes import byref, c_char_p, c_double, c_int, c_uint
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import fmpy
 import numpy as np
 import pytest
-from fmpy import read_model_description, simulate_fmu
+from fmpy import read_model_description
 from fmpy.fmi1 import FMICallException
-from fmpy.validation import validate_fmu
 
 from builder import native_compile
 from builder.drive_cycle import reference_cycle
-from builder.fmu_drive import drive_fmu, loaded
+from builder.fmu_drive import drive_fmu
 from builder.native import build_native_fmu
 from builder.native_compile import PLATFORMS, compile_libraries, plan_for
 from builder.train import TrainingResult
-from models.cycle import Cycle
 from models.errors import InputError
 from models.gearbox import Gearbox
 from tests.contract.fmu_host import DISCARD, LOADED, Host, hosted
-from tests.contract.networks import with_everything
+from tests.contract.native_hosts import run, unpacked
 
 Build = Callable[..., Path]
+ROOT = Path(__file__).parents[2]
 ERROR = 3
 SOURCE = {"one.c": b"int one(void);\nint one(void) { return 1; }\n"}
 HAS_ZIG = native_compile._zig() is not None
@@ -65,57 +63,6 @@ def test_cycle_is_that_of_the_network_in_python(fzg_native: Path, fzg: Gearbox, 
     cycle = reference_cycle(fzg)
     expected = fzg.network().simulate(cycle, losses=fzg_training.losses, initial=20.0)
     columns_agree(drive_fmu(fzg_native, cycle, initial=20.0), expected.columns(), relative=1e-9)
-
-
-def test_extended_network_runs_as_in_python(
-    build_native: Build, fzg: Gearbox, fzg_training: TrainingResult, tmp_path: Path
-) -> None:
-    network = with_everything(fzg.network())
-    path = build_native(tmp_path / "extended box.fmu", network)
-    assert validate_fmu(str(path)) == []
-    time = np.arange(0.0, 181.0)
-    columns = {"time_s": time, "speed_rpm": 1500.0 + 20.0 * time, "torque_Nm": 200.0 - time, "pump_flow": time / 90.0}
-    cycle = Cycle.from_columns(columns, extra=("pump_flow",))
-    expected = network.simulate(cycle, losses=fzg_training.losses, initial=25.0)
-    columns_agree(drive_fmu(path, cycle, initial=25.0), expected.columns(), relative=1e-9)
-    heater = expected.extra_heat["heater (electric)"]
-    assert 0.0 < np.mean(heater > 0.0) < 1.0
-    with hosted(path) as host:
-        assert host.get("state.heater_on", "state.run_in") == [1.0, 1.0]
-        host.step(1.0, count=60)
-        assert host.get("state.heater_on")[0] == 0.0
-        assert 0.0 < host.get("state.run_in")[0] < 1.0
-        state, time_0 = host.slave.getFMUstate(), host.time
-        host.step(7.3, count=10)
-        first = host.outputs()
-        host.slave.setFMUstate(state)
-        host.time = time_0
-        host.step(7.3, count=10)
-        assert host.outputs() == first
-        host.slave.freeFMUstate(state)
-
-
-def test_steps_are_those_of_the_python_fmu(fzg_native: Path, fzg_fmu: Path) -> None:
-    with hosted(fzg_native) as native, hosted(fzg_fmu) as python:
-        for duration, speed in ((0.013, 20.0), (1.0, 20.0), (7.0, 600.0), (300.0, 300.0), (0.5, -700.0)):
-            for one in (native, python):
-                one.set(speed=speed)
-                one.step(duration, count=3)
-            found, expected = native.outputs(), python.outputs()
-            assert found == pytest.approx(expected, rel=1e-9, abs=1e-12)
-
-
-def test_reference_run_is_what_fmpy_finds(fzg_native: Path, tmp_path: Path) -> None:
-    with zipfile.ZipFile(fzg_native) as archive:
-        archive.extractall(tmp_path, [n for n in archive.namelist() if n.startswith("documentation/")])
-    given, expected = (
-        np.genfromtxt(tmp_path / f"documentation/reference_{which}.csv", delimiter=",", names=True, deletechars="")
-        for which in ("in", "out")
-    )
-    names = [n.strip('"') for n in expected.dtype.names if n != "time"]
-    result = simulate_fmu(str(fzg_native), stop_time=600.0, output_interval=10.0, input=given, output=names)
-    for name in names:
-        np.testing.assert_allclose(result[name], expected[name], rtol=1e-7, atol=1e-7, err_msg=name)
 
 
 # ---------------------------------------------------------------------- what it adds: input rates, derivatives
@@ -228,61 +175,51 @@ def test_derivatives_at_initialization(fzg_native: Path) -> None:
             derivative(host, ["oil.T"], "initial.T")
 
 
-# ---------------------------------------------------------------------- FMI: what a host can do wrong
+# ---------------------------------------------------------------------- calls of a host
 
 
-def test_calls_out_of_order_are_errors_and_change_nothing(fzg_native: Path) -> None:
-    with hosted(fzg_native, start=False) as host:
-        for call in ("enterInitializationMode", "exitInitializationMode", "terminate"):
-            with pytest.raises(FMICallException, match="error"):
-                getattr(host.slave, call)()
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="written for Linux")
+@pytest.mark.parametrize("seed", range(5))
+def test_random_calls_follow_the_state_machine_of_fmi(fzg_native: Path, tmp_path: Path, seed: int) -> None:
+    fmu = unpacked(fzg_native, tmp_path)
+    assert run([sys.executable, "-m", "tests.contract.native_state_machine", fmu.folder, "60", seed], cwd=ROOT) == ""
+
+
+def test_damaged_states_and_those_of_another_fmu_are_refused(
+    fzg_native: Path, build_native: Build, fzg: Gearbox, tmp_path: Path
+) -> None:
+    other_fmu = build_native(tmp_path / "fzg.fmu", fzg.network().with_source("oil", lambda s: 5.0, name="heater"))
+    with hosted(fzg_native) as host, hosted(other_fmu) as other:
+        host.step(12.3)
+        state = host.slave.getFMUstate()
+        content = host.slave.serializeFMUstate(state)
+        damaged = []
+        dice = random.Random(0)
+        for place in range(len(content)):
+            changed = bytearray(content)
+            changed[place] ^= dice.randrange(1, 256)
+            damaged.append(bytes(changed))
+        damaged += [content[:length] for length in range(0, len(content), 7)]
+        for one, wrong in ((other, [content]), (host, damaged)):
+            for serialized in wrong:
+                with pytest.raises(FMICallException, match="error"):
+                    one.slave.deSerializeFMUstate(serialized)
         with pytest.raises(FMICallException, match="error"):
-            host.get("oil.T")
-        host.start()
-        with pytest.raises(FMICallException, match="error"):
-            host.slave.setupExperiment(startTime=5.0)
-        host.step(1.0)
-        host.slave.terminate()
-        assert np.isfinite(host.get("oil.T")[0])
-        for refused in (lambda: host.step(1.0), lambda: host.set(speed=1.0), host.slave.terminate):
-            with pytest.raises(FMICallException, match="error"):
-                refused()
-        said = host.said
-        assert all(status == ERROR and "not allowed" in text for status, text in said if "no value" not in text)
+            other.slave.setFMUstate(state)
+        assert host.slave.serializeFMUstate(state) == content
+        host.slave.freeFMUstate(state)
 
 
-def test_null_and_wrong_types_are_errors(host: Host) -> None:
-    slave, component = host.slave, host.slave.component
-    speed, flag = (c_uint * 1)(reference(host, "speed")), (c_uint * 1)(reference(host, "in_domain"))
-    real, whole = (c_double * 1)(1.0), (c_int * 1)(1)
-    slave.fmi2GetReal(component, None, 0, None)
-    slave.fmi2SetReal(component, None, 0, None)
-    slave.fmi2GetString(component, None, 0, None)
-    state, none = c_void_p(), c_void_p()
-    calls: list[Callable[[], object]] = [
-        lambda: slave.fmi2GetReal(None, speed, 1, real),
-        lambda: slave.fmi2GetReal(component, None, 1, real),
-        lambda: slave.fmi2GetReal(component, speed, 1, None),
-        lambda: slave.fmi2GetReal(component, flag, 1, real),
-        lambda: slave.fmi2GetBoolean(component, speed, 1, whole),
-        lambda: slave.fmi2GetInteger(component, speed, 1, whole),
-        lambda: slave.fmi2SetInteger(component, speed, 1, whole),
-        lambda: slave.fmi2GetString(component, speed, 1, (c_char_p * 1)()),
-        lambda: slave.fmi2DoStep(None, 0.0, 1.0, 1),
-        lambda: slave.fmi2GetFMUstate(component, None),
-        lambda: slave.fmi2SetFMUstate(component, none),
-        lambda: slave.fmi2SerializedFMUstateSize(component, none, byref(c_size_t())),
-        lambda: slave.fmi2DeSerializeFMUstate(component, None, 10, byref(state)),
-        lambda: slave.fmi2SetDebugLogging(component, 1, 1, (c_char_p * 1)(b"logNothing")),
-        lambda: slave.fmi2CancelStep(component),
-    ]
-    before = host.outputs()
-    for call in calls:
-        with pytest.raises(FMICallException, match="error"):
-            call()
-    slave.fmi2FreeFMUstate(component, byref(none))
-    assert host.outputs() == before
-    host.step(1.0)
+def test_threads_do_not_touch_each_other(fzg_native: Path) -> None:
+    with ExitStack() as stack:  # loaded one after another: FMPy changes the working directory of the process meanwhile
+        first, *others = [stack.enter_context(hosted(fzg_native)) for _ in range(5)]
+        first.step(0.1, count=2000)
+        threads = [threading.Thread(target=host.step, args=(0.1,), kwargs={"count": 2000}) for host in others]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        assert all(host.outputs() == first.outputs() for host in others)
 
 
 def test_status_can_be_asked(host: Host) -> None:
@@ -316,73 +253,6 @@ def test_log_categories_can_be_chosen(host: Host) -> None:
     assert excursions() == 1
     slave.fmi2SetDebugLogging(component, 0, 0, None)
     assert excursions() == 0
-
-
-@pytest.mark.parametrize("given", ["guid", "name", "type", "callbacks"])
-def test_wrong_instantiation_gives_no_instance(fzg_native: Path, given: str) -> None:
-    with loaded(fzg_native) as fmu:
-        functions = fmpy.fmi2.fmi2CallbackFunctions()
-        guid, name = fmu.description.guid.encode(), b"one"
-        arguments = [name, fmpy.fmi2.fmi2CoSimulation, guid, b"", byref(functions), False, False]
-        instance = fmu.slave.fmi2Instantiate(*arguments)  # without any callback and without resources
-        assert instance
-        fmu.slave.fmi2FreeInstance(c_void_p(instance))
-        change = {"guid": (2, b"{0}"), "name": (0, None), "type": (1, 0), "callbacks": (4, None)}[given]
-        arguments[change[0]] = change[1]
-        assert not fmu.slave.fmi2Instantiate(*arguments)
-
-
-def test_state_of_another_fmu_and_damaged_states_are_refused(
-    fzg_native: Path, build_native: Build, fzg: Gearbox, tmp_path: Path
-) -> None:
-    other_fmu = build_native(tmp_path / "fzg.fmu", fzg.network().with_source("oil", lambda s: 5.0, name="heater"))
-    with hosted(fzg_native) as host, hosted(other_fmu) as other:
-        host.step(10.0)
-        state = host.slave.getFMUstate()
-        content = host.slave.serializeFMUstate(state)
-        with pytest.raises(FMICallException, match="error"):
-            other.slave.setFMUstate(state)
-        for wrong in (
-            content[:-1],
-            b"",
-            content[:300] + bytes([content[300] ^ 1]) + content[301:],
-            bytes(len(content)),
-        ):
-            for one in (host, other):
-                with pytest.raises(FMICallException, match="error"):
-                    one.slave.deSerializeFMUstate(wrong)
-        with pytest.raises(FMICallException, match="error"):
-            other.slave.deSerializeFMUstate(content)
-        short = create_string_buffer(len(content) - 1)
-        with pytest.raises(FMICallException, match="error"):
-            host.slave.fmi2SerializeFMUstate(host.slave.component, state, short, len(short))
-        assert host.slave.serializeFMUstate(state) == content
-        host.slave.freeFMUstate(state)
-
-
-def test_many_small_steps_stay_with_few_long_ones(fzg_native: Path) -> None:
-    with hosted(fzg_native) as fine, hosted(fzg_native) as coarse:
-        component, do_step = fine.slave.component, fine.slave.fmi2DoStep
-        for step in range(100_000):
-            do_step(component, step * 0.01, 0.01, 1)
-        coarse.step(10.0, count=100)
-        assert fine.get("oil.T")[0] == pytest.approx(coarse.get("oil.T")[0], abs=0.001)
-        assert fine.get("mesh.T")[0] == pytest.approx(coarse.get("mesh.T")[0], abs=0.05)
-
-
-def test_threads_do_not_touch_each_other(fzg_native: Path) -> None:
-    def run(host: Host) -> None:
-        host.step(0.1, count=2000)
-
-    with ExitStack() as stack:  # loaded one after another: FMPy changes the working directory of the process meanwhile
-        hosts = [stack.enter_context(hosted(fzg_native)) for _ in range(5)]
-        run(hosts[0])
-        threads = [threading.Thread(target=run, args=(host,)) for host in hosts[1:]]
-        for thread in threads:
-            thread.start()
-        for thread in threads:
-            thread.join()
-        assert all(host.outputs() == hosts[0].outputs() for host in hosts)
 
 
 # ---------------------------------------------------------------------- packaging
@@ -427,16 +297,6 @@ def test_only_fmi_functions_are_exported_and_only_libc_is_needed(fzg_native: Pat
     assert needed <= known
 
 
-def test_paths_with_blanks_and_other_letters(fzg_native: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    folder = tmp_path / "Prüfstand Ω 齿轮 100%"
-    (folder / "tmp ü").mkdir(parents=True)
-    monkeypatch.setattr("tempfile.tempdir", str(folder / "tmp ü"))
-    copy = folder / "Getriebe ä b.fmu"
-    copy.write_bytes(fzg_native.read_bytes())
-    cycle = Cycle.from_columns({"time_s": [0.0, 1.0], "speed_rpm": [1000.0, 1000.0], "torque_Nm": [100.0, 100.0]})
-    assert drive_fmu(copy, cycle)["T_oil_degC"][-1] > 27.0
-
-
 def test_same_content_gives_the_same_bytes_with_and_without_cache(
     build_native: Build, fzg_native: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -446,12 +306,6 @@ def test_same_content_gives_the_same_bytes_with_and_without_cache(
         assert one.namelist() == other.namelist()
         assert [name for name in one.namelist() if one.read(name) != other.read(name)] == []
     assert again.read_bytes() == fzg_native.read_bytes()
-
-
-def test_failed_build_leaves_no_file(fzg: Gearbox, fzg_training: TrainingResult, tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"mesh\.onnx"):
-        build_native_fmu(fzg, fzg_training, [], tmp_path / "fzg.fmu", platforms="host")
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_networks_of_other_weights_are_what_is_built(
@@ -469,93 +323,22 @@ def test_networks_of_other_weights_are_what_is_built(
 # ---------------------------------------------------------------------- compilers and cache
 
 
-@pytest.fixture
-def compiled(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[str]:
-    """The platforms that a compiler was run for, with an empty cache."""
-    ran: list[str] = []
-    run = native_compile._compiled
-
-    def counted(*arguments: Any) -> bytes:
-        ran.append(arguments[3].folder)
-        return run(*arguments)
-
-    monkeypatch.setattr(native_compile, "_compiled", counted)
+def test_the_cache_follows_the_sources_and_can_be_done_without(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(native_compile.CACHE_VARIABLE, str(tmp_path / "cache"))
-    return ran
-
-
-def test_cache_is_used_and_follows_the_sources(compiled: list[str], tmp_path: Path) -> None:
     first = compile_libraries(SOURCE, "host")
-    assert compile_libraries(SOURCE, "host") == first
-    assert len(compiled) == 1
+    (kept,) = (tmp_path / "cache").iterdir()
+    kept.write_bytes(b"from the cache")
+    assert list(compile_libraries(SOURCE, "host").libraries.values()) == [b"from the cache"]
     compile_libraries({"one.c": SOURCE["one.c"].replace(b"return 1", b"return 2")}, "host")
-    assert len(compiled) == 2
     assert len(list((tmp_path / "cache").iterdir())) == 2
-
-
-def test_cache_knows_the_compilers_own_options(compiled: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
-    own = native_compile._own_compiler()
-    if own is None:
-        pytest.skip("no compiler of the machine's own")
-    libraries = []
-    for number in (1, 2):
-        monkeypatch.setenv("CC", f"{own.command[0]} -DNUMBER={number}")
-        libraries.append(compile_libraries({"one.c": b"int one(void) { return NUMBER; }\n"}, "host").libraries)
-    assert libraries[0] != libraries[1] and len(compiled) == 2
-
-
-def test_cache_that_cannot_be_written_is_done_without(
-    compiled: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
     (tmp_path / "file").write_text("")
     monkeypatch.setenv(native_compile.CACHE_VARIABLE, str(tmp_path / "file" / "cache"))
-    assert compile_libraries(SOURCE, "host").libraries
+    assert compile_libraries(SOURCE, "host") == first
 
 
-def test_concurrent_builds_share_a_cache(compiled: list[str], tmp_path: Path) -> None:
-    results: list[Any] = []
-    threads = [threading.Thread(target=lambda: results.append(compile_libraries(SOURCE, "host"))) for _ in range(4)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    assert len(results) == 4
-    assert all(result == results[0] for result in results)
-    assert len(list((tmp_path / "cache").iterdir())) == 1
-
-
-def test_faulty_source_is_told_with_the_compilers_words(compiled: list[str]) -> None:
+def test_a_faulty_source_is_refused_with_the_compilers_words() -> None:
     with pytest.raises(InputError, match=r"(?s)cannot compile the FMU for .*one\.c"):
         compile_libraries({"one.c": b"int one(void) { return missing; }\n"}, "host")
-
-
-@pytest.mark.parametrize(
-    ("platforms", "says"),
-    [("win46", "did you mean 'win64'"), ("", "no platform is named"), ("linux64,all", "'all' is not known")],
-)
-def test_unknown_platforms_are_refused(platforms: str, says: str) -> None:
-    with pytest.raises(InputError, match=says):
-        plan_for(platforms)
-
-
-def test_without_zig_this_machine_is_built_for_and_the_rest_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    if native_compile._own_compiler() is None:
-        pytest.skip("no compiler of the machine's own")
-    monkeypatch.setattr(native_compile, "_zig", lambda: None)
-    plan = plan_for("all")
-    assert plan.platforms == (native_compile.host_platform(),)
-    assert "aarch64-windows" in plan.note
-    assert "pip install ziglang" in plan.note
-    foreign = next(name for name in PLATFORMS if name not in plan.platforms)
-    with pytest.raises(InputError, match=r"cannot build for .*pip install ziglang"):
-        plan_for(foreign)
-
-
-def test_without_any_compiler_it_is_told_how_to_get_one(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(native_compile, "_zig", lambda: None)
-    monkeypatch.setattr(native_compile, "_own_compiler", lambda: None)
-    with pytest.raises(InputError, match=r"needs a C compiler.*pip install ziglang"):
-        plan_for("host")
 
 
 def test_compiler_of_the_environment_is_taken_or_refused(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -565,23 +348,6 @@ def test_compiler_of_the_environment_is_taken_or_refused(monkeypatch: pytest.Mon
     monkeypatch.setenv("CC", "gcc 'x")
     with pytest.raises(InputError, match="cannot be read .*correct it or unset it"):
         plan_for("host")
-
-
-def test_fmpy_compile_rebuilds_it_with_the_same_numbers(fzg_native: Path, tmp_path: Path) -> None:
-    if shutil.which("cmake") is None:
-        pytest.skip("fmpy compile needs cmake")
-    copy = tmp_path / "fzg.fmu"
-    with zipfile.ZipFile(fzg_native) as old, zipfile.ZipFile(copy, "w") as new:
-        for name in old.namelist():
-            if not name.startswith("binaries/"):
-                new.writestr(name, old.read(name))
-    command = [sys.executable, "-m", "fmpy", "compile", str(copy)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=tmp_path, env={**os.environ})
-    assert done.returncode == 0, done.stdout + done.stderr
-    with hosted(copy) as rebuilt, hosted(fzg_native) as built:
-        for one in (rebuilt, built):
-            one.step(1.0, count=20)
-        assert rebuilt.outputs() == pytest.approx(built.outputs(), rel=1e-12)
 
 
 @pytest.mark.slow

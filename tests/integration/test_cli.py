@@ -226,7 +226,7 @@ FAULTY = [
     (["simulate", "--gearbox", "fzg", "missing.csv", "--output", "r.csv"], "missing.csv: no such file"),
     (["simulate", "--gearbox", "fzg", "CYCLE", "--output", "r.xls"], "r.xls: the ending says nothing"),
     (["simulate", "--gearbox", "fzg", "CYCLE", "--output", "r.csv", "--initial", "-300"], "above -273.15"),
-    (["simulate", "--gearbox", "fzg", "CYCLE", "--output", "r.csv", "--initial", "nan"], "must be a finite number"),
+    (["simulate", "--gearbox", "fzg", "CYCLE", "--output", "r.csv", "--initial", "nan"], "a finite number above"),
     (["simulate", "FMU", "CYCLE", "--output", "r.csv", "--initial", "293"], "if kelvin are meant, give 19.85"),
     (["reproduce", "--output", "CYCLE/inside"], "cannot be written"),
     (["simulate", "--gearbox", "fzg", "CYCLE", "--output", "r.csv", "--plot", "p.txt"], "p.txt: plots are written"),

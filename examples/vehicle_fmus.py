@@ -1,24 +1,23 @@
-"""What the gearbox FMU is coupled with in the examples: a light vehicle and a drive cycle as native FMUs, and an SSP.
+"""Partners of the gearbox FMU in the examples: a light vehicle and a drive cycle as native FMUs, and an SSP.
 
 They show that the gearbox works in a loop (the loss torque goes back into the driveline) and that the FMI layer serves
-other models as well. The hand-written C is in ``fmu_src/vehicle``.
+other models as well. The hand-written C is in ``examples/vehicle``.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from builder.files import appearing_whole
-from builder.fmu import AUTHOR, model_identifier, write_archive
+from builder.fmu_package import AUTHOR, model_identifier, write_archive
 from builder.model_description import Identity
 from builder.native import FLAGS, NativeBuild, build_native_archive
 from builder.native_data import number
 from builder.signals import Signal, SignalTable
+from models.atomic_write import atomic_file
 from models.errors import InputError
 from models.version import license_text, project_version
 
@@ -168,7 +167,7 @@ def write_system(output: Path, structure: Path, fmus: Mapping[str, Path]) -> Pat
         content |= {f"resources/{name}.fmu": path.read_bytes() for name, path in fmus.items()}
     except OSError as error:
         raise InputError(f"{error.filename}: cannot be read ({error.strerror}); build it first") from error
-    with appearing_whole(output) as partial:
+    with atomic_file(output) as partial:
         write_archive(partial, content)
     return output
 
@@ -188,7 +187,7 @@ def _output(name: str, unit: str, text: str, *, kind: str | None = None, initial
 
 
 def _source(name: str) -> str:
-    return (files("fmu_src") / "vehicle" / name).read_text(encoding="utf-8")
+    return (Path(__file__).parent / "vehicle" / name).read_text(encoding="utf-8")
 
 
 def _build(
