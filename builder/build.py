@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import json
-import shutil
-import tempfile
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -24,6 +22,7 @@ from builder.native_compile import plan_for
 from builder.onnx_export import export_onnx
 from builder.plots import plot_cycle
 from builder.train import TrainingResult, train_surrogate
+from models.atomic_write import atomic_folder
 from models.correction import Correction, corrected_network
 from models.errors import InputError
 from models.gearbox import Gearbox
@@ -178,7 +177,7 @@ def build(
         notes.append(f"native FMU {note}")
     network = corrected_network(gearbox, correction)
     seconds: dict[str, float] = {}
-    with staging(folder) as stage:
+    with atomic_folder(folder) as stage:
         with _timed("train", seconds), _spoken() as tell:
             training = train_surrogate(
                 gearbox, preset=preset, samples=samples, seed=seed,
@@ -241,79 +240,6 @@ def cycle_errors(driven: Mapping[str, Array], reference: Mapping[str, Array]) ->
         loss_mean=float(loss.mean()),
         loss_worst=float(loss.max()),
     )
-
-
-@contextmanager
-def staging(folder: Path) -> Iterator[Path]:
-    """A hidden folder inside `folder` whose files move up when the block ends well, and vanish otherwise.
-
-    Raises
-    ------
-    InputError
-        If `folder` cannot be made or written to, a file would replace a folder, or one that stands there cannot be
-        replaced.
-    """
-    made = [parent for parent in (folder, *folder.parents) if not parent.exists()]
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        stage = Path(tempfile.mkdtemp(prefix=".unfinished-", dir=folder))
-    except OSError as error:
-        raise InputError(f"{folder}: cannot be written ({error.strerror}); choose another output folder") from error
-    try:
-        yield stage
-        files = sorted(path for path in stage.rglob("*") if path.is_file())
-        _move_up(folder, {path: folder / path.relative_to(stage) for path in files})
-    finally:
-        shutil.rmtree(stage, ignore_errors=True)
-        for parent in made:  # deepest first; with files in it the folder stays
-            with suppress(OSError):
-                parent.rmdir()
-
-
-def _move_up(folder: Path, goals: Mapping[Path, Path]) -> None:
-    """Move files to their goals, all or none: what stood there is put back if one cannot be moved, or on an interrupt.
-
-    What stood there waits beside the goals, in a hidden folder of `folder` that goes only when nothing is left in it.
-    """
-    for goal in goals.values():
-        if goal.is_dir():
-            raise InputError(f"{goal}: is a folder; remove it or choose another output")
-    before = Path(tempfile.mkdtemp(prefix=".replaced-", dir=folder))
-    moves: list[tuple[Path, Path]] = []
-    try:
-        for path, goal in goals.items():
-            goal.parent.mkdir(parents=True, exist_ok=True)
-            old = [(goal, before / str(len(moves)))] if goal.exists() else []
-            for source, target in (*old, (path, goal)):
-                moves.append((source, target))  # first, so that an interrupt finds it
-                source.replace(target)
-    except BaseException as error:
-        kept = _put_back(moves)
-        with suppress(OSError):
-            before.rmdir()
-        if not isinstance(error, OSError):
-            raise
-        told = f"could not be put back: {kept}" if kept else "nothing was replaced"
-        raise InputError(
-            f"{error.filename}: cannot be written ({error.strerror}); {told}. Close what holds it open, "
-            "or choose another output"
-        ) from error
-    shutil.rmtree(before, ignore_errors=True)
-
-
-def _put_back(moves: Sequence[tuple[Path, Path]]) -> str:
-    """Undo moves, the last one first; gives where what cannot be moved back is, or nothing."""
-    left = []
-    for source, target in reversed(moves):
-        if not target.exists():  # not reached
-            continue
-        try:
-            if source.exists():  # what took its place could not be moved away
-                raise FileExistsError
-            target.replace(source)
-        except OSError:
-            left.append(f"{source} (it is {target})")
-    return ", ".join(left)
 
 
 @contextmanager

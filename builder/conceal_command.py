@@ -54,9 +54,9 @@ def conceal(
     The recordings come from a plant of its own, not from the model: about 22 h to learn from (train_1 to train_3) and
     6 h to judge by (hold_1, hold_2). seal.json holds the SHA-256 of the truth.
     """
-    from builder.build import staging
     from diagnosis.proof.case_files import keep_apart, keep_other_cases
     from diagnosis.proof.conceal import Plan, conceal_set, random_plans  # imports scipy.signal
+    from models.atomic_write import atomic_folder
 
     if (effect is None) == (not random):
         raise InputError("conceal takes either --effect NAME or --random")
@@ -70,7 +70,11 @@ def conceal(
     definition = load_gearbox(gearbox)
     recordings, apart = output / "recordings", output / "truth" if truth is None else truth
     keep_apart(recordings, apart)
-    with staging(recordings) as stage, staging(apart) as sealed, console.progress_bar("concealing") as progress:
+    with (
+        atomic_folder(recordings) as stage,
+        atomic_folder(apart) as sealed,
+        console.progress_bar("concealing") as progress,
+    ):
         names = conceal_set(
             definition, plans, seed=seed, recordings=stage, truth=sealed, flat=cases is None, progress=progress
         )

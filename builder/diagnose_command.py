@@ -85,10 +85,10 @@ def diagnose(
 
     Of a fleet every gearbox gets its own report, and all together one table (summary.csv).
     """
-    from builder.build import staging
     from diagnosis import diagnose as run
     from diagnosis.files import names_of_files, write_files
     from diagnosis.recording import read_train_and_holdout
+    from models.atomic_write import atomic_folder
     from models.mechanisms import CATALOGUE
     from models.mechanisms.user_files import check_placeable, load_mechanisms
 
@@ -113,7 +113,7 @@ def diagnose(
     given = [*(r.path for r in (*train, *held)), *mechanisms, Path(gearbox), *([mapping] if mapping else [])]
     refuse_to_replace(given, [output / name for name in names_of_files((*train, *held))])
     _tell_notes((*train, *held))
-    with staging(output) as stage, _told() as tell:
+    with atomic_folder(output) as stage, _told() as tell:
         found = run(train, definition, holdout=held, false_alarm_rate=false_alarm_rate, catalogue=catalogue,
                     jobs=processes(jobs), progress=tell)  # fmt: skip
         tell("writing the report")

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
 import gzip
-import os
-import tempfile
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,6 +11,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
+from models.atomic_write import atomic_file
 from models.cycle import Cycle
 from models.errors import InputError
 from models.simulation import HOTTEST_START, can_start, kelvin_hint
@@ -178,7 +176,7 @@ def write_table(path: Path, columns: Mapping[str, ArrayLike]) -> None:
     """
     kind = kind_of(path)
     table = pd.DataFrame(dict(columns))
-    with appearing_whole(path) as partial:
+    with atomic_file(path) as partial:
         if kind == ".parquet":
             try:
                 table.to_parquet(partial)
@@ -188,32 +186,3 @@ def write_table(path: Path, columns: Mapping[str, ArrayLike]) -> None:
             text = table.round(DECIMALS).to_csv(index=False, lineterminator="\n").encode()
             # Neither name nor time go into the archive, so that the same table gives the same bytes.
             partial.write_bytes(gzip.compress(text, mtime=0) if kind == ".csv.gz" else text)
-
-
-@contextlib.contextmanager
-def appearing_whole(path: Path) -> Iterator[Path]:
-    """A temporary name beside `path` that becomes `path` when the block ends well, and vanishes otherwise.
-
-    It has the ending of `path`, so that who writes by the ending may write to it.
-
-    Raises
-    ------
-    InputError
-        If the folder cannot be made or written to.
-    """
-    folder = path.parent
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=path.suffix, dir=folder)
-        os.close(handle)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror}); choose another output") from error
-    partial = Path(name)
-    try:
-        yield partial
-        if path.is_dir():
-            raise InputError(f"{path}: is a folder; name a file")
-        partial.chmod(0o644)
-        partial.replace(path)
-    finally:
-        partial.unlink(missing_ok=True)

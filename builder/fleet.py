@@ -17,7 +17,6 @@ from joblib import Parallel, delayed
 from threadpoolctl import threadpool_limits
 
 from builder import console
-from builder.build import staging
 from builder.doe import on_dask
 from builder.files import refuse_to_replace, write_table
 from diagnosis import diagnose
@@ -25,6 +24,7 @@ from diagnosis.files import names_of_files, write_files
 from diagnosis.recording import Recording, read_train_and_holdout
 from diagnosis.recording_file import RECORDING_KINDS
 from diagnosis.result import Diagnosis
+from models.atomic_write import atomic_folder
 from models.errors import InputError
 from models.gearbox import Gearbox
 from models.mechanisms import Mechanism
@@ -234,7 +234,7 @@ def diagnose_fleet(
                 yield delayed(_diagnosed)(member.name, train, held, gearbox, catalogue, false_alarm_rate, inside)
 
     with (
-        staging(output) as stage,
+        atomic_folder(output) as stage,
         on_dask(dask_address) if dask_address else nullcontext(),
         console.progress_bar("diagnosing the fleet") as tell,
     ):
@@ -286,7 +286,7 @@ def _written(outcome: Outcome, output: Path) -> Outcome:
     if not outcome.files:
         return outcome
     try:
-        with staging(output / outcome.row.gearbox) as stage:
+        with atomic_folder(output / outcome.row.gearbox) as stage:
             for name, content in outcome.files.items():
                 (stage / name).write_bytes(content)
     except InputError as error:

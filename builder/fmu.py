@@ -18,7 +18,6 @@ from typing import Any
 
 import fmu_src
 import models
-from builder.files import appearing_whole
 from builder.fmu_documentation import Kind, documentation
 from builder.fmu_reference import reference_run
 from builder.model_description import Identity, model_description
@@ -27,6 +26,7 @@ from builder.train import TrainingResult
 from builder.units import UNITS
 from fmu_src.contents import DATA
 from fmu_src.twin import LISTS
+from models.atomic_write import atomic_file
 from models.compiled import compile_laws, law_source
 from models.correction import Correction, corrected_network
 from models.errors import InputError
@@ -106,7 +106,7 @@ def build_python_fmu(
     """
     network = corrected_network(gearbox, correction) if network is None else network
     refuse_mismatch(network, training.losses, networks)
-    with appearing_whole(output) as partial, tempfile.TemporaryDirectory(prefix="twin-fmu-") as scratch:
+    with atomic_file(output) as partial, tempfile.TemporaryDirectory(prefix="twin-fmu-") as scratch:
         table = signal_table(gearbox, network, training.losses)
         identity = gearbox_identity(gearbox, output, FLAGS, correction)
         data = twin_data(table, network, training.losses, definition=gearbox.hash)

@@ -14,7 +14,6 @@ from importlib.resources import files
 from pathlib import Path
 from sys import float_info
 
-from builder.files import appearing_whole
 from builder.fmu import gearbox_identity, gearbox_pages, refuse_mismatch, write_archive
 from builder.model_description import Identity, guid_of, model_description
 from builder.native_compile import PLATFORMS, compile_libraries
@@ -22,6 +21,7 @@ from builder.native_data import gearbox_sources, number
 from builder.onnx_export import read_network
 from builder.signals import Signal, SignalTable, signal_table
 from builder.train import TrainingResult
+from models.atomic_write import atomic_file
 from models.correction import Correction, corrected_network
 from models.gearbox import Gearbox
 from models.network import ThermalNetwork
@@ -178,7 +178,7 @@ def build_native_archive(
             for folder, library in binaries.libraries.items()
         },
     }
-    with appearing_whole(output) as partial:
+    with atomic_file(output) as partial:
         write_archive(partial, content)
     return NativeBuild(output, tuple(binaries.libraries), binaries.note)
 

@@ -21,6 +21,7 @@ from dataclasses import dataclass
 from functools import cache, partial
 from pathlib import Path
 
+from models.atomic_write import atomic_file
 from models.errors import InputError, did_you_mean
 
 CACHE_VARIABLE = "GEARBOX_TWIN_CACHE"
@@ -226,12 +227,9 @@ def _library(sources: Mapping[str, bytes], compiler: Compiler, target: Platform)
     except OSError:
         library = _compiled(sources, compiler, options, target)
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        handle, partial_name = tempfile.mkstemp(dir=folder)
-        with os.fdopen(handle, "wb") as file:
-            file.write(library)
-        Path(partial_name).replace(kept)
-    except OSError:
+        with atomic_file(kept) as file:
+            file.write_bytes(library)
+    except (InputError, OSError):
         pass  # without a cache it is only slower
     return library
 

@@ -10,7 +10,6 @@ import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from builder.files import appearing_whole
 from models.types import Array
 
 # Okabe and Ito's palette: told apart by people with any colour vision, and in grey by order of lightness.
@@ -74,9 +73,7 @@ def plot_cycle(
             losses.plot([], [], **DOTS, label=reference_name)
             losses.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
         kind = path.suffix.removeprefix(".").lower() or "png"
-        with appearing_whole(path) as partial:
-            metadata = {"Software": None} if kind == "png" else None
-            figure.savefig(partial, format=kind, dpi=150, metadata=metadata)
+        figure.savefig(path, format=kind, dpi=150, metadata={"Software": None} if kind == "png" else None)
 
 
 def _time_scale(time: Array) -> tuple[float, str]:

@@ -18,10 +18,10 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from builder.build import staging
 from builder.doe import on_dask
 from diagnosis.proof import protocol
 from diagnosis.proof.protocol import BLIND, Settings, Task
+from models.atomic_write import atomic_folder
 from models.gearbox import load_gearbox, names_a_file
 
 PAGE, NUMBERS = "proof.html", "proof.json"
@@ -106,7 +106,7 @@ def prove(
     records = {t: json.loads(protocol.verdict_file(output, t).read_text(encoding="utf-8")) for t in tasks}
     found = outcome(settings, gearbox, truths, records, code=code, hashes=protocol.hash_of_hashes(output),
                     scored_as_begun=protocol.scored_as_begun(output))  # fmt: skip
-    with staging(output) as stage:
+    with atomic_folder(output) as stage:
         (stage / NUMBERS).write_text(json.dumps(found, indent=1, allow_nan=False) + "\n", encoding="utf-8")
         (stage / PAGE).write_text(page(found), encoding="utf-8", newline="\n")
     return found

@@ -14,12 +14,12 @@ import numpy as np
 from builder import console
 from builder.files import (
     RecordedStart,
-    appearing_whole,
     read_cycle_and_start,
     read_initial,
     refuse_to_replace,
     write_table,
 )
+from models.atomic_write import atomic_file
 from models.correction import read_correction
 from models.cycle import COLUMNS, Cycle
 from models.definition import Training
@@ -164,7 +164,7 @@ def simulate(
         cycle = cycle.refined(output_interval)
     with console.progress_bar("simulating") as progress:
         columns = model.run(cycle, start, progress)
-    with nullcontext() if plot is None else appearing_whole(plot) as picture:
+    with nullcontext() if plot is None else atomic_file(plot) as picture:
         if picture is not None:
             from builder.plots import plot_cycle
 

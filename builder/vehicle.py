@@ -13,12 +13,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from builder.files import appearing_whole
 from builder.fmu import AUTHOR, model_identifier, write_archive
 from builder.model_description import Identity
 from builder.native import FLAGS, NativeBuild, build_native_archive
 from builder.native_data import number
 from builder.signals import Signal, SignalTable
+from models.atomic_write import atomic_file
 from models.errors import InputError
 from models.version import license_text, project_version
 
@@ -168,7 +168,7 @@ def write_system(output: Path, structure: Path, fmus: Mapping[str, Path]) -> Pat
         content |= {f"resources/{name}.fmu": path.read_bytes() for name, path in fmus.items()}
     except OSError as error:
         raise InputError(f"{error.filename}: cannot be read ({error.strerror}); build it first") from error
-    with appearing_whole(output) as partial:
+    with atomic_file(output) as partial:
         write_archive(partial, content)
     return output
 

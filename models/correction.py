@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import sympy as sp
 from pydantic import Field, StringConstraints
 
+from models.atomic_write import atomic_file
 from models.definition import Name, Section, Text
 from models.errors import InputError, did_you_mean
 from models.expressions import expression_text, parse_expression
@@ -397,10 +398,8 @@ def write_correction(correction: Correction, path: str | Path) -> None:
     InputError
         If the file cannot be written.
     """
-    try:
-        Path(path).write_text(correction_text(correction), encoding="utf-8", newline="\n")
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror or error})") from error
+    with atomic_file(Path(path)) as partial:
+        partial.write_text(correction_text(correction), encoding="utf-8", newline="\n")
 
 
 def correction_text(correction: Correction) -> str:

@@ -10,7 +10,6 @@ from pathlib import Path
 
 import numpy as np
 
-from builder.build import staging
 from builder.fmu import build_python_fmu
 from builder.onnx_export import export_onnx
 from builder.reproduce.drive import drive_cycle
@@ -26,6 +25,7 @@ from builder.reproduce.speed import speed
 from builder.reproduce.study import Settings, Study
 from builder.reproduce.tables import definition_tables, equations_as_printed, pitch_velocities_are_the_wheels
 from builder.train import train_surrogate
+from models.atomic_write import atomic_folder
 from models.gearbox import load_gearbox
 from models.version import project_version
 
@@ -58,7 +58,7 @@ def reproduce(
     begin = time.perf_counter()
     settings = settings or Settings()
     gearbox = load_gearbox(GEARBOX)
-    with staging(folder) as stage:
+    with atomic_folder(folder) as stage:
         progress("training: networks as printed")
         printed = train_surrogate(gearbox, preset="paper", seed=settings.seed, jobs=settings.jobs)
         progress("training: our networks")

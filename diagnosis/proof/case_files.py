@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from models.atomic_write import atomic_file
 from models.errors import InputError
 from models.types import Array
 
@@ -120,13 +121,8 @@ def seal_holds(folder: Path, truth_file: Path) -> bool:
 
 
 def _write_whole(path: Path, content: bytes) -> None:
-    """Let a file appear whole or not at all."""
-    partial = path.with_name(f".{path.name}.partial")
-    try:
+    with atomic_file(path) as partial:
         partial.write_bytes(content)
-        partial.replace(path)
-    finally:
-        partial.unlink(missing_ok=True)
 
 
 def _csv(columns: Mapping[str, Array]) -> bytes:

@@ -23,6 +23,7 @@ from typing import Any, Literal
 
 from diagnosis.proof.case_files import MAPPING, SEAL, seal_holds
 from diagnosis.proof.conceal import PHYSICS, Plan, conceal_set, mixed_plans
+from models.atomic_write import atomic_file
 from models.errors import InputError
 from models.gearbox import Gearbox
 from models.version import project_version
@@ -330,15 +331,8 @@ def write_whole(path: Path, text: str) -> None:
     InputError
         If it cannot be written.
     """
-    partial = path.with_name(f".{path.name}.partial")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
+    with atomic_file(path) as partial:
         partial.write_text(text, encoding="utf-8", newline="\n")
-        partial.replace(path)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror}); choose another output folder") from error
-    finally:
-        partial.unlink(missing_ok=True)
 
 
 # ---------------------------------------------------------------------- after

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from diagnosis.report.page import page
 from diagnosis.result import Diagnosis
-from models.errors import InputError
+from models.atomic_write import atomic_file
 
 __all__ = ["page", "write_report"]
 
@@ -18,20 +18,13 @@ def write_report(diagnosis: Diagnosis, path: str | Path) -> None:
     ----------
     diagnosis : Diagnosis
     path : str or Path
-        The file appears whole or not at all; its folder must be there
+        The file appears whole or not at all
 
     Raises
     ------
     InputError
         If it cannot be written.
     """
-    path = Path(path)
-    partial = path.with_name(f".{path.name}.partial")
     text = page(diagnosis)
-    try:
+    with atomic_file(Path(path)) as partial:
         partial.write_text(text, encoding="utf-8", newline="\n")
-        partial.replace(path)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror}); choose another output") from error
-    finally:
-        partial.unlink(missing_ok=True)

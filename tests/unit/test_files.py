@@ -9,7 +9,6 @@ import pandas as pd
 import pytest
 
 from builder.files import (
-    appearing_whole,
     read_cycle,
     read_cycle_and_start,
     read_initial,
@@ -43,21 +42,6 @@ def test_the_same_table_gives_the_same_bytes(tmp_path: Path) -> None:
         first = (tmp_path / name).read_bytes()
         write_table(tmp_path / name, COLUMNS)
         assert (tmp_path / name).read_bytes() == first
-
-
-def test_a_failure_leaves_the_old_file_and_nothing_else(tmp_path: Path) -> None:
-    path = tmp_path / "a.csv"
-    path.write_text("old")
-
-    def interrupted() -> None:
-        with appearing_whole(path) as partial:
-            partial.write_text("half")
-            raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        interrupted()
-    assert path.read_text() == "old"
-    assert [p.name for p in tmp_path.iterdir()] == ["a.csv"]
 
 
 @pytest.mark.parametrize(
