@@ -24,10 +24,12 @@ import psutil
 
 from diagnosis import diagnose
 from diagnosis.files import write_files
-from diagnosis.proof.conceal import Plan, draw_case
+from diagnosis.proof.conceal import draw_case
+from diagnosis.proof.concealed_case import Plan
 from diagnosis.proof.cycles import Programme, ambient, programmes
 from diagnosis.proof.instruments import record
 from diagnosis.proof.plant import Plant
+from diagnosis.proof.plant_run import run_plant
 from diagnosis.recording import read_train_and_holdout
 from models.gearbox import load_gearbox
 from models.mechanisms import CATALOGUE
@@ -78,7 +80,7 @@ def make_recordings(folder: Path, lengths_h: Sequence[float], step_s: float) -> 
             start=float(air[0]), random_heat={}, effects=case.physics,
         ))  # fmt: skip
     paths = []
-    for run, outcome in zip(runs, plant.run(runs), strict=True):
+    for run, outcome in zip(runs, run_plant(plant, runs), strict=True):
         columns = record(plant, run, outcome, case.instruments, (), None)
         at = np.arange(0.0, columns["time_s"][-1] + 0.5 * step_s, step_s)
         table = pd.DataFrame({name: np.interp(at, columns["time_s"], values) for name, values in columns.items()})

@@ -11,7 +11,8 @@ from scipy.signal import lfilter, lfiltic
 from diagnosis.proof.cycles import ROW_S, reference_torque
 from diagnosis.proof.effect import Concealed, Effect, Kind
 from diagnosis.proof.effects_losses import Draw, Places, at
-from diagnosis.proof.plant import Outcome, Plant, Run
+from diagnosis.proof.plant import Plant
+from diagnosis.proof.plant_run import Outcome, Run
 from models.types import Array
 
 LOSS = "P_loss"
