@@ -29,7 +29,6 @@ from models.gearbox import Gearbox
 from models.types import Array
 from models.version import project_version
 
-ALL_CORES = -1
 SUFFIX = {"python": "", "native": "_native"}  # of the files' names
 
 
@@ -136,8 +135,8 @@ def build(
     preset: str = "default",
     samples: int | None = None,
     seed: int = 0,
-    jobs: int | None = None,
-    dask_address: str | None = None,
+    jobs: int = 1,
+    dask: str | None = None,
     correction: Correction | None = None,
 ) -> BuildReport:
     """Train the networks of `gearbox`, build its FMU and try it on the reference cycle.
@@ -155,8 +154,8 @@ def build(
         Kind of FMU: ``python``, ``native`` or ``both``
     platforms : str
         Of a native FMU, see :func:`builder.native_compile.plan_for`
-    preset, samples, seed, jobs, dask_address
-        See :func:`builder.train.train_surrogate`; `jobs` None takes all cores
+    preset, samples, seed, jobs, dask
+        See :func:`builder.train.train_surrogate`
     correction : Correction or None
         What a diagnosis found: the FMU and the full model it is compared with carry it
 
@@ -181,7 +180,7 @@ def build(
         with _timed("train", seconds), _spoken() as tell:
             training = train_surrogate(
                 gearbox, preset=preset, samples=samples, seed=seed,
-                jobs=ALL_CORES if jobs is None else jobs, dask_address=dask_address, progress=tell,
+                jobs=jobs, dask_address=dask, progress=tell,
             )  # fmt: skip
         fmus = {kind: stage / f"{name}{SUFFIX[kind]}.fmu" for kind in kinds}
         with _timed("export", seconds):

@@ -13,9 +13,8 @@ from builder.diagnose_command import diagnose
 from builder.prove_command import prove
 from builder.reproduce.command import reproduce
 from builder.simulate_command import simulate
-from builder.workers import check_workers
+from builder.workers import worker_options
 from models.correction import read_correction
-from models.errors import InputError
 from models.gearbox import known_gearboxes, load_gearbox
 from models.version import DISTRIBUTION, project_version
 
@@ -52,10 +51,7 @@ def commands() -> None:
               help="Training points per network.  [default: by preset]")  # fmt: skip
 @click.option("--seed", type=click.IntRange(min=0, max=2**32 - 1), default=0, show_default=True, metavar="N",
               help="Seed of samples and starts.")  # fmt: skip
-@click.option("--jobs", type=click.IntRange(min=1), default=None, metavar="N",
-              help="Processes on this machine; the result does not depend on it.  [default: all cores]")  # fmt: skip
-@click.option("--dask", "dask_address", default=None, metavar="ADDRESS",
-              help="Scheduler of a Dask cluster to work on instead, e.g. tcp://host:8786.")  # fmt: skip
+@worker_options(jobs_help="Processes on this machine; the result does not depend on it.")
 def build_fmu(
     gearbox: str,
     target: str,
@@ -65,15 +61,14 @@ def build_fmu(
     preset: str,
     samples: int | None,
     seed: int,
-    jobs: int | None,
-    dask_address: str | None,
+    jobs: int,
+    dask: str | None,
 ) -> None:
     """Train the networks of a gearbox and build its FMU."""
     from builder.build import build  # imports scikit-learn and onnx, which the other verbs need not wait for
 
-    check_workers(jobs, dask_address)
     if platforms is not None and target == "python":
-        raise InputError("--platforms is about native FMUs: give it with --target native or both")
+        raise click.UsageError("--platforms is about native FMUs: give it with --target native or both")
     definition = load_gearbox(gearbox)
     found = None if correction is None else read_correction(correction, definition.network(), made_for=definition)
     folder = output if output is not None else Path("out") / Path(gearbox).stem
@@ -87,7 +82,7 @@ def build_fmu(
         samples=samples,
         seed=seed,
         jobs=jobs,
-        dask_address=dask_address,
+        dask=dask,
         correction=found,
     )
     report.show()

@@ -11,7 +11,7 @@ import click
 
 from builder import console
 from builder.files import refuse_to_replace
-from builder.workers import check_workers, processes
+from builder.workers import worker_options
 from models.errors import InputError, did_you_mean
 from models.gearbox import known_gearboxes, load_gearbox
 
@@ -44,7 +44,7 @@ class _HoldoutOfMany(click.Command):
 
 
 @click.command("diagnose", cls=_HoldoutOfMany, options_metavar="")
-@click.argument("recordings", nargs=-1, metavar="RECORDING... [OPTIONS]")
+@click.argument("recordings", nargs=-1, required=True, metavar="RECORDING... [OPTIONS]")
 @click.option("--gearbox", default="fzg", show_default=True, metavar="NAME|FILE",
               help=f"Name ({', '.join(known_gearboxes())}) or definition file (TOML).")  # fmt: skip
 @click.option("--holdout", multiple=True, metavar="RECORDING...",
@@ -59,12 +59,9 @@ class _HoldoutOfMany(click.Command):
               show_default=True, metavar="DIR", help="Folder for the report and what belongs to it.")  # fmt: skip
 @click.option("--false-alarm-rate", type=click.FloatRange(min=1e-4, max=0.5), default=0.05, show_default=True,
               metavar="P", help="How often recordings that agree may be called inconsistent.")  # fmt: skip
-@click.option("--jobs", type=click.IntRange(min=1), default=None, metavar="N",
-              help="Processes on this machine.  [default: all cores]")  # fmt: skip
 @click.option("--fleet", is_flag=True,
               help="RECORDING is a folder with one folder per gearbox; hold* in it is held out.")  # fmt: skip
-@click.option("--dask", "dask_address", default=None, metavar="ADDRESS",
-              help="Scheduler of a Dask cluster that the gearboxes of a fleet are spread over.")  # fmt: skip
+@worker_options(dask_help="Scheduler of a Dask cluster that the gearboxes of a fleet are spread over.")
 def diagnose(
     recordings: tuple[str, ...],
     gearbox: str,
@@ -74,9 +71,9 @@ def diagnose(
     without: tuple[str, ...],
     output: Path,
     false_alarm_rate: float,
-    jobs: int | None,
+    jobs: int,
     fleet: bool,
-    dask_address: str | None,
+    dask: str | None,
 ) -> None:
     """Say whether recordings of a real gearbox agree with its model; if not, where, and by what physics.
 
@@ -92,7 +89,7 @@ def diagnose(
     from models.mechanisms import CATALOGUE
     from models.mechanisms.user_files import check_placeable, load_mechanisms
 
-    _check_options(recordings, holdout, jobs, dask_address, fleet=fleet)
+    _check_options(recordings, holdout, dask, fleet=fleet)
     definition = load_gearbox(gearbox)
     catalogue = dict(CATALOGUE)
     for file in mechanisms:
@@ -107,7 +104,7 @@ def diagnose(
             raise InputError(f"--without-mechanism {name}: is not in the catalogue{did_you_mean(name, CATALOGUE)}")
     if fleet:
         _diagnose_fleet(Path(recordings[0]), definition, output, mapping=mapping, catalogue=catalogue,
-                        false_alarm_rate=false_alarm_rate, jobs=processes(jobs), dask_address=dask_address)  # fmt: skip
+                        false_alarm_rate=false_alarm_rate, jobs=jobs, dask=dask)  # fmt: skip
         return
     train, held = read_train_and_holdout(recordings, holdout, definition.network(), mapping=mapping)
     given = [*(r.path for r in (*train, *held)), *mechanisms, Path(gearbox), *([mapping] if mapping else [])]
@@ -115,7 +112,7 @@ def diagnose(
     _tell_notes((*train, *held))
     with atomic_folder(output) as stage, _told() as tell:
         found = run(train, definition, holdout=held, false_alarm_rate=false_alarm_rate, catalogue=catalogue,
-                    jobs=processes(jobs), progress=tell)  # fmt: skip
+                    jobs=jobs, progress=tell)  # fmt: skip
         tell("writing the report")
         names = [path.name for path in write_files(found, definition, [*train, *held], stage)]
     for line in found.summary():
@@ -134,37 +131,36 @@ def _tell_notes(recordings: Sequence[Recording]) -> None:
         console.err.print(f"{len(notes) - MOST_NOTES} more notes stand in the report")
 
 
-def _check_options(
-    recordings: tuple[str, ...], holdout: tuple[str, ...], jobs: int | None, dask_address: str | None, *, fleet: bool
-) -> None:
-    if not fleet and dask_address is not None:
-        raise InputError("--dask spreads the gearboxes of a fleet; give --fleet with it, or --jobs for one gearbox")
-    check_workers(jobs, dask_address)
-    if not recordings:
-        order = "; --holdout takes all up to the next option, so name what to learn from before it" if holdout else ""
-        raise InputError(f"diagnose has no RECORDING to learn from{order}")
+def _check_options(recordings: tuple[str, ...], holdout: tuple[str, ...], dask: str | None, *, fleet: bool) -> None:
+    if not fleet and dask is not None:
+        raise click.UsageError(
+            "--dask spreads the gearboxes of a fleet; give --fleet with it, or --jobs for one gearbox"
+        )
     if fleet and (len(recordings) != 1 or holdout):
-        raise InputError("--fleet takes one folder, with a folder per gearbox; what is named hold* in it is held out")
+        raise click.UsageError(
+            "--fleet takes one folder, with a folder per gearbox; what is named hold* in it is held out"
+        )
 
 
 def _diagnose_fleet(
     folder: Path, gearbox: Gearbox, output: Path, *, mapping: Path | None, catalogue: Mapping[str, Mechanism],
-    false_alarm_rate: float, jobs: int, dask_address: str | None,
+    false_alarm_rate: float, jobs: int, dask: str | None,
 ) -> None:  # fmt: skip
-    from builder.fleet import SUMMARY, diagnose_fleet, members_of
+    from builder.fleet import SUMMARY, diagnose_fleet, members_of, show_summary
 
-    found = diagnose_fleet(
+    outcomes = diagnose_fleet(
         members_of(folder, without=output), gearbox, output, mapping=mapping, catalogue=catalogue,
-        false_alarm_rate=false_alarm_rate, jobs=jobs, dask_address=dask_address,
+        false_alarm_rate=false_alarm_rate, jobs=jobs, dask=dask,
     )  # fmt: skip
-    found.show()
+    show_summary([outcome.row for outcome in outcomes])
     console.out.print(f"wrote {output / SUMMARY}, and a folder for each that was diagnosed")
-    for name, fault in found.faults.items():
-        console.err.print(f"{name}:\n{fault}", style="red")
-    failed = [f"{row.gearbox}: {row.error}" for row in found.rows if row.error]
+    faults = [f"{outcome.row.gearbox}:\n{outcome.fault}" for outcome in outcomes if outcome.fault]
+    for fault in faults:
+        console.err.print(fault, style="red")
+    failed = [f"{outcome.row.gearbox}: {outcome.row.error}" for outcome in outcomes if outcome.row.error]
     if failed:
-        message = "\n".join([f"{len(failed)} of {len(found.rows)} gearboxes could not be diagnosed:", *failed])
-        if found.faults:
+        message = "\n".join([f"{len(failed)} of {len(outcomes)} gearboxes could not be diagnosed:", *failed])
+        if faults:
             console.err.print(message, style="red")
             raise SystemExit(1)
         raise InputError(message)

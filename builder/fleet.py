@@ -1,23 +1,19 @@
-"""A fleet: one folder of recordings per gearbox, diagnosed side by side, one report each and one table of all.
+"""A fleet: one folder of recordings per gearbox, one report each and one table of all.
 
-Recordings are read here and travel to whoever does the work; reports travel back. So the workers of a cluster need no
-common file system.
+Recordings are read here and sent to the workers, reports are sent back: the workers of a cluster need no common file
+system.
 """
 
 from __future__ import annotations
 
+import math
 import tempfile
 import traceback
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import nullcontext
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 
-from joblib import Parallel, delayed
-from threadpoolctl import threadpool_limits
-
 from builder import console
-from builder.doe import on_dask
 from builder.files import refuse_to_replace, write_table
 from diagnosis import diagnose
 from diagnosis.files import names_of_files, write_files
@@ -28,10 +24,11 @@ from models.atomic_write import atomic_folder
 from models.errors import InputError
 from models.gearbox import Gearbox
 from models.mechanisms import Mechanism
+from models.parallel import iterate_parallel
 
-HELD_OUT = "hold"  # how names of recordings, or of a folder of them, to judge by begin
+HELD_OUT = "hold"  # prefix of held-out recordings, or of a folder with them
 SUMMARY = "summary.csv"
-ERROR = "error"  # in the place of a verdict
+ERROR = "error"  # instead of a verdict
 NAN = float("nan")
 
 
@@ -42,11 +39,11 @@ class Member:
     Attributes
     ----------
     name : str
-        Of its folder
+        Name of its folder
     train, holdout : tuple of Path
-        Recordings to learn from, and to judge by
+        Training and held-out recordings
     fault : str
-        Why its folder cannot be used, or ``""``
+        Reason why its folder cannot be used, or ``""``
     """
 
     name: str
@@ -66,12 +63,12 @@ class Row:
     found : str
         Mechanisms with place and probability, the first one first
     heat_W : float
-        Mean heat of all that was found, [W]; of the unknown heat where it has no form
+        Mean heat of all findings, or of the unknown heat if unexplained, [W]
     p_value : float
     rmse_before_K, rmse_calibrated_K, rmse_after_K : float
         Of held-out temperatures, free-running, [K]
     error : str
-        Why there is no diagnosis, or ``""``
+        Reason why there is no diagnosis, or ``""``
     """
 
     gearbox: str
@@ -87,7 +84,7 @@ class Row:
 
 @dataclass(frozen=True, kw_only=True)
 class Outcome:
-    """What became of one gearbox.
+    """Result of one gearbox.
 
     Attributes
     ----------
@@ -95,36 +92,12 @@ class Outcome:
     files : mapping of name to bytes
         Report and what belongs to it; empty without a diagnosis
     fault : str
-        Traceback, where this program is at fault and not the input
+        Traceback of an error in this program, or ``""``
     """
 
     row: Row
-    files: Mapping[str, bytes]
+    files: Mapping[str, bytes] = field(default_factory=dict)
     fault: str = ""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Fleet:
-    """The outcome of :func:`diagnose_fleet`: rows by name, and tracebacks of our own faults by name."""
-
-    rows: tuple[Row, ...]
-    faults: Mapping[str, str]
-
-    def show(self) -> None:
-        """Print the summary."""
-        numbers = [
-            [f"{r.heat_W:.1f}", *(f"{v:.2f}" for v in (r.rmse_before_K, r.rmse_calibrated_K, r.rmse_after_K))]
-            for r in self.rows
-        ]
-        console.table(
-            "Fleet; errors of held-out temperatures in K",
-            ["gearbox", "verdict", "found", "heat W", "as delivered", "calibrated", "with what was found"],
-            [
-                [r.gearbox, r.verdict.replace("_", " "), r.found, *("" if v == "nan" else v for v in n)]
-                for r, n in zip(self.rows, numbers, strict=True)
-            ],
-            text_columns=3,
-        )
 
 
 def members_of(folder: Path, *, without: Path) -> tuple[Member, ...]:
@@ -136,7 +109,7 @@ def members_of(folder: Path, *, without: Path) -> tuple[Member, ...]:
     ----------
     folder : Path
     without : Path
-        Folder that holds no recordings though it may lie there: the output
+        The output folder, which may be inside and is no gearbox
 
     Raises
     ------
@@ -187,9 +160,9 @@ def diagnose_fleet(
     catalogue: Mapping[str, Mechanism],
     false_alarm_rate: float,
     jobs: int = 1,
-    dask_address: str | None = None,
-) -> Fleet:
-    """Diagnose every gearbox of a fleet; what goes wrong with one is its row and leaves the others alone.
+    dask: str | None = None,
+) -> list[Outcome]:
+    """Diagnose every gearbox of a fleet; an error with one is its row in the summary, and the others go on.
 
     Parameters
     ----------
@@ -197,19 +170,20 @@ def diagnose_fleet(
     gearbox : Gearbox
         Their definition
     output : Path
-        Gets a folder per gearbox as it is done, and at the end ``summary.csv``
+        Gets a folder per gearbox as soon as it is done, and at the end ``summary.csv``
     mapping : Path or None
         See :func:`diagnosis.recording.read_recordings`
     catalogue, false_alarm_rate
         See :func:`diagnosis.diagnose`
     jobs : int
-        Gearboxes side by side on this machine; a single one gets all of them
-    dask_address : str or None
-        Scheduler of a dask cluster that does the work instead
+        Gearboxes at the same time on this machine; a single gearbox gets all processes
+    dask : str or None
+        Scheduler of a Dask cluster that does the work instead
 
     Returns
     -------
-    Fleet
+    list of Outcome
+        In the order of `members`
 
     Raises
     ------
@@ -217,9 +191,9 @@ def diagnose_fleet(
         If the output cannot be written to, or no scheduler answers.
     """
     outcomes: dict[str, Outcome] = {}
-    inside = jobs if len(members) == 1 and dask_address is None else 1
+    inside = jobs if len(members) == 1 and dask is None else 1
 
-    def tasks() -> Iterator[object]:
+    def readable() -> Iterator[tuple[object, ...]]:
         network = gearbox.network()
         for member in members:
             try:
@@ -228,61 +202,48 @@ def diagnose_fleet(
                 train, held = read_train_and_holdout(member.train, member.holdout, network, mapping=mapping)
                 files = names_of_files((*train, *held))
                 refuse_to_replace([r.path for r in (*train, *held)], [output / member.name / name for name in files])
+                yield member.name, train, held, gearbox, catalogue, false_alarm_rate, inside
             except InputError as error:
-                outcomes[member.name] = _refused(member.name, str(error))
-            else:
-                yield delayed(_diagnosed)(member.name, train, held, gearbox, catalogue, false_alarm_rate, inside)
+                outcomes[member.name] = _without_diagnosis(member.name, error)
 
-    with (
-        atomic_folder(output) as stage,
-        on_dask(dask_address) if dask_address else nullcontext(),
-        console.progress_bar("diagnosing the fleet") as tell,
-    ):
-        tell(0, len(members))
-        workers = Parallel(
-            n_jobs=None if dask_address else min(jobs, len(members)), return_as="generator_unordered", batch_size=1
-        )
+    with atomic_folder(output) as stage, console.progress_bar("diagnosing the fleet") as show:
+        show(0, len(members))
         try:
-            for outcome in workers(tasks()):
-                outcomes[outcome.row.gearbox] = _written(outcome, output)
-                tell(len(outcomes), len(members))
-        except Exception:  # noqa: BLE001 - a worker that died takes along what it did, not what others have done
-            lost = traceback.format_exc()
+            for outcome in iterate_parallel(_diagnose, readable(), jobs=min(jobs, len(members)), dask=dask):
+                outcomes[outcome.row.gearbox] = _write(outcome, output)
+                show(len(outcomes), len(members))
+        except InputError:
+            raise
+        except Exception as error:  # noqa: BLE001 - a worker that dies takes only its own gearbox along
             for member in members:
-                if member.name not in outcomes:
-                    outcomes[member.name] = _failed(member.name, lost)
-        rows = tuple(outcomes[member.name].row for member in members)
+                outcomes.setdefault(member.name, _without_diagnosis(member.name, error))
+        rows = [outcomes[member.name].row for member in members]
         write_table(stage / SUMMARY, {f.name: [getattr(row, f.name) for row in rows] for f in fields(Row)})
-    return Fleet(rows=rows, faults={name: o.fault for name, o in sorted(outcomes.items()) if o.fault})
+    return [outcomes[member.name] for member in members]
 
 
-def _diagnosed(
+def _diagnose(
     name: str, train: tuple[Recording, ...], holdout: tuple[Recording, ...], gearbox: Gearbox,
     catalogue: Mapping[str, Mechanism], false_alarm_rate: float, jobs: int,
 ) -> Outcome:  # fmt: skip
-    """The work on one gearbox, wherever it is done."""
     try:
-        with threadpool_limits(1), tempfile.TemporaryDirectory() as folder:
+        with tempfile.TemporaryDirectory() as folder:
             found = diagnose(train, gearbox, holdout=holdout, catalogue=catalogue, false_alarm_rate=false_alarm_rate,
                              jobs=jobs)  # fmt: skip
             written = write_files(found, gearbox, [*train, *holdout], Path(folder))
             return Outcome(row=_row(name, found), files={path.name: path.read_bytes() for path in written})
-    except InputError as error:
-        return _refused(name, str(error))
-    except Exception:  # noqa: BLE001 - told with its traceback at the end, when the others are done
-        return _failed(name, traceback.format_exc())
+    except Exception as error:  # noqa: BLE001 - shown with its traceback at the end, when the others are done
+        return _without_diagnosis(name, error)
 
 
-def _refused(name: str, error: str) -> Outcome:
-    return Outcome(row=Row(gearbox=name, error=error), files={})
+def _without_diagnosis(name: str, error: Exception) -> Outcome:
+    if isinstance(error, InputError):
+        return Outcome(row=Row(gearbox=name, error=str(error)))
+    fault = "".join(traceback.format_exception(error))
+    return Outcome(row=Row(gearbox=name, error=f"a fault of this program: {fault.splitlines()[-1]}"), fault=fault)
 
 
-def _failed(name: str, fault: str) -> Outcome:
-    last = fault.strip().splitlines()[-1]
-    return Outcome(row=Row(gearbox=name, error=f"a fault of this program: {last}"), files={}, fault=fault)
-
-
-def _written(outcome: Outcome, output: Path) -> Outcome:
+def _write(outcome: Outcome, output: Path) -> Outcome:
     if not outcome.files:
         return outcome
     try:
@@ -290,7 +251,7 @@ def _written(outcome: Outcome, output: Path) -> Outcome:
             for name, content in outcome.files.items():
                 (stage / name).write_bytes(content)
     except InputError as error:
-        return _refused(outcome.row.gearbox, str(error))
+        return _without_diagnosis(outcome.row.gearbox, error)
     return outcome
 
 
@@ -307,3 +268,21 @@ def _row(name: str, found: Diagnosis) -> Row:
         rmse_calibrated_K=found.holdout.calibrated,
         rmse_after_K=found.holdout.after,
     )
+
+
+def show_summary(rows: Sequence[Row]) -> None:
+    """Print the summary."""
+    console.table(
+        "Fleet; errors of held-out temperatures in K",
+        ["gearbox", "verdict", "found", "heat W", "as delivered", "calibrated", "with what was found"],
+        [
+            [r.gearbox, r.verdict.replace("_", " "), r.found, _number(r.heat_W, 1),
+             *(_number(v, 2) for v in (r.rmse_before_K, r.rmse_calibrated_K, r.rmse_after_K))]
+            for r in rows
+        ],
+        text_columns=3,
+    )  # fmt: skip
+
+
+def _number(value: float, decimals: int) -> str:
+    return "" if math.isnan(value) else f"{value:.{decimals}f}"

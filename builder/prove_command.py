@@ -11,7 +11,7 @@ from typing import Any
 import click
 
 from builder import console
-from builder.workers import check_workers, processes
+from builder.workers import worker_options
 
 LINES = 20  # of progress where there is no terminal
 
@@ -26,10 +26,7 @@ LINES = 20  # of progress where there is no terminal
 )
 @click.option("--cells-every", type=click.IntRange(min=0), default=3, show_default=True, metavar="N",
               help="Every N-th case is also diagnosed with fewer sensors and shorter recordings; 0: none.")  # fmt: skip
-@click.option("--jobs", type=click.IntRange(min=1), default=None, metavar="N",
-              help="Processes on this machine.  [default: all cores]")  # fmt: skip
-@click.option("--dask", default=None, metavar="ADDRESS",
-              help="Scheduler of a Dask cluster to work on instead, e.g. tcp://host:8786.")  # fmt: skip
+@worker_options()
 @click.option("--output", type=click.Path(path_type=Path, file_okay=False), default=Path("out/proof"),
               show_default=True, metavar="DIR",
               help="Folder of the proof; an interrupted one is continued.")  # fmt: skip
@@ -38,7 +35,7 @@ def prove(
     seed: int | None,
     gearbox: str,
     cells_every: int,
-    jobs: int | None,
+    jobs: int,
     dask: str | None,
     output: Path,
 ) -> None:
@@ -50,11 +47,10 @@ def prove(
     from builder.prove import prove as run
     from diagnosis.proof.protocol import UNOPENED_SEED, WHOLE, Settings
 
-    check_workers(jobs, dask)
     settings = Settings(seed=UNOPENED_SEED if seed is None else seed, cases=WHOLE if cases is None else cases,
                         gearbox=gearbox, cells_every=cells_every)  # fmt: skip
     with _progress() as progress:
-        result = run(settings, output, jobs=processes(jobs), dask=dask, progress=progress)
+        result = run(settings, output, jobs=jobs, dask=dask, progress=progress)
     show(result)
     for name in (PAGE, NUMBERS):
         console.out.print(f"wrote {output / name}")

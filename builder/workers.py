@@ -1,23 +1,43 @@
-"""Where a verb's work is done: in processes of this machine, or on a cluster."""
+"""The options ``--jobs`` and ``--dask`` of the verbs that spread their work."""
 
 from __future__ import annotations
 
-from models.errors import InputError
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+import click
+from click.core import ParameterSource
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+
+JOBS_HELP = "Processes on this machine."
+DASK_HELP = "Scheduler of a Dask cluster to work on instead, e.g. tcp://host:8786."
 
 
-def check_workers(jobs: int | None, dask_address: str | None) -> None:
-    """Refuse ``--jobs`` together with ``--dask``.
+def worker_options(*, jobs_help: str = JOBS_HELP, dask_help: str = DASK_HELP) -> Callable[[Command], Command]:
+    """Give a command the options ``--jobs`` (int, by default one per core) and ``--dask`` (str or None); one of them.
 
-    Raises
-    ------
-    InputError
+    Parameters
+    ----------
+    jobs_help, dask_help : str
     """
-    if jobs is not None and dask_address is not None:
-        raise InputError("--jobs and --dask exclude each other: the work is done here or on the cluster")
+
+    def decorate(command: Command) -> Command:
+        dask = click.option("--dask", default=None, metavar="ADDRESS", callback=_without_jobs, help=dask_help)
+        jobs = click.option("--jobs", type=click.IntRange(min=1), default=_cores, show_default="all cores",
+                            metavar="N", is_eager=True, help=jobs_help)  # fmt: skip
+        return jobs(dask(command))
+
+    return decorate
 
 
-def processes(jobs: int | None) -> int:
-    """How many processes ``--jobs`` asks for; by default as many as there are cores."""
-    from joblib import cpu_count
+def _without_jobs(context: click.Context, _: click.Parameter, address: str | None) -> str | None:
+    if address is not None and context.get_parameter_source("jobs") == ParameterSource.COMMANDLINE:
+        raise click.UsageError("--jobs and --dask exclude each other: the work is done here or on the cluster", context)
+    return address
 
-    return int(cpu_count()) if jobs is None else jobs
+
+def _cores() -> int:
+    from joblib import cpu_count  # 0.1 s that --help need not wait for
+
+    return int(cpu_count())

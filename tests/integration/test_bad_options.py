@@ -114,8 +114,8 @@ DIAGNOSE = {
     "train.csv --gearbox bytes.toml": "bytes.toml: is not UTF-8 text",
     "train.csv --false-alarm-rate 2": "2.0 is not in the range",
     "train.csv --jobs 0": "0 is not in the range",
-    "": "diagnose has no RECORDING to learn from",
-    "--holdout train.csv": "no RECORDING to learn from; --holdout takes all up to the next option",
+    "": "Missing argument 'RECORDING",
+    "--holdout train.csv": "Missing argument 'RECORDING",
 }
 SIMULATE = {
     "folder.csv": "folder.csv: is not a file",

@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from builder import doe, fleet
+from builder import fleet
 from builder.__main__ import main
 from builder.fleet import members_of
 from models.cycle import Cycle
@@ -173,7 +173,7 @@ def test_faulty_options_end_with_status_2_and_leave_nothing(
     arguments: list[str], message: str, folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # fmt: skip
-    monkeypatch.setattr(doe, "CONNECT_S", 1.0)
+    monkeypatch.setattr("models.parallel.CONNECT_S", 1.0)
     given = [a.replace("FOLDER", str(folder)) for a in arguments]
     assert run("diagnose", *given, "--output", tmp_path / "out") == 2
     shown = capsys.readouterr().err

@@ -52,16 +52,6 @@ def test_all_up_to_the_next_option_is_held_out(
     assert asked_for == [(train, held)]
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [("", "no RECORDING to learn from"), ("--holdout a b", "name what to learn from before it")],
-)
-def test_nothing_to_learn_from_is_said(words: str, message: str) -> None:
-    done = CliRunner().invoke(diagnose, words.split())
-    assert isinstance(done.exception, InputError)
-    assert message in str(done.exception)
-
-
 @pytest.mark.parametrize("words", ["a --holdout --jobs 1", "a --holdout", "a --holdout -- b"])
 def test_held_out_recordings_that_are_not_named_are_missed(words: str) -> None:
     """As an empty pattern of the shell leaves them; the next option is no recording."""
