@@ -96,7 +96,7 @@ def make_recordings(folder: Path, lengths_h: Sequence[float], step_s: float) -> 
 
 
 def once(train: Sequence[str], holdout: Sequence[str], share: float, jobs: int) -> None:
-    """One diagnosis as the verb does it, in a process of its own; prints what it took as JSON."""
+    """Diagnose as the verb does, in a separate process; print time and memory as JSON."""
     marks = [("start and reading", time.perf_counter())]
     gearbox = load_gearbox("fzg")
     names = sorted(CATALOGUE)
@@ -117,7 +117,7 @@ def once(train: Sequence[str], holdout: Sequence[str], share: float, jobs: int) 
 
 
 def measured(train: Sequence[Path], holdout: Sequence[Path], *, jobs: int, share: float = 1.0) -> Cost:
-    """A diagnosis in a process of its own, watched from outside."""
+    """Run a diagnosis in a separate process and watch it from outside."""
     given = {"train": [*map(str, train)], "holdout": [*map(str, holdout)], "share": share, "jobs": jobs}
     code = f"from benchmarks.diagnose import once; once(**{given!r})"
     load, begin = psutil.getloadavg()[0], time.perf_counter()

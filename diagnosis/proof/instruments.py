@@ -41,7 +41,7 @@ class Instruments:
     dropouts : int
         Bursts of missing readings per recording
     stated : mapping of str to float, or None
-        What the user is told of the temperature sensors, by the keys of a mapping file; None where nothing is stated
+        Data sheet of the temperature sensors, by the keys of a mapping file; None without a data sheet
     """
 
     channels: tuple[str, ...]
@@ -191,7 +191,7 @@ def two_unlike_sensors(plant: Plant, rng: np.random.Generator) -> tuple[str, ...
 
 
 def default_channels(plant: Plant) -> tuple[str, ...]:
-    """What is measured unless a case says otherwise: housing, oil, a bearing of every shaft, the first gear."""
+    """Default measured places: housing, oil, a bearing of every shaft, the first gear."""
     anatomy, stage = plant.anatomy, plant.gearbox.stage[0]
     first = [next(b.name for b in plant.gearbox.bearing if b.shaft == s) for s in (stage.driver, stage.driven)]
     return ("oil", *anatomy.parts, *first, anatomy.gears[0])

@@ -35,6 +35,13 @@ def short_programmes() -> Iterator[None]:
         yield
 
 
+def diagnose_some(task: Task, files: Any, arguments: Any) -> tuple[Task, dict[str, Any]]:
+    """Two real diagnoses, one of them with an entry removed; the others are made up."""
+    if task.removed or task.case == "case_001":
+        return run_task(task, files, arguments)
+    return task, {"status": "answered", "seconds": 0.1, "answer": {"verdict": "consistent"}, "message": ""}
+
+
 @pytest.fixture(scope="module")
 def proof(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     """Folder and numbers of a proof that was interrupted once, and the secrets in its folder while it diagnosed."""
@@ -49,10 +56,13 @@ def proof(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
             if done == 2 and of and len(readable) < 8:
                 raise KeyboardInterrupt
 
+    patch = pytest.MonkeyPatch()
+    patch.setattr(driver, "run_task", diagnose_some)
     with pytest.raises(KeyboardInterrupt):
         prove(SETTINGS, folder, progress=look)
     kept = {p: p.stat().st_mtime_ns for p in (folder / "answers").iterdir()}
     numbers = prove(SETTINGS, folder, jobs=2, progress=look)
+    patch.undo()
     assert len(kept) == 2 and all(path.stat().st_mtime_ns == time for path, time in kept.items())
     return {"folder": folder, "numbers": numbers, "readable": readable}
 
