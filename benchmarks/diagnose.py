@@ -24,10 +24,12 @@ import psutil
 
 from diagnosis import diagnose
 from diagnosis.files import write_files
-from diagnosis.proof.conceal import Plan, draw_case
+from diagnosis.proof.conceal import draw_case
+from diagnosis.proof.concealed_case import Plan
 from diagnosis.proof.cycles import Programme, ambient, programmes
 from diagnosis.proof.instruments import record
 from diagnosis.proof.plant import Plant
+from diagnosis.proof.plant_run import run_plant
 from diagnosis.recording import read_train_and_holdout
 from models.gearbox import load_gearbox
 from models.mechanisms import CATALOGUE
@@ -78,7 +80,7 @@ def make_recordings(folder: Path, lengths_h: Sequence[float], step_s: float) -> 
             start=float(air[0]), random_heat={}, effects=case.physics,
         ))  # fmt: skip
     paths = []
-    for run, outcome in zip(runs, plant.run(runs), strict=True):
+    for run, outcome in zip(runs, run_plant(plant, runs), strict=True):
         columns = record(plant, run, outcome, case.instruments, (), None)
         at = np.arange(0.0, columns["time_s"][-1] + 0.5 * step_s, step_s)
         table = pd.DataFrame({name: np.interp(at, columns["time_s"], values) for name, values in columns.items()})
@@ -94,7 +96,7 @@ def make_recordings(folder: Path, lengths_h: Sequence[float], step_s: float) -> 
 
 
 def once(train: Sequence[str], holdout: Sequence[str], share: float, jobs: int) -> None:
-    """One diagnosis as the verb does it, in a process of its own; prints what it took as JSON."""
+    """Diagnose as the verb does, in a separate process; print time and memory as JSON."""
     marks = [("start and reading", time.perf_counter())]
     gearbox = load_gearbox("fzg")
     names = sorted(CATALOGUE)
@@ -115,7 +117,7 @@ def once(train: Sequence[str], holdout: Sequence[str], share: float, jobs: int) 
 
 
 def measured(train: Sequence[Path], holdout: Sequence[Path], *, jobs: int, share: float = 1.0) -> Cost:
-    """A diagnosis in a process of its own, watched from outside."""
+    """Run a diagnosis in a separate process and watch it from outside."""
     given = {"train": [*map(str, train)], "holdout": [*map(str, holdout)], "share": share, "jobs": jobs}
     code = f"from benchmarks.diagnose import once; once(**{given!r})"
     load, begin = psutil.getloadavg()[0], time.perf_counter()

@@ -7,12 +7,13 @@ from pathlib import Path
 import click
 
 from builder import console
+from models.atomic_write import atomic_folder
 from models.errors import InputError
 from models.gearbox import load_gearbox
 
 
 def _list_effects(context: click.Context, _: click.Parameter, asked: bool) -> None:
-    """Show what can be concealed, and end."""
+    """List the effects that can be concealed, and exit."""
     if asked:
         from diagnosis.proof.conceal import EFFECTS
 
@@ -22,13 +23,13 @@ def _list_effects(context: click.Context, _: click.Parameter, asked: bool) -> No
 
 
 @click.command("conceal")
-@click.option("--effect", default=None, metavar="NAME", help="What to conceal; --list shows the names.")
+@click.option("--effect", default=None, metavar="NAME", help="Effect to conceal; --list shows the names.")
 @click.option(
     "--list", is_flag=True, is_eager=True, expose_value=False, callback=_list_effects, help="Show the effects."
 )
-@click.option("--random", "random", is_flag=True, help="Draw what to conceal; it may be nothing.")
+@click.option("--random", "random", is_flag=True, help="Draw the effects to conceal; there may be none.")
 @click.option("--strength", type=click.FloatRange(min=0.01, max=10.0), default=None, metavar="X",
-              help="Strength of the effect over its usual one.  [default: drawn from 0.25 to 2]")  # fmt: skip
+              help="Strength relative to the usual one.  [default: drawn from 0.25 to 2]")  # fmt: skip
 @click.option("--seed", type=click.IntRange(min=0, max=2**32 - 1), required=True, metavar="N",
               help="The same seed gives the same bytes.")  # fmt: skip
 @click.option("--output", type=click.Path(path_type=Path, file_okay=False), required=True, metavar="DIR",
@@ -49,14 +50,14 @@ def conceal(
     cases: int | None,
     gearbox: str,
 ) -> None:
-    """Make recordings of a gearbox that hides an effect; the truth is sealed apart.
+    """Make recordings of a gearbox that hides an effect; the truth goes into another folder.
 
-    The recordings come from a plant of its own, not from the model: about 22 h to learn from (train_1 to train_3) and
-    6 h to judge by (hold_1, hold_2). seal.json holds the SHA-256 of the truth.
+    The recordings come from a separate plant, not from the model: about 22 h to learn from (train_1 to train_3) and
+    6 h to hold out (hold_1, hold_2).
     """
     from diagnosis.proof.case_files import keep_apart, keep_other_cases
-    from diagnosis.proof.conceal import Plan, conceal_set, random_plans  # imports scipy.signal
-    from models.atomic_write import atomic_folder
+    from diagnosis.proof.conceal import conceal_set, random_plans  # imports scipy.signal
+    from diagnosis.proof.concealed_case import Plan
 
     if (effect is None) == (not random):
         raise InputError("conceal takes either --effect NAME or --random")
@@ -68,17 +69,17 @@ def conceal(
     else:
         plans = [Plan(group="single", effects=(effect,), strength=strength)] * number
     definition = load_gearbox(gearbox)
-    recordings, apart = output / "recordings", output / "truth" if truth is None else truth
-    keep_apart(recordings, apart)
+    recordings, truth = output / "recordings", truth or output / "truth"
+    keep_apart(recordings, truth)
     with (
         atomic_folder(recordings) as stage,
-        atomic_folder(apart) as sealed,
+        atomic_folder(truth) as truth_stage,
         console.progress_bar("concealing") as progress,
     ):
         names = conceal_set(
-            definition, plans, seed=seed, recordings=stage, truth=sealed, flat=cases is None, progress=progress
+            definition, plans, seed=seed, recordings=stage, truth=truth_stage, flat=cases is None, progress=progress
         )
         keep_other_cases(stage, recordings)
-        keep_other_cases(sealed, apart)
+        keep_other_cases(truth_stage, truth)
     for name in names:
-        console.out.print(f"wrote {recordings / ('' if cases is None else name)}, sealed {apart / name}.json")
+        console.out.print(f"wrote {recordings / ('' if cases is None else name)}, {truth / name}.json")

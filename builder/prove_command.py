@@ -18,7 +18,7 @@ LINES = 20  # of progress where there is no terminal
 
 @click.command("prove")
 @click.option("--cases", type=click.IntRange(min=1, max=10_000), default=None, metavar="N",
-              help="How many cases, in the proportions of the whole mix.  [default: the whole mix, 247]")  # fmt: skip
+              help="Number of cases, in the proportions of the whole mix.  [default: the whole mix, 247]")  # fmt: skip
 @click.option("--seed", type=click.IntRange(min=0, max=2**32 - 1), default=None, metavar="N",
               help="Seed of the cases.  [default: 2042, which nobody has opened]")  # fmt: skip
 @click.option(
@@ -26,43 +26,40 @@ LINES = 20  # of progress where there is no terminal
 )
 @click.option("--cells-every", type=click.IntRange(min=0), default=3, show_default=True, metavar="N",
               help="Every N-th case is also diagnosed with fewer sensors and shorter recordings; 0: none.")  # fmt: skip
-@click.option("--baselines/--no-baselines", default=True, show_default=True,
-              help="Try other methods on the same recordings.")  # fmt: skip
 @worker_options()
 @click.option("--output", type=click.Path(path_type=Path, file_okay=False), default=Path("out/proof"),
               show_default=True, metavar="DIR",
-              help="Folder of the proof; one that was interrupted goes on.")  # fmt: skip
+              help="Folder of the proof; an interrupted one is continued.")  # fmt: skip
 def prove(
     cases: int | None,
     seed: int | None,
     gearbox: str,
     cells_every: int,
-    baselines: bool,
     jobs: int,
     dask: str | None,
     output: Path,
 ) -> None:
-    """Try the diagnosis on sealed cases: hide effects, diagnose blindly, hash the verdicts, open the truth, score.
+    """Test the diagnosis on sealed cases: hide effects, diagnose blindly, hash the answers, open the truth, score.
 
-    The truth is on no disk while anything is diagnosed. The same command in the same folder goes on where it stopped.
+    The truth is on no disk while anything is diagnosed. The same command in the same folder continues a proof.
     """
     from builder.prove import NUMBERS, PAGE
     from builder.prove import prove as run
     from diagnosis.proof.protocol import UNOPENED_SEED, WHOLE, Settings
 
     settings = Settings(seed=UNOPENED_SEED if seed is None else seed, cases=WHOLE if cases is None else cases,
-                        gearbox=gearbox, cells_every=cells_every, baselines=baselines)  # fmt: skip
-    with _told() as tell:
-        found = run(settings, output, jobs=jobs, dask_address=dask, tell=tell)
-    show(found)
+                        gearbox=gearbox, cells_every=cells_every)  # fmt: skip
+    with _progress() as progress:
+        result = run(settings, output, jobs=jobs, dask=dask, progress=progress)
+    show(result)
     for name in (PAGE, NUMBERS):
         console.out.print(f"wrote {output / name}")
 
 
-def show(found: Mapping[str, Any]) -> None:
+def show(result: Mapping[str, Any]) -> None:
     """Print the rules with their counts."""
     rows = []
-    for rule in found["rules"]:
+    for rule in result["rules"]:
         count = rule["count"]
         asked = "" if rule["needed"] is None else f"{'<=' if rule['at_most'] else '>='} {100 * rule['needed']:.0f} %"
         met = {True: "yes", False: "NO", None: ""}[rule["met"]]
@@ -70,30 +67,26 @@ def show(found: Mapping[str, Any]) -> None:
         limits = f"{100 * count['low']:.0f} to {100 * count['high']:.0f} %" if count["of"] else ""
         rows.append([rule["text"], f"{count['hits']}/{count['of']}", share, limits, asked, met])
     console.table("Proof", ["rule", "cases", "share", "95 % limits", "asked", "met"], rows)
-    protocol = found["protocol"]
+    protocol = result["protocol"]
     if protocol["on_development_seed"]:
         console.out.print(f"Seed {protocol['seed']} was opened while the diagnosis was developed: this is no proof.")
-    if not protocol["scored_as_begun"]:
-        console.out.print("The rules of judging were changed after these cases were made.")
-    if "sparse" not in found["methods"] and "naive" in found["methods"]:
-        console.out.print("Sparse regression is left out: pysindy is not installed (extra 'proof').")
     if protocol["failed"]:
-        console.out.print(f"{protocol['failed']} processes failed; their verdict files say how.")
+        console.out.print(f"{protocol['failed']} processes failed; the files of their answers contain the message.")
 
 
 @contextmanager
-def _told() -> Iterator[Callable[[str, int, int], None]]:
-    """What is being done: a bar on a terminal, else a line now and then."""
+def _progress() -> Iterator[Callable[[str, int, int], None]]:
+    """Progress bar on a terminal, else a line now and then."""
     if console.err.is_terminal:
-        with console.progress_bar("starting") as report:
-            yield lambda _, done, of: report(done, of)
+        with console.progress_bar("starting") as advance:
+            yield lambda _, done, of: advance(done, of)
         return
     begin, last = time.perf_counter(), {"": -1}
 
-    def tell(what: str, done: int, of: int) -> None:
+    def report(what: str, done: int, of: int) -> None:
         part = LINES * done // max(of, 1)
         if last.get(what) != part:
             last[what] = part
             console.err.print(f"{what}: {done} of {of}, {(time.perf_counter() - begin) / 60.0:.0f} min")
 
-    yield tell
+    yield report

@@ -1,26 +1,28 @@
-"""Cases: recordings with a concealed effect in one folder, the sealed truth in another.
+"""Cases: recordings with a concealed effect in one folder, the truth in another.
 
 A case is drawn from its seed alone, so the same seed gives the same bytes. The clock of effects that age or set in
-starts anew with each recording, as if each were the first after the gearbox was set up.
+starts with each recording, as if each were the first after the gearbox was set up.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from diagnosis.proof.case_files import keep_apart, write_case
+from diagnosis.proof.concealed_case import CONTROLS, FAULTS, ConcealedCase, Plan
 from diagnosis.proof.cycles import Programme, ambient, ornstein_uhlenbeck, programmes
 from diagnosis.proof.effect import Concealed, Effect
 from diagnosis.proof.effects_heat import HEAT_EFFECTS
 from diagnosis.proof.effects_losses import LOSS_EFFECTS
 from diagnosis.proof.effects_outside import OUTSIDE_EFFECTS
 from diagnosis.proof.instruments import SENSOR_EFFECTS, Instruments, default_channels, record
-from diagnosis.proof.plant import READINGS, Individual, Outcome, Plant, Run
+from diagnosis.proof.plant import READINGS, Plant
+from diagnosis.proof.plant_run import Individual, Outcome, Run, run_plant
 from diagnosis.proof.truth import truth_of
 from models.errors import InputError, did_you_mean
 from models.gearbox import Gearbox
@@ -28,9 +30,7 @@ from models.types import Array
 
 EFFECTS: Mapping[str, Effect] = {e.name: e for e in (*LOSS_EFFECTS, *HEAT_EFFECTS, *SENSOR_EFFECTS, *OUTSIDE_EFFECTS)}
 PHYSICS = tuple(e.name for e in (*LOSS_EFFECTS, *HEAT_EFFECTS))
-FAULTS = tuple(e.name for e in SENSOR_EFFECTS)
 OUTSIDE = tuple(e.name for e in OUTSIDE_EFFECTS)
-CONTROLS = ("clean", "parameters_off", "parameter_far", "noise_misstated", "lag_wrong")
 MIX = {"control": 0.24, "single": 0.44, "double": 0.10, "sensor": 0.08, "outside": 0.10, "messy": 0.04}
 MINOR = ("windage", "shaft_ends_to_air", "oil_level_thermal", "pump_heat", "radiation_error", "hot_neighbour",
          "bearing_additive", "oil_mist", "misalignment", "ambient_swing", "run_in_seals", "motor_flange")  # fmt: skip
@@ -41,7 +41,7 @@ DOMINANT = ("churning_swirl", "splash_starvation", "run_in_flanks", "gear_wear",
             "bearing_preload", "bearing_damage")  # fmt: skip
 MINOR_STRENGTH = (0.15, 0.4)
 STRENGTH = (0.25, 2.0)  # drawn evenly in its logarithm
-LEAST_STRENGTH = {"double": 0.5, "messy": 0.8}  # of what must be found beside something else
+LEAST_STRENGTH = {"double": 0.5, "messy": 0.8}  # of effects that must be found next to others
 ORDINARY_SPREAD = 0.5  # of the definition's standard deviations, by which every gearbox is off
 FAR = 5.0  # standard deviations
 # Parameters that may be far off, and to which side: the other one of the first two would overheat the box.
@@ -49,51 +49,6 @@ FAR_FACTORS = (("mesh", -1.0), ("h_air", 1.0), ("seal", 1.0), ("seal", -1.0), ("
 TOGETHER = 40  # cases that are simulated at once, a gigabyte at most
 DATA_SHEET = {"noise": 0.2, "resolution": 0.1, "lag_s": 15.0, "lag_sd_s": 5.0}
 NOISY_K, SLOW_LAG_S = (0.4, 0.7), (30.0, 55.0)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Plan:
-    """What a case is to be, before anything is drawn.
-
-    Attributes
-    ----------
-    group : str
-        ``control``, ``single``, ``double``, ``sensor``, ``outside`` or ``messy``
-    kind : str
-        Of a control, one of :data:`CONTROLS`, else ``effects``
-    effects : tuple of str
-        Names from :data:`EFFECTS`, the dominant one first
-    strength : float or None
-        Of the first effect over its nominal one; drawn if None
-    """
-
-    group: str
-    kind: str = "effects"
-    effects: tuple[str, ...] = ()
-    strength: float | None = None
-
-
-@dataclass(frozen=True, kw_only=True)
-class Case:
-    """A drawn case: the gearbox, its five programmes, what is concealed, and how it is measured."""
-
-    name: str
-    plan: Plan
-    seed: tuple[int, ...]
-    individual: Individual
-    effects: tuple[Concealed, ...]
-    instruments: Instruments
-    runs: tuple[Run, ...]
-
-    @property
-    def physics(self) -> tuple[Concealed, ...]:
-        """Effects that act in the plant."""
-        return tuple(effect for effect in self.effects if effect.effect.name not in FAULTS)
-
-    @property
-    def faults(self) -> tuple[Concealed, ...]:
-        """Effects that act in the measurement."""
-        return tuple(effect for effect in self.effects if effect.effect.name in FAULTS)
 
 
 def mixed_plans(seed: int, counts: Mapping[str, int]) -> list[Plan]:
@@ -152,7 +107,7 @@ def conceal_set(
     flat: bool = False,
     progress: Callable[[int, int], None] | None = None,
 ) -> list[str]:
-    """Draw, simulate, record and seal cases.
+    """Draw, simulate and record cases.
 
     Parameters
     ----------
@@ -160,14 +115,13 @@ def conceal_set(
     plans : sequence of Plan
     seed : int
     recordings : Path
-        Folder that gets one folder per case with its recordings and ``seal.json``
+        Folder that gets one folder per case
     truth : Path or None
-        Folder that gets ``<case>.json``, what is concealed; must be another one. None: only its seal is kept, until
-        the same seed makes it again
+        Folder that gets ``<case>.json`` with the concealed effects; must be another one. None: it is not written
     flat : bool
-        Whether the recordings of a single case go straight into `recordings`
+        True to write the recordings of a single case straight into `recordings`
     progress : callable or None
-        Told how much of how much is done
+        Called with the amounts of work done and in all
 
     Returns
     -------
@@ -189,25 +143,25 @@ def conceal_set(
     cases = [draw_case(plant, plan, seed=(seed, i), name=f"case_{i + 1:0{digits}d}") for i, plan in enumerate(plans)]
     for first in range(0, len(cases), TOGETHER):
 
-        def tell(done: int, of: int, first: int = first, cases: int = min(TOGETHER, len(cases) - first)) -> None:
+        def report(done: int, of: int, first: int = first, cases: int = min(TOGETHER, len(cases) - first)) -> None:
             if progress is not None:
                 progress(round(100 * (first + cases * done / of)), 100 * len(plans))
 
-        for case, columns, facts in simulate_cases(plant, cases[first : first + TOGETHER], tell):
+        for case, columns, facts in simulate_cases(plant, cases[first : first + TOGETHER], report):
             folder = recordings if flat else recordings / case.name
-            sealed = None if truth is None else truth / f"{case.name}.json"
-            write_case(folder, sealed, columns, facts, case.instruments.stated)
+            truth_file = None if truth is None else truth / f"{case.name}.json"
+            write_case(folder, truth_file, columns, facts, case.instruments.stated)
     return [case.name for case in cases]
 
 
 def simulate_cases(
-    plant: Plant, cases: Sequence[Case], progress: Callable[[int, int], None] | None = None
-) -> list[tuple[Case, Mapping[str, Mapping[str, Array]], Mapping[str, Any]]]:
-    """Recordings and truth of cases, simulated all at once.
+    plant: Plant, cases: Sequence[ConcealedCase], progress: Callable[[int, int], None] | None = None
+) -> list[tuple[ConcealedCase, Mapping[str, Mapping[str, Array]], Mapping[str, Any]]]:
+    """Simulate cases together; recordings and truth of each.
 
     Returns
     -------
-    list of (Case, columns by recording, truth)
+    list of (ConcealedCase, columns by recording, truth)
     """
     runs: list[Run] = []
     for case in cases:
@@ -215,14 +169,14 @@ def simulate_cases(
             runs += [replace(run, effects=kept) for run in case.runs]
     total, done = sum(len(run) for run in runs), 0
 
-    def tell(rows: int) -> None:
+    def report(rows: int) -> None:
         nonlocal done
         done += rows
         if progress is not None:
             progress(min(done, total), total)
 
-    outcomes = iter(plant.run(runs, tell))
-    results: list[tuple[Case, Mapping[str, Mapping[str, Array]], Mapping[str, Any]]] = []
+    outcomes = iter(run_plant(plant, runs, report))
+    results: list[tuple[ConcealedCase, Mapping[str, Mapping[str, Array]], Mapping[str, Any]]] = []
     for case in cases:
         by_twin: list[list[Outcome]] = [[next(outcomes) for _ in case.runs] for _ in twins(case)]
         columns = {
@@ -235,8 +189,8 @@ def simulate_cases(
     return results
 
 
-def twins(case: Case) -> list[tuple[Concealed, ...]]:
-    """Effects of the runs that a case needs: all of them, none, and, with several, all but the first or the second."""
+def twins(case: ConcealedCase) -> list[tuple[Concealed, ...]]:
+    """Sets of effects to simulate: all, none and, with several, all but the first or the second."""
     physics = case.physics
     if not physics:
         return [()]
@@ -249,8 +203,8 @@ def twins(case: Case) -> list[tuple[Concealed, ...]]:
 # ---------------------------------------------------------------------- drawing
 
 
-def draw_case(plant: Plant, plan: Plan, *, seed: tuple[int, ...], name: str) -> Case:
-    """Draw everything that a plan leaves open.
+def draw_case(plant: Plant, plan: Plan, *, seed: tuple[int, ...], name: str) -> ConcealedCase:
+    """Draw the gearbox, strengths, programmes and instruments of a plan.
 
     Raises
     ------
@@ -265,8 +219,8 @@ def draw_case(plant: Plant, plan: Plan, *, seed: tuple[int, ...], name: str) -> 
     effects = tuple(_specimen(plant, plan, k, rng) for k in range(len(plan.effects)))
     runs = tuple(_run(plant, individual, p, rng) for p in programmes(plant.gearbox, rng))
     instruments = _instruments(plant, plan, rng)
-    return Case(name=name, plan=plan, seed=seed, individual=individual, effects=effects, instruments=instruments,
-                runs=runs)  # fmt: skip
+    return ConcealedCase(name=name, plan=plan, seed=seed, individual=individual, effects=effects,
+                         instruments=instruments, runs=runs)  # fmt: skip
 
 
 def _specimen(plant: Plant, plan: Plan, k: int, rng: np.random.Generator) -> Concealed:
@@ -331,7 +285,7 @@ def _instruments(plant: Plant, plan: Plan, rng: np.random.Generator) -> Instrume
     channels = default_channels(plant)
     lag = SLOW_LAG_S if plan.kind == "lag_wrong" else (10.0, 20.0)
     noisy = plan.kind == "noise_misstated"
-    # Half of all cases come with a data sheet, so that its presence does not tell.
+    # Half of all cases come with a data sheet, so that its presence reveals nothing.
     stated = plan.kind in ("noise_misstated", "lag_wrong") or rng.random() < 0.5
     return Instruments(
         channels=channels,

@@ -27,7 +27,7 @@ STEADY_POWER = 0.33  # highest product of the fractions in random cycles: speed 
 
 @dataclass(frozen=True, kw_only=True)
 class Programme:
-    """What is done to the gearbox in one recording, row by row every 10 s.
+    """Speed and torque of one recording, in rows of 10 s.
 
     Attributes
     ----------

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 
 from diagnosis.proof.anatomy import MESH, OIL, SPLASH, SUMP
+from diagnosis.proof.plant import Moment, Plant
 from models.types import Array
-
-if TYPE_CHECKING:
-    from diagnosis.proof.plant import Moment, Plant
 
 Kind = Literal["source", "link", "loss_factor", "link_factor", "signal", "sensor", "parameter"]
 Hook = Callable[["Grip"], None]

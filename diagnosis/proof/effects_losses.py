@@ -127,7 +127,7 @@ def splash_starvation(g: Grip) -> None:
 
 
 def oil_jet(g: Grip) -> None:
-    """Oil injected at a temperature of its own and brought to speed by the gears."""
+    """Oil injected at a fixed temperature and brought to speed by the gears."""
     g.heat(OIL, 0.3 * g.p["a"] * g.x**1.9, lost=True)
     g.sink(OIL, g.p["a"] / 30.0 * np.minimum(g.x / 0.1, 1.0), g.p["T"])
 

@@ -11,7 +11,8 @@ from scipy.signal import lfilter, lfiltic
 from diagnosis.proof.cycles import ROW_S, reference_torque
 from diagnosis.proof.effect import Concealed, Effect, Kind
 from diagnosis.proof.effects_losses import Draw, Places, at
-from diagnosis.proof.plant import Outcome, Plant, Run
+from diagnosis.proof.plant import Plant
+from diagnosis.proof.plant_run import Outcome, Run
 from models.types import Array
 
 LOSS = "P_loss"
@@ -40,7 +41,7 @@ class Instruments:
     dropouts : int
         Bursts of missing readings per recording
     stated : mapping of str to float, or None
-        What the user is told of the temperature sensors, by the keys of a mapping file; None where nothing is stated
+        Data sheet of the temperature sensors, by the keys of a mapping file; None without a data sheet
     """
 
     channels: tuple[str, ...]
@@ -190,7 +191,7 @@ def two_unlike_sensors(plant: Plant, rng: np.random.Generator) -> tuple[str, ...
 
 
 def default_channels(plant: Plant) -> tuple[str, ...]:
-    """What is measured unless a case says otherwise: housing, oil, a bearing of every shaft, the first gear."""
+    """Default measured places: housing, oil, a bearing of every shaft, the first gear."""
     anatomy, stage = plant.anatomy, plant.gearbox.stage[0]
     first = [next(b.name for b in plant.gearbox.bearing if b.shaft == s) for s in (stage.driver, stage.driven)]
     return ("oil", *anatomy.parts, *first, anatomy.gears[0])

@@ -13,7 +13,8 @@ from markupsafe import Markup
 
 from diagnosis.numbers import NONE, fixed
 from diagnosis.proof.protocol import DATA, SENSORS
-from diagnosis.proof.score import FAR, NOTHING, OUTCOMES, OUTSIDE, TO_FIND
+from diagnosis.proof.rules import FAR
+from diagnosis.proof.score import NOTHING, OUTCOMES, OUTSIDE, TO_FIND
 from diagnosis.report import wording
 from diagnosis.report.chart import Chart, Curve, drawn
 
@@ -26,13 +27,12 @@ GROUPS = {
     "sensor": "fault of measurement",
     TO_FIND: "all with something to find",
 }
-STAGES = {"before": "as delivered", "calibrated": "calibrated", "after": "with what was found",
-          "black_box": "black-box network on the residual"}  # fmt: skip
-SAID_WITHOUT_NAME = ("consistent", "insufficient data", "refused", "failed", "not in the catalogue", "parameter")
+STAGES = {"before": "as delivered", "calibrated": "calibrated", "after": "with the findings"}
+WITHOUT_NAME = ("consistent", "insufficient data", "refused", "failed", "not in the catalogue", "parameter")
 
 
 def page(found: Mapping[str, Any]) -> str:
-    """The page of a proof as HTML that needs nothing else.
+    """Render the page of a proof as one HTML file.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def page(found: Mapping[str, Any]) -> str:
         data=DATA,
         outcomes=OUTCOMES,
         groups=GROUPS,
-        stages={key: text for key, text in STAGES.items() if key != "black_box" or key in found["methods"]},
+        stages=STAGES,
         reliability=drawn(reliability_chart(found["reliability"]["bins"])),
         errors=drawn(error_chart(found["held_out_pairs"])),
         confusion=confusion_table(found["confusion"]),
@@ -80,7 +80,7 @@ def title(text: str) -> str:
 
 
 def count(found: Mapping[str, Any]) -> str:
-    """So many of so many.
+    """Hits of cases.
 
     Examples
     --------
@@ -91,17 +91,17 @@ def count(found: Mapping[str, Any]) -> str:
 
 
 def share(found: Mapping[str, Any]) -> str:
-    """Share in per cent; a dash of nothing."""
+    """Share in per cent; a dash without cases."""
     return f"{100.0 * found['hits'] / found['of']:.0f} %" if found["of"] else NONE
 
 
 def limits(found: Mapping[str, Any]) -> str:
-    """Its confidence limits in per cent."""
+    """Confidence limits of the share in per cent."""
     return f"{100.0 * found['low']:.0f} to {100.0 * found['high']:.0f} %" if found["of"] else ""
 
 
 def reliability_chart(bins: Sequence[Mapping[str, Any]]) -> Chart:
-    """Share that was right over the stated probability, with its limits; on the diagonal both are the same."""
+    """Share of right claims over the stated probability, with its limits; equal on the diagonal."""
     known = [b for b in bins if b["right"]["of"]]
     stated = np.array([100.0 * b["mean_stated"] for b in known])
     right = np.array([100.0 * b["right"]["hits"] / b["right"]["of"] for b in known])
@@ -121,7 +121,7 @@ def reliability_chart(bins: Sequence[Mapping[str, Any]]) -> Chart:
 
 
 def error_chart(pairs: Sequence[Mapping[str, Any]]) -> Chart:
-    """Held-out error with what was found over that of calibration alone, case by case."""
+    """Held-out error with the findings over that of calibration alone, case by case."""
     good = [p for p in pairs if p["after"] is not None and math.isfinite(p["after"])]
     most = max((max(p["calibrated"], p["after"]) for p in good), default=1.0)
     looks = {"control": "measured", "single": "after", "double": "law", "messy": "law", "outside": "missing",
@@ -132,15 +132,15 @@ def error_chart(pairs: Sequence[Mapping[str, Any]]) -> Chart:
         if len(x):
             curves.append(Curve(label=GROUPS[group], look=look, x=x, y=y, kind="points"))
     return Chart(
-        title="Held-out error, case by case", x_label="calibrated, in K", y_label="with what was found, in K",
+        title="Held-out error, case by case", x_label="calibrated, in K", y_label="with the findings, in K",
         curves=tuple(curves), height=300, level=True,
     )  # fmt: skip
 
 
 def confusion_table(found: Mapping[str, Mapping[str, int]]) -> dict[str, Any]:
-    """Rows (what is true), columns (what is said first) and cells (how often, and whether it is right)."""
+    """Rows (truth), columns (first name given) and cells (count, and True if right)."""
     said = {name for counts in found.values() for name in counts}
-    unnamed = [name for name in SAID_WITHOUT_NAME if name in said]
+    unnamed = [name for name in WITHOUT_NAME if name in said]
     columns = [*unnamed, *sorted(said - set(unnamed))]
     rows = []
     for label in sorted(found, key=lambda label: (not label.startswith((NOTHING, OUTSIDE)), label)):

@@ -1,11 +1,11 @@
-"""The protocol of an honest proof: who sees what, and when.
+"""The protocol of an honest proof.
 
-1. Cases are drawn and simulated. Their recordings are kept and the SHA-256 of every salted truth; the truth itself is
-   thrown away, so that while anything is diagnosed it is nowhere to be read.
-2. Every diagnosis is a process of its own that gets the recordings and the nominal definition, and cannot import the
+1. Cases are drawn from a seed and simulated. Only their recordings are written: the truth is on no disk while anything
+   is diagnosed.
+2. Every diagnosis is a separate process that gets the recordings and the nominal definition, and cannot import the
    plant (:data:`BLIND`).
-3. When all verdicts are there, they are hashed, and the list of hashes is written.
-4. Only then the truth is made again from the seed. It counts if the same recordings come out and the seal holds.
+3. When all answers are there, the list of their SHA-256 is written.
+4. Only then the truth is made from the seed, and every case is counted. All this is done by one version of the code.
 """
 
 from __future__ import annotations
@@ -13,7 +13,6 @@ from __future__ import annotations
 import gzip
 import hashlib
 import json
-import shutil
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -21,8 +20,9 @@ from importlib import resources
 from pathlib import Path
 from typing import Any, Literal
 
-from diagnosis.proof.case_files import MAPPING, SEAL, seal_holds
-from diagnosis.proof.conceal import PHYSICS, Plan, conceal_set, mixed_plans
+from diagnosis.proof.case_files import MAPPING
+from diagnosis.proof.conceal import PHYSICS, conceal_set, mixed_plans
+from diagnosis.proof.concealed_case import Plan
 from models.atomic_write import atomic_file
 from models.errors import InputError
 from models.gearbox import Gearbox
@@ -34,7 +34,7 @@ WHOLE = sum(MIX.values())
 # Opened while the diagnosis was developed: thresholds were set on the first, open forms, the search for thermostats and
 # some rules made while looking at others.
 DEVELOPMENT_SEEDS = (1, *range(2026, 2038), 2039, 2041)
-UNOPENED_SEED = 2042  # of a proof whose truth nobody has seen; once opened it belongs above
+UNOPENED_SEED = 2042  # nobody has seen its truth; once opened it belongs above
 # Start of a diagnosis: an import of the plant, or of anything else of the proof, is an ImportError there.
 BLIND = "import sys; sys.modules['diagnosis.proof'] = None; from builder.__main__ import main; main()"
 
@@ -53,69 +53,61 @@ DATA: Mapping[Data, str] = {
 FIRST = ("rich", "full")
 TRAIN, HOLD, SHORT = ("train_1", "train_2", "train_3"), ("hold_1", "hold_2"), "train_2"
 ENDING = ".csv.gz"
-RECORDINGS, VERDICTS, TRUTH = "recordings", "verdicts", "truth"
-SETTINGS, HASHES = "settings.json", "verdicts.sha256"
-JUDGED = ("models", "diagnosis")  # packages whose code the verdicts depend on
-NOT_JUDGED = ("diagnosis/proof/", "diagnosis/report/")
-SCORING = ("score.py", "outcome.py")  # modules of this package that say what counts as right
+RECORDINGS, ANSWERS, TRUTH = "recordings", "answers", "truth"
+SETTINGS, HASHES = "settings.json", "answers.sha256"
 
 
 @dataclass(frozen=True, kw_only=True)
 class Settings:
-    """What a proof is made of.
+    """Options of a proof.
 
     Attributes
     ----------
     seed : int
     cases : int
-        In all, in the proportions of :data:`MIX`
+        Number of cases, in the proportions of :data:`MIX`
     gearbox : str
         Name or file of the definition
     cells_every : int
-        Of each group every n-th case is also diagnosed with fewer sensors and shorter recordings; 0: none
-    baselines : bool
-        Whether other methods are tried on the same recordings
+        Every n-th case of each group is also diagnosed with fewer sensors and shorter recordings; 0: none
     """
 
     seed: int
     cases: int = WHOLE
     gearbox: str = "fzg"
     cells_every: int = 3
-    baselines: bool = True
 
 
 @dataclass(frozen=True, kw_only=True)
 class Task:
-    """One thing to be found out from the recordings of one case.
+    """One diagnosis of the recordings of a case.
 
     Attributes
     ----------
     case : str
-    kind : {"diagnose", "baselines"}
     sensors, data : str
         Keys of :data:`SENSORS` and :data:`DATA`
     removed : str or None
-        Mechanism that is taken out of the catalogue
+        Mechanism that is removed from the catalogue
     """
 
     case: str
-    kind: Literal["diagnose", "baselines"] = "diagnose"
     sensors: Sensors = "rich"
     data: Data = "full"
     removed: str | None = None
 
     @property
     def name(self) -> str:
-        """Of its verdict's file."""
-        what = "removed" if self.removed else f"{self.sensors}-{self.data.replace(' ', '')}"
-        return f"{self.case}_{what if self.kind == 'diagnose' else self.kind}"
+        """Name of the file of its answer."""
+        cell = f"{self.sensors}-{self.data.replace(' ', '')}"
+        return f"{self.case}_{'removed' if self.removed else cell}"
 
 
-# ---------------------------------------------------------------------- what is to be done
+# ---------------------------------------------------------------------- tasks
 
 
 def mix_of(cases: int) -> dict[str, int]:
-    """How many cases of each group, in the proportions of :data:`MIX`, at least one of each.
+    """Number of cases of each group, in the proportions of :data:`MIX`, at least one of each.
 
     Raises
     ------
@@ -148,7 +140,7 @@ def plans_of(settings: Settings) -> dict[str, Plan]:
 
 
 def tasks_of(settings: Settings, plans: Mapping[str, Plan]) -> list[Task]:
-    """Everything that is to be found out, the main cell first.
+    """All diagnoses of a proof, the main cell first.
 
     Every case with all sensors and recordings; every mechanism that is the only one in a case once more with its entry
     removed from the catalogue; and part of the cases in the other cells.
@@ -166,13 +158,11 @@ def tasks_of(settings: Settings, plans: Mapping[str, Plan]) -> list[Task]:
             others += [
                 Task(case=case, sensors=s, data=d) for s in SENSORS for d in DATA if (s, d) != FIRST
             ]  # fmt: skip
-    if settings.baselines:
-        tasks += [Task(case=case, kind="baselines") for case in plans]
     return tasks + others
 
 
 def files_of(recordings: Path, task: Task) -> tuple[dict[str, bytes], list[str]]:
-    """What a process gets to see, and the arguments that name it.
+    """Files that a diagnosis gets, and its arguments.
 
     Parameters
     ----------
@@ -183,7 +173,7 @@ def files_of(recordings: Path, task: Task) -> tuple[dict[str, bytes], list[str]]
     Returns
     -------
     files : dict of name to bytes
-        Recordings with the channels of the task, and what the data sheet says of them; nothing else
+        Recordings with the channels of the task, and their data sheet; nothing else
     arguments : list of str
     """
     folder = recordings / task.case
@@ -205,7 +195,7 @@ def files_of(recordings: Path, task: Task) -> tuple[dict[str, bytes], list[str]]
 
 
 def kept_columns(columns: Sequence[str], sensors: Sensors) -> list[str]:
-    """Columns that a set of sensors has; inputs are always recorded.
+    """Columns of a set of sensors; inputs are always recorded.
 
     Examples
     --------
@@ -233,168 +223,103 @@ def _without_columns(mapping: str, columns: Sequence[str]) -> str:
     return "\n\n".join([head, *kept]) + "\n"
 
 
-# ---------------------------------------------------------------------- before
+# ---------------------------------------------------------------------- steps
 
 
 def code_hash() -> str:
-    """SHA-256 over the code and the tables that a diagnosis is made of; thresholds are in it."""
+    """SHA-256 over code and tables of diagnosis, plant and scoring."""
     digest = hashlib.sha256()
-    for package in JUDGED:
+    for package in ("models", "diagnosis"):
         root = Path(str(resources.files(package)))
         for path in sorted(root.rglob("*")):
-            name = f"{package}/{path.relative_to(root).as_posix()}"
-            if path.suffix in (".py", ".toml") and not name.startswith(NOT_JUDGED):
-                digest.update(f"{name}\0".encode() + path.read_bytes() + b"\0")
+            if path.suffix in (".py", ".toml"):
+                digest.update(f"{package}/{path.relative_to(root).as_posix()}\0".encode() + path.read_bytes() + b"\0")
     return digest.hexdigest()
-
-
-def scoring_hash() -> str:
-    """SHA-256 over the rules by which verdicts are judged."""
-    here = Path(str(resources.files("diagnosis.proof")))
-    return hashlib.sha256(b"\0".join((here / name).read_bytes() for name in SCORING)).hexdigest()
-
-
-def scored_as_begun(folder: Path) -> bool:
-    """Whether the rules of judging are those that stood when the cases were made."""
-    return bool(json.loads((folder / SETTINGS).read_text(encoding="utf-8")).get("scoring_sha256") == scoring_hash())
 
 
 def begin(
     settings: Settings, gearbox: Gearbox, folder: Path, progress: Callable[[int, int], None] | None = None
-) -> str:
-    """Make the recordings and seal the truth; nothing is done where that has been done.
-
-    Returns
-    -------
-    str
-        Hash of the code that is to be tried, see :func:`code_hash`
+) -> None:
+    """Make the recordings; a folder that holds them already is continued.
 
     Raises
     ------
     InputError
-        If the settings cannot be met, or the folder holds another proof, or one of other code.
+        If the settings cannot be met, or the folder holds other files, or a proof with other options or code.
     """
-    code, plans = code_hash(), list(plans_of(settings).values())
-    # Of the seed only a hash is written, so that the folder does not tell what the truth can be made from.
-    whole = json.dumps({**asdict(settings), "gearbox": gearbox.hash}, sort_keys=True)
-    about = {"settings_sha256": hashlib.sha256(whole.encode()).hexdigest(), "code_sha256": code,
-             "scoring_sha256": scoring_hash(), "version": project_version()}  # fmt: skip
+    plans = list(plans_of(settings).values())
+    # Only a hash of the options is written, so that the folder does not contain the seed.
+    options = json.dumps({**asdict(settings), "gearbox": gearbox.hash}, sort_keys=True)
+    about = {"options": hashlib.sha256(options.encode()).hexdigest(), "code": code_hash(), "version": project_version()}
     file = folder / SETTINGS
-    if file.exists():
-        try:
-            before = json.loads(file.read_text(encoding="utf-8"))
-        except (OSError, ValueError) as error:
-            raise InputError(f"{file}: cannot be read ({error}); choose another output folder") from error
-        for key, what in (("settings_sha256", "other options"), ("code_sha256", "another version of the diagnosis")):
-            if before.get(key) != about[key]:
-                raise InputError(f"{folder}: holds a proof with {what}; choose another output folder")
-    else:
+    if not file.exists():
         if folder.exists() and any(folder.iterdir()):
             raise InputError(f"{folder}: is not empty and holds no proof; choose another output folder")
-        write_whole(file, json.dumps(about, indent=1) + "\n")
+        write_text(file, json.dumps(about, indent=1) + "\n")
+    before = json.loads(file.read_text(encoding="utf-8"))
+    for key, difference in (("options", "other options"), ("code", "another version of the code")):
+        if before.get(key) != about[key]:
+            raise InputError(f"{folder}: holds a proof with {difference}; choose another output folder")
     if not (folder / RECORDINGS).exists():
-        unfinished = Path(tempfile.mkdtemp(prefix=".unfinished-", dir=folder))
-        try:
-            conceal_set(gearbox, plans, seed=settings.seed,
-                        recordings=unfinished / RECORDINGS, truth=None, progress=progress)  # fmt: skip
-            (unfinished / RECORDINGS).replace(folder / RECORDINGS)
-        finally:
-            shutil.rmtree(unfinished, ignore_errors=True)
-    return code
+        with tempfile.TemporaryDirectory(prefix=".unfinished-", dir=folder) as unfinished:
+            made = Path(unfinished) / RECORDINGS
+            conceal_set(gearbox, plans, seed=settings.seed, recordings=made, truth=None, progress=progress)
+            made.replace(folder / RECORDINGS)
 
 
 def open_tasks(folder: Path, tasks: Sequence[Task]) -> list[Task]:
-    """Tasks without a verdict.
+    """Tasks without an answer.
 
     Raises
     ------
     InputError
-        If the truth is open already: then no verdict may be added.
+        If the answers are fixed already: then none may be added.
     """
-    missing = [task for task in tasks if not verdict_file(folder, task).exists()]
-    if missing and ((folder / HASHES).exists() or (folder / TRUTH).exists()):
-        raise InputError(f"{folder}: the truth is open, but {verdict_file(folder, missing[0]).name} is missing; start "
-                         "anew in another folder")  # fmt: skip
+    missing = [task for task in tasks if not answer_file(folder, task).exists()]
+    if missing and (folder / HASHES).exists():
+        raise InputError(f"{answer_file(folder, missing[0])}: is missing, but all answers were fixed in {HASHES}; "
+                         "start again in another folder")  # fmt: skip
     return missing
 
 
-def verdict_file(folder: Path, task: Task) -> Path:
-    """Where the verdict of a task is kept."""
-    return folder / VERDICTS / f"{task.name}.json"
+def answer_file(folder: Path, task: Task) -> Path:
+    """File of the answer to a task."""
+    return folder / ANSWERS / f"{task.name}.json"
 
 
-def write_whole(path: Path, text: str) -> None:
-    """Let a file appear whole or not at all.
-
-    Raises
-    ------
-    InputError
-        If it cannot be written.
-    """
-    with atomic_file(path) as partial:
-        partial.write_text(text, encoding="utf-8", newline="\n")
-
-
-# ---------------------------------------------------------------------- after
-
-
-def seal_verdicts(folder: Path, tasks: Sequence[Task], code: str) -> None:
-    """Write the hash of every verdict; where that has been done, compare.
+def fix_answers(folder: Path, tasks: Sequence[Task]) -> None:
+    """Write the SHA-256 of every answer; compare them if that has been done.
 
     Raises
     ------
     InputError
-        If a verdict was changed since, or the code while the verdicts were made.
+        If an answer was changed since, or the code was changed while the answers were made.
     """
-    if code_hash() != code:
-        raise InputError("the code of the diagnosis was changed while the proof ran, and it is not known which verdict "
-                         "is of which; start anew in another folder")  # fmt: skip
-    files = sorted(verdict_file(folder, task) for task in tasks)
-    lines = "".join(f"{hashlib.sha256(file.read_bytes()).hexdigest()}  {VERDICTS}/{file.name}\n" for file in files)
-    hashes = folder / HASHES
-    if not hashes.exists():
-        write_whole(hashes, lines)
-    elif hashes.read_text(encoding="utf-8") != lines:
-        raise InputError(f"{folder}: the verdicts are not those that {HASHES} tells of; start anew in another folder")
-
-
-def hash_of_hashes(folder: Path) -> str:
-    """SHA-256 of the list of verdict hashes: one number that stands for all verdicts."""
-    return hashlib.sha256((folder / HASHES).read_bytes()).hexdigest()
+    if code_hash() != json.loads((folder / SETTINGS).read_text(encoding="utf-8"))["code"]:
+        raise InputError("the code was changed while the proof ran; start again in another folder")
+    files = sorted(answer_file(folder, task) for task in tasks)
+    lines = "".join(f"{hashlib.sha256(file.read_bytes()).hexdigest()}  {ANSWERS}/{file.name}\n" for file in files)
+    if not (folder / HASHES).exists():
+        write_text(folder / HASHES, lines)
+    elif (folder / HASHES).read_text(encoding="utf-8") != lines:
+        raise InputError(f"{folder}: the answers are not those of {HASHES}; start again in another folder")
 
 
 def open_truth(
     settings: Settings, gearbox: Gearbox, folder: Path, progress: Callable[[int, int], None] | None = None
 ) -> dict[str, dict[str, Any]]:
-    """The truth of every case, made again from the seed and held against the seals.
-
-    Raises
-    ------
-    InputError
-        If verdicts are not hashed yet, other recordings come out, or a seal does not hold.
-    """
-    if not (folder / HASHES).exists():
-        raise InputError(f"{folder}: the verdicts must be hashed before the truth is opened")
+    """Truth of every case, made from the seed after the answers were fixed."""
     plans = plans_of(settings)
     if not (folder / TRUTH).exists():
-        again = Path(tempfile.mkdtemp(prefix=".unfinished-", dir=folder))
-        try:
-            conceal_set(gearbox, list(plans.values()), seed=settings.seed, recordings=again / RECORDINGS,
-                        truth=again / TRUTH, progress=progress)  # fmt: skip
-            for file in sorted((again / RECORDINGS).rglob("*")):
-                kept = folder / RECORDINGS / file.relative_to(again / RECORDINGS)
-                if file.is_file() and file.name != SEAL and file.read_bytes() != kept.read_bytes():
-                    raise InputError(f"{kept}: the seed does not make these recordings again; they were changed, or "
-                                     "the plant was")  # fmt: skip
-            _check_seals(folder / RECORDINGS, again / TRUTH, plans)
-            (again / TRUTH).replace(folder / TRUTH)
-        finally:
-            shutil.rmtree(again, ignore_errors=True)
-    _check_seals(folder / RECORDINGS, folder / TRUTH, plans)
+        with tempfile.TemporaryDirectory(prefix=".unfinished-", dir=folder) as unfinished:
+            room = Path(unfinished)
+            conceal_set(gearbox, list(plans.values()), seed=settings.seed, recordings=room / RECORDINGS,
+                        truth=room / TRUTH, progress=progress)  # fmt: skip
+            (room / TRUTH).replace(folder / TRUTH)
     return {case: json.loads((folder / TRUTH / f"{case}.json").read_text(encoding="utf-8")) for case in plans}
 
 
-def _check_seals(recordings: Path, truth: Path, cases: Mapping[str, Plan]) -> None:
-    for case in cases:
-        if not seal_holds(recordings / case, truth / f"{case}.json"):
-            raise InputError(f"{truth / case}.json: is not the truth that was sealed in {recordings / case / SEAL}")
+def write_text(path: Path, text: str) -> None:
+    """Write a file that appears whole or not at all."""
+    with atomic_file(path) as partial:
+        partial.write_text(text, encoding="utf-8", newline="\n")

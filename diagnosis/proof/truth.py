@@ -1,21 +1,20 @@
-"""What is true of a case: what was concealed, how much heat it made, how many kelvin it caused."""
+"""The truth of a case: concealed effects, their heat, and the kelvin that they cause."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from diagnosis.proof.concealed_case import ConcealedCase
 from diagnosis.proof.cycles import ROW_S
+from diagnosis.proof.effect import Concealed
 from diagnosis.proof.instruments import record
+from diagnosis.proof.plant import Plant
+from diagnosis.proof.plant_run import Outcome
 from models.types import Array
-
-if TYPE_CHECKING:
-    from diagnosis.proof.conceal import Case
-    from diagnosis.proof.effect import Concealed
-    from diagnosis.proof.plant import Outcome, Plant
 
 SCHEMA = 1
 PRACTICAL_K = 0.3
@@ -24,13 +23,13 @@ COLUMN_SIZE = {"T_ambient_degC": PRACTICAL_K, "torque_Nm": 1.0, "speed_rpm": 20.
 ACTIVE_SHARE = 0.1  # an effect acts where its heat is above this share of its highest
 
 
-def truth_of(plant: Plant, case: Case, by_twin: Sequence[Sequence[Outcome]]) -> dict[str, Any]:
+def truth_of(plant: Plant, case: ConcealedCase, by_twin: Sequence[Sequence[Outcome]]) -> dict[str, Any]:
     """The truth of a case, ready for JSON.
 
     Parameters
     ----------
     plant : Plant
-    case : Case
+    case : ConcealedCase
     by_twin : sequence of sequences of Outcome
         Per twin (see :func:`diagnosis.proof.conceal.twins`) the outcome of every recording
 
@@ -57,7 +56,6 @@ def truth_of(plant: Plant, case: Case, by_twin: Sequence[Sequence[Outcome]]) -> 
         "schema": SCHEMA,
         "case": case.name,
         "seed": list(case.seed),
-        "salt": np.random.default_rng([*case.seed, 11]).bytes(16).hex(),
         "gearbox": plant.gearbox.hash,
         "group": case.plan.group,
         "control": case.plan.kind if case.plan.group == "control" else None,
@@ -90,7 +88,7 @@ def truth_of(plant: Plant, case: Case, by_twin: Sequence[Sequence[Outcome]]) -> 
 
 
 def _practical(facts: Sequence[Mapping[str, Any]]) -> list[bool | None]:
-    """Per effect, whether it moves some measured temperature by more than is of practical interest; None: not known."""
+    """True per effect if it moves a measured temperature by more than is of practical interest; None: not known."""
     largest = [None if f["K"] is None else max(size["rms"] for size in f["K"]["train"].values()) for f in facts]
     inputs = [any(c in COLUMN_SIZE and s["rms"] > COLUMN_SIZE[c] for c, s in _columns(f).items()) for f in facts]
     return [None if K is None else K > PRACTICAL_K or moved for K, moved in zip(largest, inputs, strict=True)]
@@ -100,7 +98,7 @@ def _columns(fact: Mapping[str, Any]) -> Mapping[str, Mapping[str, float]]:
     return dict(fact.get("column_shift", {}).get("train", {}))
 
 
-def _effect(effect: Concealed, case: Case) -> dict[str, Any]:
+def _effect(effect: Concealed, case: ConcealedCase) -> dict[str, Any]:
     kind = effect.effect
     return {
         "name": kind.name,
@@ -119,7 +117,7 @@ def _at(plant: Plant, outcome: Outcome, place: str) -> Array:
     return outcome.T[:, plant.anatomy.coarse.index(place)]
 
 
-def _sets(case: Case) -> dict[str, list[int]]:
+def _sets(case: ConcealedCase) -> dict[str, list[int]]:
     names = [run.programme.name for run in case.runs]
     return {kind: [i for i, name in enumerate(names) if name.startswith(kind)] for kind in ("train", "hold")}
 
@@ -131,7 +129,9 @@ def _size(values: Array) -> dict[str, float]:
     }
 
 
-def _kelvin(plant: Plant, case: Case, with_it: Sequence[Outcome], without: Sequence[Outcome]) -> dict[str, Any]:
+def _kelvin(
+    plant: Plant, case: ConcealedCase, with_it: Sequence[Outcome], without: Sequence[Outcome]
+) -> dict[str, Any]:
     return {
         kind: {
             place: _size(
@@ -150,7 +150,7 @@ def _heat_of(effect: Concealed, k: int, with_it: Outcome, without: Outcome) -> M
     return {place: with_it.losses[place] - without.losses[place] for place in with_it.losses}
 
 
-def _heat(case: Case, heat: Sequence[Mapping[str, Array]]) -> dict[str, Any]:
+def _heat(case: ConcealedCase, heat: Sequence[Mapping[str, Array]]) -> dict[str, Any]:
     """Mean and greatest heat by place, its mean magnitude over all places, and when it acted."""
     places = list(heat[0])
     found: dict[str, Any] = {}
@@ -184,7 +184,7 @@ def _spans(active: NDArray[np.bool_]) -> list[list[float]]:
 
 
 def _felt(with_it: Sequence[Outcome], without: Sequence[Outcome], effect: Concealed) -> dict[str, Any]:
-    """How far an effect on an input shifted what the gearbox felt."""
+    """Shift of the inputs at the gearbox by an effect on an input."""
     if effect.effect.kind != "signal":
         return {}
     shift = {
@@ -194,8 +194,8 @@ def _felt(with_it: Sequence[Outcome], without: Sequence[Outcome], effect: Concea
     return {"input_shift": {name: _size(values) for name, values in shift.items() if np.any(values != 0.0)}}
 
 
-def _measured(plant: Plant, case: Case, outcomes: Sequence[Outcome], effect: Concealed) -> dict[str, Any]:
-    """What a fault of measurement does to the columns, without noise."""
+def _measured(plant: Plant, case: ConcealedCase, outcomes: Sequence[Outcome], effect: Concealed) -> dict[str, Any]:
+    """Changes of the columns by a fault of measurement, without noise."""
     shifts: dict[str, dict[str, Any]] = {"train": {}, "hold": {}}
     for kind, members in _sets(case).items():
         faulty = [record(plant, case.runs[i], outcomes[i], case.instruments, (effect,), None) for i in members]

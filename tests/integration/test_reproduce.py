@@ -86,7 +86,7 @@ def test_verdicts_that_do_not_depend_on_how_much_is_computed(report: Report) -> 
 
 
 def test_the_readme_tells_every_item_and_these_verdicts(report: Report) -> None:
-    readme = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
+    readme = (Path(__file__).parents[2] / "docs" / "paper.md").read_text(encoding="utf-8")
     verdict = "(reproduced|differs|scheme|cannot be compared|not in the paper)"
     told = dict(re.findall(rf"^\| ([^|]+) \| [^|]+ \| {verdict} \|$", readme, flags=re.MULTILINE))
     assert list(told) == ITEMS

@@ -1,8 +1,9 @@
-"""What the README says of the FMU's variables, commands and files is what the code says."""
+"""README and docs agree with the code: variables, commands, options, links."""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from pathlib import Path
 
 from builder.cli import commands
@@ -10,26 +11,53 @@ from builder.signals import signal_table
 from models.gearbox import Gearbox
 
 ROOT = Path(__file__).parents[2]
-README = (ROOT / "README.md").read_text(encoding="utf-8")
+PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
+TEXT = "\n".join(page.read_text(encoding="utf-8") for page in PAGES)
 
 
 def test_the_nomenclature_is_the_signal_table(fzg: Gearbox) -> None:
-    assert signal_table(fzg).markdown().strip() in README
+    assert signal_table(fzg).markdown().strip() in (ROOT / "docs" / "fmu.md").read_text(encoding="utf-8")
 
 
-def test_every_verb_that_is_named_exists() -> None:
-    verbs = set(re.findall(r"python -m builder ([a-z-]+)", README))
+def test_every_verb_exists() -> None:
+    verbs = set(re.findall(r"python -m builder ([a-z-]+)", TEXT))
     assert {"build-fmu", "simulate", "reproduce"} <= verbs <= set(commands.commands)
 
 
-def test_every_option_that_is_named_exists() -> None:
+def test_every_option_exists() -> None:
     known = {name for command in commands.commands.values() for p in command.params
              for name in (*p.opts, *p.secondary_opts)}  # fmt: skip
-    named = {o for line in README.splitlines() if "-m builder" in line for o in re.findall(r" (--[a-z-]+)", line)}
+    named = {o for line in TEXT.splitlines() if "-m builder" in line for o in re.findall(r" (--[a-z-]+)", line)}
     assert named - {"--quiet"} <= known
 
 
-def test_every_file_that_is_linked_exists() -> None:
-    paths = re.findall(r"(?:examples|models|docs|benchmarks)/[\w./-]+\.(?:py|toml|csv|png)", README)
+def test_every_file_exists() -> None:
+    paths = re.findall(r"(?:examples|models|docs|benchmarks)/[\w./-]+\.(?:py|toml|csv|png)", TEXT)
     assert paths
     assert [path for path in paths if not (ROOT / path).is_file()] == []
+
+
+def anchors(page: Path) -> set[str]:
+    """Anchors of the headings of a page, as GitHub makes them."""
+    headings = re.findall(r"^#+ (.+)$", page.read_text(encoding="utf-8"), flags=re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+def broken_links(page: Path) -> Iterator[str]:
+    for link in re.findall(r"\]\(([^)\s]+)\)", page.read_text(encoding="utf-8")):
+        if "://" in link:
+            continue
+        file, _, anchor = link.partition("#")
+        target = page.parent / file if file else page
+        if not target.is_file() or (anchor and anchor not in anchors(target)):
+            yield f"{page.name}: {link}"
+
+
+def test_every_link_resolves() -> None:
+    assert [link for page in PAGES for link in broken_links(page)] == []
+
+
+def test_a_broken_link_is_found(tmp_path: Path) -> None:
+    page = tmp_path / "page.md"
+    page.write_text("# A title, here\n[a](#a-title-here) [b](#other) [c](none.md) [d](https://example.org/x)\n")
+    assert list(broken_links(page)) == ["page.md: #other", "page.md: none.md"]

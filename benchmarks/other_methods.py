@@ -1,7 +1,9 @@
-"""What others do, on the same recordings: the naive regression, sparse regression, and a black box.
+"""Other methods on concealed cases: calibration only, naive regression, sparse regression, a black-box network.
 
-All start from the same calibrated model as the diagnosis. They see recordings and the nominal definition, never the
-truth. As a program: ``python -m diagnosis.proof.baselines RECORDING... --holdout RECORDING... --output FILE``.
+All start from the same calibrated model as the diagnosis. They read recordings and the nominal definition; the truth
+only scores them, by the rules of a proof. pysindy is in the extra ``dev``. Cases of ``conceal --cases`` or ``prove``:
+
+    python -m benchmarks.other_methods out/proof/recordings out/proof/truth [--gearbox NAME] [--jobs N] [--output FILE]
 """
 
 from __future__ import annotations
@@ -15,6 +17,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pysindy import STLSQ
+from rich.console import Console
+from rich.table import Table
 from scipy.signal import lfilter
 from sklearn.exceptions import ConvergenceWarning
 from sklearn.neural_network import MLPRegressor
@@ -30,20 +35,21 @@ from diagnosis.latent import knots_of, latent_heat
 from diagnosis.mapping import LOSS
 from diagnosis.posterior import Fit, Problem
 from diagnosis.predict import Prediction, predict
+from diagnosis.proof.answers import Answer
+from diagnosis.proof.counts import Count, Median
+from diagnosis.proof.rules import RULES, ScoredCase
+from diagnosis.proof.score import far_of, near_nodes
 from diagnosis.recording import read_recordings
 from diagnosis.search import threshold_at
 from diagnosis.term_on_grid import TermOnGrid
 from models.gearbox import load_gearbox
 from models.mechanisms import CATALOGUE
+from models.parallel import run_parallel
 from models.types import Array
 
-METHODS: Mapping[str, str] = {
-    "calibration": "calibration only",
-    "naive": "naive residual regression",
-    "sparse": "sparse regression (pysindy)",
-    "black_box": "black-box residual network",
-}
-NAMING = ("naive", "sparse")  # methods that name something
+METHODS: Mapping[str, str] = {"naive": "naive residual regression", "sparse": "sparse regression (pysindy)"}
+ERRORS: Mapping[str, str] = {"calibrated_K": "calibration only", "black_box_K": "black-box residual network"}
+NOT_THEIRS = ("far", "strength", "strength_as_stated", "single_evident", "sensor_evident", "heldout")  # rules
 SPARSE_THRESHOLD, SPARSE_RIDGE = 0.1, 0.05  # of pysindy's STLSQ on columns of unit norm: its defaults
 HIDDEN, SEED = (32, 32), 0
 MEMORIES_S = (600.0, 3600.0)  # over which the black box remembers its inputs
@@ -51,7 +57,7 @@ MOST_ROWS = 20_000
 
 
 class _ParametersHeld:
-    """Stands in for :class:`diagnosis.evidence.Marginal`: the residual after calibration, no parameter may move."""
+    """In place of :class:`diagnosis.evidence.Marginal`: the residual after calibration, all parameters held."""
 
     def __init__(self, fit: Fit) -> None:
         self.columns, self.rest = fit.white_columns, fit.white_residual
@@ -60,20 +66,19 @@ class _ParametersHeld:
         return np.asarray(columns.T @ self.rest), np.einsum("mn,mn->n", columns, columns)
 
 
-def baselines(case: Case, even: Case) -> dict[str, Any]:
-    """What the methods say of one case.
+def answers_to(case: Case, even: Case) -> dict[str, Any]:
+    """Answers of the methods to one case.
 
     Parameters
     ----------
     case : Case
     even : Case
-        The same on intervals of one length, on which the network remembers its inputs
+        The case on intervals of one length, on which the network remembers its inputs
 
     Returns
     -------
     dict
-        Of every method of :data:`METHODS` but the calibration something like ``diagnosis.json``; None of ``sparse``
-        where pysindy is not installed
+        For every method of :data:`METHODS` the part of ``diagnosis.json`` that the rules read, and :data:`ERRORS`
     """
     base = first(case)
     candidates = [
@@ -84,7 +89,7 @@ def baselines(case: Case, even: Case) -> dict[str, Any]:
     return {
         "naive": _naive(case, base, candidates),
         "sparse": _sparse(case, base, candidates),
-        "black_box": _black_box(even, base),
+        **_errors(even, base),
     }
 
 
@@ -93,16 +98,12 @@ def _naive(case: Case, base: Explanation, candidates: Sequence[Hypothesis]) -> d
     scored = scan(base.problem, base.fit, _ParametersHeld(base.fit), candidates)  # type: ignore[arg-type]
     logs = np.array([s.log_bayes for s in scored])
     if float(np.logaddexp.reduce(logs) - np.log(len(logs))) < threshold_at(0.05):
-        return _said(case, None)
-    return _said(case, scored[0].hypothesis)
+        return _answer(case, None)
+    return _answer(case, scored[0].hypothesis)
 
 
-def _sparse(case: Case, base: Explanation, candidates: Sequence[Hypothesis]) -> dict[str, Any] | None:
+def _sparse(case: Case, base: Explanation, candidates: Sequence[Hypothesis]) -> dict[str, Any]:
     """Heat that is missing at the likeliest node, regressed sparsely on the catalogue's heats there."""
-    try:
-        from pysindy import STLSQ
-    except ImportError:
-        return None
     marginal, pieces = Marginal.of(base.fit), base.problem.pieces
     knots = knots_of(pieces)
     kinds = (True, False) if LOSS in case.channels else (False,)
@@ -113,7 +114,7 @@ def _sparse(case: Case, base: Explanation, candidates: Sequence[Hypothesis]) -> 
     )  # fmt: skip
     here = [h for h in candidates if h.in_network and node_of(case, h) == missing.node]
     if missing.log_bayes < threshold_at(0.05) or not here:
-        return _said(case, None)
+        return _answer(case, None)
     weights = np.sqrt(np.concatenate([piece.steps for piece in pieces]))  # intervals are of different lengths
     columns = weights[:, None] * np.column_stack([_heat(base, h) for h in here])
     target = weights * np.concatenate(missing.mean)
@@ -121,12 +122,12 @@ def _sparse(case: Case, base: Explanation, candidates: Sequence[Hypothesis]) -> 
     here = [h for h, norm in zip(here, norms, strict=True) if norm > 0.0]
     columns = columns[:, norms > 0.0] / norms[norms > 0.0]
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # it warns where its threshold leaves nothing: then nothing is named
+        warnings.simplefilter("ignore")  # it warns if its threshold leaves no term: then nothing is named
         found = STLSQ(threshold=SPARSE_THRESHOLD * float(np.linalg.norm(target)), alpha=SPARSE_RIDGE).fit(
             columns, target[:, None]
         )
     sizes = np.abs(np.ravel(found.coef_))
-    return _said(case, here[int(sizes.argmax())] if sizes.any() else None)
+    return _answer(case, here[int(sizes.argmax())] if sizes.any() else None)
 
 
 def _heat(base: Explanation, h: Hypothesis) -> Array:
@@ -137,7 +138,7 @@ def _heat(base: Explanation, h: Hypothesis) -> Array:
     return np.asarray(np.nan_to_num(np.concatenate(heats)))
 
 
-def _said(case: Case, h: Hypothesis | None) -> dict[str, Any]:
+def _answer(case: Case, h: Hypothesis | None) -> dict[str, Any]:
     if h is None:
         return {"verdict": "consistent", "findings": [], "location": []}
     of_measurement = h.term is not None and h.term.of_measurement
@@ -155,8 +156,11 @@ def _said(case: Case, h: Hypothesis | None) -> dict[str, Any]:
 # ---------------------------------------------------------------------- black box
 
 
-def _black_box(even: Case, base: Explanation) -> dict[str, Any]:
-    """A network from inputs, their fading memories and the calibrated prediction to what that prediction lacks."""
+def _errors(even: Case, base: Explanation) -> dict[str, float | None]:
+    """Held-out error of the calibrated model, alone and with a network on its residual.
+
+    The network goes from inputs, their fading memories and the calibrated prediction to the residual.
+    """
     temperatures = [i for i, name in enumerate(even.channels) if name != LOSS]
 
     def table(problem: Problem) -> tuple[Array, Array]:
@@ -165,7 +169,7 @@ def _black_box(even: Case, base: Explanation) -> dict[str, Any]:
     x, y = table(even.train)
     x_held, y_held = table(even.holdout)
     if not len(x) or not len(x_held):
-        return {"rmse_K": None}
+        return dict.fromkeys(ERRORS)
     step = max(1, len(x) // MOST_ROWS)
     scale = StandardScaler().fit(y)
     network = make_pipeline(
@@ -175,12 +179,16 @@ def _black_box(even: Case, base: Explanation) -> dict[str, Any]:
         warnings.simplefilter("ignore", ConvergenceWarning)
         network.fit(x[::step], np.squeeze(scale.transform(y[::step])))
     rest = y_held - scale.inverse_transform(np.reshape(network.predict(x_held), y_held.shape))
-    rmse = float(np.sqrt(np.mean(rest**2)))
-    return {"rmse_K": rmse if math.isfinite(rmse) else None}
+    return {"calibrated_K": _rms(y_held), "black_box_K": _rms(rest)}
+
+
+def _rms(values: Array) -> float | None:
+    rms = float(np.sqrt(np.mean(values**2)))
+    return rms if math.isfinite(rms) else None
 
 
 def _table(predictions: Sequence[Prediction], temperatures: Sequence[int]) -> tuple[Array, Array]:
-    """Features and residuals of the rows that count and are measured everywhere."""
+    """Features and residuals of the rows that are measured in every channel."""
     features, residuals = [], []
     for one in predictions:
         inputs = one.piece.inputs[np.clip(np.arange(len(one.piece.time)), 0, len(one.piece.inputs) - 1)]
@@ -195,20 +203,59 @@ def _table(predictions: Sequence[Prediction], temperatures: Sequence[int]) -> tu
     return (np.concatenate(features), np.concatenate(residuals)) if features else (np.empty((0, 1)), np.empty((0, 1)))
 
 
+# ---------------------------------------------------------------------- a folder of cases
+
+
+def answers_to_files(folder: Path, gearbox: str) -> dict[str, Any]:
+    """Answers of the methods to the recordings ``train*`` and ``hold*`` of a folder."""
+    definition = load_gearbox(gearbox)
+    train, held = (
+        read_recordings(sorted(folder.glob(f"{kind}*.csv*")), definition.network()) for kind in ("train", "hold")
+    )
+    return answers_to(prepare(definition, train, held), prepare(definition, train, held, even=True))
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Write what the baselines say of recordings."""
-    parser = argparse.ArgumentParser(prog="baselines")
-    parser.add_argument("recordings", nargs="+")
-    parser.add_argument("--holdout", action="append", default=[])
+    """Print the rules with the counts of every method, and the median held-out errors."""
+    parser = argparse.ArgumentParser(prog="benchmarks.other_methods")
+    parser.add_argument("recordings", type=Path, help="folder with one folder of recordings per case")
+    parser.add_argument("truth", type=Path, help="folder with one JSON file per case")
     parser.add_argument("--gearbox", default="fzg")
-    parser.add_argument("--output", type=Path, required=True)
+    parser.add_argument("--jobs", type=int, default=1)
+    parser.add_argument("--output", type=Path, help="JSON file for the answers")
     given = parser.parse_args(arguments)
+    folders = sorted(path for path in given.recordings.iterdir() if path.is_dir())
+    found = run_parallel(answers_to_files, [(folder, given.gearbox) for folder in folders], jobs=given.jobs)
+    answers = {folder.name: answer for folder, answer in zip(folders, found, strict=True)}
+    if given.output:
+        given.output.write_text(json.dumps(answers, indent=1, allow_nan=False) + "\n", encoding="utf-8")
     gearbox = load_gearbox(given.gearbox)
-    network = gearbox.network()
-    train = read_recordings(given.recordings, network)
-    held = read_recordings(given.holdout, network) if given.holdout else ()
-    said = baselines(prepare(gearbox, train, held), prepare(gearbox, train, held, even=True))
-    given.output.write_text(json.dumps(said, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    near = near_nodes(gearbox)
+    scored: dict[str, list[ScoredCase]] = {method: [] for method in METHODS}
+    for case, answer in answers.items():
+        truth = json.loads((given.truth / f"{case}.json").read_text(encoding="utf-8"))
+        for method, cases in scored.items():
+            cases.append(ScoredCase(case=case, truth=truth, answer=Answer.of(answer[method]), near=near,
+                                    far=far_of(truth, gearbox)))  # fmt: skip
+    show(scored, answers)
+
+
+def show(scored: Mapping[str, Sequence[ScoredCase]], answers: Mapping[str, Mapping[str, Any]]) -> None:
+    """Print the two tables."""
+    rules = Table("rule", *METHODS.values(), title="Other methods, by the rules of a proof")
+    for rule in RULES:
+        if rule.key not in NOT_THEIRS:
+            counts = [Count.over([rule.apply(case) for case in scored[method]]) for method in METHODS]
+            rules.add_row(rule.text, *(f"{count.hits}/{count.of}" for count in counts))
+    errors = Table(
+        "held-out error, median", "K", "95 % limits", "cases", title="Cases with an effect of practical size"
+    )
+    to_find = [c.case for c in next(iter(scored.values())) if c.group != "control" and c.practical()]
+    for key, text in ERRORS.items():
+        median = Median.over([math.nan if answers[case][key] is None else answers[case][key] for case in to_find])
+        errors.add_row(text, f"{median.value:.2f}", f"{median.low:.2f} to {median.high:.2f}", str(median.of))
+    for table in (rules, errors):
+        Console().print(table)
 
 
 if __name__ == "__main__":
