@@ -27,9 +27,7 @@ def correction(fzg: Gearbox) -> str:
     finding = Finding.of(placed, {p.name: (p.start + 0.5, 0.1) for p in placed.parameters}, mechanism="windage")
     known = fzg.network().parameters[0]
     estimate = Estimate(name=known.name, value=known.start, stderr=0.1, unit=known.unit)
-    return correction_text(
-        Correction(gearbox=fzg.name, gearbox_sha256=fzg.hash, findings=(finding,), calibration=(estimate,))
-    )
+    return correction_text(Correction.of(fzg, findings=(finding,), calibration=(estimate,)))
 
 
 @pytest.fixture
