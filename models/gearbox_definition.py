@@ -96,9 +96,18 @@ def _unsupported(definition: Definition) -> Iterator[str]:
             yield f"{key}: has {len(entries)} entries; more than {most} is not supported yet"
 
 
+def _part_names(definition: Definition) -> list[str]:
+    """Return the names of all parts that have a temperature, but oil and mesh."""
+    return [
+        *(part.name for part in definition.housing.part),
+        *(bearing.name for bearing in definition.bearing),
+        *(shaft.name for shaft in definition.shaft),
+        *(name for stage in definition.stage for name in stage.names),
+    ]
+
+
 def _duplicate_names(definition: Definition) -> Iterator[str]:
-    parts = (*definition.housing.part, *definition.bearing, *definition.shaft, *definition.seal)
-    names = [*(part.name for part in parts), *(name for stage in definition.stage for name in stage.names)]
+    names = [*_part_names(definition), *(seal.name for seal in definition.seal)]
     for name, count in Counter(names).items():
         if count > 1:
             yield f"name '{name}' is given {count} times; every part and component needs its own"
@@ -118,8 +127,7 @@ def _unknown_names(definition: Definition) -> Iterator[str]:
     for place, name in references:
         if name not in shafts:
             yield f"{place}: there is no shaft '{name}'{did_you_mean(name, shafts)}"
-    parts = [part.name for part in (*definition.housing.part, *definition.bearing, *definition.shaft)]
-    nodes = [*parts, "oil", "mesh", *(name for stage in definition.stage for name in stage.names)]
+    nodes = [*_part_names(definition), "oil", "mesh"]
     for node in definition.node:
         if node.name in BOUNDARY_NODES:
             yield f"node '{node.name}': is a boundary, and has no heat capacity"
