@@ -227,7 +227,10 @@ class Correction(Section):
         calibrated = (replace(p, start=values.get(p.name, p.start)) for p in network.parameters)
         network = replace(network, parameters=tuple(calibrated))
         for finding in self.findings:
-            network = finding.term.apply(network, as_recorded=as_recorded)
+            try:
+                network = finding.term.apply(network, as_recorded=as_recorded)
+            except InputError as error:
+                raise InputError(f"finding '{finding.label}': {error}") from error
         return network
 
     def network(self, gearbox: Gearbox, *, as_recorded: bool = False) -> ThermalNetwork:

@@ -58,7 +58,7 @@ class Section(BaseModel):
         known = [field.alias or key for key, field in cls.model_fields.items()]
         unknown = [key for key in values if key not in known] if isinstance(values, Mapping) else []
         if unknown:
-            raise ValueError("; ".join(f"'{key}' is not a known key{did_you_mean(key, known)}" for key in unknown))
+            raise ValueError("\n".join(f"'{key}' is not a known key{did_you_mean(key, known)}" for key in unknown))
         return values
 
 

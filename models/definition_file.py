@@ -39,7 +39,7 @@ def read_values(text: str, *, file: str) -> tuple[dict[str, Any], Annotations]:
             document[key] = _filled_from_earlier(document[key], key, notes)
     values = strip(document, notes)
     if "source" not in document:
-        notes.faults.append(("source", "is missing; name where the values come from"))
+        notes.faults.append(("", "source is missing; name where the values come from"))
     if isinstance(values.get("oil"), dict) and "named" in values["oil"]:
         values["oil"] = _filled_from_named_oil(values["oil"], notes)
     refuse(notes.faults, values, file=file)
@@ -56,8 +56,8 @@ def refuse(faults: Iterable[tuple[str, str]], values: Any, *, file: str) -> None
     """
     lines = []
     for path, text in faults:
-        steps = [int(step) if step.isdecimal() else step for step in path.split(".")]
-        lines.append(f"{file}: {place_in(values, steps)}: {text}")
+        place = place_in(values, [int(step) if step.isdecimal() else step for step in path.split(".")])
+        lines.append(f"{file}: {place}: {text}" if place else f"{file}: {text}")
     if lines:
         raise InputError("\n".join(lines))
 

@@ -66,10 +66,9 @@ def explained(error: ValidationError, values: Any, *, file: str) -> InputError:
     """Return the message about a table that is not valid, for the person who wrote the file."""
     lines = []
     for detail in error.errors(include_url=False):
-        place, message = place_in(values, detail["loc"]), _message(detail)
-        if place:
-            message = f"{place} is missing" if detail["type"] == "missing" else f"{place}: {message}"
-        lines += message.splitlines()
+        place = place_in(values, detail["loc"])
+        prefix = f"{place} " if detail["type"] == "missing" else f"{place}: " if place else ""
+        lines += [f"{prefix}{line}" for line in _message(detail).splitlines()]
     return InputError("\n".join(f"{file}: {line}" for line in dict.fromkeys(lines)))
 
 

@@ -185,7 +185,7 @@ def test_estimates_must_be_complete() -> None:
         ("value = 9.5", "value = 1e9", "windage_oil_strength': value = 1e.* is outside the limits 0 to"),
         ("value = 9.5", "value = nan", "must be finite"),
         ("stderr = 0.5", "stderr = -0.5", "windage_oil_strength'.stderr"),
-        ("Abs(speed)", "Abs(sped)", "law of 'source_windage_oil' uses 'sped', .* did you mean 'speed'"),
+        ("Abs(speed)", "Abs(sped)", "finding 'windage_oil': the law .* uses 'sped', .* did you mean 'speed'"),
         ("Abs(speed)", "open('x')", "finding 'windage_oil'.law: not allowed here: .*open.*; functions are Abs"),
         ("Abs(speed)", "speed.real", "finding 'windage_oil'.law: not allowed here: 'speed.real'"),
         ("weights = [", "weights = [\n    1.0,", "'oil_ageing_losses': 9 weights for 8 targets of a loss_factor"),

@@ -43,7 +43,7 @@ FAULTS = [
     ("[housing]", "[housings]\n[housing]", "'housings' is not a known key; did you mean 'housing'?"),
     ("{ value = 0.45,", "{ value = 0.45, std = 1,", "housing.part 'housing_lower'.area_fraction: 'std' ; 'sd'?"),
     ("air_speed_m_s = { value = 2.0, sd = 0.3, source", "# source", "ambient.air_speed_m_s is missing"),
-    ('source = "the paper, Tables 1, 2, 4 and 5"\n', "", "source: is missing"),
+    ('source = "the paper, Tables 1, 2, 4 and 5"\n', "", "source is missing"),
     ('source = "the paper, Tables 1, 2, 4 and 5"\n', "source = 3\n", "source: must be a text"),
     ("schema = 1", "schema = 2", "schema is 2; gearbox definitions of schema 1"),
     ("schema = 1", "schema = true", "schema is True"),
