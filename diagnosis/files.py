@@ -47,11 +47,10 @@ def correction_of(diagnosis: Diagnosis, gearbox: Gearbox) -> Correction:
                 term, {name: (calibrated[name].value, calibrated[name].stderr)}, mechanism="shape",
                 family="calibration", place=name.removeprefix(SHAPE), says=term.strength.description,
             ))  # fmt: skip
-    return Correction(
-        gearbox=gearbox.name,
-        gearbox_sha256=gearbox.hash,
-        findings=tuple(findings),
-        calibration=tuple(
+    return Correction.of(
+        gearbox,
+        findings=findings,
+        calibration=(
             Estimate(name=c.parameter, value=c.value, stderr=c.stderr, unit=nominal[c.parameter].unit, prior=c.prior)
             for c in diagnosis.calibration
             if c.parameter in nominal

@@ -28,9 +28,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from math import pi
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, field_validator
+from pydantic import Field, field_validator, model_validator
 
 from models import toml_file
 from models.cycle import COLUMNS
@@ -112,17 +112,15 @@ class Column(Section):
             raise ValueError(f"the first number must be below the second, not {value[0]:g}, {value[1]:g}")
         return value
 
-    def relations(self) -> tuple[Iterator[str], ...]:
-        """See :meth:`models.definition.Section.relations`."""
-        return (self._unit_faults(),)
-
-    def _unit_faults(self) -> Iterator[str]:
+    @model_validator(mode="after")
+    def _unit_is_known(self) -> Self:
         dimension = dimension_of(self.quantity)
         if dimension is None or self.quantity in (AUXILIARY, IGNORE):
-            return
+            return self
         units = UNITS[dimension]
         if self.unit is not None and self.unit not in units:
-            yield f"unit {self.unit!r} is no unit of {dimension}{did_you_mean(self.unit, units)}"
+            raise ValueError(f"unit {self.unit!r} is no unit of {dimension}{did_you_mean(self.unit, units)}")
+        return self
 
     def conversion(self, unit_of_file: str | None) -> tuple[float, float]:
         """Factor and offset from the numbers of the file to the unit inside; `scale` comes first."""
@@ -152,13 +150,11 @@ class Csv(Section):
             raise ValueError(f"{value!r} cannot separate columns; use ',', ';', a tab or '|'")
         return value
 
-    def relations(self) -> tuple[Iterator[str], ...]:
-        """See :meth:`models.definition.Section.relations`."""
-        return (self._sign_faults(),)
-
-    def _sign_faults(self) -> Iterator[str]:
+    @model_validator(mode="after")
+    def _signs_differ(self) -> Self:
         if self.separator == self.decimal:
-            yield "separator and decimal are the same sign; with decimal ',' columns are separated by ';'"
+            raise ValueError("separator and decimal are the same sign; with decimal ',' columns are separated by ';'")
+        return self
 
 
 class RecordingMapping(Section):
@@ -181,20 +177,21 @@ class RecordingMapping(Section):
             raise ValueError("; ".join(faults))
         return values
 
-    def relations(self) -> tuple[Iterator[str], ...]:
-        """See :meth:`models.definition.Section.relations`."""
-        return (self._quantity_faults(),)
-
-    def _quantity_faults(self) -> Iterator[str]:
+    @model_validator(mode="after")
+    def _quantities_are_unique(self) -> Self:
         by_quantity: dict[str, str] = {}
+        faults = []
         for name, column in self.columns.items():
             quantity = column.quantity
             if quantity in self.constants:
-                yield f"{quantity} is a constant and the column {name!r}; keep one"
+                faults.append(f"{quantity} is a constant and the column {name!r}; keep one")
             if quantity in by_quantity:
-                yield f"columns {by_quantity[quantity]!r} and {name!r} are both {quantity}; keep one"
+                faults.append(f"columns {by_quantity[quantity]!r} and {name!r} are both {quantity}; keep one")
             elif quantity not in (AUXILIARY, IGNORE):
                 by_quantity[quantity] = name
+        if faults:
+            raise ValueError("; ".join(faults))
+        return self
 
     @property
     def text_form(self) -> TextForm:

@@ -19,15 +19,21 @@ LEAF_KEYS = ("value", "sd", "source")
 
 @dataclass(frozen=True)
 class Annotations:
-    """What stands beside the values of a file.
+    """Sources and standard deviations of the values of a file, by dotted path.
 
-    ``sources`` holds the path of every table or leaf that names one (``""`` is the file itself), ``priors`` the
-    standard deviation of every single number that has one, ``faults`` what cannot be understood.
+    Attributes
+    ----------
+    sources : dict
+        Source of every table or value that names one; ``""`` is the path of the file itself
+    priors : dict
+        Standard deviation of every single number that has one
+    faults : list of (path, message)
+        Annotations that cannot be used
     """
 
     sources: dict[str, str] = field(default_factory=dict)
     priors: dict[str, float] = field(default_factory=dict)
-    faults: list[str] = field(default_factory=list)
+    faults: list[tuple[str, str]] = field(default_factory=list)
 
     def source_of(self, path: str) -> str:
         """Return the source of a value: its own, else that of the nearest table around it that names one."""
@@ -48,17 +54,17 @@ def join(path: str, key: object) -> str:
 
 
 def strip(node: Any, notes: Annotations, path: str = "") -> Any:
-    """Return a parsed document as plain values (lists as tuples), and add what stands beside them to `notes`.
+    """Return a parsed document (lists as tuples) as plain values, and add their annotations to `notes`.
 
     Examples
     --------
     >>> notes = Annotations()
-    >>> strip({"source": "report 7", "seal": [{"diameter_mm": {"value": 24.0, "sd": "5 %"}}]}, notes)
+    >>> strip({"source": "report 7", "seal": ({"diameter_mm": {"value": 24.0, "sd": "5 %"}},)}, notes)
     {'seal': ({'diameter_mm': 24.0},)}
     >>> notes.priors, notes.source_of("seal.0.diameter_mm")
     ({'seal.0.diameter_mm': 1.2}, 'report 7')
     """
-    if isinstance(node, list):
+    if isinstance(node, tuple):
         return tuple(strip(item, notes, join(path, index)) for index, item in enumerate(node))
     if not isinstance(node, dict):
         return node
@@ -66,18 +72,18 @@ def strip(node: Any, notes: Annotations, path: str = "") -> Any:
         if isinstance(node["source"], str) and node["source"].strip():
             notes.sources[path] = node["source"]
         else:
-            notes.faults.append(f"{join(path, 'source')}: must be a text that says where the value comes from")
+            notes.faults.append((join(path, "source"), "must be a text that names where the value comes from"))
     if "value" in node and path:
         return _leaf(node, notes, path)
     if "sd" in node:
-        notes.faults.append(f"{join(path, 'sd')}: stands without a value beside it")
+        notes.faults.append((join(path, "sd"), "has no value next to it"))
     return {key: strip(item, notes, join(path, key)) for key, item in node.items() if key not in ("source", "sd")}
 
 
 def _leaf(node: Mapping[str, Any], notes: Annotations, path: str) -> Any:
     for key in node:
         if key not in LEAF_KEYS:
-            notes.faults.append(f"{join(path, key)} is not a known key{did_you_mean(key, LEAF_KEYS)}")
+            notes.faults.append((path, f"'{key}' is not a known key{did_you_mean(key, LEAF_KEYS)}"))
     value = strip(node["value"], notes, path)
     if "sd" in node:
         _read_sd(node["sd"], value, notes, path)
@@ -91,17 +97,17 @@ def _is_number(value: Any) -> bool:
 def _read_sd(sd: Any, value: Any, notes: Annotations, path: str) -> None:
     """Record the standard deviation(s) of a number or of every number in a list; 0 in a list means exactly known."""
     if isinstance(value, tuple):
-        each = sd if isinstance(sd, list) else [sd] * len(value)
+        each = sd if isinstance(sd, tuple) else [sd] * len(value)
         if len(each) != len(value):
-            notes.faults.append(f"{path}: has {len(value)} values but {len(each)} sd")
+            notes.faults.append((path, f"has {len(value)} values but {len(each)} sd"))
             return
         for index, (item_sd, item) in enumerate(zip(each, value, strict=True)):
-            if isinstance(sd, list) and item_sd == 0:
+            if isinstance(sd, tuple) and item_sd == 0:
                 continue
             _read_sd(item_sd, item, notes, join(path, index))
         return
     if not _is_number(value):
-        notes.faults.append(f"{path}: only a number can have an sd")
+        notes.faults.append((path, "only a number can have an sd"))
         return
     percent = PERCENT.fullmatch(sd) if isinstance(sd, str) else None
     try:
@@ -111,4 +117,4 @@ def _read_sd(sd: Any, value: Any, notes: Annotations, path: str) -> None:
     if 0.0 < size < float("inf"):
         notes.priors[path] = size
     else:
-        notes.faults.append(f"{path}: sd must be a number above 0 or a text such as '20 %' (of a value that is not 0)")
+        notes.faults.append((path, "sd must be a number above 0 or a text such as '20 %' (of a value that is not 0)"))

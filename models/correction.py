@@ -1,80 +1,96 @@
-"""A correction: what a diagnosis found, as a small file that people review and every verb takes.
+"""A correction: what a diagnosis found, as a small file that people review and every command takes.
 
-A corrected model is the same definition plus this file. Laws stand in it as full expressions, so that the file means
-the same whatever becomes of the catalogue.
+A corrected model is the same definition plus this file. Laws are in it as full expressions, so that the file means the
+same when the catalogue changes.
 """
 
 from __future__ import annotations
 
 import hashlib
-import math
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
-import sympy as sp
-from pydantic import Field, StringConstraints
+import tomli_w
+from pydantic import Field, StringConstraints, model_validator
 
 from models.atomic_write import atomic_file
-from models.definition import Name, Section, Text
+from models.definition import Name, OneOrMore, Section, Text
 from models.errors import InputError, did_you_mean
-from models.expressions import expression_text, parse_expression
-from models.faults import as_written, validated
+from models.expressions import Law
+from models.faults import validated
+from models.gearbox import Gearbox
+from models.law_file import LawParameter, LawState, LawTable
 from models.laws import Parameter
 from models.network import ExtraState, ThermalNetwork
-from models.terms import FACTORS, Form, Kind, Term
-from models.toml_file import parse, read_text
+from models.terms import FACTORS, Term
+from models.toml_file import parse_schema_1, read_text
 
-if TYPE_CHECKING:
-    from models.gearbox import Gearbox
-
-SCHEMA = 1
-BOUND_TOLERANCE = 1e-9  # a bound that a fit ends at is a rounding off
+HEADER = "# Found by a diagnosis: the same gearbox definition plus this file is the corrected model.\n"
+BOUND_TOLERANCE = 1e-9  # a fit that ends at a bound may exceed it by rounding
 Sha256 = Annotated[str, StringConstraints(pattern=r"^[0-9a-f]{64}$")]
 NotNegative = Annotated[float, Field(ge=0.0)]
 
 
-@dataclass(frozen=True, kw_only=True)
-class Estimate:
-    """A number that was found.
+class Identity(Section):
+    """``[gearbox]``, ``[[recording]]``: a name and the hash of the content."""
 
-    Attributes
-    ----------
-    name : str
-        A parameter of the network
-    value, stderr : float
-    unit : str
-    prior : float or None
-        The value as delivered
-    """
+    name: Text
+    sha256: Sha256
 
-    name: str
+
+class Estimate(Section):
+    """``[[calibrated]]``: a parameter of the network with its estimate; `prior` is the value as delivered."""
+
+    name: Name
     value: float
-    stderr: float
-    unit: str = "1"
+    stderr: NotNegative
+    unit: Text = "1"
     prior: float | None = None
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Finding:
-    """Physics that was left out, or a fault of an instrument.
+class FoundParameter(LawParameter):
+    """``[[finding.parameter]]``: an estimated number in a law."""
 
-    Attributes
-    ----------
-    mechanism, family, place, says : str
-        For people; see :class:`models.mechanisms.Mechanism`
-    term : Term
-        Its parameters start at the found values; their `sd` are the standard errors
-    probability : float or None
+    value: float
+    stderr: NotNegative
+    lower: float
+    upper: float
+
+    @model_validator(mode="after")
+    def _value_within_limits(self) -> Self:
+        if not self.lower <= self.value <= self.upper:
+            raise ValueError(f"value = {self.value:g} is outside the limits {self.lower:g} to {self.upper:g}")
+        return self
+
+
+class Finding(LawTable):
+    """``[[finding]]``: physics that was left out, or a fault of an instrument.
+
+    `mechanism`, `family`, `place` and `says` are for people, see :class:`models.mechanisms.Mechanism`; the other keys
+    are those of :class:`models.terms.Term`.
     """
 
-    mechanism: str
-    family: str
-    place: str
-    says: str
-    term: Term
-    probability: float | None = None
+    mechanism: Text
+    family: str = ""
+    place: str = ""
+    says: str = ""
+    probability: Annotated[float, Field(ge=0.0, le=1.0)] | None = None
+    label: Name
+    target: OneOrMore[Text]
+    weights: tuple[float, ...] = ()
+    boundary_temperature: Law | None = None
+    parameter: OneOrMore[FoundParameter]
+
+    @model_validator(mode="after")
+    def _one_weight_per_target(self) -> Self:
+        if self.weights and (self.kind not in FACTORS or len(self.weights) != len(self.target)):
+            raise ValueError(
+                f"{len(self.weights)} weights for {len(self.target)} targets of a {self.kind}; a loss_factor or "
+                "link_factor has one weight for each target, or none"
+            )
+        return self
 
     @classmethod
     def of(
@@ -88,7 +104,7 @@ class Finding:
         says: str = "",
         probability: float | None = None,
     ) -> Finding:
-        """A finding from a term and what was estimated.
+        """Return the finding of a term.
 
         Parameters
         ----------
@@ -96,6 +112,8 @@ class Finding:
             E.g. a mechanism at its place
         estimates : mapping of str to (float, float)
             Value and standard error of every parameter of the term
+        mechanism, family, place, says, probability
+            See the class
 
         Raises
         ------
@@ -106,48 +124,97 @@ class Finding:
         if missing:
             raise InputError(f"{term.label}: no value was given for {', '.join(missing)}")
         valued = term.with_values({name: value for name, (value, _) in estimates.items()})
-        # Standard errors are of the values themselves, whatever the prior was of.
-        found = tuple(replace(p, sd=estimates[p.name][1], log=False, grid=()) for p in valued.parameters)
-        plain = Term(**{name: getattr(valued, name) for name in Term.__dataclass_fields__} | {"parameters": found})
-        return cls(mechanism=mechanism, family=family, place=place, says=says, term=plain, probability=probability)
+        return cls(
+            mechanism=mechanism,
+            family=family,
+            place=place,
+            says=says,
+            probability=probability,
+            label=term.label,
+            kind=term.kind,
+            target=term.target,
+            weights=term.weights,
+            law=term.expression,
+            is_loss=term.is_loss,
+            boundary_temperature=term.boundary_temperature,
+            form=term.form,
+            of_measurement=term.of_measurement,
+            parameter=tuple(
+                FoundParameter(
+                    name=p.name, value=p.start, stderr=estimates[p.name][1], unit=p.unit, lower=p.lower, upper=p.upper,
+                    description=p.description,
+                )
+                for p in valued.parameters
+            ),
+            state=tuple(LawState(name=s.name, start=s.start, rate=s.rate, update=s.update) for s in term.states),
+        )  # fmt: skip
+
+    @property
+    def term(self) -> Term:
+        """The term with its parameters at the estimated values; their `sd` are the standard errors."""
+        return Term(
+            label=self.label,
+            kind=self.kind,
+            target=self.target,
+            weights=self.weights,
+            expression=self.law,
+            parameters=tuple(
+                Parameter(
+                    name=p.name, unit=p.unit, start=p.value, lower=p.lower, upper=p.upper, sd=p.stderr, log=False,
+                    description=p.description,
+                )
+                for p in self.parameter
+            ),
+            states=tuple(ExtraState(name=s.name, start=s.start, rate=s.rate, update=s.update) for s in self.state),
+            is_loss=self.is_loss,
+            boundary_temperature=self.boundary_temperature,
+            form=self.form,
+            of_measurement=self.of_measurement,
+        )  # fmt: skip
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Correction:
-    """Findings and calibrated parameters of one gearbox.
+class Correction(Section):
+    """The whole file: findings and calibrated parameters of one gearbox.
 
-    Attributes
-    ----------
-    gearbox : str
-        Name in the definition
-    gearbox_sha256 : str
-        Hash of the definition's values, :attr:`models.gearbox.Gearbox.hash`
-    findings : tuple of Finding
-    calibration : tuple of Estimate
-        Parameters of the nominal network
-    recordings : mapping of str to str
-        SHA-256 of every recording that was learnt from, by name
-    version : str
-        Of the program that wrote it
+    `gearbox` has the hash of the definition's values (:attr:`models.gearbox.Gearbox.hash`), `recordings` those of the
+    recordings that were used, `version` is that of the program that wrote it.
     """
 
-    gearbox: str
-    gearbox_sha256: str
-    findings: tuple[Finding, ...] = ()
-    calibration: tuple[Estimate, ...] = ()
-    recordings: Mapping[str, str] = field(default_factory=dict)
+    schema_number: Literal[1] = Field(default=1, alias="schema")
     version: str = ""
+    gearbox: Identity
+    recordings: tuple[Identity, ...] = Field(default=(), alias="recording")
+    calibration: tuple[Estimate, ...] = Field(default=(), alias="calibrated")
+    findings: tuple[Finding, ...] = Field(default=(), alias="finding")
+
+    @classmethod
+    def of(
+        cls,
+        gearbox: Gearbox,
+        *,
+        findings: Iterable[Finding] = (),
+        calibration: Iterable[Estimate] = (),
+        recordings: Mapping[str, str] | None = None,
+        version: str = "",
+    ) -> Correction:
+        """Return the correction of a gearbox; `recordings` are hashes by name."""
+        return cls(
+            gearbox=Identity(name=gearbox.name, sha256=gearbox.hash),
+            recording=tuple(Identity(name=name, sha256=sha256) for name, sha256 in (recordings or {}).items()),
+            calibrated=tuple(calibration),
+            finding=tuple(findings),
+            version=version,
+        )
 
     def apply(self, network: ThermalNetwork, *, as_recorded: bool = False) -> ThermalNetwork:
-        """The corrected network.
+        """Return the corrected network.
 
         Parameters
         ----------
         network : ThermalNetwork
             The nominal one
         as_recorded : bool
-            Whether it is driven by inputs as the faulty instruments recorded them; see
-            :meth:`models.terms.Term.apply`
+            True if its inputs are those that the faulty instruments recorded; see :meth:`models.terms.Term.apply`
 
         Raises
         ------
@@ -161,11 +228,39 @@ class Correction:
         calibrated = (replace(p, start=values.get(p.name, p.start)) for p in network.parameters)
         network = replace(network, parameters=tuple(calibrated))
         for finding in self.findings:
-            network = finding.term.apply(network, as_recorded=as_recorded)
+            try:
+                network = finding.term.apply(network, as_recorded=as_recorded)
+            except InputError as error:
+                raise InputError(f"finding '{finding.label}': {error}") from error
         return network
 
+    def network(self, gearbox: Gearbox, *, as_recorded: bool = False) -> ThermalNetwork:
+        """Return the corrected network of the gearbox that the correction was made for.
+
+        Raises
+        ------
+        InputError
+            If it was made for another definition, or :meth:`apply` refuses.
+        """
+        self.check_made_for(gearbox)
+        return self.apply(gearbox.network(), as_recorded=as_recorded)
+
+    def check_made_for(self, gearbox: Gearbox) -> None:
+        """Refuse another definition than the one that the correction was made for.
+
+        Raises
+        ------
+        InputError
+            If the values of the definitions differ.
+        """
+        if gearbox.hash != self.gearbox.sha256:
+            raise InputError(
+                f"the correction was made for {self.gearbox.name!r} with definition {self.gearbox.sha256[:12]}, but "
+                f"{gearbox.name!r} is {gearbox.hash[:12]}; use the definition it was made for, or diagnose again"
+            )
+
     def summary(self) -> dict[str, Any]:
-        """What it is, for a report: names of the findings, and a hash of the whole."""
+        """Return the names of the findings and a hash of the whole, for a report."""
         return {
             "sha256": hashlib.sha256(correction_text(self).encode()).hexdigest(),
             "findings": [f"{f.mechanism} at {f.place}" for f in self.findings if f.mechanism != "shape"],
@@ -173,24 +268,13 @@ class Correction:
 
     @property
     def words(self) -> str:
-        """What it is in half a sentence, for an FMU that carries it."""
+        """Half a sentence about it, for an FMU that contains it."""
         summary = self.summary()
         return f"corrected by {', '.join(summary['findings']) or 'calibration'} (correction {summary['sha256'][:12]})"
 
-    def network(self, gearbox: Gearbox, *, as_recorded: bool = False) -> ThermalNetwork:
-        """The corrected network of the gearbox that the correction was made for.
-
-        Raises
-        ------
-        InputError
-            If it was made for another definition, or :meth:`apply` refuses.
-        """
-        _check_made_for(gearbox, self.gearbox, self.gearbox_sha256)
-        return self.apply(gearbox.network(), as_recorded=as_recorded)
-
 
 def _calibration_faults(calibration: Iterable[Estimate], network: ThermalNetwork) -> Iterator[str]:
-    """What is wrong with calibrated values; the limits are those that the fit of a diagnosis has, and an FMU's."""
+    """Yield the faults of calibrated values; the limits are those of the fit of a diagnosis, and of an FMU."""
     known = {p.name: p for p in network.parameters}
     for estimate in calibration:
         p = known.get(estimate.name)
@@ -204,7 +288,7 @@ def _calibration_faults(calibration: Iterable[Estimate], network: ThermalNetwork
 
 
 def corrected_network(gearbox: Gearbox, correction: Correction | None) -> ThermalNetwork:
-    """The network of a gearbox, corrected where there is a correction.
+    """Return the network of a gearbox, corrected if there is a correction.
 
     Raises
     ------
@@ -214,180 +298,32 @@ def corrected_network(gearbox: Gearbox, correction: Correction | None) -> Therma
     return gearbox.network() if correction is None else correction.network(gearbox)
 
 
-def _check_made_for(gearbox: Gearbox, name: str, sha256: str, where: str = "") -> None:
-    if gearbox.hash != sha256:
-        raise InputError(
-            f"{where}the correction was made for {name!r} with definition {sha256[:12]}, but "
-            f"{gearbox.name!r} is {gearbox.hash[:12]}; use the definition it was made for, or diagnose again"
-        )
-
-
-# ---------------------------------------------------------------------- the file
-
-
-class _Parameter(Section):
-    name: Name
-    value: float
-    stderr: NotNegative
-    unit: Text
-    lower: float
-    upper: float
-    description: str = ""
-
-
-class _State(Section):
-    name: Name
-    start: float
-    rate: Text
-    update: Text | None = None
-
-
-class _Finding(Section):
-    mechanism: Text
-    family: str = ""
-    place: str = ""
-    says: str = ""
-    probability: Annotated[float, Field(ge=0.0, le=1.0)] | None = None
-    label: Name
-    kind: Kind
-    target: tuple[Text, ...] = Field(min_length=1, strict=False)
-    weights: tuple[float, ...] = Field(default=(), strict=False)
-    law: Text
-    is_loss: bool = False
-    boundary_temperature: Text | None = None
-    form: Form | None = None
-    of_measurement: bool = False
-    parameter: tuple[_Parameter, ...] = Field(min_length=1, strict=False)
-    state: tuple[_State, ...] = Field(default=(), strict=False)
-
-
-class _Calibrated(Section):
-    name: Name
-    value: float
-    stderr: NotNegative
-    unit: Text = "1"
-    prior: float | None = None
-
-
-class _Recording(Section):
-    name: Text
-    sha256: Sha256
-
-
-class _Definition(Section):
-    name: Text
-    sha256: Sha256
-
-
-class _File(Section):
-    # "schema" is a method of pydantic's models.
-    version_of_schema: Literal[1] = Field(alias="schema")
-    version: str = ""
-    gearbox: _Definition
-    recording: tuple[_Recording, ...] = Field(default=(), strict=False)
-    calibrated: tuple[_Calibrated, ...] = Field(default=(), strict=False)
-    finding: tuple[_Finding, ...] = Field(default=(), strict=False)
-
-
 def read_correction(path: str | Path, network: ThermalNetwork, *, made_for: Gearbox | None = None) -> Correction:
-    """A correction from its file.
+    """Read a correction.
 
     Parameters
     ----------
     path : str or Path
     network : ThermalNetwork
-        The nominal network of the gearbox, whose signals the laws may use
+        The nominal network of the gearbox, to which it is applied once to find its faults
     made_for : Gearbox or None
         Refuse a correction that was made for another one
 
     Raises
     ------
     InputError
-        If the file cannot be read, is not a correction, was made for another gearbox, or a calibrated value or a law
-        in it cannot be used; with file, key and reason.
+        If the file cannot be read, is not a correction, was made for another gearbox, or cannot be applied to the
+        network; with file, key and reason.
     """
     file = str(path)
-    table = parse(read_text(Path(path)), file=file)
-    if table.get("schema") != SCHEMA:
-        raise InputError(
-            f"{file}: schema is {table.get('schema')!r}; this program reads corrections of schema {SCHEMA}"
-        )
-    content = validated(_File, table, file=file)
-    if made_for is not None:
-        _check_made_for(made_for, content.gearbox.name, content.gearbox.sha256, f"{file}: ")
-    calibration = tuple(
-        Estimate(name=c.name, value=c.value, stderr=c.stderr, unit=c.unit, prior=c.prior) for c in content.calibrated
-    )
-    faults = list(_calibration_faults(calibration, network))
-    if faults:
-        raise InputError("\n".join(f"{file}: the correction calibrates {fault}" for fault in faults))
-    signals = list(network.signals)
-    findings = []
-    for index, entry in enumerate(content.finding):
-        finding = _finding(entry, signals, f"{file}: {as_written(f'finding.{index}', table)}")
-        findings.append(finding)
-        # A later finding may lean on an earlier one's memories and boundary.
-        signals += [p.name for p in finding.term.parameters] + [s.name for s in finding.term.states]
-        if finding.term.boundary_temperature is not None:
-            signals.append(f"T_{finding.term.target[-1]}")
-    return Correction(
-        gearbox=content.gearbox.name,
-        gearbox_sha256=content.gearbox.sha256,
-        findings=tuple(findings),
-        calibration=calibration,
-        recordings={recording.name: recording.sha256 for recording in content.recording},
-        version=content.version,
-    )
-
-
-def _finding(entry: _Finding, signals: list[str], where: str) -> Finding:
-    for parameter in entry.parameter:
-        if not parameter.lower <= parameter.value <= parameter.upper:
-            limits = f"{parameter.lower:g} ... {parameter.upper:g}"
-            raise InputError(f"{where}.parameter {parameter.name} is {parameter.value:g}; {limits} is possible")
-    if entry.weights and (entry.kind not in FACTORS or len(entry.weights) != len(entry.target)):
-        raise InputError(
-            f"{where}.weights: {len(entry.weights)} weights for {len(entry.target)} targets of a {entry.kind}; "
-            "a loss_factor or link_factor has one for each target, or none"
-        )
-    own = [p.name for p in entry.parameter] + [s.name for s in entry.state]
-    names = [*signals, *own]
-
-    def law(text: str, key: str) -> sp.Expr:
-        return parse_expression(text, names, where=f"{where}.{key}")
-
-    temperature = entry.boundary_temperature
-    term = Term(
-        label=entry.label,
-        kind=entry.kind,
-        target=entry.target,
-        weights=entry.weights,
-        expression=law(entry.law, "law"),
-        parameters=tuple(
-            Parameter(
-                name=p.name, unit=p.unit, start=p.value, lower=p.lower, upper=p.upper, sd=p.stderr, log=False,
-                description=p.description,
-            )
-            for p in entry.parameter
-        ),
-        states=tuple(
-            ExtraState(
-                name=s.name,
-                start=s.start,
-                rate=law(s.rate, f"state {s.name}.rate"),
-                update=None if s.update is None else law(s.update, f"state {s.name}.update"),
-            )
-            for s in entry.state
-        ),
-        is_loss=entry.is_loss,
-        boundary_temperature=None if temperature is None else law(temperature, "boundary_temperature"),
-        form=entry.form,
-        of_measurement=entry.of_measurement,
-    )  # fmt: skip
-    return Finding(
-        mechanism=entry.mechanism, family=entry.family, place=entry.place, says=entry.says, term=term,
-        probability=entry.probability,
-    )  # fmt: skip
+    correction = validated(Correction, parse_schema_1(read_text(Path(path)), file=file, kind="corrections"), file=file)
+    try:
+        if made_for is not None:
+            correction.check_made_for(made_for)
+        correction.apply(network, as_recorded=True)
+    except InputError as error:
+        raise InputError("\n".join(f"{file}: {line}" for line in str(error).splitlines())) from error
+    return correction
 
 
 def write_correction(correction: Correction, path: str | Path) -> None:
@@ -403,74 +339,5 @@ def write_correction(correction: Correction, path: str | Path) -> None:
 
 
 def correction_text(correction: Correction) -> str:
-    """A correction as TOML."""
-    lines = [
-        "# Found by a diagnosis: the same gearbox definition plus this file is the corrected model.",
-        *_entries({"schema": SCHEMA, "version": correction.version}),
-        *_table("[gearbox]", {"name": correction.gearbox, "sha256": correction.gearbox_sha256}),
-    ]
-    for name, sha256 in correction.recordings.items():
-        lines += _table("[[recording]]", {"name": name, "sha256": sha256})
-    for estimate in correction.calibration:
-        values = {key: getattr(estimate, key) for key in ("name", "value", "stderr", "unit", "prior")}
-        lines += _table("[[calibrated]]", values)
-    for finding in correction.findings:
-        lines += _finding_lines(finding)
-    return "\n".join(lines) + "\n"
-
-
-def _finding_lines(finding: Finding) -> list[str]:
-    term, temperature = finding.term, finding.term.boundary_temperature
-    lines = _table(
-        "[[finding]]",
-        {
-            "mechanism": finding.mechanism,
-            "family": finding.family,
-            "place": finding.place,
-            "says": finding.says,
-            "probability": finding.probability,
-            "label": term.label,
-            "kind": term.kind,
-            "target": list(term.target),
-            "weights": list(term.weights) or None,
-            "law": expression_text(term.expression),
-            "is_loss": term.is_loss,
-            "boundary_temperature": None if temperature is None else expression_text(temperature),
-            "form": term.form,
-            "of_measurement": term.of_measurement,
-        },
-    )
-    for p in term.parameters:
-        values = {"name": p.name, "value": p.start, "stderr": p.sd, "unit": p.unit, "lower": p.lower, "upper": p.upper}
-        lines += _table("[[finding.parameter]]", values | {"description": p.description})
-    for s in term.states:
-        laws = {"rate": expression_text(s.rate), "update": None if s.update is None else expression_text(s.update)}
-        lines += _table("[[finding.state]]", {"name": s.name, "start": s.start} | laws)
-    return lines
-
-
-def _table(head: str, values: Mapping[str, Any]) -> list[str]:
-    return ["", head, *_entries(values)]
-
-
-def _entries(values: Mapping[str, Any]) -> list[str]:
-    return [f"{key} = {_toml(value)}" for key, value in values.items() if value is not None]
-
-
-def _toml(value: Any) -> str:
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, (list, tuple)):
-        return f"[{', '.join(map(_toml, value))}]"
-    if isinstance(value, str):
-        escaped = "".join(_escaped(character) for character in value)
-        return f'"{escaped}"'
-    if not math.isfinite(value):
-        raise ValueError(f"a correction cannot hold the number {value}")
-    return repr(value) if isinstance(value, int) else repr(float(value))
-
-
-def _escaped(character: str) -> str:
-    if character in '\\"':
-        return f"\\{character}"
-    return character if character.isprintable() else f"\\U{ord(character):08x}"
+    """Return a correction as TOML; numbers are written with all digits, keys at their default left out."""
+    return HEADER + tomli_w.dumps({"schema": 1, **correction.model_dump(by_alias=True, exclude_defaults=True)})

@@ -1,24 +1,30 @@
-"""The definition file of a gearbox, schema 1: one frozen, validated class per table.
+"""The tables of a gearbox definition, schema 1: one frozen, validated class per table.
 
-Attributes are the keys of the file, in the units that their names tell; the same value in SI has the bare name
-(``stage.face_width_mm`` and ``stage.face_width`` [m]). Faults within one table are found here, faults between tables
-in :mod:`models.consistency`; :mod:`models.gearbox` reads the file and reports all of them at once.
+Attributes are the keys of the file, in the units that end their names; the same value in SI has the bare name
+(``stage.face_width_mm`` and ``stage.face_width`` [m]). :mod:`models.gearbox_definition` has the whole file.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from math import pi
-from typing import Annotated, Literal, Self
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal, Self, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field, StringConstraints, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StringConstraints, model_validator
 
-from models.errors import InputError
+from models.errors import did_you_mean
 from models.geometry import GearPair, gear_pair
 from models.quantity import InSI, between, in_si, optional_pair_in_si, pair_in_si
 
-SCHEMA = 1
+T = TypeVar("T")
 
+
+def _at_least_one(entries: tuple[T, ...]) -> tuple[T, ...]:
+    if not entries:
+        raise ValueError("has no entries; at least one is needed")
+    return entries
+
+
+OneOrMore = Annotated[tuple[T, ...], AfterValidator(_at_least_one)]
 Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z][A-Za-z0-9_]*$")]
 Text = Annotated[str, StringConstraints(min_length=1)]
 # A whole number of hundreds of digits, which no float holds, is refused before anything is calculated with it.
@@ -31,13 +37,7 @@ FluidTemperature = Annotated[float, between(-60.0, 250.0, unit="_degC")]
 Viscosity = Annotated[float, between(0.5, 1e5, unit="_mm2_s")]
 Coefficient = Annotated[float, between(1e-4, 0.5)]
 
-# Outside diameter over bore: the largest of ISO 15, from memory, is 4 (634: 16 over 4 mm).
-LARGEST_RING_RATIO = 5.0
-# Width over the height between bore and outside diameter: 0.8 of an NU 406, about 4 of four-row roller bearings.
-RING_SECTION = (0.1, 10.0)
-# Mass over that of a solid steel ring of the same envelope: 0.70 to 0.74 of NU 207, 210 and 406; sleeves may add to it.
-RING_MASS = (0.1, 2.0)
-STEEL_KG_M3 = 7830.0
+LARGEST_RING_RATIO = 5.0  # outside diameter over bore; the largest of ISO 15, from memory, is 4 (634: 16 over 4 mm)
 
 
 class Section(BaseModel):
@@ -52,20 +52,14 @@ class Section(BaseModel):
         ignored_types=(InSI,),
     )
 
-    def relations(self) -> tuple[Iterator[str], ...]:
-        """What is wrong between values of this table: texts by independent check.
-
-        Where some values are not valid on their own, :mod:`models.faults` goes through the checks that need the others
-        only, so that one reading tells all faults.
-        """
-        return ()
-
-    @model_validator(mode="after")
-    def _values_fit_together(self) -> Self:
-        faults = [fault for check in self.relations() for fault in check]
-        if faults:
-            raise ValueError("; ".join(faults))
-        return self
+    @model_validator(mode="before")
+    @classmethod
+    def _known_keys_only(cls, values: Any) -> Any:
+        known = [field.alias or key for key, field in cls.model_fields.items()]
+        unknown = [key for key in values if key not in known] if isinstance(values, Mapping) else []
+        if unknown:
+            raise ValueError("\n".join(f"'{key}' is not a known key{did_you_mean(key, known)}" for key in unknown))
+        return values
 
 
 class Ambient(Section):
@@ -95,35 +89,25 @@ class Modulus(Section):
     b2_per_K: Annotated[float, between(-0.01, 0.01)]
     nu_40_mm2_s: Annotated[float, between(1.0, 2000.0)]
 
-    def relations(self) -> tuple[Iterator[str], ...]:
-        """See :meth:`Section.relations`."""
-        return (self._stiffness_faults(),)
-
-    def _stiffness_faults(self) -> Iterator[str]:
+    @model_validator(mode="after")
+    def _stiffness_is_plausible(self) -> Self:
         stiffness = self.a1_Pa + self.a2_Pa_per_K * 333.15
         if not 1.5e7 <= stiffness <= 2.5e8:
-            yield (
+            raise ValueError(
                 f"a1 + a2 T is {stiffness:.3g} Pa at 60 degC, but 1.5e7 to 2.5e8 Pa (pressure-viscosity coefficients "
                 "of 4 to 67 1/GPa) is plausible: check the signs, and that T is in K"
             )
+        return self
 
 
 class Gold(Section):
-    """Pressure-viscosity coefficient after Gold: ``alpha = s nu^t 1e-9`` [1/Pa], nu in mm2/s."""
+    """Pressure-viscosity coefficient after Gold: ``alpha = s nu^t 1e-9`` [1/Pa], nu in mm2/s.
 
-    s: float
-    t: float
+    A pair such as s = 0.139, t = 0.9904 circulates swapped, and means s = 9.904, t = 0.139.
+    """
 
-    def relations(self) -> tuple[Iterator[str], ...]:
-        """See :meth:`Section.relations`."""
-        return (self._swap_faults(),)
-
-    def _swap_faults(self) -> Iterator[str]:
-        if not (2.0 <= self.s <= 20.0 and 0.05 <= self.t <= 0.3):
-            yield (
-                f"s = {self.s:g}, t = {self.t:g} is outside s = 2 to 20, t = 0.05 to 0.3: a pair such as s = 0.139, "
-                "t = 0.9904 circulates swapped, and means s = 9.904, t = 0.139"
-            )
+    s: Annotated[float, between(2.0, 20.0)]
+    t: Annotated[float, between(0.05, 0.3)]
 
 
 class Fluid(Section):
@@ -144,30 +128,31 @@ class Fluid(Section):
     limiting_shear_coefficient: Annotated[float, between(0.005, 0.2)]
     schlenk_X_L: Annotated[float, between(0.3, 2.0)]
 
-    def relations(self) -> tuple[Iterator[str], ...]:
-        """See :meth:`Section.relations`."""
-        return self._viscosity_faults(), self._pressure_faults(), self._point_faults()
-
-    def _viscosity_faults(self) -> Iterator[str]:
+    @model_validator(mode="after")
+    def _viscosity_is_given_once(self) -> Self:
         if (self.viscosity_points is None) == (self.d341 is None):
-            yield "needs either viscosity_points or d341, and not both"
+            raise ValueError("needs either viscosity_points or d341, and not both")
+        return self
 
-    def _pressure_faults(self) -> Iterator[str]:
+    @model_validator(mode="after")
+    def _pressure_viscosity_has_its_table(self) -> Self:
         needed = "modulus" if self.pressure_viscosity == "modulus" else "gold"
         if getattr(self, needed) is None:
-            yield f"pressure_viscosity = '{self.pressure_viscosity}' needs the table '{needed}'"
+            raise ValueError(f"pressure_viscosity = '{self.pressure_viscosity}' needs the table '{needed}'")
+        return self
 
-    def _point_faults(self) -> Iterator[str]:
-        if self.viscosity_points is None:
-            return
-        (cold, nu_cold), (hot, nu_hot) = sorted(self.viscosity_points)
-        if cold == hot:
-            yield f"viscosity_points are both at {hot:g} degC; two different temperatures are needed"
-        elif nu_hot >= nu_cold:
-            yield (
-                f"viscosity_points: {nu_hot:g} mm2/s at {hot:g} degC is not below {nu_cold:g} mm2/s at "
-                f"{cold:g} degC; the hotter oil must be the thinner one"
-            )
+    @model_validator(mode="after")
+    def _viscosity_falls(self) -> Self:
+        if self.viscosity_points is not None:
+            (cold, nu_cold), (hot, nu_hot) = sorted(self.viscosity_points)
+            if cold == hot:
+                raise ValueError(f"viscosity_points are both at {hot:g} degC; two different temperatures are needed")
+            if nu_hot >= nu_cold:
+                raise ValueError(
+                    f"viscosity_points: {nu_hot:g} mm2/s at {hot:g} degC is not below {nu_cold:g} mm2/s at "
+                    f"{cold:g} degC; the hotter oil must be the thinner one"
+                )
+        return self
 
 
 class Oil(Fluid):
@@ -201,17 +186,18 @@ class Shaft(Section):
         given = self.length_mm if self.length_in_air_mm is None else self.length_in_air_mm
         return 1e-3 * given if self.surface_to_air else 0.0
 
-    def relations(self) -> tuple[Iterator[str], ...]:
-        """See :meth:`Section.relations`."""
-        return (self._air_faults(),)
-
-    def _air_faults(self) -> Iterator[str]:
-        if self.length_in_air_mm is None:
-            return
-        if not self.surface_to_air:
-            yield f"length_in_air_mm is {self.length_in_air_mm:g}, but surface_to_air is false; set it to true"
-        if self.length_in_air_mm > self.length_mm:
-            yield f"length_in_air_mm is {self.length_in_air_mm:g}, more than length_mm, which is {self.length_mm:g}"
+    @model_validator(mode="after")
+    def _length_in_air_fits(self) -> Self:
+        if self.length_in_air_mm is not None:
+            if not self.surface_to_air:
+                raise ValueError(
+                    f"length_in_air_mm is {self.length_in_air_mm:g}, but surface_to_air is false; set it to true"
+                )
+            if self.length_in_air_mm > self.length_mm:
+                raise ValueError(
+                    f"length_in_air_mm is {self.length_in_air_mm:g}, more than length_mm, which is {self.length_mm:g}"
+                )
+        return self
 
 
 class Material(Section):
@@ -306,31 +292,22 @@ class Stage(Section):
             r_a=None if self.tip_diameter is None else (self.tip_diameter[0] / 2.0, self.tip_diameter[1] / 2.0),
         )
 
-    def relations(self) -> tuple[Iterator[str], ...]:
-        """See :meth:`Section.relations`."""
-        return self._shaft_faults(), self._pair_faults(), self._bore_faults()
-
-    def _shaft_faults(self) -> Iterator[str]:
+    @model_validator(mode="after")
+    def _joins_two_shafts(self) -> Self:
         if self.driver == self.driven:
-            yield f"driver and driven are both '{self.driver}'; a stage joins two shafts"
+            raise ValueError(f"driver and driven are both '{self.driver}'; a stage joins two shafts")
+        return self
 
-    def _pair_faults(self) -> Iterator[str]:
+    @model_validator(mode="after")
+    def _gears_are_possible(self) -> Self:
         if self.helix_angle_deg != 0.0:
-            yield f"helix_angle_deg = {self.helix_angle_deg:g}: helical gears are not supported yet; only 0 (spur) is"
-            return
-        try:
-            self.pair()
-        except InputError as error:
-            yield str(error)
-
-    def _bore_faults(self) -> Iterator[str]:
-        try:
-            pair = self.pair()
-        except InputError:
-            return
-        for name, bore, r_f in zip(self.names, self.bore_mm, pair.r_f, strict=True):
+            raise ValueError(
+                f"helix_angle_deg = {self.helix_angle_deg:g}: helical gears are not supported yet; only 0 (spur) is"
+            )
+        for name, bore, r_f in zip(self.names, self.bore_mm, self.pair().r_f, strict=True):
             if bore >= 2e3 * r_f:
-                yield f"bore_mm of '{name}' is {bore:g}, not below its root diameter {2e3 * r_f:.4g} mm"
+                raise ValueError(f"bore_mm of '{name}' is {bore:g}, not below its root diameter {2e3 * r_f:.4g} mm")
+        return self
 
 
 class Bearing(Section):
@@ -375,42 +352,17 @@ class Bearing(Section):
             return self.oil_level_mm
         return max(0.0, 0.3 * (self.bore_mm + self.outside_diameter_mm) - level_below_axis_mm)
 
-    def relations(self) -> tuple[Iterator[str], ...]:
-        """See :meth:`Section.relations`."""
-        return self._ring_faults(), self._mass_faults()
-
-    def _ring_faults(self) -> Iterator[str]:
+    @model_validator(mode="after")
+    def _rings_are_possible(self) -> Self:
         bore, outside = self.bore_mm, self.outside_diameter_mm
         if outside <= bore:
-            yield f"outside_diameter_mm = {outside:g} is not above bore_mm = {bore:g}"
-            return
+            raise ValueError(f"outside_diameter_mm = {outside:g} is not above bore_mm = {bore:g}")
         if outside > LARGEST_RING_RATIO * bore:
-            yield (
+            raise ValueError(
                 f"outside_diameter_mm = {outside:g} is {outside / bore:.3g} times bore_mm = {bore:g}; rolling bearings "
                 f"have up to 4 times, above {LARGEST_RING_RATIO:g} is refused: correct one of them"
             )
-            return
-        ratio = 2.0 * self.width_mm / (outside - bore)
-        if not RING_SECTION[0] <= ratio <= RING_SECTION[1]:
-            yield (
-                f"width_mm = {self.width_mm:g} is {ratio:.3g} times the height of its section, "
-                f"{0.5 * (outside - bore):g} mm between bore_mm and outside_diameter_mm; {RING_SECTION[0]:g} to "
-                f"{RING_SECTION[1]:g} times is possible: correct one of them"
-            )
-
-    def _mass_faults(self) -> Iterator[str]:
-        if any(self._ring_faults()):
-            return  # there is no ring to compare with
-        mass = self.mass_kg
-        area = 0.25e-6 * pi * (self.outside_diameter_mm**2 - self.bore_mm**2)
-        solid = STEEL_KG_M3 * area * 1e-3 * self.width_mm
-        low, high = RING_MASS[0] * solid, RING_MASS[1] * solid
-        if not low <= mass <= high:
-            meant = ": were grams meant?" if low <= 1e-3 * mass <= high else ""
-            yield (
-                f"mass_kg = {mass:g} does not fit its size: a solid steel ring of its bore_mm, outside_diameter_mm and "
-                f"width_mm has {solid:.3g} kg, so {low:.2g} to {high:.2g} kg is possible{meant}"
-            )
+        return self
 
 
 class Seal(Section):
@@ -447,23 +399,23 @@ class Housing(Section):
     convection: Literal["iso_14179", "flat_plate", "iso_14179_free", "churchill_chu"]
     foundation_conductance_W_K: Annotated[float, between(0.0, 1e4)] = 0.0
     joint_conductance_W_K: Annotated[float, between(0.0, 1e5)]
-    part: Annotated[tuple[HousingPart, ...], Field(min_length=1)]
+    part: OneOrMore[HousingPart]
 
-    def relations(self) -> tuple[Iterator[str], ...]:
-        """See :meth:`Section.relations`."""
-        return self._share_faults(), self._foundation_faults()
-
-    def _share_faults(self) -> Iterator[str]:
+    @model_validator(mode="after")
+    def _shares_sum_to_one(self) -> Self:
         total = sum(part.area_fraction for part in self.part)
         if abs(total - 1.0) > 1e-6:
-            yield f"the area_fraction of its parts sum to {total:g}, not to 1"
+            raise ValueError(f"the area_fraction of its parts sum to {total:g}, not to 1")
+        return self
 
-    def _foundation_faults(self) -> Iterator[str]:
+    @model_validator(mode="after")
+    def _foundation_has_a_part(self) -> Self:
         if self.foundation_conductance_W_K > 0.0 and not any(part.foundation for part in self.part):
-            yield (
+            raise ValueError(
                 "foundation_conductance_W_K is above 0, but no part stands on the foundation; "
                 "set foundation = true for one of them"
             )
+        return self
 
 
 class Node(Section):
@@ -480,28 +432,10 @@ class Training(Section):
     torque_Nm: tuple[Annotated[float, between(1e-6, 1e6)], Annotated[float, between(1e-6, 1e6)]]
     temperature_degC: tuple[Annotated[float, between(-60.0, 300.0)], Annotated[float, between(-60.0, 300.0)]]
 
-    def relations(self) -> tuple[Iterator[str], ...]:
-        """See :meth:`Section.relations`."""
-        return tuple(self._order_faults(key) for key in ("speed_rpm", "torque_Nm", "temperature_degC"))
-
-    def _order_faults(self, key: str) -> Iterator[str]:
-        low, high = getattr(self, key)
-        if low >= high:
-            yield f"{key}: the lower bound {low:g} is not below the upper bound {high:g}"
-
-
-class Definition(Section):
-    """The whole file."""
-
-    schema_number: Literal[1] = Field(alias="schema")
-    name: Text
-    ambient: Ambient
-    oil: Oil
-    shaft: Annotated[tuple[Shaft, ...], Field(min_length=1)]
-    stage: Annotated[tuple[Stage, ...], Field(min_length=1)]
-    bearing: Annotated[tuple[Bearing, ...], Field(min_length=1)]
-    seal: tuple[Seal, ...] = ()
-    housing: Housing
-    node: tuple[Node, ...] = ()
-    factors: dict[str, Annotated[float, between(1e-3, 1e3)]] = Field(default_factory=dict)
-    training: Training
+    @model_validator(mode="after")
+    def _bounds_are_ordered(self) -> Self:
+        for key in ("speed_rpm", "torque_Nm", "temperature_degC"):
+            low, high = getattr(self, key)
+            if low >= high:
+                raise ValueError(f"{key}: the lower bound {low:g} is not below the upper bound {high:g}")
+        return self

@@ -8,31 +8,38 @@ from __future__ import annotations
 
 import ast
 import operator
-import sys
-from collections.abc import Callable, Collection, Mapping
-from typing import Any
+from collections.abc import Callable, Mapping
+from itertools import pairwise
+from typing import Annotated, Any, TypeAlias
 
 import sympy as sp
-from sympy.logic.boolalg import Boolean
+from pydantic import PlainSerializer, PlainValidator
 from sympy.printing.str import StrPrinter
 
-from models.errors import InputError, did_you_mean
+from models.errors import InputError
 from models.laws import symbol
 
-LONGEST, DEEPEST = 20_000, 100  # characters, levels: far beyond any law that a person would review
-LARGEST_WHOLE = 10**6  # beyond it whole numbers are taken as floating ones, so that powers stay small
-LARGEST_EXACT_POWER = 4
-LARGEST_NUMBER = sys.float_info.max
+LARGEST_EXACT_POWER = 4  # larger powers of two numbers are taken as floating ones: 9**9**9 would fill the memory
 FUNCTIONS: Mapping[str, Callable[..., Any]] = {
     "Abs": sp.Abs, "abs": sp.Abs, "sign": sp.sign, "sqrt": sp.sqrt, "exp": sp.exp, "log": sp.log,
     "sin": sp.sin, "cos": sp.cos, "tan": sp.tan, "atan": sp.atan, "sinh": sp.sinh, "cosh": sp.cosh, "tanh": sp.tanh,
     "Min": sp.Min, "min": sp.Min, "Max": sp.Max, "max": sp.Max, "Mod": sp.Mod,
 }  # fmt: skip
-COMPARISONS: Mapping[type[ast.cmpop], Callable[[Any, Any], Any]] = {
-    ast.Lt: sp.StrictLessThan, ast.LtE: sp.LessThan, ast.Gt: sp.StrictGreaterThan, ast.GtE: sp.GreaterThan,
-}  # fmt: skip
-ARITHMETIC: Mapping[type[ast.operator], Callable[[Any, Any], Any]] = {
+
+
+def _power(base: Any, exponent: Any) -> Any:
+    small = exponent.is_Integer and abs(exponent) <= LARGEST_EXACT_POWER
+    if base.is_number and exponent.is_number and not small:
+        return sp.Float(float(base)) ** sp.Float(float(exponent))
+    return base**exponent
+
+
+OPERATORS: Mapping[type[ast.AST], Callable[..., Any]] = {
+    ast.USub: operator.neg, ast.UAdd: operator.pos, ast.Not: sp.Not, ast.Invert: sp.Not,
     ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
+    ast.Pow: _power,
+    ast.BitAnd: sp.And, ast.BitOr: sp.Or, ast.And: sp.And, ast.Or: sp.Or,
+    ast.Lt: sp.StrictLessThan, ast.LtE: sp.LessThan, ast.Gt: sp.StrictGreaterThan, ast.GtE: sp.GreaterThan,
 }  # fmt: skip
 
 
@@ -44,7 +51,7 @@ class _Printer(StrPrinter):  # type: ignore[misc]
 
 
 def expression_text(expression: sp.Expr) -> str:
-    """An expression as text that :func:`parse_expression` reads back.
+    """Return an expression as text that :func:`parse_expression` reads back.
 
     Examples
     --------
@@ -54,145 +61,96 @@ def expression_text(expression: sp.Expr) -> str:
     return str(_Printer().doprint(expression))
 
 
-def parse_expression(text: str, names: Collection[str], *, where: str) -> sp.Expr:
-    """The expression that a text stands for.
-
-    Parameters
-    ----------
-    text : str
-    names : collection of str
-        Signals and parameters that it may use
-    where : str
-        What messages call it, e.g. file and key
+def parse_expression(text: str) -> sp.Expr:
+    """Return the expression that a text denotes; every name in it becomes a symbol.
 
     Raises
     ------
     InputError
-        If it is no expression, uses an unknown name or function, or is too long or too deep.
+        If it is no expression of numbers, names and :data:`FUNCTIONS`, or not a finite real number.
 
     Examples
     --------
-    >>> parse_expression("8.0*(speed/3000.0)**3 + Max(T_oil, 0)", ["speed", "T_oil"], where="law")
+    >>> parse_expression("8.0*(speed/3000.0)**3 + Max(T_oil, 0)")
     2.96296296296296e-10*speed**3 + Max(0, T_oil)
-    >>> parse_expression("speed.real", ["speed"], where="law")
+    >>> parse_expression("speed.real")
     Traceback (most recent call last):
-    models.errors.InputError: law: 'speed.real' has no place in a law
+    models.errors.InputError: not allowed here: 'speed.real'
     """
-    if len(text) > LONGEST:
-        raise InputError(f"{where}: a law of {len(text)} characters is too long; {LONGEST} are possible")
     try:
-        tree = ast.parse(text.strip(), mode="eval")
-    except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
-        raise InputError(f"{where}: {_shown(text)} is not an expression ({getattr(error, 'msg', error)})") from error
-    reader = _Reader({name: symbol(name) for name in names}, where)
-    try:
-        value = reader.read(tree.body, 0)
+        value = _read(ast.parse(text.strip(), mode="eval").body)
     except InputError:
         raise
-    except Exception as error:  # whatever sympy makes of it, the file is at fault
-        raise InputError(f"{where}: {_shown(text)} cannot be used ({error})") from error
+    except SyntaxError as error:
+        raise InputError(f"{_shown(text)} is not an expression ({error.msg})") from error
+    except Exception as error:  # sympy refuses operands with exceptions of many types
+        raise InputError(f"{_shown(text)} cannot be used ({error})") from error
     if not isinstance(value, sp.Expr):
-        raise InputError(f"{where}: {_shown(text)} is a condition, not a number")
-    too_large = any(abs(number) > LARGEST_NUMBER for number in value.atoms(sp.Number) if number.is_finite)
-    if too_large or value.has(sp.nan, sp.zoo, sp.oo, -sp.oo, sp.I):
-        raise InputError(f"{where}: {_shown(text)} is not a finite real expression")
+        raise InputError(f"{_shown(text)} is a condition, not a number")
+    if value.has(sp.nan, sp.zoo, sp.oo, -sp.oo, sp.I):
+        raise InputError(f"{_shown(text)} is not a finite real expression")
     return value
 
 
-class _Reader:
-    """Walks a syntax tree and builds the expression."""
+def _read(node: ast.expr) -> Any:
+    """Return the sympy object of one node of the syntax tree."""
+    match node:
+        case ast.Constant(value=bool() | int() | float() as number):
+            return sp.sympify(number)
+        case ast.Name(id=name):
+            return sp.pi if name == "pi" else symbol(name)
+        case ast.BinOp(left=left, op=op, right=right) if type(op) in OPERATORS:
+            return OPERATORS[type(op)](_read(left), _read(right))
+        case ast.UnaryOp(op=op, operand=operand):
+            return OPERATORS[type(op)](_read(operand))
+        case ast.BoolOp(op=op, values=values):
+            return OPERATORS[type(op)](*map(_read, values))
+        case ast.Compare():
+            return _comparison(node)
+        case ast.Call():
+            return _call(node)
+    raise _not_allowed(node)
 
-    def __init__(self, symbols: Mapping[str, sp.Symbol], where: str) -> None:
-        self.symbols, self.where = symbols, where
 
-    def read(self, node: ast.expr, depth: int) -> Any:
-        if depth > DEEPEST:
-            raise InputError(f"{self.where}: the law is nested deeper than {DEEPEST} levels")
-        step = getattr(self, f"_{type(node).__name__}", None)
-        if step is None:
-            raise InputError(f"{self.where}: {_shown(ast.unparse(node))} has no place in a law")
-        return step(node, depth + 1)
+def _comparison(node: ast.Compare) -> Any:
+    if not all(type(op) in OPERATORS for op in node.ops):
+        raise _not_allowed(node, "; compare with <, <=, > or >=")
+    pairs = pairwise(map(_read, (node.left, *node.comparators)))
+    return sp.And(*(OPERATORS[type(op)](*pair) for op, pair in zip(node.ops, pairs, strict=True)))
 
-    def _number(self, node: ast.expr, depth: int) -> sp.Expr:
-        value = self.read(node, depth)
-        if not isinstance(value, sp.Expr):
-            raise InputError(f"{self.where}: {_shown(ast.unparse(node))} is a condition where a number is needed")
-        return value
 
-    def _condition(self, node: ast.expr, depth: int) -> Any:
-        value = self.read(node, depth)
-        if isinstance(value, sp.Expr) or not isinstance(value, Boolean):  # a symbol is both
-            raise InputError(f"{self.where}: {_shown(ast.unparse(node))} is a number where a condition is needed")
-        return value
+def _call(node: ast.Call) -> Any:
+    match node:
+        case ast.Call(func=ast.Name(id="Piecewise"), args=cases, keywords=[]):
+            return sp.Piecewise(*map(_case, cases))
+        case ast.Call(func=ast.Name(id=name), args=arguments, keywords=[]) if name in FUNCTIONS:
+            return FUNCTIONS[name](*map(_read, arguments))
+    raise _not_allowed(node, f"; functions are {', '.join(sorted([*FUNCTIONS, 'Piecewise']))}")
 
-    def _Constant(self, node: ast.Constant, _: int) -> Any:
-        value = node.value
-        if isinstance(value, bool):
-            return sp.true if value else sp.false
-        if isinstance(value, int):
-            return sp.Integer(value) if abs(value) <= LARGEST_WHOLE else sp.Float(float(value))
-        if isinstance(value, float):
-            return sp.Float(value)
-        raise InputError(f"{self.where}: {_shown(repr(value))} is not a number")
 
-    def _Name(self, node: ast.Name, _: int) -> sp.Symbol:
-        if node.id == "pi" and node.id not in self.symbols:
-            return sp.pi
-        if node.id not in self.symbols:
-            raise InputError(f"{self.where}: {node.id!r} is not a signal{did_you_mean(node.id, self.symbols)}")
-        return self.symbols[node.id]
+def _case(node: ast.expr) -> tuple[Any, Any]:
+    match node:
+        case ast.Tuple(elts=[value, condition]) if not isinstance(_read(condition), sp.Expr):
+            return _read(value), _read(condition)
+    raise _not_allowed(node, "; Piecewise takes pairs (value, condition)")
 
-    def _UnaryOp(self, node: ast.UnaryOp, depth: int) -> Any:
-        if isinstance(node.op, (ast.Not, ast.Invert)):
-            return sp.Not(self._condition(node.operand, depth))
-        value = self._number(node.operand, depth)
-        return -value if isinstance(node.op, ast.USub) else value
 
-    def _BinOp(self, node: ast.BinOp, depth: int) -> Any:
-        if isinstance(node.op, (ast.BitAnd, ast.BitOr)):
-            joined = sp.And if isinstance(node.op, ast.BitAnd) else sp.Or
-            return joined(self._condition(node.left, depth), self._condition(node.right, depth))
-        left, right = self._number(node.left, depth), self._number(node.right, depth)
-        if isinstance(node.op, ast.Pow):
-            small = right.is_Integer and abs(right) <= LARGEST_EXACT_POWER
-            if left.is_number and right.is_number and not small:
-                return sp.Float(float(left)) ** sp.Float(float(right))
-            return left**right
-        if type(node.op) not in ARITHMETIC:
-            raise InputError(f"{self.where}: {_shown(ast.unparse(node))} has no place in a law")
-        value = ARITHMETIC[type(node.op)](left, right)
-        large = value.is_Rational and max(abs(value.p), value.q) > LARGEST_WHOLE**2
-        return sp.Float(float(value)) if large else value
-
-    def _BoolOp(self, node: ast.BoolOp, depth: int) -> Any:
-        joined = sp.And if isinstance(node.op, ast.And) else sp.Or
-        return joined(*(self._condition(value, depth) for value in node.values))
-
-    def _Compare(self, node: ast.Compare, depth: int) -> Any:
-        values = [self._number(value, depth) for value in (node.left, *node.comparators)]
-        if any(type(op) not in COMPARISONS for op in node.ops):
-            raise InputError(f"{self.where}: {_shown(ast.unparse(node))}: compare with <, <=, > or >=")
-        pairs = zip(node.ops, values[:-1], values[1:], strict=True)
-        return sp.And(*(COMPARISONS[type(op)](left, right) for op, left, right in pairs))
-
-    def _Call(self, node: ast.Call, depth: int) -> Any:
-        name = node.func.id if isinstance(node.func, ast.Name) else ast.unparse(node.func)
-        if node.keywords:
-            raise InputError(f"{self.where}: {_shown(ast.unparse(node))}: functions take no named arguments")
-        if name == "Piecewise":
-            return sp.Piecewise(*(self._case(case, depth) for case in node.args))
-        if name not in FUNCTIONS:
-            known = ", ".join(sorted([*FUNCTIONS, "Piecewise"]))
-            raise InputError(f"{self.where}: {_shown(name)} is not a function; known are: {known}")
-        value = FUNCTIONS[name](*(self._number(argument, depth) for argument in node.args))
-        # Towers of numbers are worked out at once, so that what overflows is refused here and not in a simulation.
-        return sp.Float(float(value)) if value.is_number and not value.is_Rational else value
-
-    def _case(self, node: ast.expr, depth: int) -> tuple[Any, Any]:
-        if not (isinstance(node, ast.Tuple) and len(node.elts) == 2):
-            raise InputError(f"{self.where}: {_shown(ast.unparse(node))}: Piecewise takes pairs (value, condition)")
-        return self._number(node.elts[0], depth + 1), self._condition(node.elts[1], depth + 1)
+def _not_allowed(node: ast.expr, hint: str = "") -> InputError:
+    return InputError(f"not allowed here: {_shown(ast.unparse(node))}{hint}")
 
 
 def _shown(text: str) -> str:
     return repr(text) if len(text) <= 80 else f"{text[:77]!r}..."
+
+
+def _law(value: Any) -> sp.Expr:
+    """Return the law of a text; an expression stays as it is."""
+    if isinstance(value, sp.Expr):
+        return value
+    if isinstance(value, str):
+        return parse_expression(value)
+    raise InputError(f"must be a text such as 'strength * speed', not {value!r}")
+
+
+Law: TypeAlias = Annotated[sp.Expr, PlainValidator(_law), PlainSerializer(expression_text, return_type=str)]
+"""A law in a file: a text that is parsed when the file is read and printed when it is written."""

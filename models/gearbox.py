@@ -1,6 +1,7 @@
-"""Gearboxes and oils by name or from a file: TOML in, one validated :class:`Gearbox` out, all faults at once.
+"""Gearboxes by name or from a file: TOML in, one validated :class:`Gearbox` out.
 
-The keys of a file are the classes of :mod:`models.definition`.
+The keys of a file are the classes of :mod:`models.gearbox_definition`, without geometry those of
+:mod:`models.parametric_definition`.
 """
 
 from __future__ import annotations
@@ -11,38 +12,27 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any
 
 import numpy as np
 
-from models.annotated import Annotations, join, strip
-from models.consistency import consistency_faults, factor_names
-from models.definition import SCHEMA, Ambient, Bearing, Definition, Housing, Node, Oil, Seal, Shaft, Stage, Training
+from models.annotated import Annotations, join
+from models.definition import Ambient, Bearing, Housing, Node, Oil, Seal, Shaft, Stage, Training
+from models.definition_file import read_values, refuse
 from models.errors import InputError, did_you_mean
-from models.faults import as_written, shown, validated
-from models.named_oils import lubricant, read_oil
+from models.faults import validated
+from models.gearbox_definition import Definition
+from models.gearbox_network import build_network
+from models.losses import LossModel
+from models.network import Losses, ThermalNetwork
 from models.oil import Oil as Lubricant
-from models.parametric import (
-    KEY,
-    ParametricDefinition,
-    ParametricLosses,
-    build_parametric_network,
-    viscosity_constants,
-)
-from models.toml_file import known_names, packaged, parse, read_text
-
-if TYPE_CHECKING:
-    from models.losses import LossModel
-    from models.network import Losses, ThermalNetwork
-
-T = TypeVar("T")
+from models.parametric import ParametricLosses, build_parametric_network
+from models.parametric_definition import KEY, ParametricDefinition
+from models.toml_file import known_names, packaged, read_text
 
 FOLDER = "gearboxes"
-LIKE_KEYS = ("bearing", "seal")  # tables that may say ``like = "<name of an earlier one>"`` and name what differs only
-DEFAULT_SOURCE = f"default of schema {SCHEMA}"
+DEFAULT_SOURCE = "default of schema 1"
 CHANGED_SOURCE = "changed after reading (with_values)"
-# Giving one of these in a gearbox file also replaces the other in the named oil.
-ALTERNATIVES = {"viscosity_points": "d341", "d341": "viscosity_points"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,17 +61,17 @@ class Gearbox:
 
     @property
     def name(self) -> str:
-        """What the gearbox is called."""
+        """Name of the gearbox."""
         return self.definition.name
 
     @property
     def is_parametric(self) -> bool:
-        """Whether it has no geometry, and its losses are parametric laws."""
+        """True if it has no geometry, and its losses are parametric laws."""
         return isinstance(self.definition, ParametricDefinition)
 
     @property
-    def _geometry(self) -> Definition:
-        """The definition with geometry.
+    def geometry(self) -> Definition:
+        """The definition, if it has geometry.
 
         Raises
         ------
@@ -90,7 +80,7 @@ class Gearbox:
         """
         if isinstance(self.definition, ParametricDefinition):
             raise InputError(
-                f"{self.file}: defines a gearbox without geometry ([[part]]); what was asked needs teeth, shafts, "
+                f"{self.file}: defines a gearbox without geometry ([[part]]); this needs teeth, shafts, "
                 "bearings and a housing ([[stage]], [[shaft]], [[bearing]], [housing])"
             )
         return self.definition
@@ -98,7 +88,7 @@ class Gearbox:
     @property
     def ambient(self) -> Ambient:
         """``[ambient]``."""
-        return self._geometry.ambient
+        return self.geometry.ambient
 
     @property
     def ambient_degC(self) -> float:
@@ -108,50 +98,47 @@ class Gearbox:
     @property
     def oil(self) -> Oil:
         """``[oil]``, with the values of the named oil."""
-        return self._geometry.oil
+        return self.geometry.oil
 
     @property
     def shaft(self) -> tuple[Shaft, ...]:
         """``[[shaft]]``."""
-        return self._geometry.shaft
+        return self.geometry.shaft
 
     @property
     def stage(self) -> tuple[Stage, ...]:
         """``[[stage]]``; exactly one for now."""
-        return self._geometry.stage
+        return self.geometry.stage
 
     @property
     def bearing(self) -> tuple[Bearing, ...]:
         """``[[bearing]]``."""
-        return self._geometry.bearing
+        return self.geometry.bearing
 
     @property
     def seal(self) -> tuple[Seal, ...]:
         """``[[seal]]``."""
-        return self._geometry.seal
+        return self.geometry.seal
 
     @property
     def housing(self) -> Housing:
         """``[housing]``."""
-        return self._geometry.housing
+        return self.geometry.housing
 
     @property
     def node(self) -> tuple[Node, ...]:
         """``[[node]]``: overridden heat capacities."""
-        return self._geometry.node
+        return self.geometry.node
 
     @property
     def training(self) -> Training:
         """``[training]``."""
-        return self._geometry.training
+        return self.geometry.training
 
-    @cached_property
+    @property
     def factors(self) -> Mapping[str, float]:
-        """Every tunable factor of the thermal network by name; 1 where the file names none."""
-        return {
-            name: self._geometry.factors.get(name, 1.0)
-            for name in factor_names(tuple(part.name for part in self.housing.part))
-        }
+        """Every tunable factor of the thermal network by name; 1 if the file does not name it."""
+        return self.geometry.all_factors
 
     @property
     def sources(self) -> Mapping[str, str]:
@@ -188,8 +175,7 @@ class Gearbox:
     @property
     def speed_ratio(self) -> Mapping[str, float]:
         """Speed of every shaft over the speed of the input shaft, by shaft name, [-]."""
-        stage = self.stage[0]
-        return {stage.driver: 1.0, stage.driven: stage.z[0] / stage.z[1]}
+        return self.geometry.speed_ratio
 
     def source_of(self, path: str) -> str:
         """Return where a value comes from.
@@ -230,14 +216,13 @@ class Gearbox:
         (0.07, 1.1)
         """
         values: Any = self.values
-        faults: list[str] = []
         for path, value in changes.items():
             try:
                 values = _replaced(values, path.split("."), _plain(value))
             except LookupError:
-                faults.append(f"{path} is not a value of this gearbox{did_you_mean(path, self.leaves)}")
-        faults += consistency_faults(values)
-        definition = _checked(values, file=self.file, faults=faults, numbered=True)
+                hint = did_you_mean(path, self.leaves)
+                raise InputError(f"{self.file}: {path} is not a value of this gearbox{hint}") from None
+        definition = _validated(values, file=self.file)
         changed = dict.fromkeys(changes, CHANGED_SOURCE)
         notes = Annotations(sources={**self.sources, **changed}, priors=dict(self.priors))
         given = {leaf for leaf, _ in _leaves(values) if any(f"{leaf}.".startswith(f"{path}.") for path in changes)}
@@ -254,32 +239,27 @@ class Gearbox:
     def viscosity_constants(self) -> tuple[float, float]:
         """Constants m and n of the oil's viscosity, see :func:`models.oil.kinematic_viscosity_d341`."""
         if isinstance(self.definition, ParametricDefinition):
-            return viscosity_constants(self.definition)
+            return self.definition.viscosity_constants
         oil = self.lubricant()
         return oil.m, oil.n
 
     def lubricant(self) -> Lubricant:
         """Return the oil as the loss formulas use it."""
-        return lubricant(self.oil)
+        return self.geometry.lubricant()
 
     def losses(self) -> LossModel:
         """Return the full power-loss model of this gearbox; :meth:`loss_laws` also works without geometry."""
-        from models.losses import LossModel
-
-        return LossModel.from_gearbox(self)
+        return LossModel.from_definition(self.geometry)
 
     def loss_laws(self) -> Losses:
-        """Return what its network needs of losses: the full model, or parametric laws where there is no geometry."""
+        """Return the losses of its network: the full model, or without geometry the parametric laws."""
         return ParametricLosses(self.definition) if isinstance(self.definition, ParametricDefinition) else self.losses()
 
     def network(self) -> ThermalNetwork:
         """Return the thermal network of this gearbox."""
-        from models.gearbox_network import build_network
-
         if isinstance(self.definition, ParametricDefinition):
-            return build_parametric_network(self, self.definition)
-
-        return build_network(self)
+            return build_parametric_network(self.definition, self.priors)
+        return build_network(self.definition, self.priors)
 
 
 def known_gearboxes() -> tuple[str, ...]:
@@ -294,7 +274,7 @@ def known_gearboxes() -> tuple[str, ...]:
 
 
 def names_a_file(name_or_path: str | Path) -> bool:
-    """Whether a definition file is named, by its ending or a folder, and not a gearbox that comes with the package.
+    """Return True if a definition file is named (by its ending or a folder), False for a gearbox of the package.
 
     Examples
     --------
@@ -316,7 +296,7 @@ def load_gearbox(name_or_path: str | Path) -> Gearbox:
     Raises
     ------
     InputError
-        With every fault of the file, one per line.
+        With the faults of the file, one per line.
 
     Examples
     --------
@@ -341,79 +321,20 @@ def read_gearbox(text: str, *, file: str) -> Gearbox:
     Raises
     ------
     InputError
-        With every fault of the text, one per line.
+        With the faults of the text, one per line.
     """
-    document = parse(text, file=file)
-    number = document.get("schema", SCHEMA)
-    if number != SCHEMA or isinstance(number, bool):
-        raise InputError(f"{file}: schema = {shown(number)} is not known; this version reads schema = {SCHEMA}")
-    notes = Annotations()
-    for key in LIKE_KEYS:
-        document = document | {key: _alike(document.get(key), key, notes)} if key in document else document
-    try:
-        values = strip(document, notes)
-    except RecursionError as error:
-        raise InputError(f"{file}: its tables are nested too deeply") from error
-    if "source" not in document:
-        notes.faults.append("source is missing; say where the values come from")
-    if isinstance(values.get("oil"), dict) and "named" in values["oil"]:
-        values = values | {"oil": _with_named_oil(values["oil"], notes)}
-    faults = [*notes.faults, *consistency_faults(values)]
-    definition = _checked(values, file=file, faults=faults)
+    values, notes = read_values(text, file=file)
+    definition = _validated(values, file=file)
     gearbox = Gearbox(definition, notes, frozenset(path for path, _ in _leaves(values)), file)
     whole = [path for path in notes.priors if isinstance(gearbox.leaves[path], int)]
-    if whole:
-        lines = (as_written(f"{path} is a whole number and cannot have an sd", values) for path in whole)
-        raise InputError("\n".join(f"{file}: {line}" for line in lines))
+    refuse(((path, "is a whole number and cannot have an sd") for path in whole), values, file=file)
     return gearbox
 
 
-def _checked(
-    values: Mapping[str, Any], *, file: str, faults: Sequence[str], numbered: bool = False
-) -> Definition | ParametricDefinition:
+def _validated(values: Mapping[str, Any], *, file: str) -> Definition | ParametricDefinition:
     if KEY in values:
-        return validated(ParametricDefinition, values, file=file, faults=faults, numbered=numbered)
-    return validated(Definition, values, file=file, faults=faults, numbered=numbered)
-
-
-def _alike(tables: Any, key: str, notes: Annotations) -> Any:
-    """Fill tables that say ``like = "<name>"`` up from the earlier table of that name, annotations included."""
-    if not isinstance(tables, list):
-        return tables  # the validation says so
-    filled: list[Any] = []
-    for index, own in enumerate(tables):
-        if isinstance(own, dict) and "like" in own:
-            earlier = {t["name"]: t for t in filled if isinstance(t, dict) and isinstance(t.get("name"), str)}
-            model = earlier.get(own["like"]) if isinstance(own["like"], str) else None
-            if model is None:
-                hint = did_you_mean(str(own["like"]), earlier) if earlier else "; there is none before it"
-                notes.faults.append(f"{key}.{index}.like: {shown(own['like'])} is no earlier {key}{hint}")
-            own = {**(model or {}), **{k: v for k, v in own.items() if k != "like"}}
-        filled.append(own)
-    return filled
-
-
-def _with_named_oil(own: dict[str, Any], notes: Annotations) -> dict[str, Any]:
-    """Fill an ``[oil]`` table up from its named oil, value by value, sources and standard deviations included."""
-    name = own["named"]
-    if not isinstance(name, str):
-        return own  # the validation says so
-    try:
-        values, oil_notes = read_oil(name)
-    except InputError as error:
-        notes.faults.append(f"oil.named: {error}")
-        return own
-    notes.faults.extend(oil_notes.faults)
-    open_keys = [key for key in values if key not in own and ALTERNATIVES.get(key) not in own]
-    notes.sources.update({f"oil.{key}": oil_notes.source_of(key) for key in open_keys})
-    notes.sources.update(_moved(oil_notes.sources, open_keys))
-    notes.priors.update(_moved(oil_notes.priors, open_keys))
-    return own | {key: values[key] for key in open_keys}
-
-
-def _moved(recorded: Mapping[str, T], keys: Sequence[str]) -> dict[str, T]:
-    """Return what is recorded at or below some keys of an oil, by the paths of the gearbox."""
-    return {f"oil.{path}": item for path, item in recorded.items() if path.partition(".")[0] in keys}
+        return validated(ParametricDefinition, values, file=file)
+    return validated(Definition, values, file=file)
 
 
 def _leaves(values: Any, path: str = "") -> Iterator[tuple[str, Any]]:
@@ -448,7 +369,7 @@ def _replaced(values: Any, keys: Sequence[str], new: Any) -> Any:
 
 
 def _plain(value: Any) -> Any:
-    """Return a value as TOML would have given it: numpy scalars as numbers, arrays and lists as tuples."""
+    """Return a value as a TOML reader gives it: numpy scalars as numbers, arrays and lists as tuples."""
     if isinstance(value, np.generic | np.ndarray):
         value = value.tolist()
     return tuple(_plain(item) for item in value) if isinstance(value, list | tuple) else value

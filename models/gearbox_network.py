@@ -7,17 +7,18 @@ laws are those of :mod:`models.heat_transfer`, with the numbers of the definitio
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 import sympy as sp
 
 from models import heat_transfer as ht
 from models.bearing import OIL_FLOW_HEAT, oil_flow_max
+from models.definition import Bearing, Shaft
 from models.ehl import reduced_modulus
+from models.gearbox_definition import Definition
 from models.laws import Parameter, symbol
-from models.losses import RPM, SPEED_FLOOR_RPM, TORQUE_FLOOR_NM
+from models.losses import RPM, SPEED_FLOOR_RPM, TORQUE_FLOOR_NM, LossModel
 from models.network import Link, Node, Source, ThermalNetwork
 from models.oil import (
     T_HIGHEST,
@@ -27,10 +28,6 @@ from models.oil import (
     kinematic_viscosity_d341,
     specific_heat_cragoe,
 )
-
-if TYPE_CHECKING:
-    from models.definition import Bearing, Shaft
-    from models.gearbox import Gearbox
 
 AIR, FRAME, OIL, MESH = "air", "frame", "oil", "mesh"
 T_SERVICE = 60.0  # degC, where the oil's heat capacity is taken (constant: it varies by 5 % over the service range)
@@ -55,12 +52,14 @@ FACTOR_TEXT = {
 }
 
 
-def build_network(gearbox: Gearbox) -> ThermalNetwork:
-    """The thermal network of a gearbox.
+def build_network(gearbox: Definition, priors: Mapping[str, float]) -> ThermalNetwork:
+    """Return the thermal network of a gearbox.
 
     Parameters
     ----------
-    gearbox : Gearbox
+    gearbox : Definition
+    priors : mapping of str to float
+        Standard deviations by dotted path
 
     Returns
     -------
@@ -73,17 +72,17 @@ def build_network(gearbox: Gearbox) -> ThermalNetwork:
     Changenet, Oviedo-Marlot, Velex, J. Mech. Des. 128 (2006); Durand de Gevigney, Changenet, Ville, Velex, Mech. Mach.
     Theory 67 (2013). Layout from memory; Table 5 of the paper for the FZG values.
     """
-    return _Builder(gearbox).network()
+    return _Builder(gearbox, priors).network()
 
 
 class _Builder:
     """The definition at hand while its network is put together."""
 
-    def __init__(self, gearbox: Gearbox) -> None:
-        self.gearbox = gearbox
+    def __init__(self, gearbox: Definition, priors: Mapping[str, float]) -> None:
+        self.gearbox, self.priors = gearbox, priors
         self.stage = gearbox.stage[0]
         self.pair = self.stage.pair()
-        self.losses = gearbox.losses()
+        self.losses = LossModel.from_definition(gearbox)
         self.overrides = {node.name: node.heat_capacity_J_K for node in gearbox.node}
         self.housing_parts = tuple(part.name for part in gearbox.housing.part)
         self.shaft_of_gear = {self.stage.names[0]: self.stage.driver, self.stage.names[1]: self.stage.driven}
@@ -112,9 +111,9 @@ class _Builder:
     # ------------------------------------------------------------------ parameters, nodes, sources
 
     def parameters(self) -> Iterator[Parameter]:
-        for name, value in self.gearbox.factors.items():
+        for name, value in self.gearbox.all_factors.items():
             text = FACTOR_TEXT.get(name, f"heat capacity of {name.removeprefix('C_')}")
-            sd = self.gearbox.priors.get(f"factors.{name}", DEFAULT_FACTOR_SD)
+            sd = self.priors.get(f"factors.{name}", DEFAULT_FACTOR_SD)
             yield Parameter(
                 name=name,
                 start=value,

@@ -14,7 +14,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -24,13 +23,11 @@ from models.bearing import SkfRollerBearing, heat_dissipation_reference
 from models.ehl import reduced_modulus
 from models.errors import InputError, did_you_mean
 from models.friction import MeshContact
+from models.gearbox_definition import Definition
 from models.geometry import GearPair
 from models.load_sharing import contact_points
 from models.oil import Oil
 from models.types import Array
-
-if TYPE_CHECKING:
-    from models.gearbox import Gearbox
 
 SPEED_FLOOR_RPM = 1.0
 TORQUE_FLOOR_NM = 1.0
@@ -129,7 +126,7 @@ class LossModel:
     bearing_load_per_torque: tuple[float, ...]
 
     @classmethod
-    def from_gearbox(cls, gearbox: Gearbox) -> LossModel:
+    def from_definition(cls, gearbox: Definition) -> LossModel:
         """Build the model that a definition describes."""
         stage, oil = gearbox.stage[0], gearbox.lubricant()
         pair = stage.pair()

@@ -27,7 +27,7 @@ def known_oils() -> tuple[str, ...]:
 
 
 def read_oil(name: str) -> tuple[dict[str, Any], Annotations]:
-    """Return the plain values of a named oil, not validated yet, and what stands beside them.
+    """Return the plain values of a named oil, not validated yet, and their annotations.
 
     Raises
     ------
@@ -54,8 +54,7 @@ def named_oil(name: str) -> Fluid:
     >>> named_oil("M100").limiting_shear_coefficient
     0.047
     """
-    values, notes = read_oil(name)
-    return validated(Fluid, values, file=f"{name}.toml", faults=notes.faults)
+    return validated(Fluid, read_oil(name)[0], file=f"{name}.toml")
 
 
 def lubricant(fluid: Fluid) -> Oil:

@@ -1,177 +1,29 @@
-"""A definition without geometry: losses as parametric laws, and a network of as many parts as are known.
-
-Whoever holds a recording of a gearbox mostly does not hold its drawings. What remains is the form of things: a loss has
-a part that does not depend on the load and one that does, heat flows from part to part and out, oil comes back from
-somewhere. The sizes are guesses with wide priors; a recording narrows them. Temperatures alone tell only ratios of
-heats, conductances and capacities; see :mod:`diagnosis.identifiable`.
-
-The tables are ``[reference]``, ``[ambient]``, ``[oil]``, ``[[boundary]]``, ``[[part]]``, ``[[link]]``, ``[[loss]]`` and
-``[recording]``.
-"""
+"""Losses and thermal network of a gearbox without geometry: parametric laws, and as many parts as are known."""
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 import sympy as sp
 from numpy.typing import ArrayLike
-from pydantic import Field
 
-from models.definition import FluidTemperature, Name, Section, Text, Viscosity
-from models.errors import did_you_mean
 from models.laws import Parameter, symbol
 from models.network import Link, Node, Source, ThermalNetwork
-from models.oil import T_HIGHEST, T_LOWEST, d341_constants, kinematic_viscosity_d341
-from models.quantity import between
+from models.oil import T_HIGHEST, T_LOWEST, kinematic_viscosity_d341
+from models.parametric_definition import Loss, ParametricDefinition, Path
 from models.types import Array
 
-if TYPE_CHECKING:
-    from models.gearbox import Gearbox
-
-KEY = "part"  # a definition with this table has no geometry
 GROUPS = ("housing", "bearings", "returns")
-RUN_POWER = 8  # how sharply running is told from standstill by speed
-RATIOS = (0.02, 50.0)  # of speed, torque or viscosity, beyond which an exponent's deviation counts no further
-FARTHEST = 1000.0  # a factor is found within so many times what the definition says; its prior keeps it much nearer
-
-
-class Reference(Section):
-    """``[reference]``: where the losses are stated, and the speed between standing and running."""
-
-    speed_rpm: Annotated[float, between(1e-3, 1e5)]
-    torque_Nm: Annotated[float, between(1e-6, 1e7)]
-    temperature_degC: FluidTemperature
-    running_rpm: Annotated[float, between(1e-3, 1e5)]
-
-
-class Surroundings(Section):
-    """``[ambient]``: the air where a recording names none."""
-
-    temperature_degC: Annotated[float, between(-60.0, 80.0)]
-
-
-class Lubricant(Section):
-    """``[oil]``: two points of its viscosity, known or assumed."""
-
-    viscosity_points: tuple[tuple[FluidTemperature, Viscosity], tuple[FluidTemperature, Viscosity]]
-
-
-class Boundary(Section):
-    """``[[boundary]]``: air of a recorded temperature; `input` is the name of that signal."""
-
-    name: Name
-    input: Name
-    temperature_degC: Annotated[float, between(-60.0, 150.0)]
-
-
-class Part(Section):
-    """``[[part]]``: an isothermal part; `group` makes it one of what mechanisms look for."""
-
-    name: Name
-    heat_capacity_J_K: Annotated[float, between(1.0, 1e9)]
-    group: Literal["housing", "bearings", "returns"] | None = None
-
-
-class Path(Section):
-    """``[[link]]``: a heat path; `standstill_share` of its conductance is left when the gearbox stands."""
-
-    between: tuple[Name, Name]
-    conductance_W_K: Annotated[float, between(1e-4, 1e6)]
-    standstill_share: Annotated[float, between(1e-4, 1.0)] = 1.0
-
-
-class Loss(Section):
-    """``[[loss]]``: heat in a part at the reference, without load and by the load, and how it goes with operation."""
-
-    name: Name
-    part: Name
-    no_load_W: Annotated[float, between(0.0, 1e7)]
-    speed_exponent: Annotated[float, between(0.0, 5.0)] = 1.5
-    viscosity_exponent: Annotated[float, between(-1.0, 2.0)] = 0.3
-    load_W: Annotated[float, between(0.0, 1e7)]
-    torque_exponent: Annotated[float, between(0.0, 3.0)] = 1.0
-
-
-class ParametricDefinition(Section):
-    """The whole file of a gearbox whose geometry is not known."""
-
-    schema_number: Literal[1] = Field(alias="schema")
-    name: Text
-    reference: Reference
-    ambient: Surroundings
-    oil: Lubricant
-    boundary: Annotated[tuple[Boundary, ...], Field(min_length=1)]
-    part: Annotated[tuple[Part, ...], Field(min_length=1)]
-    link: Annotated[tuple[Path, ...], Field(min_length=1)]
-    loss: Annotated[tuple[Loss, ...], Field(min_length=1)]
-    recording: dict[str, Any] = Field(default_factory=dict)
-
-
-def parametric_faults(values: Mapping[str, Any]) -> Iterator[str]:
-    """What is wrong between the tables of such a definition, one text per fault, each beginning with a path."""
-    parts, boundaries = _names(values, "part"), _names(values, "boundary")
-    for name, count in Counter([*parts, *boundaries]).items():
-        if count > 1:
-            yield f"name '{name}' is given {count} times; every part and boundary needs its own"
-    for name, count in Counter(_names(values, "loss")).items():
-        if count > 1:
-            yield f"loss: '{name}' is given {count} times"
-    yield from _link_faults(values, parts, boundaries)
-    for index, loss in _tables(values, "loss"):
-        part = loss.get("part")
-        if isinstance(part, str) and part not in parts:
-            yield f"loss.{index}.part: there is no part '{part}'{did_you_mean(part, parts)}"
-    signals = [b.get("input") for _, b in _tables(values, "boundary")]
-    if boundaries and "T_ambient" not in signals:
-        yield "boundary: none has input = 'T_ambient'; the air around the gearbox needs it"
-    if "oil" not in parts and parts:
-        yield "part: none is called 'oil'; its temperature decides on viscosity"
-
-
-def _link_faults(values: Mapping[str, Any], parts: list[str], boundaries: list[str]) -> Iterator[str]:
-    ends = [*parts, *boundaries]
-    joined: list[frozenset[str]] = []
-    for index, link in _tables(values, "link"):
-        pair, path = link.get("between", ()), f"link.{index}.between"
-        names = [n for n in pair if isinstance(n, str)] if isinstance(pair, tuple) else []
-        for name in names:
-            if name not in ends:
-                yield f"{path}: there is no part or boundary '{name}'{did_you_mean(name, ends)}"
-        if len(names) != 2:
-            continue  # the validation says so
-        if names[0] == names[1]:
-            yield f"{path}: joins '{names[0]}' with itself"
-        if set(names) <= set(boundaries):
-            yield f"{path}: joins two boundaries; heat between them warms nothing"
-        if frozenset(names) in joined:
-            yield f"{path}: {' and '.join(names)} are joined already"
-        joined.append(frozenset(names))
-
-
-def _tables(values: Mapping[str, Any], key: str) -> Iterator[tuple[int, Mapping[str, Any]]]:
-    items = values.get(key, ())
-    for index, item in enumerate(items if isinstance(items, tuple) else ()):
-        if isinstance(item, Mapping):
-            yield index, item
-
-
-def _names(values: Mapping[str, Any], key: str) -> list[str]:
-    return [table["name"] for _, table in _tables(values, key) if isinstance(table.get("name"), str)]
-
-
-def viscosity_constants(definition: ParametricDefinition) -> tuple[float, float]:
-    """Constants m and n of the oil's viscosity, see :func:`models.oil.kinematic_viscosity_d341`."""
-    (T_1, nu_1), (T_2, nu_2) = definition.oil.viscosity_points
-    return d341_constants(T_1, nu_1, T_2, nu_2)
+RUN_POWER = 8  # sharpness of the step of a conductance from standstill to running, over speed
+RATIOS = (0.02, 50.0)  # of speed, torque or viscosity, beyond which an exponent's deviation has no further effect
+FARTHEST = 1000.0  # limits of a factor; its prior keeps it much nearer to 1
 
 
 @dataclass(frozen=True)
 class ParametricLosses:
-    r"""Losses of a gearbox of which only the form is known.
+    r"""Losses of which only the form is known.
 
     .. math::
 
@@ -201,7 +53,7 @@ class ParametricLosses:
 
     @property
     def reads(self) -> tuple[frozenset[str], ...]:
-        """Which of these each component reads: the part that it warms."""
+        """Nodes that each component reads: the part that it warms."""
         return tuple(frozenset({loss.part}) for loss in self.definition.loss for _ in ("no_load", "load"))
 
     def power(self, speed: ArrayLike, torque: ArrayLike, temperatures: ArrayLike) -> Array:
@@ -210,7 +62,7 @@ class ParametricLosses:
         T = np.asarray(temperatures, dtype=float)
         n = np.abs(np.asarray(speed, dtype=float)) / reference.speed_rpm
         m = np.abs(np.asarray(torque, dtype=float)) / reference.torque_Nm
-        constants = viscosity_constants(self.definition)
+        constants = self.definition.viscosity_constants
         nu_ref = kinematic_viscosity_d341(reference.temperature_degC, *constants)
         found = []
         for loss in self.definition.loss:
@@ -228,24 +80,24 @@ class ParametricLosses:
         return np.zeros(np.broadcast_shapes(np.shape(speed), np.shape(torque), T.shape))
 
 
-def build_parametric_network(gearbox: Gearbox, definition: ParametricDefinition) -> ThermalNetwork:
-    """The network that the tables of a definition without geometry spell out.
+def build_parametric_network(definition: ParametricDefinition, priors: Mapping[str, float]) -> ThermalNetwork:
+    """Return the network that the tables of a definition without geometry describe.
 
     Every value with a standard deviation becomes a factor on it: ``C_<part>``, ``G_<part>_<part>``,
-    ``standstill_<part>_<part>``, ``<loss>_no_load``, ``<loss>_load``; exponents become deviations from what is
-    assumed: ``<loss>_speed_exponent`` and its like.
+    ``standstill_<part>_<part>``, ``<loss>_no_load``, ``<loss>_load``; exponents become deviations from the assumed
+    ones: ``<loss>_speed_exponent`` etc.
 
     Parameters
     ----------
-    gearbox : Gearbox
-        Tells the standard deviations
     definition : ParametricDefinition
+    priors : mapping of str to float
+        Standard deviations by dotted path
     """
-    return _Builder(definition, gearbox.priors).network()
+    return _Builder(definition, priors).network()
 
 
 class _Builder:
-    """The definition at hand while its network is put together."""
+    """Assembles the network of one definition."""
 
     def __init__(self, definition: ParametricDefinition, priors: Mapping[str, float]) -> None:
         self.definition, self.priors = definition, priors
@@ -293,7 +145,7 @@ class _Builder:
 
     def _sources(self, index: int, loss: Loss) -> Iterator[Source]:
         path = f"loss.{index}"
-        constants = viscosity_constants(self.definition)
+        constants = self.definition.viscosity_constants
         T = sp.Min(sp.Max(symbol(f"T_{loss.part}"), T_LOWEST), T_HIGHEST)
         nu_ref = kinematic_viscosity_d341(self.definition.reference.temperature_degC, *constants)
         nu = kinematic_viscosity_d341(T, *constants, xp=sp) / nu_ref

@@ -8,7 +8,7 @@ from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any
 
-from models.errors import InputError
+from models.errors import InputError, shown
 
 ENDING = ".toml"
 
@@ -41,7 +41,7 @@ def read_text(source: Path | Traversable) -> str:
 
 
 def parse(text: str, *, file: str) -> dict[str, Any]:
-    """Return a TOML document as nested tables.
+    """Return a TOML document as nested tables, lists as tuples.
 
     Raises
     ------
@@ -49,6 +49,36 @@ def parse(text: str, *, file: str) -> dict[str, Any]:
         If it is not TOML; the message names line and column.
     """
     try:
-        return tomllib.loads(text)
+        document: dict[str, Any] = _with_tuples(tomllib.loads(text))
+        return document
     except (ValueError, RecursionError) as error:
         raise InputError(f"{file}: is not valid TOML: {error}") from error
+
+
+def _with_tuples(node: Any) -> Any:
+    if isinstance(node, dict):
+        return {key: _with_tuples(item) for key, item in node.items()}
+    return tuple(map(_with_tuples, node)) if isinstance(node, list) else node
+
+
+def parse_schema_1(text: str, *, file: str, kind: str) -> dict[str, Any]:
+    """Return a TOML document of schema 1 as nested tables, the key ``schema`` included.
+
+    Parameters
+    ----------
+    text : str
+    file : str
+        Name of the file, for the message
+    kind : str
+        What the document holds, in the plural, for the message
+
+    Raises
+    ------
+    InputError
+        If it is not TOML, or of another schema.
+    """
+    document = parse(text, file=file)
+    number = document.get("schema")
+    if number != 1 or isinstance(number, bool):
+        raise InputError(f"{file}: schema is {shown(number)}; this program reads {kind} of schema 1")
+    return document

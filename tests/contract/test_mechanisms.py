@@ -275,7 +275,7 @@ class TestInANetwork:
         term = placed(name)[-1]
         estimates = {key: (value, 0.1 * abs(value)) for key, value in usual(term).items()}
         finding = Finding.of(term, estimates, mechanism=name, place=term.place, says=term.says)
-        correction = Correction(gearbox=gearbox.name, gearbox_sha256=gearbox.hash, findings=(finding,))
+        correction = Correction.of(gearbox, findings=(finding,))
         write_correction(correction, tmp_path / "correction.toml")
         read = read_correction(tmp_path / "correction.toml", base)
         again = simulate("fzg", read.apply(base, as_recorded=True))

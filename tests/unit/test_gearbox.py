@@ -206,12 +206,12 @@ def test_with_values_can_set_what_was_left_open(fzg: Gearbox) -> None:
 
 @pytest.mark.parametrize(
     ("path", "value", "message"),
-    [("stage.0.friction.mu_sold", 0.1, "stage.0.friction.mu_sold is not a known key; did you mean 'mu_solid'?"),
+    [("stage.0.friction.mu_sold", 0.1, "stage.friction: 'mu_sold' is not a known key; did you mean 'mu_solid'?"),
      ("stage.1.friction.mu_solid", 0.1, "stage.1.friction.mu_solid is not a value of this gearbox; did you mean"),
      ("stage.-1.module_mm", 4.0, "is not a value of this gearbox"),
-     ("stage.0.friction.mu_solid", math.nan, "stage.0.friction.mu_solid: must be finite, not nan"),
-     ("stage.0.friction.mu_solid", "0.1", "stage.0.friction.mu_solid: must be a number, not '0.1'"),
-     ("factors.h_iar", 1.0, "factors.h_iar is not a known factor; did you mean 'h_air'?"),
+     ("stage.0.friction.mu_solid", math.nan, "stage.friction.mu_solid: must be finite, not nan"),
+     ("stage.0.friction.mu_solid", "0.1", "stage.friction.mu_solid: must be a number, not '0.1'"),
+     ("factors.h_iar", 1.0, "factors: 'h_iar' is not a known factor; did you mean 'h_air'?"),
      ("bearing.0.load_share", 0.6, "load_share of the bearings on 'shaft_1' sum to 1.1, not to 1")],
 )  # fmt: skip
 def test_with_values_validates(fzg: Gearbox, path: str, value: object, message: str) -> None:

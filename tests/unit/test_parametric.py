@@ -55,10 +55,10 @@ def test_it_is_one_of_the_gearboxes_and_knows_what_it_lacks(gearbox):
         ('name = "bearing_2"\nheat', 'name = "bearing_1"\nheat', "given 2 times"),
         ('input = "T_ambient"', 'input = "T_nacelle"', "none has input = 'T_ambient'"),
         ("speed_exponent = { value = 1.8", "speed_exponent = { value = 18.0", "speed_exponent"),
-        ("no_load_W = { value = 8000.0", "no_loads_W = { value = 8000.0", "no_loads_W is not a known key"),
+        ("no_load_W = { value = 8000.0", "no_loads_W = { value = 8000.0", "'no_loads_W' is not a known key"),
     ],
 )
-def test_faults_of_a_definition_are_told(old, new, fault):
+def test_faults_of_a_definition_are_named(old, new, fault):
     assert old in TEXT
     with pytest.raises(InputError, match=fault):
         read_gearbox(TEXT.replace(old, new), file="mine.toml")
@@ -191,7 +191,7 @@ def test_columns_of_the_farm_need_no_mapping_file(gearbox, tmp_path):
     assert "P_avg" in recording.auxiliary
 
 
-def test_a_driver_that_was_not_recorded_is_assumed_and_told(gearbox, tmp_path):
+def test_a_driver_that_was_not_recorded_is_assumed_and_noted(gearbox, tmp_path):
     (recording,) = read_recordings([_scada(tmp_path / "R1.csv", Yt_avg=None)], gearbox.network())
     assert recording.inputs["T_ambient"][0] == 20.0
     assert any("T_ambient_degC was not recorded; 20 is assumed" in note for note in recording.notes)

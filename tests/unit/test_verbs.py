@@ -66,9 +66,7 @@ def test_build_passes_correction_preset_and_platforms_on(
 ) -> None:
     asked: list[dict[str, Any]] = []
     monkeypatch.setattr(builder.build, "build", recorder(asked))
-    correction = Correction(
-        gearbox=fzg.name, gearbox_sha256=fzg.hash, calibration=(Estimate(name="mesh", value=1.07, stderr=0.02),)
-    )
+    correction = Correction.of(fzg, calibration=[Estimate(name="mesh", value=1.07, stderr=0.02)])
     write_correction(correction, tmp_path / "correction.toml")
     usual = ("build-fmu", "--output", tmp_path / "out")
     invoked(*usual)
