@@ -6,7 +6,6 @@ from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
-from joblib import delayed
 
 from diagnosis.acceptance import SECOND_GAIN
 from diagnosis.case import FLOORS, Case, heat_over_time
@@ -20,7 +19,6 @@ from diagnosis.identifiable import scale_notes
 from diagnosis.latent import LatentHeat, knots_of, latent_heat
 from diagnosis.mapping import LOSS
 from diagnosis.noise import HEAT_FRACTION, PARAMETRIC_FRACTION, PARAMETRIC_K
-from diagnosis.parallel import spread
 from diagnosis.posterior import Problem
 from diagnosis.predict import Prediction, overall_rmse, predict, rmse
 from diagnosis.recording import Recording
@@ -42,6 +40,7 @@ from diagnosis.shapes import shape_terms
 from diagnosis.stage import TEMPER, Stage, log_weights
 from models.cycle import COLUMNS
 from models.mechanisms import OPEN_FORM, Mechanism
+from models.parallel import run_parallel
 from models.types import Array
 from models.version import project_version
 
@@ -70,7 +69,7 @@ def assembled(
     detected = found.detected
     findings = tuple(finding_of(case, found.final, h, stage, catalogue) for h, stage in found.findings if detected)
     both = [found.final, found.calibrated] if detected else []
-    remaining, first = spread(jobs, [delayed(_latents)(case, explanation) for explanation in both]) or ((), ())
+    remaining, first = run_parallel(_latents, [(case, explanation) for explanation in both], jobs=jobs) or ((), ())
     unseen = _unseen(found.stages[-1], catalogue, found.threshold)
     misfit = max(found.final.misfit, found.judge.misfit if detected else 0.0)
     left = _much_is_left(misfit, first, remaining)
@@ -307,8 +306,8 @@ def _predictions(case: Case, found: Search, jobs: int) -> Predictions:
     places = [(name, index) for name, (nominal, *_) in problems.items() for index in range(len(nominal.pieces))]
     fitted = found.final.fit.without_parts().courses
     near = {"train": fitted, "holdout": (None,) * len(case.holdout.pieces)}
-    three = spread(
-        jobs, [delayed(_predicted)(*problems[name], *zs, index, near[name][index]) for name, index in places]
+    three = run_parallel(
+        _predicted, [(*problems[name], *zs, index, near[name][index]) for name, index in places], jobs=jobs
     )
     return {
         name: {state: [them[which] for (one, _), them in zip(places, three, strict=True) if one == name]

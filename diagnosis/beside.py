@@ -6,14 +6,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from joblib import delayed
 
 from diagnosis.acceptance import SECOND_GAIN, holds_out, stands
 from diagnosis.explain import Explanation, instead, linearised, without
 from diagnosis.holdout import Judge
 from diagnosis.hypotheses import Hypothesis
-from diagnosis.parallel import spread
 from diagnosis.stage import LEAST_RIVAL, LEAST_SHARE, Stage, penalised
+from models.parallel import run_parallel
 
 Found = tuple[Hypothesis, Stage]
 MOST_CHANGES = 3  # of what was found
@@ -107,11 +106,11 @@ def ranked_beside(start: Explanation, final: Explanation, found: Sequence[Found]
     """
     rivals = [_rivals(final, stage) for _, stage in found]
     work = [
-        delayed(_fitted)(start, final, final.labels.index(h.label), other)
+        (start, final, final.labels.index(h.label), other)
         for (h, _), others in zip(found, rivals, strict=True) if others is not None
         for other in (None, *others)
     ]  # fmt: skip
-    fits = iter(spread(jobs, work))
+    fits = iter(run_parallel(_fitted, work, jobs=jobs))
     result = []
     for (h, stage), others in zip(found, rivals, strict=True):
         none, *anew = [next(fits) for _ in (None, *others)] if others is not None else [None]

@@ -10,16 +10,15 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from joblib import delayed
 from scipy.special import log_ndtr
 
 from diagnosis.evidence import Marginal
 from diagnosis.hypotheses import WIDE_PRIOR, Hypothesis, Scored, white_column
 from diagnosis.network_on_grid import NetworkOnGrid
-from diagnosis.parallel import spread
 from diagnosis.posterior import Fit, Problem
 from diagnosis.reshape import reshaped
 from diagnosis.trajectory import Trajectory
+from models.parallel import run_parallel
 from models.types import Array
 
 FIRST_ITERATIONS, ROUGH_ITERATIONS, ITERATIONS = 4, 3, 10
@@ -341,10 +340,10 @@ def best_fits(base: Explanation, chosen: Sequence[tuple[Explanation, Scored]], *
     chosen = sorted(chosen, key=lambda pair: -len(pair[1].hypothesis.term.states) if pair[1].hypothesis.term else 0)
     # The base seen from elsewhere is a further start already.
     again = [view is not base and view.labels == base.labels for view, _ in chosen]
-    work = [delayed(fitted)(view, s, np.inf if it else AS_PROMISED * most)
+    work = [(view, s, np.inf if it else AS_PROMISED * most)
             for (view, s), it in zip(chosen, again, strict=True)]  # fmt: skip
     by_label: dict[str, Explanation] = {}
-    for found in spread(jobs, work):
+    for found in run_parallel(fitted, work, jobs=jobs):
         if found is not None:
             label = found.found[-1].label
             by_label[label] = max(found, by_label.get(label, found), key=lambda e: e.log_evidence)
@@ -356,7 +355,7 @@ def best_fits(base: Explanation, chosen: Sequence[tuple[Explanation, Scored]], *
         count = max(count, RACERS)
     racing, beaten = rough[:count], rough[count:]
     worth = base.log_evidence + HOPE * max(gains, default=0.0)
-    done = spread(jobs, [delayed(refined)(e, worth) for e in racing])
+    done = run_parallel(refined, [(e, worth) for e in racing], jobs=jobs)
     return sorted(_elsewhere([*done, *beaten], jobs), key=lambda e: -e.log_evidence)
 
 
@@ -373,7 +372,8 @@ def _elsewhere(fits: Sequence[Explanation], jobs: int) -> list[Explanation]:
     # What was found beside another explanation has other unknowns.
     beside = best.labels[:-1]
     again = [shaped and e is not best and e.found[-1].name == own.name and e.labels[:-1] == beside for e in fits]
-    better = iter(spread(jobs, [delayed(_started_from)(e, best) for e, it in zip(fits, again, strict=True) if it]))
+    work = [(e, best) for e, it in zip(fits, again, strict=True) if it]
+    better = iter(run_parallel(_started_from, work, jobs=jobs))
     return [next(better) if it else e for e, it in zip(fits, again, strict=True)]
 
 

@@ -13,16 +13,15 @@ from functools import partial
 from itertools import product
 
 import numpy as np
-from joblib import delayed
 
 from diagnosis.evidence import Marginal, strength
 from diagnosis.latent import white_columns
 from diagnosis.network_on_grid import NetworkOnGrid
 from diagnosis.observation import readings
-from diagnosis.parallel import spread
 from diagnosis.posterior import Fit, Linearised, Problem
 from diagnosis.term_on_grid import TermOnGrid
 from models.mechanisms import OPEN_FORM, Placed
+from models.parallel import run_parallel
 from models.terms import Term
 from models.types import Array
 
@@ -191,8 +190,8 @@ def scan(
     """
     intervals = sum(len(piece.steps) for piece in problem.pieces)
     chunks = list(_chunks(hypotheses, max(8, min(CHUNK, CHUNK_VALUES // max(intervals, 1)))))
-    work = [delayed(_scan_chunk)(problem, fit, marginal, chunk) for chunk in chunks]
-    results = spread(jobs, work, bundles=BUNDLES * jobs)
+    work = [(problem, fit, marginal, chunk) for chunk in chunks]
+    results = run_parallel(_scan_chunk, work, jobs=jobs, batches=BUNDLES * jobs)
     scored = [one for result in results for one in result]
     return sorted(scored, key=lambda s: -s.log_bayes)
 

@@ -11,7 +11,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from joblib import delayed
 
 from diagnosis.acceptance import SECOND_GAIN, holds_out, judged
 from diagnosis.beside import Found, settled_beside
@@ -29,9 +28,9 @@ from diagnosis.hypotheses import (
     two_point_columns,
 )
 from diagnosis.mapping import LOSS
-from diagnosis.parallel import spread, starting
 from diagnosis.stage import OPEN_PENALTY, Stage, log_e_value, penalised
 from models.mechanisms import OPEN_FORMS, Mechanism
+from models.parallel import run_parallel, starting_processes
 
 # Set on development cases (seed 1 of `conceal`) and by the four open ones, what is about open forms and the calibration
 # on opened proofs (seeds 2033 and 2034); a proof draws others.
@@ -130,7 +129,7 @@ def search(
         Told what is being done
     """
     progress("calibrating the model inside its priors")
-    with starting(jobs):
+    with starting_processes(jobs, __name__):
         start = base = first(case)
     threshold = threshold_at(false_alarm_rate)
     candidates = candidates_of(case, catalogue)
@@ -299,7 +298,8 @@ def _scanned(base: Explanation, hypotheses: Sequence[Hypothesis], jobs: int) -> 
     real = [s for s in scored if not s.hypothesis.is_open]
     opened = [s for s in scored if s.hypothesis.is_open]
     near = [s for s in [*real[:SHARPENED], *opened[:SHARPENED_FORMS]] if s.log_bayes > SHARPEN_FROM]
-    finer = spread(jobs, [delayed(sharpened)(base.problem, base.fit, marginal, s) for s in near], bundles=jobs)
+    work = [(base.problem, base.fit, marginal, s) for s in near]
+    finer = run_parallel(sharpened, work, jobs=jobs, batches=jobs)
     by_label = {s.hypothesis.label: s for s in finer}
     real, opened = (
         sorted((by_label.get(s.hypothesis.label, s) for s in some), key=lambda s: -s.log_bayes)

@@ -1,54 +1,90 @@
-"""Work over processes: the same results in the same order, however it is tied together."""
+"""Work over processes and on a cluster: the same results in the same order."""
 
 from __future__ import annotations
 
 import os
-import warnings
+from collections.abc import Iterator
 from uuid import uuid4
 
 import pytest
-from joblib import delayed
-from joblib.externals.loky import get_reusable_executor
+from threadpoolctl import threadpool_info
 
-from diagnosis import parallel
-from diagnosis.parallel import spread, starting
-
-
-def _worked(number: int) -> tuple[int, int]:
-    return number**2, os.getpid()
+from models.errors import InputError
+from models.parallel import iterate_parallel, run_parallel, starting_processes
 
 
-@pytest.mark.parametrize(("jobs", "bundles"), [(1, 0), (1, 3), (2, 0), (2, 1), (2, 3), (2, 50)])
-def test_results_come_in_order(jobs: int, bundles: int) -> None:
-    found = spread(jobs, [delayed(_worked)(number) for number in range(7)], bundles=bundles)
+def _worked(number: int, exponent: int) -> tuple[int, int]:
+    return number**exponent, os.getpid()
+
+
+ITEMS = [(number, 2) for number in range(7)]
+
+
+@pytest.fixture(scope="module")
+def scheduler() -> Iterator[str]:
+    distributed = pytest.importorskip("distributed", reason="the extra 'dask' is not installed")
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=True, protocol="tcp", dashboard_address=None
+    ) as cluster:
+        yield cluster.scheduler_address
+
+
+@pytest.mark.parametrize(("jobs", "batches"), [(1, None), (1, 3), (2, None), (2, 1), (2, 3), (2, 50), (None, None)])
+def test_results_come_in_order(jobs: int | None, batches: int | None) -> None:
+    found = run_parallel(_worked, ITEMS, jobs=jobs, batches=batches)
     assert [result for result, _ in found] == [number**2 for number in range(7)]
-    elsewhere = {process for _, process in found} - {os.getpid()}
-    assert bool(elsewhere) == (jobs > 1)
+    if jobs is not None:
+        assert (os.getpid() not in {process for _, process in found}) == (jobs > 1)
 
 
-def test_one_call_alone_stays_here() -> None:
-    assert spread(2, [delayed(_worked)(3)]) == [(9, os.getpid())]
-    assert spread(2, []) == []
+def test_a_cluster_does_the_work(scheduler: str) -> None:
+    found = run_parallel(_worked, ITEMS, dask=scheduler)
+    assert [result for result, _ in found] == [number**2 for number in range(7)]
+    assert os.getpid() not in {process for _, process in found}
+    assert sorted(result for result, _ in iterate_parallel(_worked, ITEMS, dask=scheduler)) == sorted(
+        number**2 for number in range(7)
+    )
 
 
-def test_processes_that_were_started_are_those_that_work() -> None:
-    get_reusable_executor().shutdown(wait=True)  # those of other tests may be ended any time, for their memory
-    with starting(2):
-        pass
-    before = {process for _, process in spread(2, [delayed(_worked)(number) for number in range(8)])}
-    with starting(2):
-        pass
-    after = {process for _, process in spread(2, [delayed(_worked)(number) for number in range(8)])}
-    assert len(before | after) <= 2
+def test_one_item_and_none_need_no_process() -> None:
+    assert run_parallel(_worked, [(3, 2)], jobs=2) == [(9, os.getpid())]
+    assert run_parallel(_worked, [], jobs=2) == []
 
 
-def test_what_fails_meanwhile_is_told() -> None:
-    with pytest.raises(ArithmeticError, match="no solution"), starting(2):
+def test_results_come_as_they_are_completed_and_items_as_they_are_needed() -> None:
+    taken = []
+
+    def items() -> Iterator[tuple[int, int]]:
+        for item in ITEMS:
+            taken.append(item)
+            yield item
+
+    results = iterate_parallel(_worked, items(), jobs=1)
+    next(results)
+    assert len(taken) < len(ITEMS)
+    assert sorted(result for result, _ in results) == [number**2 for number in range(1, 7)]
+
+
+def test_a_failure_arrives_and_processes_started_before_do_not_hide_it() -> None:
+    with pytest.raises(ZeroDivisionError):
+        run_parallel(divmod, [(1, 1), (1, 0)], jobs=2)
+    with pytest.raises(ArithmeticError, match="no solution"), starting_processes(2, "models.parallel"):
         raise ArithmeticError("no solution")
 
 
+def _threads() -> int:
+    import numpy  # noqa: F401, ICN001 - its BLAS is counted
+
+    return max((pool["num_threads"] for pool in threadpool_info()), default=1)
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_every_call_has_one_blas_thread(jobs: int) -> None:
+    assert run_parallel(_threads, [(), ()], jobs=jobs) == [1, 1]
+
+
 class _Shared:
-    """Something that tells how often it travelled."""
+    """Something that knows whether it was sent."""
 
     def __init__(self) -> None:
         self.arrived = "never"
@@ -62,28 +98,18 @@ def _arrived(shared: _Shared) -> str:
     return shared.arrived
 
 
-@pytest.mark.parametrize("bundles", [0, 2])
-def test_what_a_bundle_has_in_common_travels_once(bundles: int) -> None:
+@pytest.mark.parametrize("batches", [None, 2])
+def test_what_a_batch_has_in_common_is_sent_once(batches: int | None) -> None:
     shared = _Shared()
-    arrivals = set(spread(2, [delayed(_arrived)(shared) for _ in range(24)], bundles=bundles))
-    assert len(arrivals) == (bundles or 24)
+    arrivals = set(run_parallel(_arrived, [(shared,) for _ in range(24)], jobs=2, batches=batches))
+    assert len(arrivals) == (batches or 24)
 
 
-@pytest.mark.parametrize(("text", "shown"), [("A worker stopped while some jobs were given to the executor.", False),
-                                             ("something else", True)])  # fmt: skip
-def test_only_the_warning_of_a_replaced_process_is_kept_quiet(
-    monkeypatch: pytest.MonkeyPatch, text: str, shown: bool
-) -> None:
-    class Stub:
-        def __init__(self, **_: object) -> None:
-            pass
-
-        def __call__(self, work: list[object]) -> list[int]:
-            warnings.warn(text, UserWarning, stacklevel=1)
-            return list(range(len(work)))
-
-    monkeypatch.setattr(parallel, "Parallel", Stub)
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        assert spread(2, [delayed(_worked)(number) for number in range(3)]) == [0, 1, 2]
-    assert bool(caught) is shown
+def test_a_scheduler_that_does_not_answer_and_a_missing_dask_are_input_errors(monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("distributed", reason="the extra 'dask' is not installed")
+    monkeypatch.setattr("models.parallel.CONNECT_S", 0.3)
+    with pytest.raises(InputError, match=r"no dask scheduler answers at tcp://127.0.0.1:1 .*port open"):
+        run_parallel(abs, [(1,)], dask="tcp://127.0.0.1:1")
+    monkeypatch.setitem(__import__("sys").modules, "distributed", None)
+    with pytest.raises(InputError, match="install the extra 'dask'"):
+        run_parallel(abs, [(1,)], dask="tcp://127.0.0.1:1")
