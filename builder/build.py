@@ -30,7 +30,6 @@ from models.gearbox import Gearbox
 from models.types import Array
 from models.version import project_version
 
-ALL_CORES = -1
 SUFFIX = {"python": "", "native": "_native"}  # of the files' names
 
 
@@ -182,7 +181,7 @@ def build(
         with _timed("train", seconds), _spoken() as tell:
             training = train_surrogate(
                 gearbox, preset=preset, samples=samples, seed=seed,
-                jobs=ALL_CORES if jobs is None else jobs, dask_address=dask_address, progress=tell,
+                jobs=jobs, dask_address=dask_address, progress=tell,
             )  # fmt: skip
         fmus = {kind: stage / f"{name}{SUFFIX[kind]}.fmu" for kind in kinds}
         with _timed("export", seconds):

@@ -18,7 +18,6 @@ from threadpoolctl import threadpool_limits
 
 from builder import console
 from builder.build import staging
-from builder.doe import on_dask
 from builder.files import refuse_to_replace, write_table
 from diagnosis import diagnose
 from diagnosis.files import names_of_files, write_files
@@ -28,6 +27,7 @@ from diagnosis.result import Diagnosis
 from models.errors import InputError
 from models.gearbox import Gearbox
 from models.mechanisms import Mechanism
+from models.parallel import _dask_cluster as on_dask
 
 HELD_OUT = "hold"  # how names of recordings, or of a folder of them, to judge by begin
 SUMMARY = "summary.csv"

@@ -19,7 +19,6 @@ from builder.fmu import gearbox_identity, gearbox_pages, refuse_mismatch, write_
 from builder.model_description import Identity, guid_of, model_description
 from builder.native_compile import PLATFORMS, compile_libraries
 from builder.native_data import gearbox_sources, number
-from builder.onnx_export import read_network
 from builder.signals import Signal, SignalTable, signal_table
 from builder.train import TrainingResult
 from models.correction import Correction, corrected_network
@@ -108,11 +107,7 @@ def build_native_fmu(
     """
     network = corrected_network(gearbox, correction) if network is None else network
     refuse_mismatch(network, training.losses, networks)
-    by_name = {path.name: path for path in networks}
-    losses = replace(
-        training.losses,
-        networks=tuple(read_network(by_name[f"{n.name}.onnx"], n) for n in training.losses.networks),
-    )
+    losses = training.losses
     table = signal_table(gearbox, network, losses)
     identity = gearbox_identity(gearbox, output, FLAGS, correction)
     written = {name: native_source(name) for name in GEARBOX_MODEL}

@@ -19,10 +19,10 @@ from pathlib import Path
 from typing import Any
 
 from builder.build import staging
-from builder.doe import on_dask
 from diagnosis.proof import protocol
 from diagnosis.proof.protocol import BLIND, Settings, Task
 from models.gearbox import load_gearbox, names_a_file
+from models.parallel import _dask_cluster as on_dask
 
 PAGE, NUMBERS = "proof.html", "proof.json"
 REFUSED = 2  # exit status of a diagnosis that does not accept its recordings

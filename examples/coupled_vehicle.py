@@ -53,7 +53,7 @@ def build_system(folder: Path, gearbox_fmu: Path) -> Path:
 def build_gearbox(folder: Path) -> Path:
     """Train the FZG rig's networks and build its native FMU for this machine."""
     gearbox = load_gearbox("fzg")
-    training = train_surrogate(gearbox, jobs=-1)
+    training = train_surrogate(gearbox, jobs=None)
     networks = export_onnx(training, folder / "networks", version=project_version())
     return build_native_fmu(gearbox, training, networks, folder / "gearbox.fmu", platforms="host").path
 

@@ -17,7 +17,7 @@ from diagnosis.proof.effect import Concealed, Grip, Hook
 from diagnosis.proof.integrator import sdirk_step
 from models.gearbox import Gearbox
 from models.heat_transfer import KELVIN, STEFAN_BOLTZMANN
-from models.losses import RPM
+from models.loss_term import RPM
 from models.types import Array
 
 REFERENCE_SPEED = 0.415  # of the top speed
@@ -162,6 +162,7 @@ class Plant:
         self.anatomy = Anatomy(gearbox)
         nominal = gearbox.losses()
         self.components = nominal.components
+        self.oil = gearbox.lubricant()
         self.losses = tuple(gearbox.with_values(reading).losses() for reading in READINGS)
         self.speed_top = top_speed(gearbox)
         n, M = REFERENCE_SPEED * self.speed_top, reference_torque(gearbox)
@@ -173,8 +174,8 @@ class Plant:
         forced, free = self.anatomy.convection
         self.shed_ref = float(np.cbrt(forced**3 + free**3) + RADIATION_REF) * gearbox.housing.outside_area_m2
         self.warmth = self.loss_ref / self.shed_ref / FZG_RISE_K
-        at = np.array([n]), np.array([M]), np.array([[80.0, 80.0]])
-        sliding = [float(model.mesh_power(*at)[0, 0]) for model in (nominal, *self.losses)]
+        at = np.array([n]), np.array([M]), dict.fromkeys(self.anatomy.gears, np.array([80.0]))
+        sliding = [float(model.term("mesh").power(*at)[0, 0]) for model in (nominal, *self.losses)]
         self.reading_scale = np.array([sliding[0] / own for own in sliding[1:]])
         paths, index = self.anatomy.paths, self.anatomy.index
         self.a = np.array([index[path.ends[0]] for path in paths])
@@ -375,21 +376,22 @@ class _Batch:
         """Loss of every component, shape (B, c), [W]; thinner oil is read as hotter oil, except by the seals."""
         index, anatomy = self.plant.anatomy.index, self.plant.anatomy
         oil = moment.T[:, index[SUMP]]
-        gears = np.stack([moment.T[:, index[f"{gear}.rim"]] for gear in anatomy.gears], axis=1)
-        loss = np.empty((len(oil), len(self.plant.components)))
         thin = moment.thinning
+        gears = {gear: moment.T[:, index[f"{gear}.rim"]] + thin for gear in anatomy.gears}
+        mesh = np.empty((len(oil), 2))
         for reading in np.unique(self.reading):
             of = self.reading == reading
-            model = self.plant.losses[reading]
-            loss[of, :2] = model.mesh_power(moment.speed[of], moment.torque[of], gears[of] + thin[of, None])
-        model = self.plant.losses[0]
-        first_bearing = len(self.plant.components) - len(anatomy.bearings)
-        loss[:, 2:first_bearing] = model.no_load_power(moment.speed, oil)
-        for k, bearing in enumerate(anatomy.bearings):
-            T_bearing = moment.T[:, index[bearing]]
-            load = moment.torque * moment.bearing_load[:, k]
-            loss[:, first_bearing + k] = model.bearing_power(k, moment.speed, load, oil + thin, T_bearing + thin)
-        return np.asarray(loss * self.loss_factor)
+            at = {gear: T[of] for gear, T in gears.items()}
+            mesh[of] = self.plant.losses[reading].term("mesh").power(moment.speed[of], moment.torque[of], at)
+        columns = [mesh]
+        for term in self.plant.losses[0].terms:
+            if term.name in anatomy.bearings:
+                load = moment.torque * moment.bearing_load[:, anatomy.bearings.index(term.name)]
+                at = {OIL: oil + thin, term.name: moment.T[:, index[term.name]] + thin}
+                columns.append(term.power(moment.speed, load, at))
+            elif term.name != MESH:
+                columns.append(term.power(moment.speed, moment.torque, {OIL: oil}))
+        return np.asarray(np.concatenate(columns, axis=1) * self.loss_factor)
 
     def _conductances(self, moment: Moment) -> Array:
         G = self.base.copy()
@@ -454,7 +456,7 @@ class _Batch:
 
         Smooth where the usual forms change regime; constants as in Dorfman 1963 and de Winter, Blok 1974, from memory.
         """
-        oil, pair = self.plant.losses[0].mesh.oil, self.plant.anatomy.pair
+        oil, pair = self.plant.oil, self.plant.anatomy.pair
         omega = np.maximum(speed, 0.0) * RPM / (1.0 if gear == 0 else pair.u)
         nu = oil.kinematic_viscosity(T_oil) * 1e-6
         rho, c, k = oil.density(T_SERVICE), oil.specific_heat(T_SERVICE), oil.conductivity(T_SERVICE)
