@@ -163,7 +163,7 @@ class LossTerm:
         Array, shape (N, components)
             [W]
         """
-        return power_of((self,), speed, torque, temperatures)[0]
+        return np.asarray(power_of((self,), speed, torque, temperatures)[0])
 
 
 def power_of(terms: Sequence[LossTerm], speed: Array, torque: Array, temperatures: Mapping[str, Array]) -> Array:
