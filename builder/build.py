@@ -180,7 +180,7 @@ def build(
         with _timed("train", seconds), _spoken() as tell:
             training = train_surrogate(
                 gearbox, preset=preset, samples=samples, seed=seed,
-                jobs=jobs, dask_address=dask, progress=tell,
+                jobs=jobs, dask=dask, progress=tell,
             )  # fmt: skip
         fmus = {kind: stage / f"{name}{SUFFIX[kind]}.fmu" for kind in kinds}
         with _timed("export", seconds):

@@ -1,21 +1,18 @@
 """Design of experiments: operating points for training and for judging, and their losses from the full model.
 
-Points depend on their seed only, losses on the points only: the work is cut into the same blocks whoever does it, one
-process, several (``jobs``) or a dask cluster (``dask_address``).
+Points depend on their seed only, losses on the points only: the work is cut into the same blocks for one process,
+several (``jobs``) or a Dask cluster (``dask``).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, nullcontext
+from collections.abc import Callable, Sequence
 
 import numpy as np
-from joblib import Parallel, delayed, parallel_config
 from numpy.typing import ArrayLike
 from scipy.stats import qmc
-from threadpoolctl import threadpool_limits
 
-from models.errors import InputError
+from models.parallel import run_parallel
 from models.surrogate import Feature, feature_values
 from models.types import Array
 
@@ -25,7 +22,6 @@ Losses = Callable[[Array], Array]
 BLOCK_ROWS = 256  # operating points per task, fixed: the blocks must not depend on the number of processes
 EDGE = 0.03  # share of the dense points that is moved up to the lower edge
 GRID = 4001  # support points of the inverse of a spacing
-CONNECT_S = 10.0  # within which a scheduler has to answer
 
 
 def latin_hypercube(count: int, lower: ArrayLike, upper: ArrayLike, *, seed: int) -> Array:
@@ -69,9 +65,9 @@ def mixed_hypercube(
     """Latin hypercube of equal parts: speed, load and temperatures are each uniform, or denser at the low end.
 
     Uniform points alone leave the slow, light, cold corner empty, where every cold start begins; dense points alone
-    leave the largest losses thin. All combinations are met alike: slow and cold, fast and cold, fast and unloaded.
-    Temperatures are dense together. Dense points reach a little below the lowest speed and load and are moved up to it,
-    so that this edge, which everything below is held at, is well known.
+    leave the largest losses thin. All combinations are equally frequent: slow and cold, fast and cold, fast and
+    unloaded. Temperatures are dense together. Dense points reach a little below the lowest speed and load and are moved
+    up to it, so that this edge, which everything below is held at, is well known.
 
     Parameters
     ----------
@@ -109,7 +105,7 @@ def random_points(count: int, lower: ArrayLike, upper: ArrayLike, *, seed: int) 
     return np.random.default_rng([seed, 1]).uniform(low, high, (count, len(low)))
 
 
-def sample_losses(losses: Losses, points: Array, *, jobs: int = 1, dask_address: str | None = None) -> Array:
+def sample_losses(losses: Losses, points: Array, *, jobs: int | None = 1, dask: str | None = None) -> Array:
     """Losses at many points, in blocks that may be computed by several processes or machines.
 
     Parameters
@@ -117,58 +113,23 @@ def sample_losses(losses: Losses, points: Array, *, jobs: int = 1, dask_address:
     losses : callable, (N, inputs) -> (N, outputs)
         For example one of :mod:`builder.networks`; picklable
     points : Array, shape (N, inputs)
-    jobs : int
-        Processes on this machine; -1 for all cores
-    dask_address : str, optional
+    jobs : int or None
+        Processes on this machine; None for one per core
+    dask : str, optional
         Address of a dask scheduler (``"tcp://host:8786"``) that does the work instead
 
     Returns
     -------
     Array, shape (N, outputs)
-        The same numbers whatever computed them
+        Numbers do not depend on `jobs` and `dask`
 
     Raises
     ------
     InputError
         If dask is not installed or the scheduler cannot be reached.
     """
-    blocks = [points[start : start + BLOCK_ROWS] for start in range(0, len(points), BLOCK_ROWS)]
-    with on_dask(dask_address) if dask_address else nullcontext():
-        parts = Parallel(n_jobs=None if dask_address else jobs)(delayed(_one_thread)(losses, block) for block in blocks)
-    return np.concatenate(list(parts))
-
-
-def _one_thread(losses: Losses, block: Array) -> Array:
-    with threadpool_limits(1):
-        return losses(block)
-
-
-@contextmanager
-def on_dask(address: str) -> Iterator[None]:
-    """Let joblib work on a dask cluster.
-
-    Parameters
-    ----------
-    address : str
-        Of its scheduler (``"tcp://host:8786"``)
-
-    Raises
-    ------
-    InputError
-        If dask is not installed or the scheduler cannot be reached.
-    """
-    try:
-        from distributed import Client
-    except ImportError as error:
-        raise InputError("a dask address is given but dask is not installed; install the extra 'dask'") from error
-    try:
-        client = Client(address, timeout=CONNECT_S)
-    except (OSError, ValueError) as error:  # a TimeoutError is an OSError
-        raise InputError(
-            f"no dask scheduler answers at {address} ({error}); is it running, is the port open?"
-        ) from error
-    with client, parallel_config(backend="dask", client=client):
-        yield
+    blocks = [(points[start : start + BLOCK_ROWS],) for start in range(0, len(points), BLOCK_ROWS)]
+    return np.concatenate(run_parallel(losses, blocks, jobs=jobs, dask=dask))
 
 
 def _unit_hypercube(count: int, inputs: int, seed: int) -> Array:

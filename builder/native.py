@@ -18,7 +18,6 @@ from builder.fmu_package import gearbox_identity, gearbox_pages, package_fmu, re
 from builder.model_description import Identity, guid_of, model_description
 from builder.native_compile import PLATFORMS, compile_libraries
 from builder.native_data import gearbox_sources, number
-from builder.onnx_export import read_network
 from builder.signals import Signal, SignalTable, signal_table
 from builder.train import TrainingResult
 from builder.twin_data import twin_data
@@ -108,11 +107,7 @@ def build_native_fmu(
     """
     network = corrected_network(gearbox, correction) if network is None else network
     refuse_mismatch(network, training.losses, networks)
-    by_name = {path.name: path for path in networks}
-    losses = replace(
-        training.losses,
-        networks=tuple(read_network(by_name[f"{n.name}.onnx"], n) for n in training.losses.networks),
-    )
+    losses = training.losses
     table = signal_table(gearbox, network, losses)
     identity = gearbox_identity(gearbox, output, FLAGS, correction)
     data = twin_data(table, network, training.losses, definition=gearbox.hash)

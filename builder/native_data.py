@@ -1,6 +1,6 @@
 """The generated C of a gearbox's native FMU: sizes, tables, weights and laws. What uses them is hand-written C.
 
-Everything follows from the table of signals, the network and the trained losses; the same arguments give the same text.
+Everything follows from the table of signals, the network and the trained losses; equal arguments give equal text.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from builder.signals import Signal, SignalTable
 from builder.units import UNITS
 from models.compiled import c_law_source, law_expressions
 from models.network import ThermalNetwork
-from models.surrogate import KELVIN, LN10, Feature, Network, SurrogateLosses, feature_values
+from models.surrogate import KELVIN, LN10, Feature, Network, SurrogateLosses, Use, feature_values
 from models.types import Array
 
 Indices = NDArray[np.intp]
@@ -87,7 +87,6 @@ def gearbox_sources(table: SignalTable, network: ThermalNetwork, losses: Surroga
     network : ThermalNetwork
         Without numeric laws
     losses : SurrogateLosses
-        With the networks as their ONNX files hold them
 
     Raises
     ------
@@ -121,7 +120,7 @@ class _Data:
         self.defines.append(f"#define {name} {value if isinstance(value, int) else number(value)}")
 
     def array(self, kind: str, name: str, values: Iterable[Any]) -> None:
-        """A constant array; an empty one gets an element that nobody reads, as C has no empty arrays."""
+        """A constant array; an empty one gets an element that is not read, as C has no empty arrays."""
         texts = [value if isinstance(value, str) else number(value) if isinstance(value, float) else str(value)
                  for value in values]  # fmt: skip
         self.declared.append(f"extern const {kind} {name}[{max(len(texts), 1)}];")
@@ -199,7 +198,7 @@ def _laws_header() -> str:
 
 
 def _laws(network: ThermalNetwork) -> str:
-    """Arguments stand as in the struct Signals of thermal_network.h."""
+    """The order of the arguments is that of the struct Signals of thermal_network.h."""
     groups = [
         ["time"],
         ["speed", "torque", *network.inputs],
@@ -208,7 +207,7 @@ def _laws(network: ThermalNetwork) -> str:
         [state.name for state in network.states],
         [f"P_{name}" for name in network.components],
     ]
-    names = [name for group in groups for name in group or ["-"]]  # an empty group has one element that nobody reads
+    names = [name for group in groups for name in group or ["-"]]  # an empty group has one element that is not read
     places = {name: f"s[{index}]" for index, name in enumerate(names)}
     functions = c_law_source(network, places)
     alone = {parameter.name: f"s[{index}]" for index, parameter in enumerate(network.parameters)}
@@ -271,7 +270,7 @@ def _loss_data(data: _Data, network: ThermalNetwork, losses: SurrogateLosses) ->
 
 
 class _Pool:
-    """Numbers of one kind that are computed once, whoever uses them."""
+    """Numbers of one type that are computed once for all uses."""
 
     def __init__(self) -> None:
         self.entries: list[tuple[Any, ...]] = []
@@ -293,7 +292,7 @@ class _Features:
         self.rows, self.logs, self.viscosities = _Pool(), _Pool(), _Pool()
         self.features: list[tuple[str, int]] = []
 
-    def add(self, trained: Network, use: Any, kind: Feature, column: int) -> None:
+    def add(self, trained: Network, use: Use, kind: Feature, column: int) -> None:
         row = self.rows.place(self.columns[use.sources[column]], float(use.factors[column]), trained.lower[column],
                               trained.upper[column])  # fmt: skip
         if kind == "value":
@@ -333,7 +332,7 @@ class _Blocks:
         self.net_of: dict[str, tuple[int, bool]] = {}
         self.largest = 0.0
 
-    def add(self, trained: Network, use: Any) -> None:
+    def add(self, trained: Network, use: Use) -> None:
         begin = len(self.features.features)
         for kind, column in trained.features:
             self.features.add(trained, use, kind, column)
@@ -400,7 +399,7 @@ def _largest_sum(trained: Network) -> float:
 
 
 def _parts(trained: Network) -> list[tuple[Indices, Indices, Indices]]:
-    """Units of the first layer, of the second, and outputs of every part of a network that stands alone."""
+    """Units of the first and second layer and outputs of every part of a network that shares no unit with others."""
     h_1, h_2, n_out = len(trained.biases[0]), len(trained.biases[1]), len(trained.biases[2])
     joined: Array = np.zeros((h_1 + h_2 + n_out,) * 2)
     joined[:h_1, h_1 : h_1 + h_2] = trained.weights[1]

@@ -1,6 +1,7 @@
-"""Which networks a gearbox gets: inputs, outputs, bounds, the losses to learn, and the presets of training.
+"""The table of networks of a gearbox: inputs, outputs, bounds, the losses to learn; and the presets of training.
 
-One network for the mesh, one for the losses without load, and one for every kind of bearing, used once per bearing.
+It is derived from the loss terms: one network for the mesh, one for the losses without load, and one for every kind of
+bearing, used once per bearing.
 """
 
 from __future__ import annotations
@@ -11,7 +12,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from models.errors import InputError, did_you_mean
-from models.losses import SPEED_FLOOR_RPM, TORQUE_FLOOR_NM, LossModel
+from models.loss_term import SPEED, SPEED_FLOOR_RPM, TORQUE, TORQUE_FLOOR_NM, LossTerm
+from models.losses import LossModel
 from models.surrogate import Feature, Use
 from models.types import Array
 
@@ -33,6 +35,10 @@ class Domain:
     speed_rpm: Bounds
     torque_Nm: Bounds
     temperature_degC: Bounds
+
+    def of(self, source: str) -> Bounds:
+        """Return the bounds of speed, torque, or the temperature of a node."""
+        return {SPEED: self.speed_rpm, TORQUE: self.torque_Nm}.get(source, self.temperature_degC)
 
     def above_floors(self) -> Domain:
         """Return the range above the full model's lowest speed and torque: below, losses are linear.
@@ -129,144 +135,115 @@ def preset_named(name: str) -> Preset:
     return PRESETS[name]
 
 
-@dataclass(frozen=True)
-class MeshLosses:
-    """Rows (speed [1/min], torque [N m], both gears' temperatures [degC]) to sliding and rolling loss [W]."""
-
-    model: LossModel
-
-    def __call__(self, rows: Array) -> Array:
-        """Evaluate the full model."""
-        return self.model.mesh_power(rows[:, 0], rows[:, 1], rows[:, 2:4])
-
-
-@dataclass(frozen=True)
-class NoLoadLosses:
-    """Rows (speed [1/min], oil temperature [degC]) to churning and seal losses [W]."""
-
-    model: LossModel
-
-    def __call__(self, rows: Array) -> Array:
-        """Evaluate the full model."""
-        return self.model.no_load_power(rows[:, 0], rows[:, 1])
-
-
-@dataclass(frozen=True)
-class BearingLosses:
-    """Rows (own speed [1/min], radial load [N], oil and bearing temperature [degC]) to the loss [W] of a bearing."""
-
-    model: LossModel
-    index: int
-
-    def __call__(self, rows: Array) -> Array:
-        """Evaluate the full model."""
-        speed = rows[:, 0] / self.model.bearing_speed_ratio[self.index]
-        torque = rows[:, 1] / load_per_torque(self.model, self.index)
-        return self.model.bearing_power(self.index, speed, torque, rows[:, 2], rows[:, 3])[:, None]
-
-
-def load_per_torque(model: LossModel, index: int) -> float:
-    """Radial load of one bearing per input torque, [N/(N m)]."""
-    return float(model.bearing_radial_load(index, np.array([1.0]))[0])
-
-
 @dataclass(frozen=True, kw_only=True)
 class NetworkSpec:
-    """One network to train.
+    """One network to train: derived from the loss terms that it learns.
 
     Attributes
     ----------
     name, kind : str
-        Kind is mesh, no_load or bearing
-    inputs, outputs : tuple of str
+        Name of the network, and of the size in :attr:`Preset.hidden`
+    outputs : tuple of str
         Names with units
     lower, upper : tuple of float
         Bounds of the inputs
-    powers : tuple of tuple of float, shape (outputs, inputs)
-        Powers of the inputs that the losses are divided by before their logarithm is taken
-    losses : callable, (N, inputs) -> (N, outputs)
-        The full model
-    uses : tuple of Use
+    terms : tuple of LossTerm
+        If `shared`, the terms of one law, of which each uses the network for itself; else terms that read the same
+        inputs, whose losses are its outputs
+    shared : bool
     """
 
     name: str
     kind: str
-    inputs: tuple[str, ...]
     outputs: tuple[str, ...]
     lower: tuple[float, ...]
     upper: tuple[float, ...]
-    powers: tuple[tuple[float, ...], ...]
-    losses: MeshLosses | NoLoadLosses | BearingLosses
-    uses: tuple[Use, ...]
+    terms: tuple[LossTerm, ...]
+    shared: bool
+
+    @property
+    def sampled(self) -> tuple[LossTerm, ...]:
+        """Terms that the full model is sampled for: of a shared network the one on the slowest shaft.
+
+        Its speed stays above the full model's lowest speed over all of the range.
+        """
+        return (min(self.terms, key=lambda term: term.inputs[0].factor),) if self.shared else self.terms
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names with units."""
+        return tuple(i.name for i in self.terms[0].inputs)
+
+    @property
+    def powers(self) -> Array:
+        """Powers of the inputs that losses are divided by before their logarithm is taken, (outputs, inputs)."""
+        return np.concatenate([term.kind.powers for term in self.sampled])
 
     @property
     def dense(self) -> tuple[Feature, ...]:
         """Feature of each input in which half of the points are uniform."""
-        return tuple("viscosity" if name.endswith("_degC") else "log" for name in self.inputs)
+        return tuple("log" if i.source in (SPEED, TORQUE) else "viscosity" for i in self.terms[0].inputs)
+
+    @property
+    def uses(self) -> tuple[Use, ...]:
+        """Every use of the network."""
+        groups = [(term,) for term in self.terms] if self.shared else [self.terms]
+        return tuple(
+            Use(
+                self.name,
+                tuple(i.source for i in terms[0].inputs),
+                tuple(i.factor for i in terms[0].inputs),
+                tuple(name for term in terms for name in term.components),
+            )
+            for terms in groups
+        )
 
     def features(self, *, transforms: bool) -> tuple[tuple[Feature, int], ...]:
-        """Features of the network, those of a kind side by side."""
+        """Features of the network, those of one type next to each other."""
         if not transforms:
             return tuple(("value", column) for column in range(len(self.inputs)))
         logs: list[tuple[Feature, int]] = [("log", i) for i, kind in enumerate(self.dense) if kind == "log"]
         hot = [i for i, kind in enumerate(self.dense) if kind == "viscosity"]
         return (*logs, *(("viscosity", i) for i in hot), *(("log_kelvin", i) for i in hot))
 
+    def losses(self, rows: Array) -> Array:
+        """Losses of the full model [W], shape (N, outputs), at rows of inputs, shape (N, inputs)."""
+        found = []
+        for term in self.sampled:
+            at = {i.source: rows[:, column] / i.factor for column, i in enumerate(term.inputs)}
+            found.append(term.power(at[SPEED], at.get(TORQUE, at[SPEED]), at))
+        return np.concatenate(found, axis=1)
+
 
 def network_specs(model: LossModel, domain: Domain) -> tuple[NetworkSpec, ...]:
-    """Return the networks of a gearbox, the most laborious first."""
-    speed, torque, temperature = domain.speed_rpm, domain.torque_Nm, domain.temperature_degC
-    bearings = len(model.bearing_speed_ratio)
-    no_load = model.components[2 : len(model.components) - bearings]
-    bearing_components, bearing_nodes = model.components[-bearings:], model.temperature_nodes[-bearings:]
-    gears = model.temperature_nodes[1:3]
+    """Return the networks of a gearbox, those of the most inputs (the most laborious) first."""
+    learnt: dict[str, list[LossTerm]] = {}
+    for terms in model.groups:
+        kind = terms[0].kind
+        known = sum(name.startswith(f"{kind.network}s_") for name in learnt)
+        name = f"{kind.network}s_{known + 1}" if kind.alike else kind.network
+        learnt.setdefault(name, []).extend(terms)
+    specs = [_spec(name, tuple(terms), domain) for name, terms in learnt.items()]
+    return tuple(sorted(specs, key=lambda spec: -len(spec.inputs)))
 
-    mesh = NetworkSpec(
-        name="mesh",
-        kind="mesh",
-        inputs=("speed_rpm", "torque_Nm", *(f"T_{gear}_degC" for gear in gears)),
-        outputs=("mesh_sliding_W", "mesh_rolling_W"),
-        lower=(speed[0], torque[0], temperature[0], temperature[0]),
-        upper=(speed[1], torque[1], temperature[1], temperature[1]),
-        # Rolling goes with film thickness times speed, n^0.67 n.
-        powers=((1.0, 1.0, 0.0, 0.0), (1.67, 0.0, 0.0, 0.0)),
-        losses=MeshLosses(model),
-        uses=(Use("mesh", ("speed", "torque", *gears), (1.0,) * 4, model.components[:2]),),
+
+def _spec(name: str, terms: tuple[LossTerm, ...], domain: Domain) -> NetworkSpec:
+    kind, bounds = terms[0].kind, []
+    for column, first in enumerate(terms[0].inputs):
+        factors = [term.inputs[column].factor for term in terms]
+        low, high = domain.of(first.source)
+        if first.lowest is None:
+            bounds.append((min(factors) * low, max(factors) * high))
+        else:
+            bounds.append((first.lowest, max(max(factors) * high, 2.0 * first.lowest)))
+    lower, upper = zip(*bounds, strict=True)
+    components = [component for term in terms for component in term.components]
+    return NetworkSpec(
+        name=name,
+        kind=kind.network,
+        outputs=(f"{kind.name}_W",) if kind.alike else tuple(f"{component}_W" for component in components),
+        lower=lower,
+        upper=upper,
+        terms=terms,
+        shared=kind.alike,
     )
-    unloaded = NetworkSpec(
-        name="no_load",
-        kind="no_load",
-        inputs=("speed_rpm", "T_oil_degC"),
-        outputs=tuple(f"{name}_W" for name in no_load),
-        lower=(speed[0], temperature[0]),
-        upper=(speed[1], temperature[1]),
-        powers=((1.5, 0.0), *(((1.0, 0.0),) * (len(no_load) - 1))),
-        losses=NoLoadLosses(model),
-        uses=(Use("no_load", ("speed", "oil"), (1.0, 1.0), no_load),),
-    )
-    kinds = []
-    for number, group in enumerate(model.bearing_groups, start=1):
-        name = f"bearings_{number}"
-        ratio = [model.bearing_speed_ratio[i] for i in group]
-        load = [load_per_torque(model, i) for i in group]
-        # Below the bearing's own weight the load does not matter.
-        lightest = model.bearings[group[0]].lightest_load
-        heaviest = max(max(load) * torque[1], 2.0 * lightest)
-        kinds.append(
-            NetworkSpec(
-                name=name,
-                kind="bearing",
-                inputs=("speed_rpm", "radial_load_N", "T_oil_degC", "T_bearing_degC"),
-                outputs=("bearing_W",),
-                lower=(min(ratio) * speed[0], lightest, temperature[0], temperature[0]),
-                upper=(max(ratio) * speed[1], heaviest, temperature[1], temperature[1]),
-                powers=((1.0, 0.0, 0.0, 0.0),),
-                # The slowest shaft's bearing stays above the full model's lowest speed over all of the range.
-                losses=BearingLosses(model, group[int(np.argmin(ratio))]),
-                uses=tuple(
-                    Use(name, ("speed", "torque", "oil", bearing_nodes[i]), (r, f, 1.0, 1.0), (bearing_components[i],))
-                    for i, r, f in zip(group, ratio, load, strict=True)
-                ),
-            )
-        )
-    return (mesh, *kinds, unloaded)

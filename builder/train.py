@@ -1,4 +1,4 @@
-"""Training of a gearbox's surrogate: sample the full model, fit the networks, judge them on points they never saw."""
+"""Training of a gearbox's surrogate: sample the full model, fit networks, report their errors on separate points."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from joblib import Parallel, delayed
 from sklearn.model_selection import train_test_split
 
 from builder.doe import latin_hypercube, mixed_hypercube, random_points, sample_losses
 from builder.levenberg_marquardt import LevenbergMarquardtRegressor
 from builder.networks import Domain, NetworkSpec, Preset, network_specs, preset_named
-from builder.pipeline import fitted_network, plain_network, side_by_side, surrogate_pipeline
+from builder.pipeline import joined_network, plain_network, reduced_target, surrogate_pipeline
 from models.errors import InputError
 from models.losses import LossModel
+from models.parallel import run_parallel
 from models.surrogate import Network, SurrogateLosses
 from models.types import Array
 
@@ -114,8 +114,8 @@ def train_surrogate(
     preset: str | Preset = "default",
     samples: int | None = None,
     seed: int = 0,
-    jobs: int = 1,
-    dask_address: str | None = None,
+    jobs: int | None = 1,
+    dask: str | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> TrainingResult:
     """Train the reduced loss model of a gearbox.
@@ -128,10 +128,10 @@ def train_surrogate(
     samples : int, optional
         Points per network, in place of the preset's
     seed : int
-        Same seed, same networks, to the last bit on the same machine, whatever `jobs`
-    jobs : int
-        Processes; -1 for all cores
-    dask_address : str, optional
+        On one machine the same seed gives the same networks to the last bit, for any `jobs`
+    jobs : int or None
+        Processes; None for one per core
+    dask : str, optional
         Scheduler that evaluates the full model; the networks are trained here
     progress : callable, optional
         Called with a line of text at every stage
@@ -146,7 +146,7 @@ def train_surrogate(
         If the preset is not known, there are too few samples, or the scheduler cannot be reached.
     """
     begin = time.perf_counter()
-    tell = progress or (lambda _: None)
+    report = progress or (lambda _: None)
     chosen = preset_named(preset) if isinstance(preset, str) else preset
     chosen = replace(chosen, samples=chosen.samples if samples is None else samples)
     if chosen.samples < LEAST_SAMPLES:
@@ -159,21 +159,18 @@ def train_surrogate(
         ).above_floors()
     )
     model = gearbox.losses()
-    viscosity = (model.mesh.oil.m, model.mesh.oil.n)
+    viscosity = gearbox.viscosity_constants
     specs = network_specs(model, domain)
 
-    tell(f"full model: {chosen.samples} points for each of {len(specs)} networks")
+    report(f"full model: {chosen.samples} points for each of {len(specs)} networks")
     tables = []
     for number, spec in enumerate(specs):
         points = _training_points(spec, chosen, viscosity, seed + number)
-        tables.append((points, sample_losses(spec.losses, points, jobs=jobs, dask_address=dask_address)))
+        tables.append((points, sample_losses(spec.losses, points, jobs=jobs, dask=dask)))
 
-    tell(f"training of {', '.join(spec.name for spec in specs)}")
-    trained = tuple(
-        Parallel(n_jobs=jobs)(
-            delayed(_train)(spec, chosen, viscosity, *table, seed) for spec, table in zip(specs, tables, strict=True)
-        )
-    )
+    report(f"training of {', '.join(spec.name for spec in specs)}")
+    items = [(spec, chosen, viscosity, *table, seed) for spec, table in zip(specs, tables, strict=True)]
+    trained = tuple(run_parallel(_train, items, jobs=jobs))
     losses = SurrogateLosses(
         components=model.components,
         temperature_nodes=model.temperature_nodes,
@@ -182,9 +179,9 @@ def train_surrogate(
         speed_bounds=domain.speed_rpm,
         torque_bounds=domain.torque_Nm,
         temperature_bounds=domain.temperature_degC,
-        torque_driven=("mesh_sliding",),
+        torque_driven=tuple(name for term in model.terms for name in term.torque_driven),
     )
-    tell(f"judging on {chosen.judged} random points")
+    report(f"judging on {chosen.judged} random points")
     return TrainingResult(
         losses=losses,
         networks=trained,
@@ -259,7 +256,8 @@ def _train(
     parts = [list(range(len(spec.outputs)))] if together else [[column] for column in range(len(spec.outputs))]
     estimators, networks = [], []
     for columns in parts:
-        outputs = tuple(spec.outputs[column] for column in columns)
+        outputs = [spec.outputs[column] for column in columns]
+        powers = spec.powers[columns] if preset.transforms else None
         regressor = LevenbergMarquardtRegressor(
             preset.hidden[spec.kind if together else outputs[0].removesuffix("_W")],
             max_iter=preset.max_iter,
@@ -273,20 +271,16 @@ def _train(
         estimator = surrogate_pipeline(
             features=spec.features(transforms=preset.transforms),
             viscosity=viscosity,
-            powers=[spec.powers[column] for column in columns] if preset.transforms else None,
+            standardised=preset.transforms,
             network=regressor,
-        ).fit(x, y[:, columns])
+        ).fit(x, y[:, columns] if powers is None else reduced_target(x, y[:, columns], powers))
         estimators.append(estimator)
-        networks.append(
-            plain_network(
-                estimator, name=spec.name, inputs=spec.inputs, outputs=outputs, lower=spec.lower, upper=spec.upper
-            )
-        )
-    network = side_by_side(networks)
+        networks.append(plain_network(estimator, spec, outputs, powers))
+    network = joined_network(networks)
     return TrainedNetwork(
         network=network,
         estimators=tuple(estimators),
         test_r_squared=tuple(map(float, r_squared(y_test, network(x_test)))),
-        iterations=max(fitted_network(estimator).n_iter_ for estimator in estimators),
+        iterations=max(estimator.regressor_["network"].n_iter_ for estimator in estimators),
         seconds=time.perf_counter() - begin,
     )

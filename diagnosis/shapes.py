@@ -12,20 +12,14 @@ from collections.abc import Mapping
 import sympy as sp
 
 from models.laws import Parameter, symbol
+from models.losses import law_errors
 from models.mechanisms import Scale
 from models.network import Link, Source, ThermalNetwork
 from models.terms import Kind, Term
 
 LOWEST_RATIO = 0.02  # below it a tilt stays as it is
 LOWEST_CHANGE = -0.9  # a conductance that is tilted through zero lets a standing gearbox heat itself
-# Standard deviation of the tilt per e-fold; the published formulas of a loss differ by about as much.
-LOSS_TILTS: Mapping[str, Mapping[str, float]] = {
-    "mesh": {"speed": 0.08, "torque": 0.08, "viscosity": 0.08, "speed speed": 0.03, "speed torque": 0.03,
-             "torque torque": 0.03},
-    "bearing": {"speed": 0.05, "torque": 0.05},
-    "seal": {"speed": 0.05, "viscosity": 0.05},
-    "churning": {"speed": 0.1, "viscosity": 0.05},
-}  # fmt: skip
+# Standard deviation of the tilt per e-fold; those of the losses are in their laws.
 LINK_TILTS: Mapping[str, Mapping[str, float]] = {
     "h_air": {"rise": 0.05},
     "h_oil_gear": {"speed": 0.1, "viscosity": 0.05},
@@ -44,7 +38,7 @@ def shape_terms(network: ThermalNetwork, scale: Scale) -> tuple[Term, ...]:
         Sizes where the tilts have no effect
     """
     found: list[Term] = []
-    for factor, tilts in LOSS_TILTS.items():
+    for factor, tilts in law_errors().items():
         sources = [s for s in network.sources if symbol(factor) in s.heat.free_symbols]
         if sources:
             found += [

@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from builder.build import build as build_fmu
+    from builder.files import read_cycle as read_cycle
     from builder.fmu_drive import drive_fmu as drive_fmu
     from diagnosis.diagnose import diagnose as diagnose
     from diagnosis.recording import Recording as Recording
@@ -29,7 +30,6 @@ if TYPE_CHECKING:
     from models.correction import corrected_network as corrected_network
     from models.correction import read_correction as read_correction
     from models.cycle import Cycle as Cycle
-    from builder.files import read_cycle as read_cycle
     from models.errors import InputError as InputError
     from models.gearbox import Gearbox as Gearbox
     from models.gearbox import load_gearbox as load_gearbox
@@ -63,7 +63,6 @@ _DEFINED_IN = {
     "read_cycle": "builder.files:read_cycle",
     "read_recordings": "diagnosis.recording:read_recordings",
     "simulate": "models.simulation:simulate",
-
     "steady_state": "models.simulation:steady_state",
 }
 __all__ = sorted(_DEFINED_IN)

@@ -5,11 +5,13 @@ The catalogue's units are kept inside: mm, N, 1/min, mm^2/s, N mm.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
+from models.loss_term import OIL, SPEED, TORQUE, GearboxData, LossKind, LossTerm, TermInput
 from models.oil import Oil
 from models.root import decreasing_root
 from models.types import Array, Numeric
@@ -222,3 +224,62 @@ class SkfRollerBearing:
 
         bracket = (0.5 * (T_oil + lowest), 0.5 * (T_oil + highest))
         return power(decreasing_root(excess, *bracket, f_tol=TEMPERATURE_TOL))
+
+
+@dataclass(frozen=True, kw_only=True)
+class BearingLaw:
+    """A bearing in the oil of a gearbox; reads its own speed and radial load, oil and bearing temperature."""
+
+    bearing: SkfRollerBearing
+    oil: Oil
+
+    def power(self, x: Array) -> Array:
+        """Bearing loss [W], shape (N, 1), at speed [1/min], load [N], oil and bearing temperature [degC], (N, 4)."""
+        loss = self.bearing.loss(n_rpm=x[:, 0], F_r=x[:, 1], T_oil=x[:, 2], T_bearing=x[:, 3], oil=self.oil)
+        return loss[:, None]
+
+
+def bearing_terms(gearbox: GearboxData) -> Iterator[LossTerm]:
+    """Yield the loss of every ``[[bearing]]``: its share of the tooth force is its radial load."""
+    oil, r_b = gearbox.lubricant(), gearbox.stage[0].pair().r_b[0]
+    level_mm = gearbox.oil.level_below_axis * 1e3
+    for table in gearbox.bearing:
+        d, D, B = table.bore_mm, table.outside_diameter_mm, table.width_mm
+        W_s = table.heat_dissipation_W_K
+        bearing = SkfRollerBearing(
+            d=d,
+            D=D,
+            B=B,
+            H=table.oil_level(level_mm),
+            mass=table.mass_kg,
+            R1=table.R1,
+            S2=table.S2,
+            K_rs=table.K_rs,
+            K_Z=table.K_Z,
+            K_L=table.K_L,
+            mu_bl=table.mu_bl,
+            mu_EHL=table.mu_EHL,
+            drag=table.drag,
+            temperature=table.temperature,
+            W_s=heat_dissipation_reference(d, D, B) if W_s is None else W_s,
+            T_ambient=gearbox.ambient.temperature_degC,
+        )
+        inputs = (
+            TermInput("speed_rpm", SPEED, gearbox.speed_ratio[table.shaft]),
+            TermInput("radial_load_N", TORQUE, table.load_share / r_b, lowest=bearing.lightest_load),
+            TermInput("T_oil_degC", OIL),
+            TermInput("T_bearing_degC", table.name),
+        )
+        law = BearingLaw(bearing=bearing, oil=oil)
+        yield LossTerm(kind=BEARING, name=table.name, components=(table.name,), node=table.name, inputs=inputs, law=law)
+
+
+BEARING = LossKind(
+    name="bearing",
+    factors={"bearing": "bearing losses"},
+    network="bearing",
+    alike=True,
+    powers=((1.0, 0.0, 0.0, 0.0),),
+    law_error={"speed": 0.05, "torque": 0.05},
+    terms=bearing_terms,
+)

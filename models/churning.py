@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import dataclass
+
 import numpy as np
 
+from models.geometry import GearPair
+from models.loss_term import OIL, RPM, SPEED, GearboxData, LossKind, LossTerm, TermInput
+from models.oil import Oil
 from models.types import Array, Numeric
 
 GRAVITY = 9.80665
@@ -156,3 +162,82 @@ def churning_changenet_velex(
     share = np.clip((Re - RE_LAMINAR) / (RE_TURBULENT - RE_LAMINAR), 0.0, 1.0)
     C_m = (1.0 - share) * laminar + share * turbulent
     return np.asarray(0.5 * rho * omega**3 * S_m * r_p**3 * C_m)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ChurningLaw:
+    """Splashing of both gears of a mesh, by one of the named models; reads pinion speed and oil temperature."""
+
+    pair: GearPair
+    oil: Oil
+    model: str
+    level_below_axis: float  # m
+    oil_volume: float  # m^3
+    C_Sp: float = 1.0
+
+    @property
+    def immersion(self) -> tuple[float, float]:
+        """Immersion depths of pinion and wheel, [m]; not positive if the gear is dry."""
+        return self.pair.r_a[0] - self.level_below_axis, self.pair.r_a[1] - self.level_below_axis
+
+    def power(self, x: Array) -> Array:
+        """Churning loss [W], shape (N, 1), at speed [1/min] and oil temperature [degC], shape (N, 2)."""
+        return self._loss(x[:, 0] * RPM, x[:, 1])[:, None]
+
+    def _loss(self, omega_1: Array, T_oil: Array) -> Array:
+        pair, v_t = self.pair, omega_1 * self.pair.r_w[0]
+        omega = (omega_1, omega_1 / pair.u)
+        if self.model == "niemann":
+            per_gear = [churning_niemann(e=e, b=pair.b, v_t=v_t) for e in self.immersion]
+        elif self.model == "niemann_printed":
+            per_gear = [
+                churning_niemann_printed(e=e, b=pair.b, v_t=v_t, omega=w)
+                for e, w in zip(self.immersion, omega, strict=True)
+            ]
+        elif self.model == "mauz":
+            per_gear = [churning_mauz(e=self.immersion, b=pair.b, v_t=v_t, omega_2=omega[1], C_Sp=self.C_Sp)]
+        else:
+            nu, rho = self.oil.kinematic_viscosity(T_oil), self.oil.density(T_oil)
+            per_gear = [
+                churning_changenet_velex(
+                    # Measured at the pitch circle, as theta and D are; the tooth flanks are a separate area.
+                    h=pair.r_w[i] - self.level_below_axis,
+                    r_p=pair.r_w[i],
+                    b=pair.b,
+                    z=pair.z[i],
+                    tooth_height=pair.r_a[i] - pair.r_f[i],
+                    alpha=pair.alpha_n,
+                    V_oil=self.oil_volume,
+                    omega=omega[i],
+                    nu=nu,
+                    rho=rho,
+                )
+                for i in (0, 1)
+            ]
+        return np.asarray(sum(per_gear))
+
+
+def churning_terms(gearbox: GearboxData) -> Iterator[LossTerm]:
+    """Yield the churning loss of the stage."""
+    stage = gearbox.stage[0]
+    law = ChurningLaw(
+        pair=stage.pair(),
+        oil=gearbox.lubricant(),
+        model=stage.churning.model,
+        level_below_axis=gearbox.oil.level_below_axis,
+        oil_volume=gearbox.oil.volume,
+        C_Sp=stage.churning.C_Sp,
+    )
+    inputs = (TermInput("speed_rpm", SPEED), TermInput("T_oil_degC", OIL))
+    yield LossTerm(kind=CHURNING, name="churning", components=CHURNING.components, node=OIL, inputs=inputs, law=law)
+
+
+CHURNING = LossKind(
+    name="churning",
+    components=("churning",),
+    factors={"churning": "churning loss"},
+    network="no_load",
+    powers=((1.5, 0.0),),
+    law_error={"speed": 0.1, "viscosity": 0.05},
+    terms=churning_terms,
+)

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
 from models import ehl
+from models.load_sharing import contact_points
+from models.loss_term import MESH as MESH_NODE
+from models.loss_term import RPM, SPEED, TORQUE, TORQUE_FLOOR_NM, GearboxData, LossKind, LossTerm, TermInput
 from models.oil import Oil
 from models.root import decreasing_root
 from models.types import Array, Numeric
@@ -95,9 +99,9 @@ def rolling_loss_anderson(*, h: Numeric, v_r: Numeric, b: float, constant: float
     return np.asarray(constant * np.asarray(h) * v_r * b)
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class MeshContact:
-    """A gear mesh as a row of contact points along the path of contact, ready to be evaluated.
+    """A gear mesh as a row of contact points along the path of contact.
 
     Attributes
     ----------
@@ -141,6 +145,14 @@ class MeshContact:
     film: Film = "hamrock_dowson"
     thermal_reduction: ThermalReduction = "gupta"
     rolling_constant: float = 9.0e7
+
+    def power(self, x: Array) -> Array:
+        """Sliding and rolling loss [W], (N, 2), at speed [1/min], torque [N m], gear temperatures [degC], (N, 4).
+
+        The contact is evaluated at 1 N m at least.
+        """
+        losses = self.loss(omega_1=x[:, 0] * RPM, torque=np.maximum(x[:, 1], TORQUE_FLOOR_NM), T_1=x[:, 2], T_2=x[:, 3])
+        return np.stack(losses, axis=-1)
 
     def solve(self, *, omega_1: Array, torque: Array, T_1: Array, T_2: Array) -> ContactState:
         """Film, temperature and friction at every contact point.
@@ -294,3 +306,69 @@ class ContactState:
     T_film: Array
     residual: Array
     mu: Array
+
+
+def mesh_contact(gearbox: GearboxData) -> MeshContact:
+    """Return the contact of the gearbox's stage."""
+    stage = gearbox.stage[0]
+    pair, friction, material = stage.pair(), stage.friction, stage.material
+    E, nu = (material.youngs_modulus,) * 2, (material.poisson,) * 2
+    t, dx, share = contact_points(pair, model=stage.load_sharing, r_bore=stage.bore_radius, E=E, nu=nu)
+    rho_1, rho_2, R = pair.curvature_radii(t)
+    averaged_over = pair.p_b if friction.average == "base_pitch" else pair.T1E - pair.T1A
+    _, rho_2_C, rho_red_C = pair.curvature_radii(np.asarray(pair.T1C))
+    return MeshContact(
+        oil=gearbox.lubricant(),
+        weight=dx / averaged_over,
+        share=share,
+        rho_1=rho_1,
+        rho_2=rho_2,
+        R=R,
+        r_b1=pair.r_b[0],
+        u=pair.u,
+        v_sum_C_per_omega=float(pair.T1C + rho_2_C / pair.u),
+        rho_red_C=float(rho_red_C),
+        b=pair.b,
+        E_red=ehl.reduced_modulus(E[0], nu[0], E[1], nu[1]),
+        k_steel=material.conductivity_W_mK,
+        chi_steel=material.conductivity_W_mK / (material.density_kg_m3 * material.specific_heat_J_kgK),
+        Ra=stage.roughness_Ra,
+        mu_solid=friction.mu_solid,
+        friction=friction.model,
+        asperity_share=friction.asperity_load_share,
+        roughness=friction.roughness,
+        film=friction.film,
+        thermal_reduction=friction.thermal_reduction,
+        rolling_constant=stage.rolling.constant_N_m2,
+    )
+
+
+def mesh_terms(gearbox: GearboxData) -> Iterator[LossTerm]:
+    """Yield the loss of the stage's mesh; it reads the bulk temperatures of both gears."""
+    inputs = (
+        TermInput("speed_rpm", SPEED),
+        TermInput("torque_Nm", TORQUE),
+        *(TermInput(f"T_{gear}_degC", gear) for gear in gearbox.stage[0].names),
+    )
+    law = mesh_contact(gearbox)
+    yield LossTerm(kind=MESH, name="mesh", components=MESH.components, node=MESH_NODE, inputs=inputs, law=law)
+
+
+MESH = LossKind(
+    name="mesh",
+    components=("mesh_sliding", "mesh_rolling"),
+    factors={"mesh": "sliding loss of the mesh", "rolling": "rolling loss of the mesh"},
+    torque_driven=(True, False),
+    network="mesh",
+    # Sliding goes with power; rolling with film thickness times speed, n^0.67 n.
+    powers=((1.0, 1.0, 0.0, 0.0), (1.67, 0.0, 0.0, 0.0)),
+    law_error={
+        "speed": 0.08,
+        "torque": 0.08,
+        "viscosity": 0.08,
+        "speed speed": 0.03,
+        "speed torque": 0.03,
+        "torque torque": 0.03,
+    },
+    terms=mesh_terms,
+)

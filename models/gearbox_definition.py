@@ -23,20 +23,31 @@ from models.definition import (
     Training,
 )
 from models.errors import did_you_mean
+from models.losses import loss_components, loss_factors
 from models.named_oils import lubricant
 from models.oil import Oil as Lubricant
 from models.quantity import between
 
 BOUNDARY_NODES = ("air", "frame")
-COMPONENTS = ("mesh_sliding", "mesh_rolling", "churning")
 FACTORS = (
-    "mesh", "rolling", "churning", "seal", "bearing", "h_air", "radiation", "h_oil_housing", "h_oil_gear", "gear_shaft",
+    *loss_factors(), "h_air", "radiation", "h_oil_housing", "h_oil_gear", "gear_shaft",
     "shaft_bearing", "bearing_housing", "bearing_oil", "housing_joint", "striction", "C_oil", "C_bearings", "C_shafts",
     "C_gears",
 )  # fmt: skip
 # The model's own names next to nodes and losses: the sum of losses, FMU parameters (initial.T), an input (T_ambient),
 # factors on heat capacities of groups (C_bearings).
-RESERVED = (*BOUNDARY_NODES, "oil", "mesh", *COMPONENTS, "total", "initial", "ambient", "bearings", "shafts", "gears")
+RESERVED = (
+    *BOUNDARY_NODES,
+    "oil",
+    "mesh",
+    *loss_components(),
+    "total",
+    "initial",
+    "ambient",
+    "bearings",
+    "shafts",
+    "gears",
+)
 SHARE_TOLERANCE = 1e-6
 
 

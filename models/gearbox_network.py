@@ -18,7 +18,8 @@ from models.definition import Bearing, Shaft
 from models.ehl import reduced_modulus
 from models.gearbox_definition import Definition
 from models.laws import Parameter, symbol
-from models.losses import RPM, SPEED_FLOOR_RPM, TORQUE_FLOOR_NM, LossModel
+from models.loss_term import MESH, OIL, RPM, SPEED_FLOOR_RPM, TORQUE_FLOOR_NM
+from models.losses import loss_factors
 from models.network import Link, Node, Source, ThermalNetwork
 from models.oil import (
     T_HIGHEST,
@@ -29,16 +30,12 @@ from models.oil import (
     specific_heat_cragoe,
 )
 
-AIR, FRAME, OIL, MESH = "air", "frame", "oil", "mesh"
+AIR, FRAME = "air", "frame"
 T_SERVICE = 60.0  # degC, where the oil's heat capacity is taken (constant: it varies by 5 % over the service range)
-MESH_CAPACITY = 2.0  # J/K, stands for a node without mass: 0.1 s is far below every other time constant
+MESH_CAPACITY = 2.0  # J/K, replaces a node without mass: 0.1 s is far below every other time constant
 DEFAULT_FACTOR_SD = 0.2
 FACTOR_TEXT = {
-    "mesh": "sliding loss of the mesh",
-    "rolling": "rolling loss of the mesh",
-    "churning": "churning loss",
-    "seal": "seal losses",
-    "bearing": "bearing losses",
+    **loss_factors(),
     "h_air": "convection from the housing to air",
     "radiation": "radiation from the housing",
     "h_oil_housing": "convection from oil to housing",
@@ -152,17 +149,10 @@ class _Builder:
         return Node(name=name, capacity=value if factor is None else value * symbol(factor))
 
     def sources(self) -> Iterator[Source]:
-        yield self._loss("mesh_sliding", MESH, "mesh")
-        yield self._loss("mesh_rolling", MESH, "rolling")
-        yield self._loss("churning", OIL, "churning")
-        for seal in self.gearbox.seal:
-            yield self._loss(seal.name, OIL, "seal")
-        for bearing in self.gearbox.bearing:
-            yield self._loss(bearing.name, bearing.name, "bearing")
-
-    @staticmethod
-    def _loss(component: str, node: str, factor: str) -> Source:
-        return Source(name=component, node=node, heat=symbol(factor) * symbol(f"P_{component}"), is_loss=True)
+        for term in self.losses.terms:
+            for component, factor in zip(term.components, term.kind.factors, strict=True):
+                heat = symbol(factor) * symbol(f"P_{component}")
+                yield Source(name=component, node=term.node, heat=heat, is_loss=True)
 
     # ------------------------------------------------------------------ links
 

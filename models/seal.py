@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import dataclass
+
 import numpy as np
 
+from models.loss_term import OIL, SPEED, GearboxData, LossKind, LossTerm, TermInput
 from models.types import Array, Numeric
 
 LOWEST_BRACKET = 5.0  # the straight line in temperature would turn negative above about 130 degC
@@ -74,3 +78,46 @@ def seal_loss_iso_simple(*, d_mm: float, n_rpm: Numeric) -> Array:
     42.0
     """
     return np.asarray(7.69e-6 * d_mm**2 * np.asarray(n_rpm))
+
+
+@dataclass(frozen=True, kw_only=True)
+class SealLaw:
+    """One radial shaft seal; reads the speed of the input shaft and the oil temperature."""
+
+    d_mm: float
+    model: str
+    nu_40: float
+    c_T: float
+    speed_ratio: float
+
+    def power(self, x: Array) -> Array:
+        """Seal loss [W], shape (N, 1), at input speed [1/min] and oil temperature [degC], shape (N, 2)."""
+        n = x[:, 0] * self.speed_ratio
+        if self.model == "iso_simple":
+            return seal_loss_iso_simple(d_mm=self.d_mm, n_rpm=n)[:, None]
+        return seal_loss_linke(d_mm=self.d_mm, n_rpm=n, T_oil=x[:, 1], nu_40=self.nu_40, c_T=self.c_T)[:, None]
+
+
+def seal_terms(gearbox: GearboxData) -> Iterator[LossTerm]:
+    """Yield the loss of every ``[[seal]]``."""
+    oil = gearbox.lubricant()
+    inputs = (TermInput("speed_rpm", SPEED), TermInput("T_oil_degC", OIL))
+    for seal in gearbox.seal:
+        law = SealLaw(
+            d_mm=seal.diameter_mm,
+            model=seal.model,
+            nu_40=oil.nu_40 if seal.nu_40_mm2_s is None else seal.nu_40_mm2_s,
+            c_T=seal.temperature_coefficient,
+            speed_ratio=gearbox.speed_ratio[seal.shaft],
+        )
+        yield LossTerm(kind=SEAL, name=seal.name, components=(seal.name,), node=OIL, inputs=inputs, law=law)
+
+
+SEAL = LossKind(
+    name="seal",
+    factors={"seal": "seal losses"},
+    network="no_load",
+    powers=((1.0, 0.0),),
+    law_error={"speed": 0.05, "viscosity": 0.05},
+    terms=seal_terms,
+)

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
 from typing import Any, Literal, Self
 
 import numpy as np
@@ -97,6 +97,11 @@ def feature_values(kind: Feature, x: Array, viscosity: tuple[float, float]) -> A
     return np.asarray(LN10 * np.exp(LN10 * m - n * ln_theta))
 
 
+def feature_matrix(x: Array, features: Sequence[tuple[Feature, int]], viscosity: tuple[float, float]) -> Array:
+    """Return the features, shape (N, features), of inputs, shape (N, inputs); each is a type and an input's column."""
+    return np.stack([feature_values(kind, x[:, column], viscosity) for kind, column in features], axis=-1)
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Network:
     """One trained network with its scaling folded into the weights: physical inputs to losses in W.
@@ -134,24 +139,10 @@ class Network:
     passed: Array
     log_output: bool
 
-    def __post_init__(self) -> None:
-        """Refuse a network that does not fit together."""
-        n_in, n_feature, n_out = len(self.inputs), len(self.features), len(self.outputs)
-        h_1, h_2 = (len(b) for b in self.biases[:2])
-        shapes = [w.shape for w in self.weights] + [b.shape for b in self.biases] + [self.passed.shape]
-        wanted = [(n_feature, h_1), (h_1, h_2), (h_2, n_out), (h_1,), (h_2,), (n_out,), (n_feature, n_out)]
-        if shapes != wanted or len(self.lower) != n_in or len(self.upper) != n_in:
-            raise InputError(f"network {self.name}: shapes {shapes} do not fit, {wanted} are needed; build it again")
-        if not all(kind in FEATURES and 0 <= column < n_in for kind, column in self.features):
-            raise InputError(f"network {self.name}: features {self.features} are not known; build it again")
-        if not all(np.isfinite(a).all() for a in (*self.weights, *self.biases, self.passed, self.lower, self.upper)):
-            raise InputError(f"network {self.name}: a weight or bound is not a finite number; build it again")
-
     def __call__(self, rows: Array) -> Array:
         """Outputs [W], shape (N, outputs), at inputs of shape (N, inputs), held at the bounds."""
         x = np.clip(rows, self.lower, self.upper)
-        columns = [feature_values(kind, x[:, column], self.viscosity) for kind, column in self.features]
-        features = np.stack(columns, axis=-1)
+        features = feature_matrix(x, self.features, self.viscosity)
         activation = features
         for weights, bias in zip(self.weights[:2], self.biases[:2], strict=True):
             activation = 0.5 + 0.5 * np.tanh(0.5 * (activation @ weights + bias))
@@ -176,34 +167,22 @@ class Network:
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Self:
-        """Return the network of :meth:`to_dict`.
-
-        Raises
-        ------
-        InputError
-            If something is missing or does not fit.
-        """
-        try:
-            w_1, w_2, w_3 = (np.array(w, dtype=float) for w in data["weights"])
-            b_1, b_2, b_3 = (np.array(b, dtype=float) for b in data["biases"])
-            m, n = data["viscosity"]
-            return cls(
-                name=data["name"],
-                inputs=tuple(data["inputs"]),
-                outputs=tuple(data["outputs"]),
-                lower=tuple(map(float, data["lower"])),
-                upper=tuple(map(float, data["upper"])),
-                features=tuple((kind, int(column)) for kind, column in data["features"]),
-                viscosity=(float(m), float(n)),
-                weights=(w_1, w_2, w_3),
-                biases=(b_1, b_2, b_3),
-                passed=np.array(data["passed"], dtype=float),
-                log_output=bool(data["log_output"]),
-            )
-        except (KeyError, TypeError, ValueError) as error:
-            if isinstance(error, InputError):
-                raise
-            raise InputError(f"not a network of this version ({error!r}); build the surrogate again") from error
+        """Return the network of :meth:`to_dict`."""
+        w_1, w_2, w_3 = (np.array(w, dtype=float) for w in data["weights"])
+        b_1, b_2, b_3 = (np.array(b, dtype=float) for b in data["biases"])
+        return cls(
+            name=data["name"],
+            inputs=tuple(data["inputs"]),
+            outputs=tuple(data["outputs"]),
+            lower=tuple(data["lower"]),
+            upper=tuple(data["upper"]),
+            features=tuple((kind, column) for kind, column in data["features"]),
+            viscosity=_pair(data["viscosity"]),
+            weights=(w_1, w_2, w_3),
+            biases=(b_1, b_2, b_3),
+            passed=np.array(data["passed"], dtype=float),
+            log_output=data["log_output"],
+        )
 
 
 @dataclass(frozen=True)
@@ -229,10 +208,10 @@ class Use:
 
 
 class _Stack:
-    """All uses of all networks as one block-diagonal network: a dozen array operations per call, whatever their number.
+    """All uses of all networks as one block-diagonal network: a dozen array operations per call for any number.
 
-    Takes the input rows of all uses side by side, gives their outputs side by side. Sigmoids are written as tanh, with
-    the factors of ``sigmoid(z) = (1 + tanh(z/2))/2`` folded into the weights.
+    Takes the input rows of all uses next to each other and returns their outputs in that order. Sigmoids are written as
+    tanh, with the factors of ``sigmoid(z) = (1 + tanh(z/2))/2`` folded into the weights.
     """
 
     def __init__(self, networks: Sequence[Network]) -> None:
@@ -308,36 +287,16 @@ class SurrogateLosses:
     speed_bounds: tuple[float, float]
     torque_bounds: tuple[float, float]
     temperature_bounds: tuple[float, float]
-    torque_driven: tuple[str, ...] = ("mesh_sliding",)
+    torque_driven: tuple[str, ...]
     evaluators: Mapping[str, Evaluator] | None = None
 
-    def __post_init__(self) -> None:
-        """Refuse networks and uses that do not fit together."""
-        by_name = {network.name: network for network in self.networks}
-        known = {"speed", "torque", *self.temperature_nodes}
-        served = [component for use in self.uses for component in use.components]
-        faults = [
-            f"use of network {use.network!r} does not fit it"
-            for use in self.uses
-            if use.network not in by_name
-            or not len(use.sources) == len(use.factors) == len(by_name[use.network].inputs)
-            or len(use.components) != len(by_name[use.network].outputs)
-            or not known.issuperset(use.sources)
-        ]
-        if sorted(served) != sorted(self.components):
-            faults.append(f"the networks give {', '.join(served)}, but {', '.join(self.components)} are needed")
-        if self.evaluators is not None and not set(by_name).issubset(self.evaluators):
-            faults.append(f"no evaluator for {', '.join(sorted(set(by_name).difference(self.evaluators)))}")
-        if faults:
-            raise InputError("surrogate: " + "; ".join(faults) + "; build it again")
-
     def with_evaluators(self, evaluators: Mapping[str, Evaluator]) -> SurrogateLosses:
-        """Return the same surrogate, its networks computed by `evaluators` (one per network name)."""
+        """Return this surrogate with its networks computed by `evaluators` (one per network name)."""
         return replace(self, evaluators=evaluators)
 
     @cached_property
     def reads(self) -> tuple[frozenset[str], ...]:
-        """Which of the `temperature_nodes` each component reads."""
+        """The `temperature_nodes` that each component reads."""
         nodes = frozenset(self.temperature_nodes)
         found = {component: nodes.intersection(use.sources) for use in self.uses for component in use.components}
         return tuple(found[component] for component in self.components)
@@ -374,23 +333,26 @@ class SurrogateLosses:
 
     @cached_property
     def _evaluate(self) -> Evaluator:
+        """Input rows of all uses next to each other to their outputs next to each other."""
         if self.evaluators is None:
             return _Stack(self._used_networks)
-        return partial(self._evaluate_each, self.evaluators)
-
-    def _evaluate_each(self, evaluators: Mapping[str, Evaluator], rows: Array) -> Array:
-        """Outputs of all uses side by side; the uses of one network go to its evaluator as one batch of rows."""
-        flat = rows.reshape(-1, rows.shape[-1])
         inputs = np.cumsum([0, *(len(n.inputs) for n in self._used_networks)])
         outputs = np.cumsum([0, *(len(n.outputs) for n in self._used_networks)])
-        result = np.empty((len(flat), outputs[-1]))
+        plan = []
         for network in self.networks:
-            mine = [i for i, used in enumerate(self._used_networks) if used is network]
-            stacked = np.concatenate([flat[:, inputs[i] : inputs[i + 1]] for i in mine])
-            parts = np.split(np.asarray(evaluators[network.name](stacked), dtype=float), len(mine))
-            for i, part in zip(mine, parts, strict=True):
-                result[:, outputs[i] : outputs[i + 1]] = part
-        return result.reshape(*rows.shape[:-1], -1)
+            uses = [i for i, used in enumerate(self._used_networks) if used is network]
+            read = np.array([np.arange(inputs[i], inputs[i + 1]) for i in uses])
+            written = np.array([np.arange(outputs[i], outputs[i + 1]) for i in uses])
+            plan.append((self.evaluators[network.name], read, written))
+
+        def evaluate(rows: Array) -> Array:
+            result = np.empty((*rows.shape[:-1], outputs[-1]))
+            for run, read, written in plan:  # the uses of one network as one batch of rows
+                batch = rows[..., read]
+                result[..., written] = run(batch.reshape(-1, batch.shape[-1])).reshape(*rows.shape[:-1], *written.shape)
+            return result
+
+        return evaluate
 
     def power(self, speed: ArrayLike, torque: ArrayLike, temperatures: ArrayLike) -> Array:
         """Loss of every component.
@@ -447,10 +409,6 @@ class SurrogateLosses:
         bounds = self.speed_bounds, self.torque_bounds, self.temperature_bounds
         return range_distance(speed, torque, temperatures, *bounds)
 
-    def in_domain(self, speed: ArrayLike, torque: ArrayLike, temperatures: ArrayLike) -> Any:
-        """Return whether operating points lie inside the range of training, bool, shape (...)."""
-        return self.domain_distance(speed, torque, temperatures) == 0.0
-
     def to_dict(self) -> dict[str, Any]:
         """Return the surrogate as plain lists, numbers and strings (JSON); evaluators are not part of it."""
         return {
@@ -480,30 +438,25 @@ class SurrogateLosses:
         Raises
         ------
         InputError
-            If the format is another one, or something is missing or does not fit.
+            If it was written by another version.
         """
-        if not isinstance(data, Mapping) or data.get("format") != FORMAT:
+        if data.get("format") != FORMAT:
             raise InputError(f"not a surrogate of format {FORMAT}; build it again with this version")
-        try:
-            return cls(
-                components=tuple(data["components"]),
-                temperature_nodes=tuple(data["temperature_nodes"]),
-                networks=tuple(Network.from_dict(network) for network in data["networks"]),
-                uses=tuple(
-                    Use(u["network"], tuple(u["sources"]), tuple(map(float, u["factors"])), tuple(u["components"]))
-                    for u in data["uses"]
-                ),
-                speed_bounds=_pair(data["speed_rpm"]),
-                torque_bounds=_pair(data["torque_Nm"]),
-                temperature_bounds=_pair(data["temperature_degC"]),
-                torque_driven=tuple(data["torque_driven"]),
-            )
-        except (KeyError, TypeError, ValueError) as error:
-            if isinstance(error, InputError):
-                raise
-            raise InputError(f"not a surrogate of this version ({error!r}); build it again") from error
+        return cls(
+            components=tuple(data["components"]),
+            temperature_nodes=tuple(data["temperature_nodes"]),
+            networks=tuple(Network.from_dict(network) for network in data["networks"]),
+            uses=tuple(
+                Use(use["network"], tuple(use["sources"]), tuple(use["factors"]), tuple(use["components"]))
+                for use in data["uses"]
+            ),
+            speed_bounds=_pair(data["speed_rpm"]),
+            torque_bounds=_pair(data["torque_Nm"]),
+            temperature_bounds=_pair(data["temperature_degC"]),
+            torque_driven=tuple(data["torque_driven"]),
+        )
 
 
 def _pair(values: Iterable[float]) -> tuple[float, float]:
-    low, high = map(float, values)
+    low, high = values
     return low, high

@@ -133,7 +133,7 @@ def equations_as_printed(study: Study) -> Item:
     """Eqs. (6) and (10), computed literally."""
     gearbox, pair = study.gearbox, study.gearbox.stage[0].pair()
     v, omega_1 = 8.3, study.pinion_speed[MIDDLE] * RPM
-    immersion = study.full.churning.immersion
+    immersion = tuple(r_a - gearbox.oil.level_below_axis for r_a in pair.r_a)
     literal = [
         float(churning_niemann_printed(e=e, b=pair.b, v_t=v, omega=w))
         for e, w in zip(immersion, (omega_1, omega_1 / pair.u), strict=True)

@@ -9,7 +9,8 @@ import numpy as np
 from diagnosis.proof.anatomy import MESH, OIL, T_SERVICE
 from diagnosis.proof.effect import Effect, Grip, Hook, Kind
 from diagnosis.proof.plant import REFERENCE_SPEED, Plant
-from models.losses import RPM
+from models.bearing import BearingLaw
+from models.loss_term import RPM
 
 Draw = Callable[[Plant, np.random.Generator, float], Mapping[str, float]]
 Places = Callable[[Plant, np.random.Generator], tuple[str, ...]]
@@ -95,7 +96,7 @@ def pocketing(g: Grip) -> None:
 
 def churning_swirl(g: Grip) -> None:
     """Regime change of churning at a Reynolds number, that is at a speed that depends on the oil's temperature."""
-    oil, pair = g.plant.losses[0].mesh.oil, g.plant.anatomy.pair
+    oil, pair = g.plant.oil, g.plant.anatomy.pair
     v = g.x * g.plant.speed_top * RPM * pair.r_w[0]
     Re = v * pair.b / (oil.kinematic_viscosity(g.T(OIL)) * 1e-6)
     turbulent = 1.0 / (1.0 + np.exp(-(Re - g.p["Re"]) / 500.0))
@@ -142,7 +143,7 @@ def pump_heat(g: Grip) -> None:
 
 def run_in_flanks(g: Grip) -> None:
     """Asperities are worn off with loaded revolutions, and matter in the mixed regime only."""
-    oil = g.plant.losses[0].mesh.oil
+    oil = g.plant.oil
     worn = g.remembered("worn", 0.0)
     g.memory["worn"] = worn + (g.hours > 0.0) * g.x * g.y**0.5 * 10.0 / 3600.0
     nu = oil.kinematic_viscosity(g.T(g.plant.anatomy.gears[0]))
@@ -160,7 +161,7 @@ def run_in_seals(g: Grip) -> None:
 
 def oil_ageing(g: Grip) -> None:
     """The oil thickens, a few percent per hour; thicker oil is read as colder oil."""
-    beta = g.plant.losses[0].mesh.oil.thermoviscosity(T_SERVICE)
+    beta = g.plant.oil.thermoviscosity(T_SERVICE)
     g.moment.thinning[g.members] -= np.log1p(g.p["a"] * g.hours**0.9) / beta
 
 
@@ -190,14 +191,16 @@ def bearing_preload(g: Grip) -> None:
 
 def bearing_additive(g: Grip) -> None:
     """Additives lower the sliding friction of the rollers."""
-    model, plant = g.plant.losses[0], g.plant
+    plant = g.plant
     speed = np.maximum(g.x * plant.speed_top, 1.0)
-    for k, name in enumerate(plant.anatomy.bearings):
-        T = 0.5 * (g.T(OIL) + g.T(name))
-        moments = model.bearings[k].friction_moments(
-            n_rpm=speed * model.bearing_speed_ratio[k],
-            F_r=np.maximum(model.bearing_radial_load(k, g.y * plant.torque_ref), model.bearings[k].lightest_load),
-            nu=model.mesh.oil.kinematic_viscosity(T),
+    for name in plant.anatomy.bearings:
+        term = plant.losses[0].term(name)
+        assert isinstance(term.law, BearingLaw)  # noqa: S101
+        n, load, *_ = term.inputs
+        moments = term.law.bearing.friction_moments(
+            n_rpm=speed * n.factor,
+            F_r=np.maximum(load.factor * np.abs(g.y * plant.torque_ref), term.law.bearing.lightest_load),
+            nu=plant.oil.kinematic_viscosity(0.5 * (g.T(OIL) + g.T(name))),
         )
         g.factor(name, -g.p["a"] * moments[1] / sum(moments))
 

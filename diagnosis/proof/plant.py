@@ -66,6 +66,7 @@ class Plant:
         self.anatomy = Anatomy(gearbox)
         nominal = gearbox.losses()
         self.components = nominal.components
+        self.oil = gearbox.lubricant()
         self.losses = tuple(gearbox.with_values(reading).losses() for reading in READINGS)
         self.speed_top = top_speed(gearbox)
         n, M = REFERENCE_SPEED * self.speed_top, reference_torque(gearbox)
@@ -77,8 +78,8 @@ class Plant:
         forced, free = self.anatomy.convection
         self.shed_ref = float(np.cbrt(forced**3 + free**3) + RADIATION_REF) * gearbox.housing.outside_area_m2
         self.warmth = self.loss_ref / self.shed_ref / FZG_RISE_K
-        at = np.array([n]), np.array([M]), np.array([[80.0, 80.0]])
-        sliding = [float(model.mesh_power(*at)[0, 0]) for model in (nominal, *self.losses)]
+        at = np.array([n]), np.array([M]), dict.fromkeys(self.anatomy.gears, np.array([80.0]))
+        sliding = [float(model.term("mesh").power(*at)[0, 0]) for model in (nominal, *self.losses)]
         self.reading_scale = np.array([sliding[0] / own for own in sliding[1:]])
         paths, index = self.anatomy.paths, self.anatomy.index
         self.a = np.array([index[path.ends[0]] for path in paths])

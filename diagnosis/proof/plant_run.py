@@ -10,13 +10,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from diagnosis.proof.anatomy import MESH, SPLASH, SUMP, T_SERVICE
+from diagnosis.proof.anatomy import MESH, OIL, SPLASH, SUMP, T_SERVICE
 from diagnosis.proof.cycles import ROW_S, Programme
 from diagnosis.proof.effect import Concealed, Grip, Hook
 from diagnosis.proof.integrator import sdirk_step
 from diagnosis.proof.plant import Moment, Plant
 from models.heat_transfer import KELVIN, STEFAN_BOLTZMANN
-from models.losses import RPM
+from models.loss_term import RPM
 from models.types import Array
 
 FILM_REFERENCE_K = 316.65  # film temperature at which the reference of the convection is taken
@@ -293,21 +293,22 @@ class _Batch:
         """Loss of every component, shape (B, c), [W]; thinner oil is read as hotter oil, except by the seals."""
         index, anatomy = self.plant.anatomy.index, self.plant.anatomy
         oil = moment.T[:, index[SUMP]]
-        gears = np.stack([moment.T[:, index[f"{gear}.rim"]] for gear in anatomy.gears], axis=1)
-        loss = np.empty((len(oil), len(self.plant.components)))
         thin = moment.thinning
+        gears = {gear: moment.T[:, index[f"{gear}.rim"]] + thin for gear in anatomy.gears}
+        mesh = np.empty((len(oil), 2))
         for reading in np.unique(self.reading):
             of = self.reading == reading
-            model = self.plant.losses[reading]
-            loss[of, :2] = model.mesh_power(moment.speed[of], moment.torque[of], gears[of] + thin[of, None])
-        model = self.plant.losses[0]
-        first_bearing = len(self.plant.components) - len(anatomy.bearings)
-        loss[:, 2:first_bearing] = model.no_load_power(moment.speed, oil)
-        for k, bearing in enumerate(anatomy.bearings):
-            T_bearing = moment.T[:, index[bearing]]
-            load = moment.torque * moment.bearing_load[:, k]
-            loss[:, first_bearing + k] = model.bearing_power(k, moment.speed, load, oil + thin, T_bearing + thin)
-        return np.asarray(loss * self.loss_factor)
+            at = {gear: T[of] for gear, T in gears.items()}
+            mesh[of] = self.plant.losses[reading].term("mesh").power(moment.speed[of], moment.torque[of], at)
+        columns = [mesh]
+        for term in self.plant.losses[0].terms:
+            if term.name in anatomy.bearings:
+                load = moment.torque * moment.bearing_load[:, anatomy.bearings.index(term.name)]
+                at = {OIL: oil + thin, term.name: moment.T[:, index[term.name]] + thin}
+                columns.append(term.power(moment.speed, load, at))
+            elif term.name != MESH:
+                columns.append(term.power(moment.speed, moment.torque, {OIL: oil}))
+        return np.asarray(np.concatenate(columns, axis=1) * self.loss_factor)
 
     def _conductances(self, moment: Moment) -> Array:
         G = self.base.copy()
@@ -372,7 +373,7 @@ class _Batch:
 
         Smooth where the usual forms change regime; constants as in Dorfman 1963 and de Winter, Blok 1974, from memory.
         """
-        oil, pair = self.plant.losses[0].mesh.oil, self.plant.anatomy.pair
+        oil, pair = self.plant.oil, self.plant.anatomy.pair
         omega = np.maximum(speed, 0.0) * RPM / (1.0 if gear == 0 else pair.u)
         nu = oil.kinematic_viscosity(T_oil) * 1e-6
         rho, c, k = oil.density(T_SERVICE), oil.specific_heat(T_SERVICE), oil.conductivity(T_SERVICE)

@@ -12,7 +12,7 @@ from models.gearbox import load_gearbox
 
 GEARBOX = load_gearbox("fzg")
 OIL = GEARBOX.lubricant()
-NU_406 = GEARBOX.losses().bearings[0]
+NU_406 = GEARBOX.losses().term("bearing_1").law.bearing
 
 
 def watts(bearing: SkfRollerBearing, n: float, F_r: float, T_oil: float, T_bearing: float) -> float:

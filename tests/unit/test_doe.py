@@ -1,4 +1,4 @@
-"""Sampling plans, and that losses do not depend on who computes them."""
+"""Sampling plans, and samples of the full model."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 
 from builder.doe import BLOCK_ROWS, latin_hypercube, mixed_hypercube, random_points, sample_losses
 from builder.networks import PRESETS, network_specs
-from models.errors import InputError
 from models.gearbox import load_gearbox
 
 LOWER, UPPER = [1.0, 1.0, -20.0], [6500.0, 350.0, 200.0]
@@ -68,7 +67,7 @@ def test_losses_do_not_depend_on_the_number_of_processes():
 
 
 def test_network_samples_are_the_full_model():
-    """What each network learns is what the full model gives for the components that it serves."""
+    """Each network learns what the full model gives for its components."""
     model = load_gearbox("fzg").losses()
     for spec in network_specs(model, PRESETS["paper"].domain):
         for use in spec.uses:
@@ -83,20 +82,3 @@ def test_network_samples_are_the_full_model():
             np.testing.assert_allclose(spec.losses(rows), full[:, columns], rtol=1e-12)
             assert (rows[3:, 0] >= spec.lower[0]).all()
             assert (rows[3:, 0] <= spec.upper[0]).all()
-
-
-def test_a_dead_scheduler_is_an_input_error(monkeypatch):
-    distributed = pytest.importorskip("distributed", reason="dask is not installed")
-
-    def refuse(*args, **kwargs):
-        raise OSError("Timed out trying to connect")
-
-    monkeypatch.setattr(distributed, "Client", refuse)
-    with pytest.raises(InputError, match=r"no dask scheduler answers at tcp://127.0.0.1:1 .*port open"):
-        sample_losses(np.sin, np.zeros((3, 1)), dask_address="tcp://127.0.0.1:1")
-
-
-def test_a_missing_dask_is_an_input_error(monkeypatch):
-    monkeypatch.setitem(__import__("sys").modules, "distributed", None)
-    with pytest.raises(InputError, match="install the extra 'dask'"):
-        sample_losses(np.sin, np.zeros((3, 1)), dask_address="tcp://127.0.0.1:1")

@@ -13,7 +13,7 @@ from models.gearbox import load_gearbox
 
 GEARBOX = load_gearbox("fzg")
 LOSSES = GEARBOX.losses()
-MESH = LOSSES.mesh
+MESH = LOSSES.term("mesh").law
 RPM = np.pi / 30.0
 
 

@@ -1,13 +1,18 @@
-"""The loss model as a whole: names, order, floors, mapping of nodes, errors."""
+"""The loss model: names, order, floors, nodes that are read, errors."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from builder.networks import PRESETS
+from builder.train import train_surrogate
 from models.errors import InputError
 from models.gearbox import load_gearbox
-from models.losses import BATCH
+from models.loss_term import LossKind, LossTerm, TermInput
+from models.losses import BATCH, LOSS_KINDS
 
 GEARBOX = load_gearbox("fzg")
 LOSSES = GEARBOX.losses()
@@ -49,24 +54,44 @@ def test_bearings_run_at_the_speed_of_their_shafts() -> None:
 
 
 def test_bearing_load_is_half_the_tooth_force() -> None:
-    assert LOSSES.bearing_radial_load(0, np.array([302.0])) == pytest.approx(4463.0, abs=1.0)
+    load = LOSSES.term("bearing_1").inputs[1]
+    assert (load.name, load.source, load.factor * 302.0) == ("radial_load_N", "torque", pytest.approx(4463.0, abs=1.0))
 
 
-def test_parts_for_the_surrogate_are_the_columns_of_the_whole() -> None:
+def test_a_term_alone_gives_its_components_of_the_whole() -> None:
     rng = np.random.default_rng(3)
     n, torque, temperatures = rng.uniform(-6500, 6500, 50), rng.uniform(-350, 350, 50), rng.uniform(-20, 200, (50, 7))
+    n[:5], torque[:5] = rng.uniform(-1.0, 1.0, (2, 5))  # below the floors
     whole = LOSSES.power(n, torque, temperatures)
-    assert LOSSES.mesh_power(n, torque, temperatures[:, 1:3]) == pytest.approx(whole[:, :2], rel=1e-12)
-    assert LOSSES.no_load_power(n, temperatures[:, 0]) == pytest.approx(whole[:, 2:5], rel=1e-12)
-    for i in range(4):
-        one = LOSSES.bearing_power(i, n, torque, temperatures[:, 0], temperatures[:, 3 + i])
-        assert one == pytest.approx(whole[:, 5 + i], rel=1e-12)
+    by_node = dict(zip(LOSSES.temperature_nodes, temperatures.T, strict=True))
+    apart = [term.power(n, torque, {node: by_node[node] for node in term.reads}) for term in LOSSES.terms]
+    assert np.concatenate(apart, axis=1) == pytest.approx(whole, rel=1e-12)
 
 
-def test_like_bearings_share_a_group() -> None:
-    assert LOSSES.bearing_groups == ((0, 1, 2, 3),)
-    other = GEARBOX.with_values({"bearing.1.mu_bl": 0.1}).losses()
-    assert other.bearing_groups == ((0, 2, 3), (1,))
+def test_a_loss_of_a_new_kind_needs_its_kind_only(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A pump: factor, heat in the network, surrogate and FMU signals follow from its loss kind."""
+
+    class Pump:
+        def power(self, x: np.ndarray) -> np.ndarray:
+            return 0.02 * x[:, :1] * (1.0 + 0.001 * x[:, 1:])
+
+    def pump_terms(gearbox):
+        inputs = (TermInput("speed_rpm", "speed"), TermInput("T_oil_degC", "oil"))
+        yield LossTerm(kind=PUMP, name="pump", components=("pump",), node="oil", inputs=inputs, law=Pump())
+
+    PUMP = LossKind(
+        name="pump", components=("pump",), factors={"pump": "loss of the pump"}, network="no_load",
+        powers=((1.0, 0.0),), law_error={"speed": 0.1}, terms=pump_terms,
+    )  # fmt: skip
+    monkeypatch.setattr("models.losses.LOSS_KINDS", (*LOSS_KINDS, PUMP))
+    model = GEARBOX.losses()
+    assert model.components == (*LOSSES.components, "pump")
+    assert model.breakdown(speed=1000.0, torque=0.0, temperatures=50.0)["pump"] == pytest.approx(21.0)
+    (heat,) = [source for source in GEARBOX.network().sources if source.name == "pump"]
+    assert (heat.node, {s.name for s in heat.heat.free_symbols}) == ("oil", {"pump", "P_pump"})
+    preset = replace(PRESETS["default"], samples=200, judged=100, max_iter=30, starts=1)
+    trained = train_surrogate(GEARBOX, preset=preset)
+    assert trained.report[-1].component == "pump" and trained.report[-1].median < 0.05
 
 
 def test_floors_are_linear() -> None:
@@ -86,7 +111,7 @@ def test_many_points_are_the_same_in_parts() -> None:
     assert whole[-20:] == pytest.approx(LOSSES.power(n[-20:], 50.0, temperatures[-20:]), rel=1e-12)
 
 
-def test_no_points_at_all() -> None:
+def test_no_points() -> None:
     assert LOSSES.power(np.zeros(0), np.zeros(0), np.zeros((0, 7))).shape == (0, 9)
 
 
@@ -95,12 +120,8 @@ def test_breakdown_total() -> None:
     assert loss["total"] == pytest.approx(sum(loss[name] for name in LOSSES.components))
 
 
-def test_full_model_has_no_domain() -> None:
-    assert LOSSES.domain_distance(np.ones((3, 1)), 1.0, np.ones((4, 7))).shape == (3, 4)
-
-
 @pytest.mark.parametrize(
-    ("speed", "torque", "temperature", "says"),
+    ("speed", "torque", "temperature", "message"),
     [
         (np.nan, 1.0, 60.0, "speed is nan 1/min at operating point 0"),
         (1.0, np.inf, 60.0, "torque is inf N m at operating point 0"),
@@ -108,8 +129,8 @@ def test_full_model_has_no_domain() -> None:
         (1.0, 1.0, -300.0, "T_oil is -300.0 degC at operating point 0; finite numbers above -273.15"),
     ],
 )
-def test_unphysical_input_is_refused(speed: float, torque: float, temperature: float, says: str) -> None:
-    with pytest.raises(InputError, match=says):
+def test_unphysical_input_is_refused(speed: float, torque: float, temperature: float, message: str) -> None:
+    with pytest.raises(InputError, match=message):
         LOSSES.power(speed, torque, np.full(7, temperature))
 
 

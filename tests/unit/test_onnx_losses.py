@@ -25,13 +25,6 @@ def test_single_points_equal_the_surrogate_inside_and_outside_its_range(both) ->
         assert single.domain_distance(row[0], row[1], row[2:]) == losses.domain_distance(row[0], row[1], row[2:])
 
 
-@pytest.mark.parametrize(("speed", "torque"), [(0.0, 0.0), (0.5, 100.0), (1000.0, 0.3), (-0.5, -0.3), (1.0, 1.0)])
-def test_below_the_lowest_speed_and_torque(both, speed: float, torque: float) -> None:
-    losses, single = both
-    T = np.full(len(losses.temperature_nodes), 60.0)
-    np.testing.assert_allclose(single.power(speed, torque, T), losses.power(speed, torque, T), rtol=1e-12, atol=0.0)
-
-
 def test_same_point_again_and_another_one_after_it(both) -> None:
     losses, single = both
     T = np.full(len(losses.temperature_nodes), 60.0)

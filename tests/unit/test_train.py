@@ -1,4 +1,4 @@
-"""Training as a whole: accuracy on points never seen, presets, and what is refused."""
+"""Training: accuracy on separate points, presets, and options that are refused."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ TINY = {"max_iter": 3, "starts": 1, "judged": 20, "hidden": dict.fromkeys(("mesh
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [0, 1])
 def test_default_preset_reaches_its_targets(seed):
-    for row in train_surrogate(FZG, seed=seed, jobs=-1).report:
+    for row in train_surrogate(FZG, seed=seed, jobs=None).report:
         assert row.r_squared >= 0.9999, row
         assert row.median <= 0.0025, row
         assert row.percentile_95 <= 0.008, row
@@ -38,20 +38,7 @@ def test_paper_preset_has_the_papers_r_squared_and_the_papers_flaw():
     assert result.report[0].corner_median > 0.1
 
 
-def test_judging_the_full_model_against_itself_finds_no_error():
-    full = FZG.losses()
-    surrogate = train_surrogate(FZG, preset=replace(PRESETS["default"], **TINY), samples=60).losses
-
-    class Itself:
-        components, temperature_nodes, power = full.components, full.temperature_nodes, full.power
-        speed_bounds, torque_bounds, temperature_bounds = (1.0, 6500.0), (1.0, 350.0), (-20.0, 200.0)
-
-    for row in judge(Itself(), full, count=50, seed=0):
-        assert (row.r_squared, row.median, row.percentile_95, row.corner_percentile_95) == (1.0, 0.0, 0.0, 0.0)
-    assert max(row.median for row in judge(surrogate, full, count=50, seed=0)) > 0.0
-
-
-def test_errors_that_are_known_are_what_is_told():
+def test_known_errors_are_reported():
     """A tenth of the points is 8 % off, the rest 1 %: in the middle 1 %, at the 95th percentile 8 %."""
     full = FZG.losses()
 
@@ -121,18 +108,8 @@ def test_faulty_options_are_refused(options, message):
         train_surrogate(FZG, **options)
 
 
-def test_progress_is_told():
-    lines: list[str] = []
-    train_surrogate(FZG, preset=replace(PRESETS["default"], **TINY), samples=60, progress=lines.append)
-    assert lines[0] == "full model: 60 points for each of 3 networks"
-    assert len(lines) == 3
-
-
-def test_outputs_with_hidden_units_of_their_own_make_one_network():
+def test_outputs_with_hidden_units_for_each_make_one_network():
     hidden = {"mesh_sliding": (4, 3), "mesh_rolling": (3, 2), "no_load": (2, 2), "bearing": (2, 2)}
     preset = replace(PRESETS["default"], samples=300, judged=20, max_iter=15, starts=1, hidden=hidden)
     mesh = train_surrogate(load_gearbox("fzg"), preset=preset).networks[0]
     assert [len(bias) for bias in mesh.network.biases] == [7, 5, 2]
-    rows = np.random.default_rng(0).uniform(mesh.network.lower, mesh.network.upper, (50, 4))
-    apart = np.stack([estimator.predict(rows).ravel() for estimator in mesh.estimators], axis=-1)
-    np.testing.assert_allclose(mesh.network(rows), apart, rtol=1e-9)

@@ -50,7 +50,7 @@ def test_anchors() -> None:
         sum(float(seal_loss_linke(d_mm=d, n_rpm=n, T_oil=60.0, nu_40=32.0, c_T=c)) for d, n in SEALS)
         for c in (1.6, 1.0)
     ]
-    moments = LOSSES.bearings[0].friction_moments(n_rpm=2165.7, F_r=4463.0, nu=15.41)
+    moments = LOSSES.term("bearing_1").law.bearing.friction_moments(n_rpm=2165.7, F_r=4463.0, nu=15.41)
     for ours, anchor in (
         (OIL.kinematic_viscosity(60.0), 15.41),
         (PAIR.epsilon_alpha, 1.43716),

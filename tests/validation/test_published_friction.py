@@ -129,7 +129,7 @@ def test_whole_model_reproduces_c14() -> None:
     )
     losses = gearbox.losses()
     T = np.linspace(40.0, 90.0, 5001)
-    eta = losses.mesh.oil.dynamic_viscosity(T)
+    eta = gearbox.lubricant().dynamic_viscosity(T)
     T_case = float(np.interp(-case.eta_mPas * 1e-3, -eta, T))
     sliding = losses.breakdown(speed=case.n_1, torque=case.T_1, temperatures=T_case)["mesh_sliding"]
     assert sliding == pytest.approx(case.P_VZP, rel=5e-4)
