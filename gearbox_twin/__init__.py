@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from builder.build import build as build_fmu
+    from builder.build import build as build_fmu  # noqa: F401 - public as build_fmu
     from builder.files import read_cycle as read_cycle
     from builder.fmu_drive import drive_fmu as drive_fmu
     from diagnosis.diagnose import diagnose as diagnose

@@ -19,7 +19,7 @@ from models.ehl import reduced_modulus
 from models.gearbox_definition import Definition
 from models.laws import Parameter, symbol
 from models.loss_term import MESH, OIL, RPM, SPEED_FLOOR_RPM, TORQUE_FLOOR_NM
-from models.losses import loss_factors
+from models.losses import LossModel, loss_factors
 from models.network import Link, Node, Source, ThermalNetwork
 from models.oil import (
     T_HIGHEST,
