@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
+from numpy.typing import NDArray
 
 from builder.drive_cycle import KNOTS
 from builder.plots import PALETTE
-from builder.reproduce.figure import BLACK, BLUE, RED, Curve, Figure, Plot
+from builder.reproduce.figure import BLACK, BLUE, RED, Curve, Figure, Kind, Plot
 from builder.reproduce.report import Check, Part, Table, item
 from builder.reproduce.study import FULL, PRINTED, REDUCED, Study
 from models.simulation import Result
@@ -256,7 +257,7 @@ def _temperature_figures(study: Study, differences: dict[str, dict[str, Array]])
     for title, nodes in shown.items():
         curves = []
         for node in nodes:
-            kind = "dashed" if order.index(node) >= len(PALETTE) else "line"
+            kind: Kind = "dashed" if order.index(node) >= len(PALETTE) else "line"
             curves.append(Curve(node.replace("_", " "), full.time, full.temperatures[node], kind))
             x, y = reduced.time[::20], reduced.temperatures[node][::20]
             curves.append(Curve(REDUCED, x, y, "points", "#444444"))
@@ -274,7 +275,7 @@ def _temperature_figures(study: Study, differences: dict[str, dict[str, Array]])
     )
 
 
-def _hotter(pairs: dict[str, Array], after: Array) -> tuple[dict[str, float], str, dict[str, float]]:
+def _hotter(pairs: dict[str, Array], after: NDArray[np.bool_]) -> tuple[dict[str, float], str, dict[str, float]]:
     """Share of the time with a positive difference, the differences in words, and all numbers."""
     mean = {name: float(values[after].mean()) for name, values in pairs.items()}
     share = {name: float((values[after] > 0.0).mean()) for name, values in pairs.items()}

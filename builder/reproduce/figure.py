@@ -19,6 +19,7 @@ from models.types import Array
 WIDTH, HEIGHT, BAR_HEIGHT = 4.6, 3.6, 0.26  # inches per panel, and per bar
 MARKED = range(3, 13)  # number of points of a line that gets a mark at each
 BLUE, RED, BLACK = PALETTE[0], PALETTE[1], "#000000"
+Kind = Literal["line", "dashed", "points", "rings", "area", "band"]
 COLUMNS = ["panel", "curve", "point", "x_quantity", "x", "y_quantity", "y", "y_low"]
 
 
@@ -40,7 +41,7 @@ class Curve:
     label: str
     x: Array
     y: Array
-    kind: Literal["line", "dashed", "points", "rings", "area", "band"] = "line"
+    kind: Kind = "line"
     colour: str | None = None
     low: Array | None = None
 
@@ -186,11 +187,13 @@ class Graph:
     def draw(self, ax: Axes, colours: Mapping[str, str]) -> None:
         """Draw into axes."""
         for a, b, width, _ in self.links:
-            x, y = zip(self.nodes[a][:2], self.nodes[b][:2], strict=True)
-            ax.plot(x, y, color="#8A8A8A", linewidth=0.5 + 4.0 * width, zorder=1, solid_capstyle="round")
+            (x_a, y_a, _), (x_b, y_b, _) = self.nodes[a], self.nodes[b]
+            ax.plot(
+                [x_a, x_b], [y_a, y_b], color="#8A8A8A", linewidth=0.5 + 4.0 * width, zorder=1, solid_capstyle="round"
+            )
         for name, (x, y, group) in self.nodes.items():
-            box = {"boxstyle": "round,pad=0.45", "facecolor": colours[group], "edgecolor": "none"}
-            text = {"ha": "center", "va": "center", "fontsize": 8, "color": "white"}
+            box: dict[str, Any] = {"boxstyle": "round,pad=0.45", "facecolor": colours[group], "edgecolor": "none"}
+            text: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 8, "color": "white"}
             ax.text(x, y, name.replace("_", " "), bbox=box, zorder=2, **text)
             ax.plot(x, y, "s", color=colours[group], label=group, zorder=0)
         ax.set_axis_off()
@@ -213,8 +216,7 @@ class Figure:
     def draw(self) -> Canvas:
         """Draw all panels in rows of at most three."""
         count = len(self.panels)
-        columns = 1 if count == 1 and not isinstance(self.panels[0], Plot) else 2 if count % 3 else 3
-        columns = min(count, columns)
+        columns = min(count, 2 if count % 3 else 3)
         rows = -(-count // columns)
         height = max(BAR_HEIGHT * len(p.names) + 1.0 if isinstance(p, Bars) else HEIGHT for p in self.panels)
         colours = self._colours()

@@ -165,9 +165,9 @@ def _settle(
     parameters, given = (
         {name: np.array([row[name] for row in rows])[each] for name in rows[0]} for rows in (factors, inputs)
     )
-    points = {"speed": np.full(len(each), speed), "torque": np.tile(torque, len(factors))}
+    n, T = np.full(len(each), speed), np.tile(torque, len(factors))
     with threadpool_limits(1):
-        oil, _ = steady_oil(changed.network(), changed.losses(), **points, inputs=given, parameters=parameters)
+        oil, _ = steady_oil(changed.network(), changed.losses(), speed=n, torque=T, inputs=given, parameters=parameters)
     return oil.reshape(len(factors), len(torque))
 
 
@@ -311,7 +311,7 @@ def _compare_oils() -> Iterator[Comparison]:
     porto = ("University of Porto", PORTO_OILS, (40.0, 60.0, 80.0, 90.0, 100.0), 5.1e-3)
     arana = ("Arana et al. 2019", ARANA_OILS, (40.0, 100.0), 0.005)
     for source, oils, temperatures, tolerance in (porto, arana):
-        for name, values in oils.items():  # type: ignore[attr-defined]
+        for name, values in oils.items():
             ours = lubricant(named_oil(name)).kinematic_viscosity(np.array(temperatures))
             for T, value, own in zip(temperatures, values, ours.tolist(), strict=True):
                 yield Comparison(f"{name}, viscosity at {T:g} °C in mm²/s", source, value, own, tolerance, 2)

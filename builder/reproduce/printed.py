@@ -15,7 +15,7 @@ PAPER = (
     "Operating Conditions"
 )
 
-Row = tuple[str, object, str]  # quantity, value, path in the definition
+Row = tuple[str, str | float | tuple[float, float], str]  # quantity, value, path in the definition
 TABLE_1: tuple[Row, ...] = (
     ("Center distance in mm", 91.5, "stage.0.center_distance_mm"),
     ("Number of teeth, pinion", 16, "stage.0.z.0"),

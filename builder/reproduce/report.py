@@ -228,5 +228,6 @@ def _draw(figure: Figure, folder: Path) -> str:
     canvas, svg = figure.draw(), io.BytesIO()
     with mpl.rc_context(STYLE):
         canvas.savefig(folder / f"{figure.name}.png", dpi=DPI, metadata={"Software": None})
+        canvas.set_layout_engine("none")  # the arrangement of the PNG
         canvas.savefig(svg, format="svg", metadata={"Date": None})
     return "data:image/svg+xml;base64," + base64.b64encode(svg.getvalue()).decode()

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import statistics
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -161,8 +162,11 @@ def _costs(study: Study) -> tuple[dict[str, float], dict[str, float]]:
     one = tuple(values[0] for values in many)
     models: dict[str, Losses] = {FULL: study.full, REDUCED: study.surrogate}
 
-    def cost(losses: Losses, points: tuple[object, ...], repeats: int) -> float:
-        work = lambda: [losses.power(*points) for _ in range(repeats)]  # type: ignore[arg-type] # noqa: E731
+    def cost(losses: Losses, points: Sequence[Any], repeats: int) -> float:
+        def work() -> None:
+            for _ in range(repeats):
+                losses.power(*points)
+
         return measure(work, runs=5, longest_s=5.0).median / repeats
 
     return (

@@ -164,7 +164,7 @@ class Study:
     def cycle_runs(self) -> dict[str, Result]:
         """The 600 s cycle with the full model, our networks, and the networks as printed."""
         cycle = reference_cycle(self.gearbox)
-        models = {FULL: self.full, REDUCED: self.surrogate, PRINTED: self.printed.losses}
+        models: dict[str, Losses] = {FULL: self.full, REDUCED: self.surrogate, PRINTED: self.printed.losses}
         return {n: self.network.simulate(cycle, losses=losses, initial=COLD_START) for n, losses in models.items()}
 
     @cached_property
@@ -177,7 +177,7 @@ class Study:
         bounds = np.array([*TABLE_4.values()])
         bounds = np.vstack([bounds[:2], np.repeat(bounds[2:], len(self.full.temperature_nodes), axis=0)])
         low, high = bounds.T
-        models = {FULL: self.full, "as printed": self.printed.losses, "ours": self.surrogate}
+        models: dict[str, Losses] = {FULL: self.full, "as printed": self.printed.losses, "ours": self.surrogate}
         return {
             corner: {name: losses.power(x[:, 0], x[:, 1], x[:, 2:]) for name, losses in models.items()}
             for corner, upper in ((False, high), (True, low + CORNER * (high - low)))
@@ -198,7 +198,7 @@ class Study:
 
 
 def steady_oil(
-    network: ThermalNetwork, losses: Losses, *, speed: Array, torque: Array, **given: Mapping[str, Array]
+    network: ThermalNetwork, losses: Losses, *, speed: Array, torque: Array, **given: Any
 ) -> tuple[Array, Array]:
     """Oil temperature [degC] and total loss [W] in steady state at N operating points, each of shape (N,).
 
@@ -211,5 +211,5 @@ def steady_oil(
     **given
         `inputs` and `parameters` of :func:`models.simulation.steady_state`
     """
-    result = steady_state(network, losses=losses, speed=speed, torque=torque, **given)  # type: ignore[arg-type]
+    result = steady_state(network, losses=losses, speed=speed, torque=torque, **given)
     return result.temperatures["oil"][..., -1].ravel(), result.loss[..., -1].ravel()
