@@ -93,9 +93,10 @@ def predictions(study: Study) -> Iterator[Part]:
     """Losses of both sets of networks over those of the full model, normalised, for every output."""
     calculated = study.network_points[False][FULL]
     scores = {name: r_squared(calculated, study.network_points[False][name]) for name in COLOURS}
-    judged = study.settings.judged
+    test_points = study.settings.test_points
     yield (
-        f"{judged} random points within Table 4, separate from the training; both sets of networks on the same points."
+        f"{test_points} random points within Table 4, separate from the training; both sets of networks on the same"
+        " points."
     )
     for name, score in scores.items():
         yield Check(
@@ -119,7 +120,7 @@ def predictions(study: Study) -> Iterator[Part]:
         title = f"{component.replace('_', ' ')}, R² {' / '.join(f'{score[column]:.5f}' for score in scores.values())}"
         panels[component] = Plot(title, "Calculated, normalised", "Predicted, normalised", curves, square=True)
     caption = (
-        f"{judged} points that no network was trained on; min-max normalised by the calculated losses. R² in the"
+        f"{test_points} points that no network was trained on; min-max normalised by the calculated losses. R² in the"
         " titles: as printed / ours."
     )
     seals, bearings = ([one.name for one in parts] for parts in (study.gearbox.seal, study.gearbox.bearing))
@@ -136,8 +137,8 @@ def predictions(study: Study) -> Iterator[Part]:
 def cold_start_corner(study: Study) -> Iterator[Part]:
     """Relative errors at the lower limits of all inputs."""
     yield (
-        f"{study.settings.judged} random points in the lowest tenth of speed, torque and every temperature, where each"
-        " cold start begins. They hardly change R² over the whole box, since the losses there are small."
+        f"{study.settings.test_points} random points in the lowest tenth of speed, torque and every temperature, where"
+        " each cold start begins. They hardly change R² over the whole box, since the losses there are small."
     )
     printed, ours = (_errors(study, name, corner=True) for name in COLOURS)
     median, worst = np.median(printed, axis=0).max(), np.quantile(printed, 0.95, axis=0).max()

@@ -46,8 +46,8 @@ class Settings:
         Processes; -1 for all cores
     samples : int or None
         Training points per network of our networks; None takes the preset's
-    judged : int
-        Separate points on which networks are compared with the full model
+    test_points : int
+        Points, separate from the training, on which networks are compared with the full model
     runs : int
         Runs per timing, at most
     longest_s : float
@@ -61,7 +61,7 @@ class Settings:
     seed: int = 0
     jobs: int = -1
     samples: int | None = None
-    judged: int = 400
+    test_points: int = 400
     runs: int = 5
     longest_s: float = 30.0
     step_s: float = 10.0
@@ -181,7 +181,7 @@ class Study:
         return {
             corner: {name: losses.power(x[:, 0], x[:, 1], x[:, 2:]) for name, losses in models.items()}
             for corner, upper in ((False, high), (True, low + CORNER * (high - low)))
-            for x in [random_points(self.settings.judged, low, upper, seed=self.settings.seed + 100 + corner)]
+            for x in [random_points(self.settings.test_points, low, upper, seed=self.settings.seed + 100 + corner)]
         }
 
     @cached_property

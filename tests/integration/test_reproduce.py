@@ -19,7 +19,7 @@ from models.errors import InputError
 from models.gearbox import load_gearbox
 
 QUICK = Settings(
-    jobs=1, samples=400, judged=100, runs=1, longest_s=1.0, step_s=600.0, fine_step_s=300.0, trajectories=2
+    jobs=1, samples=400, test_points=100, runs=1, longest_s=1.0, step_s=600.0, fine_step_s=300.0, trajectories=2
 )
 # Times of this machine at this moment decide them; they do not decide the verdict of an item.
 TIMED = ("eighteen_hours_within_a_second", "what_the_surrogate_buys", "runs_take_a_second")
