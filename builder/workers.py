@@ -24,11 +24,17 @@ def worker_options(*, jobs_help: str = JOBS_HELP, dask_help: str = DASK_HELP) ->
 
     def decorate(command: Command) -> Command:
         dask = click.option("--dask", default=None, metavar="ADDRESS", callback=_without_jobs, help=dask_help)
-        jobs = click.option("--jobs", type=click.IntRange(min=1), default=_cores, show_default="all cores",
-                            metavar="N", is_eager=True, help=jobs_help)  # fmt: skip
-        return jobs(dask(command))
+        return jobs_option(jobs_help)(dask(command))
 
     return decorate
+
+
+def jobs_option(help_text: str = JOBS_HELP) -> Callable[[Command], Command]:
+    """Give a command the option ``--jobs`` (int, by default one per core)."""
+    return click.option(
+        "--jobs", type=click.IntRange(min=1), default=_cores, show_default="all cores", metavar="N", is_eager=True,
+        help=help_text,
+    )  # fmt: skip
 
 
 def _without_jobs(context: click.Context, _: click.Parameter, address: str | None) -> str | None:

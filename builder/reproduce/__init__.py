@@ -1,1 +1,1 @@
-"""The paper, reproduced: every table and figure, ours beside what is printed, with a verdict that code comes to."""
+"""The paper, reproduced: every table and figure, ours next to the print, with a verdict from checks in code."""

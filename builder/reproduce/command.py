@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import click
 
 from builder import console
+from builder.workers import jobs_option
 
 
 @click.command("reproduce")
@@ -29,41 +28,23 @@ from builder import console
     metavar="N",
     help="Seed of samples and starts.",
 )
-@click.option(
-    "--jobs",
-    type=click.IntRange(min=1),
-    default=None,
-    metavar="N",
-    help="Processes on this machine.  [default: all cores]",
-)
-def reproduce(output: Path, seed: int, jobs: int | None) -> None:
-    """Recompute every table and figure of the paper, ours beside what it prints, into one report."""
-    from builder.reproduce.report import (
-        FIGURES,
-        NUMBERS,
-        PAGE,
-        SUMMARY,
-        verdict_rows,
-    )  # imports plotly, scikit-learn and onnx
+@jobs_option()
+def reproduce(output: Path, seed: int, jobs: int) -> None:
+    """Recompute every table and figure of the paper and compare ours with the print, in one report."""
+    from builder.reproduce.report import FIGURES, NUMBERS, PAGE, SUMMARY  # imports matplotlib, scikit-learn and onnx
     from builder.reproduce.reproduce import reproduce as run
     from builder.reproduce.study import Settings
 
     begin = time.perf_counter()
-    with _stages() as tell:
-        report = run(output, settings=Settings(seed=seed, jobs=-1 if jobs is None else jobs), progress=tell)
-    console.table("The paper, reproduced", ["item", "what", "verdict"], verdict_rows(report.items), text_columns=3)
+    with console.err.status("starting") as status:  # shows nothing in a pipe
+        report = run(
+            output,
+            settings=Settings(seed=seed, jobs=jobs),
+            progress=lambda line: status.update(f"{line}  ({time.perf_counter() - begin:.0f} s so far)"),
+        )
+    rows = [(item.key, item.title, item.verdict.value) for item in report.items]
+    console.table("The paper, reproduced", ["item", "what", "verdict"], rows, text_columns=3)
     counted = ", ".join(f"{number} {verdict.value}" for verdict, number in report.count.items())
     console.out.print(f"{len(report.items)} items: {counted}; {time.perf_counter() - begin:.0f} s")
     for name in (PAGE, NUMBERS, SUMMARY, f"{FIGURES}/", "fzg.fmu"):
         console.out.print(f"wrote {output / name}")
-
-
-@contextmanager
-def _stages() -> Iterator[Callable[[str], None]]:
-    """Stages of the work with the time they have taken, as lines that stay on a terminal; nothing in a pipe."""
-    if not console.err.is_terminal:
-        yield lambda _: None
-        return
-    begin = time.perf_counter()
-    with console.err.status("starting") as status:
-        yield lambda line: status.update(f"{line}  ({time.perf_counter() - begin:.0f} s so far)")

@@ -1,77 +1,146 @@
-"""Figures as data: what is drawn is said once, and drawn into a page, a PNG and a CSV."""
+"""Figures as data: drawn by matplotlib into a PNG and an SVG, and tabulated as CSV."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import cycle
-from typing import Literal
+from typing import Any, Literal
 
+import matplotlib as mpl
 import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure as Canvas
 
-from builder.plots import PALETTE
+from builder.plots import PALETTE, STYLE
 from models.types import Array
 
-Kind = Literal["line", "points", "rings", "area", "band", "bars"]
-BLACK = "#000000"
-MARKED = range(3, 13)  # lines of so few points get a mark at each
+WIDTH, HEIGHT, BAR_HEIGHT = 4.6, 3.6, 0.26  # inches per panel, and per bar
+MARKED = range(3, 13)  # number of points of a line that gets a mark at each
+BLUE, RED, BLACK = PALETTE[0], PALETTE[1], "#000000"
+Kind = Literal["line", "dashed", "points", "rings", "area", "band"]
+COLUMNS = ["panel", "curve", "point", "x_quantity", "x", "y_quantity", "y", "y_low"]
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Curve:
-    """One curve of a panel.
+    """Points (x, y); curves of one label have one colour and one legend entry in all panels of a figure.
 
     Attributes
     ----------
     label : str
-        Its name in the legend; curves of one name have one colour and one entry over all panels of a figure
     x, y : Array, shape (N,)
-        Of bars, `x` is their length and `y` their place
-    kind : {"line", "points", "rings", "area", "band", "bars"}
-        Areas are stacked in their order; a band goes from `low` to `y`
-    low : Array, shape (N,), or None
-    names : tuple of str
-        A name for every point, which a reader sees when hovering; of bars, the names on the axis
-    dashed : bool
+    kind : str
+        Areas are stacked in their order; a band fills from `low` to `y`
     colour : str or None
-        By default, the next one of the palette
+        By default the next one of the palette
+    low : Array, shape (N,), or None
     """
 
     label: str
     x: Array
     y: Array
     kind: Kind = "line"
-    low: Array | None = None
-    names: tuple[str, ...] = ()
-    dashed: bool = False
     colour: str | None = None
+    low: Array | None = None
+
+    def draw(self, ax: Axes, colour: str, top: Array | float) -> None:
+        """Draw into axes; an area stands on `top`."""
+        style: dict[str, Any] = {"color": colour, "label": self.label}
+        if self.kind == "area":
+            ax.fill_between(self.x, top, top + self.y, linewidth=0.0, **style)
+        elif self.kind == "band":
+            ax.fill_between(self.x, 0.0 if self.low is None else self.low, self.y, linewidth=0.0, **style)
+        elif self.kind == "rings":
+            ax.plot(self.x, self.y, "o", markersize=6.0, fillstyle="none", markeredgewidth=0.8, **style)
+        elif self.kind == "points":
+            ax.plot(self.x, self.y, "o", markersize=2.6, markeredgecolor="white", markeredgewidth=0.25, **style)
+        else:
+            style["linestyle"] = "--" if self.kind == "dashed" else "-"
+            style["marker"] = "o" if len(self.x) in MARKED else ""
+            ax.plot(self.x, self.y, linewidth=1.4, markersize=3.5, **style)
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Plot:
-    """Axes with curves; labels carry the unit. The y axis starts at zero unless told otherwise."""
+    """Curves over one quantity; labels carry the unit."""
 
     title: str
     x_label: str
     y_label: str
-    curves: tuple[Curve, ...]
+    curves: Sequence[Curve]
     x_log: bool = False
     y_log: bool = False
     square: bool = False
     from_zero: bool = True
 
+    def labels(self) -> Iterator[tuple[str, str | None]]:
+        """Legend entries and their fixed colours."""
+        return ((curve.label, curve.colour) for curve in self.curves)
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+    def draw(self, ax: Axes, colours: Mapping[str, str]) -> None:
+        """Draw into axes."""
+        ax.set(xlabel=self.x_label, ylabel=self.y_label)
+        ax.set_xscale("log" if self.x_log else "linear")
+        ax.set_yscale("log" if self.y_log else "linear")
+        top: Array | float = 0.0
+        for curve in self.curves:
+            curve.draw(ax, colours[curve.label], top)
+            top = top + curve.y if curve.kind == "area" else top
+        if np.max(top) > 0.0:
+            ax.margins(0.0)
+        elif self.square:
+            ax.set_aspect("equal", adjustable="box")
+        elif self.from_zero and not self.y_log:
+            ax.set_ylim(bottom=0.0)
+
+    def rows(self) -> pd.DataFrame:
+        """Every point of every curve."""
+        quantities = {"x_quantity": self.x_label, "y_quantity": self.y_label}
+        frames = [
+            pd.DataFrame({"x": c.x, "y": c.y, "y_low": c.low}).assign(curve=c.label, **quantities) for c in self.curves
+        ]
+        return pd.concat(frames)
+
+
+@dataclass(frozen=True, eq=False)
+class Bars:
+    """Horizontal bars: a group of one bar per label for every name."""
+
+    title: str
+    x_label: str
+    names: Sequence[str]
+    lengths: Mapping[str, Array]
+
+    def labels(self) -> Iterator[tuple[str, str | None]]:
+        """Legend entries."""
+        return ((label, None) for label in self.lengths)
+
+    def draw(self, ax: Axes, colours: Mapping[str, str]) -> None:
+        """Draw into axes."""
+        thickness = 0.8 / len(self.lengths)
+        place = np.arange(len(self.names))
+        for i, (label, length) in enumerate(self.lengths.items()):
+            offset = (i - 0.5 * (len(self.lengths) - 1)) * thickness
+            ax.barh(place + offset, length, thickness, color=colours[label], label=label)
+        ax.set(xlabel=self.x_label, yticks=place, yticklabels=self.names)
+        ax.grid(visible=False, axis="y")
+        ax.margins(y=0.02)
+        ax.invert_yaxis()
+
+    def rows(self) -> pd.DataFrame:
+        """Every bar."""
+        place = np.arange(len(self.names))
+        return pd.concat(
+            pd.DataFrame({"x": length, "y": place, "point": self.names}).assign(curve=label, x_quantity=self.x_label)
+            for label, length in self.lengths.items()
+        )
+
+
+@dataclass(frozen=True, eq=False)
 class Map:
-    """A quantity over two others as colours with contour lines.
-
-    Attributes
-    ----------
-    x, y : Array, shape (M,) and (N,)
-    z : Array, shape (N, M)
-    z_label : str
-    levels : tuple of float
-        Contour lines, increasing; the colours go from the first to the last
-    """
+    """A quantity z, shape (N, M), over y, shape (N,), and x, shape (M,): filled contours at increasing levels."""
 
     title: str
     x_label: str
@@ -80,87 +149,105 @@ class Map:
     x: Array
     y: Array
     z: Array
-    levels: tuple[float, ...]
+    levels: Sequence[float]
+
+    def labels(self) -> Iterator[tuple[str, str | None]]:
+        """No legend entries: the colour bar has the levels."""
+        return iter(())
+
+    def draw(self, ax: Axes, _colours: Mapping[str, str]) -> None:
+        """Draw into axes; every step between two levels gets the same share of the colours."""
+        norm = mpl.colors.BoundaryNorm(self.levels, mpl.colormaps["cividis"].N, extend="max")
+        drawn = ax.contourf(self.x, self.y, self.z, self.levels, cmap="cividis", norm=norm, extend="max")
+        lines = ax.contour(self.x, self.y, self.z, self.levels[1:], colors="white", linewidths=0.5)
+        ax.clabel(lines, fontsize=7, fmt="%g")
+        ax.set(xlabel=self.x_label, ylabel=self.y_label)
+        ax.grid(visible=False)
+        ax.figure.colorbar(drawn, ax=ax, label=self.z_label)
+
+    def rows(self) -> pd.DataFrame:
+        """Every grid point."""
+        x, y = np.meshgrid(self.x, self.y)
+        columns = {"point": self.z.ravel(), "x": x.ravel(), "y": y.ravel()}
+        return pd.DataFrame(columns).assign(curve=self.z_label, x_quantity=self.x_label, y_quantity=self.y_label)
 
 
-@dataclass(frozen=True)
-class Knot:
-    """A node of a drawn network: name, place, its group (for the colour), and what hovering tells."""
-
-    name: str
-    x: float
-    y: float
-    group: str
-    tells: str
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Graph:
-    """A network: knots by name, and edges (knot, knot, width from 0 to 1, what hovering tells)."""
+    """Nodes as (x, y, group) by name, and links as (node, node, width from 0 to 1, value in words)."""
 
     title: str
-    knots: tuple[Knot, ...]
-    edges: tuple[tuple[str, str, float, str], ...]
+    nodes: Mapping[str, tuple[float, float, str]]
+    links: Sequence[tuple[str, str, float, str]]
+
+    def labels(self) -> Iterator[tuple[str, str | None]]:
+        """Groups."""
+        return ((group, None) for _, _, group in self.nodes.values())
+
+    def draw(self, ax: Axes, colours: Mapping[str, str]) -> None:
+        """Draw into axes."""
+        for a, b, width, _ in self.links:
+            (x_a, y_a, _), (x_b, y_b, _) = self.nodes[a], self.nodes[b]
+            ax.plot(
+                [x_a, x_b], [y_a, y_b], color="#8A8A8A", linewidth=0.5 + 4.0 * width, zorder=1, solid_capstyle="round"
+            )
+        for name, (x, y, group) in self.nodes.items():
+            box: dict[str, Any] = {"boxstyle": "round,pad=0.45", "facecolor": colours[group], "edgecolor": "none"}
+            text: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 8, "color": "white"}
+            ax.text(x, y, name.replace("_", " "), bbox=box, zorder=2, **text)
+            ax.plot(x, y, "s", color=colours[group], label=group, zorder=0)
+        ax.set_axis_off()
+        ax.margins(0.1)
+
+    def rows(self) -> pd.DataFrame:
+        """Every link."""
+        return pd.DataFrame([{"curve": f"{a} - {b}", "point": value} for a, b, _, value in self.links])
 
 
-Panel = Plot | Map | Graph
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Figure:
-    """One or more panels under one caption and one legend."""
+    """One or more panels under one caption and one legend; `name` is that of its files."""
 
     name: str
     title: str
     caption: str
-    panels: tuple[Panel, ...]
+    panels: Sequence[Plot | Bars | Map | Graph]
 
-    def colours(self) -> dict[str, str]:
-        """Return the colour of every legend entry, in order of appearance."""
+    def draw(self) -> Canvas:
+        """Draw all panels in rows of at most three."""
+        count = len(self.panels)
+        columns = min(count, 2 if count % 3 else 3)
+        rows = -(-count // columns)
+        height = max(BAR_HEIGHT * len(p.names) + 1.0 if isinstance(p, Bars) else HEIGHT for p in self.panels)
+        colours = self._colours()
+        in_row = 3 if columns == 1 else 4
+        with mpl.rc_context(STYLE):
+            size = WIDTH * max(columns, 1.4), height * rows + 0.25 * -(-len(colours) // in_row) + 0.5
+            canvas = Canvas(figsize=size, layout="constrained")
+            canvas.suptitle(self.title, fontsize=11)
+            axes = canvas.subplots(rows, columns, squeeze=False).ravel()
+            handles: dict[str, Any] = {}
+            for ax, panel in zip(axes, self.panels, strict=False):
+                ax.set_title(panel.title, fontsize=9.5)
+                panel.draw(ax, colours)
+                found, labels = ax.get_legend_handles_labels()
+                handles = dict(zip(labels, found, strict=True)) | handles
+            for spare in axes[count:]:
+                spare.set_visible(False)
+            if len(colours) > 1:
+                shown = [handles[label] for label in colours]
+                canvas.legend(shown, [*colours], loc="outside lower center", ncols=min(len(colours), in_row))
+        return canvas
+
+    def rows(self) -> pd.DataFrame:
+        """Everything drawn as one long table: panel, curve, both quantities with their names and units."""
+        table = pd.concat(panel.rows().assign(panel=panel.title) for panel in self.panels)
+        return table.reindex(columns=COLUMNS)
+
+    def _colours(self) -> dict[str, str]:
         colours: dict[str, str] = {}
         following = cycle(PALETTE)
-        for panel in self.panels:
-            if isinstance(panel, Map):
-                continue
-            if isinstance(panel, Graph):
-                labels: list[tuple[str, str | None]] = [(knot.group, None) for knot in panel.knots]
-            else:
-                labels = [(curve.label, curve.colour) for curve in panel.curves]
-            for label, colour in labels:
-                if label not in colours:
-                    colours[label] = colour or next(following)
+        for label, colour in (entry for panel in self.panels for entry in panel.labels()):
+            if label not in colours:
+                colours[label] = colour or next(following)
         return colours
-
-    def rows(self) -> dict[str, list[object]]:
-        """Return everything drawn as one long table: panel, curve, both quantities with their names and units."""
-        table: dict[str, list[object]] = {
-            key: [] for key in ("panel", "curve", "point", "x_quantity", "x", "y_quantity", "y", "y_low")
-        }
-
-        def add(*values: object) -> None:
-            for column, value in zip(table.values(), values, strict=True):
-                column.append(value)
-
-        for panel in self.panels:
-            if isinstance(panel, Graph):
-                for a, b, _, tells in panel.edges:
-                    add(panel.title, f"{a} - {b}", tells, "", None, "", None, None)
-            elif isinstance(panel, Map):
-                for (i, j), z in np.ndenumerate(panel.z):
-                    add(
-                        panel.title,
-                        panel.z_label,
-                        float(z),
-                        panel.x_label,
-                        float(panel.x[j]),
-                        panel.y_label,
-                        float(panel.y[i]),
-                        None,
-                    )
-            else:
-                for curve in panel.curves:
-                    names = curve.names or ("",) * len(curve.x)
-                    low = [None] * len(curve.x) if curve.low is None else curve.low.tolist()
-                    for name, x, y, y_low in zip(names, curve.x.tolist(), curve.y.tolist(), low, strict=True):
-                        add(panel.title, curve.label, name, panel.x_label, x, panel.y_label, y, y_low)
-        return table

@@ -1,54 +1,175 @@
-"""All items in one report: a page that needs nothing else, figures as PNG and CSV, and the numbers as JSON."""
+"""Items of the paper with their checks, tables and figures, and the report that shows them."""
 
 from __future__ import annotations
 
+import base64
+import io
 import json
 from collections import Counter
-from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import StrEnum
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
+import matplotlib as mpl
 from jinja2 import Environment, StrictUndefined
-from markupsafe import Markup
-from plotly.offline import get_plotlyjs
 
 from builder.files import write_table
-from builder.reproduce import render_html
+from builder.plots import STYLE
 from builder.reproduce.figure import Figure
-from builder.reproduce.item import Item, Verdict
-from builder.reproduce.render_png import write_png
+from builder.reproduce.printed import PAPER
+from builder.reproduce.study import Study
 
 PAGE, NUMBERS, SUMMARY, FIGURES = "report.html", "report.json", "summary.md", "figures"
-PAPER = (
-    "A Data-Driven Approach to Estimate the Power Loss and Thermal Behaviour of Cylindrical Gearboxes under Transient "
-    "Operating Conditions"
-)
+DPI = 150
 
 
-@dataclass(frozen=True, kw_only=True)
-class Report:
-    """What was reproduced.
+class Verdict(StrEnum):
+    """Outcome of a check or an item."""
+
+    REPRODUCED = "reproduced"
+    DIFFERS = "differs"
+    SILENT = "cannot be compared"
+    SCHEME = "scheme"
+    OURS = "not in the paper"
+    MET = "target met"
+    MISSED = "target not met"
+
+
+@dataclass(frozen=True)
+class Check:
+    """One statement of the paper against our numbers.
 
     Attributes
     ----------
-    items : tuple of Item
-        In the order of the paper
-    provenance : tuple of (str, str)
-        What it was made with
+    name : str
+    statement : str
+        Of the paper; of a target, ours
+    found : str
+        Our numbers in words
+    holds : bool or None
+        None if there is nothing to compare with
+    numbers : mapping of str to float
+        Those that the verdict depends on
+    otherwise : str
+        Why it does not hold, or cannot be compared
+    target : bool
+        True for a target of our own, which leaves the verdict of the item alone
     """
 
-    items: tuple[Item, ...]
-    provenance: tuple[tuple[str, str], ...]
+    name: str
+    statement: str
+    found: str
+    holds: bool | None
+    numbers: Mapping[str, float] = field(default_factory=dict)
+    otherwise: str = ""
+    target: bool = False
+
+    @property
+    def verdict(self) -> Verdict:
+        """The outcome."""
+        if self.holds is None:
+            return Verdict.SILENT
+        if self.target:
+            return Verdict.MET if self.holds else Verdict.MISSED
+        return Verdict.REPRODUCED if self.holds else Verdict.DIFFERS
+
+    @property
+    def why(self) -> str:
+        """Why it does not hold, or cannot be compared."""
+        return "" if self.holds else self.otherwise
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table; the first column is text, and numbers follow unless all columns are `texts`."""
+
+    title: str
+    header: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    note: str = ""
+    texts: bool = False
+
+
+@dataclass(frozen=True)
+class Item:
+    """A table, figure or section of the paper.
+
+    Attributes
+    ----------
+    key, title : str
+    unchecked : Verdict
+        Verdict of an item without checks
+    readings : tuple of str
+        How it was recomputed: what was assumed where the paper leaves something open
+    checks, tables, figures : tuple
+    """
+
+    key: str
+    title: str
+    unchecked: Verdict
+    readings: tuple[str, ...] = ()
+    checks: tuple[Check, ...] = ()
+    tables: tuple[Table, ...] = ()
+    figures: tuple[Figure, ...] = ()
+
+    @property
+    def verdict(self) -> Verdict:
+        """Differs if one check does; reproduced if one holds and none differs."""
+        verdicts = {check.verdict for check in self.checks}
+        order = (Verdict.DIFFERS, Verdict.REPRODUCED, Verdict.SILENT)
+        return next((verdict for verdict in order if verdict in verdicts), self.unchecked)
+
+    @property
+    def why(self) -> str:
+        """Why it differs, or cannot be compared; otherwise the number of checks per verdict."""
+        reasons = dict.fromkeys(c.why for c in self.checks if c.verdict == self.verdict and c.why)
+        count = Counter(check.verdict for check in self.checks)
+        return " ".join(reasons) or ", ".join(f"{number} {verdict}" for verdict, number in count.items())
+
+    @property
+    def anchor(self) -> str:
+        """Name of its place in the page."""
+        return "".join(c if c.isalnum() else "-" for c in self.key.lower()).strip("-")
+
+
+Part = str | Check | Table | Figure
+Recompute = Callable[[Study], Item]
+
+
+def item(key: str, title: str, *, unchecked: Verdict = Verdict.SILENT) -> Callable[[Callable[..., Any]], Recompute]:
+    """Decorate a generator of readings, checks, tables and figures: it becomes a function that returns the `Item`."""
+
+    def decorate(function: Callable[[Study], Iterator[Part]]) -> Recompute:
+        def recompute(study: Study) -> Item:
+            study.progress(f"{key}: {title}")
+            parts = list(function(study))
+            readings, checks, tables, figures = (
+                tuple(part for part in parts if isinstance(part, kind)) for kind in (str, Check, Table, Figure)
+            )
+            return Item(key, title, unchecked, readings, checks, tables, figures)  # type: ignore[arg-type]
+
+        return recompute
+
+    return decorate
+
+
+@dataclass(frozen=True)
+class Report:
+    """All items in the order of the paper, and with what they were made."""
+
+    items: Sequence[Item]
+    provenance: Mapping[str, str]
 
     @property
     def count(self) -> Counter[Verdict]:
-        """How many items there are of each verdict."""
+        """Number of items per verdict."""
         return Counter(item.verdict for item in self.items)
 
     def as_dict(self) -> dict[str, Any]:
-        """Verdicts, statements, and the numbers they were made from."""
+        """Verdicts, statements and numbers, for JSON."""
         return {
             "provenance": dict(self.provenance),
             "verdicts": {verdict.value: number for verdict, number in self.count.items()},
@@ -58,65 +179,55 @@ class Report:
                     "title": item.title,
                     "verdict": item.verdict.value,
                     "why": item.why,
-                    "checks": [asdict(check) for check in item.checks],
+                    "checks": [
+                        {
+                            "name": check.name,
+                            "statement": check.statement,
+                            "found": check.found,
+                            "verdict": check.verdict.value,
+                            "why": check.why,
+                            "numbers": {name: float(value) for name, value in check.numbers.items()},
+                        }
+                        for check in item.checks
+                    ],
                     "figures": [figure.name for figure in item.figures],
                 }
                 for item in self.items
             ],
         }
 
+    def summary(self) -> str:
+        """Verdicts and times as Markdown tables."""
+        timing = next(table for item in self.items if item.key == "Speed" for table in item.tables)
+        lines = ["| item | what | verdict |", "|---|---|---|"]
+        lines += [f"| {item.key} | {item.title} | {item.verdict} |" for item in self.items]
+        lines += ["", f"| {timing.title} | {' | '.join(timing.header[1:])} |"]
+        lines += ["|---|" + "---:|" * (len(timing.header) - 1)]
+        lines += [f"| {' | '.join(row)} |" for row in timing.rows]
+        return "\n".join(lines) + "\n"
 
-def write_report(report: Report, folder: Path, progress: Callable[[str], None]) -> None:
-    """Write ``report.html``, ``report.json``, ``summary.md`` and ``figures/*.png, *.csv`` into a folder."""
-    (folder / FIGURES).mkdir(parents=True, exist_ok=True)
-    for item in report.items:
-        for figure in item.figures:
+    def write(self, folder: Path, progress: Callable[[str], None]) -> None:
+        """Write ``report.html``, ``report.json``, ``summary.md`` and ``figures/*.png, *.csv`` into a folder."""
+        (folder / FIGURES).mkdir(parents=True, exist_ok=True)
+        images = {}
+        for figure in (figure for item in self.items for figure in item.figures):
             progress(f"drawing {figure.name}")
-            write_png(figure, folder / FIGURES / f"{figure.name}.png")
-            write_table(folder / FIGURES / f"{figure.name}.csv", figure.rows())  # type: ignore[arg-type]
-    (folder / NUMBERS).write_text(json.dumps(report.as_dict(), indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
-    (folder / SUMMARY).write_text(summary(report), encoding="utf-8")
-    (folder / PAGE).write_text(page(report), encoding="utf-8")
+            images[figure.name] = _draw(figure, folder / FIGURES)
+        numbers = json.dumps(self.as_dict(), indent=2, ensure_ascii=False)
+        (folder / NUMBERS).write_text(numbers + "\n", encoding="utf-8")
+        (folder / SUMMARY).write_text(self.summary(), encoding="utf-8")
+        environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+        source = (resources.files("builder.reproduce") / "report.html.j2").read_text(encoding="utf-8")
+        page = environment.from_string(source).render(paper=PAPER, report=self, images=images, folder=FIGURES)
+        (folder / PAGE).write_text(page, encoding="utf-8")
 
 
-def summary(report: Report) -> str:
-    """Return the verdicts and the times as Markdown tables."""
-    timing = next(table for item in report.items if item.key == "Speed" for table in item.tables)
-    lines = ["| item | what | verdict |", "|---|---|---|"]
-    lines += [f"| {item.key} | {item.title} | {item.verdict.value} |" for item in report.items]
-    lines += ["", f"| {timing.title} | {' | '.join(timing.header[1:])} |", "|---|" + "---:|" * (len(timing.header) - 1)]
-    lines += [f"| {' | '.join(row)} |" for row in timing.rows]
-    return "\n".join(lines) + "\n"
-
-
-def page(report: Report) -> str:
-    """Return the report as one HTML page."""
-    figures = [figure for item in report.items for figure in item.figures]
-    drawings = _json({figure.name: render_html.drawings(figure) for figure in figures})
-    source = (resources.files("builder.reproduce") / "report.html.j2").read_text(encoding="utf-8")
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    return environment.from_string(source).render(
-        paper=PAPER,
-        report=report,
-        Verdict=Verdict,
-        plotly=Markup(get_plotlyjs()),  # noqa: S704 - the library itself
-        drawings=Markup(drawings),  # noqa: S704 - escaped by _json
-        legends={figure.name: render_html.legend(figure) for figure in figures},
-        folder=FIGURES,
-        arrangement=_arrangement,
-    )
-
-
-def _arrangement(figure: Figure) -> str:
-    """How the panels stand on a wide screen: so that no row is left with one."""
-    return {1: "one", 2: "pairs", 4: "pairs"}.get(len(figure.panels), "threes")
-
-
-def _json(value: object) -> str:
-    """JSON that can stand inside a script element."""
-    return json.dumps(value, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
-
-
-def verdict_rows(items: Sequence[Item]) -> list[list[str]]:
-    """Rows of the summary that a terminal shows."""
-    return [[item.key, item.title, item.verdict.value] for item in items]
+def _draw(figure: Figure, folder: Path) -> str:
+    """Write the PNG and the CSV of a figure; the SVG is returned as an address that holds the whole picture."""
+    write_table(folder / f"{figure.name}.csv", dict(figure.rows().items()))  # type: ignore[arg-type]
+    canvas, svg = figure.draw(), io.BytesIO()
+    with mpl.rc_context(STYLE):
+        canvas.savefig(folder / f"{figure.name}.png", dpi=DPI, metadata={"Software": None})
+        canvas.set_layout_engine("none")  # the arrangement of the PNG
+        canvas.savefig(svg, format="svg", metadata={"Date": None})
+    return "data:image/svg+xml;base64," + base64.b64encode(svg.getvalue()).decode()

@@ -1,4 +1,4 @@
-"""The whole of it: train, build the FMU, recompute every item of the paper, write the report."""
+"""Train, build the FMU, recompute every item of the paper, write the report."""
 
 from __future__ import annotations
 
@@ -12,24 +12,43 @@ import numpy as np
 
 from builder.fmu import build_python_fmu
 from builder.onnx_export import export_onnx
-from builder.reproduce.drive import drive_cycle
-from builder.reproduce.item import Item
-from builder.reproduce.long_run import long_run
-from builder.reproduce.losses import breakdown_over_torque, loss_map, losses_over_speed
-from builder.reproduce.networks import predictors
-from builder.reproduce.published import published
-from builder.reproduce.report import Report, write_report
-from builder.reproduce.schemes import schemes, thermal_network
-from builder.reproduce.sensitivity import sensitivity
-from builder.reproduce.speed import speed
+from builder.reproduce import drive, losses, networks, others, rig, speed, stages
+from builder.reproduce.report import Report
 from builder.reproduce.study import Settings, Study
-from builder.reproduce.tables import definition_tables, equations_as_printed, pitch_velocities_are_the_wheels
 from builder.train import train_surrogate
 from models.atomic_write import atomic_folder
 from models.gearbox import load_gearbox
 from models.version import project_version
 
 GEARBOX = "fzg"
+# In the order of the paper; items that it does not have come last.
+ITEMS = (
+    rig.design_scheme,
+    rig.rig_scheme,
+    rig.characteristics,
+    rig.loss_models,
+    rig.equations_as_printed,
+    losses.losses_over_speed,
+    losses.breakdown_over_torque,
+    networks.hyperparameters,
+    networks.training_bounds,
+    networks.network_scheme,
+    networks.predictions,
+    networks.cold_start_corner,
+    rig.thermal_network,
+    rig.thermal_parameters,
+    drive.profile,
+    drive.power_loss,
+    drive.temperatures,
+    # Before the items that start worker processes, which may still be running afterwards.
+    speed.computation_times,
+    rig.kinematic_condition,
+    stages.eighteen_hours,
+    stages.boundary_conditions,
+    others.sensitivity,
+    others.published_numbers,
+    losses.loss_map,
+)
 
 
 def reproduce(
@@ -64,49 +83,18 @@ def reproduce(
         progress("training: our networks")
         ours = train_surrogate(gearbox, seed=settings.seed, jobs=settings.jobs, samples=settings.samples)
         progress("packaging the FMU")
-        networks = export_onnx(ours, stage / "networks", version=project_version())
-        fmu = build_python_fmu(gearbox, ours, networks, stage / f"{GEARBOX}.fmu")
-        study = Study(gearbox=gearbox, ours=ours, printed=printed, fmu=fmu, settings=settings)
-        items = recompute(study, progress)
-        provenance = (
-            ("version", project_version()),
-            ("definition", f"{GEARBOX}, SHA-256 {gearbox.hash[:16]}"),
-            ("seed", str(settings.seed)),
-            ("machine", f"{platform.machine()}, Python {platform.python_version()}, numpy {np.__version__}"),
-            ("made", datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")),
-            ("took", f"{time.perf_counter() - begin:.0f} s"),
-        )
-        report = Report(items=tuple(items), provenance=provenance)
-        write_report(report, stage, progress)
+        exported = export_onnx(ours, stage / "networks", version=project_version())
+        fmu = build_python_fmu(gearbox, ours, exported, stage / f"{GEARBOX}.fmu")
+        study = Study(gearbox=gearbox, ours=ours, printed=printed, fmu=fmu, settings=settings, progress=progress)
+        items = [recompute(study) for recompute in ITEMS]
+        provenance = {
+            "version": project_version(),
+            "definition": f"{GEARBOX}, SHA-256 {gearbox.hash[:16]}",
+            "seed": str(settings.seed),
+            "machine": f"{platform.machine()}, Python {platform.python_version()}, numpy {np.__version__}",
+            "made": datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
+            "took": f"{time.perf_counter() - begin:.0f} s",
+        }
+        report = Report(items, provenance)
+        report.write(stage, progress)
     return report
-
-
-def recompute(study: Study, progress: Callable[[str], None]) -> list[Item]:
-    """All items, in the order of the paper; what the paper does not have comes last."""
-    # Timings first: later, worker processes of other items may still be about.
-    timing = speed(study, progress)
-    progress("schemes and tables")
-    fig_1, fig_2 = schemes(study)
-    table_1, table_2, table_5 = definition_tables(study)
-    progress("losses")
-    section_3 = [table_1, table_2, equations_as_printed(study), losses_over_speed(study), breakdown_over_torque(study)]
-    progress("networks")
-    *section_4, corner = predictors(study)
-    progress("thermal network and drive cycle")
-    section_5 = [thermal_network(study), table_5]
-    section_6 = [*drive_cycle(study), timing, pitch_velocities_are_the_wheels(study)]
-    fig_13, boundaries = long_run(study, progress)
-    return [
-        fig_1,
-        fig_2,
-        *section_3,
-        *section_4,
-        corner,
-        *section_5,
-        *section_6,
-        fig_13,
-        boundaries,
-        sensitivity(study, progress),
-        published(study),
-        loss_map(study),
-    ]

@@ -1,33 +1,38 @@
-"""What all items are made from: the gearbox, its full model, both sets of networks and the FMU; and Table 6."""
+"""Models and simulations that several items share, each made once."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from builder.doe import random_points
+from builder.drive_cycle import COLD_START, reference_cycle
+from builder.reproduce.printed import OUTPUT_TORQUE, STAGE_S, TABLE_4, TABLE_6_RPM
 from builder.train import TrainingResult
 from models.cycle import Cycle
 from models.gearbox import Gearbox
 from models.losses import LossModel
-from models.network import ThermalNetwork
+from models.network import Losses, ThermalNetwork
+from models.simulation import Result, steady_state
 from models.surrogate import SurrogateLosses
 from models.types import Array
 
-# Table 6 of the paper.
-PITCH_VELOCITY = np.array([1.0, 2.0, 5.0, 8.3, 15.0, 20.0])  # m/s
-TABLE_6_RPM = np.array([174.0, 348.0, 870.0, 1444.0, 2609.0, 3476.0])
-OUTPUT_TORQUE = np.array([0.0, 141.0, 453.0])  # N m
-STAGE_S = 3.0 * 3600.0
-CHANGE_S = 1.0  # in which the speed changes
-MIDDLE = 3  # 8.3 m/s, the stage that figures of one speed show
-# Node temperatures above the oil's that losses without a thermal network are evaluated at.
-BEARING_ABOVE_OIL = 5.0  # K
-GEAR_ABOVE_OIL = np.array([0.0, 10.0, 25.0])  # K, at OUTPUT_TORQUE
+FULL, REDUCED, PRINTED = "F-PL", "ROM-PL", "ROM-PL, networks as printed"
+MIDDLE = 3  # index of 8.3 m/s, the stage that figures of one speed show
+MEDIUM, HIGHEST = 1, 2  # indices of OUTPUT_TORQUE
+CHANGE_S = 1.0  # in which the speed of Table 6 changes
+# Temperatures that losses without a thermal network are evaluated at; gears at OUTPUT_TORQUE.
 T_OIL = 60.0  # degC
+BEARING_ABOVE_OIL = 5.0  # K
+GEAR_ABOVE_OIL = np.array([0.0, 10.0, 25.0])  # K
+CORNER = 0.1  # lowest tenth of every input's range: where cold starts begin
+LIMIT = 120.0  # degC: upper bound of the paper's networks (Table 4)
+FACTORS = np.geomspace(1.0, 40.0, 41)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,11 +43,11 @@ class Settings:
     ----------
     seed : int
     jobs : int
-        Processes; -1 for all cores
+        Processes
     samples : int or None
         Training points per network of our networks; None takes the preset's
-    judged : int
-        Separate points that networks are judged on
+    test_points : int
+        Points, separate from the training, on which networks are compared with the full model
     runs : int
         Runs per timing, at most
     longest_s : float
@@ -54,9 +59,9 @@ class Settings:
     """
 
     seed: int = 0
-    jobs: int = -1
+    jobs: int = 1
     samples: int | None = None
-    judged: int = 400
+    test_points: int = 400
     runs: int = 5
     longest_s: float = 30.0
     step_s: float = 10.0
@@ -76,6 +81,8 @@ class Study:
     fmu : Path
         Of our networks
     settings : Settings
+    progress : callable
+        Called with a line of text at every stage
     """
 
     gearbox: Gearbox
@@ -83,6 +90,7 @@ class Study:
     printed: TrainingResult
     fmu: Path
     settings: Settings
+    progress: Callable[[str], None]
 
     @cached_property
     def full(self) -> LossModel:
@@ -114,54 +122,94 @@ class Study:
         """Torques of Table 6 at the pinion shaft, [N m], shape (3,)."""
         return OUTPUT_TORQUE / self.ratio
 
-    def stated_temperatures(self, output_torque: Any, *, T_oil: float = T_OIL) -> Array:
-        """Node temperatures for losses without a thermal network, [degC], shape (..., temperature nodes).
-
-        Parameters
-        ----------
-        output_torque : ArrayLike, shape (...)
-            T2, [N m]; the gears are the warmer above the oil, the more torque they carry
-        T_oil : float
-            [degC]
-        """
+    def stated_temperatures(self, output_torque: Any, *, T_oil: float = T_OIL) -> dict[str, Array]:
+        """Node temperatures for losses without a thermal network, [degC]: gears are the warmer, the higher T2 [N m]."""
         gears = T_oil + np.interp(output_torque, OUTPUT_TORQUE, GEAR_ABOVE_OIL)
-        columns = [
-            (
-                np.full_like(gears, T_oil)
-                if node == "oil"
-                else gears
-                if node in self.gearbox.stage[0].names
-                else np.full_like(gears, T_oil + BEARING_ABOVE_OIL)
-            )
-            for node in self.full.temperature_nodes
-        ]
-        return np.stack(columns, axis=-1)
+        others = {"oil": np.full_like(gears, T_oil)} | dict.fromkeys(self.gearbox.stage[0].names, gears)
+        bearings = np.full_like(gears, T_oil + BEARING_ABOVE_OIL)
+        return {node: others.get(node, bearings) for node in self.full.temperature_nodes}
 
-    def staircase(self, output_torque: float, *, step_s: float, speeds: Array | None = None) -> Cycle:
-        """Return the 18 h of Table 6 at one torque: six speeds of 3 h each, changed within a second.
+    def by_kind(self, losses: Mapping[str, Array]) -> dict[str, Array]:
+        """Losses of components added up by kind, [W]."""
+        return {
+            "sliding": losses["mesh_sliding"],
+            "rolling": losses["mesh_rolling"],
+            "churning": losses["churning"],
+            "seals": np.sum([losses[seal.name] for seal in self.gearbox.seal], axis=0),
+            "bearings": np.sum([losses[bearing.name] for bearing in self.gearbox.bearing], axis=0),
+        }
 
-        Parameters
-        ----------
-        output_torque : float
-            T2, [N m]
-        step_s : float
-            [s]; a divisor of 3 h
-        speeds : Array, shape (6,), or None
-            Of the pinion, [1/min]; by default Table 6 read as wheel speeds
+    def staircase(self, output_torque: float, *, step_s: float) -> Cycle:
+        """Return the 18 h of Table 6 at one torque T2 [N m]: six speeds of 3 h each, changed within a second.
+
+        `step_s` is a divisor of 3 h, [s].
         """
-        speeds = self.pinion_speed if speeds is None else speeds
-        end = STAGE_S * len(speeds)
+        end = STAGE_S * len(TABLE_6_RPM)
         changes = np.arange(STAGE_S, end, STAGE_S)
         time = np.union1d(np.linspace(0.0, end, round(end / step_s) + 1), changes + CHANGE_S)
         # The row at a change belongs to the earlier stage, so that every stage ends with its own speed.
-        stage = np.clip(np.ceil(time / STAGE_S).astype(int) - 1, 0, len(speeds) - 1)
+        stage = np.clip(np.ceil(time / STAGE_S).astype(int) - 1, 0, len(TABLE_6_RPM) - 1)
         ambient = self.gearbox.ambient
         return Cycle.from_columns(
             {
                 "time_s": time,
-                "speed_rpm": speeds[stage],
+                "speed_rpm": self.pinion_speed[stage],
                 "torque_Nm": np.full_like(time, output_torque / self.ratio),
                 "T_ambient_degC": np.full_like(time, ambient.temperature_degC),
                 "air_speed_m_s": np.full_like(time, ambient.air_speed_m_s),
             }
         )
+
+    @cached_property
+    def cycle_runs(self) -> dict[str, Result]:
+        """The 600 s cycle with the full model, our networks, and the networks as printed."""
+        cycle = reference_cycle(self.gearbox)
+        models: dict[str, Losses] = {FULL: self.full, REDUCED: self.surrogate, PRINTED: self.printed.losses}
+        return {n: self.network.simulate(cycle, losses=losses, initial=COLD_START) for n, losses in models.items()}
+
+    @cached_property
+    def network_points(self) -> dict[bool, dict[str, Array]]:
+        """Losses [W], shape (points, components), of the full model and both sets of networks.
+
+        False: random points within Table 4, of another seed than the training. True: points in its cold, slow, light
+        corner.
+        """
+        bounds = np.array([*TABLE_4.values()])
+        bounds = np.vstack([bounds[:2], np.repeat(bounds[2:], len(self.full.temperature_nodes), axis=0)])
+        low, high = bounds.T
+        models: dict[str, Losses] = {FULL: self.full, "as printed": self.printed.losses, "ours": self.surrogate}
+        return {
+            corner: {name: losses.power(x[:, 0], x[:, 1], x[:, 2:]) for name, losses in models.items()}
+            for corner, upper in ((False, high), (True, low + CORNER * (high - low)))
+            for x in [random_points(self.settings.test_points, low, upper, seed=self.settings.seed + 100 + corner)]
+        }
+
+    @cached_property
+    def needed_convection(self) -> tuple[float, float]:
+        """Factor on the convection, and air speed [m/s], that hold `LIMIT` at the highest load and speed."""
+        speed, torque = (np.full_like(FACTORS, v) for v in (self.pinion_speed[-1], self.pinion_torque[HIGHEST]))
+        oil_at = partial(steady_oil, self.network, self.full, speed=speed, torque=torque)
+        air_speed = self.gearbox.ambient.air_speed_m_s * FACTORS
+        by_factor, by_air = (oil_at(parameters={"h_air": FACTORS})[0], oil_at(inputs={"air_speed": air_speed})[0])
+        return (
+            float(np.exp(np.interp(-LIMIT, -by_factor, np.log(FACTORS)))),
+            float(np.exp(np.interp(-LIMIT, -by_air, np.log(air_speed)))),
+        )
+
+
+def steady_oil(
+    network: ThermalNetwork, losses: Losses, *, speed: Array, torque: Array, **given: Any
+) -> tuple[Array, Array]:
+    """Oil temperature [degC] and total loss [W] in steady state at N operating points, each of shape (N,).
+
+    Parameters
+    ----------
+    network : ThermalNetwork
+    losses : Losses
+    speed, torque : Array, shape (N,)
+        Of the input shaft, [1/min] and [N m]
+    **given
+        `inputs` and `parameters` of :func:`models.simulation.steady_state`
+    """
+    result = steady_state(network, losses=losses, speed=speed, torque=torque, **given)
+    return result.temperatures["oil"][..., -1].ravel(), result.loss[..., -1].ravel()

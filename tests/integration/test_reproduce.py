@@ -1,53 +1,100 @@
-"""The report on the paper: complete, self-contained, and good in a real browser, wide and narrow."""
+"""The report on the paper, with fewer points, runs and rows than the verb takes: complete, and with known verdicts."""
 
 from __future__ import annotations
 
 import json
 import re
-import shutil
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pandas as pd
 import pytest
 from matplotlib.image import imread
 
-from builder.reproduce.report import FIGURES, NUMBERS, PAGE, SUMMARY, Report
+from builder.reproduce.report import FIGURES, NUMBERS, PAGE, SUMMARY, Check, Item, Report, Verdict
 from builder.reproduce.reproduce import reproduce
-from builder.reproduce.study import Settings
+from builder.reproduce.rig import characteristics
+from builder.reproduce.speed import measure
+from builder.reproduce.study import Settings, Study
 from models.errors import InputError
+from models.gearbox import load_gearbox
 
-# Fewer points, runs and rows than the command takes.
 QUICK = Settings(
-    jobs=1, samples=400, judged=100, runs=1, longest_s=1.0, step_s=600.0, fine_step_s=300.0, trajectories=2
+    jobs=1, samples=400, test_points=100, runs=1, longest_s=1.0, step_s=600.0, fine_step_s=300.0, trajectories=2
 )
-ITEMS = [
-    "Fig. 1",
-    "Fig. 2",
-    "Table 1",
-    "Table 2",
-    "Eqs. (6), (10)",
-    "Fig. 3",
-    "Fig. 4",
-    "Table 3",
-    "Table 4",
-    "Fig. 5",
-    "Figs. 6-8",
-    "Cold-start corner",
-    "Fig. 9",
-    "Table 5",
-    "Fig. 10",
-    "Fig. 11",
-    "Fig. 12",
-    "Speed",
-    "Table 6",
-    "Fig. 13",
-    "Boundary conditions",
-    "Sensitivity",
-    "Published numbers",
-    "Loss map",
-]
+# Times of this machine at this moment decide them; they do not decide the verdict of an item.
+TIMED = ("eighteen_hours_within_a_second", "what_the_surrogate_buys", "runs_take_a_second")
+# With these settings; those of the verb train better networks.
+GOLDEN = """
+Fig. 1: scheme
+Fig. 2: scheme
+Table 1: reproduced
+    values_equal_the_print: reproduced
+Table 2: reproduced
+    values_equal_the_print: reproduced
+Eqs. (6), (10): differs
+    eq_6_is_below_the_power_transmitted: differs
+    eq_10_is_the_standards: differs
+Fig. 3: reproduced
+    underestimates_at_high_speed_and_low_torque: reproduced
+    underestimation_stays_constant_over_torque: reproduced
+    trend_changes_with_torque: reproduced
+    agrees_with_measurement_at_high_torque: cannot be compared
+Fig. 4: reproduced
+    no_load_losses_constant_over_torque: reproduced
+    sliding_and_bearings_dominate_at_high_torque: reproduced
+Table 3: differs
+    printed_set_up_is_run_as_printed: differs
+Table 4: reproduced
+    bounds_as_printed: reproduced
+Fig. 5: scheme
+Figs. 6-8: reproduced
+    high_r_squared_as_printed: reproduced
+    high_r_squared_ours: reproduced
+Cold-start corner: reproduced
+    printed_set_up_is_weak_at_the_lower_limits: reproduced
+    our_networks_are_not_weak_there: target not met
+Fig. 9: scheme
+Table 5: reproduced
+    values_equal_the_print: reproduced
+Fig. 10: cannot be compared
+    profile_as_printed: cannot be compared
+Fig. 11: differs
+    agreement_is_good_after_the_start: differs
+    end_agrees_better_than_start: reproduced
+    our_start_agrees: target not met
+    sliding_rises_slightly_at_constant_power: reproduced
+    bearing_and_no_load_losses_fall_at_constant_power: reproduced
+Fig. 12: differs
+    temperatures_almost_identical: differs
+    gears_hotter_when_torque_is_high: reproduced
+    gears_tend_to_the_oil_when_torque_drops: reproduced
+    input_branch_hotter_than_output_branch: differs
+    input_bearings_lose_more: reproduced
+    shafts_hotter_than_their_bearings: differs
+Speed: differs
+    surrogate_is_faster_than_the_full_model: reproduced
+    full_model_is_a_thousand_times_slower: differs
+    hours_are_simulated_in_minutes: reproduced
+Table 6: differs
+    pitch_velocities_belong_to_the_input_shaft: differs
+Fig. 13: differs
+    agrees_with_measurement_at_0_Nm: cannot be compared
+    agrees_with_measurement_at_141_Nm: cannot be compared
+    highest_load_stays_within_the_printed_range: differs
+    settles_within_three_hours: reproduced
+    temperatures_are_distributed_as_in_the_cycle: reproduced
+    step_is_fine_enough: target met
+Boundary conditions: differs
+    highest_load_is_plausible_as_printed: differs
+Sensitivity: not in the paper
+Published numbers: reproduced
+    ours_are_the_published_numbers: reproduced
+Loss map: not in the paper
+"""
+FIGURE_NAMES = [
+    "fig_03", "fig_04", "fig_06", "fig_07", "fig_08", "corner_errors", "fig_09", "fig_10", "fig_11", "fig_12",
+    "fig_12_differences", "fig_13", "boundary_conditions", "sensitivity", "loss_map",
+]  # fmt: skip
 KEPT = "notes of mine.txt"
 
 
@@ -63,154 +110,86 @@ def report(folder: Path) -> Report:
     return reproduce(folder, settings=QUICK)
 
 
-def test_no_item_of_the_paper_is_missing(report: Report, folder: Path) -> None:
-    assert [item.key for item in report.items] == ITEMS
+def test_verdicts(report: Report, folder: Path) -> None:
     written = json.loads((folder / NUMBERS).read_text(encoding="utf-8"))
-    assert [item["key"] for item in written["items"]] == ITEMS
-    page = (folder / PAGE).read_text(encoding="utf-8")
-    for item in report.items:
-        assert f'<section id="{item.anchor}">' in page
-    assert len({item.anchor for item in report.items}) == len(ITEMS)
-    for key in ITEMS:
-        assert f"| {key} |" in (folder / SUMMARY).read_text(encoding="utf-8")
+    lines = []
+    for one in written["items"]:
+        lines.append(f"{one['key']}: {one['verdict']}")
+        lines += [f"    {c['name']}: {c['verdict']}" for c in one["checks"] if c["name"] not in TIMED]
+    assert "\n".join(lines) == GOLDEN.strip()
+    assert {c["name"] for one in written["items"] for c in one["checks"]} >= {*TIMED}
+    assert sum(written["verdicts"].values()) == len(report.items)
 
 
-def test_verdicts_that_do_not_depend_on_how_much_is_computed(report: Report) -> None:
-    verdicts = {item.key: item.verdict.value for item in report.items}
-    for key in ("Table 1", "Table 2", "Table 4", "Table 5", "Fig. 3", "Fig. 4", "Published numbers"):
-        assert verdicts[key] == "reproduced", key
-    for key in ("Eqs. (6), (10)", "Table 3", "Table 6", "Fig. 13", "Speed"):
-        assert verdicts[key] == "differs", key
-    assert {verdicts[key] for key in ("Fig. 1", "Fig. 2", "Fig. 5", "Fig. 9")} == {"scheme"}
-    assert verdicts["Fig. 10"] == "cannot be compared"
-
-
-def test_the_readme_tells_every_item_and_these_verdicts(report: Report) -> None:
-    readme = (Path(__file__).parents[2] / "docs" / "paper.md").read_text(encoding="utf-8")
-    verdict = "(reproduced|differs|scheme|cannot be compared|not in the paper)"
-    told = dict(re.findall(rf"^\| ([^|]+) \| [^|]+ \| {verdict} \|$", readme, flags=re.MULTILINE))
-    assert list(told) == ITEMS
-    verdicts = {item.key: item.verdict.value for item in report.items}
-    # With the few points and runs of a test these come out otherwise.
-    of_size = {"Figs. 6-8", "Cold-start corner", "Fig. 11", "Fig. 12", "Boundary conditions"}
-    assert {k: v for k, v in verdicts.items() if k not in of_size} == {
-        k: v for k, v in told.items() if k not in of_size
-    }
-
-
-def test_every_check_tells_what_it_found(report: Report) -> None:
-    for item in report.items:
-        for check in item.checks:
-            assert check.statement, check.name
-            assert check.found or check.why, check.name
-            assert (check.verdict.value in ("reproduced", "target met")) == (not check.why), check.name
-            assert all(abs(value) < float("inf") for value in check.numbers.values()), check.name
+def test_every_item_is_in_page_and_summary(report: Report, folder: Path) -> None:
+    page, summary = ((folder / name).read_text(encoding="utf-8") for name in (PAGE, SUMMARY))
+    for one in report.items:
+        assert f'<section id="{one.anchor}">' in page
+        assert f"| {one.key} | {one.title} | {one.verdict} |" in summary
+    assert page.count("<figure") == page.count('src="data:image/svg+xml;base64,') == len(FIGURE_NAMES)
 
 
 def test_every_figure_is_there_as_png_and_csv(report: Report, folder: Path) -> None:
-    names = [figure.name for item in report.items for figure in item.figures]
-    assert sorted(path.name for path in (folder / FIGURES).iterdir()) == sorted(
-        name + ending for name in names for ending in (".csv", ".png")
-    )
-    for name in names:
+    assert [figure.name for one in report.items for figure in one.figures] == FIGURE_NAMES
+    written = {path.name for path in (folder / FIGURES).iterdir()}
+    assert written == {name + ending for name in FIGURE_NAMES for ending in (".csv", ".png")}
+    for name in FIGURE_NAMES:
         height, width, _ = imread(folder / FIGURES / f"{name}.png").shape
         assert width > 800, name
         assert height > 400, name
         assert len(pd.read_csv(folder / FIGURES / f"{name}.csv")) > 5, name
 
 
-def test_nothing_is_fetched_from_elsewhere(report: Report, folder: Path) -> None:
+def test_the_page_refers_to_nothing_but_its_figures(report: Report, folder: Path) -> None:
     page = (folder / PAGE).read_text(encoding="utf-8")
-    without_library = re.sub(r"<script>.*?</script>", "", page, flags=re.DOTALL)
-    assert not re.findall(r"""(?:src|href)\s*=\s*["']?(?:https?:)?//""", without_library)
-    assert "@import" not in without_library
-    for link in re.findall(r'href="([^"#]+)"', without_library):
+    for link in re.findall(r"""(?:src|href)="([^"#]+)""", page):
         assert link.startswith("data:") or (folder / link).is_file(), link
+    assert "<script" not in page
+    assert "@import" not in page
 
 
-def test_a_folder_that_is_there_is_not_emptied(report: Report, folder: Path) -> None:
+def test_other_files_of_the_folder_are_kept(report: Report, folder: Path) -> None:
     assert (folder / KEPT).read_text() == "keep me"
     assert not list(folder.glob(".unfinished-*"))
 
 
-def test_an_output_that_cannot_be_made_is_refused_at_once(tmp_path: Path) -> None:
-    file = tmp_path / "file"
-    file.write_text("")
-    told: list[str] = []
+def test_an_output_that_cannot_be_made_is_refused_before_the_work(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    lines: list[str] = []
     with pytest.raises(InputError, match="cannot be written"):
-        reproduce(file / "inside", settings=QUICK, progress=told.append)
-    assert told == [], "nothing is computed before"
+        reproduce(tmp_path / "file/inside", settings=QUICK, progress=lines.append)
+    assert lines == []
 
 
-# ------------------------------------------------------------------ in a browser
-
-CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-DRIVER = shutil.which("chromedriver")
-WIDE, PHONE = (1440, 900), (390, 844)
-
-
-@pytest.fixture(scope="module", params=[WIDE, PHONE], ids=["wide", "phone"])
-def browser(request: pytest.FixtureRequest, report: Report, folder: Path) -> Iterator[Any]:
-    """The report, opened without a network and fully drawn."""
-    if CHROMIUM is None or DRIVER is None:
-        pytest.skip("no chromium with chromedriver here; 'apt-get install chromium chromium-driver' brings them")
-    webdriver = pytest.importorskip("selenium.webdriver", reason="needs selenium, which the extra 'dev' brings")
-    width, height = request.param
-    options = webdriver.ChromeOptions()
-    options.binary_location = CHROMIUM
-    for argument in ("--headless=new", "--no-sandbox", "--disable-gpu", "--host-resolver-rules=MAP * ~NOTFOUND"):
-        options.add_argument(argument)
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
-    driver = webdriver.Chrome(options=options, service=webdriver.ChromeService(DRIVER))
-    try:
-        screen = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width == PHONE[0]}
-        driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", screen)
-        driver.set_script_timeout(60)
-        driver.get((folder / PAGE).as_uri())
-        driver.execute_async_script(
-            "const done = arguments[0];"
-            "const wait = () => document.body.dataset.drawn ? done() : setTimeout(wait, 100); wait();"
-        )
-        yield driver
-    finally:
-        driver.quit()
+def test_a_definition_that_departs_from_the_print_differs() -> None:
+    other = load_gearbox("fzg").with_values({"stage.0.face_width_mm": 14.01})
+    study = Study(gearbox=other, ours=None, printed=None, fmu=Path(), settings=QUICK, progress=lambda _: None)  # type: ignore[arg-type]
+    found = characteristics(study)
+    assert found.verdict == Verdict.DIFFERS
+    assert found.checks[0].numbers == {"printed": 17, "equal": 16}
+    assert "Face width" in found.checks[0].found
 
 
-def test_opens_without_a_console_error(browser: Any) -> None:
-    assert [entry["message"] for entry in browser.get_log("browser") if entry["level"] != "INFO"] == []
+def check(holds: bool | None, *, target: bool = False) -> Check:
+    return Check("name", "statement", "found", holds, otherwise="because", target=target)
 
 
-def test_every_panel_is_drawn(browser: Any, report: Report) -> None:
-    panels = sum(len(figure.panels) for item in report.items for figure in item.figures)
-    drawn = browser.execute_script(
-        "return [...document.querySelectorAll('.panel')].map((p) => ["
-        "p.dataset.figure, p.querySelectorAll('svg.main-svg path, svg.main-svg .point').length,"
-        "p.getBoundingClientRect().width, p.getBoundingClientRect().height])"
-    )
-    assert len(drawn) == panels
-    for name, marks, width, height in drawn:
-        assert marks > 2, name
-        assert width > 250, name
-        assert height > 250, name
+@pytest.mark.parametrize(
+    ("checks", "verdict", "why"),
+    [
+        ([check(True), check(None), check(False)], "differs", "because"),
+        ([check(True), check(None), check(False, target=True)], "reproduced",
+         "1 reproduced, 1 cannot be compared, 1 target not met"),
+        ([check(None), check(True, target=True)], "cannot be compared", "because"),
+        ([], "scheme", ""),
+    ],
+)  # fmt: skip
+def test_the_verdict_of_an_item_follows_from_its_checks(checks: list[Check], verdict: str, why: str) -> None:
+    one = Item("Fig. 1", "title", Verdict.SCHEME, checks=tuple(checks))
+    assert (one.verdict, one.why) == (verdict, why)
 
 
-def test_fits_the_screen(browser: Any) -> None:
-    page, screen = browser.execute_script("return [document.documentElement.scrollWidth, window.innerWidth]")
-    assert page <= screen
-    outside = browser.execute_script(
-        "return [...document.querySelectorAll('main *')].filter((e) => !e.closest('.scroll') && !e.closest('.panel') &&"
-        " e.getBoundingClientRect().right > window.innerWidth + 1).map((e) => e.outerHTML.slice(0, 80))"
-    )
-    assert outside == []
-
-
-def test_hovering_tells_values_and_a_legend_entry_hides_its_curves(browser: Any) -> None:
-    assert browser.execute_script(
-        "const p = document.querySelector('.panel[data-figure=fig_03]');"
-        "Plotly.Fx.hover(p, [{curveNumber: 2, pointNumber: 5}]);"
-        "return [...p.querySelectorAll('.hovertext')].map((e) => e.textContent).join(' ');"
-    ).count("Total power loss in W")
-    visible = "return [...document.querySelectorAll('.panel[data-figure=fig_03]')].flatMap((p) => p.data).filter((t) => t.name === 'Mauz').map((t) => t.visible !== false)"  # noqa: E501
-    assert browser.execute_script(visible) == [True] * 3
-    browser.execute_script("document.querySelector('button[data-figure=fig_03][data-label=Mauz]').click()")
-    assert browser.execute_script(visible) == [False] * 3
+def test_the_first_run_of_a_timing_does_not_count() -> None:
+    calls: list[int] = []
+    assert measure(lambda: calls.append(1), runs=4, longest_s=60.0).runs == 4
+    assert len(calls) == 5
