@@ -52,16 +52,6 @@ def test_all_up_to_the_next_option_is_held_out(
     assert asked_for == [(train, held)]
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [("", "no RECORDING to learn from"), ("--holdout a b", "name what to learn from before it")],
-)
-def test_nothing_to_learn_from_is_said(words: str, message: str) -> None:
-    done = CliRunner().invoke(diagnose, words.split())
-    assert isinstance(done.exception, InputError)
-    assert message in str(done.exception)
-
-
 @pytest.mark.parametrize("words", ["a --holdout --jobs 1", "a --holdout", "a --holdout -- b"])
 def test_held_out_recordings_that_are_not_named_are_missed(words: str) -> None:
     """As an empty pattern of the shell leaves them; the next option is no recording."""
@@ -83,9 +73,3 @@ def test_a_recording_is_never_replaced_by_its_prediction(tmp_path: Path) -> None
         assert isinstance(done.exception, InputError), done.output
         assert "is read as well and would be replaced" in str(done.exception)
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
-
-
-def test_holdout_without_a_recording_is_an_error_of_usage() -> None:
-    done = CliRunner().invoke(diagnose, ["a", "--holdout"])
-    assert done.exit_code == 2
-    assert "'--holdout' requires an argument" in done.output
