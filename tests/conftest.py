@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from builder.__main__ import main
 from builder.fmu import build_python_fmu
 from builder.native import build_native_fmu
 from builder.networks import PRESETS
@@ -34,6 +36,25 @@ def fzg_training(fzg: Gearbox) -> TrainingResult:
 @pytest.fixture(scope="session")
 def fzg_networks(fzg_training: TrainingResult, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, ...]:
     return export_onnx(fzg_training, tmp_path_factory.mktemp("networks"), version="0")
+
+
+RunCli = Callable[..., int]
+
+
+@pytest.fixture(scope="session")
+def run_cli() -> RunCli:
+    """Runs the command line in this process and returns its exit status; `capsys` has what it printed."""
+
+    def run(*arguments: object) -> int:
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(sys, "argv", ["builder", *map(str, arguments)])
+            try:
+                main()
+            except SystemExit as end:
+                return int(end.code or 0)
+        return 0
+
+    return run
 
 
 FmuBuilder = Callable[..., Path]

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -18,47 +16,10 @@ from builder.fmu_drive import drive_fmu
 from builder.native import build_native_fmu
 from builder.train import TrainingResult
 from models.correction import read_correction
-from models.cycle import Cycle
 from models.gearbox import Gearbox
 from models.network import ThermalNetwork
-
-SENSORS = ("oil", "housing_lower", "housing_upper", "bearing_1", "bearing_3", "pinion")
-NOISE_K = 0.15
-
-
-def run(*arguments: object) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([sys.executable, "-m", "builder", *map(str, arguments)], capture_output=True, text=True)
-
-
-def staircase(seed: int, hours: float) -> dict[str, np.ndarray]:
-    """Speed and torque in steps of 12 min, a standstill in between, every 20 s."""
-    rng = np.random.default_rng(seed)
-    time = np.arange(0.0, hours * 3600.0 + 1.0, 20.0)
-    step = (time // 720.0).astype(int)
-    count = step.max() + 1
-    speed, torque = rng.uniform(300.0, 4000.0, count), rng.uniform(20.0, 250.0, count)
-    speed[rng.integers(0, count, max(1, count // 6))] = 0.0
-    return {
-        "time_s": time, "speed_rpm": speed[step], "torque_Nm": np.where(speed[step] > 0.0, torque[step], 0.0),
-        "T_ambient_degC": 23.0 + 0.5 * np.sin(time / 4000.0), "air_speed_m_s": np.full(len(time), 2.0),
-    }  # fmt: skip
-
-
-def record(
-    network: ThermalNetwork, gearbox: Gearbox, path: Path, *, seed: int, hours: float, bias: float = 0.0,
-    parameters: dict[str, float] | None = None,
-) -> Path:  # fmt: skip
-    rng = np.random.default_rng(seed)
-    rows = staircase(seed, hours)
-    result = network.simulate(Cycle.from_columns(rows), losses=gearbox.losses(), initial=24.0,
-                              parameters=parameters).columns()  # fmt: skip
-    columns = dict(rows)
-    for name in SENSORS:
-        columns[f"T_{name}_degC"] = result[f"T_{name}_degC"] + NOISE_K * rng.normal(size=len(rows["time_s"]))
-    columns["T_housing_upper_degC"] = columns["T_housing_upper_degC"] + bias
-    columns["P_loss_W"] = result["P_loss_W"] * (1.0 + 0.02 * rng.normal(size=len(rows["time_s"])))
-    pd.DataFrame(columns).to_csv(path, index=False, float_format="%.3f")
-    return path
+from tests.conftest import RunCli
+from tests.golden.recordings import SENSORS, record
 
 
 @pytest.fixture(scope="module")
@@ -69,16 +30,20 @@ def cooled(fzg: Gearbox) -> ThermalNetwork:
 
 
 @pytest.fixture(scope="module")
-def diagnosed(cooled: ThermalNetwork, fzg: Gearbox, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+def diagnosed(
+    run_cli: RunCli, cooled: ThermalNetwork, fzg: Gearbox, tmp_path_factory: pytest.TempPathFactory
+) -> tuple[Path, Path]:
     """Folder of the recordings and folder of the diagnosis."""
     folder = tmp_path_factory.mktemp("cooled")
     off = {"mesh": 1.1, "h_air": 0.85, "h_oil_housing": 1.2, "seal": 0.9}
     record(cooled, fzg, folder / "train.csv", seed=1, hours=5.0, parameters=off)
     record(cooled, fzg, folder / "hold.csv", seed=2, hours=2.5, parameters=off)
-    done = run(
-        "diagnose", folder / "train.csv", "--holdout", folder / "hold.csv", "--jobs", 1, "--output", folder / "out"
+    assert (
+        run_cli(
+            "diagnose", folder / "train.csv", "--holdout", folder / "hold.csv", "--jobs", 1, "--output", folder / "out"
+        )
+        == 0
     )
-    assert done.returncode == 0, done.stderr
     return folder, folder / "out"
 
 
@@ -111,14 +76,14 @@ def test_prediction_files_give_the_figures_of_the_diagnosis(diagnosed: tuple[Pat
 
 
 def test_corrected_model_and_rebuilt_fmus_follow_the_held_out_recording(
-    diagnosed: tuple[Path, Path], fzg: Gearbox, fzg_training: TrainingResult, fzg_networks: tuple[Path, ...],
+    run_cli: RunCli, diagnosed: tuple[Path, Path], fzg: Gearbox,
+    fzg_training: TrainingResult, fzg_networks: tuple[Path, ...],
     tmp_path: Path,
 ) -> None:  # fmt: skip
     folder, out = diagnosed
     result = tmp_path / "result.csv"
     options = ("--correction", out / "correction.toml", "--initial", 24, "--output", result)
-    done = run("simulate", "--gearbox", "fzg", folder / "hold.csv", *options)
-    assert done.returncode == 0, done.stderr
+    assert run_cli("simulate", "--gearbox", "fzg", folder / "hold.csv", *options) == 0
     correction = read_correction(out / "correction.toml", fzg.network())
     cycle = read_cycle(folder / "hold.csv")
     python, native = tmp_path / "corrected.fmu", tmp_path / "native.fmu"
@@ -144,36 +109,26 @@ def test_corrected_model_and_rebuilt_fmus_follow_the_held_out_recording(
             assert rmse < 0.6 * held[name]["calibrated"], (kind, name)
 
 
-def test_biased_sensor_is_no_missing_physics(fzg: Gearbox, tmp_path: Path) -> None:
+def test_biased_sensor_is_no_missing_physics(run_cli: RunCli, fzg: Gearbox, tmp_path: Path) -> None:
     path = record(fzg.network(), fzg, tmp_path / "biased.csv", seed=3, hours=4.0, bias=3.0)
-    assert run("diagnose", path, "--jobs", 1, "--output", tmp_path / "out").returncode == 0
+    assert run_cli("diagnose", path, "--jobs", 1, "--output", tmp_path / "out") == 0
     found = json.loads((tmp_path / "out" / "diagnosis.json").read_text())
     assert found["verdict"] == "sensor_fault"
     assert (found["findings"][0]["mechanism"], found["findings"][0]["node"]) == ("sensor_bias", "housing_upper")
     assert found["findings"][0]["parameters"][0]["value"] == pytest.approx(3.0, abs=0.6)
 
 
-def test_recording_that_agrees_is_called_consistent(fzg: Gearbox, tmp_path: Path) -> None:
+def test_recording_that_agrees_is_called_consistent(run_cli: RunCli, fzg: Gearbox, tmp_path: Path) -> None:
     off = {"mesh": 0.9, "h_air": 1.15, "bearing": 1.2, "C_oil": 1.08}
     path = record(fzg.network(), fzg, tmp_path / "fine.csv", seed=4, hours=4.0, parameters=off)
-    assert run("diagnose", path, "--jobs", 1, "--output", tmp_path / "out").returncode == 0
+    assert run_cli("diagnose", path, "--jobs", 1, "--output", tmp_path / "out") == 0
     found = json.loads((tmp_path / "out" / "diagnosis.json").read_text())
     assert found["verdict"] == "consistent"
     assert found["findings"] == []
     assert found["not_visible"]
 
 
-def test_ten_minutes_cannot_decide(fzg: Gearbox, tmp_path: Path) -> None:
+def test_ten_minutes_cannot_decide(run_cli: RunCli, fzg: Gearbox, tmp_path: Path) -> None:
     path = record(fzg.network(), fzg, tmp_path / "short.csv", seed=5, hours=0.2)
-    assert run("diagnose", path, "--jobs", 1, "--output", tmp_path / "out").returncode == 0
+    assert run_cli("diagnose", path, "--jobs", 1, "--output", tmp_path / "out") == 0
     assert json.loads((tmp_path / "out" / "diagnosis.json").read_text())["verdict"] == "insufficient_data"
-
-
-def test_bad_recording_ends_with_status_2_and_leaves_nothing(tmp_path: Path) -> None:
-    path = tmp_path / "bad.csv"
-    pd.DataFrame({"time_s": [0.0, 10.0, 5.0], "speed_rpm": 100.0, "torque_Nm": 10.0, "T_oil_degC": 20.0}).to_csv(path)
-    done = run("diagnose", path, "--output", tmp_path / "out")
-    assert done.returncode == 2
-    assert "bad.csv" in done.stderr
-    assert "Traceback" not in done.stderr
-    assert not (tmp_path / "out").exists()

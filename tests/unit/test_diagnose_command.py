@@ -73,9 +73,3 @@ def test_a_recording_is_never_replaced_by_its_prediction(tmp_path: Path) -> None
         assert isinstance(done.exception, InputError), done.output
         assert "is read as well and would be replaced" in str(done.exception)
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
-
-
-def test_holdout_without_a_recording_is_an_error_of_usage() -> None:
-    done = CliRunner().invoke(diagnose, ["a", "--holdout"])
-    assert done.exit_code == 2
-    assert "'--holdout' requires an argument" in done.output

@@ -17,30 +17,12 @@ from models.oil import (
     conductivity_cragoe,
     d341_constants,
     kinematic_viscosity_d341,
-    modulus_scale,
     pressure_viscosity_gold,
     specific_heat_cragoe,
 )
 
 OIL = load_gearbox("fzg").lubricant()
 ROELANDS = replace(OIL, pressure_viscosity="roelands")
-
-
-@pytest.mark.parametrize(
-    ("T", "nu", "rho", "eta"),
-    [
-        (20.0, 88.57, 873.6, 0.0774),
-        (40.0, 32.63, 860.8, 0.0281),
-        (60.0, 15.41, 848.0, 0.01307),
-        (90.0, 6.77, 828.8, 0.00561),
-        (120.0, 3.75, 809.6, 0.00304),
-    ],
-)
-def test_check_values(T: float, nu: float, rho: float, eta: float) -> None:
-    """Values of an independent evaluation, to its printed digits."""
-    assert OIL.kinematic_viscosity(T) == pytest.approx(nu, abs=5e-3 * 1.01)
-    assert OIL.density(T) == pytest.approx(rho, abs=0.05)
-    assert OIL.dynamic_viscosity(T) == pytest.approx(eta, rel=2e-3)
 
 
 def test_viscosity_goes_through_its_two_points() -> None:
@@ -76,17 +58,6 @@ def test_thermoviscosity_is_the_derivative_of_the_viscosity(T: float) -> None:
     h = 1e-3
     slope = -(np.log(OIL.dynamic_viscosity(T + h)) - np.log(OIL.dynamic_viscosity(T - h))) / (2.0 * h)
     assert OIL.thermoviscosity(T) == pytest.approx(slope, rel=1e-6)
-
-
-@pytest.mark.parametrize(("T", "alpha"), [(40.0, 17.9), (60.0, 16.4), (90.0, 14.5)])
-def test_modulus_equation_at_ambient_pressure(T: float, alpha: float) -> None:
-    assert OIL.pressure_viscosity_coefficient(T, 0.0) * 1e9 == pytest.approx(alpha, abs=0.05)
-
-
-@pytest.mark.parametrize(("T", "alpha"), [(40.0, 16.1), (60.0, 14.5), (90.0, 12.9)])
-def test_gold(T: float, alpha: float) -> None:
-    value = pressure_viscosity_gold(OIL.kinematic_viscosity(T), 9.904, 0.139)
-    assert np.asarray(value) * 1e9 == pytest.approx(alpha, abs=0.05)
 
 
 def test_swapped_gold_exponents_would_be_seen() -> None:
@@ -138,11 +109,6 @@ def test_roelands_is_the_printed_exponential() -> None:
     Z = alpha_0 * 1.96e8 / (np.log(eta_0) + 9.67)
     exponent = (np.log(eta_0) + 9.67) * ((1.0 + 1e9 / 1.96e8) ** Z - 1.0)
     assert ROELANDS.pressure_viscosity_coefficient(60.0, 1e9) * 1e9 == pytest.approx(exponent, rel=1e-9)
-
-
-def test_modulus_scale_carries_an_oil_to_another_viscosity() -> None:
-    assert modulus_scale(96.0, 32.63) == pytest.approx(1.162, abs=5e-4)
-    assert modulus_scale(50.0, 50.0) == 1.0
 
 
 def test_measured_constants_replace_cragoe() -> None:

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from diagnosis.report.page import page
 from diagnosis.result import AHEAD, NOT_ACCEPTED, VERDICT_TEXT, Ranked
-from tests.unit.diagnosis_example import consistent, missing_physics, two_effects, unexplained
+from tests.unit.diagnosis_example import consistent, missing_physics, unexplained
 
 
 def test_what_was_found_where_and_how_well_it_fits() -> None:
@@ -49,18 +49,6 @@ def test_what_is_nearest_to_something_without_a_name_is_told() -> None:
         assert other.nearest == () and "Most like" not in str(other) and "<b>Most like" not in page(other)
 
 
-def test_two_effects_are_both_told() -> None:
-    told = str(two_effects())
-    assert "[cooler_thermostat at oil" in told
-    assert "[bearing_seat_contact at bearing_1_housing" in told
-
-
-def test_consistent_names_no_place() -> None:
-    lines = consistent().summary()
-    assert lines[0] == f"consistent: {VERDICT_TEXT['consistent']}"
-    assert not any(line.startswith("Where:") for line in lines)
-
-
 def test_parameters_far_from_their_priors_are_told_the_farthest_first() -> None:
     usual = consistent()
     assert not any(line.startswith("Far from") for line in usual.summary())  # all within 2.6 sd
@@ -69,13 +57,6 @@ def test_parameters_far_from_their_priors_are_told_the_farthest_first() -> None:
            replace(seal, parameter="seal", value=0.319, shift_in_sd=-4.57))  # fmt: skip
     lines = replace(usual, calibration=(*far, *rest)).summary()
     assert "Far from what the definition expects: seal = 0.319 (4.6 sd), bearing = 1.9 (3.2 sd)" in lines
-
-
-def test_a_notebook_shows_the_same_lines_escaped() -> None:
-    found = replace(missing_physics(), next_test="hold <20> m/s & wait")
-    shown = found._repr_html_()
-    assert "hold &lt;20&gt; m/s &amp; wait" in shown
-    assert shown.count("<li>") == len(found.summary()) - 1
 
 
 def test_every_likely_place_is_told_with_what_the_first_one_does() -> None:

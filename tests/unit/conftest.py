@@ -1,0 +1,53 @@
+"""One smooth ride of the rig, simulated, on the grid, and as a problem of inference."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from diagnosis.grid import Piece, pieces
+from diagnosis.network_on_grid import NetworkOnGrid
+from diagnosis.noise import noise_of, start_guess
+from diagnosis.posterior import Problem
+from diagnosis.unknowns import unknowns_of
+from models.cycle import Cycle
+from models.gearbox import Gearbox
+from models.types import Array
+from tests.unit.inference_example import CHANNELS, recording_of
+
+
+@pytest.fixture(scope="session")
+def ride() -> dict[str, Array]:
+    """Forty minutes of smooth operation, every 10 s."""
+    time = np.arange(0.0, 2401.0, 10.0)
+    return {
+        "time_s": time,
+        "speed_rpm": 1800.0 + 900.0 * np.sin(time / 300.0),
+        "torque_Nm": 120.0 + 60.0 * np.cos(time / 400.0),
+        "T_ambient_degC": np.full(len(time), 22.0),
+    }
+
+
+@pytest.fixture(scope="session")
+def simulated(fzg: Gearbox, ride: dict[str, Array]) -> dict[str, Array]:
+    cycle = Cycle.from_columns(ride | {"air_speed_m_s": np.full(len(ride["time_s"]), 2.0)})
+    return dict(fzg.network().simulate(cycle, losses=fzg.losses(), initial=25.0).columns())
+
+
+@pytest.fixture(scope="session")
+def model(fzg: Gearbox) -> NetworkOnGrid:
+    return NetworkOnGrid(fzg.network(), fzg.losses())
+
+
+@pytest.fixture(scope="session")
+def piece(model: NetworkOnGrid, ride: dict[str, Array], simulated: dict[str, Array]) -> Piece:
+    channels = {n: simulated["P_loss_W" if n == "P_loss" else f"T_{n}_degC"] for n in CHANNELS}
+    (found,) = pieces([recording_of(ride, channels)], model.laws.inputs, CHANNELS, even=True)
+    return found
+
+
+@pytest.fixture(scope="session")
+def problem(fzg: Gearbox, model: NetworkOnGrid, piece: Piece) -> Problem:
+    white = dict.fromkeys(CHANNELS, 0.2) | {"P_loss": 5.0}
+    noise = noise_of(model, piece, white, 250.0)
+    return Problem(model, [piece], unknowns_of(fzg.network(), CHANNELS), [noise], [start_guess(model, piece)])
