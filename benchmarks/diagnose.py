@@ -28,7 +28,7 @@ from diagnosis.proof.conceal import Plan, draw_case
 from diagnosis.proof.cycles import Programme, ambient, programmes
 from diagnosis.proof.instruments import record
 from diagnosis.proof.plant import Plant
-from diagnosis.recording import read_train_and_holdout
+from diagnosis.read_recordings import read_train_and_holdout
 from models.gearbox import load_gearbox
 from models.mechanisms import CATALOGUE
 

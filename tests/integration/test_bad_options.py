@@ -135,7 +135,7 @@ SIMULATE = {
     "back.csv": "back.csv: time_s",
     "cycle.csv --output folder.csv": "folder.csv: is a folder; name a file",
     "cycle.csv --output file/r.csv": "file/r.csv: cannot be written",
-    "cycle.csv --output r.txt": "r.txt: the ending says nothing",
+    "cycle.csv --output r.txt": "r.txt: unknown file ending",
     "cycle.csv --plot file/p.png": "file/p.png: cannot be written",
     "cycle.csv --plot p.png --output file/r.csv": "file/r.csv: cannot be written",
     "cycle.csv --initial missing.csv": "missing.csv: no such file",

@@ -224,7 +224,7 @@ FAULTY = [
     (["simulate", "--gearbox", "fgz", "CYCLE", "--output", "r.csv"], "no gearbox named 'fgz'; did you mean 'fzg'?"),
     (["simulate", "--gearbox", "missing.toml", "CYCLE", "--output", "r.csv"], "missing.toml"),
     (["simulate", "--gearbox", "fzg", "missing.csv", "--output", "r.csv"], "missing.csv: no such file"),
-    (["simulate", "--gearbox", "fzg", "CYCLE", "--output", "r.xls"], "r.xls: the ending says nothing"),
+    (["simulate", "--gearbox", "fzg", "CYCLE", "--output", "r.xls"], "r.xls: unknown file ending"),
     (["simulate", "--gearbox", "fzg", "CYCLE", "--output", "r.csv", "--initial", "-300"], "above -273.15"),
     (["simulate", "--gearbox", "fzg", "CYCLE", "--output", "r.csv", "--initial", "nan"], "must be a finite number"),
     (["simulate", "FMU", "CYCLE", "--output", "r.csv", "--initial", "293"], "if kelvin are meant, give 19.85"),

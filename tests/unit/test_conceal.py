@@ -29,7 +29,7 @@ from diagnosis.proof.conceal import (
     twins,
 )
 from diagnosis.proof.plant import Plant
-from diagnosis.recording import read_recordings
+from diagnosis.read_recordings import read_recordings
 from models.errors import InputError
 from models.gearbox import Gearbox
 
