@@ -30,7 +30,7 @@ from diagnosis.proof.cycles import Programme, ambient, programmes
 from diagnosis.proof.instruments import record
 from diagnosis.proof.plant import Plant
 from diagnosis.proof.plant_run import run_plant
-from diagnosis.recording import read_train_and_holdout
+from diagnosis.read_recordings import read_train_and_holdout
 from models.gearbox import load_gearbox
 from models.mechanisms import CATALOGUE
 

@@ -32,14 +32,14 @@ from diagnosis.explain import Explanation
 from diagnosis.findings import node_of
 from diagnosis.hypotheses import Hypothesis, hypothesis_of, scan
 from diagnosis.latent import knots_of, latent_heat
-from diagnosis.mapping import LOSS
 from diagnosis.posterior import Fit, Problem
 from diagnosis.predict import Prediction, predict
 from diagnosis.proof.answers import Answer
 from diagnosis.proof.counts import Count, Median
 from diagnosis.proof.rules import RULES, ScoredCase
 from diagnosis.proof.score import far_of, near_nodes
-from diagnosis.recording import read_recordings
+from diagnosis.quantities import LOSS
+from diagnosis.read_recordings import read_recordings
 from diagnosis.search import threshold_at
 from diagnosis.term_on_grid import TermOnGrid
 from models.gearbox import load_gearbox

@@ -77,14 +77,14 @@ def diagnose(
 ) -> None:
     """Say whether recordings of a real gearbox agree with its model; if not, where, and by what physics.
 
-    RECORDING is a table (.csv, .csv.gz, .parquet, .mf4), or a part of one (FILE@start..end), with the columns of a
-    cycle and what was measured: T_<node>_degC, P_loss_W.
+    RECORDING is a table (.csv, .csv.gz, .parquet, .mf4) with the columns of a cycle and what was measured:
+    T_<node>_degC, P_loss_W. FILE+FILE joins files that follow each other in time; FILE@start..end is a part.
 
     Of a fleet every gearbox gets its own report, and all together one table (summary.csv).
     """
     from diagnosis import diagnose as run
     from diagnosis.files import names_of_files, write_files
-    from diagnosis.recording import read_train_and_holdout
+    from diagnosis.read_recordings import read_train_and_holdout
     from models.atomic_write import atomic_folder
     from models.mechanisms import CATALOGUE
     from models.mechanisms.user_files import check_placeable, load_mechanisms
@@ -107,7 +107,12 @@ def diagnose(
                         false_alarm_rate=false_alarm_rate, jobs=jobs, dask=dask)  # fmt: skip
         return
     train, held = read_train_and_holdout(recordings, holdout, definition.network(), mapping=mapping)
-    given = [*(r.path for r in (*train, *held)), *mechanisms, Path(gearbox), *([mapping] if mapping else [])]
+    given = [
+        *(p for r in (*train, *held) for p in r.files),
+        *mechanisms,
+        Path(gearbox),
+        *([mapping] if mapping else []),
+    ]
     refuse_to_replace(given, [output / name for name in names_of_files((*train, *held))])
     _tell_notes((*train, *held))
     with atomic_folder(output) as stage, _told() as tell:

@@ -9,19 +9,20 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from models.atomic_write import atomic_file
 from models.cycle import Cycle
 from models.errors import InputError
 from models.table_file import is_folder, kind_of, read_table
+from models.types import Array
 
 DECIMALS = 6  # of results: a millionth of a kelvin or a watt
 
 
 @dataclass(frozen=True)
 class RecordedStart:
-    """The first temperature of every node that a cycle's file holds beside the inputs.
+    """First temperature of every node in the file of a cycle.
 
     Attributes
     ----------
@@ -29,9 +30,9 @@ class RecordedStart:
     temperatures : mapping of node name to float
         [degC]
     rows : mapping of node name to int
-        Where they stand, counted from 1
+        Their row numbers, counted from 1
     columns : mapping of node name to str
-        What the file calls them
+        Their columns in the file
     """
 
     path: Path
@@ -39,8 +40,28 @@ class RecordedStart:
     rows: Mapping[str, int]
     columns: Mapping[str, str]
 
+    @classmethod
+    def first_of(cls, path: Path, measured: Iterable[tuple[str, str, Array]], rows: NDArray[np.int64]) -> RecordedStart:
+        """Take the first value that is not missing.
+
+        Parameters
+        ----------
+        path : Path
+        measured : iterable of (node, column, Array of shape (rows,))
+            [degC]; NaN where missing
+        rows : array of int, shape (rows,)
+            Row numbers
+        """
+        known = [(node, name, v, i[0]) for node, name, v in measured if len(i := np.flatnonzero(np.isfinite(v)))]
+        return cls(
+            path,
+            temperatures={node: float(values[row]) for node, _, values, row in known},
+            rows={node: int(rows[row]) for node, _, _, row in known},
+            columns={node: name for node, name, _, _ in known},
+        )
+
     def of(self, nodes: Iterable[str]) -> dict[str, float]:
-        """Start temperatures [degC] of all `nodes`: as recorded; of nodes that were not recorded the others' mean.
+        """Return start temperatures [degC] of all `nodes`: as recorded, else the mean of those recorded.
 
         Raises
         ------
@@ -64,7 +85,7 @@ def read_cycle(path: Path, extra: tuple[str, ...] = ()) -> Cycle:
 
 
 def read_cycle_and_start(path: Path, extra: tuple[str, ...] = ()) -> tuple[Cycle, RecordedStart]:
-    """Read a cycle, and the node temperatures (columns ``T_<node>_degC``) that its file holds beside the inputs.
+    """Read a cycle, and the first node temperatures (columns ``T_<node>_degC``) in its file.
 
     Raises
     ------
@@ -73,18 +94,15 @@ def read_cycle_and_start(path: Path, extra: tuple[str, ...] = ()) -> tuple[Cycle
     """
     table = read_table(path)
     cycle = Cycle.from_columns({str(c): table[c].to_numpy() for c in table.columns}, name=str(path), extra=extra)
-    numbers = {name: pd.to_numeric(table[name], errors="coerce") for name in _temperature_columns(table)}
-    temperatures, rows = {}, {}
-    for name in numbers:
-        known = np.flatnonzero(numbers[name].notna().to_numpy())
-        if len(known):
-            node, row = name[2:-5], int(known[0])
-            temperatures[node], rows[node] = float(numbers[name].iloc[row]), row + 1
-    return cycle, RecordedStart(path, temperatures, rows, {node: f"T_{node}_degC" for node in temperatures})
+    measured = (
+        (name[2:-5], name, pd.to_numeric(table[name], errors="coerce").to_numpy(dtype=np.float64, na_value=np.nan))
+        for name in _temperature_columns(table)
+    )
+    return cycle, RecordedStart.first_of(path, measured, np.asarray(table.index) + 1)
 
 
 def read_initial(value: str) -> float | dict[str, float]:
-    """Initial temperatures: a number in degC, or a file whose ``T_<node>_degC`` columns end with them.
+    """Read initial temperatures: a number in degC, or a file whose ``T_<node>_degC`` columns end with them.
 
     The last row counts, so that a result can be continued. :func:`models.start_temperatures.start_temperatures` checks
     the temperatures.
@@ -114,7 +132,7 @@ def read_initial(value: str) -> float | dict[str, float]:
 
 
 def _temperature_columns(table: pd.DataFrame) -> list[str]:
-    """Columns of nodes; that of the surroundings is an input."""
+    """Return the columns of nodes; that of the surroundings is an input."""
     names = [str(c) for c in table.columns if str(c).startswith("T_") and str(c).endswith("_degC")]
     return [name for name in names if name != "T_ambient_degC"]
 

@@ -17,9 +17,10 @@ from builder import console
 from builder.files import refuse_to_replace, write_table
 from diagnosis import diagnose
 from diagnosis.files import names_of_files, write_files
-from diagnosis.recording import Recording, read_train_and_holdout
-from diagnosis.recording_file import RECORDING_KINDS
+from diagnosis.read_recordings import read_train_and_holdout
+from diagnosis.recording import Recording
 from diagnosis.result import Diagnosis
+from diagnosis.time_axis import RECORDING_KINDS
 from models.atomic_write import atomic_folder
 from models.errors import InputError
 from models.gearbox import Gearbox
@@ -172,7 +173,7 @@ def diagnose_fleet(
     output : Path
         Gets a folder per gearbox as soon as it is done, and at the end ``summary.csv``
     mapping : Path or None
-        See :func:`diagnosis.recording.read_recordings`
+        See :func:`diagnosis.read_recordings.read_recordings`
     catalogue, false_alarm_rate
         See :func:`diagnosis.diagnose`
     jobs : int
@@ -201,7 +202,9 @@ def diagnose_fleet(
                     raise InputError(member.fault)
                 train, held = read_train_and_holdout(member.train, member.holdout, network, mapping=mapping)
                 files = names_of_files((*train, *held))
-                refuse_to_replace([r.path for r in (*train, *held)], [output / member.name / name for name in files])
+                refuse_to_replace(
+                    [p for r in (*train, *held) for p in r.files], [output / member.name / name for name in files]
+                )
                 yield member.name, train, held, gearbox, catalogue, false_alarm_rate, inside
             except InputError as error:
                 outcomes[member.name] = _without_diagnosis(member.name, error)

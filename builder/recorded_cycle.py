@@ -1,34 +1,34 @@
-"""A recording as the cycle of a simulation, read by the rules by which ``diagnose`` reads it."""
+"""A recording as the cycle of a simulation, read by the rules of ``diagnose``."""
 
 from __future__ import annotations
 
-import math
-from datetime import UTC, datetime
 from pathlib import Path
-
-import numpy as np
+from typing import TYPE_CHECKING
 
 from builder.files import RecordedStart, read_cycle_and_start
-from diagnosis.mapping import LOSS, RecordingMapping, mapping_beside, mapping_of_definition
-from diagnosis.recording_columns import RecordedColumns, read_columns
-from diagnosis.recording_file import RecordingFile, name_parts, read_recording_file
-from diagnosis.recording_time import ISO_NAMES, STANDARD, Clock, split_path
+from diagnosis.mapping import RecordingMapping, mapping_beside, mapping_of_definition
+from diagnosis.quantities import LOSS
+from diagnosis.read_recordings import name_parts, read_recording
+from diagnosis.recording import Recording
+from diagnosis.time_axis import ISO_NAMES, STANDARD, moment_text, split_path
 from models.cycle import COLUMNS, REQUIRED, Cycle
 from models.errors import InputError
-from models.network import ThermalNetwork
 from models.table_file import KINDS, column_names
+
+if TYPE_CHECKING:
+    from models.network import ThermalNetwork
 
 NEEDED = (STANDARD, *(COLUMNS[signal][0] for signal in REQUIRED))  # columns of a plain cycle
 MOST_SHOWN = 3  # pieces of a recording with gaps
 
 
-def file_of(text: Path) -> Path:
-    """The file of ``FILE@start..end``.
+def files_of(text: Path) -> tuple[Path, ...]:
+    """Return the files of ``FILE+FILE@start..end``.
 
     Raises
     ------
     InputError
-        If what follows the ``@`` names no part.
+        If the text after the ``@`` is not a part.
     """
     return split_path(text)[0]
 
@@ -36,21 +36,21 @@ def file_of(text: Path) -> Path:
 def read_cycle_or_recording(
     text: Path, network: ThermalNetwork, *, mapping: Path | None = None
 ) -> tuple[Cycle, RecordedStart, tuple[str, ...]]:
-    """The inputs of a network over time, from a plain cycle or from a recording.
+    """Read the inputs of a network over time from a plain cycle or from a recording.
 
     Parameters
     ----------
     text : Path
-        File (.csv, .csv.gz, .parquet, .mf4), or a part of one, ``FILE@start..end``
+        File (.csv, .csv.gz, .parquet, .mf4), files ``FILE+FILE``, or a part, ``FILE@start..end``
     network : ThermalNetwork
-        Tells which nodes and inputs there are, and what its definition says of recordings
+        Defines nodes and inputs, and the usual mapping of its recordings
     mapping : Path or None
-        Mapping file of a recording; by default the one beside it, else what the definition says
+        Mapping file of a recording; by default the one next to it, else that of the definition
 
     Returns
     -------
     cycle : Cycle
-        Of a recording its time counts from the first row that is used, as in a diagnosis
+        The time of a recording counts from its first row, as in a diagnosis
     start : RecordedStart
     notes : tuple of str
         What was cleaned, assumed or not used of a recording
@@ -58,77 +58,61 @@ def read_cycle_or_recording(
     Raises
     ------
     InputError
-        With all faults of the file; or if a recording has gaps, with the pieces between them.
+        With all problems of the file; or if a recording has gaps, with the pieces between them.
     """
-    usual = mapping_of_definition(network.recording)
-    if mapping is None and not _is_recording(text, usual):
+    if mapping is None and not _is_recording(text, mapping_of_definition(network.recording)):
         return *read_cycle_and_start(text, tuple(name for name in network.inputs if name not in COLUMNS)), ()
-    file = read_recording_file(text, mapping=mapping, usual=usual)
-    columns = read_columns(file, network, to_compare=False)
-    if len(columns.segments) > 1:
-        raise InputError(f"{text}: {_gaps(file, columns)}")
-    piece = columns.segments[0]
-    seconds = columns.seconds - columns.seconds[0]
-    cycle = Cycle(seconds[piece], {name: values[piece] for name, values in columns.inputs.items()})
-    return cycle, _start(file.path, columns), (*columns.notes, *_clock_notes(file, columns))
+    recording = read_recording(text, network, mapping=mapping, to_compare=False)
+    if len(recording.segments) > 1:
+        raise InputError(f"{text}: {_gaps(recording)}")
+    piece = recording.segments[0]
+    cycle = Cycle(recording.time[piece], {name: values[piece] for name, values in recording.inputs.items()})
+    temperatures = [(c.name, c.column, c.values[piece]) for c in recording.channels if c.name != LOSS]
+    start = RecordedStart.first_of(recording.path, temperatures, recording.rows[piece])
+    return cycle, start, (*recording.notes, *_clock_notes(recording))
 
 
 def _is_recording(text: Path, usual: RecordingMapping) -> bool:
-    """Whether only the reader of recordings takes a file as it is meant.
+    """Return True if a file must be read as a recording.
 
-    So it is with a part, or another format than tables; where a mapping names a column of the file; and where the file
-    lacks columns of a plain cycle, but has a mapping beside it or tells dates.
+    So are parts, joined files and formats other than tables; files with a column that a mapping names; and files that
+    lack columns of a plain cycle, but have a mapping next to them or dates.
     """
-    if not text.name.lower().endswith(KINDS):
+    if not text.name.lower().endswith(KINDS) or len(files_of(text)) > 1:
         return True
     names = set(column_names(text))
-    if not names:  # the table itself is at fault, as the reader of plain cycles tells
+    if not names:  # the reader of plain cycles reports why
         return False
-    beside = mapping_beside(text, name_parts(text)[1])
-    if beside is not None:
-        return not names.issuperset(NEEDED) or _is_meant_for(beside, text)
-    tells_dates = STANDARD not in names and not names.isdisjoint(ISO_NAMES)
-    return tells_dates or not names.isdisjoint(_named(usual))
-
-
-def _is_meant_for(mapping: RecordingMapping, path: Path) -> bool:
-    """Whether a mapping beside a plain cycle is about it; other files of the folder may be what it is there for."""
-    as_it_splits = column_names(path, mapping.csv.separator)
-    return not (_named(mapping) or set(NEEDED)).isdisjoint(as_it_splits)
+    own = mapping_beside(text, name_parts(text)[1])
+    if own is not None:
+        # The mapping may be there for other files of the folder.
+        as_it_splits = column_names(text, own.csv.separator)
+        is_meant = not (_named(own) or set(NEEDED)).isdisjoint(as_it_splits)
+        return is_meant or not names.issuperset(NEEDED)
+    has_dates = STANDARD not in names and not names.isdisjoint(ISO_NAMES)
+    return has_dates or not names.isdisjoint(_named(usual))
 
 
 def _named(mapping: RecordingMapping) -> set[str]:
     return {*mapping.columns, *([mapping.time.column] if mapping.time is not None else [])}
 
 
-def _start(path: Path, columns: RecordedColumns) -> RecordedStart:
-    piece = columns.segments[0]
-    temperatures, rows, names = {}, {}, {}
-    for quantity, values in columns.measured.items():
-        known = np.flatnonzero(np.isfinite(values[piece]))
-        if quantity != LOSS and len(known):
-            node = quantity.removeprefix("T_")
-            temperatures[node] = float(values[piece][known[0]])
-            rows[node] = int(columns.rows[piece][known[0]])
-            names[node] = columns.names[quantity]
-    return RecordedStart(path, temperatures, rows, names)
-
-
-def _clock_notes(file: RecordingFile, columns: RecordedColumns) -> list[str]:
-    clock, first = file.clock, float(columns.seconds[0])
+def _clock_notes(recording: Recording) -> list[str]:
+    clock, first = recording.clock, recording.from_s
     if clock is None or (first == 0.0 and not clock.is_date):
         return []
     unit = "" if clock.is_date else " s"
-    return [f"time_s counts from its first row, {clock.column} = {_moment(first, clock)}{unit}"]
+    return [f"time_s counts from its first row, {clock.column} = {moment_text(first, clock)}{unit}"]
 
 
-def _gaps(file: RecordingFile, columns: RecordedColumns) -> str:
-    """That a recording with gaps is no cycle, and the longest pieces as parts that can be named."""
-    spans = [(float(columns.seconds[piece][0]), float(columns.seconds[piece][-1])) for piece in columns.segments]
+def _gaps(recording: Recording) -> str:
+    """Say that a recording with gaps is no cycle, and name the longest pieces as parts."""
+    time = recording.time + recording.from_s
+    spans = [(float(time[piece][0]), float(time[piece][-1])) for piece in recording.segments]
     longest = sorted(sorted(spans, key=lambda span: span[0] - span[1])[:MOST_SHOWN])
+    name, clock = "+".join(path.name for path in recording.files), recording.clock
     parts = [
-        f"{file.path.name}@{_moment(first, file.clock)}..{_moment(math.floor(last) + 1.0, file.clock)} "
-        f"({(last - first) / 3600.0:.3g} h)"
+        f"{name}@{moment_text(first, clock)}..{moment_text(last + 1.0, clock)} ({(last - first) / 3600.0:.3g} h)"
         for first, last in longest
     ]
     which = "" if len(spans) <= MOST_SHOWN else "; the longest are"
@@ -136,11 +120,3 @@ def _gaps(file: RecordingFile, columns: RecordedColumns) -> str:
         f"gaps split it into {len(spans)} pieces, and nothing is known of the gearbox between them; simulate one of "
         f"them{which}: {', '.join(parts)}; or raise max_gap_s in a mapping file, to take straight lines across"
     )
-
-
-def _moment(seconds: float, clock: Clock | None) -> str:
-    """Whole seconds, rounded down, as a part names them."""
-    whole = math.floor(seconds)
-    if clock is None or not clock.is_date:
-        return str(whole)
-    return datetime.fromtimestamp(whole, tz=UTC).strftime("%Y-%m-%dT%H:%M:%SZ")

@@ -147,7 +147,7 @@ def simulate(
 
     CYCLE is a table (.csv, .csv.gz, .parquet) with the columns time_s, speed_rpm, torque_Nm and, where known,
     T_ambient_degC and air_speed_m_s. With --gearbox it may be a recording that diagnose reads as well, or a part of
-    one (FILE@start..end).
+    one (FILE@start..end), or files that follow each other in time (FILE+FILE).
     """
     _check_options(files, gearbox, mapping, correction)
     named = [Path(name) for name in (gearbox, initial, mapping, correction) if name is not None]
@@ -204,9 +204,9 @@ def _read_as_files(files: tuple[Path, ...], gearbox: str | None) -> tuple[Path, 
     """What is read, a part of a recording as its file."""
     if gearbox is None:
         return files
-    from builder.recorded_cycle import file_of
+    from builder.recorded_cycle import files_of
 
-    return tuple(file_of(file) for file in files)
+    return tuple(path for file in files for path in files_of(file))
 
 
 def _check_outputs(output: Path, plot: Path | None, inputs: list[Path]) -> None:

@@ -12,8 +12,8 @@ from diagnosis.explain import Explanation, linearised
 from diagnosis.heat import heats_of
 from diagnosis.holdout import Judge
 from diagnosis.hypotheses import Hypothesis
-from diagnosis.mapping import LOSS
 from diagnosis.observation import reading_columns, readings
+from diagnosis.quantities import LOSS
 from diagnosis.stage import LEAST_SHARE, Stage
 from diagnosis.term_on_grid import TermOnGrid
 

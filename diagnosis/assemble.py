@@ -17,10 +17,10 @@ from diagnosis.holdout import at_holdout
 from diagnosis.hypotheses import Hypothesis
 from diagnosis.identifiable import scale_notes
 from diagnosis.latent import LatentHeat, knots_of, latent_heat
-from diagnosis.mapping import LOSS
 from diagnosis.noise import HEAT_FRACTION, PARAMETRIC_FRACTION, PARAMETRIC_K
 from diagnosis.posterior import Problem
 from diagnosis.predict import Prediction, overall_rmse, predict, rmse
+from diagnosis.quantities import LOSS
 from diagnosis.recording import Recording
 from diagnosis.regime import active, regime, windows
 from diagnosis.result import (

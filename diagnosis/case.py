@@ -9,11 +9,11 @@ import numpy as np
 
 from diagnosis.explain import Explanation, calibrated, evidence_of, settled
 from diagnosis.grid import Piece, pieces, slow_rows
-from diagnosis.mapping import LOSS
 from diagnosis.network_on_grid import NetworkOnGrid
 from diagnosis.noise import channel_noise, loss_noise, noise_of, start_guess
 from diagnosis.posterior import Problem
 from diagnosis.predict import START_S
+from diagnosis.quantities import LOSS
 from diagnosis.recording import Recording
 from diagnosis.shapes import shape_terms
 from diagnosis.unknowns import Unknowns, unknowns_of

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from diagnosis.mapping import LOSS
+from diagnosis.quantities import LOSS
 from diagnosis.recording import Recording
 from diagnosis.result import Diagnosis
 from models.correction import Correction, Estimate, Finding, write_correction

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from diagnosis.mapping import LOSS
+from diagnosis.quantities import LOSS
 from diagnosis.recording import Recording
 from models.types import Array
 

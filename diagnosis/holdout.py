@@ -9,9 +9,9 @@ import numpy as np
 
 from diagnosis.case import Case
 from diagnosis.explain import Explanation
-from diagnosis.mapping import LOSS
 from diagnosis.posterior import Linearised, Problem
 from diagnosis.predict import overall_rmse, predict
+from diagnosis.quantities import LOSS
 from diagnosis.trajectory import ROUNDS
 from diagnosis.whitening import Whitening
 from models.types import Array

@@ -8,8 +8,8 @@ import numpy as np
 from scipy.optimize import nnls
 
 from diagnosis.grid import Piece, slow_rows, white_sd
-from diagnosis.mapping import LOSS
 from diagnosis.network_on_grid import NetworkOnGrid
+from diagnosis.quantities import LOSS
 from diagnosis.recording import Recording
 from diagnosis.whitening import Noise
 from models.types import Array

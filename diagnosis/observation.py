@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from diagnosis.mapping import LOSS
 from diagnosis.network_on_grid import NetworkOnGrid
+from diagnosis.quantities import LOSS
 from diagnosis.recurrence import lagged
 from diagnosis.trajectory import Trajectory
 from models.types import Array

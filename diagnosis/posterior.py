@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 
 from diagnosis.grid import Piece
-from diagnosis.mapping import LOSS
 from diagnosis.network_on_grid import TORQUE_STEP, Balance, NetworkOnGrid
 from diagnosis.observation import Sensors, delay_column, lag_column, reading_columns, readings, total_at_points
+from diagnosis.quantities import LOSS
 from diagnosis.term_on_grid import TermOnGrid, moved_heat
 from diagnosis.trajectory import ROUNDS, Trajectory, parameter_heats, settled_balance, simulate
 from diagnosis.unknowns import Unknown, Unknowns, shifted

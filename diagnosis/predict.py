@@ -11,9 +11,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from diagnosis.grid import Piece, stands_for
-from diagnosis.mapping import LOSS
 from diagnosis.observation import Sensors, reading_columns, readings
 from diagnosis.posterior import Problem
+from diagnosis.quantities import LOSS
 from diagnosis.trajectory import Trajectory, complete_start, free_running, simulate
 from models.types import Array
 

@@ -27,7 +27,7 @@ from diagnosis.hypotheses import (
     sharpened,
     two_point_columns,
 )
-from diagnosis.mapping import LOSS
+from diagnosis.quantities import LOSS
 from diagnosis.stage import OPEN_PENALTY, Stage, log_e_value, penalised
 from models.mechanisms import OPEN_FORMS, Mechanism
 from models.parallel import run_parallel, starting_processes

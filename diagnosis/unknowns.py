@@ -14,8 +14,8 @@ from typing import Literal
 import numpy as np
 
 from diagnosis.grid import Piece
-from diagnosis.mapping import LOSS
 from diagnosis.observation import Sensors
+from diagnosis.quantities import LOSS
 from models.laws import Parameter
 from models.network import ThermalNetwork
 from models.types import Array

@@ -18,9 +18,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from diagnosis.mapping import LOSS
 from diagnosis.network_on_grid import NetworkOnGrid
 from diagnosis.observation import Sensors, total_at_points
+from diagnosis.quantities import LOSS
 from diagnosis.trajectory import Trajectory
 from models.types import Array
 

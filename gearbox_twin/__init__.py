@@ -22,9 +22,9 @@ if TYPE_CHECKING:
     from builder.build import build as build_fmu  # noqa: F401 - public as build_fmu
     from builder.files import read_cycle as read_cycle
     from builder.fmu_drive import drive_fmu as drive_fmu
-    from diagnosis.diagnose import diagnose as diagnose
+    from diagnosis.diagnose_recordings import diagnose as diagnose
+    from diagnosis.read_recordings import read_recordings as read_recordings
     from diagnosis.recording import Recording as Recording
-    from diagnosis.recording import read_recordings as read_recordings
     from diagnosis.result import Diagnosis as Diagnosis
     from models.correction import Correction as Correction
     from models.correction import corrected_network as corrected_network
@@ -55,13 +55,13 @@ _DEFINED_IN = {
     "ThermalNetwork": "models.network:ThermalNetwork",
     "build_fmu": "builder.build:build",
     "corrected_network": "models.correction:corrected_network",
-    "diagnose": "diagnosis.diagnose:diagnose",
+    "diagnose": "diagnosis.diagnose_recordings:diagnose",
     "drive_fmu": "builder.fmu_drive:drive_fmu",
     "load_gearbox": "models.gearbox:load_gearbox",
     "load_mechanisms": "models.mechanisms:load_mechanisms",
     "read_correction": "models.correction:read_correction",
     "read_cycle": "builder.files:read_cycle",
-    "read_recordings": "diagnosis.recording:read_recordings",
+    "read_recordings": "diagnosis.read_recordings:read_recordings",
     "simulate": "models.simulation:simulate",
     "steady_state": "models.simulation:steady_state",
 }

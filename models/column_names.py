@@ -1,4 +1,4 @@
-"""Columns of tables under another name than the one that is asked for."""
+"""Columns of tables under another name than the required one."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ UNIT_WORDS = frozenset({
 SHORT_FOR = {"amb": "ambient", "tamb": "ambient", "tambient": "ambient"}
 
 
-def meant(name: str, lacking: Iterable[str], *, near: float, near_stem: float = 1.0, told: bool = False) -> str:
-    """The missing column that a name stands for by all appearance: nearly alike, or the same in other words.
+def meant(name: str, lacking: Iterable[str], *, near: float, near_stem: float = 1.0, with_kind: bool = False) -> str:
+    """Return the missing column that a name probably means: nearly alike, or other words for it.
 
     Parameters
     ----------
     name : str
     lacking : iterable of str
-        Columns that are asked for and not there
+        Columns that are required and not there
     near, near_stem : float
-        Likeness (0 to 1) of whole names, and of what they say beside kind and unit, that makes one a slip of the other
-    told : bool
-        Whether other words count only beside a kind or a unit: a column called ``oil`` alone may be anything
+        Likeness (0 to 1) of whole names, and of names without kind and unit, that makes one a slip of the other
+    with_kind : bool
+        True if other words count only together with a kind or a unit: a column called ``oil`` may be anything
 
     Returns
     -------
@@ -36,14 +36,14 @@ def meant(name: str, lacking: Iterable[str], *, near: float, near_stem: float = 
     --------
     >>> meant("Temp_oil [K]", ["T_oil_degC", "T_ambient_degC"], near=0.9)
     'T_oil_degC'
-    >>> meant("oil", ["T_oil_degC"], near=0.9), meant("oil", ["T_oil_degC"], near=0.9, told=True)
+    >>> meant("oil", ["T_oil_degC"], near=0.9), meant("oil", ["T_oil_degC"], near=0.9, with_kind=True)
     ('T_oil_degC', '')
     """
     by_small = {other.lower(): other for other in lacking}
     close = get_close_matches(name.lower(), by_small, n=1, cutoff=near)
     if close:
         return by_small[close[0]]
-    if told and not _words(name) & (KIND_WORDS | UNIT_WORDS):
+    if with_kind and not _words(name) & (KIND_WORDS | UNIT_WORDS):
         return ""
     return next((other for other in by_small.values() if _alike(_stem(name), _stem(other)) >= near_stem), "")
 
@@ -57,5 +57,5 @@ def _words(name: str) -> frozenset[str]:
 
 
 def _stem(name: str) -> str:
-    """What a name says beside kind and unit: ``ambient`` of ``T_ambient``, ``Temp_amb_C`` and ``ambient_degC``."""
+    """Return a name without kind and unit: ``ambient`` of ``T_ambient``, ``Temp_amb_C`` and ``ambient_degC``."""
     return "".join(sorted(SHORT_FOR.get(word, word) for word in _words(name) - KIND_WORDS - UNIT_WORDS))

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from models.column_names import meant
-from models.errors import InputError
+from models.errors import InputError, Problems
 from models.types import Array
 
 # signal -> (column of a file, plausible range, what a value outside it usually is)
@@ -23,7 +24,7 @@ REQUIRED = ("speed", "torque")
 
 MOST_ROWS = 5_000_000  # of a refined cycle, as of a table that is read
 SHORTEST_INTERVAL_S = 1e-5  # times in files have six decimals
-# Likeness of names (T_cabinet_degC is no slip of T_ambient_degC), and of what they say beside the unit.
+# Likeness of names (T_cabinet_degC is no slip of T_ambient_degC), and of names without the unit.
 NEAR, NEAR_STEM = 0.9, 0.8
 
 
@@ -53,7 +54,7 @@ class Cycle:
         columns : mapping of column name to ArrayLike, shape (N,)
             ``time_s``, ``speed_rpm``, ``torque_Nm`` and, where known, ``T_ambient_degC`` and ``air_speed_m_s``
         name : str
-            What messages call it, e.g. the file
+            Its name in messages, e.g. the file
         extra : tuple of str
             Further columns that the network has as inputs, read under their own name
 
@@ -71,39 +72,30 @@ class Cycle:
         models.errors.InputError: run.csv: column torque_Nm is missing; it has: speed_rpm, time_s
         run.csv: time_s goes from 1 to 1 at row 3; it must increase from row to row
         """
-        faults: list[str] = []
-        have = {str(key) for key in columns}
-        needed = ["time_s", *(COLUMNS[signal][0] for signal in REQUIRED)]
-        faults += [f"column {c} is missing; it has: {', '.join(sorted(have))}" for c in needed if c not in have]
-        arrays: dict[str, Array] = {}
+        problems = Problems(name)
         wanted = {"time": "time_s"} | {signal: spec[0] for signal, spec in COLUMNS.items()} | {c: c for c in extra}
-        faults += _slips(
-            [c for c in map(str, columns) if c not in wanted.values()], [c for c in wanted.values() if c not in have]
-        )
+        _check_names([str(key) for key in columns], list(wanted.values()), problems)
+        arrays: dict[str, Array] = {}
         for signal, column in wanted.items():
-            if column in have:
-                values = _numbers(columns[column], column, faults)
-                if values is not None:
-                    arrays[signal] = values
+            values = _numbers(columns[column], column, problems) if column in columns else None
+            if values is not None:
+                arrays[signal] = values
         time = arrays.pop("time", None)
         if time is not None:
-            faults += _time_faults(time)
-            faults += [
-                f"{wanted[signal]} has {len(values)} rows, but time_s has {len(time)}"
-                for signal, values in arrays.items()
-                if len(values) != len(time)
-            ]
+            _check_time(time, problems)
+            for signal, values in arrays.items():
+                if len(values) != len(time):
+                    problems.add(f"{wanted[signal]} has {len(values)} rows, but time_s has {len(time)}")
         for signal in [s for s in COLUMNS if s in arrays]:
-            faults += _range_faults(signal, arrays[signal])
-        if faults or time is None:
-            raise InputError("\n".join(f"{name}: {fault}" for fault in faults))
-        return cls(time, arrays)
+            _check_range(signal, arrays[signal], problems)
+        problems.stop_if_any()
+        return cls(cast(Array, time), arrays)
 
     def __len__(self) -> int:
         return len(self.time)
 
     def refined(self, interval: float) -> Cycle:
-        """The same straight lines with more rows: its own, and one every `interval` from the first row on.
+        """Return the same inputs with more rows: its own, and one every `interval` from the first row on.
 
         Parameters
         ----------
@@ -136,7 +128,7 @@ class Cycle:
                 f"{MOST_ROWS} are possible: choose {longer} s or more"
             )
         grid = first + interval * np.arange(1, int((last - first) / interval) + 1)
-        # What rounding alone sets apart from a row of its own, in the cycle or in a file, is that row.
+        # A grid point that differs from a row only by rounding, in the cycle or in a file, is that row.
         same = max(1e-6 * interval, 0.2 * SHORTEST_INTERVAL_S, 4.0 * float(np.spacing(np.abs(self.time).max())))
         after = np.searchsorted(self.time, grid).clip(1, len(self) - 1)
         distance = np.minimum(np.abs(grid - self.time[after - 1]), np.abs(self.time[after] - grid))
@@ -150,46 +142,48 @@ def _rounded_up(seconds: float) -> str:
     return f"{np.ceil(seconds / unit) * unit:g}"
 
 
-def _slips(unused: Iterable[str], absent: Sequence[str]) -> list[str]:
-    """Faults for columns that seem to be an absent one; an optional one would otherwise silently have its default."""
-    return [
-        f"column {name[:80]} is not known; is {column} meant? rename it, or remove it"
-        for name in unused
-        if (column := meant(name, absent, near=NEAR, near_stem=NEAR_STEM))
-    ]
+def _check_names(have: list[str], wanted: list[str], problems: Problems) -> None:
+    for column in ("time_s", *(COLUMNS[signal][0] for signal in REQUIRED)):
+        if column not in have:
+            problems.add(f"column {column} is missing; it has: {', '.join(sorted(have))}")
+    absent = [column for column in wanted if column not in have]
+    for given in have:
+        # An optional column under another name would otherwise silently have its default.
+        if given not in wanted and (column := meant(given, absent, near=NEAR, near_stem=NEAR_STEM)):
+            problems.add(f"column {given[:80]} is not known; is {column} meant? rename it, or remove it")
 
 
-def _time_faults(time: Array) -> list[str]:
-    if len(time) == 0:
-        return ["it has no rows"]
+def _check_time(time: Array, problems: Problems) -> None:
     back = np.flatnonzero(np.diff(time) <= 0.0)
-    if not len(back):
-        return []
-    row = int(back[0])
-    return [f"time_s goes from {time[row]:g} to {time[row + 1]:g} at row {row + 2}; it must increase from row to row"]
+    if len(time) == 0:
+        problems.add("it has no rows")
+    elif len(back):
+        row = int(back[0])
+        problems.add(
+            f"time_s goes from {time[row]:g} to {time[row + 1]:g} at row {row + 2}; it must increase from row to row"
+        )
 
 
-def _range_faults(signal: str, values: Array) -> list[str]:
+def _check_range(signal: str, values: Array, problems: Problems) -> None:
     column, low, high, unit = COLUMNS[signal]
     wrong = np.flatnonzero((values < low) | (values > high))
-    if not len(wrong):
-        return []
-    row = int(wrong[0])
-    return [f"{column} is {values[row]:g} at row {row + 1}; {low:g} ... {high:g} is possible ({unit})"]
+    if len(wrong):
+        row = int(wrong[0])
+        problems.add(f"{column} is {values[row]:g} at row {row + 1}; {low:g} ... {high:g} is possible ({unit})")
 
 
-def _numbers(values: ArrayLike, column: str, faults: list[str]) -> Array | None:
+def _numbers(values: ArrayLike, column: str, problems: Problems) -> Array | None:
     try:
         numbers = np.asarray(values, dtype=np.float64)
     except (TypeError, ValueError) as error:
-        faults.append(f"{column} holds something that is not a number ({error})")
+        problems.add(f"{column} holds something that is not a number ({error})")
         return None
     if numbers.ndim != 1:
-        faults.append(f"{column} has shape {numbers.shape}; one value per row is needed")
+        problems.add(f"{column} has shape {numbers.shape}; one value per row is needed")
         return None
     wrong = np.flatnonzero(~np.isfinite(numbers))
     if len(wrong):
         row = int(wrong[0])
-        faults.append(f"{column} is {numbers[row]} at row {row + 1}; {len(wrong)} rows are not finite numbers")
+        problems.add(f"{column} is {numbers[row]} at row {row + 1}; {len(wrong)} rows are not finite numbers")
         return None
     return numbers

@@ -1,9 +1,10 @@
-"""The one exception for faulty input, and the helpers that make its text useful."""
+"""The one exception for faulty input, and what makes its text useful."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from difflib import get_close_matches
+from pathlib import Path
 
 LONGEST_SHOWN = 60
 
@@ -13,6 +14,47 @@ class InputError(ValueError):
 
     The command line prints the message and exits with status 2.
     """
+
+
+class Problems:
+    """Problems of one file, collected so that one error lists all of them.
+
+    Parameters
+    ----------
+    file : str or Path
+        Name of the file, the start of every line
+
+    Examples
+    --------
+    >>> problems = Problems("run.csv")
+    >>> problems.stop_if_any()
+    >>> problems.add("column time_s is missing")
+    >>> problems.stop_if_any()
+    Traceback (most recent call last):
+    models.errors.InputError: run.csv: column time_s is missing
+    """
+
+    def __init__(self, file: str | Path) -> None:
+        self.file = file
+        self._texts: list[str] = []
+
+    def __bool__(self) -> bool:
+        return bool(self._texts)
+
+    def add(self, text: str) -> None:
+        """Collect a problem."""
+        self._texts.append(text)
+
+    def stop_if_any(self) -> None:
+        """Raise all problems as one error.
+
+        Raises
+        ------
+        InputError
+            One line per problem.
+        """
+        if self._texts:
+            raise InputError("\n".join(f"{self.file}: {text}" for text in dict.fromkeys(self._texts)))
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:

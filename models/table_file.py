@@ -1,17 +1,15 @@
-"""Tables of users: CSV, CSV.gz and Parquet, read within limits, and refused with the reason where not sound."""
+"""Tables of users: CSV, CSV.gz and Parquet files as data frames."""
 
 from __future__ import annotations
 
-import codecs
 import csv
 import gzip
 import io
 import re
-import warnings
 import zlib
-from collections.abc import Callable, Iterator
-from contextlib import closing
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from typing import IO, Any, cast
 
@@ -21,30 +19,12 @@ from models.errors import InputError
 
 KINDS = (".csv", ".csv.gz", ".parquet")
 CHUNK_ROWS = 100_000
-CHUNK_BYTES = 1 << 20
-LONGEST_HEADER = 1 << 20  # bytes
-MOST_HEAD_ROWS = 3  # rows of units or remarks below a header that are recognised as such
-SHOWN = 3  # cells of such a row in a message
+CHUNK_LINES = 1_000
+MOST_ROWS = 5_000_000  # of a table in memory
+SHOWN = 3  # cells of a row of units in a message
 # Texts that head a column ("s", "1/min", "m3/h") have no two digits in a row; dates, times and misspelt numbers do.
 _DIGITS = re.compile(r"\d{2}|\d[.,]\d")
-_PANDAS_UNEVEN = re.compile(r"Expected \d+ fields in line|Length of header or names does not match length of data")
-
-
-@dataclass(frozen=True, kw_only=True)
-class Limits:
-    """What is read at most; beyond it a file is refused before it fills the memory.
-
-    Attributes
-    ----------
-    size_bytes : int
-        Of a file, unpacked
-    rows, columns : int
-        Of a table; rows that are not kept do not count
-    """
-
-    size_bytes: int = 2_000_000_000
-    rows: int = 5_000_000
-    columns: int = 2_000
+_PANDAS_UNEVEN = re.compile(r"Expected (\d+) fields in line (\d+), saw (\d+)")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,7 +38,7 @@ class TextForm:
     missing : tuple of str
         Further texts for a missing value
     by_mapping : bool
-        Whether a mapping file can say all this, which messages then advise
+        True if a mapping file can state all this, which messages then advise
     """
 
     separator: str = ","
@@ -67,18 +47,13 @@ class TextForm:
     by_mapping: bool = False
 
 
-LIMITS = Limits()
 PLAIN = TextForm()
-# What gzip, pandas and pyarrow raise on damaged and on hostile files.
-UNREADABLE = (
-    ValueError, LookupError, ArithmeticError, OSError, EOFError, MemoryError, RuntimeError, zlib.error,
-    pd.errors.ParserWarning,
-)  # fmt: skip
-Keep = Callable[[pd.DataFrame], pd.DataFrame]
+# What gzip, pandas and pyarrow raise on damaged files.
+UNREADABLE = (ValueError, LookupError, ArithmeticError, OSError, EOFError, MemoryError, RuntimeError, zlib.error)
 
 
 def kind_of(path: Path, kinds: tuple[str, ...] = KINDS) -> str:
-    """Ending of a file, one of `kinds`.
+    """Return the ending of a file, one of `kinds`.
 
     Raises
     ------
@@ -90,19 +65,27 @@ def kind_of(path: Path, kinds: tuple[str, ...] = KINDS) -> str:
     for kind in kinds:
         if path.name.lower().endswith(kind):
             return kind
-    raise InputError(f"{path}: the ending says nothing; use one of {', '.join(kinds)}")
+    raise InputError(f"{path}: unknown file ending; use one of {', '.join(kinds)}")
 
 
 def is_folder(path: Path) -> bool:
-    """Whether it is a folder; a name that cannot be is none, and who opens it says so."""
+    """Return True for a folder; False for names that no file can have (opening them reports that)."""
     try:
         return path.is_dir()
     except (OSError, ValueError):  # too long, or with NUL in it
         return False
 
 
-def check_file(path: Path, limits: Limits = LIMITS) -> None:
-    """Refuse what is not a file, is empty or is too large.
+def is_file(path: Path) -> bool:
+    """Return True for a file; False for names that no file can have."""
+    try:
+        return path.is_file()
+    except (OSError, ValueError):
+        return False
+
+
+def check_file(path: Path) -> None:
+    """Refuse what is not a file, or is empty.
 
     Raises
     ------
@@ -117,32 +100,24 @@ def check_file(path: Path, limits: Limits = LIMITS) -> None:
     except (OSError, ValueError) as error:  # a name that is too long, or holds NUL
         raise InputError(f"{path}: cannot be read ({getattr(error, 'strerror', None) or error})") from error
     if size == 0:
-        raise InputError(f"{path}: is empty; a header line with column names and rows are needed")
-    if size > limits.size_bytes:
-        raise InputError(f"{path}: {_too_large(size, limits)}")
+        raise InputError(f"{path}: {_EMPTY}")
 
 
 def column_names(path: Path, separator: str = PLAIN.separator) -> tuple[str, ...]:
-    """Names of the columns of a CSV, CSV.gz or Parquet file, of which no row is read.
-
-    Empty where they cannot be told: who reads the table says why.
-    """
+    """Return the names of the columns without reading rows; none if they cannot be read (reading reports why)."""
     try:
         check_file(path)
         if kind_of(path) == ".parquet":
             from pyarrow import parquet
 
             return tuple(parquet.read_schema(path).names)
-        with _opened(path) as file:
-            head = file.read(LONGEST_HEADER)
-        return tuple(_names_in(_header(path, head.removeprefix(codecs.BOM_UTF8))[1], separator))
-    except (InputError, ImportError, csv.Error, StopIteration, *UNREADABLE):
+        with _opened(path) as text:
+            return tuple(_fields(_Lines(path, text).next_filled(), separator))
+    except (InputError, ImportError, csv.Error, *UNREADABLE):
         return ()
 
 
-def read_table(
-    path: Path, *, form: TextForm = PLAIN, limits: Limits = LIMITS, keep: Keep | None = None
-) -> pd.DataFrame:
+def read_table(path: Path, form: TextForm = PLAIN) -> pd.DataFrame:
     """Read a CSV, CSV.gz or Parquet file.
 
     Parameters
@@ -150,9 +125,6 @@ def read_table(
     path : Path
     form : TextForm
         Of a CSV file
-    limits : Limits
-    keep : callable or None
-        Gives the rows of a part of the table that are to be kept; by default all
 
     Returns
     -------
@@ -162,162 +134,164 @@ def read_table(
     Raises
     ------
     InputError
-        If the file is missing, empty, too large, of another kind, or its content cannot be read.
+        If the file is missing, empty, too long, of another kind, or its content cannot be read.
     """
-    kind = kind_of(path)
-    check_file(path, limits)
-    try:
-        parts = _parquet_parts(path, limits) if kind == ".parquet" else _text_parts(path, form, limits)
-        return _together(path, parts, limits, keep)
-    except InputError:
-        raise
-    except ImportError as error:
-        raise InputError(f"{path}: reading Parquet needs pyarrow; python -m pip install pyarrow") from error
-    except pd.errors.EmptyDataError as error:
-        raise InputError(f"{path}: is empty; a header line with column names and rows are needed") from error
-    except UnicodeDecodeError as error:
-        raise InputError(f"{path}: {_not_utf8(error.object[error.start], error.start)}") from error
-    except UNREADABLE as error:
-        first_line = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
-        raise InputError(f"{path}: cannot be read as {kind.removeprefix('.')}: {first_line}") from error
+    return together(path, read_chunks(path, form))
 
 
-def _together(path: Path, parts: Iterator[pd.DataFrame], limits: Limits, keep: Keep | None) -> pd.DataFrame:
-    kept: list[pd.DataFrame] = []
-    rows = 0
-    for number, part in enumerate(parts):
-        if number == 0:
-            _check_first_rows(path, part)
-        wanted = part if keep is None else keep(part)
-        rows += len(wanted)
-        if rows > limits.rows:
-            raise InputError(f"{path}: has more than {limits.rows} rows; take a part of it, or every n-th row")
-        if len(wanted) or not kept:
-            kept.append(wanted)
-    # Parts of no rows have no types of their own.
-    filled = [part for part in kept if len(part)] or kept[:1]
-    return pd.concat(filled) if len(filled) > 1 else filled[0]
-
-
-def _check_first_rows(path: Path, table: pd.DataFrame) -> None:
-    """Refuse rows of units or remarks between header and numbers, as exports of test benches have them.
+def together(path: Path, chunks: Iterable[pd.DataFrame]) -> pd.DataFrame:
+    """Join chunks of one file.
 
     Raises
     ------
     InputError
-        If no cell of the first rows is a number, and those of the next one are.
+        If they have more than 5 million rows.
     """
-    heads: list[list[str]] = []
-    for row in range(min(len(table), MOST_HEAD_ROWS + 1)):
-        cells = [str(cell).strip() for cell in table.iloc[row] if not pd.isna(cell)]
-        if any(_is_number(cell) for cell in cells):
-            break
-        if not any(cells) or any(_DIGITS.search(cell) for cell in cells):
-            return
-        heads.append(cells)
-    else:
-        return
-    if heads:
-        rows, them = ("row 1", "it") if len(heads) == 1 else (f"rows 1-{len(heads)}", "them")
-        first = ", ".join(repr(cell[:20]) for cell in heads[0][:SHOWN]) + (", ..." if len(heads[0]) > SHOWN else "")
-        verb = "holds" if len(heads) == 1 else "hold"
-        raise InputError(
-            f"{path}: {rows} (below the header) {verb} units or texts ({first}) and no number; remove {them}, or begin "
-            f"{'its line' if len(heads) == 1 else 'their lines'} with '#'"
-        )
+    kept: list[pd.DataFrame] = []
+    rows = 0
+    for chunk in chunks:
+        rows += len(chunk)
+        if rows > MOST_ROWS:
+            raise InputError(f"{path}: has more than {MOST_ROWS} rows; take a part of it, or every n-th row")
+        kept.append(chunk)
+    filled = [chunk for chunk in kept if len(chunk)] or kept[:1]  # chunks of no rows have untyped columns
+    return pd.concat(filled) if len(filled) > 1 else filled[0]
 
 
-def _too_large(size: int, limits: Limits) -> str:
-    return (
-        f"has {size / 1e9:.3g} GB, more than the {limits.size_bytes / 1e9:.3g} GB that are read; take a part of it, "
-        "or every n-th row"
-    )
-
-
-# ---------------------------------------------------------------------- text
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Scan:
-    """What a first look at a text finds: the lines before the header, the header, and whether # only begins lines."""
-
-    before: int
-    header: str
-    comments: bool
-
-
-def _opened(path: Path) -> IO[bytes]:
-    return cast(IO[bytes], gzip.open(path, "rb")) if kind_of(path) == ".csv.gz" else path.open("rb")
-
-
-def _scan(path: Path, limits: Limits) -> _Scan:
-    """Look through the whole text once, without keeping it: size, encoding, NUL, comments, header."""
-    decoder = codecs.getincrementaldecoder("utf-8")()
-    size = lines = marks = starting = 0
-    last, head = b"\n", b""
-    with _opened(path) as file:
-        while chunk := file.read(CHUNK_BYTES):
-            if not size and chunk[:2] in (b"\xff\xfe", b"\xfe\xff"):
-                raise InputError(f"{path}: is UTF-16 text; save it as UTF-8")
-            where = chunk.find(b"\0")
-            if where >= 0:
-                line = lines + chunk.count(b"\n", 0, where) + 1
-                raise InputError(f"{path}: cannot be read as csv: a NUL byte in line {line}; it is no text, or damaged")
-            try:
-                decoder.decode(chunk)
-            except UnicodeDecodeError as error:
-                line = lines + chunk.count(b"\n", 0, max(error.start, 0)) + 1
-                raise InputError(f"{path}: {_not_utf8(error.object[error.start], line)}") from error
-            size += len(chunk)
-            lines += chunk.count(b"\n")
-            marks += chunk.count(b"#")
-            starting += (last + chunk).count(b"\n#")
-            last = chunk[-1:]
-            if len(head) < LONGEST_HEADER:
-                head += chunk
-            if size > limits.size_bytes:
-                raise InputError(f"{path}: {_too_large(size, limits)}")
-    before, header = _header(path, head.removeprefix(codecs.BOM_UTF8))
-    return _Scan(before=before, header=header, comments=marks == starting)
-
-
-def _not_utf8(byte: int, line: int) -> str:
-    return f"cannot be read as csv: byte 0x{byte:02x} in line {line} is not UTF-8; save the file as UTF-8"
-
-
-def _header(path: Path, head: bytes) -> tuple[int, str]:
-    lines = head.decode("utf-8", errors="replace").splitlines()
-    for number, line in enumerate(lines):
-        if line.strip() and not line.startswith("#"):
-            if number == len(lines) - 1 and len(head) >= LONGEST_HEADER:
-                raise InputError(f"{path}: its first line has more than {LONGEST_HEADER} characters; it is no table")
-            return number, line
-    raise InputError(f"{path}: is empty; a header line with column names and rows are needed")
-
-
-def _names_in(header: str, separator: str) -> list[str]:
-    return [name.strip() for name in next(csv.reader([header], delimiter=separator, skipinitialspace=True))]
-
-
-def _check_header(path: Path, header: str, form: TextForm, limits: Limits) -> None:
+def read_chunks(path: Path, form: TextForm = PLAIN) -> Iterator[pd.DataFrame]:
+    """Read a file in chunks of rows, at least one; see :func:`read_table`."""
+    kind = kind_of(path)
+    check_file(path)
     try:
-        names = _names_in(header, form.separator)
-    except (csv.Error, StopIteration) as error:
-        raise InputError(f"{path}: its header line cannot be read: {error}") from error
-    for other, word in ((";", "';'"), ("\t", "tabs"), (",", "','")):
-        if len(names) == 1 and other in names[0]:
-            raise InputError(f"{path}: its columns are separated by {word}; {_advice(other, form)}")
-    if len(names) > limits.columns:
-        raise InputError(f"{path}: has {len(names)} columns, more than the {limits.columns} that are read; drop some")
-    if all(_is_number(name) for name in names):
-        raise InputError(f"{path}: its first line holds numbers; a header line with column names is needed")
+        yield from _parquet_chunks(path) if kind == ".parquet" else _text_chunks(path, form)
+    except InputError:
+        raise
+    except ImportError as error:
+        raise InputError(f"{path}: reading Parquet needs pyarrow; python -m pip install pyarrow") from error
+    except UNREADABLE as error:
+        text = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
+        raise InputError(f"{path}: cannot be read as {kind.removeprefix('.')}: {text}") from error
+
+
+def _check_names(path: Path, names: list[str]) -> None:
     repeated = sorted({name for name in names if name and names.count(name) > 1})
     if repeated:
         raise InputError("\n".join(f"{path}: column {name[:80]} is there twice; remove one" for name in repeated[:10]))
 
 
+# ---------------------------------------------------------------------- text
+
+_EMPTY = "is empty; a header line with column names and rows are needed"
+
+
+def _opened(path: Path) -> io.TextIOWrapper:
+    file = gzip.open(path, "rb") if kind_of(path) == ".csv.gz" else path.open("rb")  # noqa: SIM115  closed with the text
+    return io.TextIOWrapper(cast(IO[bytes], file), encoding="utf-8-sig", errors="surrogateescape")
+
+
+class _Lines:
+    """Lines of a text for pandas: remarks are blank, and what is no UTF-8 is refused with its line number."""
+
+    def __init__(self, path: Path, text: io.TextIOWrapper) -> None:
+        self.path, self.number = path, 0
+        self._text = text
+        self._waiting: list[str] = []
+
+    def __iter__(self) -> Iterator[str]:
+        return self
+
+    def __next__(self) -> str:
+        line = self._waiting.pop(0) if self._waiting else self._read_line()
+        if not line:
+            raise StopIteration
+        return line
+
+    def _read_line(self) -> str:
+        line = next(self._text, "")
+        self.number += 1
+        if self.number == 1 and line.startswith(("\udcff\udcfe", "\udcfe\udcff")):
+            raise InputError(f"{self.path}: is UTF-16 text; save it as UTF-8")
+        if "\0" in line:
+            raise InputError(f"{self.path}: a NUL byte in line {self.number}; it is no text, or damaged")
+        if not line.isascii():
+            try:
+                line.encode()
+            except UnicodeEncodeError as error:
+                byte = ord(line[error.start]) - 0xDC00
+                raise InputError(
+                    f"{self.path}: byte 0x{byte:02x} in line {self.number} is not UTF-8; save the file as UTF-8"
+                ) from error
+        # A '#' within a row is a cell such as '#REF!', so that pandas' own option for remarks cannot be used.
+        return "\n" if line.startswith("#") else line
+
+    def next_filled(self) -> str:
+        """Return the next line that is not blank; pandas will read it again. Empty at the end."""
+        while line := self._read_line():
+            self._waiting.append(line)
+            if line.strip():
+                return line
+        return ""
+
+    def read(self, _size: int = -1) -> str:
+        """Return some lines, as pandas asks for text."""
+        return "".join(islice(self, CHUNK_LINES))
+
+
+def _fields(line: str, separator: str) -> list[str]:
+    return [field.strip() for field in next(csv.reader([line], delimiter=separator, skipinitialspace=True), [])]
+
+
+def _text_chunks(path: Path, form: TextForm) -> Iterator[pd.DataFrame]:
+    with _opened(path) as text:
+        lines = _Lines(path, text)
+        _check_head(path, lines, form)
+        try:
+            for chunk in pd.read_csv(
+                cast(Any, lines), sep=form.separator, decimal=form.decimal, na_values=list(form.missing),
+                skipinitialspace=True, index_col=False, chunksize=CHUNK_ROWS, low_memory=False,
+            ):  # fmt: skip
+                yield chunk.rename(columns=lambda name: str(name).strip())
+        except pd.errors.ParserError as error:
+            uneven = _PANDAS_UNEVEN.search(str(error))
+            if uneven is None:
+                raise
+            names, line, count = map(int, uneven.groups())
+            raise InputError(f"{path}: {_too_many_fields(line, count, names, form)}") from error
+
+
+def _check_head(path: Path, lines: _Lines, form: TextForm) -> None:
+    """Refuse another separator, no header, repeated names, and rows of units or too many fields below the header."""
+    header = lines.next_filled()
+    if not header:
+        raise InputError(f"{path}: {_EMPTY}")
+    names = _fields(header, form.separator)
+    for other, word in ((";", "';'"), ("\t", "tabs"), (",", "','")):
+        if len(names) == 1 and other in names[0]:
+            raise InputError(f"{path}: its columns are separated by {word}; {_advice(other, form)}")
+    if all(_is_number(name) for name in names):
+        raise InputError(f"{path}: its first line holds numbers; a header line with column names is needed")
+    _check_names(path, names)
+    first = _fields(lines.next_filled(), form.separator)
+    if len(first) > len(names):
+        raise InputError(f"{path}: {_too_many_fields(lines.number, len(first), len(names), form)}")
+    cells = [cell for cell in first if cell]
+    if cells and not any(_is_number(cell) or _DIGITS.search(cell) for cell in cells):
+        shown = ", ".join(repr(cell[:20]) for cell in cells[:SHOWN]) + (", ..." if len(cells) > SHOWN else "")
+        raise InputError(
+            f"{path}: line {lines.number} (below the header) holds units or texts ({shown}) and no number; remove it, "
+            "or begin it with '#'"
+        )
+
+
+def _too_many_fields(line: int, count: int, names: int, form: TextForm) -> str:
+    return (
+        f"line {line} has {count} fields, but the header names {names} columns; remove what is too much, e.g. a "
+        f"{form.separator!r} at its end or within a number"
+    )
+
+
 def _advice(separator: str, form: TextForm) -> str:
-    """What to do with a file of another separator."""
+    """Return what to do with a file of another separator."""
     plain = "write it with ',' and decimal points"
     if not form.by_mapping:
         return plain
@@ -338,103 +312,27 @@ def _is_number(text: str) -> bool:
     return True
 
 
-def _text_parts(path: Path, form: TextForm, limits: Limits) -> Iterator[pd.DataFrame]:
-    scan = _scan(path, limits)
-    _check_header(path, scan.header, form, limits)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error", pd.errors.ParserWarning)  # rows with more cells than the header
-        reader: Any = pd.read_csv(
-            path,
-            sep=form.separator,
-            decimal=form.decimal,
-            na_values=list(form.missing),
-            # A '#' within a row is a cell such as '#REF!': it must not hide the rest of its row.
-            comment="#" if scan.comments else None,
-            skiprows=0 if scan.comments else scan.before,
-            skipinitialspace=True,
-            index_col=False,
-            encoding="utf-8-sig",
-            compression="gzip" if kind_of(path) == ".csv.gz" else None,
-            chunksize=CHUNK_ROWS,
-            low_memory=False,
-        )
-        with closing(reader):
-            try:
-                for part in reader:
-                    yield part.rename(columns=lambda name: str(name).strip())
-            except (pd.errors.ParserError, pd.errors.ParserWarning) as error:
-                uneven = _uneven_row(path, form, scan) if _PANDAS_UNEVEN.search(str(error)) else None
-                if uneven is None:
-                    raise
-                raise InputError(f"{path}: cannot be read as csv: {uneven}") from error
-
-
-def _uneven_row(path: Path, form: TextForm, scan: _Scan) -> str | None:
-    """The first row with more fields than the header, which pandas names by halves; None if there is none."""
-    with _opened(path) as file, io.TextIOWrapper(file, encoding="utf-8-sig", newline="") as text:
-        at = 0
-
-        def lines() -> Iterator[str]:
-            nonlocal at
-            for at, line in enumerate(text, start=1):
-                if at > scan.before and not (scan.comments and line.startswith("#")):
-                    yield line
-
-        try:
-            rows = csv.reader(lines(), delimiter=form.separator, skipinitialspace=True)
-            filled = (fields for fields in rows if len(fields) > 1 or any(field.strip() for field in fields))
-            names = len(next(filled))
-            for row, fields in enumerate(filled, start=1):
-                if len(fields) > names:
-                    return (
-                        f"row {row} (line {at}) has {len(fields)} fields, but the header names {names} columns; remove "
-                        f"what is too much, e.g. a {form.separator!r} at its end or within a number"
-                    )
-        except (csv.Error, StopIteration):
-            return None
-    return None
-
-
 # ---------------------------------------------------------------------- Parquet
 
 
-def _parquet_parts(path: Path, limits: Limits) -> Iterator[pd.DataFrame]:
+def _parquet_chunks(path: Path) -> Iterator[pd.DataFrame]:
     import pyarrow as pa
     from pyarrow import parquet
 
-    with parquet.ParquetFile(path) as plain:
-        metadata, schema = plain.metadata, plain.schema_arrow
-        if len(schema.names) > limits.columns:
-            raise InputError(
-                f"{path}: has {len(schema.names)} columns, more than the {limits.columns} that are read; drop some"
-            )
-        size = sum(metadata.row_group(i).total_byte_size for i in range(metadata.num_row_groups))
-        if size > limits.size_bytes:
-            raise InputError(f"{path}: {_too_large(size, limits)}")
-        repeated = sorted({name for name in schema.names if schema.names.count(name) > 1})
-        faults = [f"column {name} is there twice; remove one" for name in repeated]
-        faults += [
-            f"column {field.name} holds {str(field.type)[:60]}; one number, time or text per row is needed: remove it"
-            for field in schema
-            if not _is_plain(pa.types, field.type)
-        ]
-        if faults:
-            raise InputError("\n".join(f"{path}: {fault}" for fault in faults[:20]))
-        texts = [f.name for f in schema if pa.types.is_string(f.type) or pa.types.is_large_string(f.type)]
-    # Texts stay encoded, so that one long text that is repeated in every row does not fill the memory.
-    row = 0
-    with parquet.ParquetFile(path, read_dictionary=texts) as file:
+    with parquet.ParquetFile(path) as file:
+        schema = file.schema_arrow
+        _check_names(path, list(schema.names))
+        nested = [f for f in schema if pa.types.is_nested(f.type) or pa.types.is_binary(f.type)]
+        if nested:
+            raise InputError("\n".join(
+                f"{path}: column {f.name} holds {str(f.type)[:60]}; a number, time or text per row is needed: remove it"
+                for f in nested[:10]
+            ))  # fmt: skip
+        row = 0
         for batch in file.iter_batches(batch_size=CHUNK_ROWS):
-            part = batch.to_pandas(ignore_metadata=True)
-            part.index = pd.RangeIndex(row, row + len(part))
-            row += len(part)
-            yield part
-    if row == 0:
-        yield schema.empty_table().to_pandas(ignore_metadata=True)
-
-
-def _is_plain(types: Any, kind: Any) -> bool:
-    if types.is_dictionary(kind):
-        kind = kind.value_type
-    checks = ("boolean", "integer", "floating", "decimal", "timestamp", "date", "string", "large_string", "null")
-    return any(getattr(types, f"is_{check}")(kind) for check in checks)
+            chunk = batch.to_pandas(ignore_metadata=True)
+            chunk.index = pd.RangeIndex(row, row + len(chunk))
+            row += len(chunk)
+            yield chunk
+        if row == 0:
+            yield schema.empty_table().to_pandas(ignore_metadata=True)

@@ -13,7 +13,8 @@ from diagnosis import diagnose
 from diagnosis.case import prepare
 from diagnosis.explain import calibrated
 from diagnosis.identifiable import scale_direction, scale_notes
-from diagnosis.recording import Recording, read_recordings
+from diagnosis.read_recordings import read_recordings
+from diagnosis.recording import Recording
 from diagnosis.result import Course, Diagnosis
 from models.gearbox import load_gearbox
 

@@ -16,7 +16,7 @@ from builder.conceal_command import conceal
 from diagnosis.proof import cycles
 from diagnosis.proof.conceal import EFFECTS, PHYSICS, conceal_set, mixed_plans, random_plans
 from diagnosis.proof.concealed_case import CONTROLS, FAULTS, Plan
-from diagnosis.recording import read_recordings
+from diagnosis.read_recordings import read_recordings
 from models.errors import InputError
 from models.gearbox import Gearbox
 

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 from click.testing import CliRunner
 
-import diagnosis.recording
+import diagnosis.read_recordings
 from builder.diagnose_command import diagnose
 from models.errors import InputError
 
@@ -27,7 +27,7 @@ def asked_for(monkeypatch: pytest.MonkeyPatch) -> list[tuple[tuple[str, ...], tu
         asked.append((train, held))
         raise _ReadError
 
-    monkeypatch.setattr(diagnosis.recording, "read_train_and_holdout", read)
+    monkeypatch.setattr(diagnosis.read_recordings, "read_train_and_holdout", read)
     return asked
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from diagnosis.recording import read_recordings
+from diagnosis.read_recordings import read_recordings
 from models.gearbox import Gearbox
 from models.mechanisms import CATALOGUE, load_mechanisms
 from models.mechanisms.user_files import check_placeable

@@ -13,7 +13,7 @@ import sympy as sp
 from diagnosis import trajectory
 from diagnosis.grid import Piece, pieces
 from diagnosis.network_on_grid import NetworkOnGrid, named_values
-from diagnosis.recording import read_recordings
+from diagnosis.read_recordings import read_recordings
 from diagnosis.trajectory import free_running, simulate
 from models.errors import InputError
 from models.gearbox import known_gearboxes, load_gearbox, read_gearbox

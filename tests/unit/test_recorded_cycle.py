@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from builder.files import read_cycle_and_start
-from builder.recorded_cycle import file_of, read_cycle_or_recording
+from builder.recorded_cycle import files_of, read_cycle_or_recording
 from models.errors import InputError
 from models.gearbox import Gearbox, load_gearbox
 from models.network import ThermalNetwork
@@ -208,7 +208,7 @@ def test_dates_need_no_mapping(tmp_path: Path, network: ThermalNetwork) -> None:
 def test_a_part_counts_from_its_first_row_and_needs_no_temperature(tmp_path: Path, network: ThermalNetwork) -> None:
     path = plain(tmp_path / "run.csv", table()[["time_s", "speed_rpm", "torque_Nm"]])
     named = Path(f"{path}@300..600")
-    assert file_of(named) == path
+    assert files_of(named) == (path,)
     cycle, start, notes = read_cycle_or_recording(named, network)
     assert cycle.time.tolist() == [30.0 * i for i in range(10)]
     assert cycle.inputs["speed"].tolist() == table()["speed_rpm"].iloc[10:20].tolist()
@@ -262,11 +262,11 @@ def test_a_recording_with_gaps_is_refused_and_its_pieces_can_be_named(
         ("run.csv", GERMAN.replace('";"', '","', 1).replace('decimal = ","', 'decimal = "."'), "separated by ';'"),
         ("run.csv", "schema = = 1", "mapping.toml: is not valid TOML"),
         ("run.csv@5..3", GERMAN, "'5..3' ends before it starts"),
-        ("run.csv@now", GERMAN, "'now' after the @ names no part; write FILE@start..end"),
+        ("run.csv@now", GERMAN, "run.csv@now: 'now' names no part; write start..end"),
         ("run.csv@1e6..2e6", GERMAN, "run.csv: has no rows in the part that is named"),
         ("missing.csv@0..9", GERMAN, "missing.csv: no such file"),
         ("missing.mf4", GERMAN, "missing.mf4: no such file"),
-        ("run.xls", GERMAN, "run.xls: the ending says nothing; use one of .csv, .csv.gz, .parquet, .mf4, .mdf"),
+        ("run.xls", GERMAN, "run.xls: unknown file ending; use one of .csv, .csv.gz, .parquet, .mf4, .mdf"),
     ],
 )
 def test_faults_of_a_recording_are_those_of_a_diagnosis(

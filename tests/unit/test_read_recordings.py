@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import subprocess
+import sys
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -10,16 +12,16 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from diagnosis.mapping import UNITS, RecordingMapping, dimension_of, read_mapping
-from diagnosis.network_on_grid import NetworkOnGrid
-from diagnosis.recording import Recording, check_holdout, read_recordings
-from diagnosis.recording_cleaning import bridged, dropouts, outliers, resolution_of, stuck_rows
-from diagnosis.recording_plausible import SUSPECT_K, SUSPECT_LOSS, SUSPECT_SHARE, _misfit, _thinned, check_plausible
-from diagnosis.recording_time import part_of
+import diagnosis
+from diagnosis.cleaning import bridged, dropouts, outliers, resolution_of, stuck_rows
+from diagnosis.quantities import UNITS
+from diagnosis.read_recordings import read_recordings
+from diagnosis.recording import Recording
+from diagnosis.shared_rows import check_shared_rows
+from diagnosis.time_axis import part_of
 from models.errors import InputError
 from models.gearbox import Gearbox
 from models.network import ThermalNetwork
-from models.table_file import Limits
 
 
 @pytest.fixture(scope="module")
@@ -144,46 +146,20 @@ def test_columns_that_nothing_asks_for_are_noted(tmp_path: Path, network: Therma
     assert note.endswith("x11 and 3 more")
 
 
-def test_a_constant_beside_a_recorded_column_is_refused(tmp_path: Path, network: ThermalNetwork) -> None:
-    path = write(tmp_path / "run.csv", table())
-    with pytest.raises(InputError, match="T_ambient is a constant of its mapping file, and column T_ambient_degC is"):
-        read(path, network, "constants = { T_ambient = 20.0 }")
-    ignored = 'constants = { T_ambient = 20.0 }\n[columns.T_ambient_degC]\nquantity = "ignore"'
-    assert (read(path, network, ignored).inputs["T_ambient"] == 20.0).all()
-
-
-def test_rows_too_far_apart_are_another_unit(tmp_path: Path, network: ThermalNetwork) -> None:
-    late = table()
-    late["time_s"] *= 1000.0
-    with pytest.raises(InputError, match="advances by 1e\\+04 s from row to row.*at most 1800 s.*milliseconds meant"):
-        read(write(tmp_path / "run.csv", late), network)
-    late["time_s"] = pd.to_datetime(late["time_s"], unit="s").dt.strftime("%Y-%m-%dT%H:%M:%SZ")
-    with pytest.raises(InputError, match="at most 1800 s tell how it warms$"):
-        read(write(tmp_path / "dated.csv", late), network)
-
-
 def test_parts_of_a_file(tmp_path: Path, network: ThermalNetwork) -> None:
     source = table()
     path = write(tmp_path / "run.csv", source.assign(time_s=source["time_s"] + 100.0))
     first, second = read_recordings([f"{path}@100..600", f"{path}@600.."], network)
     assert (len(first.time), len(second.time)) == (50, 150)  # the end does not belong to a part
     assert first.name != second.name
-    check_holdout([first], [second])
+    check_shared_rows([first], [second])
     with pytest.raises(InputError, match="is held out, but has the rows of 500 ... 590 s in common with"):
-        check_holdout([first], read_recordings([f"{path}@500..700"], network))
+        check_shared_rows([first], read_recordings([f"{path}@500..700"], network))
 
 
 def test_a_date_as_the_end_of_a_part_includes_its_day() -> None:
     part = part_of("2017-09-01..2017-09-02")
     assert (part.start, part.end) == (datetime(2017, 9, 1, tzinfo=UTC), datetime(2017, 9, 3, tzinfo=UTC))
-
-
-def test_a_part_of_a_large_file_is_read_although_the_whole_is_not(tmp_path: Path, network: ThermalNetwork) -> None:
-    path = write(tmp_path / "run.csv", table(2000))
-    limits = Limits(rows=500, size_bytes=10_000)
-    with pytest.raises(InputError, match="run.csv: has .* GB, more than"):
-        read(path, network, limits=limits)
-    assert len(read(f"{path}@0..1000", network, limits=limits).time) == 100
 
 
 @pytest.mark.parametrize("name", ["run.csv", "run.parquet"])
@@ -302,16 +278,6 @@ def test_every_unit_is_what_it_says() -> None:
         assert found[dimension] == pytest.approx(values, rel=1e-9), dimension
 
 
-def test_every_unit_of_a_mapping_converts_one_way_and_back(tmp_path: Path) -> None:
-    path = tmp_path / "m.toml"
-    path.write_text('schema = 1\n[columns.x]\nquantity = "T_oil"\nunit = "K"\nscale = 0.1\n')
-    mapping = read_mapping(path)
-    assert isinstance(mapping, RecordingMapping)
-    factor, offset = mapping.columns["x"].conversion(None)
-    assert 2931.5 * factor + offset == pytest.approx(20.0)
-    assert [dimension_of(q) for q in ("speed", "torque", "air_speed")] == ["speed", "torque", "air speed"]
-
-
 # ---------------------------------------------------------------------- cleaning
 
 
@@ -408,14 +374,14 @@ def test_a_copy_in_another_form_is_still_the_same_rows(tmp_path: Path, network: 
     with pytest.raises(
         InputError, match=r"b.parquet: is held out, but has \d+ of \d+ distinct rows in common with .*a"
     ):
-        check_holdout(train, held)
-    check_holdout(train, read_recordings([write(tmp_path / "c.csv", table(seed=1))], network))
+        check_shared_rows(train, held)
+    check_shared_rows(train, read_recordings([write(tmp_path / "c.csv", table(seed=1))], network))
 
 
 def test_a_recording_named_twice_is_refused(tmp_path: Path, network: ThermalNetwork) -> None:
     path = write(tmp_path / "a.csv", table())
     with pytest.raises(InputError, match="a.csv: has the rows of 0 ... 1990 s in common with .*; name every row once"):
-        read_recordings([path, path], network)
+        check_shared_rows(read_recordings([path, path], network))
 
 
 def test_faults_of_all_files_come_at_once(tmp_path: Path, network: ThermalNetwork) -> None:
@@ -430,55 +396,6 @@ def test_faults_of_all_files_come_at_once(tmp_path: Path, network: ThermalNetwor
 
 
 # ---------------------------------------------------------------------- real and foreign recordings
-
-
-def test_recordings_of_a_foreign_plant_are_read_and_plausible(fzg: Gearbox, recordings_folder: Path) -> None:
-    network = fzg.network()
-    folders = sorted((recordings_folder / "fzg_open").glob("rig_*"))
-    assert folders
-    for folder in folders:
-        train = read_recordings(sorted(folder.glob("train_*.csv.gz")), network)
-        hold = read_recordings(sorted(folder.glob("hold_*.csv.gz")), network)
-        check_holdout(train, hold)
-        check_plausible([*train, *hold], network, fzg.losses())
-        assert all(not r.notes and len(r.segments) == 1 for r in (*train, *hold))
-
-
-@pytest.mark.parametrize(("changes", "says"), [
-    ({"speed_rpm": (np.pi / 30.0, 0.0)}, "speed seems to be in rad/s"),
-    ({"torque_Nm": (1e-3, 0.0)}, "torque seems to be in kN m"),
-    ({"torque_Nm": (1e3, 0.0)}, "torque seems to be in N mm"),
-    ({"T_ambient_degC": (1.8, 32.0)}, "T_ambient seems to be in degF"),
-    ({"T": (1.8, 32.0)}, "temperatures seem to be in degF"),
-    ({"speed_rpm": (0.05, 0.0)}, "is it of another gearbox"),
-    ({"time_s": (1.0 / 60.0, 0.0)}, "time seems to be in minutes"),
-    ({"time_s": (1.0 / 3600.0, 0.0)}, "time seems to be in hours"),
-])  # fmt: skip
-def test_wrong_units_and_other_gearboxes_are_found_by_the_model(
-    tmp_path: Path, fzg: Gearbox, recordings_folder: Path, changes: dict[str, tuple[float, float]], says: str
-) -> None:
-    source = pd.read_csv(recordings_folder / "fzg_open" / "rig_1" / "train_2.csv.gz").drop(columns="P_loss_W")
-    for column in source.columns:
-        factor, offset = changes.get(column, changes.get("T", (1.0, 0.0)) if column.startswith("T_") else (1.0, 0.0))
-        source[column] = source[column] * factor + offset
-    recordings = read_recordings([write(tmp_path / "run.csv", source)], fzg.network())
-    with pytest.raises(InputError, match=f"run.csv: .*{says}"):
-        check_plausible(recordings, fzg.network(), fzg.losses())
-
-
-def test_a_gearbox_that_stays_cooler_than_the_model_is_no_slip_of_the_torque(
-    tmp_path: Path, fzg: Gearbox, recordings_folder: Path
-) -> None:
-    """Without its torque the model would fit such a recording; but a torque in N mm would miss it by far more."""
-    source = pd.read_csv(recordings_folder / "fzg_open" / "rig_1" / "train_2.csv.gz").drop(columns="P_loss_W")
-    ambient = source["T_ambient_degC"].mean()
-    for column in source.columns.drop("T_ambient_degC"):
-        if column.startswith("T_"):
-            source[column] = ambient + 0.55 * (source[column] - ambient)
-    recordings = read_recordings([write(tmp_path / "run.csv", source)], fzg.network())
-    misfit = _misfit(_thinned(recordings[0]), NetworkOnGrid(fzg.network(), fzg.losses()))
-    assert misfit.beyond(SUSPECT_K, SUSPECT_SHARE, SUSPECT_LOSS)
-    check_plausible(recordings, fzg.network(), fzg.losses())
 
 
 MAPPING_OF_THE_WIND_TURBINES = """
@@ -507,3 +424,63 @@ def test_two_real_wind_turbine_gearboxes(tmp_path: Path, network: ThermalNetwork
         assert autumn.start == datetime(2017, 9, 1, tzinfo=UTC)
         assert 60.0 < autumn.time[-1] / 86400.0 < 61.0
         assert autumn.inputs["speed"].max() < 2000.0
+
+
+# ---------------------------------------------------------------------- several files of one recording
+
+
+def test_files_of_one_recording_are_joined_in_the_order_of_time(tmp_path: Path, network: ThermalNetwork) -> None:
+    source = table()
+    first, second = write(tmp_path / "a.csv", source[:120]), write(tmp_path / "b.parquet", source[120:])
+    whole = read(write(tmp_path / "whole.csv", source), network)
+    joined = read(f"{second}+{first}", network)
+    assert (joined.name, joined.files, joined.path.name) == ("b", (first, second), "a.csv+b.parquet")
+    assert "joined from a.csv (rows 1-120), b.parquet (rows 121-200)" in joined.notes
+    np.testing.assert_array_equal(joined.time, whole.time)
+    np.testing.assert_array_equal(channel(joined, "oil"), channel(whole, "oil"))
+    assert joined.segments == (slice(0, 200),)
+    part = read(f"{first}+{second}@1000..1500", network)
+    assert (part.from_s, part.to_s, len(part.time)) == (1000.0, 1490.0, 50)
+
+
+def test_a_column_that_one_of_the_files_lacks_is_missing_there(tmp_path: Path, network: ThermalNetwork) -> None:
+    source = table()
+    first = write(tmp_path / "a.csv", source[:120].drop(columns="T_pinion_degC"))
+    joined = read(f"{first}+{write(tmp_path / 'b.csv', source[120:])}", network)
+    assert np.isnan(channel(joined, "pinion")[:120]).all()
+    assert np.isfinite(channel(joined, "pinion")[120:]).all()
+
+
+def test_files_that_overlap_are_refused(tmp_path: Path, network: ThermalNetwork) -> None:
+    source = table()
+    first, second = write(tmp_path / "a.csv", source[:120]), write(tmp_path / "b.csv", source[110:])
+    with pytest.raises(InputError, match=r"b.csv: begins at 1100, before .*a.csv ends at 1190 .* follow each other"):
+        read(f"{first}+{second}", network)
+
+
+def test_a_file_whose_name_has_a_plus_or_an_at_is_a_file(tmp_path: Path, network: ThermalNetwork) -> None:
+    for name in ("a.csv+b.csv", "run@rig.csv"):
+        assert read(write(tmp_path / name, table()), network).files == (tmp_path / name,)
+
+
+def test_reading_does_not_load_the_inference() -> None:
+    code = (
+        "import sys; from diagnosis.read_recordings import read_recordings; import diagnosis;"
+        "print(*sorted(m for m in sys.modules if m.startswith('diagnosis.') or m in ('joblib', 'sympy', 'sklearn')))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert set(done.stdout.split()) == {f"diagnosis.{name}" for name in (
+        "cleaning", "columns", "mapping", "mdf", "quantities", "read_recordings", "recorded_rows", "recording",
+        "recording_file", "time_axis",
+    )}  # fmt: skip
+
+
+def test_diagnose_is_a_function_whatever_is_imported_first() -> None:
+    code = "import diagnosis.diagnose_recordings; from diagnosis import diagnose, Diagnosis; print(callable(diagnose))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "True"
+
+
+def test_a_wrong_name_of_the_package_is_an_attribute_error() -> None:
+    with pytest.raises(AttributeError, match="no attribute 'diagnos'"):
+        diagnosis.diagnos  # noqa: B018

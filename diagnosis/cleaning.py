@@ -1,6 +1,6 @@
-"""Cleaning of measured columns: what cannot be true becomes missing, short holes are bridged, and each case is noted.
+"""Cleaning of measured columns: impossible values become missing, short holes are bridged, and each case is noted.
 
-Only what no gearbox can do is taken away. A sensor that hangs is noted and left: finding it is the diagnosis' work.
+A sensor that hangs is noted and left: finding it is the task of the diagnosis.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from models.types import Array
 
 Mask = NDArray[np.bool_]
 
-# A value is an outlier if it stands alone (at most two rows) and leaves its surroundings by so many robust standard
+# A value is an outlier if it is alone (at most two rows) and differs from its surroundings by so many robust standard
 # deviations and by so much.
 OUTLIER_SDS, OUTLIER_K, OUTLIER_OF_LOSS = 15.0, 8.0, 0.3
 LONGEST_OUTLIER = 2  # rows
@@ -31,7 +31,7 @@ FINEST_RESOLUTION = 1e-4
 
 
 def runs(mask: Mask) -> Iterator[tuple[int, int]]:
-    """First row and row after the last of every run of True.
+    """Yield first row and row after the last of every run of True.
 
     Examples
     --------
@@ -43,7 +43,7 @@ def runs(mask: Mask) -> Iterator[tuple[int, int]]:
 
 
 def rows_text(rows: NDArray[np.int64]) -> str:
-    """Row numbers as a reader finds them in the file, the longest list cut short.
+    """Format row numbers as ranges; a long list is cut short.
 
     Examples
     --------
@@ -58,7 +58,7 @@ def rows_text(rows: NDArray[np.int64]) -> str:
 
 
 def time_pieces(time: Array, gap_s: float) -> list[slice]:
-    """Pieces without a step longer than `gap_s`, [s].
+    """Split time into pieces without a step longer than `gap_s`, [s].
 
     Examples
     --------
@@ -70,7 +70,7 @@ def time_pieces(time: Array, gap_s: float) -> list[slice]:
 
 
 def outliers(values: Array, *, least: float, steady: Mask | None = None) -> Mask:
-    """Values that stand alone, shape (rows,).
+    """Return True for values that differ from all their neighbours, shape (rows,).
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ def outliers(values: Array, *, least: float, steady: Mask | None = None) -> Mask
     least : float
         Smallest deviation from the running median that counts
     steady : array of bool, shape (rows,), optional
-        Rows that may be judged
+        Rows that may be outliers
 
     Examples
     --------
@@ -106,7 +106,7 @@ def outliers(values: Array, *, least: float, steady: Mask | None = None) -> Mask
 
 
 def dropouts(values: Array) -> Mask:
-    """Rows in which a temperature jumps to a constant and back from it, shape (rows,)."""
+    """Return True for rows in which a temperature jumps to a constant and back from it, shape (rows,)."""
     found = np.zeros(len(values), dtype=bool)
     good = np.flatnonzero(np.isfinite(values))
     if len(good) < 2 * WINDOW:
@@ -121,8 +121,21 @@ def dropouts(values: Array) -> Mask:
     return found
 
 
+def spikes_of_temperature(values: Array) -> Mask:
+    """Return True for dropouts and outliers of a temperature [degC], shape (rows,)."""
+    found = dropouts(values)
+    return found | outliers(np.where(found, np.nan, values), least=OUTLIER_K)
+
+
+def spikes_of_loss(values: Array, steady: Mask) -> Mask:
+    """Return True for outliers of a loss [W] while its inputs are steady, shape (rows,)."""
+    known = np.abs(values[np.isfinite(values)])
+    usual = float(np.quantile(known, 0.95)) if len(known) else 0.0
+    return outliers(values, least=OUTLIER_OF_LOSS * usual, steady=steady)
+
+
 def steady_rows(inputs: Mapping[str, Array]) -> Mask:
-    """Rows with unchanged inputs around them, shape (rows,)."""
+    """Return True for rows with unchanged inputs around them, shape (rows,)."""
     moves = np.zeros(len(next(iter(inputs.values()))), dtype=bool)
     for values in inputs.values():
         span = float(np.ptp(values)) if len(values) else 0.0
@@ -133,7 +146,7 @@ def steady_rows(inputs: Mapping[str, Array]) -> Mask:
 
 
 def bridged(time: Array, values: Array, longest_s: float) -> tuple[Array, Mask]:
-    """Holes closed by straight lines, where they are short.
+    """Close short holes by straight lines.
 
     Parameters
     ----------
@@ -142,8 +155,8 @@ def bridged(time: Array, values: Array, longest_s: float) -> tuple[Array, Mask]:
     values : Array, shape (rows,)
         NaN where missing
     longest_s : float
-        Longest time between two known values, [s]; three times the usual one where that is more, so that a slowly
-        sampled input is no row of holes
+        Longest time between two known values, [s]; at least three times the usual one, so that a slowly sampled input
+        has no holes
 
     Returns
     -------
@@ -168,7 +181,7 @@ def bridged(time: Array, values: Array, longest_s: float) -> tuple[Array, Mask]:
 
 
 def stuck_rows(time: Array, values: Mapping[str, Array]) -> dict[str, tuple[int, int, str, float]]:
-    """Channels that hang: first row, row after the last, the other channel that moves most meanwhile, and by how much.
+    """Find channels that hang: first row, row after the last, the other channel that moves most meanwhile, by how much.
 
     Parameters
     ----------
@@ -200,7 +213,7 @@ def _span(values: Array) -> float:
 
 
 def resolution_of(values: Array) -> float:
-    """Quantum of the values; 0 where there is none above 1e-4.
+    """Return the quantum of the values; 0 if there is none above 1e-4.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""The time column of a recording, and the part of it that ``FILE@start..end`` names."""
+"""Time column of a recording, and the names ``FILE+FILE@start..end`` of files and parts."""
 
 from __future__ import annotations
 
@@ -6,16 +6,19 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
+from math import floor
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from diagnosis.mapping import ISO, UNITS
-from models.errors import InputError
+from diagnosis.quantities import ISO, UNITS
+from models.errors import InputError, Problems
+from models.table_file import KINDS, is_file
 from models.types import Array
 
+RECORDING_KINDS = (*KINDS, ".mf4", ".mdf")
 STANDARD = "time_s"
 ISO_NAMES = ("time", "time_utc", "timestamp", "datetime")
 _DATE = r"\d{4}-\d{2}-\d{2}"
@@ -23,7 +26,7 @@ _ISO = re.compile(
     rf"{_DATE}(?:[T ]\d{{2}}:\d{{2}}(?::\d{{2}}(?:[.,]\d{{1,9}})?)?)?(?P<zone>Z|[+-]\d{{2}}(?::?\d{{2}})?)?"
 )
 SHORTEST_STEP = 1e-3  # s; no temperature is recorded faster, so smaller steps are another unit
-LONGEST_STEP = 1800.0  # s; a gearbox warms within an hour or two, of which rows so far apart tell nothing
+LONGEST_STEP = 1800.0  # s; a gearbox warms within an hour or two
 LONGEST_TIME = 1e11  # s since 1970 or since the start: 3000 years
 
 
@@ -45,16 +48,16 @@ class Part:
 
 
 def part_of(text: str) -> Part:
-    """The part that ``start..end`` names.
+    """Read ``start..end``.
 
     Raises
     ------
     InputError
-        If it is not written so, mixes seconds and dates, or ends before it starts.
+        If it is written otherwise, mixes seconds and dates, or ends before it starts.
     """
     first, dots, last = text.partition("..")
     if not dots or not (first.strip() or last.strip()):
-        raise InputError(f"{text!r} names no part; write start..end, e.g. 0..36000 or 2017-09-01..2017-10-31")
+        raise InputError(f"{text!r} names no part; write start..end, e.g. 0..3600 (seconds) or 2017-09-01..2017-10-31")
     start, end = _moment(first.strip(), end=False), _moment(last.strip(), end=True)
     if start is not None and end is not None:
         if isinstance(start, datetime) != isinstance(end, datetime):
@@ -64,21 +67,39 @@ def part_of(text: str) -> Part:
     return Part(start=start, end=end)
 
 
-def split_path(text: str | Path) -> tuple[Path, tuple[Part, ...]]:
-    """File and part of ``FILE@start..end``; a file whose own name has an ``@`` stays as it is.
+def split_path(text: str | Path) -> tuple[tuple[Path, ...], tuple[Part, ...]]:
+    """Split ``FILE+FILE@start..end`` into its files and the part; a file whose own name has a + or @ stays as it is.
 
     Raises
     ------
     InputError
-        If what follows the ``@`` names no part.
+        If the text after the ``@`` is not a part.
+
+    Examples
+    --------
+    >>> [path.name for path in split_path("day_1.csv+day_2.csv@0..3600")[0]]
+    ['day_1.csv', 'day_2.csv']
     """
-    file, at, part = str(text).rpartition("@")
-    if not at or ".." not in part or Path(text).is_file():
-        return Path(text), ()
+    if is_file(Path(text)):
+        return (Path(text),), ()
+    files, at, part = str(text).rpartition("@")
+    if not at or not files.lower().endswith(RECORDING_KINDS) or part.lower().endswith(RECORDING_KINDS):
+        return _split_files(str(text)), ()
     try:
-        return Path(file), (part_of(part),)
+        return _split_files(files), (part_of(part),)
     except InputError as error:
         raise InputError(f"{text}: {error}") from error
+
+
+def _split_files(text: str) -> tuple[Path, ...]:
+    files: list[str] = []
+    begun = ""
+    for piece in text.split("+"):
+        begun = f"{begun}+{piece}" if begun else piece
+        if begun.lower().endswith(RECORDING_KINDS):
+            files.append(begun)
+            begun = ""
+    return tuple(map(Path, [*files, begun] if begun or not files else files))
 
 
 def _moment(text: str, *, end: bool) -> float | datetime | None:
@@ -106,7 +127,7 @@ def _seconds(moment: float | datetime) -> float:
 
 @dataclass(frozen=True, kw_only=True)
 class Clock:
-    """How the time of a file is read.
+    """Time column of a file.
 
     Attributes
     ----------
@@ -120,11 +141,11 @@ class Clock:
 
     @property
     def is_date(self) -> bool:
-        """Whether it tells dates."""
+        """True for dates."""
         return self.unit == ISO
 
     def seconds(self, values: pd.Series) -> Array:
-        """The time column, shape (rows,), [s]; since 1970 where it tells dates; NaN where a cell is no time."""
+        """Convert a time column, shape (rows,), to [s], dates since 1970; NaN for a cell that is no time."""
         if not self.is_date:
             return _numbers(values) * UNITS["time"][self.unit][0]
         if pd.api.types.is_datetime64_any_dtype(values.dtype):
@@ -147,30 +168,44 @@ def _numbers(values: pd.Series) -> Array:
     return np.asarray(pd.to_numeric(values, errors="coerce").to_numpy(dtype=np.float64, na_value=np.nan))
 
 
+def moment_text(seconds: float, clock: Clock | None) -> str:
+    """Format a time of a clock as a part names it, in whole seconds, rounded down.
+
+    Examples
+    --------
+    >>> moment_text(0.5, None), moment_text(1504224000.0, Clock(column="time", unit="iso8601"))
+    ('0', '2017-09-01T00:00:00Z')
+    """
+    whole = floor(seconds)
+    if clock is None or not clock.is_date:
+        return str(whole)
+    return datetime.fromtimestamp(whole, tz=UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
+
+
 def clock_of(table: pd.DataFrame) -> Clock:
-    """The clock of a file without a mapping: ``time_s``, or a column of ISO 8601 times under a usual name.
+    """Find the time column without a mapping: ``time_s``, or ISO 8601 times under a usual name.
 
     Raises
     ------
     InputError
-        If there is no such column, or it is not known what its numbers mean.
+        If there is no such column, or the unit of its numbers is unknown.
     """
     columns = [str(column) for column in table.columns]
     if STANDARD in columns:
-        return Clock(column=STANDARD, unit=ISO if _tells_dates(table[STANDARD]) else "s")
+        return Clock(column=STANDARD, unit=ISO if _holds_dates(table[STANDARD]) else "s")
     for name in ISO_NAMES:
         if name in columns:
-            if _tells_dates(table[name]):
+            if _holds_dates(table[name]):
                 return Clock(column=name, unit=ISO)
             raise InputError(
                 f"column {name} is no ISO 8601 time (as 2017-09-01T08:00:00Z), and the unit of its numbers is not "
                 "known; name it time_s if they are seconds, or give [time] column and unit in a mapping file"
             )
-    shown = ", ".join(sorted(columns)[:20])
+    shown = ", ".join(name[:40] for name in sorted(columns)[:20])
     raise InputError(f"column {STANDARD} is missing; it has: {shown}")
 
 
-def _tells_dates(values: pd.Series) -> bool:
+def _holds_dates(values: pd.Series) -> bool:
     if pd.api.types.is_datetime64_any_dtype(values.dtype):
         return True
     if pd.api.types.is_numeric_dtype(values.dtype):
@@ -180,12 +215,12 @@ def _tells_dates(values: pd.Series) -> bool:
 
 
 def inside(seconds: Array, parts: Sequence[Part], clock: Clock, first: float) -> NDArray[np.bool_]:
-    """Which rows lie in one of the parts, shape (rows,); `first` is the time of the file's first row, [s].
+    """Return True for rows in one of the parts, shape (rows,); `first` is the time of the first row of all, [s].
 
     Raises
     ------
     InputError
-        If dates are asked of a file that tells seconds.
+        If a part is named by date, but the file has seconds.
     """
     chosen = np.zeros(len(seconds), dtype=bool)
     for part in parts:
@@ -194,7 +229,7 @@ def inside(seconds: Array, parts: Sequence[Part], clock: Clock, first: float) ->
             if moment is None:
                 continue
             if isinstance(moment, datetime) and not clock.is_date:
-                raise InputError(f"a part is named by date, but column {clock.column} tells seconds; name seconds")
+                raise InputError(f"a part is named by date, but column {clock.column} holds seconds; name seconds")
             at = _seconds(moment) + (first if clock.is_date and not isinstance(moment, datetime) else 0.0)
             with np.errstate(invalid="ignore"):
                 within &= (seconds < at) if is_end else (seconds >= at)
@@ -202,66 +237,78 @@ def inside(seconds: Array, parts: Sequence[Part], clock: Clock, first: float) ->
     return chosen
 
 
-def time_faults(values: pd.Series, seconds: Array, clock: Clock) -> list[str]:
-    """What is wrong with the time of the rows that are used: no times, mixed zones, not increasing, another unit."""
+def check_time(values: pd.Series, seconds: Array, clock: Clock, problems: Problems) -> None:
+    """Report rows without time, mixed zones, time that does not increase, and steps that are another unit.
+
+    Parameters
+    ----------
+    values : Series
+        Cells of the time column; the index counts the rows of the file from 0
+    seconds : Array, shape (rows,)
+        The same in [s]
+    clock : Clock
+    problems : Problems
+    """
     name, rows = clock.column, np.asarray(values.index) + 1
     wrong = np.flatnonzero(~np.isfinite(seconds))
     if len(wrong):
         cell = values.iloc[int(wrong[0])]
-        kind = "a number" if not clock.is_date else "an ISO 8601 time as 2017-09-01T08:00:00Z"
         shown = "empty" if pd.isna(cell) else repr(str(cell)[:40])
-        return [
+        needed = "an ISO 8601 time as 2017-09-01T08:00:00Z" if clock.is_date else "a number"
+        problems.add(
             f"{name} is {shown} at row {rows[wrong[0]]}; {len(wrong)} of {len(rows)} rows hold no time, each needs "
-            + kind
-        ]
-    faults = _zone_faults(values, name, rows) if clock.is_date else []
+            + needed
+        )
+        return
+    if clock.is_date:
+        _check_zones(values, name, rows, problems)
     steps = np.diff(seconds)
     back, same = np.flatnonzero(steps < 0.0), np.flatnonzero(steps == 0.0)
     if len(back):
         row = int(back[0])
         hint = "; local time that is set back in autumn needs a zone, e.g. +02:00" if clock.is_date else ""
-        faults.append(
+        problems.add(
             f"{name} goes back from {values.iloc[row]} to {values.iloc[row + 1]} at row {rows[row + 1]} "
             f"({len(back)} times in all); it must increase from row to row: sort the rows, or split the file where a "
             f"new run starts{hint}"
         )
     if len(same):
         row = int(same[0])
-        faults.append(
+        problems.add(
             f"{name} is {values.iloc[row]} at row {rows[row]} and again at row {rows[row + 1]} ({len(same)} times in "
             "all); it must increase from row to row: remove the repeated rows"
         )
-    if not faults and len(steps):
-        faults += _unit_faults(name, seconds, steps, clock)
-    return faults
+    if not len(back) and not len(same) and len(steps):
+        _check_time_unit(name, seconds, float(np.median(steps)), clock, problems)
 
 
-def _unit_faults(name: str, seconds: Array, steps: Array, clock: Clock) -> list[str]:
-    step = float(np.median(steps))
+def _check_time_unit(name: str, seconds: Array, step: float, clock: Clock, problems: Problems) -> None:
+    latest = float(np.abs(seconds).max())
+    fix = "Give [time] unit in a mapping file"
     if step > LONGEST_STEP:
-        told = f"{name} advances by {step:.4g} s from row to row (median); at most {LONGEST_STEP:g} s tell how it warms"
-        return [told if clock.is_date else f"{told}; were milliseconds meant? Give [time] unit in a mapping file"]
-    if clock.is_date:
-        return []
-    if np.abs(seconds).max() > LONGEST_TIME:
-        return [
-            f"{name} reaches {np.abs(seconds).max():.4g} s; were milliseconds meant? Give [time] unit in a mapping file"
-        ]
-    if step < SHORTEST_STEP:
-        meant = "were hours or days meant? Give [time] unit in a mapping file, or average to seconds"
-        return [f"{name} advances by {step:.3g} s from row to row (median); {meant}"]
-    return []
+        hint = "" if clock.is_date else f"; were milliseconds meant? {fix}"
+        problems.add(
+            f"{name} advances by {step:.4g} s from row to row (median), at most {LONGEST_STEP:g} s is useful{hint}"
+        )
+    elif clock.is_date:
+        return
+    elif latest > LONGEST_TIME:
+        problems.add(f"{name} reaches {latest:.4g} s; were milliseconds meant? {fix}")
+    elif step < SHORTEST_STEP:
+        problems.add(
+            f"{name} advances by {step:.3g} s from row to row (median); were hours or days meant? {fix}, or average to "
+            "seconds"
+        )
 
 
-def _zone_faults(values: pd.Series, name: str, rows: NDArray[np.int64]) -> list[str]:
+def _check_zones(values: pd.Series, name: str, rows: NDArray[np.int64], problems: Problems) -> None:
     if pd.api.types.is_datetime64_any_dtype(values.dtype):
-        return []
-    zoned = (
-        values.astype(str).str.strip().str.contains(r"(?:Z|[+-]\d{2}(?::?\d{2})?)$", regex=True).to_numpy(dtype=bool)
-    )
-    dated = values.astype(str).str.strip().str.fullmatch(_DATE).to_numpy(dtype=bool)
-    zoned = zoned & ~dated  # the day of a date looks like a zone
-    if zoned.all() or not zoned.any():
-        return []
-    row = int(np.flatnonzero(zoned != zoned[0])[0])
-    return [f"{name} has times with and without a time zone (rows {rows[0]} and {rows[row]}); give all of them one"]
+        return
+    texts = values.astype(str).str.strip()
+    zoned = texts.str.contains(r"(?:Z|[+-]\d{2}(?::?\d{2})?)$", regex=True).to_numpy(dtype=bool)
+    zoned = zoned & ~texts.str.fullmatch(_DATE).to_numpy(dtype=bool)  # the day of a date looks like a zone
+    if not zoned.all() and zoned.any():
+        row = int(np.flatnonzero(zoned != zoned[0])[0])
+        problems.add(
+            f"{name} has times with and without a time zone (rows {rows[0]} and {rows[row]}); give all of them one"
+        )

@@ -10,11 +10,12 @@ import numpy as np
 
 from diagnosis.assemble import assembled
 from diagnosis.case import prepare
-from diagnosis.recording import Recording, read_recordings
-from diagnosis.recording_checks import check_holdout
-from diagnosis.recording_plausible import check_plausible
+from diagnosis.plausibility import check_plausible
+from diagnosis.read_recordings import read_recordings
+from diagnosis.recording import Recording
 from diagnosis.result import Diagnosis
 from diagnosis.search import search
+from diagnosis.shared_rows import check_shared_rows
 from models.errors import InputError
 from models.gearbox import Gearbox, load_gearbox
 from models.mechanisms import CATALOGUE, Mechanism
@@ -37,7 +38,7 @@ def diagnose(
     Parameters
     ----------
     recordings : path, Recording, or several
-        To learn from; see :func:`diagnosis.recording.read_recordings` for files
+        To learn from; see :func:`diagnosis.read_recordings.read_recordings` for files
     gearbox : Gearbox, name or path
     holdout : path, Recording, or several
         To judge by; without any, the last quarter of every recording is held out
@@ -67,11 +68,12 @@ def diagnose(
     train, held = _read(recordings, gearbox), _read(holdout, gearbox)
     if not train:
         raise InputError("no recording was given to learn from")
-    if held:
-        check_holdout(train, held)
+    check_shared_rows(train, held)
     _refuse_unusable(train)
-    if not gearbox.is_parametric:  # a guess with wide priors is no yardstick
-        check_plausible([*train, *held], gearbox.network(), gearbox.losses())
+    # Models without geometry have too wide priors for a check of temperatures.
+    check_plausible(
+        [*train, *held], gearbox.network(), gearbox.loss_laws(), judge_temperatures=not gearbox.is_parametric
+    )
     progress("reading the recordings and setting up the inference")
     case = prepare(gearbox, train, held)
     _refuse_too_short(train, case.train.pieces)
