@@ -14,12 +14,12 @@ import numpy as np
 
 from builder import console
 from builder.drive_cycle import COLD_START, reference_cycle
-from builder.files import write_table
 from builder.fmu import build_python_fmu
 from builder.fmu_drive import drive_fmu, runs_here
 from builder.native import build_native_fmu
 from builder.native_compile import plan_for
 from builder.onnx_export import export_onnx
+from builder.output_files import write_table
 from builder.plots import plot_cycle
 from builder.train import TrainingResult, train_surrogate
 from models.atomic_write import atomic_folder

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from builder import console
-from builder.files import refuse_to_replace
+from builder.output_files import refuse_to_replace
 from builder.workers import worker_options
 from models.errors import InputError, did_you_mean
 from models.gearbox import known_gearboxes, load_gearbox

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import gzip
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from models.atomic_write import atomic_file
 from models.cycle import Cycle
 from models.errors import InputError
-from models.table_file import is_folder, kind_of, read_table
+from models.table_file import read_table
 from models.types import Array
 
 DECIMALS = 6  # of results: a millionth of a kelvin or a watt
@@ -135,51 +133,3 @@ def _temperature_columns(table: pd.DataFrame) -> list[str]:
     """Return the columns of nodes; that of the surroundings is an input."""
     names = [str(c) for c in table.columns if str(c).startswith("T_") and str(c).endswith("_degC")]
     return [name for name in names if name != "T_ambient_degC"]
-
-
-def refuse_to_replace(inputs: Iterable[Path], outputs: Iterable[Path]) -> None:
-    """Refuse, before any work, to write over what is read or over a folder; links to a file count as the file.
-
-    Raises
-    ------
-    InputError
-        All such outputs.
-    """
-    read = list(inputs)
-    faults = []
-    for out in outputs:
-        if is_folder(out):
-            faults.append(f"{out}: is a folder; name a file")
-        elif any(_same_file(path, out) for path in read):
-            faults.append(f"{out}: is read as well and would be replaced; choose another output")
-    if faults:
-        raise InputError("\n".join(faults))
-
-
-def _same_file(a: Path, b: Path) -> bool:
-    try:
-        return a.samefile(b)
-    except (OSError, ValueError):  # one of them is not there
-        return False
-
-
-def write_table(path: Path, columns: Mapping[str, ArrayLike]) -> None:
-    """Write columns as CSV, CSV.gz or Parquet by the file's ending.
-
-    Raises
-    ------
-    InputError
-        If the ending is another one or the folder cannot be written to.
-    """
-    kind = kind_of(path)
-    table = pd.DataFrame(dict(columns))
-    with atomic_file(path) as partial:
-        if kind == ".parquet":
-            try:
-                table.to_parquet(partial)
-            except ImportError as error:
-                raise InputError(f"{path}: writing Parquet needs pyarrow; python -m pip install pyarrow") from error
-        else:
-            text = table.round(DECIMALS).to_csv(index=False, lineterminator="\n").encode()
-            # Neither name nor time go into the archive, so that the same table gives the same bytes.
-            partial.write_bytes(gzip.compress(text, mtime=0) if kind == ".csv.gz" else text)

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 
 from builder import console
-from builder.files import refuse_to_replace, write_table
+from builder.output_files import refuse_to_replace, write_table
 from diagnosis import diagnose
 from diagnosis.files import names_of_files, write_files
 from diagnosis.read_recordings import read_train_and_holdout

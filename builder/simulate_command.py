@@ -12,13 +12,8 @@ import click
 import numpy as np
 
 from builder import console
-from builder.files import (
-    RecordedStart,
-    read_cycle_and_start,
-    read_initial,
-    refuse_to_replace,
-    write_table,
-)
+from builder.files import RecordedStart, read_cycle_and_start, read_initial
+from builder.output_files import refuse_to_replace, write_table
 from models.atomic_write import atomic_file
 from models.correction import read_correction
 from models.cycle import COLUMNS, Cycle

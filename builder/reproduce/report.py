@@ -16,7 +16,7 @@ from typing import Any
 import matplotlib as mpl
 from jinja2 import Environment, StrictUndefined
 
-from builder.files import write_table
+from builder.output_files import write_table
 from builder.plots import STYLE
 from builder.reproduce.figure import Figure
 from builder.reproduce.printed import PAPER

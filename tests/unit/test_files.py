@@ -8,13 +8,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from builder.files import (
-    read_cycle,
-    read_cycle_and_start,
-    read_initial,
-    refuse_to_replace,
-    write_table,
-)
+from builder.files import read_cycle, read_cycle_and_start, read_initial
+from builder.output_files import refuse_to_replace, write_table
 from models.errors import InputError
 from models.table_file import read_table
 
