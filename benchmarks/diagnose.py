@@ -23,15 +23,15 @@ import pandas as pd
 import psutil
 
 from diagnosis import diagnose
-from diagnosis.files import write_files
-from diagnosis.proof.conceal import draw_case
-from diagnosis.proof.concealed_case import Plan
-from diagnosis.proof.cycles import Programme, ambient, programmes
-from diagnosis.proof.instruments import record
-from diagnosis.proof.plant import Plant
-from diagnosis.proof.plant_run import run_plant
-from diagnosis.read_recordings import read_train_and_holdout
-from models.gearbox import load_gearbox
+from diagnosis.proof.cases.conceal import draw_case
+from diagnosis.proof.cases.concealed_case import Plan
+from diagnosis.proof.plant.cycles import Programme, ambient, programmes
+from diagnosis.proof.plant.instruments import record
+from diagnosis.proof.plant.plant import Plant
+from diagnosis.proof.plant.plant_run import run_plant
+from diagnosis.recordings.read import read_train_and_holdout
+from diagnosis.report.write import write_files
+from models.assembly.gearbox import load_gearbox
 from models.mechanisms import CATALOGUE
 
 EFFECT, SEED = "cooler_thermostat", 1

@@ -26,26 +26,26 @@ from sklearn.neural_network import MLPRegressor
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
-from diagnosis.case import Case, first, prepare
-from diagnosis.evidence import Marginal
-from diagnosis.explain import Explanation
-from diagnosis.findings import node_of
-from diagnosis.hypotheses import Hypothesis, hypothesis_of, scan
-from diagnosis.latent import knots_of, latent_heat
-from diagnosis.posterior import Fit, Problem
-from diagnosis.predict import Prediction, predict
-from diagnosis.proof.answers import Answer
-from diagnosis.proof.counts import Count, Median
-from diagnosis.proof.rules import RULES, ScoredCase
-from diagnosis.proof.score import far_of, near_nodes
-from diagnosis.quantities import LOSS
-from diagnosis.read_recordings import read_recordings
-from diagnosis.search import threshold_at
-from diagnosis.term_on_grid import TermOnGrid
-from models.gearbox import load_gearbox
+from diagnosis.candidates.explain import Explanation
+from diagnosis.candidates.hypotheses import Hypothesis, hypothesis_of, scan
+from diagnosis.decision.search import threshold_at
+from diagnosis.forward.term_on_grid import TermOnGrid
+from diagnosis.inference.evidence import Marginal
+from diagnosis.inference.latent import knots_of, latent_heat
+from diagnosis.inference.posterior import Fit, Problem
+from diagnosis.inference.predict import Prediction, predict
+from diagnosis.proof.scoring.answers import Answer
+from diagnosis.proof.scoring.counts import Count, Median
+from diagnosis.proof.scoring.rules import RULES, ScoredCase
+from diagnosis.proof.scoring.score import far_of, near_nodes
+from diagnosis.recordings.quantities import LOSS
+from diagnosis.recordings.read import read_recordings
+from diagnosis.results.findings import node_of
+from diagnosis.setup.case import Case, first, prepare
+from models.assembly.gearbox import load_gearbox
+from models.base.parallel import run_parallel
+from models.base.types import Array
 from models.mechanisms import CATALOGUE
-from models.parallel import run_parallel
-from models.types import Array
 
 METHODS: Mapping[str, str] = {"naive": "naive residual regression", "sparse": "sparse regression (pysindy)"}
 ERRORS: Mapping[str, str] = {"calibrated_K": "calibration only", "black_box_K": "black-box residual network"}
@@ -57,7 +57,8 @@ MOST_ROWS = 20_000
 
 
 class _ParametersHeld:
-    """In place of :class:`diagnosis.evidence.Marginal`: the residual after calibration, all parameters held."""
+    """In place of :class:`diagnosis.inference.evidence.Marginal`: the residual after calibration, all parameters
+    held."""
 
     def __init__(self, fit: Fit) -> None:
         self.columns, self.rest = fit.white_columns, fit.white_residual

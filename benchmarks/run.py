@@ -22,9 +22,9 @@ from fmpy import extract, read_model_description
 from fmpy.fmi2 import FMU2Slave
 
 import fmu_src as native_sources
-from builder.drive_cycle import COLD_START, reference_cycle
-from builder.fmu_drive import drive_fmu
-from models.gearbox import load_gearbox
+from builder.drive.driver import drive_fmu
+from builder.fmi.reference_cycle import COLD_START, reference_cycle
+from models.assembly.gearbox import load_gearbox
 
 STEPS, C_STEPS = 600, 64_800
 

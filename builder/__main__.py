@@ -9,9 +9,9 @@ import sys
 
 import click
 
-from builder.cli import commands
-from builder.console import err
-from models.errors import InputError
+from builder.base.console import err
+from builder.commands.cli import commands
+from models.base.errors import InputError
 
 INTERRUPTED = 130  # what shells give for a program stopped by the keyboard
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from diagnosis.diagnose_recordings import diagnose
-    from diagnosis.result import Diagnosis
+    from diagnosis.results.result import Diagnosis
 
 __all__ = ["Diagnosis", "diagnose"]
 
@@ -20,7 +20,7 @@ def __getattr__(name: str) -> Any:
 
         return diagnose
     if name == "Diagnosis":
-        from diagnosis.result import Diagnosis
+        from diagnosis.results.result import Diagnosis
 
         return Diagnosis
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

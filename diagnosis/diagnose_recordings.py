@@ -8,16 +8,16 @@ from pathlib import Path
 
 import numpy as np
 
-from diagnosis.assemble import assembled
-from diagnosis.case import prepare
-from diagnosis.plausibility import check_plausible
-from diagnosis.read_recordings import read_recordings
-from diagnosis.recording import Recording
-from diagnosis.result import Diagnosis
-from diagnosis.search import search
-from diagnosis.shared_rows import check_shared_rows
-from models.errors import InputError
-from models.gearbox import Gearbox, load_gearbox
+from diagnosis.decision.search import search
+from diagnosis.recordings.read import read_recordings
+from diagnosis.recordings.recording import Recording
+from diagnosis.recordings.shared_rows import check_shared_rows
+from diagnosis.results.assemble import assembled
+from diagnosis.results.result import Diagnosis
+from diagnosis.setup.case import prepare
+from diagnosis.setup.plausibility import check_plausible
+from models.assembly.gearbox import Gearbox, load_gearbox
+from models.base.errors import InputError
 from models.mechanisms import CATALOGUE, Mechanism
 
 Source = str | Path | Recording
@@ -38,7 +38,7 @@ def diagnose(
     Parameters
     ----------
     recordings : path, Recording, or several
-        To learn from; see :func:`diagnosis.read_recordings.read_recordings` for files
+        To learn from; see :func:`diagnosis.recordings.read.read_recordings` for files
     gearbox : Gearbox, name or path
     holdout : path, Recording, or several
         To judge by; without any, the last quarter of every recording is held out

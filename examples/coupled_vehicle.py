@@ -20,11 +20,11 @@ import pandas as pd
 from fmpy.ssp.simulation import simulate_ssp
 from vehicle_fmus import build_cycle_fmu, build_vehicle_fmu, write_system
 
-from builder.native import build_native_fmu
-from builder.onnx_export import export_onnx
-from builder.train import train_surrogate
-from models.gearbox import load_gearbox
-from models.version import project_version
+from builder.native.native_fmu import build_native_fmu
+from builder.surrogate.onnx_export import export_onnx
+from builder.surrogate.train import train_surrogate
+from models.assembly.gearbox import load_gearbox
+from models.base.version import project_version
 
 HERE = Path(__file__).parent
 STOP_S, STEP_S = 1200.0, 0.1

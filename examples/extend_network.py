@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from builder.files import read_cycle
-from models.gearbox import load_gearbox
+from models.assembly.gearbox import load_gearbox
+from models.files.cycle_file import read_cycle
 
 gearbox = load_gearbox("fzg")
 losses = gearbox.losses()

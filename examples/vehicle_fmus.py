@@ -12,14 +12,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from builder.fmu_package import AUTHOR, model_identifier, write_archive
-from builder.model_description import Identity
-from builder.native import FLAGS, NativeBuild, build_native_archive
-from builder.native_data import number
-from builder.signals import Signal, SignalTable
-from models.atomic_write import atomic_file
-from models.errors import InputError
-from models.version import license_text, project_version
+from builder.fmi.model_description import Identity
+from builder.fmi.package import AUTHOR, model_identifier, write_archive
+from builder.fmi.signals import Signal, SignalTable
+from builder.native.data import number
+from builder.native.native_fmu import FLAGS, NativeBuild, build_native_archive
+from models.base.atomic_write import atomic_file
+from models.base.errors import InputError
+from models.base.version import license_text, project_version
 
 STRUCTURE = "SystemStructure.ssd"  # its name in an SSP
 
@@ -87,7 +87,7 @@ def build_vehicle_fmu(output: Path, *, platforms: str = "all") -> NativeBuild:
     output : Path
         The FMU; its stem becomes the model identifier
     platforms : str
-        See :func:`builder.native_compile.compile_libraries`
+        See :func:`builder.native.compile.compile_libraries`
 
     Returns
     -------
@@ -116,7 +116,7 @@ def build_cycle_fmu(output: Path, time: ArrayLike, speed: ArrayLike, *, platform
     time, speed : ArrayLike, shape (N,)
         [s], increasing, and [m/s]
     platforms : str
-        See :func:`builder.native_compile.compile_libraries`
+        See :func:`builder.native.compile.compile_libraries`
 
     Returns
     -------

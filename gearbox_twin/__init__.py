@@ -19,51 +19,51 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from builder.build import build as build_fmu  # noqa: F401 - public as build_fmu
-    from builder.files import read_cycle as read_cycle
-    from builder.fmu_drive import drive_fmu as drive_fmu
+    from builder.drive.driver import drive_fmu as drive_fmu
+    from builder.workflows.build import build as build_fmu  # noqa: F401 - public as build_fmu
     from diagnosis.diagnose_recordings import diagnose as diagnose
-    from diagnosis.read_recordings import read_recordings as read_recordings
-    from diagnosis.recording import Recording as Recording
-    from diagnosis.result import Diagnosis as Diagnosis
-    from models.correction import Correction as Correction
-    from models.correction import corrected_network as corrected_network
-    from models.correction import read_correction as read_correction
-    from models.cycle import Cycle as Cycle
-    from models.errors import InputError as InputError
-    from models.gearbox import Gearbox as Gearbox
-    from models.gearbox import load_gearbox as load_gearbox
+    from diagnosis.recordings.read import read_recordings as read_recordings
+    from diagnosis.recordings.recording import Recording as Recording
+    from diagnosis.results.result import Diagnosis as Diagnosis
+    from models.assembly.gearbox import Gearbox as Gearbox
+    from models.assembly.gearbox import load_gearbox as load_gearbox
+    from models.base.errors import InputError as InputError
+    from models.correction.correction import Correction as Correction
+    from models.correction.correction import corrected_network as corrected_network
+    from models.correction.correction import read_correction as read_correction
+    from models.files.cycle import Cycle as Cycle
+    from models.files.cycle_file import read_cycle as read_cycle
     from models.mechanisms import CATALOGUE as CATALOGUE
     from models.mechanisms import Mechanism as Mechanism
     from models.mechanisms import load_mechanisms as load_mechanisms
-    from models.network import ThermalNetwork as ThermalNetwork
-    from models.simulation import Result as Result
-    from models.simulation import simulate as simulate
-    from models.simulation import steady_state as steady_state
+    from models.simulation.simulate import Result as Result
+    from models.simulation.simulate import simulate as simulate
+    from models.simulation.simulate import steady_state as steady_state
+    from models.simulation.thermal_network import ThermalNetwork as ThermalNetwork
 
 # Where each public name is defined, and its name there.
 _DEFINED_IN = {
     "CATALOGUE": "models.mechanisms:CATALOGUE",
-    "Correction": "models.correction:Correction",
-    "Cycle": "models.cycle:Cycle",
-    "Diagnosis": "diagnosis.result:Diagnosis",
-    "Gearbox": "models.gearbox:Gearbox",
-    "InputError": "models.errors:InputError",
+    "Correction": "models.correction.correction:Correction",
+    "Cycle": "models.files.cycle:Cycle",
+    "Diagnosis": "diagnosis.results.result:Diagnosis",
+    "Gearbox": "models.assembly.gearbox:Gearbox",
+    "InputError": "models.base.errors:InputError",
     "Mechanism": "models.mechanisms:Mechanism",
-    "Recording": "diagnosis.recording:Recording",
-    "Result": "models.simulation:Result",
-    "ThermalNetwork": "models.network:ThermalNetwork",
-    "build_fmu": "builder.build:build",
-    "corrected_network": "models.correction:corrected_network",
+    "Recording": "diagnosis.recordings.recording:Recording",
+    "Result": "models.simulation.simulate:Result",
+    "ThermalNetwork": "models.simulation.thermal_network:ThermalNetwork",
+    "build_fmu": "builder.workflows.build:build",
+    "corrected_network": "models.correction.correction:corrected_network",
     "diagnose": "diagnosis.diagnose_recordings:diagnose",
-    "drive_fmu": "builder.fmu_drive:drive_fmu",
-    "load_gearbox": "models.gearbox:load_gearbox",
+    "drive_fmu": "builder.drive.driver:drive_fmu",
+    "load_gearbox": "models.assembly.gearbox:load_gearbox",
     "load_mechanisms": "models.mechanisms:load_mechanisms",
-    "read_correction": "models.correction:read_correction",
-    "read_cycle": "builder.files:read_cycle",
-    "read_recordings": "diagnosis.read_recordings:read_recordings",
-    "simulate": "models.simulation:simulate",
-    "steady_state": "models.simulation:steady_state",
+    "read_correction": "models.correction.correction:read_correction",
+    "read_cycle": "models.files.cycle_file:read_cycle",
+    "read_recordings": "diagnosis.recordings.read:read_recordings",
+    "simulate": "models.simulation.simulate:simulate",
+    "steady_state": "models.simulation.simulate:steady_state",
 }
 __all__ = sorted(_DEFINED_IN)
 _INSTALLED = Path(__file__).resolve().parents[1]

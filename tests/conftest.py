@@ -11,13 +11,13 @@ from pathlib import Path
 import pytest
 
 from builder.__main__ import main
-from builder.fmu import build_python_fmu
-from builder.native import build_native_fmu
-from builder.networks import PRESETS
-from builder.onnx_export import export_onnx
-from builder.train import TrainingResult, train_surrogate
-from models.gearbox import Gearbox, load_gearbox
-from models.network import ThermalNetwork
+from builder.native.native_fmu import build_native_fmu
+from builder.python.python_fmu import build_python_fmu
+from builder.surrogate.networks import PRESETS
+from builder.surrogate.onnx_export import export_onnx
+from builder.surrogate.train import TrainingResult, train_surrogate
+from models.assembly.gearbox import Gearbox, load_gearbox
+from models.simulation.thermal_network import ThermalNetwork
 
 QUICK = replace(PRESETS["default"], samples=400, max_iter=60, starts=1, judged=200)
 

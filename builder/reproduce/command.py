@@ -7,8 +7,8 @@ from pathlib import Path
 
 import click
 
-from builder import console
-from builder.workers import jobs_option
+from builder.base import console
+from builder.base.workers import jobs_option
 
 
 @click.command("reproduce")

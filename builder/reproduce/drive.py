@@ -7,13 +7,13 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from builder.drive_cycle import KNOTS
-from builder.plots import PALETTE
+from builder.drive.plots import PALETTE
+from builder.fmi.reference_cycle import KNOTS
 from builder.reproduce.figure import BLACK, BLUE, RED, Curve, Figure, Kind, Plot
 from builder.reproduce.report import Check, Part, Table, item
 from builder.reproduce.study import FULL, PRINTED, REDUCED, Study
-from models.simulation import Result
-from models.types import Array
+from models.base.types import Array
+from models.simulation.simulate import Result
 
 # Phases of the cycle [s]: the light start, constant power, high torque, and the load of the start again.
 START, CONSTANT, HEAVY, END = (0.0, 60.0), (90.0, 300.0), (330.0, 450.0), (480.0, 600.0)

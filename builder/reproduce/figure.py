@@ -13,8 +13,8 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
 
-from builder.plots import PALETTE, STYLE
-from models.types import Array
+from builder.drive.plots import PALETTE, STYLE
+from models.base.types import Array
 
 WIDTH, HEIGHT, BAR_HEIGHT = 4.6, 3.6, 0.26  # inches per panel, and per bar
 MARKED = range(3, 13)  # number of points of a line that gets a mark at each

@@ -10,8 +10,8 @@ from builder.reproduce.figure import BLACK, Curve, Figure, Map, Plot
 from builder.reproduce.printed import OUTPUT_TORQUE, PITCH_VELOCITY, TABLE_6_RPM
 from builder.reproduce.report import Check, Part, Table, Verdict, item
 from builder.reproduce.study import BEARING_ABOVE_OIL, GEAR_ABOVE_OIL, MIDDLE, T_OIL, Study, steady_oil
-from models.runtime import RPM
-from models.types import Array
+from models.base.types import Array
+from models.portable.evaluation import RPM
 
 CHURNING = {"niemann": "Niemann (as in the paper)", "mauz": "Mauz", "changenet_velex": "Changenet-Velex"}
 WARM_OIL = 90.0  # degC

@@ -6,13 +6,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from builder.networks import PRESETS
 from builder.reproduce.figure import BLACK, BLUE, RED, Curve, Figure, Plot
 from builder.reproduce.printed import TABLE_3, TABLE_4
 from builder.reproduce.report import Check, Part, Table, Verdict, item
 from builder.reproduce.study import FULL, Study
-from builder.train import NO_LOSS_W, r_squared
-from models.types import Array
+from builder.surrogate.networks import PRESETS
+from builder.surrogate.train import NO_LOSS_W, r_squared
+from models.base.types import Array
 
 COLOURS = {"as printed": RED, "ours": BLUE}
 GOOD_R2 = 0.99

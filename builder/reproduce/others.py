@@ -22,14 +22,14 @@ from builder.reproduce.printed import (
 )
 from builder.reproduce.report import Check, Part, Table, Verdict, item
 from builder.reproduce.study import MEDIUM, MIDDLE, T_OIL, Study, steady_oil
-from models.ehl import hertz_line, reduced_modulus
-from models.friction import friction_schlenk
-from models.gearbox import Gearbox
-from models.load_sharing import contact_points, load_sharing_loss_factor
-from models.named_oils import lubricant, named_oil
-from models.parallel import run_parallel
-from models.runtime import RPM
-from models.types import Array
+from models.assembly.gearbox import Gearbox
+from models.base.parallel import run_parallel
+from models.base.types import Array
+from models.definition.named_oils import lubricant, named_oil
+from models.formulas.ehl import hertz_line, reduced_modulus
+from models.formulas.load_sharing import contact_points, load_sharing_loss_factor
+from models.losses.friction import friction_schlenk
+from models.portable.evaluation import RPM
 
 LEVELS = 4
 REACH = 2.0  # standard deviations to either side
@@ -111,7 +111,7 @@ def uncertain_groups(gearbox: Gearbox) -> dict[str, list[str]]:
 
     Examples
     --------
-    >>> from models.gearbox import load_gearbox
+    >>> from models.assembly.gearbox import load_gearbox
     >>> uncertain_groups(load_gearbox("fzg"))["bearing.mu_bl"]
     ['bearing.0.mu_bl', 'bearing.1.mu_bl', 'bearing.2.mu_bl', 'bearing.3.mu_bl']
     """

@@ -10,15 +10,15 @@ from pathlib import Path
 
 import numpy as np
 
-from builder.fmu import build_python_fmu
-from builder.onnx_export import export_onnx
+from builder.python.python_fmu import build_python_fmu
 from builder.reproduce import drive, losses, networks, others, rig, speed, stages
 from builder.reproduce.report import Report
 from builder.reproduce.study import Settings, Study
-from builder.train import train_surrogate
-from models.atomic_write import atomic_folder
-from models.gearbox import load_gearbox
-from models.version import project_version
+from builder.surrogate.onnx_export import export_onnx
+from builder.surrogate.train import train_surrogate
+from models.assembly.gearbox import load_gearbox
+from models.base.atomic_write import atomic_folder
+from models.base.version import project_version
 
 GEARBOX = "fzg"
 # In the order of the paper; items that it does not have come last.

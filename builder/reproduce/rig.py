@@ -10,11 +10,11 @@ from builder.reproduce.figure import Figure, Graph
 from builder.reproduce.printed import OUTPUT_TORQUE, PITCH_VELOCITY, TABLE_1, TABLE_2, TABLE_5, TABLE_6_RPM, Row
 from builder.reproduce.report import Check, Part, Table, Verdict, item
 from builder.reproduce.study import MEDIUM, MIDDLE, Study
-from models.churning import churning_niemann, churning_niemann_printed
-from models.gearbox import Gearbox
-from models.laws import symbol
-from models.runtime import RPM
-from models.seal import seal_loss_linke
+from models.assembly.gearbox import Gearbox
+from models.losses.churning import churning_niemann, churning_niemann_printed
+from models.losses.seal import seal_loss_linke
+from models.network.laws import symbol
+from models.portable.evaluation import RPM
 
 ROUNDING = 1e-9
 NO_CONDUCTANCE = 1e-9  # W/K

@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from builder.drive_cycle import COLD_START, reference_cycle
-from builder.fmu_drive import drive_fmu, runs_here
+from builder.drive.driver import drive_fmu, runs_here
+from builder.fmi.reference_cycle import COLD_START, reference_cycle
 from builder.reproduce.printed import OUTPUT_TORQUE, TIMES
 from builder.reproduce.report import Check, Part, Table, item
 from builder.reproduce.study import FULL, MEDIUM, REDUCED, Study
-from models.network import Losses
+from models.simulation.thermal_network import Losses
 
 FMU = "ROM-PL, FMU in FMPy"
 BATCH = 400

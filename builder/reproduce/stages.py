@@ -11,12 +11,12 @@ from builder.reproduce.figure import BLACK, Curve, Figure, Plot
 from builder.reproduce.printed import OUTPUT_TORQUE, PITCH_VELOCITY, STAGE_S, TABLE_6_RPM
 from builder.reproduce.report import Check, Part, Table, item
 from builder.reproduce.study import HIGHEST, LIMIT, MEDIUM, Study, steady_oil
-from models.cycle import Cycle
-from models.network import ThermalNetwork
-from models.parallel import run_parallel
-from models.simulation import Result
-from models.surrogate import SurrogateLosses
-from models.types import Array
+from models.base.parallel import run_parallel
+from models.base.types import Array
+from models.files.cycle import Cycle
+from models.portable.surrogate import SurrogateLosses
+from models.simulation.simulate import Result
+from models.simulation.thermal_network import ThermalNetwork
 
 STEP_ERROR_K = 0.1
 LONGEST_S = 1.0

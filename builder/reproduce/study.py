@@ -10,17 +10,17 @@ from typing import Any
 
 import numpy as np
 
-from builder.doe import random_points
-from builder.drive_cycle import COLD_START, reference_cycle
+from builder.fmi.reference_cycle import COLD_START, reference_cycle
 from builder.reproduce.printed import OUTPUT_TORQUE, STAGE_S, TABLE_4, TABLE_6_RPM
-from builder.train import TrainingResult
-from models.cycle import Cycle
-from models.gearbox import Gearbox
-from models.losses import LossModel
-from models.network import Losses, ThermalNetwork
-from models.simulation import Result, steady_state
-from models.surrogate import SurrogateLosses
-from models.types import Array
+from builder.surrogate.doe import random_points
+from builder.surrogate.train import TrainingResult
+from models.assembly.gearbox import Gearbox
+from models.base.types import Array
+from models.files.cycle import Cycle
+from models.losses.loss_model import LossModel
+from models.portable.surrogate import SurrogateLosses
+from models.simulation.simulate import Result, steady_state
+from models.simulation.thermal_network import Losses, ThermalNetwork
 
 FULL, REDUCED, PRINTED = "F-PL", "ROM-PL", "ROM-PL, networks as printed"
 MIDDLE = 3  # index of 8.3 m/s, the stage that figures of one speed show
@@ -209,7 +209,7 @@ def steady_oil(
     speed, torque : Array, shape (N,)
         Of the input shaft, [1/min] and [N m]
     **given
-        `inputs` and `parameters` of :func:`models.simulation.steady_state`
+        `inputs` and `parameters` of :func:`models.simulation.simulate.steady_state`
     """
     result = steady_state(network, losses=losses, speed=speed, torque=torque, **given)
     return result.temperatures["oil"][..., -1].ravel(), result.loss[..., -1].ravel()

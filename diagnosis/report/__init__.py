@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from diagnosis.report.page import page
-from diagnosis.result import Diagnosis
-from models.atomic_write import atomic_file
+from diagnosis.results.result import Diagnosis
+from models.base.atomic_write import atomic_file
 
 __all__ = ["page", "write_report"]
 

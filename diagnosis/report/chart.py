@@ -14,8 +14,8 @@ import numpy as np
 from markupsafe import Markup
 from matplotlib.ticker import MaxNLocator
 
-from diagnosis.numbers import MINUS
-from models.types import Array
+from diagnosis.results.number_format import MINUS
+from models.base.types import Array
 
 Kind = Literal["line", "points", "band"]
 MOST_POINTS = 800  # of a curve

@@ -12,7 +12,7 @@ from matplotlib.path import Path as Outline
 from matplotlib.textpath import TextPath
 from numpy.typing import NDArray
 
-from models.types import Array
+from models.base.types import Array
 
 SIZE_PX = 19.0
 LEADING_PX, MARGIN_PX, GAP_PX = 10.0, 3.0, 8.0
@@ -36,7 +36,7 @@ def drawn(latex: str) -> Markup:
     Parameters
     ----------
     latex : str
-        As :meth:`models.terms.Term.equation` gives it; ``cases`` may be the last thing of a line
+        As :meth:`models.terms.term.Term.equation` gives it; ``cases`` may be the last thing of a line
 
     Returns
     -------

@@ -9,13 +9,13 @@ from dataclasses import dataclass
 import numpy as np
 from markupsafe import Markup
 
-from diagnosis.grid import stands_for
-from diagnosis.numbers import fixed
-from diagnosis.predict import rmse
+from diagnosis.forward.grid import stands_for
+from diagnosis.inference.predict import rmse
 from diagnosis.report.chart import Chart, Curve, averaged, drawn
 from diagnosis.report.wording import LOSS, name, time_scale
-from diagnosis.result import Course, Diagnosis, Finding, MissingHeat
-from models.types import Array
+from diagnosis.results.number_format import fixed
+from diagnosis.results.result import Course, Diagnosis, Finding, MissingHeat
+from models.base.types import Array
 
 STAGES = (("as delivered", "before"), ("calibrated", "calibrated"), ("with what was found", "after"))
 SENSOR_PX, ERROR_PX, INPUT_PX = 190, 120, 90

@@ -9,8 +9,8 @@ from itertools import pairwise
 from markupsafe import Markup
 
 from diagnosis.report.wording import headline, name, share
-from diagnosis.result import Diagnosis, Finding
-from models.network import ThermalNetwork
+from diagnosis.results.result import Diagnosis, Finding
+from models.simulation.thermal_network import ThermalNetwork
 
 NO_CLAIM = ("consistent", "insufficient_data")
 LIKELY = 0.1  # probability from which a place is pointed out

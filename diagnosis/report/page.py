@@ -9,10 +9,10 @@ from typing import Any
 from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
 
-from diagnosis import numbers
+from diagnosis.decision.stage import LEAST_RIVAL
 from diagnosis.report import equation, figures, network_drawing, wording
-from diagnosis.result import NOT_ACCEPTED, Calibrated, Diagnosis, Finding, Fits
-from diagnosis.stage import LEAST_RIVAL
+from diagnosis.results import number_format as numbers
+from diagnosis.results.result import NOT_ACCEPTED, Calibrated, Diagnosis, Finding, Fits
 
 PACKAGE = "diagnosis.report"
 SHOWN_RANKS, MOST_RANKS = 10, 300

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from diagnosis.numbers import NONE, SUPERSCRIPTS
+from diagnosis.results.number_format import NONE, SUPERSCRIPTS
 from models.mechanisms import OPEN_FORMS
 
 DAY, HOUR, MINUTE = 86_400.0, 3600.0, 60.0

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from models.mechanisms import ageing, heat_paths, losses, measurement, oil_circuit, surroundings
+from models.mechanisms import ageing, heat_paths, measurement, oil_circuit, surroundings
+from models.mechanisms import power_losses as losses
 from models.mechanisms.mechanism import Mechanism, Memory, Placed
 from models.mechanisms.open_forms import OPEN_FORM, OPEN_FORMS
 from models.mechanisms.scale import Scale

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import sympy as sp
 
-from models.laws import Parameter
 from models.mechanisms.forms import EDGE_S, RUNNING, moment, plain, positive, steps, strength
 from models.mechanisms.mechanism import Mechanism, Memory
 from models.mechanisms.scale import Scale
+from models.network.laws import Parameter
 
 FAMILY = "ageing and running-in"
 REPEAT = "repeat the first test after the last one: only what changes with time differs"

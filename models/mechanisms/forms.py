@@ -7,9 +7,9 @@ from typing import Any
 
 import sympy as sp
 
-from models.laws import Parameter
 from models.mechanisms.mechanism import Memory
 from models.mechanisms.scale import Scale
+from models.network.laws import Parameter
 
 LARGEST = 100.0  # strength, in standard deviations of its prior
 SMALLEST_FACTOR = -0.95  # of a relative change: a loss or conductance never turns round

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from models.heat_transfer import KELVIN
+from models.formulas.heat_transfer import KELVIN
 from models.mechanisms.forms import plain, positive, rises, strength, temperature
 from models.mechanisms.mechanism import Mechanism, Memory
 

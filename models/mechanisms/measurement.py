@@ -6,10 +6,10 @@ from collections.abc import Callable
 
 import sympy as sp
 
-from models.laws import LawLike, Parameter
 from models.mechanisms.forms import moment, plain, share, strength
 from models.mechanisms.mechanism import Mechanism, Parameters
-from models.terms import Form
+from models.network.laws import LawLike, Parameter
+from models.terms.term import Form
 
 FAMILY = "measurement"
 EXCHANGE = "exchange the sensor with another one and repeat: a fault of the sensor goes with it"

@@ -13,12 +13,12 @@ from typing import Literal, TypeAlias
 
 import sympy as sp
 
-from models.errors import InputError
-from models.laws import LawLike, NumericLaw, Parameter, symbol, trace
+from models.base.errors import InputError
 from models.mechanisms.places import LOSS_CHANNEL, Spot, spots
 from models.mechanisms.scale import Scale
-from models.network import ExtraState, ThermalNetwork
-from models.terms import Form, Kind, Term, equation
+from models.network.laws import LawLike, NumericLaw, Parameter, symbol, trace
+from models.simulation.thermal_network import ExtraState, ThermalNetwork
+from models.terms.term import Form, Kind, Term, equation
 
 Parameters: TypeAlias = Callable[[Scale], tuple[Parameter, ...]]
 Traced: TypeAlias = Callable[[LawLike, tuple[str, ...]], tuple[sp.Expr, NumericLaw | None]]
@@ -60,12 +60,12 @@ class Mechanism:
     ----------
     name, family : str
     kind : str
-        What the law is, see :class:`~models.terms.Term`
+        What the law is, see :class:`~models.terms.term.Term`
     places : tuple of str
         Patterns of :mod:`models.mechanisms.places`
     parameters : callable of :class:`Scale`
         Parameters by local names, ``strength`` first; its `sd` is the size that the effect typically has
-    law : callable of :class:`~models.laws.Signals`, or sympy expression
+    law : callable of :class:`~models.network.laws.Signals`, or sympy expression
         Beside the network's signals it has the parameters and memories by their local names, ``T_here`` and ``T_there``
         (mean temperatures at the place and the other end), ``T_<group>``, ``ambient_ref`` [degC], ``duration_ref`` [s],
         and in ratios to the scale ``n`` (magnitude of speed), ``m`` (of torque), ``x`` (time since the start of the
@@ -83,7 +83,7 @@ class Mechanism:
         Temperature of a new boundary, [degC], of time, inputs and own parameters
     states : tuple of Memory
     form, of_measurement
-        See :class:`~models.terms.Term`
+        See :class:`~models.terms.term.Term`
     says : str
         One sentence a test engineer understands; ``{place}`` stands for the place
     reference : str
@@ -131,7 +131,7 @@ class Mechanism:
 
         Examples
         --------
-        >>> from models.gearbox import load_gearbox
+        >>> from models.assembly.gearbox import load_gearbox
         >>> from models.mechanisms import CATALOGUE
         >>> rig = load_gearbox("fzg")
         >>> windage = CATALOGUE["windage"].placed(rig.network(), Scale.of(rig, speed=3000.0, torque=94.0))[0]
@@ -240,7 +240,7 @@ class Placed(Term):
     place : str
         As a report calls it
     written : mapping of str to sympy.Expr
-        The laws as the catalogue writes them, in ratios to the scale; see :attr:`~models.terms.Term.laws`
+        The laws as the catalogue writes them, in ratios to the scale; see :attr:`~models.terms.term.Term.laws`
     scale : Scale
         What they are ratios to
     """

@@ -6,7 +6,6 @@ from typing import Any
 
 import sympy as sp
 
-from models.laws import Parameter
 from models.mechanisms.forms import (
     EDGE_S,
     RUNNING,
@@ -22,6 +21,7 @@ from models.mechanisms.forms import (
 )
 from models.mechanisms.mechanism import Mechanism, Memory
 from models.mechanisms.scale import Scale
+from models.network.laws import Parameter
 
 FAMILY = "oil circuit"
 STANDING = 25.0  # sharpness of an interlock: at a tenth of the reference speed it is off

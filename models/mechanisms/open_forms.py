@@ -12,10 +12,10 @@ from typing import Any
 
 import sympy as sp
 
-from models.laws import LawLike, Parameter
 from models.mechanisms.forms import plain, positive, share_between, strength
 from models.mechanisms.mechanism import Mechanism, Memory
 from models.mechanisms.scale import TYPICAL_RISE, Scale
+from models.network.laws import LawLike, Parameter
 
 OPEN_FORM = "open form"  # their family
 PLACES = ("each parts",)

@@ -21,9 +21,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
-from models.laws import symbol
-from models.network import BASE_SIGNALS, ThermalNetwork
-from models.terms import Kind
+from models.network.laws import symbol
+from models.simulation.thermal_network import BASE_SIGNALS, ThermalNetwork
+from models.terms.term import Kind
 
 LOSS_CHANNEL = "P_loss"
 EACH, FACTOR, ALL_LOSSES, ALL_PARTS = "each ", "factor ", "losses", "parts"
@@ -63,7 +63,7 @@ def spots(network: ThermalNetwork, kind: Kind, pattern: str, channels: Sequence[
 
     Examples
     --------
-    >>> from models.gearbox import load_gearbox
+    >>> from models.assembly.gearbox import load_gearbox
     >>> network = load_gearbox("fzg").network()
     >>> [spot.target for spot in spots(network, "link_factor", "each bearings-housing", ())][0]
     ('bearing_1-housing_lower', 'bearing_1-housing_upper')

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 import sympy as sp
 
-from models.laws import symbol
-from models.oil import d341_constants, kinematic_viscosity_d341
+from models.formulas.oil import d341_constants, kinematic_viscosity_d341
+from models.network.laws import symbol
 
 if TYPE_CHECKING:
-    from models.gearbox import Gearbox
-    from models.network import Losses, ThermalNetwork
+    from models.assembly.gearbox import Gearbox
+    from models.simulation.thermal_network import Losses, ThermalNetwork
 
 TYPICAL_OIL = d341_constants(40.0, 100.0, 100.0, 11.2)  # ISO VG 100, mineral
 HOTTEST, COOLEST_RISE, TYPICAL_RISE = 100.0, 20.0, 50.0  # degC, K, K
@@ -46,7 +46,7 @@ class Scale:
     interval : float
         Between its rows, [s]
     oil_m, oil_n : float
-        Constants of the oil's viscosity, see :func:`models.oil.kinematic_viscosity_d341`
+        Constants of the oil's viscosity, see :func:`models.formulas.oil.kinematic_viscosity_d341`
     viscosity_exponents : mapping of str to float
         Of every loss in the network, by the name of its source: d ln(loss) / d ln(viscosity) at these sizes, [-]
     """
@@ -104,7 +104,7 @@ class Scale:
 
         Examples
         --------
-        >>> from models.gearbox import load_gearbox
+        >>> from models.assembly.gearbox import load_gearbox
         >>> scale = Scale.of(load_gearbox("fzg"), speed=2600.0, torque=94.0)
         >>> round(scale.conductance, 1), round(scale.viscosity, 1)
         (6.9, 8.1)

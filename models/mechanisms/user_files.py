@@ -9,23 +9,23 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from models.definition import Name, OneOrMore, Section, Text
-from models.errors import InputError
-from models.expressions import Law
-from models.faults import validated
-from models.gearbox import Gearbox
-from models.law_file import LawParameter, LawTable
-from models.laws import Parameter
+from models.assembly.gearbox import Gearbox
+from models.base.errors import InputError
+from models.definition.messages import validated
+from models.definition.sections import Name, OneOrMore, Section, Text
+from models.files.toml_file import parse_schema_1, read_text
 from models.mechanisms.forms import LARGEST, strength
 from models.mechanisms.mechanism import STRENGTH, Mechanism, Memory
 from models.mechanisms.scale import Scale
-from models.toml_file import parse_schema_1, read_text
+from models.network.laws import Parameter
+from models.terms.expressions import Law
+from models.terms.law_file import LawParameter, LawTable
 
 Positive = Annotated[float, Field(gt=0.0)]
 
 
 class PriorParameter(LawParameter):
-    """``[[mechanism.parameter]]``: a number in a law with its prior, see :class:`models.laws.Parameter`."""
+    """``[[mechanism.parameter]]``: a number in a law with its prior, see :class:`models.network.laws.Parameter`."""
 
     start: float | None = None
     sd: Positive

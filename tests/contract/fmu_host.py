@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from fmpy.fmi1 import FMICallException
 
-from builder.fmu_drive import LoadedFmu, loaded
+from builder.drive.driver import LoadedFmu, loaded
 
 DISCARD = 2
 LOADED = {"speed": 300.0, "torque": 150.0, "T_ambient": 293.15, "air_speed": 2.0}

@@ -6,7 +6,7 @@ from typing import Any
 
 import sympy as sp
 
-from models.network import ThermalNetwork
+from models.simulation.thermal_network import ThermalNetwork
 
 
 def thermostat(s: Any) -> sp.Expr:

@@ -16,14 +16,14 @@ from fmpy import read_model_description, simulate_fmu
 from fmpy.fmi1 import FMICallException
 from fmpy.validation import validate_fmu
 
-from builder.fmu import build_python_fmu
-from builder.fmu_drive import drive_fmu
-from builder.native import build_native_fmu
-from builder.signals import signal_table
-from builder.train import TrainingResult
-from models.cycle import Cycle
-from models.errors import InputError
-from models.gearbox import Gearbox
+from builder.drive.driver import drive_fmu
+from builder.fmi.signals import signal_table
+from builder.native.native_fmu import build_native_fmu
+from builder.python.python_fmu import build_python_fmu
+from builder.surrogate.train import TrainingResult
+from models.assembly.gearbox import Gearbox
+from models.base.errors import InputError
+from models.files.cycle import Cycle
 from tests.contract.fmu_host import DISCARD, LOADED, Host, hosted
 from tests.contract.networks import extended, with_everything
 

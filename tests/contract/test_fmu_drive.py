@@ -11,12 +11,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from builder.drive_cycle import reference_cycle
-from builder.fmu_drive import drive_fmu, fmu_inputs, fmu_nodes
-from builder.train import TrainingResult
-from models.cycle import Cycle
-from models.errors import InputError
-from models.gearbox import Gearbox
+from builder.drive.driver import drive_fmu, fmu_inputs, fmu_nodes
+from builder.fmi.reference_cycle import reference_cycle
+from builder.surrogate.train import TrainingResult
+from models.assembly.gearbox import Gearbox
+from models.base.errors import InputError
+from models.files.cycle import Cycle
 from tests.contract.test_fmu_python import rewritten
 
 OTHER_MODEL = """<?xml version="1.0" encoding="UTF-8"?>
@@ -107,8 +107,8 @@ NESTED = """
 import gc, sys
 from pathlib import Path
 import fmpy
-from builder.fmu_drive import drive_fmu, loaded
-from models.cycle import Cycle
+from builder.drive.driver import drive_fmu, loaded
+from models.files.cycle import Cycle
 
 fmu = Path(sys.argv[1])
 fast = Cycle.from_columns({"time_s": [0, 1], "speed_rpm": [1000, 1e5], "torque_Nm": [50, 50]})
@@ -155,7 +155,7 @@ def test_more_rows_bring_the_old_ones_no_further_from_the_truth(
     fine = ramps.refined(interval)
     own = np.isin(fine.time, ramps.time)
     assert own.sum() == len(ramps) < len(fine)
-    monkeypatch.setattr("models.solver.TOLERANCE_K", 1e-4)
+    monkeypatch.setattr("models.portable.solver.TOLERANCE_K", 1e-4)
     truth = fzg.network().simulate(ramps, losses=fzg_training.losses, initial=20.0).columns()
     coarse, dense = (drive_fmu(path, c, initial=20.0) for c in (ramps, fine))
     names = [name for name in truth if name.startswith("T_")]

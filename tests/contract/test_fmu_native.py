@@ -20,14 +20,14 @@ import pytest
 from fmpy import read_model_description
 from fmpy.fmi1 import FMICallException
 
-from builder import native_compile
-from builder.drive_cycle import reference_cycle
-from builder.fmu_drive import drive_fmu
-from builder.native import build_native_fmu
-from builder.native_compile import PLATFORMS, compile_libraries, plan_for
-from builder.train import TrainingResult
-from models.errors import InputError
-from models.gearbox import Gearbox
+from builder.drive.driver import drive_fmu
+from builder.fmi.reference_cycle import reference_cycle
+from builder.native import compile as native_compile
+from builder.native.compile import PLATFORMS, compile_libraries, plan_for
+from builder.native.native_fmu import build_native_fmu
+from builder.surrogate.train import TrainingResult
+from models.assembly.gearbox import Gearbox
+from models.base.errors import InputError
 from tests.contract.fmu_host import DISCARD, LOADED, Host, hosted
 from tests.contract.native_hosts import run, unpacked
 

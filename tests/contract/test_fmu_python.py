@@ -14,10 +14,10 @@ from pathlib import Path
 
 import pytest
 
-from builder.fmu_drive import loaded
-from builder.train import TrainingResult
-from models.errors import InputError
-from models.gearbox import Gearbox
+from builder.drive.driver import loaded
+from builder.surrogate.train import TrainingResult
+from models.assembly.gearbox import Gearbox
+from models.base.errors import InputError
 from tests.contract.fmu_host import hosted
 
 Build = Callable[..., Path]
@@ -67,8 +67,9 @@ def test_same_definition_gives_the_same_bytes_in_any_process(
 ) -> None:
     (tmp_path / "training").write_bytes(pickle.dumps((fzg_training, fzg_networks)))
     script = (
-        "import pickle, sys; from pathlib import Path; from builder.fmu import build_python_fmu; "
-        "from models.gearbox import load_gearbox; training, networks = pickle.loads(Path(sys.argv[1]).read_bytes()); "
+        "import pickle, sys; from pathlib import Path; from builder.python.python_fmu import build_python_fmu; "
+        "from models.assembly.gearbox import load_gearbox; "
+        "training, networks = pickle.loads(Path(sys.argv[1]).read_bytes()); "
         "build_python_fmu(load_gearbox('fzg'), training, networks, Path(sys.argv[2]))"
     )
     again = tmp_path / "fzg.fmu"

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from models.gearbox import Gearbox, load_gearbox
+from models.assembly.gearbox import Gearbox, load_gearbox
 
 FZG, CONVEYOR = load_gearbox("fzg"), load_gearbox("conveyor")
 EVERY_BEARING = range(len(FZG.bearing))

@@ -13,17 +13,17 @@ import pytest
 import sympy as sp
 from fmpy.validation import validate_fmu
 
-from builder.fmu_drive import drive_fmu
-from builder.train import TrainingResult
-from models.compiled import law_source
-from models.correction import Correction, Finding, read_correction, write_correction
-from models.cycle import Cycle
-from models.gearbox import load_gearbox
-from models.laws import compile_function, function_source, symbol
+from builder.drive.driver import drive_fmu
+from builder.surrogate.train import TrainingResult
+from models.assembly.gearbox import load_gearbox
+from models.base.types import Array
+from models.correction.correction import Correction, Finding, read_correction, write_correction
+from models.files.cycle import Cycle
 from models.mechanisms import CATALOGUE, OPEN_FORM, OPEN_FORMS, Mechanism, Placed, Scale
-from models.network import ThermalNetwork
-from models.simulation import Result
-from models.types import Array
+from models.network.compiled import law_source
+from models.network.laws import compile_function, function_source, symbol
+from models.simulation.simulate import Result
+from models.simulation.thermal_network import ThermalNetwork
 
 MOST_STARTS = 24  # combinations of shape parameters that a search can afford per place
 DURATION = 7200.0

@@ -15,7 +15,7 @@ import pandas as pd
 import pytest
 from fmpy import simulate_fmu
 
-from builder.native_compile import compile_libraries
+from builder.native.compile import compile_libraries
 from tests.contract.fmu_host import hosted
 from tests.contract.native_hosts import SOURCES, Unpacked, compiled, needs_compiler, run, unpacked
 

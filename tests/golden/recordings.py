@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from models.cycle import Cycle
-from models.gearbox import Gearbox
-from models.network import ThermalNetwork
+from models.assembly.gearbox import Gearbox
+from models.files.cycle import Cycle
+from models.simulation.thermal_network import ThermalNetwork
 
 SENSORS = ("oil", "housing_lower", "housing_upper", "bearing_1", "bearing_3", "pinion")
 NOISE_K = 0.15

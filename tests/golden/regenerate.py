@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from models.gearbox import load_gearbox
+from models.assembly.gearbox import load_gearbox
 
 FILE = Path(__file__).with_name("rig.json")
 CYCLE: dict[str, list[float]] = {

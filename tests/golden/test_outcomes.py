@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from diagnosis import diagnose
-from models.gearbox import Gearbox
+from models.assembly.gearbox import Gearbox
 from models.mechanisms import CATALOGUE, Scale
 from tests.golden.recordings import record
 

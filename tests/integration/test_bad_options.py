@@ -9,8 +9,8 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from models.correction import Correction, Estimate, Finding, correction_text
-from models.gearbox import Gearbox
+from models.assembly.gearbox import Gearbox
+from models.correction.correction import Correction, Estimate, Finding, correction_text
 from models.mechanisms import CATALOGUE, Scale
 from tests.conftest import RunCli
 

@@ -10,14 +10,14 @@ import pandas as pd
 import pytest
 from fmpy import read_model_description
 
-from builder.files import read_cycle
-from builder.fmu import build_python_fmu
-from builder.fmu_drive import drive_fmu
-from builder.native import build_native_fmu
-from builder.train import TrainingResult
-from models.correction import read_correction
-from models.gearbox import Gearbox
-from models.network import ThermalNetwork
+from builder.drive.driver import drive_fmu
+from builder.native.native_fmu import build_native_fmu
+from builder.python.python_fmu import build_python_fmu
+from builder.surrogate.train import TrainingResult
+from models.assembly.gearbox import Gearbox
+from models.correction.correction import read_correction
+from models.files.cycle_file import read_cycle
+from models.simulation.thermal_network import ThermalNetwork
 from tests.conftest import RunCli
 from tests.golden.recordings import SENSORS, record
 

@@ -12,12 +12,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from builder import fleet
 from builder.__main__ import main
-from builder.fleet import members_of
-from models.cycle import Cycle
-from models.errors import InputError
-from models.gearbox import Gearbox
+from builder.workflows import fleet
+from builder.workflows.fleet import members_of
+from models.assembly.gearbox import Gearbox
+from models.base.errors import InputError
+from models.files.cycle import Cycle
 
 SENSORS = ("oil", "housing_lower", "bearing_1")
 REPORT = {"report.html", "diagnosis.json", "correction.toml", "train.csv"}
@@ -173,7 +173,7 @@ def test_faulty_options_end_with_status_2_and_leave_nothing(
     arguments: list[str], message: str, folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # fmt: skip
-    monkeypatch.setattr("models.parallel.CONNECT_S", 1.0)
+    monkeypatch.setattr("models.base.parallel.CONNECT_S", 1.0)
     given = [a.replace("FOLDER", str(folder)) for a in arguments]
     assert run("diagnose", *given, "--output", tmp_path / "out") == 2
     shown = capsys.readouterr().err

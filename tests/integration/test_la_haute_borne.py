@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 from diagnosis import diagnose
-from diagnosis.case import prepare
-from diagnosis.explain import calibrated
-from diagnosis.identifiable import scale_direction, scale_notes
-from diagnosis.read_recordings import read_recordings
-from diagnosis.recording import Recording
-from diagnosis.result import Course, Diagnosis
-from models.gearbox import load_gearbox
+from diagnosis.candidates.explain import calibrated
+from diagnosis.recordings.read import read_recordings
+from diagnosis.recordings.recording import Recording
+from diagnosis.results.identifiable import scale_direction, scale_notes
+from diagnosis.results.result import Course, Diagnosis
+from diagnosis.setup.case import prepare
+from models.assembly.gearbox import load_gearbox
 
 
 @pytest.fixture(scope="module")

@@ -15,13 +15,14 @@ from typing import Any
 import pytest
 from click.testing import CliRunner
 
-from builder import prove as driver
-from builder.prove import environment, prove, run_task, work_of
-from builder.prove_command import prove as verb
-from diagnosis.proof import cycles, protocol
-from diagnosis.proof.protocol import BLIND, Settings, Task
-from models.errors import InputError
-from models.gearbox import Gearbox
+from builder.commands.prove import prove as verb
+from builder.workflows import prove as driver
+from builder.workflows.prove import environment, prove, run_task, work_of
+from diagnosis.proof.plant import cycles
+from diagnosis.proof.scoring import protocol
+from diagnosis.proof.scoring.protocol import BLIND, Settings, Task
+from models.assembly.gearbox import Gearbox
+from models.base.errors import InputError
 
 SETTINGS = Settings(seed=77, cases=6, cells_every=0)
 SECRETS = ("base_parameters", "acting_s", "heat_W")  # keys of a truth

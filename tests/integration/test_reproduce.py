@@ -15,8 +15,8 @@ from builder.reproduce.reproduce import reproduce
 from builder.reproduce.rig import characteristics
 from builder.reproduce.speed import measure
 from builder.reproduce.study import Settings, Study
-from models.errors import InputError
-from models.gearbox import load_gearbox
+from models.assembly.gearbox import load_gearbox
+from models.base.errors import InputError
 
 QUICK = Settings(
     jobs=1, samples=400, test_points=100, runs=1, longest_s=1.0, step_s=600.0, fine_step_s=300.0, trajectories=2

@@ -11,10 +11,16 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from models.errors import InputError
-from models.geometry import GearPair, centre_distance, gear_pair, half_tooth_angle, profile_shift_sum
-from models.load_sharing import LoadSharing, contact_breakpoints, contact_points, load_share, load_sharing_loss_factor
-from models.mesh_stiffness import tooth_pair_stiffness
+from models.base.errors import InputError
+from models.formulas.geometry import GearPair, centre_distance, gear_pair, half_tooth_angle, profile_shift_sum
+from models.formulas.load_sharing import (
+    LoadSharing,
+    contact_breakpoints,
+    contact_points,
+    load_share,
+    load_sharing_loss_factor,
+)
+from models.formulas.mesh_stiffness import tooth_pair_stiffness
 
 MODELS = get_args(LoadSharing)
 

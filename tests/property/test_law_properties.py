@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from models import churning, ehl, heat_transfer, seal
-from models.types import Array
+from models.base.types import Array
+from models.formulas import ehl, heat_transfer
+from models.losses import churning, seal
 from tests.validation.test_published_points import CONTACT, DISK, E_RED, GEAR, NU_406, OIL, PAIR, F, disk_speed
 
 Law = Callable[[float], Any]

@@ -14,11 +14,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from models import friction
-from models.gearbox import load_gearbox
-from models.laws import Parameter
-from models.network import ThermalNetwork
-from models.simulation import Result, network_system
+from models.assembly.gearbox import load_gearbox
+from models.losses import friction
+from models.network.laws import Parameter
+from models.simulation.simulate import Result, network_system
+from models.simulation.thermal_network import ThermalNetwork
 
 GEARBOX = load_gearbox("fzg")
 NETWORK, LOSSES = GEARBOX.network(), GEARBOX.losses()

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from diagnosis.grid import Piece, pieces
-from diagnosis.network_on_grid import NetworkOnGrid
-from diagnosis.noise import noise_of, start_guess
-from diagnosis.posterior import Problem
-from diagnosis.unknowns import unknowns_of
-from models.cycle import Cycle
-from models.gearbox import Gearbox
-from models.types import Array
+from diagnosis.forward.grid import Piece, pieces
+from diagnosis.forward.network_on_grid import NetworkOnGrid
+from diagnosis.inference.noise import noise_of, start_guess
+from diagnosis.inference.posterior import Problem
+from diagnosis.inference.unknowns import unknowns_of
+from models.assembly.gearbox import Gearbox
+from models.base.types import Array
+from models.files.cycle import Cycle
 from tests.unit.inference_example import CHANNELS, recording_of
 
 

@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from diagnosis.result import (
+from diagnosis.inference.shapes import shape_terms
+from diagnosis.results.result import (
     Calibrated,
     Course,
     Diagnosis,
@@ -19,10 +20,9 @@ from diagnosis.result import (
     Rival,
     Unseen,
 )
-from diagnosis.shapes import shape_terms
-from models.gearbox import load_gearbox
+from models.assembly.gearbox import load_gearbox
+from models.base.types import Array
 from models.mechanisms import CATALOGUE, Placed, Scale
-from models.types import Array
 
 CHANNELS = ("oil", "housing_lower", "housing_upper", "bearing_1", "bearing_3", "pinion", "P_loss")
 RECORDINGS = {

@@ -9,19 +9,16 @@ from typing import Any
 
 import numpy as np
 
-from diagnosis.grid import Piece
-from diagnosis.hypotheses import (
-    Hypothesis,
-    Scored,
-)
-from diagnosis.network_on_grid import NetworkOnGrid, named_values
-from diagnosis.observation import readings
-from diagnosis.posterior import Problem
-from diagnosis.recording import Channel, Recording
-from diagnosis.trajectory import simulate
-from models.gearbox import Gearbox
+from diagnosis.candidates.hypotheses import Hypothesis, Scored
+from diagnosis.forward.grid import Piece
+from diagnosis.forward.network_on_grid import NetworkOnGrid, named_values
+from diagnosis.forward.observation import readings
+from diagnosis.forward.trajectory import simulate
+from diagnosis.inference.posterior import Problem
+from diagnosis.recordings.recording import Channel, Recording
+from models.assembly.gearbox import Gearbox
+from models.base.types import Array
 from models.mechanisms import CATALOGUE, OPEN_FORM, Scale
-from models.types import Array
 
 CHANNELS = ("housing_lower", "oil", "bearing_1", "P_loss")
 

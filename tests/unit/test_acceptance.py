@@ -9,19 +9,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from diagnosis import acceptance, explain, search
-from diagnosis.explain import (
-    Explanation,
-)
-from diagnosis.hypotheses import (
-    hypothesis_of,
-)
-from diagnosis.posterior import Problem
-from diagnosis.stage import Stage, log_e_value
-from diagnosis.unknowns import Unknown, Unknowns
-from models.gearbox import Gearbox
+from diagnosis.candidates import explain
+from diagnosis.candidates.explain import Explanation
+from diagnosis.candidates.hypotheses import hypothesis_of
+from diagnosis.decision import acceptance, search
+from diagnosis.decision.stage import Stage, log_e_value
+from diagnosis.inference.posterior import Problem
+from diagnosis.inference.unknowns import Unknown, Unknowns
+from models.assembly.gearbox import Gearbox
+from models.base.types import Array
 from models.mechanisms import CATALOGUE, Scale
-from models.types import Array
 from tests.unit.inference_example import CHANNELS, NOTHING, judge_of, scored_as
 
 

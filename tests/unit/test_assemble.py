@@ -9,13 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from diagnosis import assemble
-from diagnosis.explain import (
-    Explanation,
-)
-from diagnosis.posterior import Problem
-from diagnosis.stage import Stage
-from models.gearbox import Gearbox
+from diagnosis.candidates.explain import Explanation
+from diagnosis.decision.stage import Stage
+from diagnosis.inference.posterior import Problem
+from diagnosis.results import assemble
+from models.assembly.gearbox import Gearbox
 from tests.unit.inference_example import NOTHING, scored_as
 
 

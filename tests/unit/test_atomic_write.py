@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from models.atomic_write import atomic_file, atomic_folder
-from models.errors import InputError
+from models.base.atomic_write import atomic_file, atomic_folder
+from models.base.errors import InputError
 
 
 def test_a_failure_leaves_the_old_file_and_nothing_else(tmp_path: Path) -> None:

@@ -13,10 +13,10 @@ import pandas as pd
 import pytest
 
 from builder.__main__ import main
-from diagnosis.read_recordings import read_recordings
-from models.errors import InputError
-from models.gearbox import Gearbox
-from models.network import ThermalNetwork
+from diagnosis.recordings.read import read_recordings
+from models.assembly.gearbox import Gearbox
+from models.base.errors import InputError
+from models.simulation.thermal_network import ThermalNetwork
 
 ROWS = 60
 
@@ -230,8 +230,8 @@ def test_a_folder_and_a_missing_file(tmp_path: Path, network: ThermalNetwork) ->
 
 
 def test_more_rows_than_memory_holds(tmp_path: Path, network: ThermalNetwork, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("models.table_file.MOST_ROWS", 50)
-    monkeypatch.setattr("models.table_file.CHUNK_ROWS", 20)
+    monkeypatch.setattr("models.files.table_file.MOST_ROWS", 50)
+    monkeypatch.setattr("models.files.table_file.CHUNK_ROWS", 20)
     (tmp_path / "run.csv").write_text(text())
     assert "has more than 50 rows; take a part of it" in message_of(tmp_path / "run.csv", network)
     assert len(read_recordings([f"{tmp_path / 'run.csv'}@0..300"], network)[0].time) == 30

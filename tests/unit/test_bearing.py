@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models.bearing import OIL_FLOW_HEAT, SkfRollerBearing, oil_flow_max
-from models.gearbox import load_gearbox
+from models.assembly.gearbox import load_gearbox
+from models.losses.bearing import OIL_FLOW_HEAT, SkfRollerBearing, oil_flow_max
 
 GEARBOX = load_gearbox("fzg")
 OIL = GEARBOX.lubricant()

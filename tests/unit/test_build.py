@@ -8,13 +8,13 @@ from zipfile import ZipFile
 import numpy as np
 import pytest
 
-from builder import build as builder_build
-from builder import fmu_drive
-from builder.build import build, cycle_errors
-from builder.fmu_drive import runs_here
-from builder.native_compile import host_platform
-from builder.train import TrainingResult
-from models.gearbox import Gearbox
+from builder.drive import driver as fmu_drive
+from builder.drive.driver import runs_here
+from builder.native.compile import host_platform
+from builder.surrogate.train import TrainingResult
+from builder.workflows import build as builder_build
+from builder.workflows.build import build, cycle_errors
+from models.assembly.gearbox import Gearbox
 
 
 def test_errors_over_a_cycle_are_those_of_the_fmu_against_the_model() -> None:

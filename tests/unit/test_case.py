@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from diagnosis.case import HELD_OUT_SHARE, START_S, prepare, split
-from diagnosis.explain import calibrated
-from diagnosis.recording import Channel, Recording
-from models.cycle import Cycle
-from models.gearbox import Gearbox
+from diagnosis.candidates.explain import calibrated
+from diagnosis.recordings.recording import Channel, Recording
+from diagnosis.setup.case import HELD_OUT_SHARE, START_S, prepare, split
+from models.assembly.gearbox import Gearbox
+from models.files.cycle import Cycle
 
 CHANNELS = ("oil", "housing_lower")
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from models.gearbox import load_gearbox
+from models.assembly.gearbox import load_gearbox
 
 GEARBOX = load_gearbox("fzg").with_values({"oil.volume_l": 1.0})
 PAIR = GEARBOX.stage[0].pair()

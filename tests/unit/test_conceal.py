@@ -12,13 +12,13 @@ import pandas as pd
 import pytest
 from click.testing import CliRunner
 
-from builder.conceal_command import conceal
-from diagnosis.proof import cycles
-from diagnosis.proof.conceal import EFFECTS, PHYSICS, conceal_set, mixed_plans, random_plans
-from diagnosis.proof.concealed_case import CONTROLS, FAULTS, Plan
-from diagnosis.read_recordings import read_recordings
-from models.errors import InputError
-from models.gearbox import Gearbox
+from builder.commands.conceal import conceal
+from diagnosis.proof.cases.conceal import EFFECTS, PHYSICS, conceal_set, mixed_plans, random_plans
+from diagnosis.proof.cases.concealed_case import CONTROLS, FAULTS, Plan
+from diagnosis.proof.plant import cycles
+from diagnosis.recordings.read import read_recordings
+from models.assembly.gearbox import Gearbox
+from models.base.errors import InputError
 
 PLANS = (
     Plan(group="single", effects=("foundation_conduction",), strength=1.0),

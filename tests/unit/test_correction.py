@@ -9,18 +9,25 @@ import sympy as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from builder.signals import signal_table
-from models.correction import Correction, Estimate, Finding, correction_text, read_correction, write_correction
-from models.errors import InputError
-from models.expressions import expression_text, parse_expression
-from models.faults import validated
-from models.gearbox import Gearbox, load_gearbox
-from models.laws import Parameter, symbol
+from builder.fmi.signals import signal_table
+from models.assembly.gearbox import Gearbox, load_gearbox
+from models.base.errors import InputError
+from models.correction.correction import (
+    Correction,
+    Estimate,
+    Finding,
+    correction_text,
+    read_correction,
+    write_correction,
+)
+from models.definition.messages import validated
+from models.files.toml_file import parse
 from models.mechanisms import CATALOGUE, Scale, load_mechanisms
 from models.mechanisms.user_files import check_placeable
-from models.network import ExtraState
-from models.terms import Term
-from models.toml_file import parse
+from models.network.laws import Parameter, symbol
+from models.simulation.thermal_network import ExtraState
+from models.terms.expressions import expression_text, parse_expression
+from models.terms.term import Term
 
 RIG = load_gearbox("fzg")
 NETWORK = RIG.network()

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from models.cycle import Cycle
-from models.errors import InputError
-from models.gearbox import load_gearbox
+from models.assembly.gearbox import load_gearbox
+from models.base.errors import InputError
+from models.files.cycle import Cycle
 
 GOOD: dict[str, Any] = {"time_s": [0.0, 1.0], "speed_rpm": [0.0, 100.0], "torque_Nm": [1, 2]}
 

@@ -9,9 +9,9 @@ import pandas as pd
 import pytest
 from click.testing import CliRunner
 
-import diagnosis.read_recordings
-from builder.diagnose_command import diagnose
-from models.errors import InputError
+import diagnosis.recordings.read
+from builder.commands.diagnose import diagnose
+from models.base.errors import InputError
 
 
 class _ReadError(Exception):

@@ -11,15 +11,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from diagnosis.numbers import NONE, fixed
 from diagnosis.report import equation as equations
 from diagnosis.report import network_drawing as drawing
 from diagnosis.report import page, write_report
 from diagnosis.report.chart import Chart, Curve, averaged, drawn, stretches, thinned
 from diagnosis.report.figures import courses
 from diagnosis.report.wording import WORDS
-from diagnosis.result import VERDICT_TEXT, Diagnosis
-from models.errors import InputError
+from diagnosis.results.number_format import NONE, fixed
+from diagnosis.results.result import VERDICT_TEXT, Diagnosis
+from models.base.errors import InputError
 from tests.unit.diagnosis_example import (
     CHANNELS,
     EXAMPLES,

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from builder.doe import BLOCK_ROWS, latin_hypercube, mixed_hypercube, random_points, sample_losses
-from builder.networks import PRESETS, network_specs
-from models.gearbox import load_gearbox
+from builder.surrogate.doe import BLOCK_ROWS, latin_hypercube, mixed_hypercube, random_points, sample_losses
+from builder.surrogate.networks import PRESETS, network_specs
+from models.assembly.gearbox import load_gearbox
 
 LOWER, UPPER = [1.0, 1.0, -20.0], [6500.0, 350.0, 200.0]
 MIXED = {"dense": ("log", "log", "viscosity"), "viscosity": (9.5468, 3.7520)}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from models import ehl
+from models.formulas import ehl
 
 E_RED = ehl.reduced_modulus(206e9, 0.3, 206e9, 0.3)
 

@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from diagnosis.evidence import Marginal, strength
-from diagnosis.grid import Piece, pieces
-from diagnosis.latent import knots_of, latent_heat
-from diagnosis.network_on_grid import NetworkOnGrid
-from diagnosis.noise import loss_noise
-from diagnosis.posterior import Problem
-from diagnosis.whitening import Noise, Whitening, reading_variance
-from models.cycle import Cycle
-from models.gearbox import Gearbox
-from models.types import Array
+from diagnosis.forward.grid import Piece, pieces
+from diagnosis.forward.network_on_grid import NetworkOnGrid
+from diagnosis.inference.evidence import Marginal, strength
+from diagnosis.inference.latent import knots_of, latent_heat
+from diagnosis.inference.noise import loss_noise
+from diagnosis.inference.posterior import Problem
+from diagnosis.inference.whitening import Noise, Whitening, reading_variance
+from models.assembly.gearbox import Gearbox
+from models.base.types import Array
+from models.files.cycle import Cycle
 from tests.unit.inference_example import CHANNELS, recording_of
 
 

@@ -9,8 +9,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from diagnosis.read_recordings import read_recordings
-from models.gearbox import Gearbox
+from diagnosis.recordings.read import read_recordings
+from models.assembly.gearbox import Gearbox
 from models.mechanisms import CATALOGUE, load_mechanisms
 from models.mechanisms.user_files import check_placeable
 

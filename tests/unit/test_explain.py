@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from diagnosis import acceptance, explain
-from diagnosis.evidence import Marginal
-from diagnosis.explain import (
+from diagnosis.candidates import explain
+from diagnosis.candidates.explain import (
     DISTORTED,
     Explanation,
     calibrated,
@@ -22,10 +21,8 @@ from diagnosis.explain import (
     refined,
     without,
 )
-from diagnosis.findings import _with_form, finding_of
-from diagnosis.grid import Piece
-from diagnosis.heat import _heats_with, heats_of, mean_heat_of
-from diagnosis.hypotheses import (
+from diagnosis.candidates.heat import _heats_with, heats_of, mean_heat_of
+from diagnosis.candidates.hypotheses import (
     _lines,
     hypothesis_of,
     scan,
@@ -33,13 +30,17 @@ from diagnosis.hypotheses import (
     switched_elsewhere,
     two_point_columns,
 )
-from diagnosis.network_on_grid import NetworkOnGrid, named_values
-from diagnosis.observation import readings
-from diagnosis.posterior import Problem
-from diagnosis.stage import Stage
-from diagnosis.trajectory import simulate
-from diagnosis.unknowns import unknowns_of
-from models.gearbox import Gearbox
+from diagnosis.decision import acceptance
+from diagnosis.decision.stage import Stage
+from diagnosis.forward.grid import Piece
+from diagnosis.forward.network_on_grid import NetworkOnGrid, named_values
+from diagnosis.forward.observation import readings
+from diagnosis.forward.trajectory import simulate
+from diagnosis.inference.evidence import Marginal
+from diagnosis.inference.posterior import Problem
+from diagnosis.inference.unknowns import unknowns_of
+from diagnosis.results.findings import _with_form, finding_of
+from models.assembly.gearbox import Gearbox
 from models.mechanisms import CATALOGUE, Scale
 from tests.unit.inference_example import CHANNELS, damaged
 

@@ -8,10 +8,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from builder.files import read_cycle, read_cycle_and_start, read_initial
-from builder.output_files import refuse_to_replace, write_table
-from models.errors import InputError
-from models.table_file import read_table
+from models.base.errors import InputError
+from models.files.cycle_file import read_cycle, read_cycle_and_start, read_initial
+from models.files.output_files import refuse_to_replace, write_table
+from models.files.table_file import read_table
 
 COLUMNS = {
     "time_s": np.array([0.0, 1.0, 2.5]),

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from models import ehl
-from models.friction import ContactState, MeshContact, friction_schlenk
-from models.gearbox import load_gearbox
+from models.assembly.gearbox import load_gearbox
+from models.formulas import ehl
+from models.losses.friction import ContactState, MeshContact, friction_schlenk
 
 GEARBOX = load_gearbox("fzg")
 LOSSES = GEARBOX.losses()
@@ -79,7 +79,7 @@ def test_sliding_loss_is_the_power_of_the_friction_forces() -> None:
 
 def test_quadrature_is_fine_enough() -> None:
     """Six points on each of four stretches against 60 on each: 0.1 % is claimed."""
-    from models.load_sharing import contact_points
+    from models.formulas.load_sharing import contact_points
 
     stage = GEARBOX.stage[0]
     pair = stage.pair()

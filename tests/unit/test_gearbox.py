@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from models.errors import InputError
-from models.gearbox import Gearbox, known_gearboxes, load_gearbox, read_gearbox
-from models.quantity import UNITS, unit_of
-from models.toml_file import packaged, read_text
+from models.assembly.gearbox import Gearbox, known_gearboxes, load_gearbox, read_gearbox
+from models.base.errors import InputError
+from models.files.toml_file import packaged, read_text
+from models.quantities.definition_units import UNITS, unit_of
 
 FZG = read_text(packaged("gearboxes", "fzg"))
 
@@ -230,7 +230,7 @@ def test_hash_knows_values_only(fzg: Gearbox) -> None:
 
 
 def test_hash_is_the_same_in_another_process(fzg: Gearbox) -> None:
-    code = "from models.gearbox import load_gearbox; print(load_gearbox('fzg').hash)"
+    code = "from models.assembly.gearbox import load_gearbox; print(load_gearbox('fzg').hash)"
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert run.stdout.strip() == fzg.hash
 

@@ -9,9 +9,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from models.errors import InputError
-from models.gearbox import load_gearbox, read_gearbox
-from models.toml_file import packaged, read_text
+from models.assembly.gearbox import load_gearbox, read_gearbox
+from models.base.errors import InputError
+from models.files.toml_file import packaged, read_text
 
 FZG = read_text(packaged("gearboxes", "fzg"))
 THIRD_SHAFT = '[[shaft]]\nname = "shaft_3"\nlength_mm = 90.0\ndiameter_mm = 20.0\n[[bearing]]'

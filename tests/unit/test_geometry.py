@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from models import geometry
-from models.errors import InputError
-from models.geometry import GearPair, gear_pair
+from models.base.errors import InputError
+from models.formulas import geometry
+from models.formulas.geometry import GearPair, gear_pair
 
 ALPHA = math.radians(20.0)
 TYPE_C: dict[str, Any] = {"z": (16, 24), "m_n": 4.5e-3, "alpha_n": ALPHA, "b": 14e-3, "a": 91.5e-3, "x": (0.182, 0.172)}

@@ -8,14 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from diagnosis.grid import FREE_S, INTERVAL_S, LONGEST, SAMPLES, Piece, pieces, stands_for
-from diagnosis.network_on_grid import NetworkOnGrid
-from diagnosis.recording import Channel, Recording
-from diagnosis.recurrence import lagged
-from diagnosis.trajectory import free_running
-from models.gearbox import Gearbox
+from diagnosis.forward.grid import FREE_S, INTERVAL_S, LONGEST, SAMPLES, Piece, pieces, stands_for
+from diagnosis.forward.network_on_grid import NetworkOnGrid
+from diagnosis.forward.recurrence import lagged
+from diagnosis.forward.trajectory import free_running
+from diagnosis.recordings.recording import Channel, Recording
+from models.assembly.gearbox import Gearbox
+from models.base.types import Array
 from models.mechanisms import CATALOGUE, Scale
-from models.types import Array
 
 INPUTS = ("speed", "torque", "T_ambient", "air_speed")
 TIME = np.arange(0.0, 7201.0, 10.0)

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from models import heat_transfer as ht
-from models.gearbox import load_gearbox
-from models.laws import symbol
+from models.assembly.gearbox import load_gearbox
+from models.formulas import heat_transfer as ht
+from models.network.laws import symbol
 
 WALL: dict[str, float] = {"T": 60.0, "T_a": 27.0, "length": 0.215}
 

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from models.errors import InputError
-from models.laws import Signals, compile_function, function_source, symbol, trace
+from models.base.errors import InputError
+from models.network.laws import Signals, compile_function, function_source, symbol, trace
 
 NAMES = ["speed", "T_oil", "k"]
 x, y = symbol("x"), symbol("y")

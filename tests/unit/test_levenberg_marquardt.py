@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from sklearn.base import clone
 from threadpoolctl import threadpool_limits
 
-from builder.levenberg_marquardt import (
+from builder.surrogate.levenberg_marquardt import (
     BLOCK_ROWS,
     LayerShapes,
     LevenbergMarquardtRegressor,

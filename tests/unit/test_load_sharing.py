@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from models.errors import InputError
-from models.geometry import GearPair, gear_pair
-from models.load_sharing import (
+from models.base.errors import InputError
+from models.formulas.geometry import GearPair, gear_pair
+from models.formulas.load_sharing import (
     LoadSharing,
     contact_breakpoints,
     contact_points,

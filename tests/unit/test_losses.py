@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from builder.networks import PRESETS
-from builder.train import train_surrogate
-from models.errors import InputError
-from models.gearbox import load_gearbox
-from models.loss_term import LossKind, LossTerm, TermInput
-from models.losses import BATCH, LOSS_KINDS
+from builder.surrogate.networks import PRESETS
+from builder.surrogate.train import train_surrogate
+from models.assembly.gearbox import load_gearbox
+from models.base.errors import InputError
+from models.losses.loss_model import BATCH, LOSS_KINDS
+from models.losses.loss_term import LossKind, LossTerm, TermInput
 
 GEARBOX = load_gearbox("fzg")
 LOSSES = GEARBOX.losses()
@@ -83,7 +83,7 @@ def test_a_loss_of_a_new_kind_needs_its_kind_only(monkeypatch: pytest.MonkeyPatc
         name="pump", components=("pump",), factors={"pump": "loss of the pump"}, network="no_load",
         powers=((1.0, 0.0),), law_error={"speed": 0.1}, terms=pump_terms,
     )  # fmt: skip
-    monkeypatch.setattr("models.losses.LOSS_KINDS", (*LOSS_KINDS, PUMP))
+    monkeypatch.setattr("models.losses.loss_model.LOSS_KINDS", (*LOSS_KINDS, PUMP))
     model = GEARBOX.losses()
     assert model.components == (*LOSSES.components, "pump")
     assert model.breakdown(speed=1000.0, torque=0.0, temperatures=50.0)["pump"] == pytest.approx(21.0)

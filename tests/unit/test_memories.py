@@ -10,19 +10,19 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from diagnosis import trajectory
-from diagnosis.grid import Piece, pieces
-from diagnosis.memories import SWITCHED_PARTS, Memories, within
-from diagnosis.network_on_grid import NetworkOnGrid, named_values
-from diagnosis.recording import Recording
-from diagnosis.recurrence import lagged, recurrence
-from diagnosis.trajectory import free_running, parameter_heats, settled_balance, simulate
-from models.cycle import Cycle
-from models.gearbox import Gearbox, load_gearbox
-from models.laws import symbol
+from diagnosis.forward import trajectory
+from diagnosis.forward.extra_states import SWITCHED_PARTS, Memories, within
+from diagnosis.forward.grid import Piece, pieces
+from diagnosis.forward.network_on_grid import NetworkOnGrid, named_values
+from diagnosis.forward.recurrence import lagged, recurrence
+from diagnosis.forward.trajectory import free_running, parameter_heats, settled_balance, simulate
+from diagnosis.recordings.recording import Recording
+from models.assembly.gearbox import Gearbox, load_gearbox
+from models.base.types import Array
+from models.files.cycle import Cycle
 from models.mechanisms import CATALOGUE, Placed, Scale
-from models.network import ExtraState
-from models.types import Array
+from models.network.laws import symbol
+from models.simulation.thermal_network import ExtraState
 
 INPUTS = ("speed", "torque", "T_ambient", "air_speed")
 FZG = load_gearbox("fzg")

@@ -10,9 +10,9 @@ import pytest
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
-from models.errors import InputError
-from models.geometry import GearPair, gear_pair, half_tooth_angle
-from models.mesh_stiffness import (
+from models.base.errors import InputError
+from models.formulas.geometry import GearPair, gear_pair, half_tooth_angle
+from models.formulas.mesh_stiffness import (
     foundation_compliance,
     foundation_notes,
     hertz_compliance,

@@ -7,9 +7,9 @@ from xml.etree import ElementTree as ET
 import pytest
 from fmpy.validation import validate_fmu
 
-from builder.model_description import Identity, model_description
-from builder.signals import SignalTable, signal_table
-from models.gearbox import Gearbox
+from builder.fmi.model_description import Identity, model_description
+from builder.fmi.signals import SignalTable, signal_table
+from models.assembly.gearbox import Gearbox
 
 IDENTITY = Identity(
     model_name="a < b & c",

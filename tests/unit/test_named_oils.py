@@ -6,10 +6,10 @@ import re
 
 import pytest
 
-from models.errors import InputError
-from models.gearbox import load_gearbox, read_gearbox
-from models.named_oils import known_oils, lubricant, named_oil, read_oil
-from models.toml_file import packaged, read_text
+from models.assembly.gearbox import load_gearbox, read_gearbox
+from models.base.errors import InputError
+from models.definition.named_oils import known_oils, lubricant, named_oil, read_oil
+from models.files.toml_file import packaged, read_text
 
 FZG = read_text(packaged("gearboxes", "fzg"))
 NAMES = known_oils()

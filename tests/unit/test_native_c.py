@@ -13,19 +13,19 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from builder.native import GEARBOX_MODEL, native_source
-from builder.native_compile import OPTIONS
-from builder.native_data import gearbox_sources
-from builder.native_structure import Structure
-from builder.onnx_export import onnx_evaluator
-from builder.signals import signal_table
-from builder.train import TrainingResult
-from models.compiled import compile_laws, law_expressions
-from models.errors import InputError
-from models.gearbox import Gearbox
-from models.laws import c_function_source, symbol
-from models.network import ThermalNetwork
-from models.surrogate import SurrogateLosses
+from builder.fmi.signals import signal_table
+from builder.native.compile import OPTIONS
+from builder.native.data import gearbox_sources
+from builder.native.native_fmu import GEARBOX_MODEL, native_source
+from builder.native.structure import Structure
+from builder.surrogate.onnx_export import onnx_evaluator
+from builder.surrogate.train import TrainingResult
+from models.assembly.gearbox import Gearbox
+from models.base.errors import InputError
+from models.network.compiled import compile_laws, law_expressions
+from models.network.laws import c_function_source, symbol
+from models.portable.surrogate import SurrogateLosses
+from models.simulation.thermal_network import ThermalNetwork
 from tests.contract.networks import with_everything
 
 COMPILER = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from models.compiled import law_source, structure
-from models.errors import InputError
-from models.gearbox import load_gearbox
-from models.laws import Parameter, symbol
-from models.network import Link, Node, ThermalNetwork
+from models.assembly.gearbox import load_gearbox
+from models.base.errors import InputError
+from models.network.compiled import law_source, structure
+from models.network.laws import Parameter, symbol
+from models.simulation.thermal_network import Link, Node, ThermalNetwork
 
 GEARBOX = load_gearbox("fzg")
 NETWORK = GEARBOX.network()

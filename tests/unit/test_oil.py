@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from models.errors import InputError
-from models.gearbox import load_gearbox
-from models.oil import (
+from models.assembly.gearbox import load_gearbox
+from models.base.errors import InputError
+from models.formulas.oil import (
     T_HIGHEST,
     T_LOWEST,
     Oil,

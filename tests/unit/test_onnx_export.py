@@ -10,10 +10,10 @@ import onnx
 import onnxruntime
 import pytest
 
-from builder.networks import PRESETS
-from builder.onnx_export import TOLERANCE, export_onnx, largest_deviation, onnx_evaluator
-from builder.train import train_surrogate
-from models.gearbox import load_gearbox
+from builder.surrogate.networks import PRESETS
+from builder.surrogate.onnx_export import TOLERANCE, export_onnx, largest_deviation, onnx_evaluator
+from builder.surrogate.train import train_surrogate
+from models.assembly.gearbox import load_gearbox
 
 SMALL = {
     "samples": 300,

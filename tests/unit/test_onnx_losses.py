@@ -3,9 +3,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from builder.doe import random_points
-from builder.train import TrainingResult
-from fmu_src.onnx_losses import OnnxLosses
+from builder.surrogate.doe import random_points
+from builder.surrogate.train import TrainingResult
+from fmu_src.python.onnx_losses import OnnxLosses
 
 
 @pytest.fixture

@@ -9,8 +9,8 @@ from uuid import uuid4
 import pytest
 from threadpoolctl import threadpool_info
 
-from models.errors import InputError
-from models.parallel import iterate_parallel, run_parallel, starting_processes
+from models.base.errors import InputError
+from models.base.parallel import iterate_parallel, run_parallel, starting_processes
 
 
 def _worked(number: int, exponent: int) -> tuple[int, int]:
@@ -68,7 +68,7 @@ def test_results_come_as_they_are_completed_and_items_as_they_are_needed() -> No
 def test_a_failure_arrives_and_processes_started_before_do_not_hide_it() -> None:
     with pytest.raises(ZeroDivisionError):
         run_parallel(divmod, [(1, 1), (1, 0)], jobs=2)
-    with pytest.raises(ArithmeticError, match="no solution"), starting_processes(2, "models.parallel"):
+    with pytest.raises(ArithmeticError, match="no solution"), starting_processes(2, "models.base.parallel"):
         raise ArithmeticError("no solution")
 
 
@@ -107,7 +107,7 @@ def test_what_a_batch_has_in_common_is_sent_once(batches: int | None) -> None:
 
 def test_a_scheduler_that_does_not_answer_and_a_missing_dask_are_input_errors(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("distributed", reason="the extra 'dask' is not installed")
-    monkeypatch.setattr("models.parallel.CONNECT_S", 0.3)
+    monkeypatch.setattr("models.base.parallel.CONNECT_S", 0.3)
     with pytest.raises(InputError, match=r"no dask scheduler answers at tcp://127.0.0.1:1 .*port open"):
         run_parallel(abs, [(1,)], dask="tcp://127.0.0.1:1")
     monkeypatch.setitem(__import__("sys").modules, "distributed", None)

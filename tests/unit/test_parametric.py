@@ -10,19 +10,19 @@ import pandas as pd
 import pytest
 import sympy as sp
 
-from diagnosis import trajectory
-from diagnosis.grid import Piece, pieces
-from diagnosis.network_on_grid import NetworkOnGrid, named_values
-from diagnosis.read_recordings import read_recordings
-from diagnosis.trajectory import free_running, simulate
-from models.errors import InputError
-from models.gearbox import known_gearboxes, load_gearbox, read_gearbox
-from models.laws import symbol
+from diagnosis.forward import trajectory
+from diagnosis.forward.grid import Piece, pieces
+from diagnosis.forward.network_on_grid import NetworkOnGrid, named_values
+from diagnosis.forward.trajectory import free_running, simulate
+from diagnosis.recordings.read import read_recordings
+from models.assembly.gearbox import known_gearboxes, load_gearbox, read_gearbox
+from models.assembly.parametric import ParametricLosses
+from models.base.errors import InputError
+from models.files.toml_file import packaged, read_text
 from models.mechanisms import CATALOGUE, Scale
 from models.mechanisms.forms import two_point
-from models.network import ThermalNetwork
-from models.parametric import ParametricLosses
-from models.toml_file import packaged, read_text
+from models.network.laws import symbol
+from models.simulation.thermal_network import ThermalNetwork
 
 TEXT = read_text(packaged("gearboxes", "la_haute_borne"))
 REFERENCE = {"speed": 1800.0, "torque": 10900.0}

@@ -10,19 +10,19 @@ import pytest
 from scipy.linalg import expm
 
 import diagnosis.proof
-from diagnosis.proof.conceal import EFFECTS, OUTSIDE, PHYSICS, draw_case
-from diagnosis.proof.concealed_case import FAULTS, Plan
-from diagnosis.proof.cycles import ROW_S, Programme, reference_torque, top_speed
-from diagnosis.proof.effect import Concealed
-from diagnosis.proof.instruments import lagged, record
-from diagnosis.proof.integrator import sdirk_step
-from diagnosis.proof.plant import Plant
-from diagnosis.proof.plant_run import Individual, Outcome, Run, run_plant
-from models.gearbox import Gearbox
-from models.types import Array
+from diagnosis.proof.cases.conceal import EFFECTS, OUTSIDE, PHYSICS, draw_case
+from diagnosis.proof.cases.concealed_case import FAULTS, Plan
+from diagnosis.proof.plant.cycles import ROW_S, Programme, reference_torque, top_speed
+from diagnosis.proof.plant.effect import Concealed
+from diagnosis.proof.plant.instruments import lagged, record
+from diagnosis.proof.plant.integrator import sdirk_step
+from diagnosis.proof.plant.plant import Plant
+from diagnosis.proof.plant.plant_run import Individual, Outcome, Run, run_plant
+from models.assembly.gearbox import Gearbox
+from models.base.types import Array
 
-SCORING = ("answers", "counts", "outcome", "proof_report", "protocol", "rules", "score")
-PLANT_MODULES = sorted(p for p in Path(diagnosis.proof.__path__[0]).glob("*.py") if p.stem not in SCORING)
+PROOF = Path(diagnosis.proof.__path__[0])
+PLANT_MODULES = sorted((*(PROOF / "plant").glob("*.py"), *(PROOF / "cases").glob("*.py")))
 NOT_MECHANICAL = ("heater_thermostat", "solar_soak", "limit_cycle_pump", "phase_change", "drying")
 PURE_SOURCES = [n for n in (*PHYSICS, *OUTSIDE) if EFFECTS[n].kind == "source" and n not in ("oil_jet", "oil_added")]
 ACT_ON_COLD = ("heater_thermostat", "grease_plug", "sludge_threshold", "phase_change", "drying")
@@ -169,5 +169,5 @@ def test_plant_imports_neither_catalogue_nor_diagnosis_nor_scoring(module: Path)
     imported |= {name.name for node in ast.walk(tree) if isinstance(node, ast.Import) for name in node.names}
     for name in imported:
         assert not name.startswith("models.mechanisms"), name
-        assert name.removeprefix("diagnosis.proof.") not in SCORING, name
+        assert not name.startswith("diagnosis.proof.scoring"), name
         assert not name.startswith("diagnosis") or name.startswith("diagnosis.proof"), name

@@ -8,10 +8,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from diagnosis.plausibility import check_plausible, loss_problem
-from diagnosis.read_recordings import read_recordings
-from models.errors import InputError
-from models.gearbox import Gearbox
+from diagnosis.recordings.read import read_recordings
+from diagnosis.setup.plausibility import check_plausible, loss_problem
+from models.assembly.gearbox import Gearbox
+from models.base.errors import InputError
 
 
 @pytest.mark.parametrize(("loss", "power", "says"), [

@@ -9,22 +9,20 @@ from typing import Any
 import numpy as np
 import pytest
 
-from diagnosis.case import Case, floored
-from diagnosis.explain import (
-    calibrated,
-)
-from diagnosis.grid import Piece
-from diagnosis.holdout import Judge, at_holdout
-from diagnosis.network_on_grid import NetworkOnGrid
-from diagnosis.noise import noise_of
-from diagnosis.observation import readings
-from diagnosis.posterior import Problem, _gauss_newton
-from diagnosis.trajectory import simulate
-from diagnosis.unknowns import Unknowns, unknowns_of
-from diagnosis.whitening import Whitening
-from models.gearbox import Gearbox
+from diagnosis.candidates.explain import calibrated
+from diagnosis.decision.holdout import Judge, at_holdout
+from diagnosis.forward.grid import Piece
+from diagnosis.forward.network_on_grid import NetworkOnGrid
+from diagnosis.forward.observation import readings
+from diagnosis.forward.trajectory import simulate
+from diagnosis.inference.noise import noise_of
+from diagnosis.inference.posterior import Problem, _gauss_newton
+from diagnosis.inference.unknowns import Unknowns, unknowns_of
+from diagnosis.inference.whitening import Whitening
+from diagnosis.setup.case import Case, floored
+from models.assembly.gearbox import Gearbox
+from models.base.types import Array
 from models.mechanisms import CATALOGUE, Scale
-from models.types import Array
 from tests.unit.inference_example import CHANNELS
 
 

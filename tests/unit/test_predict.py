@@ -8,16 +8,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from diagnosis.grid import Piece
-from diagnosis.network_on_grid import NetworkOnGrid
-from diagnosis.observation import readings
-from diagnosis.posterior import Problem
-from diagnosis.predict import START_S, predict
-from diagnosis.trajectory import complete_start, simulate
-from diagnosis.unknowns import unknowns_of
-from models.gearbox import Gearbox
+from diagnosis.forward.grid import Piece
+from diagnosis.forward.network_on_grid import NetworkOnGrid
+from diagnosis.forward.observation import readings
+from diagnosis.forward.trajectory import complete_start, simulate
+from diagnosis.inference.posterior import Problem
+from diagnosis.inference.predict import START_S, predict
+from diagnosis.inference.unknowns import unknowns_of
+from models.assembly.gearbox import Gearbox
+from models.base.types import Array
 from models.mechanisms import CATALOGUE, Scale
-from models.types import Array
 from tests.unit.inference_example import CHANNELS
 
 
@@ -94,10 +94,12 @@ def test_a_start_that_leads_nowhere_is_not_taken(monkeypatch: pytest.MonkeyPatch
     measured = np.array(problem.pieces[0].measured)
     measured[:20] += 3.0  # so that another start is asked for
     moved = problem.changed(pieces=[replace(problem.pieces[0], measured=measured)])
-    monkeypatch.setattr("diagnosis.predict.simulate", only_from_the_guess)
+    monkeypatch.setattr("diagnosis.inference.predict.simulate", only_from_the_guess)
     found = predict(moved, 0, np.zeros(len(problem.unknowns)))
     assert len(tried) == 2 and tried[0] > 0.5
     np.testing.assert_array_equal(found.trajectory.T[0], guess)
-    monkeypatch.setattr("diagnosis.predict.simulate", lambda *_, **__: (_ for _ in ()).throw(ArithmeticError("away")))
+    monkeypatch.setattr(
+        "diagnosis.inference.predict.simulate", lambda *_, **__: (_ for _ in ()).throw(ArithmeticError("away"))
+    )
     with pytest.raises(ArithmeticError, match="away"):
         predict(moved, 0, np.zeros(len(problem.unknowns)))

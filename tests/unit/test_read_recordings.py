@@ -13,15 +13,15 @@ import pandas as pd
 import pytest
 
 import diagnosis
-from diagnosis.cleaning import bridged, dropouts, outliers, resolution_of, stuck_rows
-from diagnosis.quantities import UNITS
-from diagnosis.read_recordings import read_recordings
-from diagnosis.recording import Recording
-from diagnosis.shared_rows import check_shared_rows
-from diagnosis.time_axis import part_of
-from models.errors import InputError
-from models.gearbox import Gearbox
-from models.network import ThermalNetwork
+from diagnosis.recordings.cleaning import bridged, dropouts, outliers, resolution_of, stuck_rows
+from diagnosis.recordings.quantities import UNITS
+from diagnosis.recordings.read import read_recordings
+from diagnosis.recordings.recording import Recording
+from diagnosis.recordings.shared_rows import check_shared_rows
+from diagnosis.recordings.time_axis import part_of
+from models.assembly.gearbox import Gearbox
+from models.base.errors import InputError
+from models.simulation.thermal_network import ThermalNetwork
 
 
 @pytest.fixture(scope="module")
@@ -166,7 +166,7 @@ def test_a_date_as_the_end_of_a_part_includes_its_day() -> None:
 def test_rows_are_counted_through_all_parts_of_a_file(
     tmp_path: Path, network: ThermalNetwork, monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
-    monkeypatch.setattr("models.table_file.CHUNK_ROWS", 30)
+    monkeypatch.setattr("models.files.table_file.CHUNK_ROWS", 30)
     source = table()
     source.loc[130, "torque_Nm"] = np.inf
     with pytest.raises(InputError, match="torque_Nm is inf in row 131"):
@@ -465,7 +465,7 @@ def test_a_file_whose_name_has_a_plus_or_an_at_is_a_file(tmp_path: Path, network
 
 def test_reading_does_not_load_the_inference() -> None:
     code = (
-        "import sys; from diagnosis.read_recordings import read_recordings; import diagnosis;"
+        "import sys; from diagnosis.recordings.read import read_recordings; import diagnosis;"
         "print(*sorted(m for m in sys.modules if m.startswith('diagnosis.') or m in ('joblib', 'sympy', 'sklearn')))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

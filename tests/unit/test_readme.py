@@ -6,9 +6,9 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
-from builder.cli import commands
-from builder.signals import signal_table
-from models.gearbox import Gearbox
+from builder.commands.cli import commands
+from builder.fmi.signals import signal_table
+from models.assembly.gearbox import Gearbox
 
 ROOT = Path(__file__).parents[2]
 PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))

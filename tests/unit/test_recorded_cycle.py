@@ -9,11 +9,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from builder.files import read_cycle_and_start
-from builder.recorded_cycle import files_of, read_cycle_or_recording
-from models.errors import InputError
-from models.gearbox import Gearbox, load_gearbox
-from models.network import ThermalNetwork
+from diagnosis.recordings.as_cycle import files_of, read_cycle_or_recording
+from models.assembly.gearbox import Gearbox, load_gearbox
+from models.base.errors import InputError
+from models.files.cycle_file import read_cycle_and_start
+from models.simulation.thermal_network import ThermalNetwork
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 GERMAN = """schema = 1

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from models.root import decreasing_root
-from models.types import Array
+from models.base.root_finding import decreasing_root
+from models.base.types import Array
 
 
 def test_many_roots_at_once() -> None:

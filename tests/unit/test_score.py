@@ -9,16 +9,16 @@ from typing import Any
 
 import pytest
 
-from diagnosis.proof import score
-from diagnosis.proof.answers import Answer
-from diagnosis.proof.conceal import PHYSICS
-from diagnosis.proof.counts import Count, Median
-from diagnosis.proof.outcome import outcome
-from diagnosis.proof.proof_report import page
-from diagnosis.proof.protocol import DATA, MIX, SENSORS, WHOLE, Settings, mix_of, plans_of, tasks_of
-from diagnosis.proof.rules import BY_KEY, ScoredCase
-from models.errors import InputError
-from models.gearbox import Gearbox
+from diagnosis.proof.cases.conceal import PHYSICS
+from diagnosis.proof.scoring import score
+from diagnosis.proof.scoring.answers import Answer
+from diagnosis.proof.scoring.counts import Count, Median
+from diagnosis.proof.scoring.outcome import outcome
+from diagnosis.proof.scoring.proof_report import page
+from diagnosis.proof.scoring.protocol import DATA, MIX, SENSORS, WHOLE, Settings, mix_of, plans_of, tasks_of
+from diagnosis.proof.scoring.rules import BY_KEY, ScoredCase
+from models.assembly.gearbox import Gearbox
+from models.base.errors import InputError
 
 KIN = frozenset({"windage", "churning_swirl"})
 

@@ -5,12 +5,12 @@ from dataclasses import replace
 
 import pytest
 
-from builder.signals import SignalTable, fmi_name, input_column, result_column, signal_table
-from builder.train import TrainingResult
-from builder.units import UNITS
-from models.errors import InputError
-from models.gearbox import Gearbox
-from models.laws import Parameter
+from builder.fmi.signals import SignalTable, fmi_name, input_column, result_column, signal_table
+from builder.surrogate.train import TrainingResult
+from models.assembly.gearbox import Gearbox
+from models.base.errors import InputError
+from models.network.laws import Parameter
+from models.quantities.fmi_units import UNITS
 
 
 @pytest.fixture(scope="module")

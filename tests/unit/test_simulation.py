@@ -7,14 +7,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from builder.train import TrainingResult
-from models.cycle import Cycle
-from models.errors import InputError
-from models.gearbox import load_gearbox
-from models.network import Node, ThermalNetwork
-from models.runtime import efficiency, torque_loss
-from models.simulation import initial_states, input_table, network_system
-from models.surrogate import range_distance
+from builder.surrogate.train import TrainingResult
+from models.assembly.gearbox import load_gearbox
+from models.base.errors import InputError
+from models.files.cycle import Cycle
+from models.portable.evaluation import efficiency, torque_loss
+from models.portable.surrogate import range_distance
+from models.simulation.simulate import initial_states, input_table, network_system
+from models.simulation.thermal_network import Node, ThermalNetwork
 
 GEARBOX = load_gearbox("fzg")
 NETWORK, LOSSES = GEARBOX.network(), GEARBOX.losses()

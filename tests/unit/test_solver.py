@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from models import solver
-from models.solver import Balance, State
-from models.types import Array
+from models.base.types import Array
+from models.portable import solver
+from models.portable.solver import Balance, State
 
 
 @dataclass

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from models.gearbox import load_gearbox
+from models.assembly.gearbox import load_gearbox
 
 TEMPERATURES = (-20.0, 20.0, 45.0)
 SPEEDS = np.array([261.0, 522.0, 1305.0, 2166.0, 3914.0, 5214.0])

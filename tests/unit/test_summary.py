@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from diagnosis.report.page import page
-from diagnosis.result import AHEAD, NOT_ACCEPTED, VERDICT_TEXT, Ranked
+from diagnosis.results.result import AHEAD, NOT_ACCEPTED, VERDICT_TEXT, Ranked
 from tests.unit.diagnosis_example import consistent, missing_physics, unexplained
 
 

@@ -10,11 +10,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from builder.networks import PRESETS, network_specs
-from builder.train import train_surrogate
-from models.errors import InputError
-from models.gearbox import load_gearbox
-from models.surrogate import SurrogateLosses
+from builder.surrogate.networks import PRESETS, network_specs
+from builder.surrogate.train import train_surrogate
+from models.assembly.gearbox import load_gearbox
+from models.base.errors import InputError
+from models.portable.surrogate import SurrogateLosses
 
 SMALL = {
     "samples": 300,

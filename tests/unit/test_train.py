@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from builder.networks import PRESETS, Domain, network_specs
-from builder.train import judge, train_surrogate
-from models.errors import InputError
-from models.gearbox import load_gearbox
+from builder.surrogate.networks import PRESETS, Domain, network_specs
+from builder.surrogate.train import judge, train_surrogate
+from models.assembly.gearbox import load_gearbox
+from models.base.errors import InputError
 
 FZG = load_gearbox("fzg")
 TINY = {"max_iter": 3, "starts": 1, "judged": 20, "hidden": dict.fromkeys(("mesh", "no_load", "bearing"), (2, 2))}

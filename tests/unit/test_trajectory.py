@@ -7,17 +7,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from diagnosis.grid import Piece, pieces
-from diagnosis.network_on_grid import SLOW_NEAR_K, SLOW_REACH_K, NetworkOnGrid, named_values
-from diagnosis.recurrence import lagged
-from diagnosis.shapes import shape_terms
-from diagnosis.term_on_grid import TermOnGrid
-from diagnosis.trajectory import exponential, parameter_heats, settled_balance, simulate
-from models.cycle import Cycle
-from models.gearbox import Gearbox
-from models.laws import symbol
+from diagnosis.forward.grid import Piece, pieces
+from diagnosis.forward.network_on_grid import SLOW_NEAR_K, SLOW_REACH_K, NetworkOnGrid, named_values
+from diagnosis.forward.recurrence import lagged
+from diagnosis.forward.term_on_grid import TermOnGrid
+from diagnosis.forward.trajectory import exponential, parameter_heats, settled_balance, simulate
+from diagnosis.inference.shapes import shape_terms
+from models.assembly.gearbox import Gearbox
+from models.base.types import Array
+from models.files.cycle import Cycle
 from models.mechanisms import CATALOGUE, Scale
-from models.types import Array
+from models.network.laws import symbol
 from tests.unit.inference_example import recording_of
 
 

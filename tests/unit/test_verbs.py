@@ -10,11 +10,11 @@ import pandas as pd
 import pytest
 from click.testing import CliRunner
 
-import builder.build
+import builder.workflows.build
 import diagnosis
-from builder.cli import commands
-from models.correction import Correction, Estimate, write_correction
-from models.gearbox import Gearbox
+from builder.commands.cli import commands
+from models.assembly.gearbox import Gearbox
+from models.correction.correction import Correction, Estimate, write_correction
 from models.mechanisms import CATALOGUE
 
 ROOT = Path(__file__).parents[2]

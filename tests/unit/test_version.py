@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from builder.cli import commands
-from models import version
+from builder.commands.cli import commands
+from models.base import version
 
 
 @pytest.mark.parametrize("foreign", ['[project]\nname = "another"\nversion = "9.9.9"\n', "[tool.x]\n"])

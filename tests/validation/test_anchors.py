@@ -10,11 +10,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from models import ehl
-from models.bearing import heat_dissipation_reference, oil_flow_max
-from models.churning import churning_niemann
-from models.gearbox import load_gearbox
-from models.seal import seal_loss_linke
+from models.assembly.gearbox import load_gearbox
+from models.formulas import ehl
+from models.losses.bearing import heat_dissipation_reference, oil_flow_max
+from models.losses.churning import churning_niemann
+from models.losses.seal import seal_loss_linke
 
 GEARBOX = load_gearbox("fzg")
 LOSSES, NETWORK = GEARBOX.losses(), GEARBOX.network()

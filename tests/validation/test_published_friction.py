@@ -14,10 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from models.friction import friction_schlenk
-from models.gearbox import Gearbox, load_gearbox
-from models.load_sharing import contact_points, load_sharing_loss_factor
-from models.named_oils import lubricant, named_oil
+from models.assembly.gearbox import Gearbox, load_gearbox
+from models.definition.named_oils import lubricant, named_oil
+from models.formulas.load_sharing import contact_points, load_sharing_loss_factor
+from models.losses.friction import friction_schlenk
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ import math
 
 import pytest
 
-from models.geometry import GearPair, gear_pair
+from models.formulas.geometry import GearPair, gear_pair
 
 
 def type_c(b_mm: float, *, tip_shortening: bool) -> GearPair:

@@ -12,8 +12,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-from models import bearing, churning, ehl, friction, heat_transfer, mesh_stiffness, oil, seal
-from models.gearbox import load_gearbox
+from models.assembly.gearbox import load_gearbox
+from models.formulas import ehl, heat_transfer, mesh_stiffness, oil
+from models.losses import bearing, churning, friction, seal
 
 GEARBOX = load_gearbox("fzg")
 PAIR, OIL = GEARBOX.stage[0].pair(), GEARBOX.lubricant()

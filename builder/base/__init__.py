@@ -1,0 +1,1 @@
+"""Terminal output and the options that verbs share."""

@@ -1,0 +1,95 @@
+"""The verbs and their options. Each verb reads its input, calls one function of the house, and shows what came out."""
+
+from __future__ import annotations
+
+import signal
+from pathlib import Path
+from types import FrameType
+
+import click
+
+from builder.base.workers import worker_options
+from builder.commands.conceal import conceal
+from builder.commands.diagnose import diagnose
+from builder.commands.prove import prove
+from builder.commands.simulate import simulate
+from builder.reproduce.command import reproduce
+from models.assembly.gearbox import known_gearboxes, load_gearbox
+from models.base.version import DISTRIBUTION, project_version
+from models.correction.correction import read_correction
+
+GEARBOX_HELP = f"Name ({', '.join(known_gearboxes())}) or definition file (TOML)."
+
+
+def _stop(_number: int, _frame: FrameType | None) -> None:
+    """Let a termination unwind like an interrupt, so that unfinished files are removed."""
+    raise KeyboardInterrupt
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
+@click.version_option(project_version(), prog_name=DISTRIBUTION)
+def commands() -> None:
+    """Power loss and temperatures of cylindrical gearboxes: full model, surrogate and FMU."""
+    signal.signal(signal.SIGTERM, _stop)
+
+
+@commands.command("build-fmu")
+@click.option("--gearbox", default="fzg", show_default=True, metavar="NAME|FILE", help=GEARBOX_HELP)
+@click.option("--target", type=click.Choice(["python", "native", "both"]), default="python", show_default=True,
+              help="Kind of FMU: python (pythonfmu, ONNX networks in onnxruntime), native (C; no Python where it "
+                   "runs), or both.")  # fmt: skip
+@click.option("--platforms", default=None, metavar="all|host|LIST",
+              help="Of a native FMU: all (with ziglang, else this machine's), host, e.g. win64,win32.  "
+                   "[default: all]")  # fmt: skip
+@click.option("--output", type=click.Path(path_type=Path, file_okay=False), default=None, metavar="DIR",
+              help="Folder for the FMU and what belongs to it.  [default: out/<gearbox>]")  # fmt: skip
+@click.option("--correction", type=click.Path(path_type=Path, dir_okay=False), default=None, metavar="FILE",
+              help="What diagnose found: the FMU carries it.")  # fmt: skip
+@click.option("--preset", type=click.Choice(["default", "paper"]), default="default", show_default=True,
+              help="Networks: default, or as printed in the paper (400 points, 2 x 5).")  # fmt: skip
+@click.option("--samples", type=click.IntRange(min=50, max=1_000_000), default=None, metavar="N",
+              help="Training points per network.  [default: by preset]")  # fmt: skip
+@click.option("--seed", type=click.IntRange(min=0, max=2**32 - 1), default=0, show_default=True, metavar="N",
+              help="Seed of samples and starts.")  # fmt: skip
+@worker_options(jobs_help="Processes on this machine; the result does not depend on it.")
+def build_fmu(
+    gearbox: str,
+    target: str,
+    platforms: str | None,
+    output: Path | None,
+    correction: Path | None,
+    preset: str,
+    samples: int | None,
+    seed: int,
+    jobs: int,
+    dask: str | None,
+) -> None:
+    """Train the networks of a gearbox and build its FMU."""
+    from builder.workflows.build import build  # imports scikit-learn and onnx, which the other verbs need not wait for
+
+    if platforms is not None and target == "python":
+        raise click.UsageError("--platforms is about native FMUs: give it with --target native or both")
+    definition = load_gearbox(gearbox)
+    found = None if correction is None else read_correction(correction, definition.network(), made_for=definition)
+    folder = output if output is not None else Path("out") / Path(gearbox).stem
+    report = build(
+        definition,
+        folder,
+        name=Path(gearbox).stem,
+        target=target,
+        platforms=platforms or "all",
+        preset=preset,
+        samples=samples,
+        seed=seed,
+        jobs=jobs,
+        dask=dask,
+        correction=found,
+    )
+    report.show()
+
+
+commands.add_command(simulate)
+commands.add_command(diagnose)
+commands.add_command(reproduce)
+commands.add_command(conceal)
+commands.add_command(prove)

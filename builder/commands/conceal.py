@@ -1,0 +1,85 @@
+"""The verb ``conceal``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from builder.base import console
+from models.assembly.gearbox import load_gearbox
+from models.base.atomic_write import atomic_folder
+from models.base.errors import InputError
+
+
+def _list_effects(context: click.Context, _: click.Parameter, asked: bool) -> None:
+    """List the effects that can be concealed, and exit."""
+    if asked:
+        from diagnosis.proof.cases.conceal import EFFECTS
+
+        rows = [[name, "yes" if effect.catalogue else "no", effect.law] for name, effect in sorted(EFFECTS.items())]
+        console.table("Effects that can be concealed", ["name", "in the catalogue", "law"], rows, text_columns=3)
+        context.exit()
+
+
+@click.command("conceal")
+@click.option("--effect", default=None, metavar="NAME", help="Effect to conceal; --list shows the names.")
+@click.option(
+    "--list", is_flag=True, is_eager=True, expose_value=False, callback=_list_effects, help="Show the effects."
+)
+@click.option("--random", "random", is_flag=True, help="Draw the effects to conceal; there may be none.")
+@click.option("--strength", type=click.FloatRange(min=0.01, max=10.0), default=None, metavar="X",
+              help="Strength relative to the usual one.  [default: drawn from 0.25 to 2]")  # fmt: skip
+@click.option("--seed", type=click.IntRange(min=0, max=2**32 - 1), required=True, metavar="N",
+              help="The same seed gives the same bytes.")  # fmt: skip
+@click.option("--output", type=click.Path(path_type=Path, file_okay=False), required=True, metavar="DIR",
+              help="Folder 'recordings' in it gets the recordings, with --cases one folder per case.")  # fmt: skip
+@click.option("--truth", type=click.Path(path_type=Path, file_okay=False), default=None, metavar="DIR",
+              help="Folder for the truth.  [default: 'truth' in --output]")  # fmt: skip
+@click.option("--cases", type=click.IntRange(min=1, max=10_000), default=None, metavar="N", help="How many cases.")
+@click.option(
+    "--gearbox", default="fzg", show_default=True, metavar="NAME|FILE", help="Name or definition file (TOML)."
+)
+def conceal(
+    effect: str | None,
+    random: bool,
+    strength: float | None,
+    seed: int,
+    output: Path,
+    truth: Path | None,
+    cases: int | None,
+    gearbox: str,
+) -> None:
+    """Make recordings of a gearbox that hides an effect; the truth goes into another folder.
+
+    The recordings come from a separate plant, not from the model: about 22 h to learn from (train_1 to train_3) and
+    6 h to hold out (hold_1, hold_2).
+    """
+    from diagnosis.proof.cases.case_files import keep_apart, keep_other_cases
+    from diagnosis.proof.cases.conceal import conceal_set, random_plans  # imports scipy.signal
+    from diagnosis.proof.cases.concealed_case import Plan
+
+    if (effect is None) == (not random):
+        raise InputError("conceal takes either --effect NAME or --random")
+    if random and strength is not None:
+        raise InputError("--strength goes with --effect; --random draws it")
+    number = 1 if cases is None else cases
+    if effect is None:
+        plans = random_plans(seed, number)
+    else:
+        plans = [Plan(group="single", effects=(effect,), strength=strength)] * number
+    definition = load_gearbox(gearbox)
+    recordings, truth = output / "recordings", truth or output / "truth"
+    keep_apart(recordings, truth)
+    with (
+        atomic_folder(recordings) as stage,
+        atomic_folder(truth) as truth_stage,
+        console.progress_bar("concealing") as progress,
+    ):
+        names = conceal_set(
+            definition, plans, seed=seed, recordings=stage, truth=truth_stage, flat=cases is None, progress=progress
+        )
+        keep_other_cases(stage, recordings)
+        keep_other_cases(truth_stage, truth)
+    for name in names:
+        console.out.print(f"wrote {recordings / ('' if cases is None else name)}, {truth / name}.json")

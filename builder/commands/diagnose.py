@@ -1,0 +1,181 @@
+"""The verb ``diagnose``."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from builder.base import console
+from builder.base.workers import worker_options
+from models.assembly.gearbox import known_gearboxes, load_gearbox
+from models.base.errors import InputError, did_you_mean
+from models.files.output_files import refuse_to_replace
+
+if TYPE_CHECKING:
+    from diagnosis.recordings.recording import Recording
+    from models.assembly.gearbox import Gearbox
+    from models.mechanisms import Mechanism
+
+MOST_NOTES = 8  # on the terminal
+
+
+class _HoldoutOfMany(click.Command):
+    """A command whose ``--holdout`` takes every word up to the next option, as its usage line says."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """Give every held-out recording an option of its own, which is what click can read."""
+        words: list[str] = []
+        held_out = False
+        for place, word in enumerate(args):
+            if word.startswith("-") and words[-1:] == ["--holdout"]:
+                raise click.UsageError(f"--holdout names no recording; {word} follows it", ctx)
+            if word == "--":
+                return super().parse_args(ctx, words + args[place:])
+            if word.startswith("-"):
+                held_out = word.partition("=")[0] == "--holdout"
+            elif held_out and words[-1] != "--holdout":
+                words.append("--holdout")
+            words.append(word)
+        return super().parse_args(ctx, words)
+
+
+@click.command("diagnose", cls=_HoldoutOfMany, options_metavar="")
+@click.argument("recordings", nargs=-1, required=True, metavar="RECORDING... [OPTIONS]")
+@click.option("--gearbox", default="fzg", show_default=True, metavar="NAME|FILE",
+              help=f"Name ({', '.join(known_gearboxes())}) or definition file (TOML).")  # fmt: skip
+@click.option("--holdout", multiple=True, metavar="RECORDING...",
+              help="To judge by: all up to the next option.  [default: the last quarter of each]")  # fmt: skip
+@click.option("--mapping", type=click.Path(path_type=Path, dir_okay=False), default=None, metavar="FILE",
+              help="What the columns mean.  [default: <stem>.toml or mapping.toml beside each]")  # fmt: skip
+@click.option("--mechanisms", type=click.Path(path_type=Path, dir_okay=False), multiple=True,
+              metavar="FILE", help="Your own mechanisms (.toml or .py), beside the catalogue's.")  # fmt: skip
+@click.option("--without-mechanism", "without", multiple=True, metavar="NAME",
+              help="Leave one of the catalogue's mechanisms out; may be given several times.")  # fmt: skip
+@click.option("--output", type=click.Path(path_type=Path, file_okay=False), default=Path("out/diagnosis"),
+              show_default=True, metavar="DIR", help="Folder for the report and what belongs to it.")  # fmt: skip
+@click.option("--false-alarm-rate", type=click.FloatRange(min=1e-4, max=0.5), default=0.05, show_default=True,
+              metavar="P", help="How often recordings that agree may be called inconsistent.")  # fmt: skip
+@click.option("--fleet", is_flag=True,
+              help="RECORDING is a folder with one folder per gearbox; hold* in it is held out.")  # fmt: skip
+@worker_options(dask_help="Scheduler of a Dask cluster that the gearboxes of a fleet are spread over.")
+def diagnose(
+    recordings: tuple[str, ...],
+    gearbox: str,
+    holdout: tuple[str, ...],
+    mapping: Path | None,
+    mechanisms: tuple[Path, ...],
+    without: tuple[str, ...],
+    output: Path,
+    false_alarm_rate: float,
+    jobs: int,
+    fleet: bool,
+    dask: str | None,
+) -> None:
+    """Say whether recordings of a real gearbox agree with its model; if not, where, and by what physics.
+
+    RECORDING is a table (.csv, .csv.gz, .parquet, .mf4) with the columns of a cycle and what was measured:
+    T_<node>_degC, P_loss_W. FILE+FILE joins files that follow each other in time; FILE@start..end is a part.
+
+    Of a fleet every gearbox gets its own report, and all together one table (summary.csv).
+    """
+    from diagnosis import diagnose as run
+    from diagnosis.recordings.read import read_train_and_holdout
+    from diagnosis.report.write import names_of_files, write_files
+    from models.base.atomic_write import atomic_folder
+    from models.mechanisms import CATALOGUE
+    from models.mechanisms.user_files import check_placeable, load_mechanisms
+
+    _check_options(recordings, holdout, dask, fleet=fleet)
+    definition = load_gearbox(gearbox)
+    catalogue = dict(CATALOGUE)
+    for file in mechanisms:
+        own = load_mechanisms(file)
+        check_placeable(own, definition, file)
+        for mechanism in own:
+            if mechanism.name in catalogue:
+                raise InputError(f"{file}: a mechanism {mechanism.name!r} exists already; give yours another name")
+            catalogue[mechanism.name] = mechanism
+    for name in without:
+        if catalogue.pop(name, None) is None:
+            raise InputError(f"--without-mechanism {name}: is not in the catalogue{did_you_mean(name, CATALOGUE)}")
+    if fleet:
+        _diagnose_fleet(Path(recordings[0]), definition, output, mapping=mapping, catalogue=catalogue,
+                        false_alarm_rate=false_alarm_rate, jobs=jobs, dask=dask)  # fmt: skip
+        return
+    train, held = read_train_and_holdout(recordings, holdout, definition.network(), mapping=mapping)
+    given = [
+        *(p for r in (*train, *held) for p in r.files),
+        *mechanisms,
+        Path(gearbox),
+        *([mapping] if mapping else []),
+    ]
+    refuse_to_replace(given, [output / name for name in names_of_files((*train, *held))])
+    _tell_notes((*train, *held))
+    with atomic_folder(output) as stage, _told() as tell:
+        found = run(train, definition, holdout=held, false_alarm_rate=false_alarm_rate, catalogue=catalogue,
+                    jobs=jobs, progress=tell)  # fmt: skip
+        tell("writing the report")
+        names = [path.name for path in write_files(found, definition, [*train, *held], stage)]
+    for line in found.summary():
+        console.out.print(line)
+    console.out.print()
+    for name in names:
+        console.out.print(f"wrote {output / name}")
+
+
+def _tell_notes(recordings: Sequence[Recording]) -> None:
+    """What was cleaned, assumed or not used; all of it stands in the report."""
+    notes = [f"{recording.name}: {note}" for recording in recordings for note in recording.notes]
+    for note in notes[:MOST_NOTES]:
+        console.err.print(f"note: {note}")
+    if len(notes) > MOST_NOTES:
+        console.err.print(f"{len(notes) - MOST_NOTES} more notes stand in the report")
+
+
+def _check_options(recordings: tuple[str, ...], holdout: tuple[str, ...], dask: str | None, *, fleet: bool) -> None:
+    if not fleet and dask is not None:
+        raise click.UsageError(
+            "--dask spreads the gearboxes of a fleet; give --fleet with it, or --jobs for one gearbox"
+        )
+    if fleet and (len(recordings) != 1 or holdout):
+        raise click.UsageError(
+            "--fleet takes one folder, with a folder per gearbox; what is named hold* in it is held out"
+        )
+
+
+def _diagnose_fleet(
+    folder: Path, gearbox: Gearbox, output: Path, *, mapping: Path | None, catalogue: Mapping[str, Mechanism],
+    false_alarm_rate: float, jobs: int, dask: str | None,
+) -> None:  # fmt: skip
+    from builder.workflows.fleet import SUMMARY, diagnose_fleet, members_of, show_summary
+
+    outcomes = diagnose_fleet(
+        members_of(folder, without=output), gearbox, output, mapping=mapping, catalogue=catalogue,
+        false_alarm_rate=false_alarm_rate, jobs=jobs, dask=dask,
+    )  # fmt: skip
+    show_summary([outcome.row for outcome in outcomes])
+    console.out.print(f"wrote {output / SUMMARY}, and a folder for each that was diagnosed")
+    faults = [f"{outcome.row.gearbox}:\n{outcome.fault}" for outcome in outcomes if outcome.fault]
+    for fault in faults:
+        console.err.print(fault, style="red")
+    failed = [f"{outcome.row.gearbox}: {outcome.row.error}" for outcome in outcomes if outcome.row.error]
+    if failed:
+        message = "\n".join([f"{len(failed)} of {len(outcomes)} gearboxes could not be diagnosed:", *failed])
+        if faults:
+            console.err.print(message, style="red")
+            raise SystemExit(1)
+        raise InputError(message)
+
+
+@contextmanager
+def _told() -> Iterator[Callable[[str], None]]:
+    """What is being done, as a changing line on a terminal, nothing in a pipe."""
+    if not console.err.is_terminal:
+        yield lambda _: None
+        return
+    with console.err.status("reading") as status:
+        yield lambda line: status.update(line)

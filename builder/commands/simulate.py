@@ -1,0 +1,272 @@
+"""The verb ``simulate``."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Mapping
+from contextlib import nullcontext
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import click
+import numpy as np
+
+from builder.base import console
+from models.assembly.gearbox import known_gearboxes, load_gearbox
+from models.base.atomic_write import atomic_file
+from models.base.errors import InputError
+from models.base.types import Array
+from models.correction.correction import read_correction
+from models.definition.sections import Training
+from models.files.cycle import COLUMNS, Cycle
+from models.files.cycle_file import RecordedStart, read_cycle_and_start, read_initial
+from models.files.output_files import refuse_to_replace, write_table
+from models.files.table_file import kind_of
+from models.simulation.start_temperatures import start_temperatures
+
+RECORDED = "recorded"  # --initial: as the cycle's own file says
+PLOTS = (".png", ".pdf", ".svg")
+COLD_START_K = 5.0  # that a start differs from what was recorded, and a warning says so
+
+Initial = float | Mapping[str, float] | None
+
+
+@dataclass(frozen=True)
+class Model:
+    """What a cycle is driven with.
+
+    Attributes
+    ----------
+    title : str
+        Its name, for a plot
+    read : callable
+        From the file of a cycle, as named, to the cycle, its recorded start, and notes of what was read how
+    nodes : tuple of str
+        Nodes that have a start temperature
+    domain : str
+        What ``in_domain`` is about, for a warning
+    run : callable
+        From cycle, start temperatures and a function that takes the progress, to the columns of the result
+    groups : mapping of str to tuple of str
+        Nodes that are drawn together
+    """
+
+    title: str
+    read: Callable[[Path], tuple[Cycle, RecordedStart, tuple[str, ...]]]
+    nodes: tuple[str, ...]
+    domain: str
+    run: Callable[[Cycle, Initial, console.Report], dict[str, Array]]
+    groups: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+
+
+def _full_model(name_or_file: str, correction: Path | None, mapping: Path | None) -> Model:
+    from diagnosis.recordings.as_cycle import (
+        read_cycle_or_recording,  # imports the diagnosis; an FMU need not wait for it
+    )
+
+    gearbox = load_gearbox(name_or_file)
+    network = gearbox.network()
+    if correction is not None:
+        network = read_correction(correction, network, made_for=gearbox).network(gearbox)
+    nodes = tuple(part.name for part in network.parts)
+    trained = None if gearbox.is_parametric else gearbox.training
+
+    def run(cycle: Cycle, initial: Initial, progress: console.Report) -> dict[str, Array]:
+        losses = gearbox.loss_laws()
+        return network.simulate(cycle, losses=losses, initial=initial, trained=trained, progress=progress).columns()
+
+    return Model(
+        title=f"{gearbox.name}, full model",
+        read=lambda file: read_cycle_or_recording(file, network, mapping=mapping),
+        nodes=nodes,
+        domain="the domain of the losses" if trained is None else _range_of(trained),
+        run=run,
+        groups=network.groups,
+    )
+
+
+def _range_of(trained: Training) -> str:
+    low, high = trained.temperature_degC
+    return (
+        f"the range that the definition names (speed to {trained.speed_rpm[1]:g} 1/min, torque to "
+        f"{trained.torque_Nm[1]:g} N m, temperatures {low:g} to {high:g} degC)"
+    )
+
+
+def _fmu(path: Path) -> Model:
+    from builder.drive.driver import (  # imports fmpy; the full model need not wait for it
+        drive_fmu,
+        fmu_inputs,
+        fmu_nodes,
+    )
+
+    extra = fmu_inputs(path)
+
+    def run(cycle: Cycle, initial: Initial, progress: console.Report) -> dict[str, Array]:
+        return drive_fmu(path, cycle, initial=initial, progress=progress)
+
+    return Model(
+        title=path.name,
+        read=lambda file: (*read_cycle_and_start(file, extra), ()),
+        nodes=fmu_nodes(path),
+        domain="the surrogate's training domain",
+        run=run,
+    )
+
+
+@click.command("simulate")
+@click.argument("files", nargs=-1, required=True, metavar="[FMU] CYCLE", type=click.Path(path_type=Path))
+@click.option("--gearbox", default=None, metavar="NAME|FILE",
+              help="Drive the full model instead. "
+                   f"Name ({', '.join(known_gearboxes())}) or definition file (TOML).")  # fmt: skip
+@click.option("--output", required=True, type=click.Path(path_type=Path), metavar="FILE",
+              help="Result: .csv, .csv.gz or .parquet.")  # fmt: skip
+@click.option("--output-interval", type=float, default=None, metavar="S",
+              help="Rows of the result also every S seconds.  [default: the cycle's rows only]")  # fmt: skip
+@click.option("--initial", default=None, metavar="T|recorded|FILE",
+              help="Start temperature of all nodes in degC; 'recorded': the first ones in the cycle's own "
+                   "T_<node>_degC columns, their mean for nodes without a column; or a file with such columns of all "
+                   "nodes, whose last row counts (a result to be continued).  [default: first ambient temperature]",
+              )  # fmt: skip
+@click.option("--mapping", type=click.Path(path_type=Path, dir_okay=False), default=None, metavar="FILE",
+              help="What the columns of a recording mean, with --gearbox.  [default: <stem>.toml or mapping.toml "
+                   "beside it]")  # fmt: skip
+@click.option("--correction", type=click.Path(path_type=Path, dir_okay=False), default=None,
+              metavar="FILE", help="What diagnose found: the full model carries it.")  # fmt: skip
+@click.option("--plot", type=click.Path(path_type=Path), default=None, metavar="FILE", help="Plot: .png, .pdf or .svg.")
+def simulate(
+    files: tuple[Path, ...],
+    gearbox: str | None,
+    output: Path,
+    output_interval: float | None,
+    initial: str | None,
+    mapping: Path | None,
+    correction: Path | None,
+    plot: Path | None,
+) -> None:
+    """Drive a CYCLE with an FMU, or with the full model of a gearbox (--gearbox).
+
+    CYCLE is a table (.csv, .csv.gz, .parquet) with the columns time_s, speed_rpm, torque_Nm and, where known,
+    T_ambient_degC and air_speed_m_s. With --gearbox it may be a recording that diagnose reads as well, or a part of
+    one (FILE@start..end), or files that follow each other in time (FILE+FILE).
+    """
+    _check_options(files, gearbox, mapping, correction)
+    named = [Path(name) for name in (gearbox, initial, mapping, correction) if name is not None]
+    _check_outputs(output, plot, inputs=[*_read_as_files(files, gearbox), *named])
+    given = None if initial in (None, RECORDED) else read_initial(str(initial))
+    model = _fmu(files[0]) if gearbox is None else _full_model(gearbox, correction, mapping)
+    cycle, recorded, notes = model.read(files[-1])
+    for note in notes:
+        console.err.print(f"note: {files[-1]}: {note}")
+    start = recorded.of(model.nodes) if initial == RECORDED else given
+    if start is not None:
+        if isinstance(start, Mapping):  # a result also has temperatures of boundaries
+            start = {name: T for name, T in start.items() if name in model.nodes}
+        source = str(recorded.path) if initial == RECORDED else f"--initial {initial}"
+        start = start_temperatures(start, model.nodes, source=source)
+    if output_interval is not None:
+        cycle = cycle.refined(output_interval)
+    with console.progress_bar("simulating") as progress:
+        columns = model.run(cycle, start, progress)
+    with nullcontext() if plot is None else atomic_file(plot) as picture:
+        if picture is not None:
+            from builder.drive.plots import plot_cycle
+
+            plot_cycle(picture, columns, title=f"{model.title}: {files[-1].name}", groups=model.groups)
+        write_table(output, columns)
+    _show(columns)
+    _tell_assumed(columns, cycle)
+    _warn_of_domain(columns, model.domain)
+    if initial is None:
+        _warn_of_start(columns, recorded, model.nodes)
+    for file in (output, plot):
+        if file is not None:
+            console.out.print(f"wrote {file}")
+    sys.stdout.flush()
+
+
+def _check_options(files: tuple[Path, ...], gearbox: str | None, mapping: Path | None, correction: Path | None) -> None:
+    if len(files) > 2 or (len(files) == 2) == (gearbox is not None):
+        raise InputError("simulate takes FMU CYCLE, or --gearbox NAME|FILE and CYCLE")
+    if gearbox is not None:
+        return
+    if correction is not None:
+        raise InputError(
+            "--correction goes with --gearbox; an FMU is built with its correction (build-fmu --correction)"
+        )
+    if mapping is not None:
+        raise InputError(
+            "--mapping goes with --gearbox; an FMU takes plain cycles: simulate the recording with --gearbox, and give "
+            "the result to the FMU"
+        )
+
+
+def _read_as_files(files: tuple[Path, ...], gearbox: str | None) -> tuple[Path, ...]:
+    """What is read, a part of a recording as its file."""
+    if gearbox is None:
+        return files
+    from diagnosis.recordings.as_cycle import files_of
+
+    return tuple(path for file in files for path in files_of(file))
+
+
+def _check_outputs(output: Path, plot: Path | None, inputs: list[Path]) -> None:
+    """Refuse what cannot be written: told before the work, not after it."""
+    if plot is not None and plot.suffix.lower() not in PLOTS:
+        raise InputError(f"{plot}: plots are written as .png, .pdf or .svg")
+    outputs = [output] if plot is None else [output, plot]
+    refuse_to_replace(inputs, outputs)
+    kind_of(output)
+
+
+def _show(columns: Mapping[str, Array]) -> None:
+    inputs = [name for name, *_ in COLUMNS.values()]
+    shown = [n for n in columns if n.startswith("T_") and n.endswith("_degC") and n not in inputs]
+    temperatures = {n[2:-5]: columns[n] for n in shown}
+    rows = [[n, f"{v[0]:.1f}", f"{v.max():.1f}", f"{v[-1]:.1f}"] for n, v in temperatures.items()]
+    console.table("Temperatures in degC", ["node", "first", "highest", "last"], rows)
+    losses = {n: v for n, v in columns.items() if n.startswith("P_loss")}
+    rows = [
+        [
+            n.removeprefix("P_loss_").removesuffix("_W") if n != "P_loss_W" else "total",
+            f"{_mean_over_time(columns['time_s'], v):.1f}",
+            f"{v.max():.1f}",
+        ]
+        for n, v in losses.items()
+    ]
+    console.table("Losses in W", ["loss", "mean over time", "highest"], rows)
+
+
+def _mean_over_time(time: Array, values: Array) -> float:
+    """Of straight lines between the rows; they may be unevenly far apart."""
+    span = time[-1] - time[0]
+    return float(np.trapezoid(values, time) / span if span > 0.0 else values[0])
+
+
+def _tell_assumed(columns: Mapping[str, Array], cycle: Cycle) -> None:
+    for name, (column, *_) in COLUMNS.items():
+        if name not in cycle.inputs and column in columns:
+            console.err.print(f"note: the cycle has no column {column}; {columns[column][0]:g} is assumed")
+
+
+def _warn_of_domain(columns: Mapping[str, Array], domain: str) -> None:
+    outside = int((~columns["in_domain"].astype(bool)).sum())
+    if outside:
+        _warn(f"{outside} of {len(columns['time_s'])} rows are outside {domain}; in_domain shows which")
+
+
+def _warn_of_start(columns: Mapping[str, Array], recorded: RecordedStart, nodes: tuple[str, ...]) -> None:
+    """Who drives a recording and says nothing of its start may take the cold start for the model's error."""
+    off = {name: abs(T - columns[f"T_{name}_degC"][0]) for name, T in recorded.temperatures.items() if name in nodes}
+    worst = max(off, key=lambda name: off[name], default=None)
+    if worst is None or off[worst] <= COLD_START_K:
+        return
+    T, row, start = recorded.temperatures[worst], recorded.rows[worst], columns[f"T_{worst}_degC"][0]
+    _warn(
+        f"{recorded.path}: {recorded.columns[worst]} is {T:.1f} at row {row}, but all nodes start at the first ambient "
+        f"temperature, {start:.1f} degC; --initial {RECORDED} starts as recorded"
+    )
+
+
+def _warn(text: str) -> None:
+    console.err.print(f"warning: {text}", style="yellow")

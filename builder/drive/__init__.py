@@ -1,0 +1,1 @@
+"""Driving an FMU with FMPy, and plots of the results."""

@@ -1,0 +1,409 @@
+"""Driving an FMU through a cycle with FMPy, from file columns to file columns.
+
+A cycle is straight between its rows, an FMU holds its inputs over a step. So a row in which an input changes is cut in
+pieces, and every input value is held half a piece before and half a piece after its moment. The mean over the row is
+right, so slow nodes are followed to second order in the piece, and fast ones have settled to the inputs of the moment
+at which they are read. An FMU that interpolates its inputs (a native one) is given their rates instead.
+"""
+
+from __future__ import annotations
+
+import itertools
+import logging
+import tempfile
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from ctypes import byref
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote
+from zipfile import ZipFile
+
+import fmpy
+import numpy as np
+from fmpy import fmi2
+from fmpy.fmi1 import FMICallException
+
+from builder.fmi.signals import input_column, result_column
+from builder.native.compile import host_platform
+from models.base.errors import InputError, did_you_mean
+from models.base.types import Array
+from models.files.cycle import Cycle
+from models.quantities.fmi_units import UNITS
+from models.simulation.start_temperatures import start_temperatures
+
+logger = logging.getLogger(__name__)
+
+LONGEST_HELD_S = 0.5  # a piece in which an input changes
+LARGEST_CHANGE = {"speed": 25.0, "torque": 5.0}  # [1/min], [N m]: a slower ramp is held longer
+NEEDED = {"speed": "input", "torque": "input", "T_ambient": "input", "loss.total": "output", "initial.T": "parameter"}
+WARNING, DISCARD = 1, 2
+PROGRESS_ROWS = 50
+
+_messages: dict[int | None, list[tuple[int, str]]] = {}  # of every instance, by its component environment
+_environments = itertools.count(1)
+
+
+def drive_fmu(
+    path: Path,
+    cycle: Cycle,
+    *,
+    initial: float | Mapping[str, float] | None = None,
+    parameters: Mapping[str, float] | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> dict[str, Array]:
+    """Drive an FMU through a cycle.
+
+    Parameters
+    ----------
+    path : Path
+        An FMU of this project, of any kind
+    cycle : Cycle
+        Inputs in the units of file columns; straight lines between the rows
+    initial : float, mapping of node name to float, or None
+        Temperatures at the first row, [degC]; by default the first ambient temperature
+    parameters : mapping of name to float, or None
+        Tunable factors, by their name in the network or at the FMI interface
+    progress : callable or None
+        Called with (rows done, rows in all) now and then
+
+    Returns
+    -------
+    dict of column name to Array, shape (N,)
+        The columns of :meth:`models.simulation.simulate.Result.columns`. The FMU's warnings go to the log of this
+        module.
+
+    Raises
+    ------
+    InputError
+        If the file is not such an FMU or damaged, it has no binary for this machine, or it refuses a value or a step.
+    """
+    with loaded(path) as fmu:
+        table = _input_table(fmu, cycle)
+        fmu.set_parameters(parameters or {})
+        fmu.set_initial(float(table[0, fmu.inputs.index("T_ambient")]) if initial is None else initial)
+        return _driven(fmu, cycle.time, table, progress)
+
+
+def runs_here(path: Path) -> bool:
+    """Whether an FMU has a binary for this machine."""
+    with ZipFile(path) as archive:
+        return any(name.startswith(f"binaries/{host_platform()}/") for name in archive.namelist())
+
+
+def fmu_inputs(path: Path) -> tuple[str, ...]:
+    """Columns of a cycle that an FMU takes beside the usual ones (for :func:`models.files.cycle_file.read_cycle`).
+
+    Raises
+    ------
+    InputError
+        If the file is not an FMU of this project.
+    """
+    inputs = [v.name for v in _description(Path(path)).modelVariables if v.causality == "input"]
+    return tuple(input_column(name) for name in inputs if input_column(name) == name.strip("'"))
+
+
+def fmu_nodes(path: Path) -> tuple[str, ...]:
+    """Nodes of an FMU that have a start temperature.
+
+    Raises
+    ------
+    InputError
+        If the file is not an FMU of this project.
+    """
+    return tuple(_starts({v.name: v for v in _description(Path(path)).modelVariables}))
+
+
+@dataclass
+class LoadedFmu:
+    """An FMU that is instantiated, its variables by their meaning, and the messages that it has logged.
+
+    Attributes
+    ----------
+    path : Path
+    description : fmpy.model_description.ModelDescription
+    slave : fmpy.fmi2.FMU2Slave
+    messages : list of (int, str)
+        Status and text, not shown yet
+    doing : str
+        Part of the simulation, for error messages
+    """
+
+    path: Path
+    description: Any
+    slave: Any = None
+    messages: list[tuple[int, str]] = field(default_factory=list)
+    doing: str = ""
+
+    def __post_init__(self) -> None:
+        """Find the variables."""
+        variables = self.description.modelVariables
+        self.variables = {v.name: v for v in variables}
+        self._inputs = [v for v in variables if v.causality == "input"]
+        self.inputs = [v.name.strip("'") for v in self._inputs]
+        self._outputs = [v for v in variables if v.causality == "output" and result_column(v.name) is not None]
+        self._references = {
+            kind: [v.valueReference for v in self._outputs if v.type == kind] for kind in ("Real", "Boolean")
+        }
+        self._input_references = [v.valueReference for v in self._inputs]
+        self._orders = [1] * len(self._inputs)
+        self._to_si = [UNITS[v.unit].column[1:] if v.unit in UNITS else (1.0, 0.0) for v in self._inputs]
+
+    def defaults(self) -> list[float]:
+        """Start values of the inputs in the units of file columns."""
+        return [_to_column(v, float(v.start)) for v in self._inputs]
+
+    def set_inputs(self, values: Sequence[float]) -> None:
+        """Set all inputs, given in the units of file columns."""
+        self.slave.setReal(self._input_references, [(v - b) / a for v, (a, b) in zip(values, self._to_si, strict=True)])
+
+    @property
+    def interpolates(self) -> bool:
+        """True if inputs can change linearly through a step."""
+        return bool(self.description.coSimulation.canInterpolateInputs)
+
+    def set_rates(self, values: Sequence[float]) -> None:
+        """Set the rates of all inputs during the next step, given in the units of file columns per second."""
+        rates = [v / a for v, (a, _) in zip(values, self._to_si, strict=True)]
+        self.slave.setRealInputDerivatives(self._input_references, self._orders, rates)
+
+    def outputs(self) -> tuple[list[float], list[int]]:
+        """Reals in the FMU's own units, and Booleans."""
+        return self.slave.getReal(self._references["Real"]), self.slave.getBoolean(self._references["Boolean"])
+
+    def columns(self, rows: Sequence[tuple[list[float], list[int]]]) -> dict[str, Array]:
+        """Columns of rows of :meth:`outputs`, in the order of the FMU."""
+        reals, booleans = (iter(np.array(values).T) for values in zip(*rows, strict=True))
+        return {
+            str(result_column(v.name)): _to_column(v, next(reals)) if v.type == "Real" else next(booleans).astype(bool)
+            for v in self._outputs
+        }
+
+    def set_parameters(self, parameters: Mapping[str, float]) -> None:
+        """Set tunable factors."""
+        known = {name: v for name, v in self.variables.items() if v.variability == "tunable"}
+        for name, value in parameters.items():
+            variable = known.get(name) or known.get(f"factor.{name}")
+            if variable is None:
+                hint = did_you_mean(name, known)
+                raise InputError(f"{self.path}: {name!r} is not a tunable parameter of this FMU{hint}")
+            self.slave.setReal([variable.valueReference], [float(value)])
+
+    def set_initial(self, initial: float | Mapping[str, float]) -> None:
+        """Set start temperatures, [degC]: one for all nodes, or all parts by name."""
+        starts = _starts(self.variables)
+        nodes = [v.name.removesuffix(".T").strip("'") for v in self._outputs if v.name.endswith(".T")]
+        temperatures = start_temperatures(initial, list(starts), known=nodes, source=str(self.path))
+        self.slave.setBoolean([self.variables["initial.uniform"].valueReference], [not isinstance(initial, Mapping)])
+        if not isinstance(initial, Mapping):
+            self._set_real(self.variables["initial.T"], initial)
+            return
+        for name, variable in starts.items():
+            self._set_real(variable, temperatures[name])
+
+    def _set_real(self, variable: Any, value: float) -> None:
+        scale, offset = UNITS[variable.unit].column[1:]
+        self.slave.setReal([variable.valueReference], [(float(value) - offset) / scale])
+
+    def report_messages(self, when: str) -> None:
+        """Pass the FMU's warnings on.
+
+        Raises
+        ------
+        InputError
+            If it has logged an error.
+        """
+        messages, self.messages[:] = list(self.messages), []
+        faults = [text for status, text in messages if status > WARNING]
+        if faults:
+            raise InputError(f"{self.path}: {when}: " + "; ".join(faults))
+        for status, text in messages:
+            if status == WARNING:
+                logger.warning("%s: %s", self.path, text)
+
+
+@contextmanager
+def loaded(path: Path) -> Iterator[LoadedFmu]:
+    """An FMU of this project, extracted to a folder of its own and instantiated; both are gone at the end.
+
+    Raises
+    ------
+    InputError
+        If the file is not such an FMU, is damaged, or has no binary for this machine; and, from the block, if the FMU
+        refuses a call.
+    """
+    path = Path(path)
+    fmu = LoadedFmu(path, _description(path))
+    with tempfile.TemporaryDirectory(prefix="twin-fmu-") as folder, _logged_to(fmu.messages) as callbacks:
+        _extract(path, Path(folder))
+        identifier = fmu.description.coSimulation.modelIdentifier
+        # FMI 2.0 names the folders of ARM as FMI 3.0 does; FMPy alone would take those of x86.
+        names = [Path(folder, "binaries", name, identifier + fmpy.sharedLibraryExtension)
+                 for name in (fmpy.platform_tuple, fmpy.platform)]  # fmt: skip
+        binary = next((name for name in names if name.is_file()), names[-1])
+        if not binary.is_file():
+            raise InputError(f"{path}: has no binary for {fmpy.platform}; build the FMU for this machine")
+        try:
+            fmu.slave = fmi2.FMU2Slave(
+                guid=fmu.description.guid, modelIdentifier=identifier, unzipDirectory=folder, instanceName=path.stem,
+                libraryPath=str(binary),
+            )  # fmt: skip
+        except Exception as error:  # fmpy raises plain Exception
+            raise InputError(f"{path}: its binary cannot be loaded: {error}") from error
+        fmu.slave.component = fmu.slave.fmi2Instantiate(
+            path.stem.encode(), fmi2.fmi2CoSimulation, fmu.description.guid.encode(), _uri(Path(folder, "resources")),
+            byref(callbacks), False, True,
+        )  # fmt: skip
+        if not fmu.slave.component:
+            fmu.slave.freeLibrary()
+            fmu.report_messages("it cannot be instantiated")
+            raise InputError(f"{path}: it cannot be instantiated, and does not say why; build the FMU again")
+        dead = False
+        try:
+            yield fmu
+        except FMICallException as error:
+            dead = error.status > DISCARD + 1
+            doing = fmu.doing or error.function
+            fmu.report_messages(doing)
+            raise InputError(f"{path}: {doing}: {error}") from error
+        finally:
+            if not dead:
+                with suppress(FMICallException):
+                    fmu.slave.terminate()
+                fmu.slave.freeInstance()
+
+
+def _driven(fmu: LoadedFmu, time: Array, table: Array, progress: Callable[[int, int], None] | None) -> dict[str, Array]:
+    slave, n_rows = fmu.slave, len(time)
+    slave.setupExperiment(startTime=float(time[0]))
+    slave.enterInitializationMode()
+    fmu.set_inputs(table[0].tolist())
+    slave.exitInitializationMode()
+    fmu.report_messages("its start values")
+    outputs = [fmu.outputs()]
+    fmu.report_messages(f"at {time[0]:g} s")
+    component, do_step = slave.component, slave.fmi2DoStep
+    for row in range(n_rows - 1):
+        begin, end = float(time[row]), float(time[row + 1])
+        change = table[row + 1] - table[row]
+        fmu.doing = f"between {begin:g} and {end:g} s"
+        pieces = _pieces(fmu.inputs, end - begin, table[row], table[row + 1])
+        if fmu.interpolates:
+            fmu.set_inputs(table[row].tolist())
+            if change.any():
+                fmu.set_rates((change / (end - begin)).tolist())
+            do_step(component, begin, end - begin, 1)
+        elif pieces == 0:
+            do_step(component, begin, end - begin, 1)
+        else:
+            half = (end - begin) / (2 * pieces)
+            do_step(component, begin, half, 1)
+            for piece in range(1, pieces):
+                share = piece / pieces
+                fmu.set_inputs(((1.0 - share) * table[row] + share * table[row + 1]).tolist())
+                do_step(component, begin + (2 * piece - 1) * half, 2.0 * half, 1)
+            fmu.set_inputs(table[row + 1].tolist())
+            do_step(component, end - half, half, 1)
+        outputs.append(fmu.outputs())
+        if fmu.messages:
+            fmu.report_messages(f"at {end:g} s")
+        if progress is not None and (row % PROGRESS_ROWS == PROGRESS_ROWS - 1 or row == n_rows - 2):
+            progress(row + 1, n_rows - 1)
+    columns = {"time_s": time} | {input_column(name): table[:, i] for i, name in enumerate(fmu.inputs)}
+    return columns | fmu.columns(outputs)
+
+
+def _pieces(names: Sequence[str], duration: float, begin: Array, end: Array) -> int:
+    """Into how many pieces a row is cut: of 0.5 s where an input ramps, longer where it changes little; 0 at rest."""
+    change = max(abs(b - a) / LARGEST_CHANGE.get(n, 1.0) for n, a, b in zip(names, begin, end, strict=True))
+    return min(int(np.ceil(duration / LONGEST_HELD_S)), int(np.ceil(change)))
+
+
+def _input_table(fmu: LoadedFmu, cycle: Cycle) -> Array:
+    """Inputs in the FMU's order, start values where the cycle has none, shape (N, inputs)."""
+    starts = zip(fmu.inputs, fmu.defaults(), strict=True)
+    return np.stack([cycle.inputs.get(name, np.full(len(cycle), start)) for name, start in starts], axis=-1)
+
+
+def _starts(variables: Mapping[str, Any]) -> dict[str, Any]:
+    """Variables of start temperatures by node."""
+    return {n.removesuffix(".T_start").strip("'"): v for n, v in variables.items() if n.endswith(".T_start")}
+
+
+def _description(path: Path) -> Any:
+    """The model description of an FMU of this project."""
+    try:
+        if path.is_dir():
+            inside = sorted(path.glob("*.fmu"))
+            raise InputError(f"{path}: is not a file but a folder; name an FMU{f', as {inside[0]}' if inside else ''}")
+        if not path.is_file():
+            raise InputError(f"{path}: no such file")
+    except OSError as error:  # a name that is too long, a folder that may not be read
+        raise InputError(f"{path}: cannot be read ({error.strerror})") from error
+    try:
+        with path.open("rb") as file:  # which fmpy would leave open where it fails
+            description = fmpy.read_model_description(file, validate=False)
+    except Exception as error:  # whatever zipfile, lxml or fmpy find, it is not an FMU
+        first = next(iter(str(error).splitlines()), type(error).__name__)
+        raise InputError(f"{path}: is not an FMU, or is damaged ({first}); build it again with build-fmu") from error
+    if description.fmiVersion != "2.0" or description.coSimulation is None:
+        raise InputError(
+            f"{path}: is an FMU of FMI {description.fmiVersion}; FMI 2.0 for co-simulation, as of build-fmu, is needed"
+        )
+    names = {v.name: v.causality for v in description.modelVariables}
+    missing = [name for name, causality in NEEDED.items() if names.get(name) != causality]
+    if missing:
+        raise InputError(
+            f"{path}: is an FMU of another model: it has no {', '.join(missing)}; give one that build-fmu made"
+        )
+    return description
+
+
+def _extract(path: Path, folder: Path) -> None:
+    try:
+        fmpy.extract(str(path), str(folder))
+    except Exception as error:  # fmpy raises plain Exception for unsafe paths, zipfile and zlib their own
+        raise InputError(f"{path}: is damaged ({error}); build it again with build-fmu") from error
+
+
+def _uri(resources: Path) -> bytes:
+    """URI of the resources of an FMU; pythonfmu crashes on an encoded one, as it decodes nothing but blanks."""
+    uri = resources.resolve().as_uri()
+    return (unquote(uri) if (resources / "slavemodule.txt").is_file() else uri).encode()
+
+
+def _log(environment: int | None, instance: bytes, status: int, category: bytes, message: bytes) -> None:
+    """Add a message to the list of its instance; messages of instances that others made go to FMPy's own logger.
+
+    FMPy's C part keeps one logger for the whole process, so this one is never freed.
+    """
+    messages = _messages.get(environment)
+    if messages is None:
+        fmi2.printLogMessage(environment, instance, status, category, message)
+    else:
+        messages.append((status, message.decode("utf-8", "replace").strip()))
+
+
+_LOGGER = fmi2.fmi2CallbackLoggerTYPE(_log)
+
+
+@contextmanager
+def _logged_to(messages: list[tuple[int, str]]) -> Iterator[Any]:
+    """Callbacks for one instance, whose messages are added to a list."""
+    callbacks = fmi2.fmi2CallbackFunctions()
+    callbacks.logger = _LOGGER
+    callbacks.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(fmpy.calloc)
+    callbacks.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(fmpy.free)
+    callbacks.componentEnvironment = next(_environments)
+    fmi2.addLoggerProxy(byref(callbacks))
+    _messages[callbacks.componentEnvironment] = messages
+    try:
+        yield callbacks
+    finally:
+        del _messages[callbacks.componentEnvironment]
+
+
+def _to_column(variable: Any, value: Any) -> Any:
+    scale, offset = UNITS[variable.unit].column[1:] if variable.unit in UNITS else (1.0, 0.0)
+    return value * scale + offset

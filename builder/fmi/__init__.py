@@ -1,0 +1,1 @@
+"""What all FMUs share: signals, model description, documentation, packaging."""

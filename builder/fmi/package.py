@@ -1,0 +1,120 @@
+"""Parts that every FMU of a gearbox has, and the archive that they go into."""
+
+from __future__ import annotations
+
+import re
+import zipfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from builder.fmi.documentation import Kind, documentation
+from builder.fmi.model_description import Identity
+from builder.fmi.reference import reference_run
+from builder.fmi.signals import SignalTable
+from builder.surrogate.train import TrainingResult
+from models.assembly.gearbox import Gearbox
+from models.base.atomic_write import atomic_file
+from models.base.errors import InputError
+from models.base.version import project_version
+from models.correction.correction import Correction
+from models.portable.surrogate import SurrogateLosses
+from models.simulation.thermal_network import ThermalNetwork
+
+AUTHOR = "gearbox-thermal-twin"
+EARLIEST = (1980, 1, 1, 0, 0, 0)  # time of files in a zip file
+
+
+def gearbox_identity(
+    gearbox: Gearbox, output: Path, flags: Mapping[str, bool], correction: Correction | None
+) -> Identity:
+    """Description of an FMU of a gearbox."""
+    version = project_version()
+    model = "reduced-order twin of a detailed loss model" + ("" if correction is None else f", {correction.words}")
+    return Identity(
+        model_name=gearbox.name,
+        model_identifier=model_identifier(output.stem),
+        description=f"Power loss and temperatures of {gearbox.name}: {model}",
+        version=version,
+        author=AUTHOR,
+        license="MIT; see documentation/licenses",
+        copyright="See documentation/licenses",
+        generation_tool=f"gearbox-thermal-twin {version}",
+        flags=flags,
+    )
+
+
+def gearbox_pages(
+    gearbox: Gearbox,
+    network: ThermalNetwork,
+    table: SignalTable,
+    identity: Identity,
+    training: TrainingResult,
+    data: Mapping[str, Any],
+    *,
+    kind: Kind,
+) -> dict[str, bytes]:
+    """Documentation of an FMU of a gearbox, by path in the archive; `data` is that of :func:`builder.fmi.twin_data`."""
+    reference = reference_run(gearbox, network, table, data, training.losses)
+    return documentation(gearbox, table, identity, training, reference, kind=kind)
+
+
+def model_identifier(name: str) -> str:
+    """A name as C identifier, as FMI wants it.
+
+    Examples
+    --------
+    >>> model_identifier("fzg"), model_identifier("2 stage-box")
+    ('fzg', 'gearbox_2_stage_box')
+    """
+    plain = re.sub(r"[^A-Za-z0-9_]", "_", name)
+    return plain if re.match(r"[A-Za-z]", plain) else f"gearbox_{plain}"
+
+
+def refuse_mismatch(network: ThermalNetwork, losses: SurrogateLosses, networks: Sequence[Path]) -> None:
+    """Refuse laws that are no expressions, and networks of another gearbox.
+
+    Raises
+    ------
+    InputError
+    """
+    if network.numeric_laws:
+        raise InputError(
+            f"{', '.join(network.numeric_laws)}: this law branches on values or calls numpy, so it simulates but "
+            "cannot go into an FMU; write it with arithmetic, sympy functions and sympy.Piecewise"
+        )
+    if tuple(losses.components) != tuple(network.components):
+        raise InputError("the networks were trained for another gearbox; train them for this one")
+    missing = {f"{trained.name}.onnx" for trained in losses.networks} - {path.name for path in networks}
+    if missing:
+        raise InputError(f"the ONNX files {', '.join(sorted(missing))} are missing; export the networks again")
+
+
+def package_fmu(output: Path, description: bytes, *parts: Mapping[str, bytes]) -> None:
+    """Write an FMU.
+
+    Parameters
+    ----------
+    output : Path
+    description : bytes
+        ``modelDescription.xml``
+    *parts : mapping of path to bytes
+        Binaries, resources, sources, documentation by their path in the archive
+
+    Raises
+    ------
+    InputError
+        If the folder cannot be written to.
+    """
+    content = {name: file for part in parts for name, file in part.items()} | {"modelDescription.xml": description}
+    with atomic_file(output) as partial:
+        write_archive(partial, content)
+
+
+def write_archive(target: Path, content: Mapping[str, bytes]) -> None:
+    """Write a zip archive: sorted, without times, deflated, so that the same content gives the same bytes."""
+    with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as archive:
+        for name in sorted(content):
+            entry = zipfile.ZipInfo(name, date_time=EARLIEST)
+            entry.compress_type, entry.create_system, entry.external_attr = zipfile.ZIP_DEFLATED, 3, 0o644 << 16
+            archive.writestr(entry, content[name], compresslevel=9)

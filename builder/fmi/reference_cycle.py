@@ -1,0 +1,56 @@
+"""The 600 s drive cycle that every build is tried on, after the kind of the paper's fig. 10."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from models.assembly.gearbox import Gearbox
+from models.files.cycle import Cycle
+
+# time [s], speed and torque as shares of the upper training bounds: cold start at low load, a phase of constant power,
+# high torque, and back to the load of the start. The paper prints the curve without numbers.
+KNOTS = np.array([
+    [0.0, 0.08, 0.06],
+    [60.0, 0.08, 0.06],
+    [90.0, 0.35, 0.25],
+    [300.0, 0.35, 0.25],
+    [330.0, 0.25, 0.80],
+    [450.0, 0.25, 0.80],
+    [480.0, 0.08, 0.06],
+    [600.0, 0.08, 0.06],
+])  # fmt: skip
+COLD_START = 20.0  # degC
+
+
+def reference_cycle(gearbox: Gearbox, *, step_s: float = 1.0) -> Cycle:
+    """The reference cycle of a gearbox, scaled to its training bounds.
+
+    Parameters
+    ----------
+    gearbox : Gearbox
+    step_s : float
+        Distance of the rows, [s]; a divisor of 600
+
+    Returns
+    -------
+    Cycle
+        600 s at 20 degC ambient
+
+    Examples
+    --------
+    >>> from models.assembly.gearbox import load_gearbox
+    >>> cycle = reference_cycle(load_gearbox("fzg"))
+    >>> len(cycle), float(cycle.inputs["torque"].max())
+    (601, 280.0)
+    """
+    time = np.linspace(0.0, KNOTS[-1, 0], round(KNOTS[-1, 0] / step_s) + 1)
+    speed = np.interp(time, KNOTS[:, 0], KNOTS[:, 1]) * gearbox.training.speed_rpm[1]
+    torque = np.interp(time, KNOTS[:, 0], KNOTS[:, 2]) * gearbox.training.torque_Nm[1]
+    columns = {
+        "time_s": time,
+        "speed_rpm": speed,
+        "torque_Nm": torque,
+        "T_ambient_degC": np.full_like(time, COLD_START),
+        "air_speed_m_s": np.full_like(time, gearbox.ambient.air_speed_m_s),
+    }
+    return Cycle.from_columns(columns)

@@ -1,0 +1,390 @@
+"""The table of signals: everything that an FMU takes and shows, said once.
+
+From this table come the model description of every kind of FMU, the value references inside it, the columns that
+driving one gives, and the nomenclature in the documentation. Signals are in SI units at the FMI interface; the network
+and all files work in the units of the file columns (1/min, degC), and :data:`models.quantities.fmi_units.UNITS`
+converts.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from math import inf
+from typing import Literal
+
+import sympy as sp
+
+from models.assembly.gearbox import Gearbox
+from models.base.errors import InputError, did_you_mean
+from models.files.cycle import COLUMNS
+from models.portable.surrogate import SurrogateLosses
+from models.quantities.fmi_units import SAME_UNIT, TYPES, UNITS
+from models.simulation.thermal_network import ThermalNetwork
+
+START_TEMPERATURE = 293.15  # K
+INITIAL = ("initial.uniform", "initial.T")
+HEADER = ("signal", "kind", "unit", "shown in", "column of files", "start", "range", "trained on", "meaning")
+LOWEST_START, HIGHEST_START = 173.15, 773.15  # K; what lies outside is most likely degC
+
+Role = Literal[
+    "input", "temperature", "total_loss", "loss", "heat", "torque_loss", "efficiency", "in_domain", "domain_distance",
+    "initial_uniform", "initial_temperature", "start_temperature", "factor", "state", "other",
+]  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class Signal:
+    """One variable of the FMU.
+
+    Attributes
+    ----------
+    name : str
+        At the FMI interface, structured: ``oil.T``
+    role : Role
+        What it is, and `of` the name that the network has for it (a node, a loss, a parameter); "other" in the FMU of
+        another model than a gearbox's network
+    description : str
+    type : str or None
+        Key of :data:`models.quantities.fmi_units.TYPES`; None for a Boolean and for a Real of `unit`
+    unit : str or None
+        Key of :data:`models.quantities.fmi_units.UNITS`; None for a Boolean, and where the network does not say
+    causality, variability, initial : str
+        As FMI 2.0 defines them; `initial` is "" where FMI gives it
+    start : float, bool or None
+    minimum, maximum : float
+        Infinite where there is no bound
+    nominal : float or None
+    domain : (float, float) or None
+        Range that the networks were trained on, in `unit`
+    column : str or None
+        Column of cycle and result files
+    depends, depends_initially : tuple of str
+        Signals that an output depends on directly, and at initialization
+    reference : int
+        FMI value reference, its place in the table
+    """
+
+    name: str
+    role: Role
+    of: str = ""
+    description: str
+    type: str | None = None
+    unit: str | None = None
+    causality: Literal["input", "output", "parameter", "local"]
+    variability: Literal["continuous", "discrete", "fixed", "tunable"]
+    initial: Literal["exact", "calculated", ""]
+    start: float | bool | None = None
+    minimum: float = -inf
+    maximum: float = inf
+    nominal: float | None = None
+    domain: tuple[float, float] | None = None
+    column: str | None = None
+    depends: tuple[str, ...] = ()
+    depends_initially: tuple[str, ...] = ()
+    reference: int = -1
+
+    @property
+    def is_boolean(self) -> bool:
+        """Whether it is a Boolean; all others are Real."""
+        return self.role in ("in_domain", "initial_uniform")
+
+    @property
+    def display(self) -> str | None:
+        """Unit in which a tool should show it, where that is not `unit`."""
+        return TYPES[self.type].display if self.type is not None else None
+
+
+class SignalTable:
+    """All signals of one FMU in the order of their value references.
+
+    Raises
+    ------
+    InputError
+        If two signals have the same name.
+    """
+
+    def __init__(self, signals: Sequence[Signal]) -> None:
+        self.signals = tuple(replace(signal, reference=index) for index, signal in enumerate(signals))
+        names = [signal.name for signal in self.signals]
+        for name in names:
+            if names.count(name) > 1:
+                raise InputError(f"two signals of the FMU would be called {name!r}; rename a node, source or parameter")
+
+    def __iter__(self) -> Iterator[Signal]:
+        return iter(self.signals)
+
+    def __len__(self) -> int:
+        return len(self.signals)
+
+    @cached_property
+    def _by_name(self) -> dict[str, Signal]:
+        return {signal.name: signal for signal in self.signals}
+
+    def __getitem__(self, name: str) -> Signal:
+        try:
+            return self._by_name[name]
+        except KeyError:
+            raise InputError(f"the FMU has no signal {name!r}{did_you_mean(name, self._by_name)}") from None
+
+    def of_role(self, *roles: Role) -> tuple[Signal, ...]:
+        """The signals of some roles, in order."""
+        return tuple(signal for signal in self.signals if signal.role in roles)
+
+    def markdown(self) -> str:
+        """The nomenclature as a Markdown table.
+
+        Examples
+        --------
+        >>> from models.assembly.gearbox import load_gearbox
+        >>> lines = signal_table(load_gearbox("fzg")).markdown().splitlines()
+        >>> lines[2][:72]
+        '| `speed` | input | rad/s | rpm | `speed_rpm` | 0 | -20944 ... 20944 | 0'
+        """
+        header, *rows = nomenclature(self)
+        lines = ["| " + " | ".join(header) + " |", "|" + "---|" * len(header)]
+        for row in rows:
+            cells = [f"`{cell}`" if index in (0, 4) and cell else cell for index, cell in enumerate(row)]
+            lines.append("| " + " | ".join(cells) + " |")
+        return "\n".join(lines) + "\n"
+
+
+def nomenclature(table: SignalTable) -> list[tuple[str, ...]]:
+    """The table for people: a header and one row of texts per signal."""
+    rows: list[tuple[str, ...]] = [HEADER]
+    for signal in table:
+        kind = f"{signal.variability} {signal.causality}" if signal.causality == "parameter" else signal.causality
+        bounds = ("" if abs(bound) == inf else f"{bound:.5g}" for bound in (signal.minimum, signal.maximum))
+        low, high = bounds
+        start = {True: "true", False: "false"}[signal.start] if isinstance(signal.start, bool) else signal.start
+        rows.append((
+            signal.name,
+            kind,
+            "Boolean" if signal.is_boolean else signal.unit or "",
+            signal.display or "",
+            signal.column or "",
+            "" if start is None else start if isinstance(start, str) else f"{start:.5g}",
+            f"{low} ... {high}" if low or high else "",
+            "" if signal.domain is None else f"{signal.domain[0]:.5g} ... {signal.domain[1]:.5g}",
+            signal.description,
+        ))  # fmt: skip
+    return rows
+
+
+def fmi_name(name: str) -> str:
+    """A name of the network as one level of a structured FMI name: quoted where it is no plain identifier.
+
+    Examples
+    --------
+    >>> fmi_name("bearing_1"), fmi_name("oil-air (extra)")
+    ('bearing_1', "'oil-air (extra)'")
+    """
+    if re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]*", name):
+        return name
+    return "'" + re.sub(r"[^A-Za-z0-9_!#$%&()*+,\-./:;<>=?@\[\]^{}|~ ]", "_", name) + "'"
+
+
+def result_column(name: str) -> str | None:
+    """Column of a result file for an output of an FMU; None for one that has no column.
+
+    Examples
+    --------
+    >>> result_column("oil.T"), result_column("loss.total"), result_column("loss.seal_1"), result_column("heat.extra")
+    ('T_oil_degC', 'P_loss_W', 'P_loss_seal_1_W', None)
+    """
+    if name in ("in_domain", "efficiency"):
+        return name
+    if name == "torque_loss":
+        return "torque_loss_Nm"
+    if name == "loss.total":
+        return "P_loss_W"
+    if name.endswith(".T"):
+        return f"T_{name[:-2].strip(chr(39))}_degC"
+    if name.startswith("loss."):
+        return f"P_loss_{name[5:].strip(chr(39))}_W"
+    return None
+
+
+def input_column(name: str) -> str:
+    """Column of a cycle file for an input of an FMU: its usual one, else its own name."""
+    return COLUMNS[name][0] if name in COLUMNS else name.strip("'")
+
+
+def signal_table(
+    gearbox: Gearbox, network: ThermalNetwork | None = None, losses: SurrogateLosses | None = None
+) -> SignalTable:
+    """The signals of a gearbox.
+
+    Parameters
+    ----------
+    gearbox : Gearbox
+    network : ThermalNetwork or None
+        Its network, where it is not the nominal one
+    losses : SurrogateLosses or None
+        The trained losses, whose domain is shown; by default that of the definition's ``[training]``
+
+    Raises
+    ------
+    InputError
+        If two signals would get the same name.
+
+    Examples
+    --------
+    >>> from models.assembly.gearbox import load_gearbox
+    >>> table = signal_table(load_gearbox("fzg"))
+    >>> table["oil.T"].unit, table["oil.T"].column
+    ('K', 'T_oil_degC')
+    """
+    network = gearbox.network() if network is None else network
+    training = gearbox.training
+    domain = (training.speed_rpm, training.torque_Nm, training.temperature_degC)
+    if losses is not None:
+        domain = (losses.speed_bounds, losses.torque_bounds, losses.temperature_bounds)
+    return SignalTable(list(_Table(gearbox, network, domain).signals()))
+
+
+class _Table:
+    """The network at hand while its signals are listed."""
+
+    def __init__(self, gearbox: Gearbox, network: ThermalNetwork, domain: tuple[tuple[float, float], ...]) -> None:
+        self.network = network
+        self.domain = dict(zip(("speed", "torque", "temperature"), domain, strict=True))
+        self.inputs = ("speed", "torque", *network.inputs)
+        self.parameters = {parameter.name: self._parameter_name(parameter.name) for parameter in network.parameters}
+        self.boundaries = {node.name: node.temperature for node in network.nodes if node.temperature is not None}
+        self.loss_nodes = gearbox.losses().temperature_nodes
+
+    def signals(self) -> Iterator[Signal]:
+        yield from self._inputs()
+        yield from self._temperatures()
+        yield from self._powers()
+        yield from self._quality()
+        yield from self._initial()
+        yield from self._factors()
+        for state in self.network.states:
+            yield Signal(name=f"state.{fmi_name(state.name)}", role="state", of=state.name, causality="local",
+                         variability="continuous", initial="calculated", nominal=max(abs(state.start), 1.0),
+                         description=f"Memory {state.name} of the thermal network")  # fmt: skip
+
+    def _domain(self, signal: str) -> tuple[float, float] | None:
+        if signal not in self.domain:
+            return None
+        low, high = self.domain[signal]
+        unit = UNITS[{"speed": "rad/s", "torque": "N.m", "temperature": "K"}[signal]]
+        return unit.from_column(low), unit.from_column(high)
+
+    def _inputs(self) -> Iterator[Signal]:
+        known = {
+            "speed": ("Speed", "Speed of the input shaft; its sign does not change the losses"),
+            "torque": ("Torque", "Torque at the input shaft; positive with positive speed drives"),
+            "T_ambient": ("Temperature", "Ambient temperature, in kelvin"),
+            "air_speed": ("AirSpeed", "Speed of the air along the housing"),
+        }
+        defaults = {"speed": 0.0, "torque": 0.0, **self.network.inputs}
+        for name in self.inputs:
+            kind, text = known.get(name, (None, f"Input {name}, in the unit of its column"))
+            unit = TYPES[kind].unit if kind else None
+            low, high = COLUMNS[name][1:3] if name in COLUMNS else (-inf, inf)
+            convert = UNITS[unit].from_column if unit else float
+            yield Signal(
+                name=fmi_name(name), role="input", of=name, description=text, type=kind, unit=unit, causality="input",
+                variability="continuous", initial="", start=convert(defaults[name]), minimum=convert(low),
+                maximum=convert(high), domain=self._domain(name), column=input_column(name),
+                nominal=TYPES[kind].nominal if kind else None,
+            )  # fmt: skip
+
+    def _output(self, *, name: str, role: Role, of: str = "", kind: str | None, description: str, expression: sp.Expr,
+                minimum: float = -inf, maximum: float = inf, domain: tuple[float, float] | None = None,
+                needs_state: bool = True) -> Signal:  # fmt: skip
+        inputs, parameters = self._direct(expression)
+        nodes = [of] if role == "temperature" else [part.name for part in self.network.parts]
+        starts = (*INITIAL, *(f"{fmi_name(node)}.T_start" for node in nodes)) if needs_state else ()
+        return Signal(
+            name=name, role=role, of=of, description=description, type=kind, unit=TYPES[kind].unit if kind else None,
+            causality="output", variability="continuous" if kind else "discrete", initial="calculated", minimum=minimum,
+            maximum=maximum, nominal=TYPES[kind].nominal if kind else None, domain=domain, column=result_column(name),
+            depends=inputs, depends_initially=(*inputs, *parameters, *starts),
+        )  # fmt: skip
+
+    def _direct(self, expression: sp.Expr) -> tuple[tuple[str, ...], tuple[str, ...]]:
+        """Inputs and parameters that an expression depends on without a detour through the temperatures of parts."""
+        names = {s.name for s in expression.free_symbols}
+        names |= {s.name for node, T in self.boundaries.items() if f"T_{node}" in names for s in T.free_symbols}
+        if any(name.startswith("P_") and name[2:] in self.network.components for name in names):
+            names |= {"speed", "torque"}
+        inputs = tuple(fmi_name(name) for name in self.inputs if name in names)
+        return inputs, tuple(fmi for name, fmi in self.parameters.items() if name in names)
+
+    def _temperatures(self) -> Iterator[Signal]:
+        for node in self.network.nodes:
+            boundary = node.temperature is not None
+            yield self._output(
+                name=f"{fmi_name(node.name)}.T", role="temperature", of=node.name, kind="Temperature", minimum=0.0,
+                description=f"Temperature of {node.name.replace('_', ' ')}" + (" (boundary)" if boundary else ""),
+                expression=sp.Integer(0) if node.temperature is None else node.temperature, needs_state=not boundary,
+                domain=self._domain("temperature") if node.name in self.loss_nodes else None,
+            )  # fmt: skip
+
+    def _powers(self) -> Iterator[Signal]:
+        losses = [source for source in self.network.sources if source.is_loss]
+        total = sum((source.heat for source in losses), sp.Integer(0))
+        yield self._output(name="loss.total", role="total_loss", kind="Power", description="Sum of all losses",
+                           expression=total)  # fmt: skip
+        for source in self.network.sources:
+            named = source.name.replace("_", " ")
+            yield self._output(
+                name=f"{'loss' if source.is_loss else 'heat'}.{fmi_name(source.name)}", of=source.name, kind="Power",
+                role="loss" if source.is_loss else "heat", expression=source.heat,
+                description=f"Loss: {named}" if source.is_loss else f"Heat into {source.node}: {named}",
+                minimum=0.0 if source.name in self.network.components else -inf,
+            )  # fmt: skip
+        yield self._output(name="torque_loss", role="torque_loss", kind="Torque", expression=total,
+                           description="Loss torque at the input shaft, signed as the speed")  # fmt: skip
+        yield self._output(name="efficiency", role="efficiency", kind="Ratio", minimum=0.0, maximum=1.0,
+                           expression=total + sp.Symbol("speed") * sp.Symbol("torque"),
+                           description="Power out over power in; 0 without power")  # fmt: skip
+
+    def _quality(self) -> Iterator[Signal]:
+        point = sp.Symbol("speed") + sp.Symbol("torque")
+        yield self._output(
+            name="in_domain", role="in_domain", kind=None, expression=point,
+            description="Whether the operating point is inside the range that the networks were trained on",
+        )  # fmt: skip
+        yield self._output(
+            name="domain_distance", role="domain_distance", kind="Ratio", minimum=0.0, expression=point,
+            description="How far outside the trained range, as a fraction of it; 0 inside",
+        )  # fmt: skip
+
+    def _initial(self) -> Iterator[Signal]:
+        def fixed(name: str, role: Role, text: str, of: str = "") -> Signal:
+            return Signal(
+                name=name, role=role, of=of, description=text, type="Temperature", unit="K", start=START_TEMPERATURE,
+                causality="parameter", variability="fixed", initial="exact", minimum=LOWEST_START,
+                maximum=HIGHEST_START, nominal=TYPES["Temperature"].nominal,
+            )  # fmt: skip
+
+        yield Signal(name="initial.uniform", role="initial_uniform", causality="parameter", variability="fixed",
+                     initial="exact", start=True,
+                     description="Whether all nodes start at initial.T; else each at its own T_start")  # fmt: skip
+        yield fixed("initial.T", "initial_temperature", "Temperature of all nodes at the start, if initial.uniform")
+        for part in self.network.parts:
+            text = f"Temperature of {part.name.replace('_', ' ')} at the start, unless initial.uniform"
+            yield fixed(f"{fmi_name(part.name)}.T_start", "start_temperature", text, part.name)
+
+    def _parameter_name(self, name: str) -> str:
+        return f"factor.{fmi_name(name)}"
+
+    def _factors(self) -> Iterator[Signal]:
+        for parameter in self.network.parameters:
+            unit = SAME_UNIT.get(parameter.unit, parameter.unit)
+            text = parameter.description or parameter.name
+            yield Signal(
+                name=self.parameters[parameter.name], role="factor", of=parameter.name,
+                unit=unit if unit in UNITS else None, type="Ratio" if unit == "1" else None,
+                causality="parameter", variability="tunable", initial="exact",
+                start=parameter.start, minimum=min(parameter.lower, parameter.start),
+                maximum=max(parameter.upper, parameter.start), nominal=abs(parameter.start) or 1.0,
+                description=(text[0].upper() + text[1:]) + ("" if unit in UNITS else f" [{parameter.unit}]"),
+            )  # fmt: skip

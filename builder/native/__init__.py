@@ -1,0 +1,1 @@
+"""The native FMU: generated C, compilation, packaging."""

@@ -1,0 +1,180 @@
+"""A gearbox and its trained networks as an FMU: FMI 2.0 co-simulation, run by Python through pythonfmu.
+
+The FMU is the same file, byte for byte, for the same definition, networks and version.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+import sys
+import tempfile
+import zipfile
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+import fmu_src
+import models
+from builder.fmi.model_description import model_description
+from builder.fmi.package import gearbox_identity, gearbox_pages, package_fmu, refuse_mismatch
+from builder.fmi.signals import signal_table
+from builder.fmi.twin_data import to_json, twin_data
+from builder.surrogate.train import TrainingResult
+from fmu_src.python.contents import DATA
+from models.assembly.gearbox import Gearbox
+from models.correction.correction import Correction, corrected_network
+from models.network.compiled import law_source
+from models.simulation.thermal_network import ThermalNetwork
+
+COPIED = {
+    models: ("base/errors", "base/types", "portable/solver", "portable/evaluation", "portable/surrogate"),
+    fmu_src: ("python/twin", "python/contents", "python/onnx_losses", "python/gearbox_slave"),
+}
+REQUIREMENTS = "numpy>=2.1\nonnxruntime>=1.20\n"
+# pythonfmu 0.7.0 decrements the reference count of the module's globals once too often per instance; one reference is
+# added for each, without which the second or third instance crashes the host.
+SLAVE = """from {package} import generated
+from {package}.gearbox_slave import GearboxSlave
+
+generated.KEPT.append(globals())  # pythonfmu releases one reference too many per instance
+
+
+class Slave(GearboxSlave):
+    \"\"\"FMU {identifier}.\"\"\"
+
+    generated = generated
+"""
+FLAGS = {
+    "needsExecutionTool": True,
+    "canHandleVariableCommunicationStepSize": True,
+    "canInterpolateInputs": False,
+    "canRunAsynchronuously": False,
+    "canBeInstantiatedOnlyOncePerProcess": False,
+    "canNotUseMemoryManagementFunctions": True,
+    "canGetAndSetFMUstate": True,
+    "canSerializeFMUstate": True,
+    "providesDirectionalDerivative": False,
+}
+
+
+def build_python_fmu(
+    gearbox: Gearbox,
+    training: TrainingResult,
+    networks: Sequence[Path],
+    output: Path,
+    *,
+    network: ThermalNetwork | None = None,
+    correction: Correction | None = None,
+) -> Path:
+    """Package a gearbox as an FMU that needs Python, numpy and onnxruntime where it is used.
+
+    Parameters
+    ----------
+    gearbox : Gearbox
+    training : TrainingResult
+        The trained surrogate
+    networks : sequence of Path
+        Its ONNX files
+    output : Path
+        The FMU; its stem becomes the model identifier
+    network : ThermalNetwork or None
+        The thermal network, where it is neither the gearbox's nominal nor the corrected one
+    correction : Correction or None
+        What a diagnosis found; the FMU has it and says so
+
+    Returns
+    -------
+    Path
+        `output`
+
+    Raises
+    ------
+    InputError
+        If the folder cannot be written to, the network has laws that are no expressions, or the networks are another
+        gearbox's.
+    """
+    network = corrected_network(gearbox, correction) if network is None else network
+    refuse_mismatch(network, training.losses, networks)
+    table = signal_table(gearbox, network, training.losses)
+    identity = gearbox_identity(gearbox, output, FLAGS, correction)
+    data = twin_data(table, network, training.losses, definition=gearbox.hash)
+    files = {DATA: to_json(data)} | {path.name: path.read_bytes() for path in networks}
+    with tempfile.TemporaryDirectory(prefix="twin-fmu-") as scratch:
+        stage = Path(scratch) / "resources"
+        slave, digest = _write_resources(stage, files, network, identity.model_identifier)
+        xml = model_description(table, identity, content=digest)
+        (stage / "modelDescription.xml").write_bytes(xml)
+        (stage / "requirements.txt").write_text(REQUIREMENTS, encoding="utf-8")
+        built = _build_with_pythonfmu(slave, stage, Path(scratch) / f"{identity.model_identifier}.fmu")
+    package_fmu(output, xml, built, gearbox_pages(gearbox, network, table, identity, training, data, kind="python"))
+    return output
+
+
+def _write_resources(
+    stage: Path, files: Mapping[str, bytes], network: ThermalNetwork, identifier: str
+) -> tuple[Path, bytes]:
+    """Write the slave module, its package and the data files; gives the module and a digest of everything.
+
+    Both names carry the digest: Python keeps one module per name in a process, so that a second FMU with modules of the
+    same name would silently run the first one's code.
+    """
+    digests = {name: hashlib.sha256(content).hexdigest() for name, content in sorted(files.items())}
+    laws = "\n\n".join(law_source(network, vector=False).values())
+    generated = (
+        '"""Generated by the builder: the laws of the thermal network, and what the data files must be."""\n\n'
+        f"import math\n\nMODEL_IDENTIFIER = {identifier!r}\nKEPT = []\n"
+        f"DIGESTS = {json.dumps(digests, indent=4)}\n\n\n{laws}"
+    )
+    sources = {"generated.py": generated, "__init__.py": ""} | dict(_copied_sources())
+    digest = hashlib.sha256(to_json(dict(sorted(sources.items())))).hexdigest()
+    package = stage / f"{identifier}_{digest[:16]}"
+    package.mkdir(parents=True)
+    for name, text in sources.items():
+        (package / name).write_text(text, encoding="utf-8", newline="\n")
+    for name, content in files.items():
+        (stage / name).write_bytes(content)
+    slave = stage / f"{package.name}_slave.py"
+    slave.write_text(SLAVE.format(package=package.name, identifier=identifier), encoding="utf-8", newline="\n")
+    return slave, digest.encode()
+
+
+def _copied_sources() -> Iterator[tuple[str, str]]:
+    """The files that run inside, importing each other as one package whatever its name."""
+    for package, names in COPIED.items():
+        for name in names:
+            text = (Path(package.__path__[0]) / f"{name}.py").read_text(encoding="utf-8")
+            # All lie in one folder inside: "from models.base.errors import" becomes "from .errors import".
+            text = re.sub(r"^from (?:models|fmu_src)\.\w+(?:\.(\w+))? import", _relative, text, flags=re.MULTILINE)
+            if re.search(r"^\s*(?:from|import) (?:models|fmu_src|builder)\b", text, flags=re.MULTILINE):
+                raise ImportError(f"{name}.py imports something that does not run inside an FMU")
+            yield f"{Path(name).name}.py", text
+
+
+def _relative(match: re.Match[str]) -> str:
+    return f"from .{match[1] or ''} import"
+
+
+def _build_with_pythonfmu(slave: Path, stage: Path, target: Path) -> dict[str, bytes]:
+    """Files that pythonfmu's own builder makes of the staged ones; it loads the slave once, which tries it out."""
+    from pythonfmu import FmuBuilder
+
+    others = [path for path in stage.iterdir() if path != slave]
+    with _unchanged_imports(slave.stem.removesuffix("_slave")):
+        FmuBuilder.build_FMU(script_file=slave, dest=target, project_files=others)
+    with zipfile.ZipFile(target) as archive:
+        return {name: archive.read(name) for name in archive.namelist()}
+
+
+@contextmanager
+def _unchanged_imports(prefix: str) -> Iterator[None]:
+    """Forget what loading the slave leaves behind in this process."""
+    path, no_bytecode = list(sys.path), sys.dont_write_bytecode
+    sys.dont_write_bytecode = True
+    try:
+        yield
+    finally:
+        sys.path[:], sys.dont_write_bytecode = path, no_bytecode
+        for name in [name for name in sys.modules if name.startswith(prefix)]:
+            del sys.modules[name]

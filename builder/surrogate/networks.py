@@ -1,0 +1,249 @@
+"""The table of networks of a gearbox: inputs, outputs, bounds, the losses to learn; and the presets of training.
+
+It is derived from the loss terms: one network for the mesh, one for the losses without load, and one for every kind of
+bearing, used once per bearing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from models.base.errors import InputError, did_you_mean
+from models.base.types import Array
+from models.losses.loss_model import LossModel
+from models.losses.loss_term import SPEED, SPEED_FLOOR_RPM, TORQUE, TORQUE_FLOOR_NM, LossTerm
+from models.portable.surrogate import Feature, Use
+
+Bounds = tuple[float, float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Domain:
+    """Range of training.
+
+    Attributes
+    ----------
+    speed_rpm, torque_Nm : (float, float)
+        Bounds of the input shaft's speed [1/min] and torque [N m]
+    temperature_degC : (float, float)
+        Bounds of all temperatures, [degC]
+    """
+
+    speed_rpm: Bounds
+    torque_Nm: Bounds
+    temperature_degC: Bounds
+
+    def of(self, source: str) -> Bounds:
+        """Return the bounds of speed, torque, or the temperature of a node."""
+        return {SPEED: self.speed_rpm, TORQUE: self.torque_Nm}.get(source, self.temperature_degC)
+
+    def above_floors(self) -> Domain:
+        """Return the range above the full model's lowest speed and torque: below, losses are linear.
+
+        Raises
+        ------
+        InputError
+            If nothing is left.
+        """
+        speed = (max(self.speed_rpm[0], SPEED_FLOOR_RPM), self.speed_rpm[1])
+        torque = (max(self.torque_Nm[0], TORQUE_FLOOR_NM), self.torque_Nm[1])
+        for name, (low, high) in {"speed_rpm": speed, "torque_Nm": torque}.items():
+            if not low < high:
+                raise InputError(f"training.{name}: the upper bound {high:g} must be above {low:g}; widen it")
+        return Domain(speed_rpm=speed, torque_Nm=torque, temperature_degC=self.temperature_degC)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Preset:
+    """How the networks are trained.
+
+    Attributes
+    ----------
+    name : str
+    samples : int
+        Points per network; of these 80 % train, 10 % validate, 10 % test
+    judged : int
+        Further, independent random points that the report is made on
+    transforms : bool
+        Logarithms of speed, load and reduced losses, viscosity in place of temperature, and points denser at the low
+        ends; without, min-max scaling and uniform points, as in the paper
+    hidden : mapping of str to (int, int)
+        Units of the hidden layers by kind of network (mesh, no_load, bearing); where a kind is not named, by output
+        (mesh_sliding ...): every output then has hidden units of its own, which fit it better for the same work
+    max_iter, starts, start_iterations, patience, tolerance
+        See :class:`builder.surrogate.levenberg_marquardt.LevenbergMarquardtRegressor`
+    domain : Domain, optional
+        Range of training; that of the gearbox's ``[training]`` where absent
+    """
+
+    name: str
+    samples: int
+    judged: int
+    transforms: bool
+    hidden: Mapping[str, tuple[int, int]] = field(hash=False)
+    max_iter: int
+    starts: int
+    start_iterations: int
+    patience: int
+    tolerance: float
+    domain: Domain | None = None
+
+
+PRESETS: Mapping[str, Preset] = {
+    "default": Preset(
+        name="default",
+        samples=8000,
+        judged=2000,
+        transforms=True,
+        hidden={"mesh_sliding": (48, 16), "mesh_rolling": (16, 10), "no_load": (10, 10), "bearing": (16, 12)},
+        max_iter=130,
+        starts=2,
+        start_iterations=25,
+        patience=60,
+        tolerance=0.02,
+    ),
+    # Tables 3 and 4 of the paper. Levenberg-Marquardt is a full-batch method: a batch size of 64 has no counterpart.
+    "paper": Preset(
+        name="paper",
+        samples=400,
+        judged=400,
+        transforms=False,
+        hidden={"mesh": (5, 5), "no_load": (5, 5), "bearing": (5, 5)},
+        max_iter=1000,
+        starts=6,
+        start_iterations=100,
+        patience=1000,
+        tolerance=0.0,
+        domain=Domain(speed_rpm=(50.0, 6500.0), torque_Nm=(1.0, 350.0), temperature_degC=(20.0, 120.0)),
+    ),
+}
+
+
+def preset_named(name: str) -> Preset:
+    """Return a preset.
+
+    Raises
+    ------
+    InputError
+        If there is none of that name.
+    """
+    if name not in PRESETS:
+        raise InputError(f"there is no training preset {name!r}{did_you_mean(name, PRESETS)}")
+    return PRESETS[name]
+
+
+@dataclass(frozen=True, kw_only=True)
+class NetworkSpec:
+    """One network to train: derived from the loss terms that it learns.
+
+    Attributes
+    ----------
+    name, kind : str
+        Name of the network, and of the size in :attr:`Preset.hidden`
+    outputs : tuple of str
+        Names with units
+    lower, upper : tuple of float
+        Bounds of the inputs
+    terms : tuple of LossTerm
+        If `shared`, the terms of one law, of which each uses the network for itself; else terms that read the same
+        inputs, whose losses are its outputs
+    shared : bool
+    """
+
+    name: str
+    kind: str
+    outputs: tuple[str, ...]
+    lower: tuple[float, ...]
+    upper: tuple[float, ...]
+    terms: tuple[LossTerm, ...]
+    shared: bool
+
+    @property
+    def sampled(self) -> tuple[LossTerm, ...]:
+        """Terms that the full model is sampled for: of a shared network the one on the slowest shaft.
+
+        Its speed stays above the full model's lowest speed over all of the range.
+        """
+        return (min(self.terms, key=lambda term: term.inputs[0].factor),) if self.shared else self.terms
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names with units."""
+        return tuple(i.name for i in self.terms[0].inputs)
+
+    @property
+    def powers(self) -> Array:
+        """Powers of the inputs that losses are divided by before their logarithm is taken, (outputs, inputs)."""
+        return np.concatenate([term.kind.powers for term in self.sampled])
+
+    @property
+    def dense(self) -> tuple[Feature, ...]:
+        """Feature of each input in which half of the points are uniform."""
+        return tuple("log" if i.source in (SPEED, TORQUE) else "viscosity" for i in self.terms[0].inputs)
+
+    @property
+    def uses(self) -> tuple[Use, ...]:
+        """Every use of the network."""
+        groups = [(term,) for term in self.terms] if self.shared else [self.terms]
+        return tuple(
+            Use(
+                self.name,
+                tuple(i.source for i in terms[0].inputs),
+                tuple(i.factor for i in terms[0].inputs),
+                tuple(name for term in terms for name in term.components),
+            )
+            for terms in groups
+        )
+
+    def features(self, *, transforms: bool) -> tuple[tuple[Feature, int], ...]:
+        """Features of the network, those of one type next to each other."""
+        if not transforms:
+            return tuple(("value", column) for column in range(len(self.inputs)))
+        logs: list[tuple[Feature, int]] = [("log", i) for i, kind in enumerate(self.dense) if kind == "log"]
+        hot = [i for i, kind in enumerate(self.dense) if kind == "viscosity"]
+        return (*logs, *(("viscosity", i) for i in hot), *(("log_kelvin", i) for i in hot))
+
+    def losses(self, rows: Array) -> Array:
+        """Losses of the full model [W], shape (N, outputs), at rows of inputs, shape (N, inputs)."""
+        found = []
+        for term in self.sampled:
+            at = {i.source: rows[:, column] / i.factor for column, i in enumerate(term.inputs)}
+            found.append(term.power(at[SPEED], at.get(TORQUE, at[SPEED]), at))
+        return np.concatenate(found, axis=1)
+
+
+def network_specs(model: LossModel, domain: Domain) -> tuple[NetworkSpec, ...]:
+    """Return the networks of a gearbox, those of the most inputs (the most laborious) first."""
+    learnt: dict[str, list[LossTerm]] = {}
+    for terms in model.groups:
+        kind = terms[0].kind
+        known = sum(name.startswith(f"{kind.network}s_") for name in learnt)
+        name = f"{kind.network}s_{known + 1}" if kind.alike else kind.network
+        learnt.setdefault(name, []).extend(terms)
+    specs = [_spec(name, tuple(terms), domain) for name, terms in learnt.items()]
+    return tuple(sorted(specs, key=lambda spec: -len(spec.inputs)))
+
+
+def _spec(name: str, terms: tuple[LossTerm, ...], domain: Domain) -> NetworkSpec:
+    kind, bounds = terms[0].kind, []
+    for column, first in enumerate(terms[0].inputs):
+        factors = [term.inputs[column].factor for term in terms]
+        low, high = domain.of(first.source)
+        if first.lowest is None:
+            bounds.append((min(factors) * low, max(factors) * high))
+        else:
+            bounds.append((first.lowest, max(max(factors) * high, 2.0 * first.lowest)))
+    lower, upper = zip(*bounds, strict=True)
+    components = [component for term in terms for component in term.components]
+    return NetworkSpec(
+        name=name,
+        kind=kind.network,
+        outputs=(f"{kind.name}_W",) if kind.alike else tuple(f"{component}_W" for component in components),
+        lower=lower,
+        upper=upper,
+        terms=terms,
+        shared=kind.alike,
+    )

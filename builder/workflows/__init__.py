@@ -1,0 +1,1 @@
+"""Work of several steps: build, fleets of gearboxes, the proof."""

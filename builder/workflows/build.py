@@ -1,0 +1,258 @@
+"""From a definition to an FMU: train, export, package, then drive the reference cycle against the full model."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from builder.base import console
+from builder.drive.driver import drive_fmu, runs_here
+from builder.drive.plots import plot_cycle
+from builder.fmi.reference_cycle import COLD_START, reference_cycle
+from builder.native.compile import plan_for
+from builder.native.native_fmu import build_native_fmu
+from builder.python.python_fmu import build_python_fmu
+from builder.surrogate.onnx_export import export_onnx
+from builder.surrogate.train import TrainingResult, train_surrogate
+from models.assembly.gearbox import Gearbox
+from models.base.atomic_write import atomic_folder
+from models.base.errors import InputError
+from models.base.types import Array
+from models.base.version import project_version
+from models.correction.correction import Correction, corrected_network
+from models.files.output_files import write_table
+
+SUFFIX = {"python": "", "native": "_native"}  # of the files' names
+
+
+@dataclass(frozen=True, kw_only=True)
+class CycleErrors:
+    """How far the FMU is from the full model over the reference cycle.
+
+    Attributes
+    ----------
+    temperature_K : mapping of node to float
+        Largest difference, [K]
+    loss_mean, loss_worst : float
+        Mean and largest difference of the total loss, relative to the full model's at that moment, [-]
+    """
+
+    temperature_K: Mapping[str, float]
+    loss_mean: float
+    loss_worst: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class BuildReport:
+    """What a build made and how good it is.
+
+    Attributes
+    ----------
+    gearbox : str
+    training : TrainingResult
+    cycles : mapping of FMU file name to CycleErrors
+    seconds : mapping of step to float
+    files : tuple of Path
+    notes : tuple of str
+        On platforms that were left out, and what could not be tried here
+    correction : mapping or None
+        Of the correction that the FMU carries, see :meth:`models.correction.correction.Correction.summary`
+    """
+
+    gearbox: str
+    training: TrainingResult
+    cycles: Mapping[str, CycleErrors]
+    seconds: Mapping[str, float]
+    files: tuple[Path, ...]
+    notes: tuple[str, ...] = ()
+    correction: Mapping[str, Any] | None = None
+
+    def as_dict(self) -> dict[str, Any]:
+        """The report without timings, so that the same build gives the same file."""
+        return {
+            **self.training.as_dict(),
+            "correction": self.correction,
+            "reference_cycle": {
+                name: {
+                    "largest_temperature_difference_K": dict(cycle.temperature_K),
+                    "loss_difference_mean": cycle.loss_mean,
+                    "loss_difference_worst": cycle.loss_worst,
+                }
+                for name, cycle in self.cycles.items()
+            },
+        }
+
+    def show(self) -> None:
+        """Print the summary."""
+        rows = [
+            [r.component, f"{r.r_squared:.6f}", *(f"{100.0 * v:.2f}" for v in
+             (r.median, r.percentile_95, r.corner_median, r.corner_percentile_95))]
+            for r in self.training.report
+        ]  # fmt: skip
+        console.table(
+            f"Networks against the full model on {self.training.preset.judged} separate points: relative errors\n"
+            "(corner: the lowest tenth of every input)",
+            ["loss", "R²", "median %", "p95 %", "corner median %", "corner p95 %"],
+            rows,
+        )
+        if self.cycles:
+            self._show_cycles()
+        console.table("Time", ["step", "s"], [[step, f"{value:.2f}"] for step, value in self.seconds.items()])
+        for file in self.files:
+            console.out.print(f"wrote {file}")
+        for note in self.notes:
+            console.err.print(f"note: {note}", style="yellow")
+
+    def _show_cycles(self) -> None:
+        worst = [max(cycle.temperature_K.items(), key=lambda item: item[1]) for cycle in self.cycles.values()]
+        cycles = self.cycles.values()
+        console.table(
+            "FMU against the full model, 600 s reference cycle from 20 °C",
+            ["quantity", *(f"difference, {name}" for name in self.cycles)],
+            [
+                ["temperature, worst node", *(f"{value:.3f} K ({node})" for node, value in worst)],
+                ["temperature, oil", *(f"{cycle.temperature_K['oil']:.3f} K" for cycle in cycles)],
+                ["total loss, mean", *(f"{100.0 * cycle.loss_mean:.2f} %" for cycle in cycles)],
+                ["total loss, worst", *(f"{100.0 * cycle.loss_worst:.2f} %" for cycle in cycles)],
+            ],
+        )
+
+
+def build(
+    gearbox: Gearbox,
+    folder: Path,
+    *,
+    name: str,
+    target: str = "python",
+    platforms: str = "all",
+    preset: str = "default",
+    samples: int | None = None,
+    seed: int = 0,
+    jobs: int = 1,
+    dask: str | None = None,
+    correction: Correction | None = None,
+) -> BuildReport:
+    """Train the networks of `gearbox`, build its FMU and try it on the reference cycle.
+
+    Parameters
+    ----------
+    gearbox : Gearbox
+    folder : Path
+        Where the files go: ``<name>.fmu`` (python), ``<name>_native.fmu``, ``networks/*.onnx``, ``drive_cycle.csv``,
+        ``.png`` (``drive_cycle_native`` of the native FMU), ``report.json``. They appear together when all is done;
+        files of an earlier build are replaced, others left alone
+    name : str
+        Name of the FMU's file
+    target : str
+        Kind of FMU: ``python``, ``native`` or ``both``
+    platforms : str
+        Of a native FMU, see :func:`builder.native.compile.plan_for`
+    preset, samples, seed, jobs, dask
+        See :func:`builder.surrogate.train.train_surrogate`
+    correction : Correction or None
+        What a diagnosis found: the FMU and the full model it is compared with carry it
+
+    Returns
+    -------
+    BuildReport
+
+    Raises
+    ------
+    InputError
+        If the folder cannot be written to or the options are at fault.
+    """
+    kinds = {"python": ("python",), "native": ("native",), "both": ("python", "native")}.get(target)
+    if kinds is None:
+        raise InputError(f"target {target!r} is not known; python, native and both are")
+    notes = []
+    if "native" in kinds and (note := plan_for(platforms).note):  # a missing compiler is told before the training
+        notes.append(f"native FMU {note}")
+    network = corrected_network(gearbox, correction)
+    seconds: dict[str, float] = {}
+    with atomic_folder(folder) as stage:
+        with _timed("train", seconds), _spoken() as tell:
+            training = train_surrogate(
+                gearbox, preset=preset, samples=samples, seed=seed,
+                jobs=jobs, dask=dask, progress=tell,
+            )  # fmt: skip
+        fmus = {kind: stage / f"{name}{SUFFIX[kind]}.fmu" for kind in kinds}
+        with _timed("export", seconds):
+            networks = export_onnx(training, stage / "networks", version=project_version())
+        for kind, path in fmus.items():
+            with _timed(f"package, {kind} FMU", seconds), _spoken() as tell:
+                tell(f"packaging the {kind} FMU")
+                if kind == "python":
+                    build_python_fmu(gearbox, training, networks, path, correction=correction)
+                else:
+                    build_native_fmu(gearbox, training, networks, path, platforms=platforms, correction=correction)
+        cycle, losses = reference_cycle(gearbox), gearbox.losses()
+        with _timed("reference cycle, full model", seconds), console.progress_bar("full model") as progress:
+            full = network.simulate(cycle, losses=losses, initial=COLD_START, progress=progress).columns()
+        cycles = {}
+        for kind, path in fmus.items():
+            if not runs_here(path):
+                notes.append(
+                    f"the {kind} FMU has no binary for this machine, so the reference cycle is not driven with it"
+                )
+                continue
+            label = f"{kind} FMU in FMPy"
+            with _timed(f"reference cycle, {label}", seconds), console.progress_bar(label) as progress:
+                driven = drive_fmu(path, cycle, initial=COLD_START, progress=progress)
+            cycles[path.name] = cycle_errors(driven, full)
+            write_table(stage / f"drive_cycle{SUFFIX[kind]}.csv", driven)
+            title = f"{gearbox.name}\n600 s reference cycle, {kind} FMU and full model"
+            plot = stage / f"drive_cycle{SUFFIX[kind]}.png"
+            plot_cycle(plot, driven, title=title, groups=network.groups, reference=full)
+        report = BuildReport(
+            gearbox=gearbox.name, training=training, cycles=cycles, seconds=seconds, files=(), notes=tuple(notes),
+            correction=None if correction is None else correction.summary(),
+        )  # fmt: skip
+        (stage / "report.json").write_text(json.dumps(report.as_dict(), indent=2) + "\n", encoding="utf-8")
+        made = sorted(path.relative_to(stage) for path in stage.rglob("*") if path.is_file())
+    files = tuple(folder / path for path in made)
+    return replace(report, files=files, notes=(*report.notes, *_left_from_before(folder, files)))
+
+
+def _left_from_before(folder: Path, files: Sequence[Path]) -> list[str]:
+    return [
+        f"{path} is of an earlier build: report.json and networks/ no longer tell about it"
+        for path in sorted(folder.glob("*.fmu"))
+        if path not in files
+    ]
+
+
+def cycle_errors(driven: Mapping[str, Array], reference: Mapping[str, Array]) -> CycleErrors:
+    """Compare two results over the same rows, in the columns of the file contract."""
+    nodes = [
+        name for name in reference if name.startswith("T_") and name.endswith("_degC") and name != "T_ambient_degC"
+    ]
+    loss = np.abs(driven["P_loss_W"] - reference["P_loss_W"]) / reference["P_loss_W"]
+    return CycleErrors(
+        temperature_K={name[2:-5]: float(np.max(np.abs(driven[name] - reference[name]))) for name in nodes},
+        loss_mean=float(loss.mean()),
+        loss_worst=float(loss.max()),
+    )
+
+
+@contextmanager
+def _timed(step: str, seconds: dict[str, float]) -> Iterator[None]:
+    begin = time.perf_counter()
+    yield
+    seconds[step] = time.perf_counter() - begin
+
+
+@contextmanager
+def _spoken() -> Iterator[Any]:
+    """Stages of long work as a changing line on a terminal, nothing in a pipe."""
+    if not console.err.is_terminal:
+        yield lambda _: None
+        return
+    with console.err.status("starting") as status:
+        yield lambda line: status.update(line)

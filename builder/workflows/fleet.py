@@ -1,0 +1,291 @@
+"""A fleet: one folder of recordings per gearbox, one report each and one table of all.
+
+Recordings are read here and sent to the workers, reports are sent back: the workers of a cluster need no common file
+system.
+"""
+
+from __future__ import annotations
+
+import math
+import tempfile
+import traceback
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+
+from builder.base import console
+from diagnosis import diagnose
+from diagnosis.recordings.read import read_train_and_holdout
+from diagnosis.recordings.recording import Recording
+from diagnosis.recordings.time_axis import RECORDING_KINDS
+from diagnosis.report.write import names_of_files, write_files
+from diagnosis.results.result import Diagnosis
+from models.assembly.gearbox import Gearbox
+from models.base.atomic_write import atomic_folder
+from models.base.errors import InputError
+from models.base.parallel import iterate_parallel
+from models.files.output_files import refuse_to_replace, write_table
+from models.mechanisms import Mechanism
+
+HELD_OUT = "hold"  # prefix of held-out recordings, or of a folder with them
+SUMMARY = "summary.csv"
+ERROR = "error"  # instead of a verdict
+NAN = float("nan")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Member:
+    """One gearbox of a fleet.
+
+    Attributes
+    ----------
+    name : str
+        Name of its folder
+    train, holdout : tuple of Path
+        Training and held-out recordings
+    fault : str
+        Reason why its folder cannot be used, or ``""``
+    """
+
+    name: str
+    train: tuple[Path, ...] = ()
+    holdout: tuple[Path, ...] = ()
+    fault: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Row:
+    """One gearbox in the summary.
+
+    Attributes
+    ----------
+    gearbox, verdict : str
+        Name of its folder; see :class:`diagnosis.results.result.Diagnosis`, or ``error``
+    found : str
+        Mechanisms with place and probability, the first one first
+    heat_W : float
+        Mean heat of all findings, or of the unknown heat if unexplained, [W]
+    p_value : float
+    rmse_before_K, rmse_calibrated_K, rmse_after_K : float
+        Of held-out temperatures, free-running, [K]
+    error : str
+        Reason why there is no diagnosis, or ``""``
+    """
+
+    gearbox: str
+    verdict: str = ERROR
+    found: str = ""
+    heat_W: float = NAN
+    p_value: float = NAN
+    rmse_before_K: float = NAN
+    rmse_calibrated_K: float = NAN
+    rmse_after_K: float = NAN
+    error: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Outcome:
+    """Result of one gearbox.
+
+    Attributes
+    ----------
+    row : Row
+    files : mapping of name to bytes
+        Report and what belongs to it; empty without a diagnosis
+    fault : str
+        Traceback of an error in this program, or ``""``
+    """
+
+    row: Row
+    files: Mapping[str, bytes] = field(default_factory=dict)
+    fault: str = ""
+
+
+def members_of(folder: Path, *, without: Path) -> tuple[Member, ...]:
+    """The gearboxes of a fleet: every folder in `folder`, with the recordings in it.
+
+    A recording whose name begins with ``hold``, and every one in a folder ``hold...`` inside, is held out.
+
+    Parameters
+    ----------
+    folder : Path
+    without : Path
+        The output folder, which may be inside and is no gearbox
+
+    Raises
+    ------
+    InputError
+        If the folder cannot be read or has no folder of a gearbox.
+    """
+    try:
+        inside = sorted(p for p in folder.iterdir() if p.is_dir() and not p.name.startswith("."))
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be read ({error.strerror}); --fleet takes a folder of folders") from error
+    homes = [home for home in inside if home.resolve() not in (without.resolve(), *without.resolve().parents)]
+    if not homes:
+        own = "; it holds recordings itself: name them, without --fleet" if _recordings(folder) else ""
+        raise InputError(f"{folder}: has no folder of a gearbox in it, one per gearbox with its recordings{own}")
+    return tuple(_member(home) for home in homes)
+
+
+def _member(home: Path) -> Member:
+    try:
+        own = _recordings(home)
+        apart = [p for p in sorted(home.iterdir()) if p.is_dir() and _is_held_out(p)]
+        held = [p for p in own if _is_held_out(p)] + [p for inner in apart for p in _recordings(inner)]
+    except OSError as error:
+        return Member(name=home.name, fault=f"{error.filename}: cannot be read ({error.strerror})")
+    train = tuple(p for p in own if not _is_held_out(p))
+    kinds = ", ".join(RECORDING_KINDS)
+    fault = "" if train else f"{home}: has no recording to learn from ({kinds}; {HELD_OUT}... is held out)"
+    return Member(name=home.name, train=train, holdout=tuple(held), fault=fault)
+
+
+def _is_held_out(path: Path) -> bool:
+    return path.name.lower().startswith(HELD_OUT)
+
+
+def _recordings(folder: Path) -> list[Path]:
+    return [
+        p for p in sorted(folder.iterdir())
+        if p.name.lower().endswith(RECORDING_KINDS) and not p.name.startswith(".") and p.is_file()
+    ]  # fmt: skip
+
+
+def diagnose_fleet(
+    members: Sequence[Member],
+    gearbox: Gearbox,
+    output: Path,
+    *,
+    mapping: Path | None,
+    catalogue: Mapping[str, Mechanism],
+    false_alarm_rate: float,
+    jobs: int = 1,
+    dask: str | None = None,
+) -> list[Outcome]:
+    """Diagnose every gearbox of a fleet; an error with one is its row in the summary, and the others go on.
+
+    Parameters
+    ----------
+    members : sequence of Member
+    gearbox : Gearbox
+        Their definition
+    output : Path
+        Gets a folder per gearbox as soon as it is done, and at the end ``summary.csv``
+    mapping : Path or None
+        See :func:`diagnosis.recordings.read.read_recordings`
+    catalogue, false_alarm_rate
+        See :func:`diagnosis.diagnose`
+    jobs : int
+        Gearboxes at the same time on this machine; a single gearbox gets all processes
+    dask : str or None
+        Scheduler of a Dask cluster that does the work instead
+
+    Returns
+    -------
+    list of Outcome
+        In the order of `members`
+
+    Raises
+    ------
+    InputError
+        If the output cannot be written to, or no scheduler answers.
+    """
+    outcomes: dict[str, Outcome] = {}
+    inside = jobs if len(members) == 1 and dask is None else 1
+
+    def readable() -> Iterator[tuple[object, ...]]:
+        network = gearbox.network()
+        for member in members:
+            try:
+                if member.fault:
+                    raise InputError(member.fault)
+                train, held = read_train_and_holdout(member.train, member.holdout, network, mapping=mapping)
+                files = names_of_files((*train, *held))
+                refuse_to_replace(
+                    [p for r in (*train, *held) for p in r.files], [output / member.name / name for name in files]
+                )
+                yield member.name, train, held, gearbox, catalogue, false_alarm_rate, inside
+            except InputError as error:
+                outcomes[member.name] = _without_diagnosis(member.name, error)
+
+    with atomic_folder(output) as stage, console.progress_bar("diagnosing the fleet") as show:
+        show(0, len(members))
+        try:
+            for outcome in iterate_parallel(_diagnose, readable(), jobs=min(jobs, len(members)), dask=dask):
+                outcomes[outcome.row.gearbox] = _write(outcome, output)
+                show(len(outcomes), len(members))
+        except InputError:
+            raise
+        except Exception as error:  # noqa: BLE001 - a worker that dies takes only its own gearbox along
+            for member in members:
+                outcomes.setdefault(member.name, _without_diagnosis(member.name, error))
+        rows = [outcomes[member.name].row for member in members]
+        write_table(stage / SUMMARY, {f.name: [getattr(row, f.name) for row in rows] for f in fields(Row)})
+    return [outcomes[member.name] for member in members]
+
+
+def _diagnose(
+    name: str, train: tuple[Recording, ...], holdout: tuple[Recording, ...], gearbox: Gearbox,
+    catalogue: Mapping[str, Mechanism], false_alarm_rate: float, jobs: int,
+) -> Outcome:  # fmt: skip
+    try:
+        with tempfile.TemporaryDirectory() as folder:
+            found = diagnose(train, gearbox, holdout=holdout, catalogue=catalogue, false_alarm_rate=false_alarm_rate,
+                             jobs=jobs)  # fmt: skip
+            written = write_files(found, gearbox, [*train, *holdout], Path(folder))
+            return Outcome(row=_row(name, found), files={path.name: path.read_bytes() for path in written})
+    except Exception as error:  # noqa: BLE001 - shown with its traceback at the end, when the others are done
+        return _without_diagnosis(name, error)
+
+
+def _without_diagnosis(name: str, error: Exception) -> Outcome:
+    if isinstance(error, InputError):
+        return Outcome(row=Row(gearbox=name, error=str(error)))
+    fault = "".join(traceback.format_exception(error))
+    return Outcome(row=Row(gearbox=name, error=f"a fault of this program: {fault.splitlines()[-1]}"), fault=fault)
+
+
+def _write(outcome: Outcome, output: Path) -> Outcome:
+    if not outcome.files:
+        return outcome
+    try:
+        with atomic_folder(output / outcome.row.gearbox) as stage:
+            for name, content in outcome.files.items():
+                (stage / name).write_bytes(content)
+    except InputError as error:
+        return _without_diagnosis(outcome.row.gearbox, error)
+    return outcome
+
+
+def _row(name: str, found: Diagnosis) -> Row:
+    unknown = found.location[0].heat_mean_W if found.verdict == "unexplained" and found.location else 0.0
+    heat = sum(f.heat_mean_W for f in found.findings) if found.findings else unknown
+    return Row(
+        gearbox=name,
+        verdict=found.verdict,
+        found="; ".join(f"{f.mechanism} at {f.place} ({f.probability:.2f})" for f in found.findings),
+        heat_W=heat,
+        p_value=found.p_value,
+        rmse_before_K=found.holdout.before,
+        rmse_calibrated_K=found.holdout.calibrated,
+        rmse_after_K=found.holdout.after,
+    )
+
+
+def show_summary(rows: Sequence[Row]) -> None:
+    """Print the summary."""
+    console.table(
+        "Fleet; errors of held-out temperatures in K",
+        ["gearbox", "verdict", "found", "heat W", "as delivered", "calibrated", "with what was found"],
+        [
+            [r.gearbox, r.verdict.replace("_", " "), r.found, _number(r.heat_W, 1),
+             *(_number(v, 2) for v in (r.rmse_before_K, r.rmse_calibrated_K, r.rmse_after_K))]
+            for r in rows
+        ],
+        text_columns=3,
+    )  # fmt: skip
+
+
+def _number(value: float, decimals: int) -> str:
+    return "" if math.isnan(value) else f"{value:.{decimals}f}"

@@ -1,0 +1,1 @@
+"""Candidate mechanisms: linear scan and nonlinear fit."""

@@ -1,0 +1,1 @@
+"""Which candidates are accepted: search, hold-out, acceptance rules."""

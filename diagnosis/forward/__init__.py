@@ -1,0 +1,1 @@
+"""Fast simulation of a network on the time grid of a recording, with derivatives."""

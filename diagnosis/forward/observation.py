@@ -1,0 +1,105 @@
+"""What the sensors would read along a trajectory, and the derivatives of that: nodes, lag, bias, total loss."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from diagnosis.forward.network_on_grid import NetworkOnGrid
+from diagnosis.forward.recurrence import lagged
+from diagnosis.forward.trajectory import Trajectory
+from diagnosis.recordings.quantities import LOSS
+from models.base.types import Array
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sensors:
+    """What every channel is like.
+
+    Attributes
+    ----------
+    channels : tuple of str
+        Nodes, or ``P_loss``
+    lag, bias : Array, shape (channels,)
+        First-order lag [s] and bias [K]; of the total loss the bias in W
+    loss_gain : float
+        Factor on the total loss, [-]
+    loss_delay : float
+        Of the total loss behind the inputs, [s]; negative where it is ahead
+    """
+
+    channels: tuple[str, ...]
+    lag: Array
+    bias: Array
+    loss_gain: float = 1.0
+    loss_delay: float = 0.0
+
+    def ideal(self) -> Sensors:
+        """The same channels without lag, bias, gain or delay."""
+        nothing = np.zeros(len(self.channels))
+        return Sensors(channels=self.channels, lag=nothing, bias=nothing)
+
+
+def readings(model: NetworkOnGrid, trajectory: Trajectory, sensors: Sensors) -> Array:
+    """What the sensors read along a trajectory, shape (K + 1, channels), [degC] or [W]."""
+    read = np.empty((len(trajectory.T), len(sensors.channels)))
+    for index, name in enumerate(sensors.channels):
+        read[:, index] = delayed_loss(trajectory, sensors.loss_delay) * sensors.loss_gain if name == LOSS else (
+            lagged(trajectory.T[:, model.parts.index(name)], trajectory.piece.steps, sensors.lag[index]))  # fmt: skip
+    return np.asarray(read + sensors.bias)
+
+
+def reading_columns(
+    model: NetworkOnGrid, trajectory: Trajectory, sensors: Sensors, T: Array, direct_loss: Array
+) -> Array:
+    """Change of the readings for changes of temperatures and loss.
+
+    The delay of the loss, half a row or so, is left out here: it moves a small change by next to nothing.
+
+    Parameters
+    ----------
+    model, trajectory, sensors
+    T : Array, shape (K + 1, parts, columns)
+        Changes of the temperatures, [K]
+    direct_loss : Array, shape (K, columns)
+        Changes of the total loss at fixed temperatures, [W]
+
+    Returns
+    -------
+    Array, shape (K + 1, channels, columns)
+    """
+    read = np.empty((len(T), len(sensors.channels), T.shape[-1]))
+    for index, name in enumerate(sensors.channels):
+        if name == LOSS:
+            middle = 0.5 * (T[1:] + T[:-1])
+            loss = np.einsum("kn,knc->kc", trajectory.loss_slope, middle) + direct_loss
+            read[:, index] = total_at_points(loss) * sensors.loss_gain
+        else:
+            read[:, index] = lagged(T[:, model.parts.index(name)], trajectory.piece.steps, sensors.lag[index])
+    return read
+
+
+def total_at_points(loss: Array) -> Array:
+    """From the middles of the intervals to the grid points, shape (K, ...) to (K + 1, ...)."""
+    return np.concatenate([loss[:1], 0.5 * (loss[1:] + loss[:-1]), loss[-1:]])
+
+
+def delayed_loss(trajectory: Trajectory, delay: float) -> Array:
+    """Total loss at the grid points as it was `delay` seconds before, shape (K + 1,), [W]."""
+    loss, time = total_at_points(trajectory.loss), trajectory.piece.time
+    return loss if delay == 0.0 else np.interp(time - delay, time, loss)
+
+
+def delay_column(trajectory: Trajectory, delay: float) -> Array:
+    """Change of the total loss per second of delay, shape (K + 1,), [W/s]."""
+    step = 1.0
+    later, earlier = (delayed_loss(trajectory, delay + way * step) for way in (1.0, -1.0))
+    return np.asarray((later - earlier) / (2.0 * step))
+
+
+def lag_column(trajectory: Trajectory, node: int, lag: float) -> Array:
+    """Change of a reading per second of lag, shape (K + 1,), [K/s]."""
+    step = 0.5
+    T, steps = trajectory.T[:, node], trajectory.piece.steps
+    return np.asarray((lagged(T, steps, lag + step) - lagged(T, steps, lag)) / step)

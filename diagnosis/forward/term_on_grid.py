@@ -1,0 +1,266 @@
+"""A term (a mechanism at its place, or any other addition) evaluated along a trajectory: the heat it brings, the input
+it shifts, or the reading it distorts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+import sympy as sp
+
+from diagnosis.forward.extra_states import Memories
+from diagnosis.forward.grid import Piece
+from diagnosis.forward.network_on_grid import NetworkOnGrid
+from diagnosis.forward.observation import Sensors
+from diagnosis.forward.recurrence import lagged
+from diagnosis.forward.trajectory import Trajectory
+from models.base.types import Array
+from models.network.laws import compile_function, function_source, symbol
+from models.simulation.thermal_network import BASE_SIGNALS
+from models.terms.term import FACTORS, Term
+
+INPUT_STEP: Mapping[str, float] = {"speed": 5.0, "torque": 1.0}
+OTHER_INPUT_STEP = 0.25
+
+
+class TermOnGrid:
+    """A term whose laws are functions of arrays.
+
+    Parameters
+    ----------
+    model : NetworkOnGrid
+        The network that the term is added to; it need not be in it
+    term : Term
+    """
+
+    def __init__(self, model: NetworkOnGrid, term: Term) -> None:
+        self.model, self.term = model, term
+        network = model.network
+        own = [p.name for p in term.parameters]
+        given = [
+            *BASE_SIGNALS, *network.inputs, *(f"T_{part.name}" for part in network.parts),
+            *(p.name for p in network.parameters if p.name not in own),
+            *(s.name for s in network.states if s.name not in {own.name for own in term.states}),
+            *(f"P_{c}" for c in network.components),
+        ]  # fmt: skip
+        # The term may be in the network already: its own parameters and states are then given apart.
+        self._kept = np.array([p.name not in own for p in network.parameters], dtype=bool)
+        self._inside = not self._kept.all()
+        memories = {s.name for s in term.states}
+        self._remembered = np.array([s.name not in memories for s in network.states], dtype=bool)
+        arguments = [*given, *own, *(s.name for s in term.states)]
+        other = sp.Integer(0) if term.boundary_temperature is None else term.boundary_temperature
+        laws = [law.xreplace(model.boundary) for law in (term.expression, other)]
+        self._law = compile_function(function_source("law", arguments, laws, vector=True), "law")
+        self._memories = Memories(term.states, [*given, *own], model.parts, model.boundary)
+        heard = {f"T_{part.name}" for part in network.parts} | {f"P_{c}" for c in network.components}
+        heard |= {s.name for s in network.states}
+        #: Whether the law asks what the gearbox does, not only what is done to it.
+        self.follows = any(s.name in heard for s in laws[0].free_symbols)
+
+    # ------------------------------------------------------------------ the law
+
+    def law(self, trajectory: Trajectory, values: Array, *, at_points: bool = False) -> tuple[Array, Array]:
+        """The law, and the temperature of a boundary of the term's own.
+
+        Parameters
+        ----------
+        trajectory : Trajectory
+        values : Array, shape (V, parameters)
+            Of the term's own parameters
+        at_points : bool
+            At the grid points instead of the middles of the intervals (for terms without memory)
+
+        Returns
+        -------
+        law, temperature : Array, shape (V, K) or (V, K + 1)
+        """
+        model, piece = self.model, trajectory.piece
+        if at_points:
+            inputs = np.concatenate([piece.inputs[:1], 0.5 * (piece.inputs[1:] + piece.inputs[:-1]), piece.inputs[-1:]])
+            T, time = trajectory.T, piece.time
+            memory, power = (
+                np.zeros((len(T), len(model.network.states))),
+                np.zeros((len(T), len(model.laws.components))),
+            )
+        else:
+            inputs, T, time, memory = piece.inputs, trajectory.middle, piece.middle, trajectory.memory
+            power = trajectory.tangent.at(T[:, model.loss_nodes])
+        kept = trajectory.values[self._kept]
+        rows = [time, *inputs.T, *T.T, *(np.full(len(T), v) for v in kept), *memory[:, self._remembered].T, *power.T]
+        own = [values[:, index, None] for index in range(values.shape[1])]
+        states = self._memories.follow(piece, [*rows, *own], trajectory.seen)
+        law, other = self._law(*rows, *own, *states)
+        size = (len(values), len(T))
+        return np.broadcast_to(np.asarray(law, float), size), np.broadcast_to(np.asarray(other, float), size)
+
+    def constant(self, values: Array) -> float:
+        """The law where it has nothing but the term's own parameters, of shape (parameters,); else nothing."""
+        given = {symbol(p.name): float(v) for p, v in zip(self.term.parameters, values, strict=True)}
+        law = sp.sympify(self.term.expression.xreplace(given))
+        return float(law) if law.is_number else 0.0
+
+    # ------------------------------------------------------------------ heat
+
+    def heat(self, trajectory: Trajectory, values: Array, there: Array | None = None) -> tuple[Array, Array]:
+        """The heat that the term brings to the network.
+
+        Parameters
+        ----------
+        trajectory : Trajectory
+        values : Array, shape (V, parameters)
+        there : Array, shape (parameters,), optional
+            Values that a network with the term had in this trajectory, where they are others
+
+        Returns
+        -------
+        heat : Array, shape (K, parts, V)
+            [W]
+        loss : Array, shape (K, V)
+            What of it is mechanical loss, [W]
+        """
+        model, term = self.model, self.term
+        law, other = (a.T for a in self.law(trajectory, values))
+        heat = np.zeros((len(law), model.n, len(values)))
+        loss = np.zeros(law.shape)
+        if term.kind == "source":
+            for node in term.target:
+                heat[:, model.parts.index(node)] += law / len(term.target)
+            loss = law if term.is_loss else loss
+        elif term.kind == "link":
+            self._link_heat(trajectory, law, other, heat)
+        elif term.kind in FACTORS:
+            within = np.zeros_like(law)
+            if self._inside:
+                within = law if there is None else self.law(trajectory, there[None, :])[0].T
+            loss = loss + self._factor_heat(trajectory, law, within, heat)
+        elif term.kind == "signal":
+            per_unit, loss_per_unit = input_slope(model, trajectory, term.target[0])
+            heat = per_unit[:, :, None] * law[:, None, :]
+            loss = loss_per_unit[:, None] * law
+        else:
+            raise ValueError(f"{term.label}: a term of kind {term.kind!r} brings no heat")
+        return heat, loss
+
+    def _factor_heat(self, trajectory: Trajectory, law: Array, within: Array, heat: Array) -> Array:
+        """Adds what a change, shape (K, V), does to the targets to `heat`; returns what of it is loss.
+
+        Their heats have the change `within` in them already: the rest of a loss that is halved is as much again.
+        """
+        model, balance, loss = self.model, trajectory.balance, np.zeros(law.shape)
+
+        def share(weight: float) -> Array:
+            return np.asarray(weight * law / (1.0 + weight * within))
+
+        if self.term.kind == "loss_factor":
+            sources = [source.name for source in model.network.sources]
+            for name, weight in self.term.weighted:
+                index = sources.index(name)
+                extra = share(weight) * balance.sources[:, index, None]
+                heat[:, model.parts.index(model.network.sources[index].node)] += extra
+                loss += extra
+        else:
+            links = [link.name for link in model.network.links]
+            for name, weight in self.term.weighted:
+                index = links.index(name)
+                flow = (balance.conductances[:, index] * balance.differences[:, index])[:, None] * share(weight)
+                heat += model.to_parts[index][:, None] * flow[:, None, :]
+        return loss
+
+    def _link_heat(self, trajectory: Trajectory, conductance: Array, other: Array, heat: Array) -> None:
+        model, T = self.model, trajectory.middle
+        signals = model.signals(trajectory.piece, T, trajectory.values, trajectory.memory)
+        known = dict(zip(model.laws.boundaries, model.laws.boundary(*signals), strict=True))
+        *sides, end = self.term.target
+        for node in sides:
+            here = T[:, model.parts.index(node), None]
+            if end in model.parts:
+                there = T[:, model.parts.index(end), None]
+            else:
+                there = np.broadcast_to(known[end], (len(T),))[:, None] if end in known else other
+            flow = conductance / len(sides) * (here - there)
+            heat[:, model.parts.index(node)] -= flow
+            if end in model.parts:
+                heat[:, model.parts.index(end)] += flow
+
+    # ------------------------------------------------------------------ inputs and readings
+
+    def adjusted(self, piece: Piece, values: Array, trajectory: Trajectory | None) -> Piece:
+        """A piece with the input as it really was, for a term of kind ``signal``; `values` of shape (parameters,)."""
+        model = self.model
+        if trajectory is None:
+            T = np.full((len(piece.steps), model.n), 20.0)
+            memory = np.zeros((len(T), len(model.network.states)))
+            power = np.zeros((len(T), len(model.laws.components)))
+            kept = model.start[self._kept]
+        else:
+            # A guess may stem from the network as it was before its latest term, whose numbers come last.
+            T, memory = trajectory.middle, np.zeros((len(trajectory.piece.steps), len(model.network.states)))
+            memory[:, : trajectory.memory.shape[1]] = trajectory.memory
+            values_before = len(trajectory.values)
+            kept = np.concatenate([trajectory.values, model.start[values_before:]])[self._kept]
+            power = trajectory.tangent.at(T[:, model.loss_nodes])
+        memory = memory[:, self._remembered]
+        rows = [piece.middle, *piece.inputs.T, *T.T, *(np.full(len(T), v) for v in kept), *memory.T, *power.T]
+        shift = np.broadcast_to(self._law(*rows, *values.tolist())[0], (len(T),))
+        samples = np.array(piece.samples)
+        samples[..., model.laws.inputs.index(self.term.target[0])] += shift[:, None]
+        return replace(piece, samples=samples)
+
+    def distorted(self, trajectory: Trajectory, sensors: Sensors, read: Array, values: Array) -> Array:
+        """Readings with the fault of a term of kind ``sensor``; `values` of shape (parameters,)."""
+        if self.term.form != "shift":
+            return self.passed_on(trajectory, sensors, read, values)
+        read = np.array(read)
+        law = self.law(trajectory, values[None, :], at_points=True)[0][0]
+        for name in self.term.target:
+            read[:, sensors.channels.index(name)] += law
+        return read
+
+    def passed_on(self, trajectory: Trajectory, sensors: Sensors, changes: Array, values: Array) -> Array:
+        """What such a fault makes of changes of the readings, shape (K + 1, channels, ...): most of them are linear."""
+        term, time = self.term, trajectory.piece.time
+        if term.form == "shift":
+            return changes
+        law = self.law(trajectory, values[None, :], at_points=True)[0][0]
+        along = law.reshape(-1, *[1] * (changes.ndim - 2))
+        channels = [sensors.channels.index(name) for name in term.target]
+        changes = np.array(changes)
+        for index in channels:
+            before = changes[:, index]
+            if term.form == "lag":
+                changes[:, index] = lagged(before, trajectory.piece.steps, float(law[0]))
+            elif term.form == "clock":
+                at = np.interp(time - law, time, np.arange(len(time)))
+                low = np.minimum(at.astype(int), len(time) - 2)
+                share = (at - low).reshape(along.shape)
+                changes[:, index] = (1.0 - share) * before[low] + share * before[low + 1]
+            elif term.form == "stuck":
+                begin = int(np.argmax(law != 0.0))  # the reading is held as it was when the law set in
+                changes[:, index] = before + along * (before[begin] - before)
+        if term.form == "swapped":
+            changes[:, channels] += along[:, None] * (changes[:, channels[::-1]] - changes[:, channels])
+        return changes
+
+
+def input_slope(model: NetworkOnGrid, trajectory: Trajectory, name: str) -> tuple[Array, Array]:
+    """Net heat, shape (K, parts), and loss, (K,), per unit of an input."""
+    step = INPUT_STEP.get(name, OTHER_INPUT_STEP)
+    samples = np.array(trajectory.piece.samples)
+    samples[..., model.laws.inputs.index(name)] += step
+    heat, loss = moved_heat(model, trajectory, replace(trajectory.piece, samples=samples))
+    return heat / step, loss / step
+
+
+def moved_heat(model: NetworkOnGrid, trajectory: Trajectory, moved: Piece) -> tuple[Array, Array]:
+    """Change of the net heat, shape (K, parts), and of the loss, (K,), when the inputs of a piece are others."""
+    piece, T = trajectory.piece, trajectory.middle
+    power = trajectory.tangent.at(T[:, model.loss_nodes])
+    changed = power
+    if not np.array_equal(moved.samples[..., :2], piece.samples[..., :2]):
+        changed = power + model.loss_at(moved.samples, T) - model.loss_at(piece.samples, T)
+    here = model.balance(piece, T, trajectory.values, power, trajectory.memory)
+    there = model.balance(moved, T, trajectory.values, changed, trajectory.memory)
+    return there.heat - here.heat, (there.sources - here.sources)[:, model.is_loss].sum(axis=-1)

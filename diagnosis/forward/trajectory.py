@@ -1,0 +1,520 @@
+"""Temperatures along a recording and their derivatives: the network simulated for all intervals at once.
+
+The network is linearised about a whole trajectory instead of integrated step by step: on every interval the heat
+balance is affine in the temperatures and solved exactly (matrix exponential), the solution is the next trajectory to
+linearise about, and three or four rounds settle it: a Newton iteration on waveforms. Every round is a handful of array
+operations over all intervals, and what it linearised serves the derivatives as well: an extra heat anywhere, at
+any time, of any parameter, answers through the same matrices.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+from scipy.special import exprel
+
+from diagnosis.forward.grid import Piece
+from diagnosis.forward.network_on_grid import HIGHEST_T, LOWEST_T, Balance, LossTangent, NetworkOnGrid
+from models.base.types import Array
+
+ROUNDS = 6
+SETTLED_K = 0.02
+TEMPERATURE_STEP_K = 0.05
+STATE_STEP = 0.05  # of a state that is solved with the temperatures, mostly a temperature itself
+# Where switches run free: a switching that comes a step later moves a temperature by more, so rounds end early.
+FREE_ROUNDS, FREE_SETTLED_K = 3, 0.2
+# From a cold start, losses linearised there are no good at operating temperature: it takes further rounds until their
+# tangents have arrived.
+MOST_FREE_ROUNDS, LOSS_ARRIVED = 10, 0.01
+RUNAWAY_T = 1500.0  # degC; beyond it there is no trajectory
+# A switching that no row shows, be they means over minutes or noisy near a set-point, sends a guided trajectory astray.
+# Further off than this, switches follow the simulated temperature until it is back.
+ASTRAY_K = 4.0
+MOST_AT_ONCE = 40_000  # intervals times parameters whose derivatives are taken together
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Trajectory:
+    """A settled trajectory of one piece and what its linearisation knows.
+
+    Attributes
+    ----------
+    piece : Piece
+    T : Array, shape (K + 1, parts)
+        Temperatures at the grid points, [degC]
+    values : Array, shape (parameters,)
+        Values of the network's parameters
+    tangent : LossTangent
+    seen : Array, shape (K + 1, parts)
+        Temperatures that the memories followed, [degC]
+    memory : Array, shape (K, states)
+    balance : Balance
+    jacobian : Array, shape (K, parts, parts)
+        Derivative of the net heats with respect to the temperatures, losses included, [W/K]
+    loss : Array, shape (K,)
+        Total mechanical loss, [W]
+    loss_slope : Array, shape (K, parts)
+        Its derivative with respect to the temperatures, [W/K]
+    decay, gain : Array, shape (K, parts + coupled, parts + coupled)
+        Exact solution over an interval: ``T_next = decay T + gain (net heat / capacity)``; [-] and [s]. After the
+        temperatures come the states that are solved with them
+    capacities : Array, shape (parts,)
+    """
+
+    piece: Piece
+    T: Array
+    values: Array
+    tangent: LossTangent
+    seen: Array
+    memory: Array
+    balance: Balance
+    jacobian: Array
+    loss: Array
+    loss_slope: Array
+    decay: Array
+    gain: Array
+    capacities: Array
+
+    @property
+    def middle(self) -> Array:
+        """Temperatures at the middles of the intervals, shape (K, parts), [degC]."""
+        return np.asarray(0.5 * (self.T[1:] + self.T[:-1]))
+
+    def response(self, heat: Array, initial: Array | None = None) -> Array:
+        """Change of the temperatures for extra heats.
+
+        Parameters
+        ----------
+        heat : Array, shape (K, parts, columns) or (K, parts + coupled, columns)
+            Extra heats, [W]; and extra rates of the states that are solved with the temperatures
+        initial : Array, shape (parts, columns) or (parts + coupled, columns), optional
+            Change of the start temperatures, [K]
+
+        Returns
+        -------
+        Array, shape (K + 1, parts, columns)
+            [K]
+        """
+        n, size = len(self.capacities), self.decay.shape[-1]
+        driven = self.gain[:, :, :n] @ (heat[:, :n] / self.capacities[:, None])
+        if heat.shape[1] > n:
+            driven += self.gain[:, :, n:] @ heat[:, n:]
+        result = np.zeros((len(heat) + 1, size, heat.shape[2]))
+        if initial is not None:
+            result[0, : len(initial)] = initial
+        now = result[0]
+        for k, decay in enumerate(self.decay):
+            now = decay @ now
+            now += driven[k]
+            result[k + 1] = now
+        return result[:, :n]
+
+
+def simulate(
+    model: NetworkOnGrid,
+    piece: Piece,
+    values: Array,
+    start: Array,
+    *,
+    guess: Trajectory | Array | None = None,
+    rounds: int = ROUNDS,
+    settled_K: float = SETTLED_K,
+) -> Trajectory:
+    """The free-running trajectory of a piece.
+
+    Parameters
+    ----------
+    model : NetworkOnGrid
+    piece : Piece
+    values : Array, shape (parameters,)
+        Values of the network's parameters
+    start : Array, shape (parts,) or (parts + coupled,)
+        Start temperatures, [degC], and where they are known those of the states that are solved with them
+    guess : Trajectory, or Array of shape (K + 1, parts), optional
+        Where to linearise first; by default the start temperatures
+    rounds : int
+        At most
+    settled_K : float
+        Largest change of a round at which it ends, [K]
+
+    Raises
+    ------
+    ArithmeticError
+        If the temperatures leave all bounds.
+    """
+    tangent = guess.tangent if isinstance(guess, Trajectory) else None
+    if isinstance(guess, Trajectory):
+        T = guess.T
+    elif guess is not None:
+        T = guess
+    else:
+        T = np.broadcast_to(start[: model.n], (len(piece.time), model.n))
+    found, states = None, guess.memory if isinstance(guess, Trajectory) else None
+    for _ in range(rounds):
+        with np.errstate(over="ignore", invalid="ignore"):
+            found = _round(model, piece, values, start, np.clip(T, LOWEST_T, HIGHEST_T), tangent, states)
+        if not np.isfinite(found.T).all():
+            raise ArithmeticError(f"the temperatures of {piece.recording} run away with these parameters")
+        change = float(np.max(np.abs(found.T - T)))
+        T, tangent, states = found.T, found.tangent, found.memory
+        if change < settled_K:
+            break
+    assert found is not None  # noqa: S101 - rounds >= 1
+    # A conductance tilted below zero lets a standing gearbox heat itself for ever: no temperatures at all.
+    if float(np.max(np.abs(found.T))) > RUNAWAY_T:
+        raise ArithmeticError(f"the temperatures of {piece.recording} run away with these parameters")
+    return found
+
+
+def free_running(
+    model: NetworkOnGrid, piece: Piece, values: Array, start: Array, *, guess: Array | None = None
+) -> Trajectory:  # fmt: skip
+    """The trajectory of a long piece of a network with switches, that nothing measured guides.
+
+    Whether a switch acts depends on when it acted before, so the rounds of :func:`simulate` settle from the front, one
+    switching after the other. Here every round is linearised for each position of the switches, and what is stepped
+    through is which of them holds; in finer intervals, since a switch acts in the midst of a row. At the grid points
+    stand means over as long as the rows lie apart, as rows of slow recordings are.
+
+    Parameters
+    ----------
+    model : NetworkOnGrid
+    piece : Piece
+    values : Array, shape (parameters,)
+    start : Array, shape (parts,) or (parts + coupled,)
+        As for :func:`simulate`
+    guess : Array, shape (K + 1, parts), optional
+        Where to linearise first; by default the start temperatures
+
+    Raises
+    ------
+    ArithmeticError
+        If the temperatures leave all bounds.
+    """
+    fine, at = piece.finer()
+    count = len(fine.steps)
+    T = np.broadcast_to(start[: model.n], (count + 1, model.n))
+    if guess is not None:
+        T = np.stack([np.interp(fine.time, piece.time, course) for course in guess.T], axis=-1)
+    tangent: LossTangent | None = None
+    states: Array | None = None
+    shift = np.inf  # of the mean temperatures in the last round, whatever the switches did meanwhile, K
+    for done in range(MOST_FREE_ROUNDS):
+        middle = np.clip(0.5 * (T[1:] + T[:-1]), LOWEST_T, HIGHEST_T)
+        last, tangent = tangent, model.loss_tangent(fine, middle, tangent)
+        still = shift < FREE_SETTLED_K and last is not None and _arrived(model, last, tangent, middle)
+        if done >= FREE_ROUNDS and still:
+            break
+        power = tangent.at(middle[:, model.loss_nodes])
+        held = np.clip(T, LOWEST_T, HIGHEST_T)
+        memory = model.memory(fine, held, held, values, power, states)
+        nothing = np.full_like(T, np.nan)
+        before, (T, _, states) = T, _stepped(model, fine, values, start, middle, tangent, memory, nothing)
+        if not np.isfinite(T).all():
+            raise ArithmeticError(f"the temperatures of {piece.recording} run away with these parameters")
+        shift = float(np.max(np.abs((T - before).mean(axis=0))))
+        if float(np.max(np.abs(T - before))) < FREE_SETTLED_K:
+            break
+    # What rows minutes apart show are means, over as much around every grid point; at the ends over what there is.
+    half = piece.samples.shape[1] // 2 if piece.slow else 0
+    total = np.concatenate([np.zeros((1, model.n)), np.cumsum(T, axis=0)])
+    low, high = np.maximum(at - half, 0), np.minimum(at + half, count) + 1
+    means = (total[high] - total[low]) / (high - low)[:, None]
+    assert states is not None  # noqa: S101 - rounds >= 1
+    memory = np.add.reduceat(states, at[:-1]) / np.diff(at)[:, None]
+    unguided = replace(piece, guided=False)
+    return replace(_round(model, unguided, values, start, means, None, None, given=memory), T=means)
+
+
+def _arrived(model: NetworkOnGrid, last: LossTangent, tangent: LossTangent, middle: Array) -> bool:
+    """Whether losses by the tangents of the last round are those at the temperatures that came out of it."""
+    mine = middle[:, model.loss_nodes]
+    off = np.abs(last.at(mine) - tangent.at(mine))
+    return bool((off.mean(axis=0) <= LOSS_ARRIVED * np.abs(tangent.at(mine)).mean(axis=0)).all())
+
+
+def _stepped(
+    model: NetworkOnGrid, piece: Piece, values: Array, start: Array, middle: Array, tangent: LossTangent,
+    memory: Array, guide: Array,
+) -> tuple[Array, Array, Array]:  # fmt: skip
+    """Temperatures at the grid points where switches follow them as they come; the other memories are given.
+
+    Linearised about the temperatures `middle` once for every position of the switches, and of what follows them, as a
+    slow valve does: between its ends the step is taken in proportion. Where there is a `guide`, see
+    :meth:`diagnosis.forward.grid.Piece.guide`, the switches follow it as long as the temperatures are near it.
+
+    Returns
+    -------
+    T, seen : Array, shape (K + 1, parts)
+        Temperatures, and those that the switches followed, [degC]
+    memory : Array, shape (K, states)
+        As given, but for what was found here
+    """
+    switches, actuated, acting, kept = model.switches, model.actuated, model.acting, memory.copy()
+    corners = list(product((0.0, 1.0), repeat=len(acting)))
+    solutions = []
+    for corner in corners:
+        kept[:, acting] = corner
+        solved = _linearised(model, piece, values, middle, tangent, kept)
+        solutions.append((solved.decay, solved.driven))
+    switching, actuation = model.switching(blurred=piece.guided and piece.slow), model.actuation
+    power = tangent.at(middle[:, model.loss_nodes])
+    given = np.broadcast_to(values, (len(kept), len(values)))
+    table = np.concatenate([piece.middle[:, None], piece.inputs, middle, given, kept, power], axis=1).tolist()
+    first = 1 + piece.inputs.shape[1]
+    states = first + model.n + len(values)
+    n, now = model.n, complete_start(model, start)
+    result, seen = np.empty((len(kept) + 1, len(now))), np.empty((len(kept) + 1, n))
+    result[0] = now
+    state = {index: model.network.states[index].start for index in (*switches, *actuated)}
+    for k, (signals, h) in enumerate(zip(table, piece.steps.tolist(), strict=True)):
+        near = np.abs(now[:n] - guide[k]) < ASTRAY_K  # not where nothing was measured
+        seen[k] = np.where(near, guide[k], now[:n])
+        signals[first : first + n] = seen[k].tolist()
+        for index, value in state.items():
+            signals[states + index] = value
+        for index, value in zip(switches, switching(signals), strict=True):
+            state[index] = signals[states + index] = value
+        # Seen in means over minutes a switch may be half way; it is where it is more likely to be.
+        opening = state | {index: float(state[index] > 0.5) for index in switches}
+        if actuated:
+            found = actuation(signals)
+            for index, rate, slope in zip(actuated, found, found[len(actuated) :], strict=False):
+                opening[index] += rate * 0.5 * h * float(exprel(0.5 * h * slope))
+                state[index] += rate * h * float(exprel(h * slope))
+        kept[k, list(opening)] = list(opening.values())
+        now = _between(solutions, corners, [opening[index] for index in acting], k, now)
+        result[k + 1] = now
+    seen[-1] = now[:n]
+    kept[:, model.coupled] = 0.5 * (result[1:, n:] + result[:-1, n:])
+    return result[:, :n], seen, kept
+
+
+def _between(
+    solutions: Sequence[tuple[Array, Array]], corners: Sequence[tuple[float, ...]], positions: Sequence[float], k: int,
+    now: Array,
+) -> Array:  # fmt: skip
+    """One step between the solutions at the ends of what acts."""
+    result = np.zeros_like(now)
+    for corner, (decay, driven) in zip(corners, solutions, strict=True):
+        weight = math.prod(z if end else 1.0 - z for z, end in zip(positions, corner, strict=True))
+        if weight:
+            result += weight * (decay[k] @ now + driven[k])
+    return result
+
+
+def complete_start(model: NetworkOnGrid, start: Array) -> Array:
+    """Start temperatures, and the start of the states that are solved with them: as given, else as declared."""
+    if len(start) > model.n:
+        return start
+    return np.concatenate([start, [model.network.states[index].start for index in model.coupled]])
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Solved:
+    """The heat balance linearised about temperatures at the middles, and its exact solution over every interval."""
+
+    balance: Balance
+    jacobian: Array
+    loss_slope: Array
+    total: Array
+    capacities: Array
+    decay: Array
+    gain: Array
+    driven: Array
+
+
+def _linearised(
+    model: NetworkOnGrid, piece: Piece, values: Array, T: Array, tangent: LossTangent, memory: Array
+) -> _Solved:
+    power = tangent.at(T[:, model.loss_nodes])
+    balance = model.balance(piece, T, values, power, memory)
+    total = balance.sources[:, model.is_loss].sum(axis=-1)
+    moved, changed = _moved(model, T, tangent)
+    there = model.balance(piece, moved, values, changed, memory)
+    jacobian = np.ascontiguousarray(np.moveaxis((there.heat - balance.heat) / TEMPERATURE_STEP_K, 0, -1))
+    loss_slope = ((there.sources[..., model.is_loss].sum(axis=-1) - total) / TEMPERATURE_STEP_K).T
+    capacities = model.capacities(values)
+    matrix = jacobian / capacities[:, None]
+    constant = balance.heat / capacities - np.einsum("kij,kj->ki", matrix, T)
+    if model.coupled:
+        matrix, constant = _with_states(model, piece, values, T, tangent, memory, balance, matrix, capacities)
+    decay, gain = exponential(matrix, piece.steps)
+    return _Solved(
+        balance=balance, jacobian=jacobian, loss_slope=loss_slope, total=total, capacities=capacities, decay=decay,
+        gain=gain, driven=np.einsum("kij,kj->ki", gain, constant),
+    )  # fmt: skip
+
+
+def _moved(model: NetworkOnGrid, T: Array, tangent: LossTangent) -> tuple[Array, Array]:
+    """Temperatures of which one part's is a little higher, and the losses there, for every part: (parts, K, ...)."""
+    moved = T + TEMPERATURE_STEP_K * np.eye(model.n)[:, None, :]
+    power = np.tile(tangent.at(T[:, model.loss_nodes]), (model.n, 1, 1))
+    power[model.loss_nodes] += TEMPERATURE_STEP_K * np.moveaxis(tangent.slope, -1, 0)
+    return moved, power
+
+
+def _with_states(
+    model: NetworkOnGrid, piece: Piece, values: Array, T: Array, tangent: LossTangent, memory: Array, balance: Balance,
+    matrix: Array, capacities: Array,
+) -> tuple[Array, Array]:  # fmt: skip
+    """Matrix and constant of temperatures and the states that are solved with them."""
+    n, power = model.n, tangent.at(T[:, model.loss_nodes])
+    rates = model.rates(piece, T, values, power, memory)
+    size = n + len(model.coupled)
+    whole = np.zeros((len(T), size, size))
+    whole[:, :n, :n] = matrix
+    moved, changed = _moved(model, T, tangent)
+    there = model.rates(piece, moved, values, changed, memory)
+    whole[:, n:, :n] = np.moveaxis((there - rates) / TEMPERATURE_STEP_K, 0, -1)
+    for index, state in enumerate(model.coupled):
+        changed = memory.copy()
+        changed[:, state] += STATE_STEP
+        heat = model.balance(piece, T, values, power, changed).heat
+        whole[:, :n, n + index] = (heat - balance.heat) / capacities / STATE_STEP
+        whole[:, n:, n + index] = (model.rates(piece, T, values, power, changed) - rates) / STATE_STEP
+    here = np.concatenate([T, memory[:, model.coupled]], axis=1)
+    slope = np.concatenate([balance.heat / capacities, rates], axis=1)
+    return whole, slope - np.einsum("kij,kj->ki", whole, here)
+
+
+def _round(
+    model: NetworkOnGrid, piece: Piece, values: Array, start: Array, T_ref: Array, tangent: LossTangent | None,
+    states: Array | None, *, given: Array | None = None,
+) -> Trajectory:  # fmt: skip
+    """Linearise about a trajectory and solve; with states that follow its temperatures, if none are given."""
+    T = 0.5 * (T_ref[1:] + T_ref[:-1])
+    tangent = model.loss_tangent(piece, T, tangent)
+    power = tangent.at(T[:, model.loss_nodes])
+    guide, seen = piece.guide(model.parts), piece.seen(T_ref, model.parts)
+    memory = model.memory(piece, T_ref, seen, values, power, states) if given is None else given.copy()
+    solved, result = _walked(model, piece, values, start, T, tangent, memory)
+    read = model.switched_by
+    if read and given is None and np.nanmax(np.abs(result[:, : model.n] - guide)[:, read], initial=0.0) > ASTRAY_K:
+        seen = _stepped(model, piece, values, start, T, tangent, memory, guide)[1]
+        memory = model.memory(piece, T_ref, seen, values, power, states)
+        solved, result = _walked(model, piece, values, start, T, tangent, memory)
+    n = model.n
+    memory[:, model.coupled] = 0.5 * (result[1:, n:] + result[:-1, n:])
+    result = result[:, :n]
+    loss = solved.total + np.einsum("kn,kn->k", solved.loss_slope, 0.5 * (result[1:] + result[:-1]) - T)
+    return Trajectory(
+        piece=piece, T=result, values=values, tangent=tangent, seen=seen, memory=memory, balance=solved.balance,
+        jacobian=solved.jacobian, loss=loss, loss_slope=solved.loss_slope, decay=solved.decay, gain=solved.gain,
+        capacities=solved.capacities,
+    )  # fmt: skip
+
+
+def _walked(
+    model: NetworkOnGrid, piece: Piece, values: Array, start: Array, T: Array, tangent: LossTangent, memory: Array
+) -> tuple[_Solved, Array]:
+    """The solution about temperatures at the middles; temperatures and states at the grid points."""
+    solved = _linearised(model, piece, values, T, tangent, memory)
+    now = complete_start(model, start)
+    result = np.empty((len(T) + 1, len(now)))
+    result[0] = now
+    for k in range(len(T)):
+        now = solved.decay[k] @ now + solved.driven[k]
+        result[k + 1] = now
+    return solved, result
+
+
+def exponential(matrix: Array, steps: Array) -> tuple[Array, Array]:
+    r"""Exact solution of ``x' = A x + b`` over an interval.
+
+    Parameters
+    ----------
+    matrix : Array, shape (K, n, n)
+        A, [1/s]
+    steps : Array, shape (K,)
+        h, [s]
+
+    Returns
+    -------
+    decay, gain : Array, shape (K, n, n)
+        :math:`e^{hA}` and :math:`\int_0^h e^{sA} ds` [s]: ``x(h) = decay x + gain b``
+
+    References
+    ----------
+    Taylor series of phi_1 with doubling, phi_1(2z) = (e^z + 1) phi_1(z) / 2; Hochbruck, Ostermann, Exponential
+    integrators, Acta Numerica 19 (2010).
+    """
+    z = matrix * steps[:, None, None]
+    largest = float(np.max(np.abs(z).sum(axis=-1), initial=0.0))
+    if not np.isfinite(largest):
+        raise ArithmeticError("the heat balance is no number with these parameters")
+    doublings = max(0, int(np.ceil(np.log2(max(largest, 1e-12) / 0.5))))
+    z = z / 2.0**doublings
+    identity = np.eye(matrix.shape[-1])
+    phi = np.broadcast_to(identity, z.shape).copy()
+    for order in range(9, 1, -1):  # Horner: phi_1 = 1 + z/2 (1 + z/3 (1 + ...))
+        phi = identity + (z / order) @ phi
+    decay = identity + z @ phi
+    for _ in range(doublings):
+        phi = 0.5 * (decay @ phi + phi)
+        decay = decay @ decay
+    return decay, phi * steps[:, None, None]
+
+
+def settled_balance(model: NetworkOnGrid, trajectory: Trajectory) -> Balance:
+    """The heat balance along a settled trajectory; its own is that of the one before, about which it was solved."""
+    T = trajectory.middle
+    power = trajectory.tangent.at(T[:, model.loss_nodes])
+    return model.balance(trajectory.piece, T, trajectory.values, power, trajectory.memory)
+
+
+def parameter_heats(
+    model: NetworkOnGrid, trajectory: Trajectory, here: Balance, indices: Sequence[int], steps: Array
+) -> tuple[Array, Array]:
+    """Net heat and total loss per unit of some parameters, along a trajectory.
+
+    Parameters
+    ----------
+    model : NetworkOnGrid
+    trajectory : Trajectory
+    here : Balance
+        Its :func:`settled_balance`
+    indices : sequence of int
+        Which parameters
+    steps : Array, shape (V,)
+        Of every parameter, in its unit
+
+    Returns
+    -------
+    heat : Array, shape (K, parts + coupled, V)
+        Including the change of stored heat that another capacity makes, per unit of the parameter, [W/unit]; then the
+        rates of the states that are solved with the temperatures
+    loss : Array, shape (K, V)
+    """
+    count = max(1, MOST_AT_ONCE // len(trajectory.memory))
+    found = [_parameter_heats(model, trajectory, here, indices[i : i + count], steps[i : i + count])
+             for i in range(0, len(indices), count)]  # fmt: skip
+    heats, losses = zip(*found, strict=True)
+    return np.concatenate(heats, axis=-1), np.concatenate(losses, axis=-1)
+
+
+def _parameter_heats(
+    model: NetworkOnGrid, trajectory: Trajectory, here: Balance, indices: Sequence[int], steps: Array
+) -> tuple[Array, Array]:
+    T, piece, memory = trajectory.middle, trajectory.piece, trajectory.memory
+    values = np.tile(trajectory.values, (len(indices), 1))
+    values[range(len(indices)), indices] += steps
+    power = trajectory.tangent.at(T[:, model.loss_nodes])
+    remembered = [i for i, index in enumerate(indices) if model.network.parameters[index].name in model.remembered]
+    memories = memory
+    if remembered:
+        memories = np.tile(memory, (len(indices), 1, 1))
+        memories[remembered] = model.memory(piece, trajectory.T, trajectory.seen, values[remembered], power, memory)
+    there = model.balance(piece, T, values, power, memories)
+    stored = (trajectory.capacities / model.capacities(values))[:, None, :]
+    heat = (there.heat * stored - here.heat) / steps[:, None, None]
+    if model.coupled:
+        before = model.rates(piece, T, trajectory.values, power, memory)
+        driven = (model.rates(piece, T, values, power, memories) - before) / steps[:, None, None]
+        heat = np.concatenate([heat, driven], axis=-1)
+    loss = (there.sources - here.sources)[..., model.is_loss].sum(axis=-1) / steps[:, None]
+    return np.moveaxis(heat, 0, -1), loss.T

@@ -1,0 +1,1 @@
+"""Calibration: unknowns, noise, whitening, posterior, evidence."""

@@ -1,0 +1,138 @@
+"""What the noise of a recording is taken to be, before anything is explained."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from scipy.optimize import nnls
+
+from diagnosis.forward.grid import Piece, slow_rows, white_sd
+from diagnosis.forward.network_on_grid import NetworkOnGrid
+from diagnosis.inference.whitening import Noise
+from diagnosis.recordings.quantities import LOSS
+from diagnosis.recordings.recording import Recording
+from models.base.types import Array
+
+LOWEST_SD_K, LOWEST_SD_W = 0.02, 0.5
+FEWEST_ROWS, DEFAULT_LOSS_RELATIVE = 50, 0.02
+HEAT_FRACTION = 0.005  # random heat in every part, of the typical total loss
+HEAT_TIME_S = 1200.0
+# Laws of which only the form is known miss more, in every part; a part of little heat capacity is at once where its
+# heat and conductances put it, so its floor is told as a temperature.
+PARAMETRIC_FRACTION, PARAMETRIC_K = 0.05, 0.7
+SLOW_SD_K = 0.3  # at most, of rows minutes apart: what differs from row to row is operation then, not instrument
+START_KNOWN_K, START_UNKNOWN_K, START_UNKNOWN_SHARE = 2.0, 2.0, 0.15
+
+
+def loss_noise(recordings: Sequence[Recording]) -> tuple[float, float]:
+    """White noise of one row of the measured total loss: a constant part [W] and one relative to the loss [-].
+
+    From the second differences in five classes of loss, by least squares of the variances.
+    """
+    seconds, levels = [], []
+    for recording in recordings:
+        for channel in recording.channels:
+            if channel.name == LOSS:
+                for rows in recording.segments:
+                    values = channel.values[rows]
+                    seconds.append(np.diff(values, 2))
+                    levels.append(values[1:-1])
+    second, level = np.concatenate(seconds), np.abs(np.concatenate(levels))
+    good = np.isfinite(second) & np.isfinite(level)
+    second, level = second[good], level[good]
+    if len(second) < FEWEST_ROWS:
+        return LOWEST_SD_W, DEFAULT_LOSS_RELATIVE
+    classes = np.array_split(np.argsort(level), 5)
+    # Steps of the operating point are rare; the median does not see them.
+    variance = np.array([(1.4826 * np.median(np.abs(second[c]))) ** 2 / 6.0 for c in classes])
+    square = np.array([np.median(level[c]) ** 2 for c in classes])
+    weight = 1.0 / (variance + 1e-6 * variance.max() + 1e-12)
+    (constant, relative), _ = nnls(np.stack([weight, weight * square], axis=1), weight * variance)
+    return max(float(np.sqrt(constant)), LOWEST_SD_W), float(np.sqrt(relative))
+
+
+def channel_noise(recordings: Sequence[Recording], channels: Sequence[str]) -> Mapping[str, float]:
+    """White noise of one row of every temperature, [K]: as the rows show it, or as stated where they are too few."""
+    result = {}
+    for name in channels:
+        if name == LOSS:
+            continue  # see loss_noise: it goes with the loss
+        found = [c for r in recordings for c in r.channels if c.name == name]
+        stated = [c.noise for c in found if c.noise is not None]
+        rows = sum(int(np.isfinite(c.values).sum()) for c in found)
+        # What the rows show is worth more than what a data sheet says.
+        if stated and rows < FEWEST_ROWS:
+            result[name] = max(stated)
+        else:
+            seen = [white_sd(c.values[piece]) for r in recordings for c in r.channels if c.name == name
+                    for piece in r.segments]  # fmt: skip
+            result[name] = max(max(seen, default=0.0), LOWEST_SD_K)
+            if slow_rows(recordings):
+                result[name] = min(result[name], SLOW_SD_K)
+    return result
+
+
+def noise_of(
+    model: NetworkOnGrid, piece: Piece, white: Mapping[str, float], loss_W: float, *,
+    loss_noise: tuple[float, float] = (0.0, 0.0), parametric: bool = False,
+) -> Noise:  # fmt: skip
+    """The noise of one piece.
+
+    Parameters
+    ----------
+    model : NetworkOnGrid
+    piece : Piece
+    white : mapping of channel to float
+        White noise of one row
+    loss_W : float
+        Typical total loss, [W]
+    loss_noise : (float, float)
+        Of the measured total loss, see :func:`loss_noise`
+    parametric : bool
+        Whether only the form of the laws is known: the structural floor (random heat in every part) is higher then
+    """
+    capacities = model.capacities(model.start)
+    heavy = capacities > 0.01 * capacities.max()
+    heat_sd = np.where(heavy, HEAT_FRACTION * loss_W, 0.0)
+    if parametric:
+        heat_sd = np.where(heavy, PARAMETRIC_FRACTION * loss_W, PARAMETRIC_K * _conductances(model, piece))
+    known = np.array([name in piece.channels for name in model.parts])
+    first = piece.measured[0, [name != LOSS for name in piece.channels]]
+    hot = float(np.nanmax(first)) if np.isfinite(first).any() else 50.0
+    ambient = _ambient(model, piece)
+    unknown = START_UNKNOWN_K + START_UNKNOWN_SHARE * abs(hot - ambient)
+    return Noise(
+        channel_sd=np.array([white.get(name, loss_noise[0]) for name in piece.channels]),
+        floor_sd=np.array([LOWEST_SD_W if name == LOSS else LOWEST_SD_K for name in piece.channels]),
+        loss_relative_sd=loss_noise[1],
+        heat_sd=heat_sd,
+        heat_time=HEAT_TIME_S,
+        start_sd=np.where(known, START_KNOWN_K, unknown),
+        capacity=float(capacities.sum()) if parametric else 0.0,
+    )
+
+
+def _conductances(model: NetworkOnGrid, piece: Piece) -> Array:
+    """Sum of the conductances of every part, mean over a piece, as delivered, [W/K], shape (parts,)."""
+    T = np.broadcast_to(start_guess(model, piece), (len(piece.steps), model.n))
+    memory = np.zeros((len(T), len(model.network.states)))
+    each = model.conductances(model.signals(piece, T, model.start, memory), model.start, (len(T),))
+    return np.asarray(each.mean(axis=0) @ np.abs(model.to_parts))
+
+
+def start_guess(model: NetworkOnGrid, piece: Piece) -> Array:
+    """Start temperatures of all parts: as measured, else the mean of what is, [degC]."""
+    first = {}
+    for index, name in enumerate(piece.channels):
+        seen = piece.measured[:, index]
+        seen = seen[np.isfinite(seen)]
+        if name in model.parts and len(seen):
+            first[name] = float(seen[0])
+    middle = float(np.mean(list(first.values()))) if first else _ambient(model, piece)
+    return np.array([first.get(name, middle) for name in model.parts])
+
+
+def _ambient(model: NetworkOnGrid, piece: Piece) -> float:
+    inputs = model.laws.inputs
+    return float(piece.inputs[0, inputs.index("T_ambient")]) if "T_ambient" in inputs else 20.0

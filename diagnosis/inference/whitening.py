@@ -1,0 +1,182 @@
+"""The noise of a recording, and the filter that turns residuals into independent standard normal numbers.
+
+A free-running residual wanders for hours: one forgotten watt in the oil shows in every later row. Judged row by row it
+looks like overwhelming evidence. The noise model therefore holds what a real gearbox always has beside its model: a
+random heat in every part (an Ornstein-Uhlenbeck process, the *structural floor*), unknown start temperatures, and white
+sensor noise. A Kalman filter of the linearised network gives the innovations of any signal under this noise; the same
+filter applied to a derivative gives that derivative in the same, whitened units.
+
+References
+----------
+Kristensen, Madsen, Jorgensen, Automatica 40 (2004), for stochastic grey-box models; Harvey, Forecasting, Structural
+Time Series Models and the Kalman Filter (1989), section 3.4, for the same filter on regressors.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from diagnosis.forward.network_on_grid import NetworkOnGrid
+from diagnosis.forward.observation import Sensors, total_at_points
+from diagnosis.forward.trajectory import Trajectory
+from diagnosis.recordings.quantities import LOSS
+from models.base.types import Array
+
+MISSING_VARIANCE = 1e12
+JUMP_SHARE = 0.3  # of a change within one interval: whether it came early or late in it is not known
+
+
+@dataclass(frozen=True, kw_only=True)
+class Noise:
+    """What a recording shows beside the model.
+
+    Attributes
+    ----------
+    channel_sd : Array, shape (channels,)
+        White noise of one row, [K] or [W]
+    floor_sd : Array, shape (channels,)
+        White part that averaging does not reduce (a step of the display), [K] or [W]
+    loss_relative_sd : float
+        White noise of the total loss as a fraction of it, [-]
+    heat_sd : Array, shape (parts,)
+        Random heat in the parts, [W]
+    heat_time : float
+        Its correlation time, [s]
+    start_sd : Array, shape (parts,)
+        Uncertainty of the start temperatures, [K]
+    capacity : float
+        Sum of the heat capacities that `heat_sd` is told for, [J/K]: it goes with them, else the floor would decide on
+        the size of a gearbox whose recordings tell ratios only; 0 where it is fixed
+    """
+
+    channel_sd: Array
+    floor_sd: Array
+    loss_relative_sd: float
+    heat_sd: Array
+    heat_time: float
+    start_sd: Array
+    capacity: float = 0.0
+
+    def with_floor(self, times: float) -> Noise:
+        """The same with its random heats multiplied."""
+        return replace(self, heat_sd=self.heat_sd * times)
+
+
+class Whitening:
+    """The Kalman filter of one trajectory: its gains depend on the noise and the linearisation, not on the data.
+
+    Parameters
+    ----------
+    model : NetworkOnGrid
+    trajectory : Trajectory
+    sensors : Sensors
+    noise : Noise
+    """
+
+    def __init__(self, model: NetworkOnGrid, trajectory: Trajectory, sensors: Sensors, noise: Noise) -> None:
+        n, piece = trajectory.decay.shape[-1], trajectory.piece
+        if noise.capacity > 0.0:
+            share = float(trajectory.capacities.sum()) / noise.capacity
+            noise = replace(noise, heat_sd=noise.heat_sd * share)
+        shaken = np.flatnonzero(noise.heat_sd > 0.0)
+        size, steps = n + len(shaken), piece.steps
+        count = len(steps)
+        rho = np.exp(-steps / noise.heat_time)
+        per_capacity = trajectory.gain[:, :, shaken] / trajectory.capacities[shaken]
+        self._transition = np.zeros((count, size, size))
+        self._transition[:, :n, :n] = trajectory.decay
+        self._transition[:, :n, n:] = per_capacity
+        self._transition[:, range(n, size), range(n, size)] = rho[:, None]
+        renewed = (noise.heat_sd[shaken] ** 2) * (1.0 - rho[:, None] ** 2)
+        observe = _observation(model, trajectory, sensors, size)
+        self._seen = np.isfinite(piece.measured)
+        variance = reading_variance(model, trajectory, sensors, noise)
+        variance = np.where(self._seen, variance, MISSING_VARIANCE)
+        self._observe = observe
+        points, m = variance.shape
+        self._root = np.empty((points, m, m))
+        self._gain = np.empty((points, size, m))
+        self.log_determinant = 0.0
+        covariance = np.zeros((size, size))
+        covariance[range(n), range(n)] = float(noise.start_sd.max()) ** 2  # of a tank it is as little known as can be
+        covariance[range(model.n), range(model.n)] = noise.start_sd**2
+        covariance[range(n, size), range(n, size)] = noise.heat_sd[shaken] ** 2
+        half = np.zeros((size, size))
+        for k in range(points):
+            H = observe[k]
+            PH = covariance @ H.T
+            S = H @ PH
+            S[range(m), range(m)] += variance[k]
+            inverse_root = np.linalg.inv(np.linalg.cholesky(S))
+            gain = PH @ inverse_root.T
+            self._root[k] = inverse_root
+            self._gain[k] = gain @ inverse_root
+            self.log_determinant -= 2.0 * float(np.log(np.diag(inverse_root)[self._seen[k]]).sum())
+            covariance = covariance - gain @ gain.T
+            if k < count:
+                half = self._transition[k]
+                covariance = half @ covariance @ half.T
+                covariance[range(n, size), range(n, size)] += renewed[k]
+        # One matrix per step takes (state, readings) to the next state.
+        self._forget = self._transition - self._transition @ self._gain[:-1] @ observe[:-1]
+        self._learn = self._transition @ self._gain[:-1]
+
+    def __call__(self, columns: Array) -> Array:
+        """Innovations of signals.
+
+        Parameters
+        ----------
+        columns : Array, shape (K + 1, channels, columns)
+            Readings: a residual, or derivatives
+
+        Returns
+        -------
+        Array, shape ((K + 1) channels, columns)
+            Standardised innovations; 0 where nothing was measured
+        """
+        given = np.where(self._seen[:, :, None], columns, 0.0)
+        points, m, count = given.shape
+        driven = self._learn @ given[:-1]
+        state = np.zeros((points, self._forget.shape[1], count))
+        now = state[0]
+        for k in range(points - 1):
+            now = self._forget[k] @ now
+            now += driven[k]
+            state[k + 1] = now
+        innovations = self._root @ (given - self._observe @ state)
+        innovations[~self._seen] = 0.0
+        return innovations.reshape(points * m, count)
+
+
+def reading_variance(model: NetworkOnGrid, trajectory: Trajectory, sensors: Sensors, noise: Noise) -> Array:
+    """White variance of every reading, shape (K + 1, channels), [K^2] or [W^2]: instruments, and jumps of operation."""
+    piece = trajectory.piece
+    variance = noise.channel_sd**2 / np.maximum(piece.counts, 1.0) + noise.floor_sd**2
+    for index, name in enumerate(sensors.channels):
+        if name == LOSS:
+            total = trajectory.loss
+            at = total_at_points(total)
+            variance[:, index] += (noise.loss_relative_sd * at) ** 2 / np.maximum(piece.counts[:, index], 1.0)
+            # Where the operating point jumps, a reading may belong to either side.
+            jump = np.abs(np.diff(total, prepend=total[0], append=total[-1]))
+            jump = np.maximum(jump, np.maximum(np.roll(jump, 1), np.roll(jump, -1)))
+            variance[:, index] += (JUMP_SHARE * jump) ** 2
+        else:
+            moved = np.abs(np.diff(trajectory.T[:, model.parts.index(name)]))
+            variance[:, index] += (JUMP_SHARE * np.maximum(np.append(moved, 0.0), np.append(0.0, moved))) ** 2
+    return np.asarray(variance)
+
+
+def _observation(model: NetworkOnGrid, trajectory: Trajectory, sensors: Sensors, size: int) -> Array:
+    """Readings per state, shape (K + 1, channels, size). Lags of the random part are not followed: it is slow."""
+    points = len(trajectory.T)
+    H = np.zeros((points, len(sensors.channels), size))
+    for index, name in enumerate(sensors.channels):
+        if name == LOSS:
+            slope = trajectory.loss_slope
+            H[:, index, : model.n] = total_at_points(slope)
+        else:
+            H[:, index, model.parts.index(name)] = 1.0
+    return H

@@ -1,0 +1,1 @@
+"""Recordings with concealed effects, and their truth."""

@@ -1,0 +1,110 @@
+"""Files of a case: recordings as CSV.gz, and the truth as JSON in another folder."""
+
+from __future__ import annotations
+
+import gzip
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from models.base.errors import InputError
+from models.base.types import Array
+
+MAPPING = "mapping.toml"
+DECIMALS = {"time_s": 0, "speed_rpm": 1, "torque_Nm": 2}
+
+
+def keep_apart(recordings: Path, truth: Path) -> None:
+    """Refuse to put the truth where the recordings are.
+
+    Raises
+    ------
+    InputError
+        If it would lie there.
+    """
+    if recordings.resolve() in (truth.resolve(), *truth.resolve().parents):
+        raise InputError(f"{truth}: the truth must not lie among the recordings in {recordings}; name another folder")
+
+
+def keep_other_cases(made: Path, output: Path) -> None:
+    """Refuse to replace files of another case; the same case may be made again.
+
+    Parameters
+    ----------
+    made : Path
+        Folder with new files
+    output : Path
+        Folder that they will be moved to
+
+    Raises
+    ------
+    InputError
+        If a file there has other content.
+    """
+    for file in sorted(path for path in made.rglob("*") if path.is_file()):
+        there = output / file.relative_to(made)
+        if there.is_file() and there.read_bytes() != file.read_bytes():
+            raise InputError(f"{there}: is of another case, which would be lost; choose another output")
+
+
+def write_case(
+    folder: Path,
+    truth_file: Path | None,
+    recordings: Mapping[str, Mapping[str, Array]],
+    truth: Mapping[str, Any],
+    stated: Mapping[str, float] | None = None,
+) -> None:
+    """Write the recordings into a folder and the truth into a file outside it.
+
+    Parameters
+    ----------
+    folder : Path
+        Gets ``<recording>.csv.gz`` and, if anything is stated of the sensors, ``mapping.toml``
+    truth_file : Path or None
+        Outside `folder`; see :func:`keep_apart`. None: the truth is not written
+    recordings : mapping of name to columns
+    truth : mapping
+    stated : mapping of key to float, or None
+        Data sheet of every temperature sensor, by the keys of a mapping file; it may be wrong
+
+    Raises
+    ------
+    InputError
+        If something cannot be written.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for name, columns in recordings.items():
+            # Neither name nor time go into the archive, so that the same case gives the same bytes.
+            (folder / f"{name}.csv.gz").write_bytes(gzip.compress(_csv(columns), compresslevel=6, mtime=0))
+        if stated is not None:
+            (folder / MAPPING).write_bytes(_mapping(recordings, stated).encode())
+        if truth_file is not None:
+            truth_file.parent.mkdir(parents=True, exist_ok=True)
+            truth_file.write_bytes((json.dumps(truth, indent=1, sort_keys=True, allow_nan=False) + "\n").encode())
+    except OSError as error:
+        raise InputError(f"{error.filename}: cannot be written ({error.strerror}); choose another output") from error
+
+
+def _mapping(recordings: Mapping[str, Mapping[str, Array]], stated: Mapping[str, float]) -> str:
+    columns = next(iter(recordings.values()))
+    sensors = [name for name in columns if name.startswith("T_") and name != "T_ambient_degC"]
+    lines = ["# from the data sheet of the temperature sensors", "schema = 1"]
+    for name in sensors:
+        lines += ["", f"[columns.{name}]", f'quantity = "{name.removesuffix("_degC")}"', 'unit = "degC"']
+        lines += [f"{key} = {value!r}" for key, value in stated.items()]
+    return "\n".join(lines) + "\n"
+
+
+def _csv(columns: Mapping[str, Array]) -> bytes:
+    """Columns as text with the decimals of their instruments; a missing reading is an empty field."""
+    texts = [_texts(values, DECIMALS.get(name, 1)) for name, values in columns.items()]
+    lines = [",".join(columns), *map(",".join, zip(*texts, strict=True))]
+    return ("\n".join(lines) + "\n").encode()
+
+
+def _texts(values: Array, decimals: int) -> list[str]:
+    return ["" if missing else f"{value:.{decimals}f}" for value, missing in zip(values, np.isnan(values), strict=True)]

@@ -1,0 +1,300 @@
+"""Cases: recordings with a concealed effect in one folder, the truth in another.
+
+A case is drawn from its seed alone, so the same seed gives the same bytes. The clock of effects that age or set in
+starts with each recording, as if each were the first after the gearbox was set up.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from diagnosis.proof.cases.case_files import keep_apart, write_case
+from diagnosis.proof.cases.concealed_case import CONTROLS, FAULTS, ConcealedCase, Plan
+from diagnosis.proof.cases.truth import truth_of
+from diagnosis.proof.plant.cycles import Programme, ambient, ornstein_uhlenbeck, programmes
+from diagnosis.proof.plant.effect import Concealed, Effect
+from diagnosis.proof.plant.effects_heat import HEAT_EFFECTS
+from diagnosis.proof.plant.effects_losses import LOSS_EFFECTS
+from diagnosis.proof.plant.effects_outside import OUTSIDE_EFFECTS
+from diagnosis.proof.plant.instruments import SENSOR_EFFECTS, Instruments, default_channels, record
+from diagnosis.proof.plant.plant import READINGS, Plant
+from diagnosis.proof.plant.plant_run import Individual, Outcome, Run, run_plant
+from models.assembly.gearbox import Gearbox
+from models.base.errors import InputError, did_you_mean
+from models.base.types import Array
+
+EFFECTS: Mapping[str, Effect] = {e.name: e for e in (*LOSS_EFFECTS, *HEAT_EFFECTS, *SENSOR_EFFECTS, *OUTSIDE_EFFECTS)}
+PHYSICS = tuple(e.name for e in (*LOSS_EFFECTS, *HEAT_EFFECTS))
+OUTSIDE = tuple(e.name for e in OUTSIDE_EFFECTS)
+MIX = {"control": 0.24, "single": 0.44, "double": 0.10, "sensor": 0.08, "outside": 0.10, "messy": 0.04}
+MINOR = ("windage", "shaft_ends_to_air", "oil_level_thermal", "pump_heat", "radiation_error", "hot_neighbour",
+         "bearing_additive", "oil_mist", "misalignment", "ambient_swing", "run_in_seals", "motor_flange")  # fmt: skip
+# At usual strength these cause a kelvin or more, so that they stand out among minor ones.
+DOMINANT = ("churning_swirl", "splash_starvation", "run_in_flanks", "gear_wear", "torque_decay", "aeration", "oil_jet",
+            "air_cooling_change", "foundation_conduction", "cooler_thermostat", "cooler_proportional", "oil_tank",
+            "cooler_constant", "cooler_shaft_driven", "water_jacket", "fan_thermostat", "rain_on_housing", "solar_soak",
+            "bearing_preload", "bearing_damage")  # fmt: skip
+MINOR_STRENGTH = (0.15, 0.4)
+STRENGTH = (0.25, 2.0)  # drawn evenly in its logarithm
+LEAST_STRENGTH = {"double": 0.5, "messy": 0.8}  # of effects that must be found next to others
+ORDINARY_SPREAD = 0.5  # of the definition's standard deviations, by which every gearbox is off
+FAR = 5.0  # standard deviations
+# Parameters that may be far off, and to which side: the other one of the first two would overheat the box.
+FAR_FACTORS = (("mesh", -1.0), ("h_air", 1.0), ("seal", 1.0), ("seal", -1.0), ("bearing", 1.0), ("C_oil", 1.0))
+TOGETHER = 40  # cases that are simulated at once, a gigabyte at most
+DATA_SHEET = {"noise": 0.2, "resolution": 0.1, "lag_s": 15.0, "lag_sd_s": 5.0}
+NOISY_K, SLOW_LAG_S = (0.4, 0.7), (30.0, 55.0)
+
+
+def mixed_plans(seed: int, counts: Mapping[str, int]) -> list[Plan]:
+    """Plans of a set, in random order.
+
+    Parameters
+    ----------
+    seed : int
+    counts : mapping of group to int
+        How many of each group; singles take every mechanism of the catalogue in turn before one comes twice
+
+    Raises
+    ------
+    InputError
+        If a group is not known.
+    """
+    turns, pairs, mess, order = (np.random.default_rng([seed, 1, stream]) for stream in range(4))
+    makers: Mapping[str, Callable[[int], Plan]] = {
+        "control": lambda i: Plan(group="control", kind=CONTROLS[i % len(CONTROLS)]),
+        "single": _in_turn("single", PHYSICS, turns),
+        "sensor": _in_turn("sensor", FAULTS, turns),
+        "outside": _in_turn("outside", OUTSIDE, turns),
+        "double": lambda _: Plan(group="double", effects=tuple(map(str, pairs.choice(PHYSICS, 2, replace=False)))),
+        "messy": lambda _: _messy(mess),
+    }
+    unknown = [group for group in counts if group not in makers]
+    if unknown:
+        raise InputError(f"{unknown[0]!r} is not a group of cases{did_you_mean(unknown[0], makers)}")
+    plans = [makers[group](i) for group, number in counts.items() for i in range(number)]
+    return [plans[i] for i in order.permutation(len(plans))]
+
+
+def random_plans(seed: int, number: int) -> list[Plan]:
+    """Plans drawn in the proportions of :data:`MIX`."""
+    groups = np.random.default_rng([seed, 0]).choice(list(MIX), number, p=list(MIX.values()))
+    return mixed_plans(seed, {group: int(np.sum(groups == group)) for group in MIX})
+
+
+def _in_turn(group: str, names: Sequence[str], rng: np.random.Generator) -> Callable[[int], Plan]:
+    order = [str(name) for name in rng.permutation(names)]
+    return lambda i: Plan(group=group, effects=(order[i % len(order)],))
+
+
+def _messy(rng: np.random.Generator) -> Plan:
+    """One dominant effect and six minor ones."""
+    return Plan(group="messy", effects=(str(rng.choice(DOMINANT)), *map(str, rng.choice(MINOR, 6, replace=False))))
+
+
+def conceal_set(
+    gearbox: Gearbox,
+    plans: Sequence[Plan],
+    *,
+    seed: int,
+    recordings: Path,
+    truth: Path | None,
+    flat: bool = False,
+    progress: Callable[[int, int], None] | None = None,
+) -> list[str]:
+    """Draw, simulate and record cases.
+
+    Parameters
+    ----------
+    gearbox : Gearbox
+    plans : sequence of Plan
+    seed : int
+    recordings : Path
+        Folder that gets one folder per case
+    truth : Path or None
+        Folder that gets ``<case>.json`` with the concealed effects; must be another one. None: it is not written
+    flat : bool
+        True to write the recordings of a single case straight into `recordings`
+    progress : callable or None
+        Called with the amounts of work done and in all
+
+    Returns
+    -------
+    list of str
+        Names of the cases, in order
+
+    Raises
+    ------
+    InputError
+        If an effect is not known, the truth is to lie among the recordings, several cases are to share a folder, or a
+        folder cannot be written to.
+    """
+    if flat and len(plans) != 1:
+        raise InputError(f"{len(plans)} cases cannot share one folder; only a single case is written flat")
+    if truth is not None:
+        keep_apart(recordings, truth)
+    plant = Plant(gearbox)
+    digits = max(3, len(str(len(plans))))
+    cases = [draw_case(plant, plan, seed=(seed, i), name=f"case_{i + 1:0{digits}d}") for i, plan in enumerate(plans)]
+    for first in range(0, len(cases), TOGETHER):
+
+        def report(done: int, of: int, first: int = first, cases: int = min(TOGETHER, len(cases) - first)) -> None:
+            if progress is not None:
+                progress(round(100 * (first + cases * done / of)), 100 * len(plans))
+
+        for case, columns, facts in simulate_cases(plant, cases[first : first + TOGETHER], report):
+            folder = recordings if flat else recordings / case.name
+            truth_file = None if truth is None else truth / f"{case.name}.json"
+            write_case(folder, truth_file, columns, facts, case.instruments.stated)
+    return [case.name for case in cases]
+
+
+def simulate_cases(
+    plant: Plant, cases: Sequence[ConcealedCase], progress: Callable[[int, int], None] | None = None
+) -> list[tuple[ConcealedCase, Mapping[str, Mapping[str, Array]], Mapping[str, Any]]]:
+    """Simulate cases together; recordings and truth of each.
+
+    Returns
+    -------
+    list of (ConcealedCase, columns by recording, truth)
+    """
+    runs: list[Run] = []
+    for case in cases:
+        for kept in twins(case):
+            runs += [replace(run, effects=kept) for run in case.runs]
+    total, done = sum(len(run) for run in runs), 0
+
+    def report(rows: int) -> None:
+        nonlocal done
+        done += rows
+        if progress is not None:
+            progress(min(done, total), total)
+
+    outcomes = iter(run_plant(plant, runs, report))
+    results: list[tuple[ConcealedCase, Mapping[str, Mapping[str, Array]], Mapping[str, Any]]] = []
+    for case in cases:
+        by_twin: list[list[Outcome]] = [[next(outcomes) for _ in case.runs] for _ in twins(case)]
+        columns = {
+            run.programme.name: record(
+                plant, run, outcome, case.instruments, case.faults, np.random.default_rng([*case.seed, 7, k])
+            )
+            for k, (run, outcome) in enumerate(zip(case.runs, by_twin[0], strict=True))
+        }
+        results.append((case, columns, truth_of(plant, case, by_twin)))
+    return results
+
+
+def twins(case: ConcealedCase) -> list[tuple[Concealed, ...]]:
+    """Sets of effects to simulate: all, none and, with several, all but the first or the second."""
+    physics = case.physics
+    if not physics:
+        return [()]
+    if len(physics) == 1:
+        return [physics, ()]
+    without = [tuple(e for e in physics if e is not left_out) for left_out in physics[:2]]
+    return [physics, (), *(without if len(physics) == 2 else without[:1])]
+
+
+# ---------------------------------------------------------------------- drawing
+
+
+def draw_case(plant: Plant, plan: Plan, *, seed: tuple[int, ...], name: str) -> ConcealedCase:
+    """Draw the gearbox, strengths, programmes and instruments of a plan.
+
+    Raises
+    ------
+    InputError
+        If an effect is not known.
+    """
+    unknown = [effect for effect in plan.effects if effect not in EFFECTS]
+    if unknown:
+        raise InputError(f"{unknown[0]!r} is not an effect that can be concealed{did_you_mean(unknown[0], EFFECTS)}")
+    rng = np.random.default_rng([*seed, 3])
+    individual = _individual(plant, plan, rng)
+    effects = tuple(_specimen(plant, plan, k, rng) for k in range(len(plan.effects)))
+    runs = tuple(_run(plant, individual, p, rng) for p in programmes(plant.gearbox, rng))
+    instruments = _instruments(plant, plan, rng)
+    return ConcealedCase(name=name, plan=plan, seed=seed, individual=individual, effects=effects,
+                         instruments=instruments, runs=runs)  # fmt: skip
+
+
+def _specimen(plant: Plant, plan: Plan, k: int, rng: np.random.Generator) -> Concealed:
+    effect = EFFECTS[plan.effects[k]]
+    if k > 0 and plan.group == "messy":
+        strength = float(rng.uniform(*MINOR_STRENGTH))
+    elif k == 0 and plan.strength is not None:
+        strength = plan.strength
+    else:
+        strongest = STRENGTH[1]
+        weakest = LEAST_STRENGTH.get(plan.group, STRENGTH[0])
+        strength = float(np.exp(rng.uniform(np.log(weakest), np.log(strongest))))
+    return Concealed(
+        effect=effect, places=effect.places(plant, rng), parameters=effect.draw(plant, rng, strength), strength=strength
+    )
+
+
+def _individual(plant: Plant, plan: Plan, rng: np.random.Generator) -> Individual:
+    gearbox = plant.gearbox
+    factors = {}
+    for name, start in gearbox.factors.items():
+        z = float(np.clip(rng.standard_normal(), -2.0, 2.0)) * ORDINARY_SPREAD
+        if plan.kind == "parameters_off":
+            z = float(rng.uniform(1.0, 2.0)) * (1.0 if rng.random() < 0.5 else -1.0)
+        factors[name] = start * float(np.exp(z * _sd(gearbox, name)))
+    if plan.kind == "parameter_far":
+        name, side = FAR_FACTORS[int(rng.integers(len(FAR_FACTORS)))]
+        factors[name] = gearbox.factors[name] * float(np.exp(side * FAR * _sd(gearbox, name)))
+    return Individual(
+        factors=factors,
+        reading=int(rng.integers(len(READINGS))),
+        forced_exponent=float(rng.normal(0.6, 0.02)),
+        oil_exponent=float(rng.normal(0.0, 0.03)),
+        exchange_exponent=float(rng.normal(0.5, 0.05)),
+    )
+
+
+def _sd(gearbox: Gearbox, factor: str) -> float:
+    # A churning formula may be wrong by a factor of e; a plant that uses it twice over in two sd would drown in oil.
+    return min(gearbox.priors.get(f"factors.{factor}", 0.2), 0.6)
+
+
+def _run(plant: Plant, individual: Individual, programme: Programme, rng: np.random.Generator) -> Run:
+    rows = len(programme)
+    air = ambient(rows, rng)
+    restless = rng.choice(plant.anatomy.coarse, int(rng.integers(2, 4)), replace=False)
+    random_heat = {
+        str(place): ornstein_uhlenbeck(rows, rng, sd=rng.uniform(1.0, 2.0), tau_s=rng.uniform(600.0, 1800.0))
+        for place in restless
+    }
+    return Run(
+        individual=individual,
+        programme=programme,
+        air=air,
+        air_speed=np.full(rows, plant.gearbox.ambient.air_speed_m_s),
+        start=float(air[0] + rng.normal(0.0, 0.5)),
+        random_heat=random_heat,
+    )
+
+
+def _instruments(plant: Plant, plan: Plan, rng: np.random.Generator) -> Instruments:
+    channels = default_channels(plant)
+    lag = SLOW_LAG_S if plan.kind == "lag_wrong" else (10.0, 20.0)
+    noisy = plan.kind == "noise_misstated"
+    # Half of all cases come with a data sheet, so that its presence reveals nothing.
+    stated = plan.kind in ("noise_misstated", "lag_wrong") or rng.random() < 0.5
+    return Instruments(
+        channels=channels,
+        lag_s={place: float(rng.uniform(*lag)) for place in channels},
+        noise_K=float(rng.uniform(*NOISY_K)) if noisy else 0.2,
+        ambient_offset_K=float(rng.normal(0.0, 0.2)),
+        torque_gain=float(rng.normal(0.0, 0.008)),
+        loss_gain=float(rng.normal(0.0, 0.015)),
+        loss_offset_W=float(rng.normal(0.0, 1.5)),
+        stated=DATA_SHEET if stated else None,
+        dropouts=int(rng.integers(1, 6)) if rng.random() < 0.3 else 0,
+    )

@@ -1,0 +1,211 @@
+"""The truth of a case: concealed effects, their heat, and the kelvin that they cause."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.proof.cases.concealed_case import ConcealedCase
+from diagnosis.proof.plant.cycles import ROW_S
+from diagnosis.proof.plant.effect import Concealed
+from diagnosis.proof.plant.instruments import record
+from diagnosis.proof.plant.plant import Plant
+from diagnosis.proof.plant.plant_run import Outcome
+from models.base.types import Array
+
+SCHEMA = 1
+PRACTICAL_K = 0.3
+# Errors of a recorded input that no gearbox's owner would care for, by column.
+COLUMN_SIZE = {"T_ambient_degC": PRACTICAL_K, "torque_Nm": 1.0, "speed_rpm": 20.0}
+ACTIVE_SHARE = 0.1  # an effect acts where its heat is above this share of its highest
+
+
+def truth_of(plant: Plant, case: ConcealedCase, by_twin: Sequence[Sequence[Outcome]]) -> dict[str, Any]:
+    """The truth of a case, ready for JSON.
+
+    Parameters
+    ----------
+    plant : Plant
+    case : ConcealedCase
+    by_twin : sequence of sequences of Outcome
+        Per twin (see :func:`diagnosis.proof.cases.conceal.twins`) the outcome of every recording
+
+    Returns
+    -------
+    dict
+        ``K`` are differences of the true temperatures with and without (of the readings, for faults of measurement),
+        ``heat_W`` the heat that an effect made in a place, for paths and factors the difference that it made to it
+    """
+    everything, without_any = by_twin[0], by_twin[min(1, len(by_twin) - 1)]
+    physics = case.physics
+    facts = []
+    for effect in case.effects:
+        if effect in physics:
+            k = physics.index(effect)
+            twin = without_any if len(physics) == 1 else by_twin[2 + k] if 2 + k < len(by_twin) else None
+            K = None if twin is None else _kelvin(plant, case, everything, twin)
+            heat = [_heat_of(effect, k, *pair) for pair in zip(everything, twin or without_any, strict=True)]
+            facts.append(_effect(effect, case) | {"K": K} | _heat(case, heat) | _felt(everything, without_any, effect))
+        else:
+            facts.append(_effect(effect, case) | _measured(plant, case, everything, effect))
+    instruments = case.instruments
+    return {
+        "schema": SCHEMA,
+        "case": case.name,
+        "seed": list(case.seed),
+        "gearbox": plant.gearbox.hash,
+        "group": case.plan.group,
+        "control": case.plan.kind if case.plan.group == "control" else None,
+        "effects": facts,
+        "practical": _practical(facts),
+        "K_all": _kelvin(plant, case, everything, without_any),
+        "base_parameters": {name: round(value, 5) for name, value in case.individual.factors.items()},
+        "friction_reading": case.individual.reading,
+        "noise": {
+            "white_K": round(instruments.noise_K, 3),
+            "quantum_K": instruments.quantum_K,
+            "sensor_lag_s": {name: round(value, 2) for name, value in instruments.lag_s.items()},
+            "ambient_offset_K": round(instruments.ambient_offset_K, 3),
+            "torque_gain": round(instruments.torque_gain, 5),
+            "loss_gain": round(instruments.loss_gain, 5),
+            "loss_offset_W": round(instruments.loss_offset_W, 3),
+            "stated": None if instruments.stated is None else dict(instruments.stated),
+            "dropouts": instruments.dropouts,
+            "random_heat": {
+                run.programme.name: {place: round(float(np.std(w)), 2) for place, w in run.random_heat.items()}
+                for run in case.runs
+            },
+        },
+        "hottest_oil_degC": round(max(float(_at(plant, o, "oil").max()) for o in everything), 1),
+        "start_degC": {
+            run.programme.name: round(float(_at(plant, o, "oil")[0]), 1)
+            for run, o in zip(case.runs, everything, strict=True)
+        },
+    }
+
+
+def _practical(facts: Sequence[Mapping[str, Any]]) -> list[bool | None]:
+    """True per effect if it moves a measured temperature by more than is of practical interest; None: not known."""
+    largest = [None if f["K"] is None else max(size["rms"] for size in f["K"]["train"].values()) for f in facts]
+    inputs = [any(c in COLUMN_SIZE and s["rms"] > COLUMN_SIZE[c] for c, s in _columns(f).items()) for f in facts]
+    return [None if K is None else K > PRACTICAL_K or moved for K, moved in zip(largest, inputs, strict=True)]
+
+
+def _columns(fact: Mapping[str, Any]) -> Mapping[str, Mapping[str, float]]:
+    return dict(fact.get("column_shift", {}).get("train", {}))
+
+
+def _effect(effect: Concealed, case: ConcealedCase) -> dict[str, Any]:
+    kind = effect.effect
+    return {
+        "name": kind.name,
+        "catalogue": kind.name if kind.catalogue else None,
+        "family": kind.family,
+        "kind": kind.kind,
+        "nodes": list(effect.places),
+        "dominant": effect is case.effects[0],
+        "law": kind.law,
+        "strength": round(effect.strength, 4),
+        "parameters": {name: round(float(value), 6) for name, value in effect.parameters.items()},
+    }
+
+
+def _at(plant: Plant, outcome: Outcome, place: str) -> Array:
+    return outcome.T[:, plant.anatomy.coarse.index(place)]
+
+
+def _sets(case: ConcealedCase) -> dict[str, list[int]]:
+    names = [run.programme.name for run in case.runs]
+    return {kind: [i for i, name in enumerate(names) if name.startswith(kind)] for kind in ("train", "hold")}
+
+
+def _size(values: Array) -> dict[str, float]:
+    return {
+        "rms": round(float(np.sqrt(np.mean(values**2))), 3),
+        "max": round(float(np.abs(values).max(initial=0.0)), 3),
+    }
+
+
+def _kelvin(
+    plant: Plant, case: ConcealedCase, with_it: Sequence[Outcome], without: Sequence[Outcome]
+) -> dict[str, Any]:
+    return {
+        kind: {
+            place: _size(
+                np.concatenate([_at(plant, with_it[i], place) - _at(plant, without[i], place) for i in members])
+            )
+            for place in case.instruments.channels
+        }
+        for kind, members in _sets(case).items()
+    }
+
+
+def _heat_of(effect: Concealed, k: int, with_it: Outcome, without: Outcome) -> Mapping[str, Array]:
+    """Heat that an effect made; where it acts on inputs of the losses, by what they lose more than without it."""
+    if effect.effect.before is None:
+        return with_it.heat[k]
+    return {place: with_it.losses[place] - without.losses[place] for place in with_it.losses}
+
+
+def _heat(case: ConcealedCase, heat: Sequence[Mapping[str, Array]]) -> dict[str, Any]:
+    """Mean and greatest heat by place, its mean magnitude over all places, and when it acted."""
+    places = list(heat[0])
+    found: dict[str, Any] = {}
+    for kind, members in _sets(case).items():
+        found[kind] = {}
+        for place in places:
+            watts = np.concatenate([heat[i][place] for i in members])
+            largest = float(np.abs(watts).max(initial=0.0))
+            active = np.abs(watts) > ACTIVE_SHARE * largest
+            found[kind][place] = {
+                "mean": round(float(watts.mean()), 3),
+                "mean_active": round(float(watts[active].mean()) if active.any() else 0.0, 3),
+                "active_share": round(float(active.mean()), 4),
+                "max": round(float(watts[np.abs(watts).argmax()]), 3),
+            }
+    total = [np.sum([np.abs(part[place]) for place in places], axis=0, initial=0.0) for part in heat]
+    top = max((float(values.max(initial=0.0)) for values in total), default=0.0)
+    acting = {
+        run.programme.name: _spans(values > ACTIVE_SHARE * top) for run, values in zip(case.runs, total, strict=True)
+    }
+    magnitude = {
+        kind: round(float(np.concatenate([total[i] for i in members]).mean()), 3)
+        for kind, members in _sets(case).items()
+    }
+    return {"heat_W": found, "heat_magnitude_W": magnitude, "acting_s": acting}
+
+
+def _spans(active: NDArray[np.bool_]) -> list[list[float]]:
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], active, [False]]).astype(int)))
+    return [[ROW_S * float(a), ROW_S * float(b)] for a, b in edges.reshape(-1, 2)]
+
+
+def _felt(with_it: Sequence[Outcome], without: Sequence[Outcome], effect: Concealed) -> dict[str, Any]:
+    """Shift of the inputs at the gearbox by an effect on an input."""
+    if effect.effect.kind != "signal":
+        return {}
+    shift = {
+        name: np.concatenate([getattr(a, name) - getattr(b, name) for a, b in zip(with_it, without, strict=True)])
+        for name in ("air", "torque")
+    }
+    return {"input_shift": {name: _size(values) for name, values in shift.items() if np.any(values != 0.0)}}
+
+
+def _measured(plant: Plant, case: ConcealedCase, outcomes: Sequence[Outcome], effect: Concealed) -> dict[str, Any]:
+    """Changes of the columns by a fault of measurement, without noise."""
+    shifts: dict[str, dict[str, Any]] = {"train": {}, "hold": {}}
+    for kind, members in _sets(case).items():
+        faulty = [record(plant, case.runs[i], outcomes[i], case.instruments, (effect,), None) for i in members]
+        sound = [record(plant, case.runs[i], outcomes[i], case.instruments, (), None) for i in members]
+        for column in faulty[0]:
+            change = np.concatenate([f[column] - s[column] for f, s in zip(faulty, sound, strict=True)])
+            if np.any(change != 0.0):
+                shifts[kind][column] = _size(change)
+    K = {
+        kind: {place: found.get(f"T_{place}_degC", {"rms": 0.0, "max": 0.0}) for place in case.instruments.channels}
+        for kind, found in shifts.items()
+    }
+    return {"K": K, "column_shift": shifts, "heat_W": {}, "acting_s": {}}

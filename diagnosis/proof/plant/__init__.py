@@ -1,0 +1,1 @@
+"""The plant that makes test recordings: an implementation independent of `models`."""

@@ -1,0 +1,296 @@
+"""Effects that move heat without losing power: heat paths, oil circuit, surroundings. Forms are the plant's own."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from diagnosis.proof.plant.anatomy import OIL
+from diagnosis.proof.plant.effect import Grip
+from diagnosis.proof.plant.effects_losses import (
+    CHURNING,
+    Draw,
+    at,
+    bearing,
+    drawn,
+    effect,
+    output_shaft,
+    relative,
+    share_of_loss,
+)
+from diagnosis.proof.plant.plant import REFERENCE_SPEED, Plant
+from models.formulas.heat_transfer import KELVIN, STEFAN_BOLTZMANN
+
+STEP_H = 10.0 / 3600.0
+
+
+def share_of_shed(nominal: float, **others: tuple[float, float]) -> Draw:
+    """Strength ``a`` [W/K] as a share of what the housing sheds (7 W/K on the FZG rig), others drawn evenly."""
+
+    def draw(plant: Plant, rng: np.random.Generator, strength: float) -> Mapping[str, float]:
+        return {"a": nominal * plant.shed_ref * strength} | drawn(plant, rng, others)
+
+    return draw
+
+
+def lowest_part(plant: Plant, _: np.random.Generator) -> tuple[str, ...]:
+    """The part of the housing that stands."""
+    return (plant.anatomy.parts[0],)
+
+
+def highest_part(plant: Plant, _: np.random.Generator) -> tuple[str, ...]:
+    """The part of the housing on top."""
+    return (plant.anatomy.parts[-1],)
+
+
+def all_parts(plant: Plant, _: np.random.Generator) -> tuple[str, ...]:
+    """The whole housing."""
+    return plant.anatomy.parts
+
+
+def shafts(plant: Plant, _: np.random.Generator) -> tuple[str, ...]:
+    """All shafts."""
+    return plant.anatomy.shafts
+
+
+def gears(plant: Plant, _: np.random.Generator) -> tuple[str, ...]:
+    """Both gears."""
+    return plant.anatomy.gears
+
+
+def input_shaft(plant: Plant, _: np.random.Generator) -> tuple[str, ...]:
+    """The input shaft."""
+    return (plant.gearbox.stage[0].driver,)
+
+
+# ---------------------------------------------------------------------- heat paths
+
+
+def aeration(g: Grip) -> None:
+    """Foam: the oil takes less heat from the gears and brings less to the walls, and brakes less."""
+    foam = g.x**2 / (g.x**2 + 0.30**2)
+    for gear in g.places:
+        g.conduct(f"{gear}-oil", -g.p["a"] * foam, place=gear)
+    for part in g.plant.anatomy.parts:
+        g.conduct(f"oil-{part}", -0.4 * g.p["a"] * foam, place=part)
+    g.factor(CHURNING, -0.4 * g.p["a"] * foam)
+
+
+def oil_housing_speed(g: Grip) -> None:
+    """The film on the walls follows the speed instead of being constant."""
+    change = np.clip(np.maximum(g.x / REFERENCE_SPEED, 0.05) ** g.p["a"], 0.1, 3.0) - 1.0
+    for part in g.places:
+        g.conduct(f"oil-{part}", change, place=part)
+
+
+def radiation_error(g: Grip) -> None:
+    """The paint is another one."""
+    area = g.plant.gearbox.housing.outside_area_m2
+    for part in g.places:
+        theta, theta_a = g.T(part) + KELVIN, g.air + KELVIN
+        per_area = STEFAN_BOLTZMANN * (theta**2 + theta_a**2) * (theta + theta_a)
+        g.sink(part, g.p["a"] * per_area * area * g.plant.anatomy.share[part], g.air)
+
+
+def air_cooling_change(g: Grip) -> None:
+    """The fan blows less than it did: forced convection, four fifths of what the housing sheds, with v^0.58."""
+    for part in g.places:
+        g.conduct(f"{part}-air", 0.8 * ((1.0 - g.p["a"]) ** 0.58 - 1.0), place=part)
+
+
+def foundation_conduction(g: Grip) -> None:
+    """The feet lead heat into a frame that warms up slowly."""
+    frame = g.remembered("frame", g.air)
+    taken = g.sink(g.places[0], g.p["a"], frame)
+    flow = -taken - 4.0 * g.p["a"] * (frame - g.air)
+    g.memory["frame"] = frame + flow * 10.0 / (g.p["mass"] * g.plant.anatomy.capacities[f"{g.places[0]}.inner"][0])
+
+
+def hot_neighbour(g: Grip) -> None:
+    """Another machine of nearly constant temperature at the end of a shaft."""
+    g.sink(g.places[0], g.p["a"], g.p["T"] + 2.0 * np.sin(2.0 * np.pi * g.hours / 3.1))
+
+
+def shaft_ends_to_air(g: Grip) -> None:
+    """Shaft ends stick out into the air and turn in it."""
+    for shaft in g.places:
+        end = next(s for s in g.plant.gearbox.shaft if s.name == shaft)
+        size = end.diameter * end.length / (0.055 * 0.09)
+        g.sink(shaft, g.p["a"] * size * (0.2 + (g.x / REFERENCE_SPEED) ** 0.7), g.air)
+
+
+def oil_mist(g: Grip) -> None:
+    """How well the mist reaches the upper housing depends on speed."""
+    g.conduct(f"oil-{g.places[0]}", np.clip(g.p["a"] * (g.x**0.7 - 0.5), -0.9, 2.0), place=g.places[0])
+
+
+def bearing_seat_contact(g: Grip) -> None:
+    """The fit of one bearing is loose, a little less so when it is hotter than the housing."""
+    excess = np.maximum(g.T(g.places[0]) - g.T(g.plant.anatomy.parts[0]), 0.0)
+    for part in g.plant.anatomy.parts:
+        g.conduct(f"{g.places[0]}-{part}", -g.p["a"] / (1.0 + 0.02 * excess), place=g.places[0])
+
+
+# ---------------------------------------------------------------------- oil circuit
+
+
+def cooler_thermostat(g: Grip) -> None:
+    """Oil cooler that a thermostat opens and closes; the valve takes a minute."""
+    switch = g.switched(g.T(OIL), g.p["T_on"], g.p["T_on"] - g.p["band"])
+    valve = g.remembered("valve", 0.0)
+    g.memory["valve"] = valve + (switch - valve) * (1.0 - np.exp(-10.0 / 40.0))
+    g.sink(OIL, g.p["a"] * g.memory["valve"], g.p["T_water"])
+
+
+def cooler_constant(g: Grip) -> None:
+    """Oil cooler that always runs."""
+    g.sink(OIL, g.p["a"] * (1.0 + 0.002 * (g.T(OIL) - 60.0)), g.p["T_water"])
+
+
+def cooler_proportional(g: Grip) -> None:
+    """Cooler whose valve opens smoothly above its set-point."""
+    opening = np.clip((g.T(OIL) - g.p["T_on"]) / g.p["band"], 0.0, 1.0)
+    g.sink(OIL, g.p["a"] * opening**1.2, g.p["T_water"])
+
+
+def cooler_shaft_driven(g: Grip) -> None:
+    """Air cooler whose fan sits on the shaft."""
+    g.sink(OIL, g.p["a"] * g.x**0.75, g.air)
+
+
+def oil_tank(g: Grip) -> None:
+    """An outside tank through which oil is pumped while the shaft turns."""
+    tank = g.remembered("tank", g.air)
+    capacity = g.p["size"] * g.plant.anatomy.capacities["sump"][0]
+    taken = g.sink(OIL, g.p["a"] * np.minimum(g.x / 0.05, 1.0), tank)
+    shed = g.p["to_air"] * g.p["a"] * (tank - g.air)
+    g.memory["tank"] = tank + (-taken - shed) * 10.0 / capacity
+
+
+def oil_added(g: Grip) -> None:
+    """Cold oil is poured in: it must be warmed, and is more oil from then on."""
+    since = g.hours - g.p["at_h"]
+    poured = (since > 0.0) & (since < 0.05)
+    capacity = g.plant.anatomy.capacities["sump"][0]
+    flow = g.p["a"] * capacity / (0.05 * 3600.0)
+    g.sink(OIL, flow * poured, 22.0 * np.ones_like(flow))
+    g.capacity(OIL, g.p["a"] * (since > 0.0))
+    g.factor(CHURNING, 1.2 * g.p["a"] * (since > 0.0))
+
+
+def heater_thermostat(g: Grip) -> None:
+    """An immersion heater keeps the oil warm at standstill."""
+    still = g.x < 1e-6
+    switch = 1.0 - g.switched(g.T(OIL), g.p["T_off"], g.p["T_off"] - g.p["band"])
+    g.heat(OIL, g.p["a"] * switch * still, lost=False)
+
+
+def water_jacket(g: Grip) -> None:
+    """Water runs through the lower housing."""
+    g.sink(g.places[0], g.p["a"], g.p["T_water"])
+
+
+# ---------------------------------------------------------------------- surroundings
+
+
+def solar_soak(g: Grip) -> None:
+    """Sun on the upper housing; the recording starts at an hour of the day."""
+    day = np.maximum(np.sin(np.pi * (g.p["start_h"] + g.hours - 6.5) / 12.5), 0.0)
+    day = np.where(np.mod(g.p["start_h"] + g.hours, 24.0) < 19.0, day, 0.0)
+    g.heat(g.places[0], g.p["a"] * day**1.2, lost=False)
+
+
+def ambient_swing(g: Grip) -> None:
+    """The air at the gearbox warms, the probe hangs elsewhere."""
+    g.moment.air[g.members] += g.p["a"] * np.sin(2.0 * np.pi * g.hours / g.p["period_h"]) * (g.hours > 0.0)
+
+
+def fan_thermostat(g: Grip) -> None:
+    """A second fan blows on the housing above a temperature."""
+    switch = g.switched(g.T(g.places[0]), g.p["T_on"], g.p["T_on"] - g.p["band"])
+    for part in g.places:
+        g.conduct(f"{part}-air", g.p["a"] * switch, place=part)
+
+
+def rain_on_housing(g: Grip) -> None:
+    """Showers wet the housing: a heat path to rain a little colder than the air."""
+    phase = np.mod(g.hours - g.p["at_h"], g.p["every_h"])
+    wet = (g.hours > 0.0) * np.where(phase < 0.6, 1.0, np.exp(-(phase - 0.6) / 0.2))
+    for part in g.places:
+        g.sink(part, g.p["a"] * g.plant.anatomy.share[part] * wet, g.air - 4.0)
+
+
+def motor_flange(g: Grip) -> None:
+    """The motor at the flange warms with its load, within the hour."""
+    motor = g.remembered("motor", g.air)
+    target = g.air + 12.0 + 45.0 * np.minimum(g.x * g.y / 0.5, 1.2)
+    g.memory["motor"] = motor + (target - motor) * (1.0 - np.exp(-STEP_H / 0.7))
+    g.sink(g.places[0], g.p["a"], g.memory["motor"])
+
+
+def torque_decay(g: Grip) -> None:
+    """The load clutch creeps: the true torque falls, the recorded set-point does not."""
+    g.moment.torque[g.members] *= np.exp(-g.p["a"] * g.hours)
+
+
+def _radiation(_: Plant, rng: np.random.Generator, strength: float) -> Mapping[str, float]:
+    return {"a": -min(0.45 * strength, 0.85) if rng.random() < 0.8 else 0.1 * min(strength, 1.0)}
+
+
+def _mist(_: Plant, rng: np.random.Generator, strength: float) -> Mapping[str, float]:
+    return {"a": (0.9 if rng.random() < 0.6 else -0.9) * strength}
+
+
+HEAT_EFFECTS = (
+    effect("aeration", "link_factor", gears, relative(0.35, 0.8), "conductance gear-oil (1 - a s(x)), walls 40 % of it",
+           family="oil circuit", after=aeration),
+    effect("oil_housing_speed", "link_factor", all_parts, relative(0.55),
+           "film oil-housing (x / 0.415)^a in place of constant", family="heat path", after=oil_housing_speed),
+    effect("radiation_error", "link", all_parts, _radiation, "emissivity + a", family="surroundings",
+           after=radiation_error),
+    effect("air_cooling_change", "link_factor", all_parts, relative(0.45, 0.95),
+           "housing to air 0.2 + 0.8 (1 - a)^0.58", family="surroundings", after=air_cooling_change),
+    effect("foundation_conduction", "link", lowest_part, share_of_shed(0.45, mass=(6.0, 15.0)),
+           "a W/K to a frame that itself sheds 4 a to air", family="heat path", after=foundation_conduction),
+    effect("hot_neighbour", "link", output_shaft, share_of_shed(0.15, T=(50.0, 75.0)), "a W/K to T", family="heat path",
+           after=hot_neighbour),
+    effect("shaft_ends_to_air", "link", shafts, share_of_shed(0.06), "a (size) (0.2 + (x / 0.415)^0.7) W/K to air",
+           family="heat path", after=shaft_ends_to_air),
+    effect("oil_mist", "link_factor", highest_part, _mist, "film oil-upper housing (1 + a (x^0.7 - 0.5))",
+           family="heat path", after=oil_mist),
+    effect("bearing_seat_contact", "link_factor", bearing, relative(0.55, 0.9),
+           "conductance to the housing (1 - a / (1 + 0.02 dT))", family="heat path", after=bearing_seat_contact),
+    effect("cooler_thermostat", "link", at(OIL),
+           share_of_shed(0.9, T_on=(62.0, 80.0), band=(5.0, 12.0), T_water=(12.0, 24.0)),
+           "a W/K to T_water, on above T_on, off below T_on - band, valve 40 s", family="oil circuit",
+           after=cooler_thermostat),
+    effect("cooler_constant", "link", at(OIL), share_of_shed(0.35, T_water=(14.0, 26.0)), "a W/K to T_water",
+           family="oil circuit", after=cooler_constant),
+    effect("cooler_proportional", "link", at(OIL),
+           share_of_shed(0.9, T_on=(50.0, 70.0), band=(10.0, 20.0), T_water=(12.0, 24.0)),
+           "a ((T_oil - T_on) / band, 0 to 1)^1.2 W/K to T_water", family="oil circuit", after=cooler_proportional),
+    effect("cooler_shaft_driven", "link", at(OIL), share_of_shed(0.7), "a x^0.75 W/K to air", family="oil circuit",
+           after=cooler_shaft_driven),
+    effect("oil_tank", "link", at(OIL), share_of_shed(2.0, size=(2.0, 4.0), to_air=(0.10, 0.25)),
+           "a W/K while turning to a tank of its own capacity, which sheds to air", family="oil circuit",
+           after=oil_tank),
+    effect("oil_added", "source", at(OIL), relative(0.30, at_h=(0.6, 1.3)), "a of the filling, cold, at t = at_h",
+           family="oil circuit", after=oil_added),
+    effect("heater_thermostat", "source", at(OIL), share_of_loss(0.5, T_off=(42.0, 55.0), band=(3.0, 8.0)),
+           "a W at standstill below T_off - band until T_off", family="oil circuit", after=heater_thermostat),
+    effect("water_jacket", "link", lowest_part, share_of_shed(0.5, T_water=(14.0, 26.0)), "a W/K to T_water",
+           family="surroundings", after=water_jacket),
+    effect("solar_soak", "source", highest_part, share_of_loss(0.15, start_h=(7.5, 10.0)),
+           "a sin(pi (hour - 6.5) / 12.5)+^1.2 W", family="surroundings", after=solar_soak),
+    effect("ambient_swing", "signal", at("air"), relative(2.5, period_h=(5.0, 9.0)), "air + a sin(2 pi t / period)",
+           family="surroundings", before=ambient_swing),
+    effect("fan_thermostat", "link_factor", all_parts, relative(0.6, T_on=(50.0, 65.0), band=(3.0, 8.0)),
+           "housing to air (1 + a) above T_on, hysteresis", family="surroundings", after=fan_thermostat),
+    effect("rain_on_housing", "link", all_parts, share_of_shed(1.0, at_h=(0.5, 1.0), every_h=(4.0, 6.5)),
+           "a W/K to air - 4 K for 36 minutes every few hours", family="surroundings", after=rain_on_housing),
+    effect("motor_flange", "link", input_shaft, share_of_shed(0.15), "a W/K to a motor 12 to 66 K above air, by load",
+           family="heat path", after=motor_flange),
+    effect("torque_decay", "signal", at("torque"), relative(0.02), "true torque = recorded exp(-a t), t in hours",
+           family="signal", before=torque_decay),
+)  # fmt: skip

@@ -1,0 +1,241 @@
+"""From what the plant did to what was recorded: lag, noise, display steps, dropouts, and faults of measurement."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.signal import lfilter, lfiltic
+
+from diagnosis.proof.plant.cycles import ROW_S, reference_torque
+from diagnosis.proof.plant.effect import Concealed, Effect, Kind
+from diagnosis.proof.plant.effects_losses import Draw, Places, at
+from diagnosis.proof.plant.plant import Plant
+from diagnosis.proof.plant.plant_run import Outcome, Run
+from models.base.types import Array
+
+LOSS = "P_loss"
+DECIMALS = {"speed_rpm": 1, "torque_Nm": 2, "T_ambient_degC": 1, "air_speed_m_s": 1, "P_loss_W": 1}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Instruments:
+    """How one case is measured.
+
+    Attributes
+    ----------
+    channels : tuple of str
+        Measured places
+    lag_s : mapping of place to float
+        Time constant of every temperature sensor
+    noise_K, quantum_K : float
+        White noise and step of temperature readings
+    ambient_offset_K : float
+        Error of the ambient probe
+    torque_gain, loss_gain : float
+        Relative errors of the recorded torque and of the measured loss, [-]
+    loss_offset_W : float
+    loss_noise : (float, float)
+        White noise of the measured loss: relative [-] and absolute [W]
+    dropouts : int
+        Bursts of missing readings per recording
+    stated : mapping of str to float, or None
+        Data sheet of the temperature sensors, by the keys of a mapping file; None without a data sheet
+    """
+
+    channels: tuple[str, ...]
+    lag_s: Mapping[str, float]
+    noise_K: float = 0.2
+    quantum_K: float = 0.1
+    ambient_offset_K: float = 0.0
+    torque_gain: float = 0.0
+    loss_gain: float = 0.0
+    loss_offset_W: float = 0.0
+    loss_noise: tuple[float, float] = (0.02, 2.0)
+    dropouts: int = 0
+    stated: Mapping[str, float] | None = None
+
+
+def record(
+    plant: Plant,
+    run: Run,
+    outcome: Outcome,
+    instruments: Instruments,
+    faults: Sequence[Concealed],
+    rng: np.random.Generator | None,
+) -> dict[str, Array]:
+    """Columns of a recording.
+
+    Parameters
+    ----------
+    plant : Plant
+    run : Run
+    outcome : Outcome
+        What the plant did in it
+    instruments : Instruments
+    faults : sequence of Concealed
+        Faults of measurement, of :data:`SENSOR_EFFECTS`
+    rng : numpy.random.Generator or None
+        None for readings without noise, steps and dropouts
+
+    Returns
+    -------
+    dict of column name to Array, shape (rows,)
+    """
+    first, rows = run.programme.unrecorded, len(outcome.T)
+    time = np.asarray(np.arange(rows) * ROW_S, dtype=np.float64)
+    inputs: dict[str, Array] = {
+        "speed_rpm": run.programme.speed[first:],
+        "torque_Nm": run.programme.torque[first:] * (1.0 + instruments.torque_gain),
+        "T_ambient_degC": run.air[first:] + instruments.ambient_offset_K,
+        "air_speed_m_s": run.air_speed[first:],
+    }
+    places = plant.anatomy.coarse
+    readings = {p: lagged(outcome.T[:, places.index(p)], instruments.lag_s[p]) for p in instruments.channels}
+    loss = outcome.P_loss * (1.0 + instruments.loss_gain) + instruments.loss_offset_W * (outcome.P_loss > 0.0)
+    housing = outcome.T[:, places.index(plant.anatomy.parts[-1])]
+    for fault in faults:
+        _spoil_inputs(fault, inputs, housing)
+        _spoil_readings(fault, readings, time)
+    if rng is not None:
+        inputs["T_ambient_degC"] = inputs["T_ambient_degC"] + 0.1 * rng.standard_normal(rows)
+        for values in readings.values():
+            values += instruments.noise_K * rng.standard_normal(rows)
+            values[:] = np.round(values / instruments.quantum_K) * instruments.quantum_K
+        relative, absolute = instruments.loss_noise
+        loss = loss + np.hypot(relative * loss, absolute) * rng.standard_normal(rows)
+    for fault in faults:
+        _hold_readings(fault, readings)
+    temperatures = {f"T_{place}_degC": values for place, values in readings.items()}
+    columns: dict[str, Array] = {"time_s": time, **inputs, **temperatures, "P_loss_W": loss}
+    if rng is not None:
+        for name, values in columns.items():
+            decimals = DECIMALS.get(name)
+            columns[name] = values if decimals is None else np.asarray(np.round(values, decimals))
+        _drop(columns, instruments.dropouts, rng)
+    return columns
+
+
+def lagged(values: Array, tau_s: float) -> Array:
+    """Reading of a sensor of first order, settled at the start, shape (rows,)."""
+    keep = np.exp(-ROW_S / tau_s)
+    start = lfiltic([1.0 - keep], [1.0, -keep], y=[values[0]])
+    return np.asarray(lfilter([1.0 - keep], [1.0, -keep], values, zi=start)[0])
+
+
+def _drop(columns: dict[str, Array], bursts: int, rng: np.random.Generator) -> None:
+    temperatures = [name for name in columns if name.startswith("T_") and name != "T_ambient_degC"]
+    for _ in range(bursts):
+        name = temperatures[int(rng.integers(len(temperatures)))]
+        start = int(rng.integers(len(columns[name])))
+        columns[name][start : start + int(rng.integers(1, 30))] = np.nan
+
+
+# ---------------------------------------------------------------------- faults
+
+
+def _spoil_inputs(fault: Concealed, inputs: dict[str, Array], housing: Array) -> None:
+    a = fault.parameters["a"]
+    name = fault.effect.name
+    if name == "torque_offset":
+        inputs["torque_Nm"] = inputs["torque_Nm"] + a
+    elif name == "torque_gain":
+        inputs["torque_Nm"] = inputs["torque_Nm"] * (1.0 + a)
+    elif name == "speed_gain":
+        inputs["speed_rpm"] = inputs["speed_rpm"] * (1.0 + a)
+    elif name == "ambient_probe_offset":
+        inputs["T_ambient_degC"] = inputs["T_ambient_degC"] + a
+    elif name == "ambient_probe_heated":
+        air = inputs["T_ambient_degC"]
+        inputs["T_ambient_degC"] = air + a * lagged(housing - air, 300.0)
+
+
+def _spoil_readings(fault: Concealed, readings: dict[str, Array], time: Array) -> None:
+    a, name, place = fault.parameters["a"], fault.effect.name, fault.places[0]
+    if name == "sensor_bias":
+        readings[place] = readings[place] + a
+    elif name == "sensor_drift":
+        readings[place] = readings[place] + a * (time / 3600.0) ** 0.9
+    elif name == "sensor_gain":
+        readings[place] = readings[place] + a * (readings[place] - 20.0)
+    elif name == "sensor_lag":
+        readings[place] = lagged(readings[place], a)
+    elif name == "clock_offset":
+        for channel, values in readings.items():
+            readings[channel] = np.interp(time - a, time, values)
+    elif name == "swapped_channels":
+        other = fault.places[1]
+        readings[place], readings[other] = readings[other], readings[place]
+
+
+def _hold_readings(fault: Concealed, readings: dict[str, Array]) -> None:
+    """A stuck sensor repeats its last reading, noise and all."""
+    if fault.effect.name == "sensor_stuck":
+        values = readings[fault.places[0]]
+        start, end = (round(fault.parameters[key] * len(values)) for key in ("from", "until"))
+        values[start:end] = values[start]
+
+
+def sensor(plant: Plant, rng: np.random.Generator) -> tuple[str, ...]:
+    """One measured place."""
+    names = default_channels(plant)
+    return (names[int(rng.integers(len(names)))],)
+
+
+def two_unlike_sensors(plant: Plant, rng: np.random.Generator) -> tuple[str, ...]:
+    """Two measured places that differ by some kelvin: a gear and something outside the gears."""
+    gear = plant.anatomy.gears[0]
+    others = [name for name in default_channels(plant) if name != gear]
+    return gear, others[int(rng.integers(len(others)))]
+
+
+def default_channels(plant: Plant) -> tuple[str, ...]:
+    """Default measured places: housing, oil, a bearing of every shaft, the first gear."""
+    anatomy, stage = plant.anatomy, plant.gearbox.stage[0]
+    first = [next(b.name for b in plant.gearbox.bearing if b.shaft == s) for s in (stage.driver, stage.driven)]
+    return ("oil", *anatomy.parts, *first, anatomy.gears[0])
+
+
+def _either(nominal: float, **others: tuple[float, float]) -> Draw:
+    """Strength of either sign."""
+
+    def draw(_plant: Plant, rng: np.random.Generator, strength: float) -> Mapping[str, float]:
+        a = nominal * strength * (1.0 if rng.random() < 0.5 else -1.0)
+        return {"a": a} | {k: float(rng.uniform(*v)) for k, v in others.items()}
+
+    return draw
+
+
+def _positive(nominal: float) -> Draw:
+    return lambda _plant, _rng, strength: {"a": nominal * strength}
+
+
+def _torque(plant: Plant, rng: np.random.Generator, strength: float) -> Mapping[str, float]:
+    return {"a": 0.05 * reference_torque(plant.gearbox) * strength * (1.0 if rng.random() < 0.5 else -1.0)}
+
+
+def _stuck(_: Plant, rng: np.random.Generator, strength: float) -> Mapping[str, float]:
+    start = float(rng.uniform(0.2, 0.6))
+    return {"a": strength, "from": start, "until": min(1.0, start + 0.2 * strength)}
+
+
+def _fault(name: str, places: Places, draw: Draw, law: str, kind: Kind = "sensor") -> Effect:
+    return Effect(name=name, catalogue=True, family="measurement", kind=kind, places=places, draw=draw, law=law)
+
+
+SENSOR_EFFECTS = (
+    _fault("sensor_bias", sensor, _either(2.0), "reading + a K"),
+    _fault("sensor_drift", sensor, _either(0.15), "reading + a t^0.9 K, t in hours"),
+    _fault("sensor_gain", sensor, _either(0.05), "reading + a (reading - 20 degC)"),
+    _fault("sensor_lag", sensor, _positive(80.0), "a first-order lag of a seconds more"),
+    _fault("sensor_stuck", sensor, _stuck, "the reading stands still from one fraction of the recording to another"),
+    _fault("swapped_channels", two_unlike_sensors, _positive(1.0), "two columns exchanged"),
+    _fault("clock_offset", at("clock"), _either(90.0), "temperatures are stamped a seconds late"),
+    _fault("torque_offset", at("torque"), _torque, "recorded torque = true + a N m", "signal"),
+    _fault("torque_gain", at("torque"), _either(0.06), "recorded torque = true (1 + a)", "signal"),
+    _fault("speed_gain", at("speed"), _either(0.05), "recorded speed = true (1 + a)", "signal"),
+    _fault("ambient_probe_offset", at("T_ambient"), _either(2.0), "recorded ambient = true + a K", "signal"),
+    _fault("ambient_probe_heated", at("T_ambient"), _positive(0.07), "recorded ambient = true + a (housing - true)",
+           "signal"),
+)  # fmt: skip

@@ -1,0 +1,1 @@
+"""Scores of diagnoses against the truth."""

@@ -1,0 +1,1 @@
+"""From files to recordings: mapping, time axis, units, plausible ranges, cleaning."""

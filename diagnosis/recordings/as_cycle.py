@@ -1,0 +1,122 @@
+"""A recording as the cycle of a simulation, read by the rules of ``diagnose``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from diagnosis.recordings.mapping import RecordingMapping, mapping_beside, mapping_of_definition
+from diagnosis.recordings.quantities import LOSS
+from diagnosis.recordings.read import name_parts, read_recording
+from diagnosis.recordings.recording import Recording
+from diagnosis.recordings.time_axis import ISO_NAMES, STANDARD, moment_text, split_path
+from models.base.errors import InputError
+from models.files.cycle import COLUMNS, REQUIRED, Cycle
+from models.files.cycle_file import RecordedStart, read_cycle_and_start
+from models.files.table_file import KINDS, column_names
+
+if TYPE_CHECKING:
+    from models.simulation.thermal_network import ThermalNetwork
+
+NEEDED = (STANDARD, *(COLUMNS[signal][0] for signal in REQUIRED))  # columns of a plain cycle
+MOST_SHOWN = 3  # pieces of a recording with gaps
+
+
+def files_of(text: Path) -> tuple[Path, ...]:
+    """Return the files of ``FILE+FILE@start..end``.
+
+    Raises
+    ------
+    InputError
+        If the text after the ``@`` is not a part.
+    """
+    return split_path(text)[0]
+
+
+def read_cycle_or_recording(
+    text: Path, network: ThermalNetwork, *, mapping: Path | None = None
+) -> tuple[Cycle, RecordedStart, tuple[str, ...]]:
+    """Read the inputs of a network over time from a plain cycle or from a recording.
+
+    Parameters
+    ----------
+    text : Path
+        File (.csv, .csv.gz, .parquet, .mf4), files ``FILE+FILE``, or a part, ``FILE@start..end``
+    network : ThermalNetwork
+        Defines nodes and inputs, and the usual mapping of its recordings
+    mapping : Path or None
+        Mapping file of a recording; by default the one next to it, else that of the definition
+
+    Returns
+    -------
+    cycle : Cycle
+        The time of a recording counts from its first row, as in a diagnosis
+    start : RecordedStart
+    notes : tuple of str
+        What was cleaned, assumed or not used of a recording
+
+    Raises
+    ------
+    InputError
+        With all problems of the file; or if a recording has gaps, with the pieces between them.
+    """
+    if mapping is None and not _is_recording(text, mapping_of_definition(network.recording)):
+        return *read_cycle_and_start(text, tuple(name for name in network.inputs if name not in COLUMNS)), ()
+    recording = read_recording(text, network, mapping=mapping, to_compare=False)
+    if len(recording.segments) > 1:
+        raise InputError(f"{text}: {_gaps(recording)}")
+    piece = recording.segments[0]
+    cycle = Cycle(recording.time[piece], {name: values[piece] for name, values in recording.inputs.items()})
+    temperatures = [(c.name, c.column, c.values[piece]) for c in recording.channels if c.name != LOSS]
+    start = RecordedStart.first_of(recording.path, temperatures, recording.rows[piece])
+    return cycle, start, (*recording.notes, *_clock_notes(recording))
+
+
+def _is_recording(text: Path, usual: RecordingMapping) -> bool:
+    """Return True if a file must be read as a recording.
+
+    So are parts, joined files and formats other than tables; files with a column that a mapping names; and files that
+    lack columns of a plain cycle, but have a mapping next to them or dates.
+    """
+    if not text.name.lower().endswith(KINDS) or len(files_of(text)) > 1:
+        return True
+    names = set(column_names(text))
+    if not names:  # the reader of plain cycles reports why
+        return False
+    own = mapping_beside(text, name_parts(text)[1])
+    if own is not None:
+        # The mapping may be there for other files of the folder.
+        as_it_splits = column_names(text, own.csv.separator)
+        is_meant = not (_named(own) or set(NEEDED)).isdisjoint(as_it_splits)
+        return is_meant or not names.issuperset(NEEDED)
+    has_dates = STANDARD not in names and not names.isdisjoint(ISO_NAMES)
+    return has_dates or not names.isdisjoint(_named(usual))
+
+
+def _named(mapping: RecordingMapping) -> set[str]:
+    return {*mapping.columns, *([mapping.time.column] if mapping.time is not None else [])}
+
+
+def _clock_notes(recording: Recording) -> list[str]:
+    clock, first = recording.clock, recording.from_s
+    if clock is None or (first == 0.0 and not clock.is_date):
+        return []
+    unit = "" if clock.is_date else " s"
+    return [f"time_s counts from its first row, {clock.column} = {moment_text(first, clock)}{unit}"]
+
+
+def _gaps(recording: Recording) -> str:
+    """Say that a recording with gaps is no cycle, and name the longest pieces as parts."""
+    time = recording.time + recording.from_s
+    spans = [(float(time[piece][0]), float(time[piece][-1])) for piece in recording.segments]
+    longest = sorted(sorted(spans, key=lambda span: span[0] - span[1])[:MOST_SHOWN])
+    name, clock = "+".join(path.name for path in recording.files), recording.clock
+    parts = [
+        f"{name}@{moment_text(first, clock)}..{moment_text(last + 1.0, clock)} ({(last - first) / 3600.0:.3g} h)"
+        for first, last in longest
+    ]
+    which = "" if len(spans) <= MOST_SHOWN else "; the longest are"
+    return (
+        f"gaps split it into {len(spans)} pieces, and nothing is known of the gearbox between them; simulate one of "
+        f"them{which}: {', '.join(parts)}; or raise max_gap_s in a mapping file, to take straight lines across"
+    )

@@ -1,0 +1,282 @@
+"""Columns of a file: which quantity each of them is, and its values in the unit inside."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from diagnosis.recordings.cleaning import rows_text
+from diagnosis.recordings.mapping import Column, RecordingMapping
+from diagnosis.recordings.quantities import AUXILIARY, IGNORE, LOSS, UNITS, dimension_of, looks_like_kelvin, range_of
+from models.base.errors import Problems, did_you_mean
+from models.base.types import Array
+from models.files.cycle import COLUMNS, REQUIRED
+from models.quantities.column_names import meant
+
+if TYPE_CHECKING:
+    from models.simulation.thermal_network import ThermalNetwork
+
+NEAR = 0.85  # likeness of names that makes one a slip of the other
+MOST_NAMED = 12  # unused columns in a note
+FEW = 0.01  # share of rows that may be impossible
+CODES, CODED = 3, 0.5  # so many different impossible values, in up to this share of rows, are codes of a logger
+
+
+def input_names(network: ThermalNetwork) -> tuple[str, ...]:
+    """Return the inputs of a network as signals, speed and torque first."""
+    return (*REQUIRED, *(name for name in network.inputs if name not in REQUIRED))
+
+
+def measurable(network: ThermalNetwork) -> tuple[str, ...]:
+    """Return the quantities that can be measured: ``T_<node>`` and ``P_loss``."""
+    return (*(f"T_{part.name}" for part in network.parts), LOSS)
+
+
+def standard_names(network: ThermalNetwork) -> dict[str, str]:
+    """Return the column of every quantity without a mapping file."""
+    names = {signal: COLUMNS[signal][0] if signal in COLUMNS else signal for signal in input_names(network)}
+    return names | {q: f"{q}_degC" if q.startswith("T_") else f"{q}_W" for q in measurable(network)}
+
+
+def match_columns(
+    present: Sequence[str],
+    time_column: str,
+    mapping: RecordingMapping,
+    network: ThermalNetwork,
+    problems: Problems,
+    notes: list[str],
+) -> dict[str, Column]:
+    """Find the quantity of every column: from the mapping, then from the standard names; the rest is auxiliary.
+
+    Parameters
+    ----------
+    present : sequence of str
+        Columns of the file
+    time_column : str
+    mapping : RecordingMapping
+    network : ThermalNetwork
+    problems : Problems
+        Receives columns that are missing, unknown, named twice or misspelt
+    notes : list of str
+        Receives the columns that are not used
+    """
+    roles = _mapped_columns(present, mapping, network, problems)
+    taken = {column.quantity for column in mapping.columns.values()}
+    lacking = []
+    for quantity, name in standard_names(network).items():
+        if name in mapping.columns or quantity in taken:
+            continue
+        if quantity in mapping.constants:
+            if name in present:
+                problems.add(
+                    f"{quantity} is a constant of its mapping file, and column {name} is there as well; leave the "
+                    f'constant out, or name the column in the mapping file with quantity = "{IGNORE}"'
+                )
+        elif name in present:
+            roles[name] = Column(quantity=quantity)
+        else:
+            lacking.append(name)
+    found = taken | {column.quantity for column in roles.values()} | set(mapping.constants)
+    for signal in REQUIRED:
+        if signal not in found:
+            shown = ", ".join(other[:40] for other in sorted(present)[:20])
+            problems.add(f"column {COLUMNS[signal][0]} is missing; it has: {shown}")
+    rest = [n for n in present if n not in roles and n not in mapping.columns and n != time_column]
+    _report_unused(rest, lacking, problems, notes)
+    return roles | {name: Column(quantity=AUXILIARY) for name in rest}
+
+
+def _mapped_columns(
+    present: Sequence[str], mapping: RecordingMapping, network: ThermalNetwork, problems: Problems
+) -> dict[str, Column]:
+    known = {*input_names(network), *measurable(network), AUXILIARY, IGNORE}
+    roles: dict[str, Column] = {}
+    for name, column in mapping.columns.items():
+        if name not in present:
+            problems.add(f"column {name} of its mapping file is missing{did_you_mean(name, present)}")
+        elif column.quantity not in known:
+            problems.add(
+                f"column {name} is {column.quantity!r} in its mapping file, which this gearbox does not have"
+                + did_you_mean(column.quantity, known)
+            )
+        else:
+            roles[name] = column
+    for name in mapping.constants:
+        if name not in input_names(network):
+            hint = did_you_mean(name, input_names(network))
+            problems.add(f"constant {name!r} of its mapping file is no input of this gearbox{hint}")
+    return roles
+
+
+def _report_unused(rest: Sequence[str], lacking: Sequence[str], problems: Problems, notes: list[str]) -> None:
+    unused = []
+    for name in rest:
+        slip = meant(name, lacking, near=NEAR, with_kind=True)
+        if slip:
+            problems.add(
+                f"column {name[:80]} is not known; did you mean {slip!r}? Rename it, or name it in a mapping file "
+                f'(quantity = "{AUXILIARY}" if it is something else)'
+            )
+        else:
+            unused.append(name[:80])
+    if unused:
+        more = f" and {len(unused) - MOST_NAMED} more" if len(unused) > MOST_NAMED else ""
+        notes.append(f"not used, being no input and no node of this gearbox: {', '.join(unused[:MOST_NAMED])}{more}")
+
+
+def auxiliary_numbers(cells: pd.Series, name: str, column: Column, notes: list[str]) -> Array | None:
+    """Return an auxiliary column as numbers, shape (rows,), in the unit of the file; None if it holds others."""
+    if pd.api.types.is_numeric_dtype(cells.dtype):
+        return np.asarray(cells.to_numpy(dtype=np.float64, na_value=np.nan) * column.scale)
+    if cells.notna().any():
+        notes.append(f"column {name[:80]} is not numeric; ignored")
+    return None
+
+
+def _numbers(cells: pd.Series, name: str, problems: Problems) -> Array | None:
+    """Return a column as numbers, shape (rows,), in the unit of the file; None and a problem if one is none."""
+    rows = np.asarray(cells.index) + 1
+    if pd.api.types.is_bool_dtype(cells.dtype) or pd.api.types.is_datetime64_any_dtype(cells.dtype):
+        problems.add(f"{name} holds {cells.dtype} values (rows {rows[0]}-{rows[-1]}), not numbers")
+        return None
+    if pd.api.types.is_numeric_dtype(cells.dtype):
+        return np.array(cells.to_numpy(dtype=np.float64, na_value=np.nan))
+    parsed = pd.to_numeric(cells.astype(object), errors="coerce")
+    wrong = np.flatnonzero((parsed.isna() & cells.notna()).to_numpy(dtype=bool))
+    if not len(wrong):
+        return np.array(parsed.to_numpy(dtype=np.float64, na_value=np.nan))
+    cell = str(cells.iloc[int(wrong[0])])[:40]
+    advice = "if it means a missing value, name it under 'missing' in a mapping file"
+    whole, comma, rest = cell.strip().partition(",")
+    if comma and whole.lstrip("+-").isdigit() and rest.isdigit():
+        advice = 'with decimal commas, give csv = { separator = ";", decimal = "," } in a mapping file'
+    problems.add(
+        f"{name} holds {cell!r} at row {rows[wrong[0]]}, which is no number ({len(wrong)} such cells, "
+        f"{rows_text(rows[wrong])}); {advice}"
+    )
+    return None
+
+
+def quantity_values(
+    cells: pd.Series,
+    name: str,
+    column: Column,
+    unit_of_file: str | None,
+    outside: NDArray[np.bool_],
+    problems: Problems,
+    notes: list[str],
+) -> Array | None:
+    """Return the values of an input or a measurement in the unit inside, shape (rows,); NaN where missing.
+
+    Parameters
+    ----------
+    cells : Series
+        Its index counts the rows of the file from 0
+    name : str
+        Of the column
+    column : Column
+        What the mapping states of it
+    unit_of_file : str or None
+        Unit that the file itself names
+    outside : array of bool, shape (rows,)
+        Rows that the mapping leaves out
+    problems : Problems
+    notes : list of str
+
+    Returns
+    -------
+    Array or None
+        None, and a problem, if the column cannot be used
+    """
+    values = _numbers(cells, name, problems)
+    rows = np.asarray(cells.index) + 1
+    if values is None or not _keep_valid(values, name, column, rows, problems, notes):
+        return None
+    values[outside] = np.nan
+    unit = unit_of_file if column.unit is None else column.unit
+    dimension = dimension_of(column.quantity)
+    units = UNITS[dimension] if dimension else {}
+    if unit and units and unit not in units:
+        problems.add(f"column {name} has the unit {unit!r}, which is no unit of {dimension}{did_you_mean(unit, units)}")
+        return None
+    factor, offset = units.get(unit or "", (1.0, 0.0))
+    return _possible(values * (column.scale * factor) + offset, column.quantity, name, rows, problems, notes)
+
+
+def _keep_valid(
+    values: Array, name: str, column: Column, rows: NDArray[np.int64], problems: Problems, notes: list[str]
+) -> bool:
+    """Replace values outside ``valid`` of the mapping by NaN; return False, and report it, if none is left."""
+    low, high = column.valid or (-np.inf, np.inf)
+    outside = (values < low) | (values > high)
+    if outside.any():
+        where = f"in {rows_text(rows[outside])} left out"
+        text = f"{name}: {int(outside.sum())} values outside {low:g} ... {high:g} {where}"
+        if not np.isfinite(values[~outside]).any():
+            problems.add(
+                f"{text}, so that none is left: the limits 'valid' of its mapping file are in the column's own unit, "
+                "as the numbers stand in the file; correct them"
+            )
+            return False
+        notes.append(text)
+        values[outside] = np.nan
+    return True
+
+
+def _possible(
+    values: Array, quantity: str, name: str, rows: NDArray[np.int64], problems: Problems, notes: list[str]
+) -> Array:
+    """Replace impossible values by NaN; many of them, or none possible, are a problem.
+
+    Parameters
+    ----------
+    values : Array, shape (rows,)
+        In the unit inside; NaN where missing
+    quantity, name : str
+        What it is, and its column
+    rows : array of int, shape (rows,)
+        Numbers of the rows, for messages
+    problems : Problems
+    notes : list of str
+    """
+    infinite = np.flatnonzero(np.isinf(values))
+    if len(infinite):
+        problems.add(
+            f"{name} is {values[infinite[0]]} in {rows_text(rows[infinite])}; leave a cell empty where the value is "
+            "unknown"
+        )
+        return values
+    good = values[np.isfinite(values)]
+    if not len(good):
+        problems.add(f"{name} has no value in any of its {len(values)} rows; remove the column, or mend it")
+        return values
+    if looks_like_kelvin(quantity, good.min(), good.max()):
+        problems.add(
+            f"{name} is {good.min():g} to {good.max():g} (rows {rows[0]}-{rows[-1]}): looks like kelvin, not degC; "
+            'subtract 273.15, or give unit = "K" in a mapping file'
+        )
+        return values
+    possible = range_of(quantity)
+    if possible is None:
+        return values
+    wrong = np.isfinite(values) & ((values < possible.low) | (values > possible.high))
+    count = int(wrong.sum())
+    if not count:
+        return values
+    first = int(np.flatnonzero(wrong)[0])
+    where = f"{count} of {len(values)} values ({rows_text(rows[wrong])})"
+    limits = f"{possible.low:g} ... {possible.high:g} {possible.unit}"
+    is_code = len(np.unique(values[wrong])) <= CODES and count <= CODED * len(good)
+    if count > max(FEW * len(good), 1) and not is_code:
+        hint = "; looks like kelvin" if looks_like_kelvin(quantity, values[first], values[first]) else ""
+        problems.add(
+            f"{name} is {values[first]:g} at row {rows[first]}, and {where} lie outside {limits}, which is possible"
+            f"{hint}; give its unit, or the valid range, in a mapping file"
+        )
+        return values
+    notes.append(f"{name}: {where} outside {limits} taken as missing")
+    return np.where(wrong, np.nan, values)

@@ -1,0 +1,96 @@
+"""MDF4 files as tables: every channel on the times of one of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from diagnosis.recordings.time_axis import STANDARD
+from models.base.errors import InputError
+from models.files.table_file import check_file
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class MdfTable:
+    """Numeric channels of an MDF file as one table.
+
+    Attributes
+    ----------
+    table : DataFrame
+        ``time_s`` since the start of the measurement, and the channels; NaN where a slower channel has no sample
+    units : mapping of channel to str
+        As the file names them
+    start : float
+        Start of the measurement since 1970, [s]
+    """
+
+    table: pd.DataFrame
+    units: Mapping[str, str]
+    start: float
+
+
+def read_mdf(path: Path, *, base: str) -> MdfTable:
+    """Read an MDF file.
+
+    Parameters
+    ----------
+    path : Path
+    base : str
+        Channel whose times become the rows; a sample of another channel goes to the nearest row, several to their mean
+
+    Raises
+    ------
+    InputError
+        If asammdf is not installed, or the file cannot be read, lacks `base`, or names a channel twice.
+    """
+    check_file(path)
+    if find_spec("asammdf") is None:
+        raise InputError(f"{path}: reading MDF4 needs asammdf; python -m pip install asammdf")
+    from asammdf import MDF
+
+    units: dict[str, str] = {}
+    groups: list[pd.DataFrame] = []
+    try:
+        with MDF(path) as file:
+            start = file.start_time.timestamp()
+            for index in range(len(file.groups)):
+                channels = [
+                    (None, group, c) for group, own in file.included_channels(index)[index].items() for c in own
+                ]
+                # Interpolated samples would count as measured; without it, invalid and missing samples are NaN.
+                frame = file.to_dataframe(channels, time_from_zero=False, use_interpolation=False, numeric_1D_only=True)
+                groups.append(frame)
+                for _, group, channel in channels:
+                    name = file.groups[group].channels[channel].name
+                    units[name] = file.get_channel_unit(group=group, index=channel)
+    except Exception as error:
+        text = str(error).strip().splitlines()
+        raise InputError(f"{path}: cannot be read as mf4: {text[0] if text else type(error).__name__}") from error
+    return MdfTable(table=_on_rows_of(base, groups, path), units={n: u for n, u in units.items() if u}, start=start)
+
+
+def _on_rows_of(base: str, groups: list[pd.DataFrame], path: Path) -> pd.DataFrame:
+    names = [str(name) for frame in groups for name in frame.columns]
+    repeated = sorted({name for name in names if names.count(name) > 1})
+    if repeated:
+        raise InputError("\n".join(f"{path}: channel {name[:80]} is there twice; keep one" for name in repeated[:10]))
+    if base not in names:
+        shown = ", ".join(sorted(names)[:20]) or "no numeric channel"
+        raise InputError(f"{path}: channel {base} is missing; it has: {shown}")
+    time = next(frame for frame in groups if base in frame.columns).index.to_numpy(dtype=np.float64)
+    if len(time) == 0:
+        raise InputError(f"{path}: channel {base} has no samples")
+    middles = 0.5 * (time[1:] + time[:-1])
+    columns = []
+    for frame in groups:
+        values = frame.astype(np.float64)
+        if not np.array_equal(values.index, time):
+            row = np.searchsorted(middles, values.index.to_numpy())
+            values = values.groupby(row).mean().reindex(range(len(time)))
+        columns.append(values.set_axis(range(len(time))))
+    return pd.concat([pd.DataFrame({STANDARD: time}), *columns], axis=1)

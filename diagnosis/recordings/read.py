@@ -1,0 +1,308 @@
+"""Reading of recordings: from files to :class:`diagnosis.recordings.recording.Recording`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from diagnosis.recordings.cleaning import (
+    bridged,
+    resolution_of,
+    rows_text,
+    spikes_of_loss,
+    spikes_of_temperature,
+    steady_rows,
+    stuck_rows,
+    time_pieces,
+)
+from diagnosis.recordings.columns import standard_names
+from diagnosis.recordings.file import open_recording, set_to_one_clock, sha256_of, stem_of
+from diagnosis.recordings.mapping import RecordingMapping, mapping_of_definition
+from diagnosis.recordings.quantities import LOSS, dimension_of
+from diagnosis.recordings.recording import Channel, Recording
+from diagnosis.recordings.rows import RecordedRows, joined, read_rows
+from diagnosis.recordings.time_axis import split_path
+from models.base.errors import InputError, Problems
+from models.files.cycle import REQUIRED
+
+if TYPE_CHECKING:
+    from models.simulation.thermal_network import ThermalNetwork
+
+FEWEST_ROWS = 3
+SHORTEST_GAP_S, GAP_STEPS = 60.0, 3.0  # a gap is longer than both, unless stated
+SLOW_GAPS = 10.0  # ambient temperature and air speed change slowly: holes so many times longer are bridged
+LEAST_USABLE = 0.1  # share of the rows
+
+
+def read_recordings(
+    paths: Sequence[str | Path],
+    network: ThermalNetwork,
+    *,
+    mapping: Path | None = None,
+    max_gap_s: float | None = None,
+) -> tuple[Recording, ...]:
+    """Read recordings of one gearbox.
+
+    Parameters
+    ----------
+    paths : sequence of str or Path
+        One entry per recording: a file (.csv, .csv.gz, .parquet, .mf4); several files of one recording, joined in the
+        order of time, ``FILE+FILE``; or a part of either, ``FILE@start..end`` (see
+        :class:`diagnosis.recordings.time_axis.Part`)
+    network : ThermalNetwork
+        Defines which nodes and inputs there are
+    mapping : Path or None
+        Mapping file for all of them (see :mod:`diagnosis.recordings.mapping`); by default ``<stem>.toml`` or
+        ``mapping.toml``
+        next to each, else the table ``[recording]`` of the network's definition
+    max_gap_s : float or None
+        Longest gap that is bridged, [s]; by default as the mapping states, else 60 s or three usual steps
+
+    Returns
+    -------
+    tuple of Recording
+
+    Raises
+    ------
+    InputError
+        With all problems of all files, each with file, column and rows.
+    """
+    recordings: list[Recording] = []
+    problems: list[str] = []
+    for path, name in zip(paths, _names(paths), strict=True):
+        try:
+            recordings.append(read_recording(path, network, name=name, mapping=mapping, max_gap_s=max_gap_s))
+        except InputError as error:
+            problems.append(str(error))
+    if problems:
+        raise InputError("\n".join(dict.fromkeys(problems)))
+    return tuple(recordings)
+
+
+def read_train_and_holdout(
+    train: Sequence[str | Path], holdout: Sequence[str | Path], network: ThermalNetwork, *, mapping: Path | None = None
+) -> tuple[tuple[Recording, ...], tuple[Recording, ...]]:
+    """Read recordings for training and hold-out, no two of one name; see :func:`read_recordings`."""
+    learnt, held = (read_recordings(paths, network, mapping=mapping) for paths in (train, holdout))
+    taken = {recording.name for recording in learnt}
+    return learnt, tuple(replace(r, name=f"{r.name}_held_out") if r.name in taken else r for r in held)
+
+
+def read_recording(
+    text: str | Path,
+    network: ThermalNetwork,
+    *,
+    name: str = "",
+    mapping: Path | None = None,
+    max_gap_s: float | None = None,
+    to_compare: bool = True,
+) -> Recording:
+    """Read one recording; see :func:`read_recordings`.
+
+    Parameters
+    ----------
+    text : str or Path
+        ``FILE``, ``FILE+FILE``, ``FILE@start..end``
+    network : ThermalNetwork
+    name : str
+    mapping : Path or None
+    max_gap_s : float or None
+    to_compare : bool
+        True if a measured temperature is required
+
+    Raises
+    ------
+    InputError
+        With all problems of the file.
+    """
+    paths, parts = split_path(text)
+    files = [open_recording(path, mapping, mapping_of_definition(network.recording)) for path in paths]
+    set_to_one_clock(files)
+    parts = parts or files[0].parts
+    first_s = min((file.first_s for file in files if np.isfinite(file.first_s)), default=np.nan)
+    tables = [read_rows(file, parts, first_s, network, to_compare=to_compare) for file in files]
+    found = joined([table for table in tables if len(table.seconds)] or tables[:1])
+    if len(found.seconds) < FEWEST_ROWS:
+        where = " in the part that is named" if parts else ""
+        rows = len(found.seconds) or "no"
+        raise InputError(f"{found.path}: has {rows} rows{where}; a recording has {FEWEST_ROWS} or more")
+    _add_unrecorded(found, files[0].mapping, network)
+    stated = max_gap_s if max_gap_s is not None else files[0].mapping.max_gap_s
+    usual = GAP_STEPS * float(np.median(np.diff(found.seconds)))
+    gap = stated if stated is not None else max(SHORTEST_GAP_S, usual)
+    resolutions = {quantity: resolution_of(found.values[quantity]) for quantity in found.measured(network)}
+    _remove_spikes(found, gap)
+    _note_stuck(found, network)
+    found = _with_known_inputs(found, network, gap)
+    segments = _segments(found, gap)
+    seconds, clock = found.seconds, files[0].clock
+    since_1970 = 0.0 if clock is not None and clock.is_date else files[0].start
+    epoch = datetime(1970, 1, 1, tzinfo=UTC)
+    return Recording(
+        name=name or files[0].stem,
+        path=found.path,
+        files=tuple(found.files),
+        sha256=sha256_of(found.files),
+        time=seconds - seconds[0],
+        start=None if since_1970 is None else epoch + timedelta(seconds=since_1970 + float(seconds[0])),
+        from_s=float(seconds[0]),
+        to_s=float(seconds[-1]),
+        clock=clock,
+        rows=found.rows,
+        inputs={name: found.values[name] for name in found.inputs(network)},
+        channels=tuple(
+            Channel(
+                name=quantity.removeprefix("T_"),
+                values=found.values[quantity],
+                noise=role.noise,
+                resolution=resolutions[quantity] if role.resolution is None else role.resolution,
+                lag_s=role.lag_s,
+                lag_sd_s=role.lag_sd_s,
+                bias_sd=role.bias_sd,
+                column=found.names[quantity],
+            )
+            for quantity in found.measured(network)
+            for role in [found.roles[quantity]]
+        ),
+        auxiliary=found.auxiliary,
+        segments=segments,
+        assumed=tuple(found.assumed),
+        notes=tuple(found.notes),
+    )
+
+
+def name_parts(text: str | Path) -> tuple[str, str, str]:
+    """Return folder, stem, and part as words for the name of a recording.
+
+    Examples
+    --------
+    >>> name_parts("rig_1/train_1.csv.gz"), name_parts("a.csv+b.csv@0..3600")
+    (('rig_1', 'train_1', ''), ('', 'a', '0_3600'))
+    """
+    paths, parts = split_path(text)
+    part = str(text).rpartition("@")[2].replace("..", "_") if parts else ""
+    return paths[0].parent.name, stem_of(paths[0]), part.replace(":", "").replace("/", "")
+
+
+def _names(paths: Sequence[str | Path]) -> list[str]:
+    """Return short names of recordings, made different by their folder, their part, or a number if need be."""
+    split = [name_parts(path) for path in paths]
+    for form in ("{stem}", "{folder}_{stem}", "{stem}_{part}", "{folder}_{stem}_{part}"):
+        names = [form.format(stem=stem, folder=folder, part=part).strip("_") for folder, stem, part in split]
+        if len(set(names)) == len(names):
+            return names
+    return [f"{stem}_{number}" for number, (_, stem, _) in enumerate(split, start=1)]
+
+
+# ---------------------------------------------------------------------- cleaning
+
+
+def _add_unrecorded(found: RecordedRows, mapping: RecordingMapping, network: ThermalNetwork) -> None:
+    """Add the constants of the mapping, and the definition's values of inputs that were not recorded."""
+    size = len(found.seconds)
+    for name, value in mapping.constants.items():
+        found.values[name] = np.full(size, value)
+    for name, default in network.inputs.items():
+        if name not in found.values:
+            found.values[name] = np.full(size, default)
+            found.assumed.append(name)
+            found.notes.append(
+                f"{standard_names(network)[name]} was not recorded; {default:g} is assumed, as the definition says"
+            )
+
+
+def _remove_spikes(found: RecordedRows, gap: float) -> None:
+    steady = steady_rows({name: found.values[name] for name in REQUIRED})
+    pieces = time_pieces(found.seconds, gap)
+    for quantity, values in found.values.items():
+        if quantity == LOSS:
+            wrong = np.concatenate([spikes_of_loss(values[piece], steady[piece]) for piece in pieces])
+        elif dimension_of(quantity) == "temperature":
+            wrong = np.concatenate([spikes_of_temperature(values[piece]) for piece in pieces])
+        else:
+            continue
+        if wrong.any():
+            found.values[quantity] = np.where(wrong, np.nan, values)
+            name, where = found.names.get(quantity, quantity), rows_text(found.rows[wrong])
+            found.notes.append(f"{name}: {int(wrong.sum())} outliers and dropouts in {where} taken as missing")
+
+
+def _note_stuck(found: RecordedRows, network: ThermalNetwork) -> None:
+    temperatures = {q: found.values[q] for q in found.measured(network) if q != LOSS}
+    for quantity, (first, end, other, moved) in stuck_rows(found.seconds, temperatures).items():
+        hours = (found.seconds[end - 1] - found.seconds[first]) / 3600.0
+        found.notes.append(
+            f"{found.names[quantity]} stays at {found.values[quantity][first]:g} degC for {hours:.1f} h (rows "
+            f"{found.rows[first]}-{found.rows[end - 1]}) while {found.names[other]} moves by {moved:.1f} K; kept"
+        )
+
+
+def _with_known_inputs(found: RecordedRows, network: ThermalNetwork, gap: float) -> RecordedRows:
+    """Bridge short holes of the inputs, and drop the rows without inputs.
+
+    Raises
+    ------
+    InputError
+        If too few rows are left.
+    """
+    problems = Problems(found.path)
+    time, rows = found.seconds, found.rows
+    usable = np.ones(len(time), dtype=bool)
+    partial = []
+    for name in found.inputs(network):
+        values, column = found.values[name], found.names.get(name, name)
+        filled, known = bridged(time, values, gap if name in REQUIRED else SLOW_GAPS * gap)
+        found.values[name] = filled
+        missing, lost = int(np.isnan(values).sum()), rows[~known]
+        if missing:
+            left = f"; {len(lost)} rows without are left out ({rows_text(lost)})" if len(lost) else ""
+            found.notes.append(
+                f"{column} is missing in {missing} of {len(rows)} rows, bridged where shorter than max_gap_s = "
+                f"{gap:g}{left}"
+            )
+        if known.sum() < FEWEST_ROWS:
+            problems.add(
+                f"{column} has only {int(known.sum())} of {len(time)} values that can be used (rows {rows[0]}-"
+                f"{rows[-1]})"
+            )
+        usable &= known
+        if len(lost):
+            partial.append(column)
+    if not problems and usable.sum() < max(FEWEST_ROWS, LEAST_USABLE * len(usable)):
+        problems.add(
+            f"only {int(usable.sum())} of rows {rows[0]}-{rows[-1]} have {' and '.join(partial)}; mend the columns, or "
+            "name the part that has them"
+        )
+    problems.stop_if_any()
+    return replace(
+        found,
+        seconds=time[usable],
+        rows=rows[usable],
+        values={name: values[usable] for name, values in found.values.items()},
+        auxiliary={name: values[usable] for name, values in found.auxiliary.items()},
+    )
+
+
+def _segments(found: RecordedRows, gap: float) -> tuple[slice, ...]:
+    """Return the gap-free pieces of more than one row.
+
+    Raises
+    ------
+    InputError
+        If there is none.
+    """
+    pieces = time_pieces(found.seconds, gap)
+    segments = tuple(piece for piece in pieces if piece.stop - piece.start > 1)
+    if not segments:
+        raise InputError(f"{found.path}: no two rows are closer than {gap:g} s (max_gap_s); raise it in a mapping file")
+    if len(pieces) > 1:
+        cuts = found.rows[[piece.start for piece in pieces[1:]]]
+        found.notes.append(
+            f"{len(cuts)} gaps longer than {gap:g} s split it into {len(pieces)} pieces (before {rows_text(cuts)})"
+        )
+    return segments

@@ -1,0 +1,103 @@
+"""A recording: the inputs of a gearbox and what was measured in it over time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from datetime import datetime
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.recordings.time_axis import Clock
+from models.base.types import Array
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Channel:
+    """One measured quantity.
+
+    Attributes
+    ----------
+    name : str
+        The node, or ``P_loss`` for the total loss
+    values : Array, shape (rows,)
+        [degC] or [W]; NaN where missing
+    noise : float or None
+        White standard deviation of one row as its mapping file states it, [K] or [W]
+    resolution : float
+        Quantum of the values as stated, else as found in them, [K] or [W]; 0 if there is none
+    lag_s : float or None
+        Time constant of the sensor as stated, [s]
+    lag_sd_s : float or None
+        Its uncertainty as stated, [s]
+    bias_sd : float or None
+        Tolerance of the sensor as stated, [K] or [W]
+    column : str
+        Name in the file
+    """
+
+    name: str
+    values: Array
+    noise: float | None = None
+    resolution: float = 0.0
+    lag_s: float | None = None
+    lag_sd_s: float | None = None
+    bias_sd: float | None = None
+    column: str = ""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Recording:
+    """Inputs and measurements of one gearbox over time.
+
+    Attributes
+    ----------
+    name : str
+        Of its file; different for recordings that are read together
+    path : Path
+        Its file, for messages; names joined by ``+`` if there are several
+    files : tuple of Path
+        In the order of time
+    sha256 : str
+        Of the file; of the hashes of several
+    time : Array, shape (rows,)
+        Since the recording's first row, [s], strictly increasing
+    start : datetime or None
+        Of the first row, if the file has dates
+    from_s, to_s : float
+        First and last row in the file's own time, [s], dates since 1970
+    clock : Clock or None
+        The file's time column
+    rows : array of int, shape (rows,)
+        Numbers of the rows in the file, counted from 1 and through all files
+    inputs : mapping of signal to Array, shape (rows,)
+        Every input of the network; free of NaN
+    channels : tuple of Channel
+    auxiliary : mapping of column to Array, shape (rows,)
+        Other numeric columns
+    segments : tuple of slice
+        Gap-free pieces
+    assumed : tuple of str
+        Inputs that were not recorded; they have the value of the definition
+    notes : tuple of str
+        What was cleaned or assumed
+    """
+
+    name: str
+    path: Path
+    files: tuple[Path, ...] = ()
+    sha256: str
+    time: Array
+    start: datetime | None = None
+    from_s: float = 0.0
+    to_s: float = 0.0
+    clock: Clock | None = None
+    rows: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+    inputs: Mapping[str, Array]
+    channels: tuple[Channel, ...]
+    auxiliary: Mapping[str, Array] = field(default_factory=dict)
+    segments: tuple[slice, ...]
+    assumed: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()

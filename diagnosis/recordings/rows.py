@@ -1,0 +1,151 @@
+"""Rows of a recording in the units inside: read from one file, and joined from several."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagnosis.recordings.columns import auxiliary_numbers, input_names, match_columns, measurable, quantity_values
+from diagnosis.recordings.file import RecordingFile
+from diagnosis.recordings.mapping import Column
+from diagnosis.recordings.quantities import AUXILIARY, IGNORE
+from diagnosis.recordings.time_axis import Clock, Part, check_time, moment_text
+from models.base.errors import InputError
+from models.base.types import Array
+
+if TYPE_CHECKING:
+    from models.simulation.thermal_network import ThermalNetwork
+
+
+@dataclass(kw_only=True, eq=False)
+class RecordedRows:
+    """Rows of a recording in the units inside, while they are cleaned.
+
+    Attributes
+    ----------
+    seconds : Array, shape (rows,)
+        Time in the file, [s]
+    rows : array of int, shape (rows,)
+        Numbers of the rows in the file, counted from 1
+    values : dict of quantity to Array, shape (rows,)
+        Inputs and measurements; NaN where missing
+    auxiliary : dict of column to Array, shape (rows,)
+    names, roles : dict of quantity to str, Column
+        Its column, and what the mapping states of it
+    assumed, notes : list of str
+    """
+
+    path: Path
+    files: list[Path]
+    clock: Clock | None
+    seconds: Array
+    rows: NDArray[np.int64]
+    values: dict[str, Array] = field(default_factory=dict)
+    auxiliary: dict[str, Array] = field(default_factory=dict)
+    names: dict[str, str] = field(default_factory=dict)
+    roles: dict[str, Column] = field(default_factory=dict)
+    assumed: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+    def inputs(self, network: ThermalNetwork) -> list[str]:
+        """Return the inputs in it."""
+        return [name for name in self.values if name in input_names(network)]
+
+    def measured(self, network: ThermalNetwork) -> list[str]:
+        """Return the measured quantities in it."""
+        return [name for name in self.values if name in measurable(network) and name not in input_names(network)]
+
+
+def read_rows(
+    file: RecordingFile, parts: Sequence[Part], first_s: float, network: ThermalNetwork, *, to_compare: bool
+) -> RecordedRows:
+    """Read the rows of the parts: numbers in the units inside, without impossible values.
+
+    Raises
+    ------
+    InputError
+        With all problems of the file.
+    """
+    clock, problems, notes = file.clock, file.problems, list[str]()
+    table = file.table(parts, first_s)
+    seconds = file.seconds(table)
+    found = RecordedRows(
+        path=file.path, files=[file.path], clock=clock, seconds=seconds, rows=np.asarray(table.index) + 1, notes=notes
+    )
+    if len(table) == 0:
+        problems.stop_if_any()
+        return found
+    if clock is not None:
+        check_time(table[clock.column], seconds, clock, problems)
+    present = [str(column) for column in table.columns]
+    roles = match_columns(present, clock.column if clock else "", file.mapping, network, problems, notes)
+    for name, role in roles.items():
+        if role.quantity == AUXILIARY:
+            auxiliary = auxiliary_numbers(table[name], name, role, notes)
+            if auxiliary is not None:
+                found.auxiliary[name] = auxiliary
+        elif role.quantity != IGNORE:
+            found.names[role.quantity], found.roles[role.quantity] = name, role
+            outside = ~file.in_rows_of(name, role, seconds, first_s)
+            values = quantity_values(table[name], name, role, file.units.get(name), outside, problems, notes)
+            if values is not None:
+                found.values[role.quantity] = values
+    if to_compare and not any(q.startswith("T_") and q in measurable(network) for q in found.names):
+        problems.add(
+            "no temperature was measured: a column T_<node>_degC is needed, of the nodes "
+            + ", ".join(part.name for part in network.parts)
+        )
+    problems.stop_if_any()
+    return found
+
+
+def joined(tables: Sequence[RecordedRows]) -> RecordedRows:
+    """Join the files of one recording in the order of time.
+
+    Raises
+    ------
+    InputError
+        If they overlap.
+    """
+    if len(tables) == 1:
+        return tables[0]
+    tables = sorted(tables, key=lambda table: table.seconds[0])
+    for before, after in pairwise(tables):
+        if after.seconds[0] <= before.seconds[-1]:
+            raise InputError(
+                f"{after.path}: begins at {moment_text(after.seconds[0], after.clock)}, before {before.path} ends at "
+                f"{moment_text(before.seconds[-1], before.clock)} (time in the file); files that are joined by + must "
+                "follow each other in time: remove the rows that are there twice, or name separate recordings"
+            )
+
+    def together_of(kind: str) -> dict[str, Array]:
+        names = dict.fromkeys(name for table in tables for name in getattr(table, kind))
+        return {
+            name: np.concatenate([getattr(t, kind).get(name, np.full(len(t.seconds), np.nan)) for t in tables])
+            for name in names
+        }
+
+    before_rows = np.cumsum([0, *(int(table.rows[-1]) for table in tables[:-1])])
+    numbered = [table.rows + start for table, start in zip(tables, before_rows, strict=True)]
+    ranges = ", ".join(
+        f"{table.path.name} (rows {rows[0]}-{rows[-1]})" for table, rows in zip(tables, numbered, strict=True)
+    )
+    notes = [f"{table.path.name}: {note}" for table in tables for note in table.notes]
+    return RecordedRows(
+        path=tables[0].path.with_name("+".join(table.path.name for table in tables)),
+        files=[table.path for table in tables],
+        clock=tables[0].clock,
+        seconds=np.concatenate([table.seconds for table in tables]),
+        rows=np.concatenate(numbered),
+        values=together_of("values"),
+        auxiliary=together_of("auxiliary"),
+        names={quantity: name for table in reversed(tables) for quantity, name in table.names.items()},
+        roles={quantity: role for table in reversed(tables) for quantity, role in table.roles.items()},
+        notes=[f"joined from {ranges}", *notes],
+    )

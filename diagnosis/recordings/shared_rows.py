@@ -1,0 +1,66 @@
+"""Rows that two recordings share: they would count twice, or be held out and used for training."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+from pandas.util import hash_array
+
+from diagnosis.recordings.recording import Recording
+from models.base.errors import InputError
+
+SHARED_ROWS, SHARED_SHARE = 20, 0.2  # distinct rows that two recordings have in common
+MIX = np.uint64(0x9E3779B97F4A7C15)  # odd and without a pattern: joins hashes
+
+
+def check_shared_rows(train: Sequence[Recording], holdout: Sequence[Recording] = ()) -> None:
+    """Refuse recordings that share rows.
+
+    Parameters
+    ----------
+    train, holdout : sequence of Recording
+
+    Raises
+    ------
+    InputError
+        With every pair that shares rows.
+    """
+    given = [(recording, _distinct_rows(recording)) for recording in (*train, *holdout)]
+    lines = []
+    for (i, (one, rows)), (j, (other, others)) in combinations(enumerate(given), 2):
+        shared = _shared(one, other, rows, others)
+        if shared and i < len(train) <= j:
+            lines.append(
+                f"{other.path}: is held out, but {shared} {one.path}, which is used for training; hold out another "
+                "recording, or a part FILE@start..end that does not overlap"
+            )
+        elif shared:
+            lines.append(f"{other.path}: {shared} {one.path}; name every row once")
+    if lines:
+        raise InputError("\n".join(lines))
+
+
+def _shared(one: Recording, other: Recording, mine: NDArray[np.uint64], theirs: NDArray[np.uint64]) -> str:
+    """Describe the overlap of two recordings, as the start of a sentence that ends with a file; empty without one."""
+    if one.sha256 == other.sha256:
+        first, last = max(one.from_s, other.from_s), min(one.to_s, other.to_s)
+        return f"has the rows of {first:g} ... {last:g} s in common with" if last >= first else ""
+    common = len(np.intersect1d(mine, theirs, assume_unique=True))
+    least = min(len(mine), len(theirs))
+    if common >= SHARED_ROWS and common > SHARED_SHARE * least:
+        return f"has {common} of {least} distinct rows in common with"
+    return ""
+
+
+def _distinct_rows(recording: Recording) -> NDArray[np.uint64]:
+    """Hash every four rows as measured, without the time: two of them are never equal by chance."""
+    columns = [recording.inputs["speed"], recording.inputs["torque"]]
+    columns += [channel.values for channel in sorted(recording.channels, key=lambda channel: channel.name)]
+    row = np.zeros(len(columns[0]), dtype=np.uint64)
+    for column in columns:
+        row = row * MIX + hash_array(np.round(np.nan_to_num(column, nan=-1e9), 3) + 0.0)
+    four = ((row[:-3] * MIX + row[1:-2]) * MIX + row[2:-1]) * MIX + row[3:]
+    return np.unique(four[row[:-3] != row[3:]])

@@ -1,0 +1,314 @@
+"""Time column of a recording, and the names ``FILE+FILE@start..end`` of files and parts."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
+from math import floor
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from diagnosis.recordings.quantities import ISO, UNITS
+from models.base.errors import InputError, Problems
+from models.base.types import Array
+from models.files.table_file import KINDS, is_file
+
+RECORDING_KINDS = (*KINDS, ".mf4", ".mdf")
+STANDARD = "time_s"
+ISO_NAMES = ("time", "time_utc", "timestamp", "datetime")
+_DATE = r"\d{4}-\d{2}-\d{2}"
+_ISO = re.compile(
+    rf"{_DATE}(?:[T ]\d{{2}}:\d{{2}}(?::\d{{2}}(?:[.,]\d{{1,9}})?)?)?(?P<zone>Z|[+-]\d{{2}}(?::?\d{{2}})?)?"
+)
+SHORTEST_STEP = 1e-3  # s; no temperature is recorded faster, so smaller steps are another unit
+LONGEST_STEP = 1800.0  # s; a gearbox warms within an hour or two
+LONGEST_TIME = 1e11  # s since 1970 or since the start: 3000 years
+
+
+@dataclass(frozen=True, kw_only=True)
+class Part:
+    """A part of a file's time, from `start` up to but without `end`; None is the first or the last row.
+
+    Numbers are seconds: of a time column in seconds as it stands there, else since the first row. A date without a time
+    of day includes that day.
+
+    Examples
+    --------
+    >>> part_of("0..36000"), part_of("2017-09-01..").start
+    (Part(start=0.0, end=36000.0), datetime.datetime(2017, 9, 1, 0, 0, tzinfo=datetime.timezone.utc))
+    """
+
+    start: float | datetime | None
+    end: float | datetime | None
+
+
+def part_of(text: str) -> Part:
+    """Read ``start..end``.
+
+    Raises
+    ------
+    InputError
+        If it is written otherwise, mixes seconds and dates, or ends before it starts.
+    """
+    first, dots, last = text.partition("..")
+    if not dots or not (first.strip() or last.strip()):
+        raise InputError(f"{text!r} names no part; write start..end, e.g. 0..3600 (seconds) or 2017-09-01..2017-10-31")
+    start, end = _moment(first.strip(), end=False), _moment(last.strip(), end=True)
+    if start is not None and end is not None:
+        if isinstance(start, datetime) != isinstance(end, datetime):
+            raise InputError(f"{text!r} mixes seconds and dates; use one of them for both ends")
+        if not _seconds(start) < _seconds(end):
+            raise InputError(f"{text!r} ends before it starts")
+    return Part(start=start, end=end)
+
+
+def split_path(text: str | Path) -> tuple[tuple[Path, ...], tuple[Part, ...]]:
+    """Split ``FILE+FILE@start..end`` into its files and the part; a file whose own name has a + or @ stays as it is.
+
+    Raises
+    ------
+    InputError
+        If the text after the ``@`` is not a part.
+
+    Examples
+    --------
+    >>> [path.name for path in split_path("day_1.csv+day_2.csv@0..3600")[0]]
+    ['day_1.csv', 'day_2.csv']
+    """
+    if is_file(Path(text)):
+        return (Path(text),), ()
+    files, at, part = str(text).rpartition("@")
+    if not at or not files.lower().endswith(RECORDING_KINDS) or part.lower().endswith(RECORDING_KINDS):
+        return _split_files(str(text)), ()
+    try:
+        return _split_files(files), (part_of(part),)
+    except InputError as error:
+        raise InputError(f"{text}: {error}") from error
+
+
+def _split_files(text: str) -> tuple[Path, ...]:
+    files: list[str] = []
+    begun = ""
+    for piece in text.split("+"):
+        begun = f"{begun}+{piece}" if begun else piece
+        if begun.lower().endswith(RECORDING_KINDS):
+            files.append(begun)
+            begun = ""
+    return tuple(map(Path, [*files, begun] if begun or not files else files))
+
+
+def _moment(text: str, *, end: bool) -> float | datetime | None:
+    if not text:
+        return None
+    if _ISO.fullmatch(text):
+        try:
+            moment = datetime.fromisoformat(text)
+        except ValueError as error:
+            raise InputError(f"{text!r} is no date: {error}") from error
+        moment = moment.replace(tzinfo=UTC) if moment.tzinfo is None else moment
+        return moment + timedelta(days=1) if end and re.fullmatch(_DATE, text) else moment
+    try:
+        number = float(text)
+    except ValueError:
+        number = float("nan")
+    if not np.isfinite(number):
+        raise InputError(f"{text!r} is neither seconds nor a date as 2017-09-01T08:00:00Z")
+    return number
+
+
+def _seconds(moment: float | datetime) -> float:
+    return moment.timestamp() if isinstance(moment, datetime) else moment
+
+
+@dataclass(frozen=True, kw_only=True)
+class Clock:
+    """Time column of a file.
+
+    Attributes
+    ----------
+    column : str
+    unit : str
+        Of numbers; ``iso8601`` for texts and for the time stamps of a Parquet file
+    """
+
+    column: str
+    unit: str
+
+    @property
+    def is_date(self) -> bool:
+        """True for dates."""
+        return self.unit == ISO
+
+    def seconds(self, values: pd.Series) -> Array:
+        """Convert a time column, shape (rows,), to [s], dates since 1970; NaN for a cell that is no time."""
+        if not self.is_date:
+            return _numbers(values) * UNITS["time"][self.unit][0]
+        if pd.api.types.is_datetime64_any_dtype(values.dtype):
+            stamps = pd.to_datetime(values, utc=True)
+        else:
+            texts = values.astype(str).str.strip()
+            stamps = pd.to_datetime(
+                texts.where(texts.map(lambda text: bool(_ISO.fullmatch(text)))),
+                format="ISO8601",
+                utc=True,
+                errors="coerce",
+            )
+        seconds = (stamps - pd.Timestamp(0, tz="UTC")) / pd.Timedelta(seconds=1)
+        return np.asarray(seconds.to_numpy(dtype=np.float64, na_value=np.nan), dtype=np.float64)
+
+
+def _numbers(values: pd.Series) -> Array:
+    if not (pd.api.types.is_numeric_dtype(values.dtype) or pd.api.types.is_string_dtype(values.dtype)):
+        values = values.astype(str)
+    return np.asarray(pd.to_numeric(values, errors="coerce").to_numpy(dtype=np.float64, na_value=np.nan))
+
+
+def moment_text(seconds: float, clock: Clock | None) -> str:
+    """Format a time of a clock as a part names it, in whole seconds, rounded down.
+
+    Examples
+    --------
+    >>> moment_text(0.5, None), moment_text(1504224000.0, Clock(column="time", unit="iso8601"))
+    ('0', '2017-09-01T00:00:00Z')
+    """
+    whole = floor(seconds)
+    if clock is None or not clock.is_date:
+        return str(whole)
+    return datetime.fromtimestamp(whole, tz=UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
+
+
+def clock_of(table: pd.DataFrame) -> Clock:
+    """Find the time column without a mapping: ``time_s``, or ISO 8601 times under a usual name.
+
+    Raises
+    ------
+    InputError
+        If there is no such column, or the unit of its numbers is unknown.
+    """
+    columns = [str(column) for column in table.columns]
+    if STANDARD in columns:
+        return Clock(column=STANDARD, unit=ISO if _holds_dates(table[STANDARD]) else "s")
+    for name in ISO_NAMES:
+        if name in columns:
+            if _holds_dates(table[name]):
+                return Clock(column=name, unit=ISO)
+            raise InputError(
+                f"column {name} is no ISO 8601 time (as 2017-09-01T08:00:00Z), and the unit of its numbers is not "
+                "known; name it time_s if they are seconds, or give [time] column and unit in a mapping file"
+            )
+    shown = ", ".join(name[:40] for name in sorted(columns)[:20])
+    raise InputError(f"column {STANDARD} is missing; it has: {shown}")
+
+
+def _holds_dates(values: pd.Series) -> bool:
+    if pd.api.types.is_datetime64_any_dtype(values.dtype):
+        return True
+    if pd.api.types.is_numeric_dtype(values.dtype):
+        return False
+    first = values.dropna().astype(str).str.strip().head(20)
+    return bool(first.map(lambda text: bool(_ISO.fullmatch(text))).any())
+
+
+def inside(seconds: Array, parts: Sequence[Part], clock: Clock, first: float) -> NDArray[np.bool_]:
+    """Return True for rows in one of the parts, shape (rows,); `first` is the time of the first row of all, [s].
+
+    Raises
+    ------
+    InputError
+        If a part is named by date, but the file has seconds.
+    """
+    chosen = np.zeros(len(seconds), dtype=bool)
+    for part in parts:
+        within = np.ones(len(seconds), dtype=bool)
+        for moment, is_end in ((part.start, False), (part.end, True)):
+            if moment is None:
+                continue
+            if isinstance(moment, datetime) and not clock.is_date:
+                raise InputError(f"a part is named by date, but column {clock.column} holds seconds; name seconds")
+            at = _seconds(moment) + (first if clock.is_date and not isinstance(moment, datetime) else 0.0)
+            with np.errstate(invalid="ignore"):
+                within &= (seconds < at) if is_end else (seconds >= at)
+        chosen |= within
+    return chosen
+
+
+def check_time(values: pd.Series, seconds: Array, clock: Clock, problems: Problems) -> None:
+    """Report rows without time, mixed zones, time that does not increase, and steps that are another unit.
+
+    Parameters
+    ----------
+    values : Series
+        Cells of the time column; the index counts the rows of the file from 0
+    seconds : Array, shape (rows,)
+        The same in [s]
+    clock : Clock
+    problems : Problems
+    """
+    name, rows = clock.column, np.asarray(values.index) + 1
+    wrong = np.flatnonzero(~np.isfinite(seconds))
+    if len(wrong):
+        cell = values.iloc[int(wrong[0])]
+        shown = "empty" if pd.isna(cell) else repr(str(cell)[:40])
+        needed = "an ISO 8601 time as 2017-09-01T08:00:00Z" if clock.is_date else "a number"
+        problems.add(
+            f"{name} is {shown} at row {rows[wrong[0]]}; {len(wrong)} of {len(rows)} rows hold no time, each needs "
+            + needed
+        )
+        return
+    if clock.is_date:
+        _check_zones(values, name, rows, problems)
+    steps = np.diff(seconds)
+    back, same = np.flatnonzero(steps < 0.0), np.flatnonzero(steps == 0.0)
+    if len(back):
+        row = int(back[0])
+        hint = "; local time that is set back in autumn needs a zone, e.g. +02:00" if clock.is_date else ""
+        problems.add(
+            f"{name} goes back from {values.iloc[row]} to {values.iloc[row + 1]} at row {rows[row + 1]} "
+            f"({len(back)} times in all); it must increase from row to row: sort the rows, or split the file where a "
+            f"new run starts{hint}"
+        )
+    if len(same):
+        row = int(same[0])
+        problems.add(
+            f"{name} is {values.iloc[row]} at row {rows[row]} and again at row {rows[row + 1]} ({len(same)} times in "
+            "all); it must increase from row to row: remove the repeated rows"
+        )
+    if not len(back) and not len(same) and len(steps):
+        _check_time_unit(name, seconds, float(np.median(steps)), clock, problems)
+
+
+def _check_time_unit(name: str, seconds: Array, step: float, clock: Clock, problems: Problems) -> None:
+    latest = float(np.abs(seconds).max())
+    fix = "Give [time] unit in a mapping file"
+    if step > LONGEST_STEP:
+        hint = "" if clock.is_date else f"; were milliseconds meant? {fix}"
+        problems.add(
+            f"{name} advances by {step:.4g} s from row to row (median), at most {LONGEST_STEP:g} s is useful{hint}"
+        )
+    elif clock.is_date:
+        return
+    elif latest > LONGEST_TIME:
+        problems.add(f"{name} reaches {latest:.4g} s; were milliseconds meant? {fix}")
+    elif step < SHORTEST_STEP:
+        problems.add(
+            f"{name} advances by {step:.3g} s from row to row (median); were hours or days meant? {fix}, or average to "
+            "seconds"
+        )
+
+
+def _check_zones(values: pd.Series, name: str, rows: NDArray[np.int64], problems: Problems) -> None:
+    if pd.api.types.is_datetime64_any_dtype(values.dtype):
+        return
+    texts = values.astype(str).str.strip()
+    zoned = texts.str.contains(r"(?:Z|[+-]\d{2}(?::?\d{2})?)$", regex=True).to_numpy(dtype=bool)
+    zoned = zoned & ~texts.str.fullmatch(_DATE).to_numpy(dtype=bool)  # the day of a date looks like a zone
+    if not zoned.all() and zoned.any():
+        row = int(np.flatnonzero(zoned != zoned[0])[0])
+        problems.add(
+            f"{name} has times with and without a time zone (rows {rows[0]} and {rows[row]}); give all of them one"
+        )

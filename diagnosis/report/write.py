@@ -1,0 +1,94 @@
+"""The files of a diagnosis: report, numbers, correction, and one prediction per recording."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from diagnosis.recordings.quantities import LOSS
+from diagnosis.recordings.recording import Recording
+from diagnosis.results.result import Diagnosis
+from models.assembly.gearbox import Gearbox
+from models.correction.correction import Correction, Estimate, Finding, write_correction
+
+SHAPE = "shape_"
+REPORT, NUMBERS, CORRECTION = "report.html", "diagnosis.json", "correction.toml"
+
+
+def names_of_files(recordings: Sequence[Recording]) -> tuple[str, ...]:
+    """Names of the files of a diagnosis, the report first."""
+    return REPORT, NUMBERS, CORRECTION, *(f"{recording.name}.csv" for recording in recordings)
+
+
+def correction_of(diagnosis: Diagnosis, gearbox: Gearbox) -> Correction:
+    """What a diagnosis found as a correction of the definition: findings, calibrated parameters and formula shapes."""
+    nominal = {p.name: p for p in gearbox.network().parameters}
+    calibrated = {c.parameter: c for c in diagnosis.calibration}
+    findings = []
+    for found in diagnosis.findings:
+        if found.term is None:
+            continue
+        prefix = f"{found.term.label}_"
+        estimates = {
+            (p.name if p.name == found.term.label else prefix + p.name): (p.value, p.stderr) for p in found.parameters
+        }
+        findings.append(Finding.of(
+            found.term, estimates, mechanism=found.mechanism, family=found.family, place=found.place, says=found.says,
+            probability=found.probability,
+        ))  # fmt: skip
+    for term in diagnosis.shapes:
+        name = term.strength.name
+        if name in calibrated:
+            findings.append(Finding.of(
+                term, {name: (calibrated[name].value, calibrated[name].stderr)}, mechanism="shape",
+                family="calibration", place=name.removeprefix(SHAPE), says=term.strength.description,
+            ))  # fmt: skip
+    return Correction.of(
+        gearbox,
+        findings=findings,
+        calibration=(
+            Estimate(name=c.parameter, value=c.value, stderr=c.stderr, unit=nominal[c.parameter].unit, prior=c.prior)
+            for c in diagnosis.calibration
+            if c.parameter in nominal
+        ),
+        recordings=dict(diagnosis.inputs["recordings"]),
+        version=str(diagnosis.inputs["version"]),
+    )
+
+
+def prediction_table(diagnosis: Diagnosis, recording: Recording) -> pd.DataFrame:
+    """Free-running prediction at the rows of a recording: what each sensor would read, and every other node."""
+    courses = [c for c in diagnosis.courses if c.recording == recording.name]
+    columns = {"time_s": recording.time}
+    for name in courses[0].after if courses else ():
+        values = np.full(len(recording.time), np.nan)
+        for course in courses:
+            inside = (recording.time >= course.time[0]) & (recording.time <= course.time[-1] + 1e-6)
+            values[inside] = np.interp(recording.time[inside], course.time, course.after[name])
+        columns["P_loss_W" if name == LOSS else f"T_{name}_degC"] = values
+    return pd.DataFrame(columns)
+
+
+def write_files(
+    diagnosis: Diagnosis, gearbox: Gearbox, recordings: Sequence[Recording], folder: Path
+) -> tuple[Path, ...]:
+    """Write everything into an existing folder.
+
+    Returns
+    -------
+    tuple of Path
+        What was written, the report first
+    """
+    from diagnosis.report import write_report
+
+    report, numbers, correction, *predictions = (folder / name for name in names_of_files(recordings))
+    write_report(diagnosis, report)
+    numbers.write_text(json.dumps(diagnosis.to_dict(), indent=2, allow_nan=False) + "\n", encoding="utf-8")
+    write_correction(correction_of(diagnosis, gearbox), correction)
+    for recording, path in zip(recordings, predictions, strict=True):
+        prediction_table(diagnosis, recording).to_csv(path, index=False, float_format="%.3f", lineterminator="\n")
+    return report, numbers, correction, *predictions

@@ -1,0 +1,1 @@
+"""Preparation of a diagnosis: plausibility of the recordings, data and noise of the inference."""

@@ -1,0 +1,1 @@
+"""From a definition to a gearbox with its losses and thermal network."""

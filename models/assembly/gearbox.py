@@ -1,0 +1,375 @@
+"""Gearboxes by name or from a file: TOML in, one validated :class:`Gearbox` out.
+
+The keys of a file are the classes of :mod:`models.assembly.gearbox_definition`, without geometry those of
+:mod:`models.definition.parametric_sections`.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from models.assembly.gearbox_definition import Definition
+from models.assembly.gearbox_network import build_network
+from models.assembly.parametric import ParametricLosses, build_parametric_network
+from models.base.errors import InputError, did_you_mean
+from models.definition.definition_file import read_values, refuse
+from models.definition.messages import validated
+from models.definition.parametric_sections import KEY, ParametricDefinition
+from models.definition.sections import Ambient, Bearing, Housing, Node, Oil, Seal, Shaft, Stage, Training
+from models.definition.values_with_source import Annotations, join
+from models.files.toml_file import known_names, packaged, read_text
+from models.formulas.oil import Oil as Lubricant
+from models.losses.loss_model import LossModel
+from models.simulation.thermal_network import Losses, ThermalNetwork
+
+FOLDER = "gearboxes"
+DEFAULT_SOURCE = "default of schema 1"
+CHANGED_SOURCE = "changed after reading (with_values)"
+
+
+@dataclass(frozen=True, eq=False)
+class Gearbox:
+    """A validated gearbox definition; :func:`load_gearbox` makes one.
+
+    The tables of the file are attributes (``gearbox.stage[0].face_width_mm``), lists of tables are tuples. Two
+    gearboxes are the same when their ``hash`` is.
+
+    Attributes
+    ----------
+    definition : Definition or ParametricDefinition
+        All values, defaults included; the latter where the geometry is not known
+    notes : Annotations
+        Sources and standard deviations by dotted path
+    given : frozenset of str
+        Paths that the file (or its named oil) gives; the others are defaults
+    file : str
+        Name of the file, for messages
+    """
+
+    definition: Definition | ParametricDefinition
+    notes: Annotations
+    given: frozenset[str]
+    file: str
+
+    @property
+    def name(self) -> str:
+        """Name of the gearbox."""
+        return self.definition.name
+
+    @property
+    def is_parametric(self) -> bool:
+        """True if it has no geometry, and its losses are parametric laws."""
+        return isinstance(self.definition, ParametricDefinition)
+
+    @property
+    def geometry(self) -> Definition:
+        """The definition, if it has geometry.
+
+        Raises
+        ------
+        InputError
+            If it has none.
+        """
+        if isinstance(self.definition, ParametricDefinition):
+            raise InputError(
+                f"{self.file}: defines a gearbox without geometry ([[part]]); this needs teeth, shafts, "
+                "bearings and a housing ([[stage]], [[shaft]], [[bearing]], [housing])"
+            )
+        return self.definition
+
+    @property
+    def ambient(self) -> Ambient:
+        """``[ambient]``."""
+        return self.geometry.ambient
+
+    @property
+    def ambient_degC(self) -> float:
+        """Temperature of the surroundings where a cycle or a recording names none."""
+        return self.definition.ambient.temperature_degC
+
+    @property
+    def oil(self) -> Oil:
+        """``[oil]``, with the values of the named oil."""
+        return self.geometry.oil
+
+    @property
+    def shaft(self) -> tuple[Shaft, ...]:
+        """``[[shaft]]``."""
+        return self.geometry.shaft
+
+    @property
+    def stage(self) -> tuple[Stage, ...]:
+        """``[[stage]]``; exactly one for now."""
+        return self.geometry.stage
+
+    @property
+    def bearing(self) -> tuple[Bearing, ...]:
+        """``[[bearing]]``."""
+        return self.geometry.bearing
+
+    @property
+    def seal(self) -> tuple[Seal, ...]:
+        """``[[seal]]``."""
+        return self.geometry.seal
+
+    @property
+    def housing(self) -> Housing:
+        """``[housing]``."""
+        return self.geometry.housing
+
+    @property
+    def node(self) -> tuple[Node, ...]:
+        """``[[node]]``: overridden heat capacities."""
+        return self.geometry.node
+
+    @property
+    def training(self) -> Training:
+        """``[training]``."""
+        return self.geometry.training
+
+    @property
+    def factors(self) -> Mapping[str, float]:
+        """Every tunable factor of the thermal network by name; 1 if the file does not name it."""
+        return self.geometry.all_factors
+
+    @property
+    def sources(self) -> Mapping[str, str]:
+        """Sources by dotted path, as written; :meth:`source_of` answers for every value."""
+        return self.notes.sources
+
+    @property
+    def priors(self) -> Mapping[str, float]:
+        """Standard deviation of every single uncertain number by dotted path, in the unit of the key."""
+        return self.notes.priors
+
+    @cached_property
+    def values(self) -> Mapping[str, Any]:
+        """All values as plain tables, defaults included, absent ones left out."""
+        return self.definition.model_dump(by_alias=True, exclude_none=True)
+
+    @cached_property
+    def leaves(self) -> Mapping[str, Any]:
+        """Every single value by dotted path.
+
+        Examples
+        --------
+        >>> load_gearbox("fzg").leaves["stage.0.z.1"]
+        24
+        """
+        return dict(_leaves(self.values))
+
+    @cached_property
+    def hash(self) -> str:
+        """SHA-256 of the values as canonical JSON; comments, sources, priors and key order do not change it."""
+        text = json.dumps(self.values, sort_keys=True, separators=(",", ":"), allow_nan=False)
+        return hashlib.sha256(text.encode()).hexdigest()
+
+    @property
+    def speed_ratio(self) -> Mapping[str, float]:
+        """Speed of every shaft over the speed of the input shaft, by shaft name, [-]."""
+        return self.geometry.speed_ratio
+
+    def source_of(self, path: str) -> str:
+        """Return where a value comes from.
+
+        Raises
+        ------
+        InputError
+            If the gearbox has no value of that path.
+
+        Examples
+        --------
+        >>> load_gearbox("fzg").source_of("stage.0.center_distance_mm")
+        'Table 1 of the paper'
+        """
+        if path in self.given:
+            return self.notes.source_of(path)
+        if path in self.leaves:
+            return DEFAULT_SOURCE
+        raise InputError(f"{self.file}: {path} is not a value of this gearbox{did_you_mean(path, self.leaves)}")
+
+    def with_values(self, changes: Mapping[str, Any]) -> Gearbox:
+        """Return a new, validated gearbox with some values changed; sources and priors stay.
+
+        Parameters
+        ----------
+        changes : Mapping of str to value
+            New values by dotted path, in the unit of the key
+
+        Raises
+        ------
+        InputError
+            If a path does not exist or the changed gearbox is not valid.
+
+        Examples
+        --------
+        >>> gearbox = load_gearbox("fzg").with_values({"stage.0.friction.mu_solid": 0.07, "factors.h_air": 1.1})
+        >>> gearbox.stage[0].friction.mu_solid, gearbox.factors["h_air"]
+        (0.07, 1.1)
+        """
+        values: Any = self.values
+        for path, value in changes.items():
+            try:
+                values = _replaced(values, path.split("."), _plain(value))
+            except LookupError:
+                hint = did_you_mean(path, self.leaves)
+                raise InputError(f"{self.file}: {path} is not a value of this gearbox{hint}") from None
+        definition = _validated(values, file=self.file)
+        changed = dict.fromkeys(changes, CHANGED_SOURCE)
+        notes = Annotations(sources={**self.sources, **changed}, priors=dict(self.priors))
+        given = {leaf for leaf, _ in _leaves(values) if any(f"{leaf}.".startswith(f"{path}.") for path in changes)}
+        return Gearbox(definition, notes, self.given | given, self.file)
+
+    @property
+    def typical_operation(self) -> tuple[float, float]:
+        """Speed [1/min] and torque [N m]: half of what surrogates are trained to, without geometry the reference."""
+        if isinstance(self.definition, ParametricDefinition):
+            return self.definition.reference.speed_rpm, self.definition.reference.torque_Nm
+        return 0.5 * max(self.training.speed_rpm), 0.5 * max(self.training.torque_Nm)
+
+    @property
+    def viscosity_constants(self) -> tuple[float, float]:
+        """Constants m and n of the oil's viscosity, see :func:`models.formulas.oil.kinematic_viscosity_d341`."""
+        if isinstance(self.definition, ParametricDefinition):
+            return self.definition.viscosity_constants
+        oil = self.lubricant()
+        return oil.m, oil.n
+
+    def lubricant(self) -> Lubricant:
+        """Return the oil as the loss formulas use it."""
+        return self.geometry.lubricant()
+
+    def losses(self) -> LossModel:
+        """Return the full power-loss model of this gearbox; :meth:`loss_laws` also works without geometry."""
+        return LossModel.from_definition(self.geometry)
+
+    def loss_laws(self) -> Losses:
+        """Return the losses of its network: the full model, or without geometry the parametric laws."""
+        return ParametricLosses(self.definition) if isinstance(self.definition, ParametricDefinition) else self.losses()
+
+    def network(self) -> ThermalNetwork:
+        """Return the thermal network of this gearbox."""
+        if isinstance(self.definition, ParametricDefinition):
+            return build_parametric_network(self.definition, self.priors)
+        return build_network(self.definition, self.priors)
+
+
+def known_gearboxes() -> tuple[str, ...]:
+    """Return the names of the gearboxes that come with the package.
+
+    Examples
+    --------
+    >>> "fzg" in known_gearboxes()
+    True
+    """
+    return known_names(FOLDER)
+
+
+def names_a_file(name_or_path: str | Path) -> bool:
+    """Return True if a definition file is named (by its ending or a folder), False for a gearbox of the package.
+
+    Examples
+    --------
+    >>> names_a_file("fzg"), names_a_file("fzg.toml"), names_a_file("mine/fzg")
+    (False, True, True)
+    """
+    path = Path(name_or_path)
+    return not isinstance(name_or_path, str) or path.name != name_or_path or bool(path.suffix)
+
+
+def load_gearbox(name_or_path: str | Path) -> Gearbox:
+    """Read a gearbox definition.
+
+    Parameters
+    ----------
+    name_or_path : str or Path
+        Name of a gearbox that comes with the package (``"fzg"``), or a TOML file
+
+    Raises
+    ------
+    InputError
+        With the faults of the file, one per line.
+
+    Examples
+    --------
+    >>> gearbox = load_gearbox("fzg")
+    >>> gearbox.stage[0].face_width_mm, gearbox.stage[0].face_width
+    (14.0, 0.014)
+    """
+    path = Path(name_or_path)
+    if names_a_file(name_or_path):
+        return read_gearbox(read_text(path), file=path.name)
+    name = str(name_or_path)
+    if name not in known_gearboxes():
+        hint = did_you_mean(name, known_gearboxes())
+        raise InputError(f"there is no gearbox named '{name}'{hint} (a file is named with its ending, .toml)")
+    source = packaged(FOLDER, name)
+    return read_gearbox(read_text(source), file=source.name)
+
+
+def read_gearbox(text: str, *, file: str) -> Gearbox:
+    """Read a gearbox definition from its text; `file` is the name that messages show.
+
+    Raises
+    ------
+    InputError
+        With the faults of the text, one per line.
+    """
+    values, notes = read_values(text, file=file)
+    definition = _validated(values, file=file)
+    gearbox = Gearbox(definition, notes, frozenset(path for path, _ in _leaves(values)), file)
+    whole = [path for path in notes.priors if isinstance(gearbox.leaves[path], int)]
+    refuse(((path, "is a whole number and cannot have an sd") for path in whole), values, file=file)
+    return gearbox
+
+
+def _validated(values: Mapping[str, Any], *, file: str) -> Definition | ParametricDefinition:
+    if KEY in values:
+        return validated(ParametricDefinition, values, file=file)
+    return validated(Definition, values, file=file)
+
+
+def _leaves(values: Any, path: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield every single value of nested tables and lists with its dotted path."""
+    if isinstance(values, Mapping):
+        for key, item in values.items():
+            yield from _leaves(item, join(path, key))
+    elif isinstance(values, tuple):
+        for index, item in enumerate(values):
+            yield from _leaves(item, join(path, index))
+    else:
+        yield path, values
+
+
+def _replaced(values: Any, keys: Sequence[str], new: Any) -> Any:
+    """Return nested tables and lists with one value exchanged, or with one more key in an existing table.
+
+    Raises
+    ------
+    LookupError
+        If there is no such place.
+    """
+    if not keys:
+        return new
+    key, *below = keys
+    if isinstance(values, Mapping) and (key in values or not below):
+        return {**values, key: _replaced(values.get(key), below, new)}
+    if isinstance(values, tuple) and key.isdecimal() and int(key) < len(values):
+        index = int(key)
+        return (*values[:index], _replaced(values[index], below, new), *values[index + 1 :])
+    raise LookupError(key)
+
+
+def _plain(value: Any) -> Any:
+    """Return a value as a TOML reader gives it: numpy scalars as numbers, arrays and lists as tuples."""
+    if isinstance(value, np.generic | np.ndarray):
+        value = value.tolist()
+    return tuple(_plain(item) for item in value) if isinstance(value, list | tuple) else value

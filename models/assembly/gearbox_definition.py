@@ -1,0 +1,181 @@
+"""The whole definition of a gearbox with geometry: its tables, and what must agree between them."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from models.base.errors import did_you_mean
+from models.definition.named_oils import lubricant
+from models.definition.sections import (
+    Ambient,
+    Bearing,
+    Housing,
+    Node,
+    Oil,
+    OneOrMore,
+    Seal,
+    Section,
+    Shaft,
+    Stage,
+    Text,
+    Training,
+)
+from models.formulas.oil import Oil as Lubricant
+from models.losses.loss_model import loss_components, loss_factors
+from models.quantities.definition_units import between
+
+BOUNDARY_NODES = ("air", "frame")
+FACTORS = (
+    *loss_factors(), "h_air", "radiation", "h_oil_housing", "h_oil_gear", "gear_shaft",
+    "shaft_bearing", "bearing_housing", "bearing_oil", "housing_joint", "striction", "C_oil", "C_bearings", "C_shafts",
+    "C_gears",
+)  # fmt: skip
+# The model's own names next to nodes and losses: the sum of losses, FMU parameters (initial.T), an input (T_ambient),
+# factors on heat capacities of groups (C_bearings).
+RESERVED = (
+    *BOUNDARY_NODES,
+    "oil",
+    "mesh",
+    *loss_components(),
+    "total",
+    "initial",
+    "ambient",
+    "bearings",
+    "shafts",
+    "gears",
+)
+SHARE_TOLERANCE = 1e-6
+
+
+class Definition(Section):
+    """The whole file."""
+
+    schema_number: Literal[1] = Field(alias="schema")
+    name: Text
+    ambient: Ambient
+    oil: Oil
+    shaft: OneOrMore[Shaft]
+    stage: OneOrMore[Stage]
+    bearing: OneOrMore[Bearing]
+    seal: tuple[Seal, ...] = ()
+    housing: Housing
+    node: tuple[Node, ...] = ()
+    factors: dict[str, Annotated[float, between(1e-3, 1e3)]] = Field(default_factory=dict)
+    training: Training
+
+    @property
+    def all_factors(self) -> Mapping[str, float]:
+        """Every tunable factor of the thermal network by name; 1 if the file does not name it."""
+        return {name: self.factors.get(name, 1.0) for name in self.factor_names}
+
+    @property
+    def factor_names(self) -> tuple[str, ...]:
+        """Names that ``[factors]`` may hold; every part of the housing has its heat capacity's."""
+        return (*FACTORS, *(f"C_{part.name}" for part in self.housing.part))
+
+    @property
+    def speed_ratio(self) -> Mapping[str, float]:
+        """Speed of every shaft over the speed of the input shaft, by shaft name, [-]."""
+        stage = self.stage[0]
+        return {stage.driver: 1.0, stage.driven: stage.z[0] / stage.z[1]}
+
+    def lubricant(self) -> Lubricant:
+        """Return the oil as the loss formulas use it."""
+        return lubricant(self.oil)
+
+    @model_validator(mode="after")
+    def _tables_agree(self) -> Self:
+        faults = [
+            *_unsupported(self),
+            *_duplicate_names(self),
+            *_unknown_names(self),
+        ]
+        # What follows reads the tables by their names.
+        faults = faults or [*_load_shares(self), *_shafts_in_gears(self), *_oil_level(self)]
+        if faults:
+            raise ValueError("\n".join(faults))
+        return self
+
+
+def _unsupported(definition: Definition) -> Iterator[str]:
+    for key, entries, most in (("stage", definition.stage, 1), ("shaft", definition.shaft, 2)):
+        if len(entries) > most:
+            yield f"{key}: has {len(entries)} entries; more than {most} is not supported yet"
+
+
+def _part_names(definition: Definition) -> list[str]:
+    """Return the names of all parts that have a temperature, but oil and mesh."""
+    return [
+        *(part.name for part in definition.housing.part),
+        *(bearing.name for bearing in definition.bearing),
+        *(shaft.name for shaft in definition.shaft),
+        *(name for stage in definition.stage for name in stage.names),
+    ]
+
+
+def _duplicate_names(definition: Definition) -> Iterator[str]:
+    names = [*_part_names(definition), *(seal.name for seal in definition.seal)]
+    for name, count in Counter(names).items():
+        if count > 1:
+            yield f"name '{name}' is given {count} times; every part and component needs its own"
+        if name in RESERVED:
+            yield f"name '{name}' is taken by the model itself; choose another"
+    for name, count in Counter(node.name for node in definition.node).items():
+        if count > 1:
+            yield f"node: '{name}' is overridden {count} times"
+
+
+def _unknown_names(definition: Definition) -> Iterator[str]:
+    shafts = [shaft.name for shaft in definition.shaft]
+    references = [("stage.driver", stage.driver) for stage in definition.stage]
+    references += [("stage.driven", stage.driven) for stage in definition.stage]
+    references += [(f"bearing '{bearing.name}'.shaft", bearing.shaft) for bearing in definition.bearing]
+    references += [(f"seal '{seal.name}'.shaft", seal.shaft) for seal in definition.seal]
+    for place, name in references:
+        if name not in shafts:
+            yield f"{place}: there is no shaft '{name}'{did_you_mean(name, shafts)}"
+    nodes = [*_part_names(definition), "oil", "mesh"]
+    for node in definition.node:
+        if node.name in BOUNDARY_NODES:
+            yield f"node '{node.name}': is a boundary, and has no heat capacity"
+        elif node.name not in nodes:
+            yield f"node '{node.name}': there is no node '{node.name}'{did_you_mean(node.name, nodes)}"
+    for name in definition.factors:
+        if name not in definition.factor_names:
+            yield f"factors: '{name}' is not a known factor{did_you_mean(name, definition.factor_names)}"
+
+
+def _load_shares(definition: Definition) -> Iterator[str]:
+    """Refuse bearings that carry more or less than the mesh force of their shaft."""
+    for shaft in definition.shaft:
+        shares = [bearing.load_share for bearing in definition.bearing if bearing.shaft == shaft.name]
+        if not shares:
+            yield f"bearing: none is on the shaft '{shaft.name}'"
+        elif abs(sum(shares) - 1.0) > SHARE_TOLERANCE:
+            yield f"bearing: load_share of the bearings on '{shaft.name}' sum to {sum(shares):g}, not to 1"
+
+
+def _shafts_in_gears(definition: Definition) -> Iterator[str]:
+    """Refuse shafts that are thicker than the gears on them."""
+    diameters = {shaft.name: shaft.diameter_mm for shaft in definition.shaft}
+    for stage in definition.stage:
+        for shaft, gear, r_f in zip((stage.driver, stage.driven), stage.names, stage.pair().r_f, strict=True):
+            if diameters[shaft] >= 2e3 * r_f:
+                yield (
+                    f"shaft '{shaft}'.diameter_mm: {diameters[shaft]:g} mm is not below the root diameter "
+                    f"{2e3 * r_f:.4g} mm of the gear '{gear}' on it"
+                )
+
+
+def _oil_level(definition: Definition) -> Iterator[str]:
+    """Refuse an oil level outside the housing."""
+    level, height = definition.oil.level_below_axis_mm, 1e3 * definition.housing.height_m
+    if abs(level) > height:
+        yield (
+            f"oil.level_below_axis_mm: {level:g} mm is outside the housing, whose height_m is {1e-3 * height:g}; "
+            f"{-height:g} to {height:g} mm is possible (positive below the axis)"
+        )

@@ -1,0 +1,179 @@
+"""Losses and thermal network of a gearbox without geometry: parametric laws, and as many parts as are known."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import sympy as sp
+from numpy.typing import ArrayLike
+
+from models.base.types import Array
+from models.definition.parametric_sections import Loss, ParametricDefinition, Path
+from models.formulas.oil import T_HIGHEST, T_LOWEST, kinematic_viscosity_d341
+from models.network.laws import Parameter, symbol
+from models.simulation.thermal_network import Link, Node, Source, ThermalNetwork
+
+GROUPS = ("housing", "bearings", "returns")
+RUN_POWER = 8  # sharpness of the step of a conductance from standstill to running, over speed
+RATIOS = (0.02, 50.0)  # of speed, torque or viscosity, beyond which an exponent's deviation has no further effect
+FARTHEST = 1000.0  # limits of a factor; its prior keeps it much nearer to 1
+
+
+@dataclass(frozen=True)
+class ParametricLosses:
+    r"""Losses of which only the form is known.
+
+    .. math::
+
+        P = P_0 \left(\frac{n}{n_r}\right)^a \left(\frac{\nu}{\nu_r}\right)^b
+            + P_1 \frac{n}{n_r} \left(\frac{M}{M_r}\right)^c
+
+    with the viscosity at the temperature of the part that the loss warms.
+
+    References
+    ----------
+    ISO/TR 14179-1 and -2: load-independent (churning, seals, no-load bearing friction: exponents of speed from 1 to 3,
+    of viscosity from 0 to 0.6) and load-dependent losses (mesh and bearings: proportional to power at constant
+    friction).
+    """
+
+    definition: ParametricDefinition
+
+    @property
+    def components(self) -> tuple[str, ...]:
+        """Two per loss: ``<name>_no_load`` and ``<name>_load``."""
+        return tuple(f"{loss.name}_{kind}" for loss in self.definition.loss for kind in ("no_load", "load"))
+
+    @property
+    def temperature_nodes(self) -> tuple[str, ...]:
+        """Parts that losses warm."""
+        return tuple(dict.fromkeys(loss.part for loss in self.definition.loss))
+
+    @property
+    def reads(self) -> tuple[frozenset[str], ...]:
+        """Nodes that each component reads: the part that it warms."""
+        return tuple(frozenset({loss.part}) for loss in self.definition.loss for _ in ("no_load", "load"))
+
+    def power(self, speed: ArrayLike, torque: ArrayLike, temperatures: ArrayLike) -> Array:
+        """Losses [W], shape (..., components), at speed [1/min], torque [N m] and temperatures [degC]."""
+        reference, nodes = self.definition.reference, self.temperature_nodes
+        T = np.asarray(temperatures, dtype=float)
+        n = np.abs(np.asarray(speed, dtype=float)) / reference.speed_rpm
+        m = np.abs(np.asarray(torque, dtype=float)) / reference.torque_Nm
+        constants = self.definition.viscosity_constants
+        nu_ref = kinematic_viscosity_d341(reference.temperature_degC, *constants)
+        found = []
+        for loss in self.definition.loss:
+            T_here = np.clip(T[..., nodes.index(loss.part)], T_LOWEST, T_HIGHEST)
+            nu = kinematic_viscosity_d341(T_here, *constants) / nu_ref
+            # At standstill nothing is lost, whatever the exponent.
+            turning = n > 0.0
+            no_load = loss.no_load_W * n**loss.speed_exponent * nu**loss.viscosity_exponent
+            found += [np.where(turning, no_load, 0.0), loss.load_W * n * m**loss.torque_exponent + 0.0 * T_here]
+        return np.stack(np.broadcast_arrays(*found), axis=-1)
+
+    def domain_distance(self, speed: ArrayLike, torque: ArrayLike, temperatures: ArrayLike) -> Array:
+        """Zero everywhere, shape (...): the laws hold as well, or as badly, at any operating point."""
+        T = np.asarray(temperatures, dtype=float)[..., 0]
+        return np.zeros(np.broadcast_shapes(np.shape(speed), np.shape(torque), T.shape))
+
+
+def build_parametric_network(definition: ParametricDefinition, priors: Mapping[str, float]) -> ThermalNetwork:
+    """Return the network that the tables of a definition without geometry describe.
+
+    Every value with a standard deviation becomes a factor on it: ``C_<part>``, ``G_<part>_<part>``,
+    ``standstill_<part>_<part>``, ``<loss>_no_load``, ``<loss>_load``; exponents become deviations from the assumed
+    ones: ``<loss>_speed_exponent`` etc.
+
+    Parameters
+    ----------
+    definition : ParametricDefinition
+    priors : mapping of str to float
+        Standard deviations by dotted path
+    """
+    return _Builder(definition, priors).network()
+
+
+class _Builder:
+    """Assembles the network of one definition."""
+
+    def __init__(self, definition: ParametricDefinition, priors: Mapping[str, float]) -> None:
+        self.definition, self.priors = definition, priors
+        self.parameters: list[Parameter] = []
+        self.n = sp.Abs(symbol("speed")) / definition.reference.speed_rpm
+        self.m = sp.Abs(symbol("torque")) / definition.reference.torque_Nm
+
+    def network(self) -> ThermalNetwork:
+        definition = self.definition
+        boundaries = [Node(name=b.name, temperature=symbol(b.input)) for b in definition.boundary]
+        parts = [
+            Node(name=part.name, capacity=part.heat_capacity_J_K * self._factor(
+                f"C_{part.name}", f"part.{index}.heat_capacity_J_K", part.heat_capacity_J_K,
+                f"factor on the heat capacity of {part.name}"))
+            for index, part in enumerate(definition.part)
+        ]  # fmt: skip
+        links = [self._link(index, path) for index, path in enumerate(definition.link)]
+        sources = [source for index, loss in enumerate(definition.loss) for source in self._sources(index, loss)]
+        return ThermalNetwork(
+            nodes=(*boundaries, *parts),
+            links=tuple(links),
+            sources=tuple(sources),
+            parameters=tuple(self.parameters),
+            components=ParametricLosses(definition).components,
+            inputs={b.input: b.temperature_degC for b in definition.boundary},
+            groups={g: names for g in GROUPS if (names := tuple(p.name for p in definition.part if p.group == g))},
+            recording=definition.recording,
+        )
+
+    def _link(self, index: int, path: Path) -> Link:
+        a, b = path.between
+        name = f"{a}_{b}"
+        G = path.conductance_W_K * self._factor(
+            f"G_{name}", f"link.{index}.conductance_W_K", path.conductance_W_K, f"factor on the conductance {a} - {b}"
+        )
+        if path.standstill_share < 1.0:
+            share = path.standstill_share * self._factor(
+                f"standstill_{name}", f"link.{index}.standstill_share", path.standstill_share,
+                f"factor on the share of the conductance {a} - {b} at standstill", highest=1.0 / path.standstill_share,
+            )  # fmt: skip
+            speed = sp.Abs(symbol("speed")) / self.definition.reference.running_rpm
+            running = speed**RUN_POWER / (1 + speed**RUN_POWER)
+            G = G * (share + (1 - share) * running)
+        return Link(name=f"{a}-{b}", nodes=(a, b), conductance=sp.sympify(G))
+
+    def _sources(self, index: int, loss: Loss) -> Iterator[Source]:
+        path = f"loss.{index}"
+        constants = self.definition.viscosity_constants
+        T = sp.Min(sp.Max(symbol(f"T_{loss.part}"), T_LOWEST), T_HIGHEST)
+        nu_ref = kinematic_viscosity_d341(self.definition.reference.temperature_degC, *constants)
+        nu = kinematic_viscosity_d341(T, *constants, xp=sp) / nu_ref
+        no_load = self._factor(f"{loss.name}_no_load", f"{path}.no_load_W", loss.no_load_W, f"no-load loss {loss.name}")
+        no_load *= self._tilt(f"{loss.name}_speed_exponent", f"{path}.speed_exponent", self.n)
+        no_load *= self._tilt(f"{loss.name}_viscosity_exponent", f"{path}.viscosity_exponent", nu)
+        load = self._factor(f"{loss.name}_load", f"{path}.load_W", loss.load_W, f"load-dependent loss {loss.name}")
+        load *= self._tilt(f"{loss.name}_torque_exponent", f"{path}.torque_exponent", self.m)
+        for kind, law in (("no_load", no_load), ("load", load)):
+            name = f"{loss.name}_{kind}"
+            # The loss as assumed, times what a recording made of it; its name is the parameter's, so apart from it.
+            yield Source(name=name, node=loss.part, heat=symbol(f"P_{name}") * law, is_loss=True)
+
+    def _factor(self, name: str, path: str, value: float, description: str, *, highest: float = FARTHEST) -> sp.Expr:
+        sd = self.priors.get(path, 0.0)
+        if sd <= 0.0 or value == 0.0:
+            return sp.Integer(1)
+        self.parameters.append(Parameter(
+            name=name, start=1.0, lower=1.0 / FARTHEST, upper=highest, sd=sd / abs(value), description=description,
+        ))  # fmt: skip
+        return symbol(name)
+
+    def _tilt(self, name: str, path: str, ratio: sp.Expr) -> sp.Expr:
+        """``ratio ** deviation`` of an uncertain exponent."""
+        sd = self.priors.get(path, 0.0)
+        if sd <= 0.0:
+            return sp.Integer(1)
+        self.parameters.append(Parameter(
+            name=name, start=0.0, lower=-2.0, upper=2.0, sd=sd, log=False, description="deviation from what is assumed",
+        ))  # fmt: skip
+        return sp.Min(sp.Max(ratio, RATIOS[0]), RATIOS[1]) ** symbol(name)

@@ -1,0 +1,1 @@
+"""Foundations of all layers: errors, types, root finding, parallel runs, atomic files, the version."""

@@ -1,0 +1,127 @@
+"""Independent pieces of work: in processes of this machine, or on a Dask cluster. Nothing else knows joblib or Dask."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+from importlib import import_module
+from typing import Any, TypeVar
+
+from joblib import Parallel, cpu_count, delayed, parallel_config
+from threadpoolctl import threadpool_limits
+
+from models.base.errors import InputError
+
+CONNECT_S = 10.0  # that a scheduler may need to answer
+R = TypeVar("R")
+
+
+def run_parallel(
+    function: Callable[..., R], items: Iterable[Sequence[Any]], *, jobs: int | None = 1, dask: str | None = None,
+    batches: int | None = None,
+) -> list[R]:  # fmt: skip
+    """Results of ``function(*item)`` for every item, in order.
+
+    Parameters
+    ----------
+    function : callable
+        Can be pickled. It runs with one BLAS thread per process, so that the numbers do not depend on `jobs`
+    items : iterable of sequences
+        Arguments of one call each
+    jobs : int or None
+        Processes on this machine, None for one per core. With one, or with a single item, everything runs in this
+        process
+    dask : str, optional
+        Address of a Dask scheduler (``"tcp://host:8786"``) that does the work instead
+    batches : int, optional
+        Number of batches that the items are sent in; objects that calls of a batch have in common are sent once. By
+        default every item is sent alone, which suits few large ones of unequal size
+
+    Raises
+    ------
+    InputError
+        If Dask is not installed or the scheduler does not answer.
+
+    Examples
+    --------
+    >>> run_parallel(pow, [(2, 3), (3, 2)])
+    [8, 9]
+    """
+    items = list(items)
+    jobs = _processes(jobs)
+    if dask is None and (jobs < 2 or len(items) < 2):
+        return [_call(function, item) for item in items]
+    size = -(-len(items) // batches) if batches and items else 1
+    calls = (delayed(_call)(function, item) for item in items)
+    with _backend(dask), warnings.catch_warnings():
+        # joblib replaces a worker whose memory has grown between two calls; no result is lost.
+        warnings.filterwarnings("ignore", "A worker stopped while some jobs were given to the executor")
+        return list(_pool(jobs, dask, batch_size=size, pre_dispatch=2 * jobs * size)(calls))
+
+
+def iterate_parallel(
+    function: Callable[..., R], items: Iterable[Sequence[Any]], *, jobs: int | None = 1, dask: str | None = None
+) -> Iterator[R]:
+    """Results of ``function(*item)`` in the order in which they are completed; items are taken as they are needed.
+
+    Parameters, errors as those of :func:`run_parallel`.
+
+    Examples
+    --------
+    >>> sorted(iterate_parallel(pow, [(2, 3), (3, 2)]))
+    [8, 9]
+    """
+    with _backend(dask):
+        pool = _pool(_processes(jobs), dask, batch_size=1, return_as="generator_unordered")
+        yield from pool(delayed(_call)(function, item) for item in items)
+
+
+@contextmanager
+def starting_processes(jobs: int, module: str) -> Iterator[None]:
+    """Start the processes of :func:`run_parallel` and import `module` in them while the block runs."""
+    begun = (
+        Parallel(n_jobs=jobs, return_as="generator")(delayed(_load)(module) for _ in range(jobs)) if jobs > 1 else ()
+    )
+    try:
+        yield
+    finally:
+        for _ in begun:
+            pass
+
+
+def _processes(jobs: int | None) -> int:
+    return int(cpu_count()) if jobs is None else jobs
+
+
+def _call(function: Callable[..., R], item: Sequence[Any]) -> R:
+    with threadpool_limits(1):
+        return function(*item)
+
+
+def _load(module: str) -> None:
+    import_module(module)
+
+
+def _pool(jobs: int, dask: str | None, **settings: Any) -> Parallel:
+    return Parallel(n_jobs=jobs if dask is None else None, **settings)
+
+
+def _backend(dask: str | None) -> AbstractContextManager[None]:
+    return nullcontext() if dask is None else _dask_cluster(dask)
+
+
+@contextmanager
+def _dask_cluster(address: str) -> Iterator[None]:
+    try:
+        from distributed import Client
+    except ImportError as error:
+        raise InputError("a dask address is given but dask is not installed; install the extra 'dask'") from error
+    try:
+        client = Client(address, timeout=CONNECT_S)
+    except (OSError, ValueError) as error:  # a TimeoutError is an OSError
+        raise InputError(
+            f"no dask scheduler answers at {address} ({error}); is it running, is the port open?"
+        ) from error
+    with client, parallel_config(backend="dask", client=client):
+        yield

@@ -1,0 +1,1 @@
+"""Corrections that a diagnosis makes to a gearbox, and their files."""

@@ -1,0 +1,344 @@
+"""A correction: what a diagnosis found, as a small file that people review and every command takes.
+
+A corrected model is the same definition plus this file. Laws are in it as full expressions, so that the file means the
+same when the catalogue changes.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+import tomli_w
+from pydantic import Field, StringConstraints, model_validator
+
+from models.assembly.gearbox import Gearbox
+from models.base.atomic_write import atomic_file
+from models.base.errors import InputError, did_you_mean
+from models.definition.messages import validated
+from models.definition.sections import Name, OneOrMore, Section, Text
+from models.files.toml_file import parse_schema_1, read_text
+from models.network.laws import Parameter
+from models.simulation.thermal_network import ExtraState, ThermalNetwork
+from models.terms.expressions import Law
+from models.terms.law_file import LawParameter, LawState, LawTable
+from models.terms.term import FACTORS, Term
+
+HEADER = "# Found by a diagnosis: the same gearbox definition plus this file is the corrected model.\n"
+BOUND_TOLERANCE = 1e-9  # a fit that ends at a bound may exceed it by rounding
+Sha256 = Annotated[str, StringConstraints(pattern=r"^[0-9a-f]{64}$")]
+NotNegative = Annotated[float, Field(ge=0.0)]
+
+
+class Identity(Section):
+    """``[gearbox]``, ``[[recording]]``: a name and the hash of the content."""
+
+    name: Text
+    sha256: Sha256
+
+
+class Estimate(Section):
+    """``[[calibrated]]``: a parameter of the network with its estimate; `prior` is the value as delivered."""
+
+    name: Name
+    value: float
+    stderr: NotNegative
+    unit: Text = "1"
+    prior: float | None = None
+
+
+class FoundParameter(LawParameter):
+    """``[[finding.parameter]]``: an estimated number in a law."""
+
+    value: float
+    stderr: NotNegative
+    lower: float
+    upper: float
+
+    @model_validator(mode="after")
+    def _value_within_limits(self) -> Self:
+        if not self.lower <= self.value <= self.upper:
+            raise ValueError(f"value = {self.value:g} is outside the limits {self.lower:g} to {self.upper:g}")
+        return self
+
+
+class Finding(LawTable):
+    """``[[finding]]``: physics that was left out, or a fault of an instrument.
+
+    `mechanism`, `family`, `place` and `says` are for people, see :class:`models.mechanisms.Mechanism`; the other keys
+    are those of :class:`models.terms.term.Term`.
+    """
+
+    mechanism: Text
+    family: str = ""
+    place: str = ""
+    says: str = ""
+    probability: Annotated[float, Field(ge=0.0, le=1.0)] | None = None
+    label: Name
+    target: OneOrMore[Text]
+    weights: tuple[float, ...] = ()
+    boundary_temperature: Law | None = None
+    parameter: OneOrMore[FoundParameter]
+
+    @model_validator(mode="after")
+    def _one_weight_per_target(self) -> Self:
+        if self.weights and (self.kind not in FACTORS or len(self.weights) != len(self.target)):
+            raise ValueError(
+                f"{len(self.weights)} weights for {len(self.target)} targets of a {self.kind}; a loss_factor or "
+                "link_factor has one weight for each target, or none"
+            )
+        return self
+
+    @classmethod
+    def of(
+        cls,
+        term: Term,
+        estimates: Mapping[str, tuple[float, float]],
+        *,
+        mechanism: str,
+        family: str = "",
+        place: str = "",
+        says: str = "",
+        probability: float | None = None,
+    ) -> Finding:
+        """Return the finding of a term.
+
+        Parameters
+        ----------
+        term : Term
+            E.g. a mechanism at its place
+        estimates : mapping of str to (float, float)
+            Value and standard error of every parameter of the term
+        mechanism, family, place, says, probability
+            See the class
+
+        Raises
+        ------
+        InputError
+            If a parameter has no estimate or an estimate no parameter.
+        """
+        missing = [p.name for p in term.parameters if p.name not in estimates]
+        if missing:
+            raise InputError(f"{term.label}: no value was given for {', '.join(missing)}")
+        valued = term.with_values({name: value for name, (value, _) in estimates.items()})
+        return cls(
+            mechanism=mechanism,
+            family=family,
+            place=place,
+            says=says,
+            probability=probability,
+            label=term.label,
+            kind=term.kind,
+            target=term.target,
+            weights=term.weights,
+            law=term.expression,
+            is_loss=term.is_loss,
+            boundary_temperature=term.boundary_temperature,
+            form=term.form,
+            of_measurement=term.of_measurement,
+            parameter=tuple(
+                FoundParameter(
+                    name=p.name, value=p.start, stderr=estimates[p.name][1], unit=p.unit, lower=p.lower, upper=p.upper,
+                    description=p.description,
+                )
+                for p in valued.parameters
+            ),
+            state=tuple(LawState(name=s.name, start=s.start, rate=s.rate, update=s.update) for s in term.states),
+        )  # fmt: skip
+
+    @property
+    def term(self) -> Term:
+        """The term with its parameters at the estimated values; their `sd` are the standard errors."""
+        return Term(
+            label=self.label,
+            kind=self.kind,
+            target=self.target,
+            weights=self.weights,
+            expression=self.law,
+            parameters=tuple(
+                Parameter(
+                    name=p.name, unit=p.unit, start=p.value, lower=p.lower, upper=p.upper, sd=p.stderr, log=False,
+                    description=p.description,
+                )
+                for p in self.parameter
+            ),
+            states=tuple(ExtraState(name=s.name, start=s.start, rate=s.rate, update=s.update) for s in self.state),
+            is_loss=self.is_loss,
+            boundary_temperature=self.boundary_temperature,
+            form=self.form,
+            of_measurement=self.of_measurement,
+        )  # fmt: skip
+
+
+class Correction(Section):
+    """The whole file: findings and calibrated parameters of one gearbox.
+
+    `gearbox` has the hash of the definition's values (:attr:`models.assembly.gearbox.Gearbox.hash`), `recordings`
+    those of the
+    recordings that were used, `version` is that of the program that wrote it.
+    """
+
+    schema_number: Literal[1] = Field(default=1, alias="schema")
+    version: str = ""
+    gearbox: Identity
+    recordings: tuple[Identity, ...] = Field(default=(), alias="recording")
+    calibration: tuple[Estimate, ...] = Field(default=(), alias="calibrated")
+    findings: tuple[Finding, ...] = Field(default=(), alias="finding")
+
+    @classmethod
+    def of(
+        cls,
+        gearbox: Gearbox,
+        *,
+        findings: Iterable[Finding] = (),
+        calibration: Iterable[Estimate] = (),
+        recordings: Mapping[str, str] | None = None,
+        version: str = "",
+    ) -> Correction:
+        """Return the correction of a gearbox; `recordings` are hashes by name."""
+        return cls(
+            gearbox=Identity(name=gearbox.name, sha256=gearbox.hash),
+            recording=tuple(Identity(name=name, sha256=sha256) for name, sha256 in (recordings or {}).items()),
+            calibrated=tuple(calibration),
+            finding=tuple(findings),
+            version=version,
+        )
+
+    def apply(self, network: ThermalNetwork, *, as_recorded: bool = False) -> ThermalNetwork:
+        """Return the corrected network.
+
+        Parameters
+        ----------
+        network : ThermalNetwork
+            The nominal one
+        as_recorded : bool
+            True if its inputs are those that the faulty instruments recorded; see :meth:`models.terms.term.Term.apply`
+
+        Raises
+        ------
+        InputError
+            If the network lacks a parameter, place or signal, or a calibrated value is outside a parameter's limits.
+        """
+        faults = list(_calibration_faults(self.calibration, network))
+        if faults:
+            raise InputError("\n".join(f"the correction calibrates {fault}" for fault in faults))
+        values = {estimate.name: estimate.value for estimate in self.calibration}
+        calibrated = (replace(p, start=values.get(p.name, p.start)) for p in network.parameters)
+        network = replace(network, parameters=tuple(calibrated))
+        for finding in self.findings:
+            try:
+                network = finding.term.apply(network, as_recorded=as_recorded)
+            except InputError as error:
+                raise InputError(f"finding '{finding.label}': {error}") from error
+        return network
+
+    def network(self, gearbox: Gearbox, *, as_recorded: bool = False) -> ThermalNetwork:
+        """Return the corrected network of the gearbox that the correction was made for.
+
+        Raises
+        ------
+        InputError
+            If it was made for another definition, or :meth:`apply` refuses.
+        """
+        self.check_made_for(gearbox)
+        return self.apply(gearbox.network(), as_recorded=as_recorded)
+
+    def check_made_for(self, gearbox: Gearbox) -> None:
+        """Refuse another definition than the one that the correction was made for.
+
+        Raises
+        ------
+        InputError
+            If the values of the definitions differ.
+        """
+        if gearbox.hash != self.gearbox.sha256:
+            raise InputError(
+                f"the correction was made for {self.gearbox.name!r} with definition {self.gearbox.sha256[:12]}, but "
+                f"{gearbox.name!r} is {gearbox.hash[:12]}; use the definition it was made for, or diagnose again"
+            )
+
+    def summary(self) -> dict[str, Any]:
+        """Return the names of the findings and a hash of the whole, for a report."""
+        return {
+            "sha256": hashlib.sha256(correction_text(self).encode()).hexdigest(),
+            "findings": [f"{f.mechanism} at {f.place}" for f in self.findings if f.mechanism != "shape"],
+        }
+
+    @property
+    def words(self) -> str:
+        """Half a sentence about it, for an FMU that contains it."""
+        summary = self.summary()
+        return f"corrected by {', '.join(summary['findings']) or 'calibration'} (correction {summary['sha256'][:12]})"
+
+
+def _calibration_faults(calibration: Iterable[Estimate], network: ThermalNetwork) -> Iterator[str]:
+    """Yield the faults of calibrated values; the limits are those of the fit of a diagnosis, and of an FMU."""
+    known = {p.name: p for p in network.parameters}
+    for estimate in calibration:
+        p = known.get(estimate.name)
+        if p is None:
+            yield f"{estimate.name!r}, not of this network{did_you_mean(estimate.name, known)}"
+            continue
+        slack = BOUND_TOLERANCE * abs(estimate.value)
+        if not p.lower - slack <= estimate.value <= p.upper + slack:
+            unit = "" if p.unit == "1" else f" {p.unit}"
+            yield f"{p.name!r} to {estimate.value:g}{unit}; {p.lower:g} to {p.upper:g}{unit} is possible"
+
+
+def corrected_network(gearbox: Gearbox, correction: Correction | None) -> ThermalNetwork:
+    """Return the network of a gearbox, corrected if there is a correction.
+
+    Raises
+    ------
+    InputError
+        If the correction was made for another definition.
+    """
+    return gearbox.network() if correction is None else correction.network(gearbox)
+
+
+def read_correction(path: str | Path, network: ThermalNetwork, *, made_for: Gearbox | None = None) -> Correction:
+    """Read a correction.
+
+    Parameters
+    ----------
+    path : str or Path
+    network : ThermalNetwork
+        The nominal network of the gearbox, to which it is applied once to find its faults
+    made_for : Gearbox or None
+        Refuse a correction that was made for another one
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, is not a correction, was made for another gearbox, or cannot be applied to the
+        network; with file, key and reason.
+    """
+    file = str(path)
+    correction = validated(Correction, parse_schema_1(read_text(Path(path)), file=file, kind="corrections"), file=file)
+    try:
+        if made_for is not None:
+            correction.check_made_for(made_for)
+        correction.apply(network, as_recorded=True)
+    except InputError as error:
+        raise InputError("\n".join(f"{file}: {line}" for line in str(error).splitlines())) from error
+    return correction
+
+
+def write_correction(correction: Correction, path: str | Path) -> None:
+    """Write a correction; the same correction gives the same bytes.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written.
+    """
+    with atomic_file(Path(path)) as partial:
+        partial.write_text(correction_text(correction), encoding="utf-8", newline="\n")
+
+
+def correction_text(correction: Correction) -> str:
+    """Return a correction as TOML; numbers are written with all digits, keys at their default left out."""
+    return HEADER + tomli_w.dumps({"schema": 1, **correction.model_dump(by_alias=True, exclude_defaults=True)})

@@ -1,0 +1,1 @@
+"""Tables of a gearbox definition, checked."""

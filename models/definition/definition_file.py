@@ -1,0 +1,102 @@
+"""From the text of a gearbox definition to its plain values, filled up, with their annotations."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, TypeVar
+
+from models.base.errors import InputError, did_you_mean, shown
+from models.definition.messages import place_in
+from models.definition.named_oils import read_oil
+from models.definition.values_with_source import Annotations, strip
+from models.files.toml_file import parse_schema_1
+
+T = TypeVar("T")
+
+LIKE_KEYS = ("bearing", "seal")  # tables that may have ``like = "<name of an earlier one>"`` and only what differs
+# Giving one of these in a gearbox file also replaces the other in the named oil.
+ALTERNATIVES = {"viscosity_points": "d341", "d341": "viscosity_points"}
+
+
+def read_values(text: str, *, file: str) -> tuple[dict[str, Any], Annotations]:
+    """Read a gearbox definition from its text.
+
+    Returns
+    -------
+    dict
+        Plain values: tables as dict, lists as tuples, ``like`` and named oil filled in; not validated yet
+    Annotations
+
+    Raises
+    ------
+    InputError
+        If it is not TOML, of another schema, has no source, or an annotation, ``like`` or named oil cannot be used.
+    """
+    document = parse_schema_1(text, file=file, kind="gearbox definitions")
+    notes = Annotations()
+    for key in LIKE_KEYS:
+        if key in document:
+            document[key] = _filled_from_earlier(document[key], key, notes)
+    values = strip(document, notes)
+    if "source" not in document:
+        notes.faults.append(("", "source is missing; name where the values come from"))
+    if isinstance(values.get("oil"), dict) and "named" in values["oil"]:
+        values["oil"] = _filled_from_named_oil(values["oil"], notes)
+    refuse(notes.faults, values, file=file)
+    return values, notes
+
+
+def refuse(faults: Iterable[tuple[str, str]], values: Any, *, file: str) -> None:
+    """Refuse a file that has faults, given by dotted path and text.
+
+    Raises
+    ------
+    InputError
+        If there is any.
+    """
+    lines = []
+    for path, text in faults:
+        place = place_in(values, [int(step) if step.isdecimal() else step for step in path.split(".")])
+        lines.append(f"{file}: {place}: {text}" if place else f"{file}: {text}")
+    if lines:
+        raise InputError("\n".join(lines))
+
+
+def _filled_from_earlier(tables: Any, key: str, notes: Annotations) -> Any:
+    """Fill tables with a key ``like = "<name>"`` up from the earlier table of that name, annotations included."""
+    if not isinstance(tables, tuple):
+        return tables  # the validation refuses it
+    filled: list[Any] = []
+    for index, own in enumerate(tables):
+        if isinstance(own, dict) and "like" in own:
+            earlier = {t["name"]: t for t in filled if isinstance(t, dict) and isinstance(t.get("name"), str)}
+            model = earlier.get(own["like"]) if isinstance(own["like"], str) else None
+            if model is None:
+                hint = did_you_mean(str(own["like"]), earlier) if earlier else "; there is none before it"
+                notes.faults.append((f"{key}.{index}.like", f"{shown(own['like'])} is no earlier {key}{hint}"))
+            own = {**(model or {}), **{k: v for k, v in own.items() if k != "like"}}
+        filled.append(own)
+    return tuple(filled)
+
+
+def _filled_from_named_oil(own: dict[str, Any], notes: Annotations) -> dict[str, Any]:
+    """Fill ``[oil]`` up from its named oil, value by value, sources and standard deviations included."""
+    name = own["named"]
+    if not isinstance(name, str):
+        notes.faults.append(("oil.named", f"must be a text, not {shown(name)}"))
+        return own
+    try:
+        values, oil_notes = read_oil(name)
+    except InputError as error:
+        notes.faults.append(("oil.named", str(error)))
+        return own
+    open_keys = [key for key in values if key not in own and ALTERNATIVES.get(key) not in own]
+    notes.sources.update({f"oil.{key}": oil_notes.source_of(key) for key in open_keys})
+    notes.sources.update(_moved(oil_notes.sources, open_keys))
+    notes.priors.update(_moved(oil_notes.priors, open_keys))
+    return own | {key: values[key] for key in open_keys}
+
+
+def _moved(recorded: Mapping[str, T], keys: Sequence[str]) -> dict[str, T]:
+    """Return the annotations at or below some keys of an oil, by their paths in the gearbox."""
+    return {f"oil.{path}": item for path, item in recorded.items() if path.partition(".")[0] in keys}

@@ -1,0 +1,1 @@
+"""Tables, TOML and cycles as files."""

@@ -1,0 +1,136 @@
+"""Tables in and out: cycles and results as CSV, CSV.gz or Parquet. Files appear whole or not at all."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from models.base.errors import InputError
+from models.base.types import Array
+from models.files.cycle import Cycle
+from models.files.table_file import read_table
+
+DECIMALS = 6  # of results: a millionth of a kelvin or a watt
+
+
+@dataclass(frozen=True)
+class RecordedStart:
+    """First temperature of every node in the file of a cycle.
+
+    Attributes
+    ----------
+    path : Path
+    temperatures : mapping of node name to float
+        [degC]
+    rows : mapping of node name to int
+        Their row numbers, counted from 1
+    columns : mapping of node name to str
+        Their columns in the file
+    """
+
+    path: Path
+    temperatures: Mapping[str, float]
+    rows: Mapping[str, int]
+    columns: Mapping[str, str]
+
+    @classmethod
+    def first_of(cls, path: Path, measured: Iterable[tuple[str, str, Array]], rows: NDArray[np.int64]) -> RecordedStart:
+        """Take the first value that is not missing.
+
+        Parameters
+        ----------
+        path : Path
+        measured : iterable of (node, column, Array of shape (rows,))
+            [degC]; NaN where missing
+        rows : array of int, shape (rows,)
+            Row numbers
+        """
+        known = [(node, name, v, i[0]) for node, name, v in measured if len(i := np.flatnonzero(np.isfinite(v)))]
+        return cls(
+            path,
+            temperatures={node: float(values[row]) for node, _, values, row in known},
+            rows={node: int(rows[row]) for node, _, _, row in known},
+            columns={node: name for node, name, _, _ in known},
+        )
+
+    def of(self, nodes: Iterable[str]) -> dict[str, float]:
+        """Return start temperatures [degC] of all `nodes`: as recorded, else the mean of those recorded.
+
+        Raises
+        ------
+        InputError
+            If no node of these was recorded.
+        """
+        nodes = tuple(nodes)
+        known = {name: T for name, T in self.temperatures.items() if name in nodes}
+        if not known:
+            raise InputError(
+                f"{self.path}: --initial recorded needs a column T_<node>_degC with a temperature, of the nodes "
+                f"{', '.join(nodes)}; give a temperature (--initial 20) or another file instead"
+            )
+        mean = sum(known.values()) / len(known)
+        return {name: known.get(name, mean) for name in nodes}
+
+
+def read_cycle(path: Path, extra: tuple[str, ...] = ()) -> Cycle:
+    """Read a cycle; see :meth:`models.files.cycle.Cycle.from_columns`."""
+    return read_cycle_and_start(path, extra)[0]
+
+
+def read_cycle_and_start(path: Path, extra: tuple[str, ...] = ()) -> tuple[Cycle, RecordedStart]:
+    """Read a cycle, and the first node temperatures (columns ``T_<node>_degC``) in its file.
+
+    Raises
+    ------
+    InputError
+        See :meth:`models.files.cycle.Cycle.from_columns` and :func:`models.files.table_file.read_table`.
+    """
+    table = read_table(path)
+    cycle = Cycle.from_columns({str(c): table[c].to_numpy() for c in table.columns}, name=str(path), extra=extra)
+    measured = (
+        (name[2:-5], name, pd.to_numeric(table[name], errors="coerce").to_numpy(dtype=np.float64, na_value=np.nan))
+        for name in _temperature_columns(table)
+    )
+    return cycle, RecordedStart.first_of(path, measured, np.asarray(table.index) + 1)
+
+
+def read_initial(value: str) -> float | dict[str, float]:
+    """Read initial temperatures: a number in degC, or a file whose ``T_<node>_degC`` columns end with them.
+
+    The last row counts, so that a result can be continued.
+    :func:`models.simulation.start_temperatures.start_temperatures` checks
+    the temperatures.
+
+    Raises
+    ------
+    InputError
+        If it is neither a number nor such a file.
+
+    Examples
+    --------
+    >>> read_initial("20")
+    20.0
+    """
+    try:
+        return float(value)
+    except ValueError:
+        table = read_table(Path(value))
+    last = {column: table[column].iloc[-1] for column in _temperature_columns(table) if len(table)}
+    if not last:
+        raise InputError(f"{value}: has no T_<node>_degC columns with values to start from")
+    try:
+        return {column[2:-5]: float(T) for column, T in last.items() if pd.notna(T)}
+    except ValueError as error:
+        texts = [f"{column} is {T!r}" for column, T in last.items() if isinstance(T, str)]
+        raise InputError(f"{value}: {', '.join(texts)} in the last row; numbers are needed to start from") from error
+
+
+def _temperature_columns(table: pd.DataFrame) -> list[str]:
+    """Return the columns of nodes; that of the surroundings is an input."""
+    names = [str(c) for c in table.columns if str(c).startswith("T_") and str(c).endswith("_degC")]
+    return [name for name in names if name != "T_ambient_degC"]

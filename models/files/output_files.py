@@ -1,0 +1,64 @@
+"""Files that the verbs write: refusal to replace what is read, tables of results."""
+
+from __future__ import annotations
+
+import gzip
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+import pandas as pd
+from numpy.typing import ArrayLike
+
+from models.base.atomic_write import atomic_file
+from models.base.errors import InputError
+from models.files.table_file import is_folder, kind_of
+
+DECIMALS = 6  # of results: a millionth of a kelvin or a watt
+
+
+def refuse_to_replace(inputs: Iterable[Path], outputs: Iterable[Path]) -> None:
+    """Refuse, before any work, to write over what is read or over a folder; links to a file count as the file.
+
+    Raises
+    ------
+    InputError
+        All such outputs.
+    """
+    read = list(inputs)
+    faults = []
+    for out in outputs:
+        if is_folder(out):
+            faults.append(f"{out}: is a folder; name a file")
+        elif any(_same_file(path, out) for path in read):
+            faults.append(f"{out}: is read as well and would be replaced; choose another output")
+    if faults:
+        raise InputError("\n".join(faults))
+
+
+def _same_file(a: Path, b: Path) -> bool:
+    try:
+        return a.samefile(b)
+    except (OSError, ValueError):  # one of them is not there
+        return False
+
+
+def write_table(path: Path, columns: Mapping[str, ArrayLike]) -> None:
+    """Write columns as CSV, CSV.gz or Parquet by the file's ending.
+
+    Raises
+    ------
+    InputError
+        If the ending is another one or the folder cannot be written to.
+    """
+    kind = kind_of(path)
+    table = pd.DataFrame(dict(columns))
+    with atomic_file(path) as partial:
+        if kind == ".parquet":
+            try:
+                table.to_parquet(partial)
+            except ImportError as error:
+                raise InputError(f"{path}: writing Parquet needs pyarrow; python -m pip install pyarrow") from error
+        else:
+            text = table.round(DECIMALS).to_csv(index=False, lineterminator="\n").encode()
+            # Neither name nor time go into the archive, so that the same table gives the same bytes.
+            partial.write_bytes(gzip.compress(text, mtime=0) if kind == ".csv.gz" else text)

@@ -1,0 +1,338 @@
+"""Tables of users: CSV, CSV.gz and Parquet files as data frames."""
+
+from __future__ import annotations
+
+import csv
+import gzip
+import io
+import re
+import zlib
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from itertools import islice
+from pathlib import Path
+from typing import IO, Any, cast
+
+import pandas as pd
+
+from models.base.errors import InputError
+
+KINDS = (".csv", ".csv.gz", ".parquet")
+CHUNK_ROWS = 100_000
+CHUNK_LINES = 1_000
+MOST_ROWS = 5_000_000  # of a table in memory
+SHOWN = 3  # cells of a row of units in a message
+# Texts that head a column ("s", "1/min", "m3/h") have no two digits in a row; dates, times and misspelt numbers do.
+_DIGITS = re.compile(r"\d{2}|\d[.,]\d")
+_PANDAS_UNEVEN = re.compile(r"Expected (\d+) fields in line (\d+), saw (\d+)")
+
+
+@dataclass(frozen=True, kw_only=True)
+class TextForm:
+    """How a CSV file is written.
+
+    Attributes
+    ----------
+    separator, decimal : str
+        Between columns, and in numbers
+    missing : tuple of str
+        Further texts for a missing value
+    by_mapping : bool
+        True if a mapping file can state all this, which messages then advise
+    """
+
+    separator: str = ","
+    decimal: str = "."
+    missing: tuple[str, ...] = ()
+    by_mapping: bool = False
+
+
+PLAIN = TextForm()
+# What gzip, pandas and pyarrow raise on damaged files.
+UNREADABLE = (ValueError, LookupError, ArithmeticError, OSError, EOFError, MemoryError, RuntimeError, zlib.error)
+
+
+def kind_of(path: Path, kinds: tuple[str, ...] = KINDS) -> str:
+    """Return the ending of a file, one of `kinds`.
+
+    Raises
+    ------
+    InputError
+        If it is another one, or a folder.
+    """
+    if is_folder(path):
+        raise InputError(f"{path}: is not a file but a folder; name a file in it ({', '.join(kinds)})")
+    for kind in kinds:
+        if path.name.lower().endswith(kind):
+            return kind
+    raise InputError(f"{path}: unknown file ending; use one of {', '.join(kinds)}")
+
+
+def is_folder(path: Path) -> bool:
+    """Return True for a folder; False for names that no file can have (opening them reports that)."""
+    try:
+        return path.is_dir()
+    except (OSError, ValueError):  # too long, or with NUL in it
+        return False
+
+
+def is_file(path: Path) -> bool:
+    """Return True for a file; False for names that no file can have."""
+    try:
+        return path.is_file()
+    except (OSError, ValueError):
+        return False
+
+
+def check_file(path: Path) -> None:
+    """Refuse what is not a file, or is empty.
+
+    Raises
+    ------
+    InputError
+    """
+    try:
+        if not path.exists():
+            raise InputError(f"{path}: no such file")
+        if not path.is_file():
+            raise InputError(f"{path}: is not a file but {'a folder' if path.is_dir() else 'a device or pipe'}")
+        size = path.stat().st_size
+    except (OSError, ValueError) as error:  # a name that is too long, or holds NUL
+        raise InputError(f"{path}: cannot be read ({getattr(error, 'strerror', None) or error})") from error
+    if size == 0:
+        raise InputError(f"{path}: {_EMPTY}")
+
+
+def column_names(path: Path, separator: str = PLAIN.separator) -> tuple[str, ...]:
+    """Return the names of the columns without reading rows; none if they cannot be read (reading reports why)."""
+    try:
+        check_file(path)
+        if kind_of(path) == ".parquet":
+            from pyarrow import parquet
+
+            return tuple(parquet.read_schema(path).names)
+        with _opened(path) as text:
+            return tuple(_fields(_Lines(path, text).next_filled(), separator))
+    except (InputError, ImportError, csv.Error, *UNREADABLE):
+        return ()
+
+
+def read_table(path: Path, form: TextForm = PLAIN) -> pd.DataFrame:
+    """Read a CSV, CSV.gz or Parquet file.
+
+    Parameters
+    ----------
+    path : Path
+    form : TextForm
+        Of a CSV file
+
+    Returns
+    -------
+    DataFrame
+        Its index counts the rows of the file from 0; a column with a cell that is no number holds texts
+
+    Raises
+    ------
+    InputError
+        If the file is missing, empty, too long, of another kind, or its content cannot be read.
+    """
+    return together(path, read_chunks(path, form))
+
+
+def together(path: Path, chunks: Iterable[pd.DataFrame]) -> pd.DataFrame:
+    """Join chunks of one file.
+
+    Raises
+    ------
+    InputError
+        If they have more than 5 million rows.
+    """
+    kept: list[pd.DataFrame] = []
+    rows = 0
+    for chunk in chunks:
+        rows += len(chunk)
+        if rows > MOST_ROWS:
+            raise InputError(f"{path}: has more than {MOST_ROWS} rows; take a part of it, or every n-th row")
+        kept.append(chunk)
+    filled = [chunk for chunk in kept if len(chunk)] or kept[:1]  # chunks of no rows have untyped columns
+    return pd.concat(filled) if len(filled) > 1 else filled[0]
+
+
+def read_chunks(path: Path, form: TextForm = PLAIN) -> Iterator[pd.DataFrame]:
+    """Read a file in chunks of rows, at least one; see :func:`read_table`."""
+    kind = kind_of(path)
+    check_file(path)
+    try:
+        yield from _parquet_chunks(path) if kind == ".parquet" else _text_chunks(path, form)
+    except InputError:
+        raise
+    except ImportError as error:
+        raise InputError(f"{path}: reading Parquet needs pyarrow; python -m pip install pyarrow") from error
+    except UNREADABLE as error:
+        text = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
+        raise InputError(f"{path}: cannot be read as {kind.removeprefix('.')}: {text}") from error
+
+
+def _check_names(path: Path, names: list[str]) -> None:
+    repeated = sorted({name for name in names if name and names.count(name) > 1})
+    if repeated:
+        raise InputError("\n".join(f"{path}: column {name[:80]} is there twice; remove one" for name in repeated[:10]))
+
+
+# ---------------------------------------------------------------------- text
+
+_EMPTY = "is empty; a header line with column names and rows are needed"
+
+
+def _opened(path: Path) -> io.TextIOWrapper:
+    file = gzip.open(path, "rb") if kind_of(path) == ".csv.gz" else path.open("rb")  # noqa: SIM115  closed with the text
+    return io.TextIOWrapper(cast(IO[bytes], file), encoding="utf-8-sig", errors="surrogateescape")
+
+
+class _Lines:
+    """Lines of a text for pandas: remarks are blank, and what is no UTF-8 is refused with its line number."""
+
+    def __init__(self, path: Path, text: io.TextIOWrapper) -> None:
+        self.path, self.number = path, 0
+        self._text = text
+        self._waiting: list[str] = []
+
+    def __iter__(self) -> Iterator[str]:
+        return self
+
+    def __next__(self) -> str:
+        line = self._waiting.pop(0) if self._waiting else self._read_line()
+        if not line:
+            raise StopIteration
+        return line
+
+    def _read_line(self) -> str:
+        line = next(self._text, "")
+        self.number += 1
+        if self.number == 1 and line.startswith(("\udcff\udcfe", "\udcfe\udcff")):
+            raise InputError(f"{self.path}: is UTF-16 text; save it as UTF-8")
+        if "\0" in line:
+            raise InputError(f"{self.path}: a NUL byte in line {self.number}; it is no text, or damaged")
+        if not line.isascii():
+            try:
+                line.encode()
+            except UnicodeEncodeError as error:
+                byte = ord(line[error.start]) - 0xDC00
+                raise InputError(
+                    f"{self.path}: byte 0x{byte:02x} in line {self.number} is not UTF-8; save the file as UTF-8"
+                ) from error
+        # A '#' within a row is a cell such as '#REF!', so that pandas' own option for remarks cannot be used.
+        return "\n" if line.startswith("#") else line
+
+    def next_filled(self) -> str:
+        """Return the next line that is not blank; pandas will read it again. Empty at the end."""
+        while line := self._read_line():
+            self._waiting.append(line)
+            if line.strip():
+                return line
+        return ""
+
+    def read(self, _size: int = -1) -> str:
+        """Return some lines, as pandas asks for text."""
+        return "".join(islice(self, CHUNK_LINES))
+
+
+def _fields(line: str, separator: str) -> list[str]:
+    return [field.strip() for field in next(csv.reader([line], delimiter=separator, skipinitialspace=True), [])]
+
+
+def _text_chunks(path: Path, form: TextForm) -> Iterator[pd.DataFrame]:
+    with _opened(path) as text:
+        lines = _Lines(path, text)
+        _check_head(path, lines, form)
+        try:
+            for chunk in pd.read_csv(
+                cast(Any, lines), sep=form.separator, decimal=form.decimal, na_values=list(form.missing),
+                skipinitialspace=True, index_col=False, chunksize=CHUNK_ROWS, low_memory=False,
+            ):  # fmt: skip
+                yield chunk.rename(columns=lambda name: str(name).strip())
+        except pd.errors.ParserError as error:
+            uneven = _PANDAS_UNEVEN.search(str(error))
+            if uneven is None:
+                raise
+            names, line, count = map(int, uneven.groups())
+            raise InputError(f"{path}: {_too_many_fields(line, count, names, form)}") from error
+
+
+def _check_head(path: Path, lines: _Lines, form: TextForm) -> None:
+    """Refuse another separator, no header, repeated names, and rows of units or too many fields below the header."""
+    header = lines.next_filled()
+    if not header:
+        raise InputError(f"{path}: {_EMPTY}")
+    names = _fields(header, form.separator)
+    for other, word in ((";", "';'"), ("\t", "tabs"), (",", "','")):
+        if len(names) == 1 and other in names[0]:
+            raise InputError(f"{path}: its columns are separated by {word}; {_advice(other, form)}")
+    if all(_is_number(name) for name in names):
+        raise InputError(f"{path}: its first line holds numbers; a header line with column names is needed")
+    _check_names(path, names)
+    first = _fields(lines.next_filled(), form.separator)
+    if len(first) > len(names):
+        raise InputError(f"{path}: {_too_many_fields(lines.number, len(first), len(names), form)}")
+    cells = [cell for cell in first if cell]
+    if cells and not any(_is_number(cell) or _DIGITS.search(cell) for cell in cells):
+        shown = ", ".join(repr(cell[:20]) for cell in cells[:SHOWN]) + (", ..." if len(cells) > SHOWN else "")
+        raise InputError(
+            f"{path}: line {lines.number} (below the header) holds units or texts ({shown}) and no number; remove it, "
+            "or begin it with '#'"
+        )
+
+
+def _too_many_fields(line: int, count: int, names: int, form: TextForm) -> str:
+    return (
+        f"line {line} has {count} fields, but the header names {names} columns; remove what is too much, e.g. a "
+        f"{form.separator!r} at its end or within a number"
+    )
+
+
+def _advice(separator: str, form: TextForm) -> str:
+    """Return what to do with a file of another separator."""
+    plain = "write it with ',' and decimal points"
+    if not form.by_mapping:
+        return plain
+    if separator == ",":
+        return 'give csv = { separator = "," } in a mapping file'
+    shown = "\\t" if separator == "\t" else separator
+    return (
+        f'give csv = {{ separator = "{shown}", decimal = "," }} in a mapping file (decimal = "." where its numbers '
+        f"have points), or {plain}"
+    )
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+# ---------------------------------------------------------------------- Parquet
+
+
+def _parquet_chunks(path: Path) -> Iterator[pd.DataFrame]:
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    with parquet.ParquetFile(path) as file:
+        schema = file.schema_arrow
+        _check_names(path, list(schema.names))
+        nested = [f for f in schema if pa.types.is_nested(f.type) or pa.types.is_binary(f.type)]
+        if nested:
+            raise InputError("\n".join(
+                f"{path}: column {f.name} holds {str(f.type)[:60]}; a number, time or text per row is needed: remove it"
+                for f in nested[:10]
+            ))  # fmt: skip
+        row = 0
+        for batch in file.iter_batches(batch_size=CHUNK_ROWS):
+            chunk = batch.to_pandas(ignore_metadata=True)
+            chunk.index = pd.RangeIndex(row, row + len(chunk))
+            row += len(chunk)
+            yield chunk
+        if row == 0:
+            yield schema.empty_table().to_pandas(ignore_metadata=True)

@@ -1,0 +1,1 @@
+"""Correlations of tribology, gear geometry and heat transfer, each with its source."""

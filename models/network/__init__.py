@@ -1,0 +1,1 @@
+"""Structure of a thermal network, its symbolic laws, and their compilation."""

@@ -1,0 +1,1 @@
+"""Code that also runs inside the Python FMU: solver, evaluation of a network, surrogate; numpy only."""

@@ -1,0 +1,1 @@
+"""Units of definition files and of the FMI interface, names of columns."""

@@ -1,0 +1,1 @@
+"""Simulation of a thermal network: cycles, steady states, start temperatures."""

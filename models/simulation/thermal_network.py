@@ -1,0 +1,349 @@
+"""The thermal network: nodes, links and sources, each with a law.
+
+A network is data. :meth:`ThermalNetwork.with_source`, :meth:`~ThermalNetwork.with_link` and their like give a new
+network with one more term; a base term, a mechanism of the catalogue and a user's own are the same kind of thing.
+``m c dT/dt = sources - sum of conductance * difference`` at every node; what leaves one node enters another, so heat is
+conserved whatever the laws say.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, replace
+from difflib import get_close_matches
+from keyword import iskeyword
+
+import sympy as sp
+from numpy.typing import ArrayLike
+
+from models.base.errors import InputError, did_you_mean
+from models.definition.sections import Training
+from models.files.cycle import Cycle
+from models.network.laws import LawLike, NumericLaw, Parameter, symbol, trace
+from models.network.structure import BASE_SIGNALS, ExtraState, Link, Losses, Network, Node, Source
+from models.simulation.simulate import Result, simulate, steady_state
+
+__all__ = ["BASE_SIGNALS", "ExtraState", "Link", "Losses", "Node", "Source", "ThermalNetwork"]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ThermalNetwork(Network):
+    """A network that can be extended, one term at a time, and simulated."""
+
+    # ------------------------------------------------------------------ extension
+
+    def with_node(self, name: str, heat_capacity: LawLike) -> ThermalNetwork:
+        """A network with one more part of `heat_capacity` [J/K]; link it with :meth:`with_link`."""
+        self._new_node(name)
+        capacity, numeric = trace(heat_capacity, [p.name for p in self.parameters], f"heat_capacity_{name}")
+        if numeric is not None:
+            raise InputError(f"the heat capacity of node {name!r} must be a number or a function of parameters")
+        return replace(self, nodes=(*self.nodes, Node(name=name, capacity=capacity)))
+
+    def with_boundary(self, name: str, temperature: LawLike) -> ThermalNetwork:
+        """A network with one more boundary node of known `temperature` [degC], a law of time, inputs and parameters."""
+        self._new_node(name)
+        allowed = (*BASE_SIGNALS, *self.inputs, *(p.name for p in self.parameters))
+        expression, numeric = trace(temperature, allowed, f"temperature_{name}")
+        if numeric is not None:
+            raise InputError(f"the temperature of boundary {name!r} must be an expression; no branches or numpy calls")
+        return replace(self, nodes=(*self.nodes, Node(name=name, temperature=expression)))
+
+    def with_input(self, name: str, default: float) -> ThermalNetwork:
+        """A network with one more input signal, e.g. a measured column, that laws may use."""
+        self._new_name(name, self.signals, "signal")
+        return replace(self, inputs={**self.inputs, name: default})
+
+    def with_parameter(self, parameter: Parameter) -> ThermalNetwork:
+        """A network with one more tunable parameter that laws may use by its name."""
+        self._new_name(parameter.name, self.signals, "signal")
+        return replace(self, parameters=(*self.parameters, parameter))
+
+    def with_state(
+        self, name: str, *, start: float, rate: LawLike = 0.0, update: LawLike | None = None,
+        blurred: sp.Expr | None = None,
+    ) -> ThermalNetwork:  # fmt: skip
+        """A network with a memory.
+
+        Parameters
+        ----------
+        name : str
+            Name of the state; laws use it like a signal
+        start : float
+            Its value at the start
+        rate : law
+            Its time derivative, [1/s]
+        update : law or None
+            Its value after each accepted step of the solver
+        blurred : sympy.Expr or None
+            The same where temperatures are means over minutes
+        """
+        self._new_name(name, self.signals, "signal")
+        names = [*self.signals, name]
+        rate_expression, numeric = trace(rate, names, f"rate_{name}")
+        update_expression = None
+        if update is not None:
+            update_expression, numeric_update = trace(update, names, f"update_{name}")
+            numeric = numeric or numeric_update
+        if numeric is not None:
+            raise InputError(f"the laws of state {name!r} must be expressions; write branches with sympy.Piecewise")
+        state = ExtraState(name=name, start=start, rate=rate_expression, update=update_expression, blurred=blurred)
+        return replace(self, states=(*self.states, state))
+
+    def with_source(self, node: str, law: LawLike, *, name: str, is_loss: bool = False) -> ThermalNetwork:
+        """A network with one more heat source.
+
+        Parameters
+        ----------
+        node : str
+            A node, or a group whose nodes share the heat evenly
+        law : callable of :class:`~models.network.laws.Signals`, sympy expression, or number
+            Heat, [W]; positive warms the node
+        name : str
+            Name of the source
+        is_loss : bool
+            Whether the heat is mechanical power lost in the gearbox: it then counts in ``P_loss_W`` and gets a column
+
+        Raises
+        ------
+        InputError
+            If the node or a signal is unknown, the node is a boundary, or the name is taken.
+
+        Examples
+        --------
+        >>> from models.assembly.gearbox import load_gearbox
+        >>> network = load_gearbox("fzg").network()
+        >>> extra = network.with_source("oil", lambda s: 8.0 * (s.speed / 3000.0) ** 3, name="extra")
+        >>> extra.sources[-1].heat
+        2.96296296296296e-10*speed**3
+        """
+        members = self._members(node)
+        for member in members:
+            if member not in {part.name for part in self.parts}:
+                raise InputError(f"node {member!r} has a given temperature; a source there has no effect")
+        names = [f"{name}_{member}" if len(members) > 1 else name for member in members]
+        for new in names:
+            self._new_name(new, [source.name for source in self.sources], "source")
+        expression, numeric_laws = self._traced(law, f"source_{name}")
+        added = tuple(
+            Source(name=new, node=member, heat=expression / len(members), is_loss=is_loss)
+            for new, member in zip(names, members, strict=True)
+        )
+        return replace(self, sources=(*self.sources, *added), numeric_laws=numeric_laws)
+
+    def with_link(
+        self, node_a: str, node_b: str, law: LawLike, *, name: str | None = None, temperature: LawLike | None = None
+    ) -> ThermalNetwork:
+        """A network with one more heat path.
+
+        Parameters
+        ----------
+        node_a : str
+            A node, or a group whose nodes share the conductance evenly
+        node_b : str
+            A node; a name that the network does not have becomes a new boundary node
+        law : callable of :class:`~models.network.laws.Signals`, sympy expression, or number
+            Conductance, [W/K], >= 0
+        name : str or None
+            Name of the link, by default ``<node_a>-<node_b>``
+        temperature : law or None
+            Temperature of a new boundary node, [degC]; ambient by default
+
+        Raises
+        ------
+        InputError
+            If a node or signal is unknown, both nodes are the same, or the name is taken. An unknown `node_b` that is
+            close to a known name is taken for a slip unless `temperature` is given.
+        """
+        members = self._members(node_a)
+        if node_b not in self.node_names:
+            close = get_close_matches(node_b, self.node_names, n=1, cutoff=0.8)
+            if close and temperature is None:
+                raise InputError(
+                    f"node {node_b!r} is unknown; did you mean {close[0]!r}? "
+                    "Give a temperature to make it a new boundary node"
+                )
+            boundary = "T_ambient" if temperature is None else temperature
+            law_b: LawLike = (lambda s: s[boundary]) if isinstance(boundary, str) else boundary
+            return self.with_boundary(node_b, law_b).with_link(node_a, node_b, law, name=name)
+        if temperature is not None:
+            raise InputError(f"node {node_b!r} exists; a temperature can be given to a new boundary node only")
+        if node_b in members:
+            raise InputError(f"a link joins two different nodes; {node_a!r} and {node_b!r} were given")
+        name = name or f"{node_a}-{node_b}"
+        names = [f"{name}_{member}" if len(members) > 1 else name for member in members]
+        for new in names:
+            self._new_name(new, [link.name for link in self.links], "link")
+        expression, numeric_laws = self._traced(law, f"link_{name}")
+        self._refuse_losses(expression, f"the conductance of link {name!r}")
+        added = tuple(
+            Link(name=new, nodes=(member, node_b), conductance=expression / len(members))
+            for new, member in zip(names, members, strict=True)
+        )
+        return replace(self, links=(*self.links, *added), numeric_laws=numeric_laws)
+
+    def with_loss_factor(self, source: str, law: LawLike) -> ThermalNetwork:
+        """A network in which one heat source is ``1 + law`` times what it was.
+
+        Parameters
+        ----------
+        source : str
+            Name of a source
+        law : callable of :class:`~models.network.laws.Signals`, sympy expression, or number
+            Relative change, [-]
+
+        Raises
+        ------
+        InputError
+            If the source or a signal is unknown.
+
+        Examples
+        --------
+        >>> from models.assembly.gearbox import load_gearbox
+        >>> network = load_gearbox("fzg").network().with_loss_factor("churning", lambda s: 0.1 * s.speed / 3000.0)
+        >>> [source.heat for source in network.sources if source.name == "churning"]
+        [P_churning*churning*(3.33333333333333e-5*speed + 1)]
+        """
+        known = [s.name for s in self.sources]
+        if source not in known:
+            raise InputError(f"the network has no source {source!r}{did_you_mean(source, known)}")
+        factor, numeric_laws = self._traced(law, f"loss_factor_{len(self.numeric_laws)}_{source}")
+        scaled = tuple(replace(s, heat=s.heat * (1 + factor)) if s.name == source else s for s in self.sources)
+        return replace(self, sources=scaled, numeric_laws=numeric_laws)
+
+    def with_link_factor(self, link: str, law: LawLike) -> ThermalNetwork:
+        """A network in which the conductance of one link is ``1 + law`` times what it was.
+
+        Parameters
+        ----------
+        link : str
+            Name of a link
+        law : callable of :class:`~models.network.laws.Signals`, sympy expression, or number
+            Relative change, [-]
+
+        Raises
+        ------
+        InputError
+            If the link or a signal is unknown, or the law depends on a loss.
+        """
+        known = [s.name for s in self.links]
+        if link not in known:
+            raise InputError(f"the network has no link {link!r}{did_you_mean(link, known)}")
+        factor, numeric_laws = self._traced(law, f"link_factor_{len(self.numeric_laws)}_{link}")
+        self._refuse_losses(factor, f"the factor of link {link!r}")
+        scaled = tuple(
+            replace(s, conductance=s.conductance * (1 + factor)) if s.name == link else s for s in self.links
+        )
+        return replace(self, links=scaled, numeric_laws=numeric_laws)
+
+    def with_signal_shift(self, name: str, law: LawLike) -> ThermalNetwork:
+        """A network that takes one input for ``input + law``: laws, boundaries and losses see the shifted value.
+
+        Parameters
+        ----------
+        name : str
+            ``speed``, ``torque`` or a further input
+        law : callable of :class:`~models.network.laws.Signals`, sympy expression, or number
+            What is added, in the unit of the input
+
+        Raises
+        ------
+        InputError
+            If the input or a signal is unknown, the law depends on a loss, or a law of the network is no expression.
+
+        Examples
+        --------
+        >>> from models.assembly.gearbox import load_gearbox
+        >>> warm = load_gearbox("fzg").network().with_signal_shift("T_ambient", 2.0)
+        >>> warm.nodes[0].temperature
+        T_ambient + 2.0
+        """
+        known = ("speed", "torque", *self.inputs)
+        if name not in known:
+            raise InputError(f"{name!r} is not an input of this network{did_you_mean(name, known)}")
+        shift, numeric = trace(law, self.signals, f"shift_{name}")
+        if numeric is not None or self.numeric_laws:
+            raise InputError(f"the input {name!r} can be shifted only where all laws are expressions, without branches")
+        self._refuse_losses(shift, f"the shift of {name!r}")
+        # A boundary's temperature may itself follow this input: the shift means it as it was.
+        boundary = {symbol(f"T_{node.name}"): node.temperature for node in self.nodes if node.temperature is not None}
+        seen = {symbol(name): symbol(name) + shift.xreplace(boundary)}
+        operating = {key: law.xreplace(seen) for key, law in self.operating.items()}
+        if name in ("speed", "torque"):
+            operating.setdefault(name, seen[symbol(name)])
+        return replace(
+            self,
+            nodes=tuple(n if n.temperature is None else replace(n, temperature=n.temperature.xreplace(seen))
+                        for n in self.nodes),
+            links=tuple(replace(link, conductance=link.conductance.xreplace(seen)) for link in self.links),
+            sources=tuple(replace(source, heat=source.heat.xreplace(seen)) for source in self.sources),
+            states=tuple(
+                replace(state, rate=state.rate.xreplace(seen),
+                        update=None if state.update is None else state.update.xreplace(seen),
+                        blurred=None if state.blurred is None else state.blurred.xreplace(seen))
+                for state in self.states
+            ),
+            operating=operating,
+        )  # fmt: skip
+
+    # ------------------------------------------------------------------ use
+
+    def simulate(
+        self,
+        cycle: Cycle | Mapping[str, ArrayLike],
+        *,
+        losses: Losses,
+        initial: float | Mapping[str, float] | None = None,
+        parameters: Mapping[str, ArrayLike] | None = None,
+        trained: Training | None = None,
+        progress: Callable[[int, int], None] | None = None,
+    ) -> Result:
+        """Temperatures and losses over a cycle; see :func:`models.simulation.simulate.simulate`."""
+        return simulate(
+            self, cycle, losses=losses, initial=initial, parameters=parameters, trained=trained, progress=progress
+        )
+
+    def steady_state(
+        self,
+        *,
+        losses: Losses,
+        speed: ArrayLike,
+        torque: ArrayLike,
+        inputs: Mapping[str, ArrayLike] | None = None,
+        parameters: Mapping[str, ArrayLike] | None = None,
+    ) -> Result:
+        """Temperatures and losses at rest with constant inputs; see :func:`models.simulation.simulate.steady_state`."""
+        return steady_state(self, losses=losses, speed=speed, torque=torque, inputs=inputs, parameters=parameters)
+
+    # ------------------------------------------------------------------ checks
+
+    def _members(self, node: str) -> tuple[str, ...]:
+        if node in self.groups:
+            return self.groups[node]
+        if node not in self.node_names:
+            raise InputError(f"node {node!r} is unknown{did_you_mean(node, [*self.node_names, *self.groups])}")
+        return (node,)
+
+    def _new_node(self, name: str) -> None:
+        self._new_name(name, [*self.node_names, *self.groups], "node")
+        self._new_name(f"T_{name}", self.signals, "signal")
+
+    def _traced(self, law: LawLike, label: str) -> tuple[sp.Expr, Mapping[str, NumericLaw]]:
+        label = "".join(c if c.isalnum() else "_" for c in label)
+        expression, numeric = trace(law, self.signals, label)
+        return expression, self.numeric_laws if numeric is None else {**self.numeric_laws, label: numeric}
+
+    def _refuse_losses(self, expression: sp.Expr, what: str) -> None:
+        losses = {symbol(f"P_{component}") for component in self.components} & expression.free_symbols
+        if losses:
+            raise InputError(
+                f"{what} depends on the loss {min(s.name for s in losses)!r}; "
+                "it may depend on inputs, temperatures, parameters and states only"
+            )
+
+    @staticmethod
+    def _new_name(name: str, taken: Iterable[str], kind: str) -> None:
+        if name in taken:
+            raise InputError(f"the network has a {kind} {name!r} already; choose another name")
+        if kind == "signal" and (not name.isidentifier() or iskeyword(name) or name.startswith("_")):
+            raise InputError(f"{name!r} cannot be a signal; a name starts with a letter and has letters, digits and _")

@@ -1,0 +1,1 @@
+"""Terms that extend a network, and their form in TOML files."""
