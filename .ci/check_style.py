@@ -22,11 +22,8 @@ EXEMPT = (
     "diagnosis/inference/",
     "diagnosis/candidates/",
     "diagnosis/decision/",
-    "diagnosis/setup/",
-    "diagnosis/results/",
     "diagnosis/report/",
-    "diagnosis/forward/",
-    "tests/unit/diagnosis/inference/",
+    "diagnosis/results/assemble.py",
 )
 
 # Phrase, and what to write instead.
