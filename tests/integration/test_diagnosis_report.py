@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from diagnosis.report import write_report
-from tests.unit.diagnosis_example import EXAMPLES
+from tests.unit.diagnosis.diagnosis_example import EXAMPLES
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 DRIVER = shutil.which("chromedriver")

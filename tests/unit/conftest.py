@@ -13,7 +13,7 @@ from diagnosis.inference.unknowns import unknowns_of
 from models.assembly.gearbox import Gearbox
 from models.base.types import Array
 from models.files.cycle import Cycle
-from tests.unit.inference_example import CHANNELS, recording_of
+from tests.unit.diagnosis.inference_example import CHANNELS, recording_of
 
 
 @pytest.fixture(scope="session")

@@ -18,7 +18,7 @@ from models.losses import bearing, churning, friction, seal
 
 GEARBOX = load_gearbox("fzg")
 PAIR, OIL = GEARBOX.stage[0].pair(), GEARBOX.lubricant()
-NU_406 = GEARBOX.losses().bearings[0]
+NU_406 = GEARBOX.losses().term("bearing_1").law.bearing
 E_RED = ehl.reduced_modulus(206e9, 0.3, 206e9, 0.3)
 INDEPENDENT = "independent evaluation"
 F = 200.0 / PAIR.r_b[0]

@@ -18,7 +18,7 @@ from models.base.types import Array
 from models.files.cycle import Cycle
 from models.mechanisms import CATALOGUE, Scale
 from models.network.laws import symbol
-from tests.unit.inference_example import recording_of
+from tests.unit.diagnosis.inference_example import recording_of
 
 
 @pytest.mark.parametrize("even", [True, False])

@@ -20,7 +20,7 @@ from diagnosis.report.wording import WORDS
 from diagnosis.results.number_format import NONE, fixed
 from diagnosis.results.result import VERDICT_TEXT, Diagnosis
 from models.base.errors import InputError
-from tests.unit.diagnosis_example import (
+from tests.unit.diagnosis.diagnosis_example import (
     CHANNELS,
     EXAMPLES,
     NETWORK,

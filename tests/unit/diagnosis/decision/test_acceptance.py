@@ -19,7 +19,7 @@ from diagnosis.inference.unknowns import Unknown, Unknowns
 from models.assembly.gearbox import Gearbox
 from models.base.types import Array
 from models.mechanisms import CATALOGUE, Scale
-from tests.unit.inference_example import CHANNELS, NOTHING, judge_of, scored_as
+from tests.unit.diagnosis.inference_example import CHANNELS, NOTHING, judge_of, scored_as
 
 
 def test_another_place_of_the_same_physics_may_be_taken_where_the_best_one_fails(

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from diagnosis.report.page import page
 from diagnosis.results.result import AHEAD, NOT_ACCEPTED, VERDICT_TEXT, Ranked
-from tests.unit.diagnosis_example import consistent, missing_physics, unexplained
+from tests.unit.diagnosis.diagnosis_example import consistent, missing_physics, unexplained
 
 
 def test_what_was_found_where_and_how_well_it_fits() -> None:

@@ -14,7 +14,7 @@ from diagnosis.decision.stage import Stage
 from diagnosis.inference.posterior import Problem
 from diagnosis.results import assemble
 from models.assembly.gearbox import Gearbox
-from tests.unit.inference_example import NOTHING, scored_as
+from tests.unit.diagnosis.inference_example import NOTHING, scored_as
 
 
 def test_the_ranking_holds_everything_that_was_scored() -> None:

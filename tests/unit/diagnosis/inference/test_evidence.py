@@ -18,7 +18,7 @@ from diagnosis.inference.whitening import Noise, Whitening, reading_variance
 from models.assembly.gearbox import Gearbox
 from models.base.types import Array
 from models.files.cycle import Cycle
-from tests.unit.inference_example import CHANNELS, recording_of
+from tests.unit.diagnosis.inference_example import CHANNELS, recording_of
 
 
 def test_innovations_of_the_noise_are_white(model: NetworkOnGrid, piece: Piece, problem: Problem) -> None:

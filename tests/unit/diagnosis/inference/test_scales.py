@@ -15,7 +15,7 @@ from diagnosis.decision import search
 from diagnosis.inference.posterior import Problem
 from models.assembly.gearbox import Gearbox, load_gearbox
 from models.mechanisms import CATALOGUE, Scale
-from tests.unit.inference_example import CHANNELS
+from tests.unit.diagnosis.inference_example import CHANNELS
 
 
 def test_parameters_of_what_was_found_are_no_further_explanation(fzg: Gearbox, problem: Problem) -> None:

@@ -42,7 +42,7 @@ from diagnosis.inference.unknowns import unknowns_of
 from diagnosis.results.findings import _with_form, finding_of
 from models.assembly.gearbox import Gearbox
 from models.mechanisms import CATALOGUE, Scale
-from tests.unit.inference_example import CHANNELS, damaged
+from tests.unit.diagnosis.inference_example import CHANNELS, damaged
 
 
 def test_shapes_are_sought_between_the_grid(fzg: Gearbox, piece: Piece, problem: Problem) -> None:

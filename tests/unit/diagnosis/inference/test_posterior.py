@@ -23,7 +23,7 @@ from diagnosis.setup.case import Case, floored
 from models.assembly.gearbox import Gearbox
 from models.base.types import Array
 from models.mechanisms import CATALOGUE, Scale
-from tests.unit.inference_example import CHANNELS
+from tests.unit.diagnosis.inference_example import CHANNELS
 
 
 def test_derivatives_are_those_of_repeated_simulation(problem: Problem) -> None:

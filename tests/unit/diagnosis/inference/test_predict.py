@@ -18,7 +18,7 @@ from diagnosis.inference.unknowns import unknowns_of
 from models.assembly.gearbox import Gearbox
 from models.base.types import Array
 from models.mechanisms import CATALOGUE, Scale
-from tests.unit.inference_example import CHANNELS
+from tests.unit.diagnosis.inference_example import CHANNELS
 
 
 @pytest.mark.parametrize("tank_degC", [27.0, 62.0])
