@@ -30,8 +30,8 @@ def start_temperatures(
     Raises
     ------
     InputError
-        If nodes are unknown or missing, a temperature is not finite or not above -273.15 degC, or all are above 250
-        degC; single nodes may be hotter, as in a result that is continued.
+        If nodes are unknown or missing, a temperature is not finite or not above -273.15 degC, or one number for all
+        nodes, or every node of a file, is above 250 degC.
 
     Examples
     --------
@@ -39,9 +39,8 @@ def start_temperatures(
     {'oil': 20.0, 'housing': 20.0}
     >>> start_temperatures(293.15, ["oil"], source="--initial 293.15")
     Traceback (most recent call last):
-    models.base.errors.InputError: --initial 293.15: the start temperature is 293.15; up to 250 degC is possible; if
-    kelvin \
-are meant, give 20
+    models.base.errors.InputError: --initial 293.15: the start temperature is 293.15; up to 250 degC is possible; if \
+kelvin are meant, give 20
     """
     faults = []
     if isinstance(initial, Mapping):
@@ -64,7 +63,8 @@ are meant, give 20
             )
             break  # often all nodes have the same
     coldest = min(temperatures.values(), default=0.0)
-    if not faults and coldest > HOTTEST_START:
+    # Python may continue any state; one number for all nodes, or a file, that hot is in kelvin.
+    if not faults and coldest > HOTTEST_START and (source or not isinstance(initial, Mapping)):
         kelvin = f"; if kelvin are meant, give {coldest + ABSOLUTE_ZERO:g}" if coldest < 1000.0 else ""
         faults.append(f"the start temperature is {coldest:g}; up to {HOTTEST_START:g} degC is possible{kelvin}")
     if faults:

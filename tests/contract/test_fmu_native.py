@@ -11,7 +11,6 @@ import zipfile
 from collections.abc import Callable
 from contextlib import ExitStack
 from ctypes import byref, c_char_p, c_double, c_int, c_uint
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -306,18 +305,6 @@ def test_same_content_gives_the_same_bytes_with_and_without_cache(
         assert one.namelist() == other.namelist()
         assert [name for name in one.namelist() if one.read(name) != other.read(name)] == []
     assert again.read_bytes() == fzg_native.read_bytes()
-
-
-def test_networks_of_other_weights_are_what_is_built(
-    fzg: Gearbox, fzg_training: TrainingResult, fzg_networks: tuple[Path, ...], fzg_native: Path, tmp_path: Path
-) -> None:
-    """Weights come from the ONNX files, not from the training result beside them."""
-    losses = fzg_training.losses
-    doubled = [replace(n, biases=(n.biases[0], n.biases[1], n.biases[2] + np.log(2.0))) for n in losses.networks]
-    other = replace(fzg_training, losses=replace(losses, networks=tuple(doubled)))
-    path = build_native_fmu(fzg, other, fzg_networks, tmp_path / "fzg.fmu", platforms="host").path
-    with hosted(path) as one, hosted(fzg_native) as two:
-        assert one.outputs() == two.outputs()
 
 
 # ---------------------------------------------------------------------- compilers and cache

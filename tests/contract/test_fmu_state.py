@@ -10,7 +10,6 @@ import pytest
 from tests.contract.conftest import Illegal
 from tests.contract.fmu_host import LOADED, Host, hosted
 
-
 # ---------------------------------------------------------------------- the whole state
 
 

@@ -65,7 +65,7 @@ def test_build_passes_correction_preset_and_platforms_on(
     fzg: Gearbox, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     asked: list[dict[str, Any]] = []
-    monkeypatch.setattr(builder.build, "build", recorder(asked))
+    monkeypatch.setattr(builder.workflows.build, "build", recorder(asked))
     correction = Correction.of(fzg, calibration=[Estimate(name="mesh", value=1.07, stderr=0.02)])
     write_correction(correction, tmp_path / "correction.toml")
     usual = ("build-fmu", "--output", tmp_path / "out")

@@ -27,7 +27,7 @@ def asked_for(monkeypatch: pytest.MonkeyPatch) -> list[tuple[tuple[str, ...], tu
         asked.append((train, held))
         raise _ReadError
 
-    monkeypatch.setattr(diagnosis.read_recordings, "read_train_and_holdout", read)
+    monkeypatch.setattr(diagnosis.recordings.read, "read_train_and_holdout", read)
     return asked
 
 

@@ -129,8 +129,8 @@ COLUMN = "schema = 1\n[columns.T_oil_degC]\n"
 MAPPINGS: list[tuple[str, tuple[str, ...]]] = [
     ("schema = = 1", ("mapping.toml: is not valid TOML", "line 1")),
     ("max_gap_s = 5", ("mapping.toml", "schema = 1")),
-    ("schema = 1\nmax_gap = 5", ("max_gap is not a known key", "max_gap_s")),
-    (COLUMN + 'quanity = "T_oil"', ("columns.T_oil_degC.quanity is not a known key", "did you mean 'quantity'?")),
+    ("schema = 1\nmax_gap = 5", ("'max_gap' is not a known key", "max_gap_s")),
+    (COLUMN + 'quanity = "T_oil"', ("columns.T_oil_degC: 'quanity' is not a known key", "did you mean 'quantity'?")),
     (COLUMN + 'quantity = "T_oill"', ("T_oil_degC", "'T_oill'", "did you mean 'T_oil'")),
     (COLUMN + 'quantity = "T_oil"\nunit = "Celsius"', ("'Celsius' is no unit of temperature",)),
     (COLUMN + 'quantity = "T_oil"\nscale = 0.0', ("columns.T_oil_degC.scale", "0 would wipe")),

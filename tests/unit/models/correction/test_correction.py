@@ -216,8 +216,9 @@ def test_faults_of_the_file(file: Path, old: str, new: str, says: str) -> None:
 def test_a_file_that_is_not_there(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"none\.toml: cannot be read"):
         read_correction(tmp_path / "none.toml", NETWORK)
+    (tmp_path / "file").write_text("")
     with pytest.raises(InputError, match=r"c\.toml: cannot be written"):
-        write_correction(CORRECTION, tmp_path / "nowhere" / "c.toml")
+        write_correction(CORRECTION, tmp_path / "file" / "c.toml")
 
 
 def calibrated(**values: float) -> Correction:
