@@ -87,13 +87,13 @@ def drive_fmu(
 
 
 def runs_here(path: Path) -> bool:
-    """Whether an FMU has a binary for this machine."""
+    """Return True if an FMU has a binary for this machine."""
     with ZipFile(path) as archive:
         return any(name.startswith(f"binaries/{host_platform()}/") for name in archive.namelist())
 
 
 def fmu_inputs(path: Path) -> tuple[str, ...]:
-    """Columns of a cycle that an FMU takes beside the usual ones (for :func:`models.files.cycle_file.read_cycle`).
+    """Return the columns of a cycle that only this FMU takes (for :func:`models.files.cycle_file.read_cycle`).
 
     Raises
     ------
@@ -225,7 +225,7 @@ class LoadedFmu:
 
 @contextmanager
 def loaded(path: Path) -> Iterator[LoadedFmu]:
-    """An FMU of this project, extracted to a folder of its own and instantiated; both are gone at the end.
+    """An FMU of this project, extracted to a temporary folder and instantiated; both are removed at the end.
 
     Raises
     ------

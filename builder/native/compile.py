@@ -53,7 +53,7 @@ class Platform:
 
     @property
     def options(self) -> tuple[str, ...]:
-        """What this platform's linker wants."""
+        """Options of this platform's linker."""
         if self.suffix == ".so":
             return ("-fPIC", "-Wl,--no-undefined", "-Wl,--build-id=none", "-lm")
         return ("-fPIC",) if self.suffix == ".dylib" else ()
@@ -84,14 +84,14 @@ class Compiler:
 
 @dataclass(frozen=True)
 class Binaries:
-    """Shared libraries by the folder of their platform, and a line on what was left out, or ``""``."""
+    """Shared libraries by the folder of their platform, and a line on platforms that are missing, or ``""``."""
 
     libraries: Mapping[str, bytes]
     note: str
 
 
 def host_platform() -> str | None:
-    """The folder of this machine's platform; None where there is none."""
+    """Return the folder of this machine's platform; None if the platform is not known."""
     machine = {"amd64": "x86_64", "arm64": "aarch64"}.get(platform.machine().lower(), platform.machine().lower())
     system = {"linux": "linux", "darwin": "macos", "windows": "windows"}.get(platform.system().lower(), "")
     found = [p.folder for p in PLATFORMS.values() if p.target.startswith(f"{machine}-{system}")]
@@ -99,12 +99,12 @@ def host_platform() -> str | None:
 
 
 def chosen_platforms(text: str) -> tuple[str, ...]:
-    """What ``--platforms`` asks for: ``all``, ``host``, or folders separated by commas.
+    """Return the platforms that ``--platforms`` names: ``all``, ``host``, or folders separated by commas.
 
     Raises
     ------
     InputError
-        If a platform is not known, or this machine is none.
+        If a platform, or that of this machine for ``host``, is not known.
 
     Examples
     --------
@@ -129,7 +129,7 @@ def chosen_platforms(text: str) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class Plan:
-    """Which platforms are built, by which compiler, and a line on what is left out, or ``""``."""
+    """Platforms to build, their compiler, and a line on platforms that are missing, or ``""``."""
 
     compiler: Compiler
     platforms: tuple[str, ...]

@@ -95,7 +95,7 @@ def build_native_fmu(
     network : ThermalNetwork or None
         The thermal network, where it is neither the gearbox's nominal nor the corrected one
     correction : Correction or None
-        What a diagnosis found; the FMU has it and says so
+        Findings of a diagnosis; the FMU contains them and its documentation lists them
     platforms : str
         See :func:`builder.native.compile.compile_libraries`
 

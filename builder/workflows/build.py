@@ -51,7 +51,7 @@ class CycleErrors:
 
 @dataclass(frozen=True, kw_only=True)
 class BuildReport:
-    """What a build made and how good it is.
+    """Result of a build: its files and their accuracy.
 
     Attributes
     ----------
@@ -222,7 +222,7 @@ def build(
 
 def _left_from_before(folder: Path, files: Sequence[Path]) -> list[str]:
     return [
-        f"{path} is of an earlier build: report.json and networks/ no longer tell about it"
+        f"{path} is of an earlier build: report.json and networks/ no longer describe it"
         for path in sorted(folder.glob("*.fmu"))
         if path not in files
     ]

@@ -68,8 +68,8 @@ class FoundParameter(LawParameter):
 class Finding(LawTable):
     """``[[finding]]``: physics that was left out, or a fault of an instrument.
 
-    `mechanism`, `family`, `place` and `says` are for people, see :class:`models.mechanisms.Mechanism`; the other keys
-    are those of :class:`models.terms.term.Term`.
+    The first four keys are for people, see :class:`models.mechanisms.Mechanism`; the others, from `label` on, are those
+    of :class:`models.terms.term.Term`.
     """
 
     mechanism: Text
@@ -112,8 +112,8 @@ class Finding(LawTable):
             E.g. a mechanism at its place
         estimates : mapping of str to (float, float)
             Value and standard error of every parameter of the term
-        mechanism, family, place, says, probability
-            See the class
+
+        The keywords are the fields of the class.
 
         Raises
         ------

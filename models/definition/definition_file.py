@@ -72,7 +72,7 @@ def _filled_from_earlier(tables: Any, key: str, notes: Annotations) -> Any:
             earlier = {t["name"]: t for t in filled if isinstance(t, dict) and isinstance(t.get("name"), str)}
             model = earlier.get(own["like"]) if isinstance(own["like"], str) else None
             if model is None:
-                hint = did_you_mean(str(own["like"]), earlier) if earlier else "; there is none before it"
+                hint = did_you_mean(str(own["like"]), earlier) if earlier else f"; no {key} comes before it"
                 notes.faults.append((f"{key}.{index}.like", f"{shown(own['like'])} is no earlier {key}{hint}"))
             own = {**(model or {}), **{k: v for k, v in own.items() if k != "like"}}
         filled.append(own)

@@ -1,4 +1,4 @@
-"""What changes with time and wear."""
+"""Mechanisms of ageing and wear."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def _life(scale: Scale) -> Parameter:
 
 
 def _turning(n: sp.Expr, exponent: sp.Expr) -> sp.Expr:
-    """What wears while shafts turn, by hours (exponent 0), by revolutions (1) or between."""
+    """Rate of wear while the shafts turn: by hours (exponent 0), by revolutions (1) or between."""
     return sp.tanh(RUNNING * n) * n**exponent
 
 

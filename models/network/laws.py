@@ -91,7 +91,7 @@ class Signals:
 
 @dataclass(frozen=True)
 class NumericLaw:
-    """A law that could not be traced: a callable of :class:`Signals` holding numbers, and the symbol it stands for."""
+    """A law that could not be traced: a callable of numeric :class:`Signals`, and the symbol in its place."""
 
     function: Callable[[Signals], Any]
     stand_in: sp.Symbol
@@ -109,7 +109,7 @@ def trace(law: LawLike, names: Iterable[str], stand_in: str) -> tuple[sp.Expr, N
     names : iterable of str
         Signals and parameters that the network has
     stand_in : str
-        Name of the symbol that stands for the law where it cannot be traced
+        Name of the symbol that replaces the law if it cannot be traced
 
     Returns
     -------
@@ -157,7 +157,7 @@ def trace(law: LawLike, names: Iterable[str], stand_in: str) -> tuple[sp.Expr, N
 
 
 def _agrees(expression: sp.Expr, law: Callable[[Signals], Any], known: Mapping[str, sp.Symbol]) -> bool:
-    """Whether a traced law gives on numbers what its callable gives.
+    """Return True if a traced law and its callable give equal values on numbers.
 
     ``1.0 if s.valve else 0.0`` does not fail on symbols, which all count as true: the trace would lose a branch.
     """
