@@ -114,8 +114,8 @@ def diagnose(
         *([mapping] if mapping else []),
     ]
     refuse_to_replace(given, [output / name for name in names_of_files((*train, *held))])
-    _tell_notes((*train, *held))
-    with atomic_folder(output) as stage, _told() as tell:
+    _print_notes((*train, *held))
+    with atomic_folder(output) as stage, _show_step() as tell:
         found = run(train, definition, holdout=held, false_alarm_rate=false_alarm_rate, catalogue=catalogue,
                     jobs=jobs, progress=tell)  # fmt: skip
         tell("writing the report")
@@ -127,7 +127,7 @@ def diagnose(
         console.out.print(f"wrote {output / name}")
 
 
-def _tell_notes(recordings: Sequence[Recording]) -> None:
+def _print_notes(recordings: Sequence[Recording]) -> None:
     """Print the first notes on cleaned, assumed or unused data; the report has all of them."""
     notes = [f"{recording.name}: {note}" for recording in recordings for note in recording.notes]
     for note in notes[:MOST_NOTES]:
@@ -172,7 +172,7 @@ def _diagnose_fleet(
 
 
 @contextmanager
-def _told() -> Iterator[Callable[[str], None]]:
+def _show_step() -> Iterator[Callable[[str], None]]:
     """Show the current step as a changing line on a terminal, nothing in a pipe."""
     if not console.err.is_terminal:
         yield lambda _: None

@@ -175,7 +175,7 @@ def simulate(
             plot_cycle(picture, columns, title=f"{model.title}: {files[-1].name}", groups=model.groups)
         write_table(output, columns)
     _show(columns)
-    _tell_assumed(columns, cycle)
+    _print_assumed_inputs(columns, cycle)
     _warn_of_domain(columns, model.domain)
     if initial is None:
         _warn_of_start(columns, recorded, model.nodes)
@@ -243,7 +243,7 @@ def _mean_over_time(time: Array, values: Array) -> float:
     return float(np.trapezoid(values, time) / span if span > 0.0 else values[0])
 
 
-def _tell_assumed(columns: Mapping[str, Array], cycle: Cycle) -> None:
+def _print_assumed_inputs(columns: Mapping[str, Array], cycle: Cycle) -> None:
     for name, (column, *_) in COLUMNS.items():
         if name not in cycle.inputs and column in columns:
             console.err.print(f"note: the cycle has no column {column}; {columns[column][0]:g} is assumed")

@@ -83,7 +83,7 @@ def drive_fmu(
         table = _input_table(fmu, cycle)
         fmu.set_parameters(parameters or {})
         fmu.set_initial(float(table[0, fmu.inputs.index("T_ambient")]) if initial is None else initial)
-        return _driven(fmu, cycle.time, table, progress)
+        return _simulate_table(fmu, cycle.time, table, progress)
 
 
 def runs_here(path: Path) -> bool:
@@ -274,7 +274,9 @@ def loaded(path: Path) -> Iterator[LoadedFmu]:
                 fmu.slave.freeInstance()
 
 
-def _driven(fmu: LoadedFmu, time: Array, table: Array, progress: Callable[[int, int], None] | None) -> dict[str, Array]:
+def _simulate_table(
+    fmu: LoadedFmu, time: Array, table: Array, progress: Callable[[int, int], None] | None
+) -> dict[str, Array]:
     slave, n_rows = fmu.slave, len(time)
     slave.setupExperiment(startTime=float(time[0]))
     slave.enterInitializationMode()

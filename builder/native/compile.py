@@ -216,7 +216,7 @@ def _library(sources: Mapping[str, bytes], compiler: Compiler, target: Platform)
     options = [*OPTIONS, *(("-target", target.target) if compiler.is_zig else ()), *target.options]
     folder = _cache_folder()
     if folder is None:
-        return _compiled(sources, compiler, options, target)
+        return _compile(sources, compiler, options, target)
     # zig is the same in every virtual environment, and another compiler's own options are part of its command.
     command = compiler.command[1:] if compiler.is_zig else compiler.command
     made_of = (compiler.version, command, options, sorted(sources.items()))
@@ -225,7 +225,7 @@ def _library(sources: Mapping[str, bytes], compiler: Compiler, target: Platform)
     try:
         return kept.read_bytes()
     except OSError:
-        library = _compiled(sources, compiler, options, target)
+        library = _compile(sources, compiler, options, target)
     try:
         with atomic_file(kept) as file:
             file.write_bytes(library)
@@ -249,7 +249,7 @@ def _cache_folder() -> Path | None:
     return Path(base) / "gearbox-thermal-twin"
 
 
-def _compiled(sources: Mapping[str, bytes], compiler: Compiler, options: Sequence[str], target: Platform) -> bytes:
+def _compile(sources: Mapping[str, bytes], compiler: Compiler, options: Sequence[str], target: Platform) -> bytes:
     with tempfile.TemporaryDirectory(prefix="twin-c-") as folder:
         for name, content in sources.items():
             Path(folder, name).write_bytes(content)

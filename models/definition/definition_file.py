@@ -92,11 +92,11 @@ def _filled_from_named_oil(own: dict[str, Any], notes: Annotations) -> dict[str,
         return own
     open_keys = [key for key in values if key not in own and ALTERNATIVES.get(key) not in own]
     notes.sources.update({f"oil.{key}": oil_notes.source_of(key) for key in open_keys})
-    notes.sources.update(_moved(oil_notes.sources, open_keys))
-    notes.priors.update(_moved(oil_notes.priors, open_keys))
+    notes.sources.update(_rename_oil_paths(oil_notes.sources, open_keys))
+    notes.priors.update(_rename_oil_paths(oil_notes.priors, open_keys))
     return own | {key: values[key] for key in open_keys}
 
 
-def _moved(recorded: Mapping[str, T], keys: Sequence[str]) -> dict[str, T]:
+def _rename_oil_paths(recorded: Mapping[str, T], keys: Sequence[str]) -> dict[str, T]:
     """Return the annotations at or below some keys of an oil, by their paths in the gearbox."""
     return {f"oil.{path}": item for path, item in recorded.items() if path.partition(".")[0] in keys}
