@@ -21,7 +21,7 @@ from models.assembly.gearbox_network import build_network
 from models.assembly.parametric import ParametricLosses, build_parametric_network
 from models.base.errors import InputError, did_you_mean
 from models.definition.definition_file import read_values, refuse
-from models.definition.messages import validated
+from models.definition.messages import validate_section
 from models.definition.parametric_sections import KEY, ParametricDefinition
 from models.definition.sections import Ambient, Bearing, Housing, Node, Oil, Seal, Shaft, Stage, Training
 from models.definition.values_with_source import Annotations, join
@@ -333,8 +333,8 @@ def read_gearbox(text: str, *, file: str) -> Gearbox:
 
 def _validate(values: Mapping[str, Any], *, file: str) -> Definition | ParametricDefinition:
     if KEY in values:
-        return validated(ParametricDefinition, values, file=file)
-    return validated(Definition, values, file=file)
+        return validate_section(ParametricDefinition, values, file=file)
+    return validate_section(Definition, values, file=file)
 
 
 def _leaves(values: Any, path: str = "") -> Iterator[tuple[str, Any]]:

@@ -20,7 +20,7 @@ from models.correction.correction import (
     read_correction,
     write_correction,
 )
-from models.definition.messages import validated
+from models.definition.messages import validate_section
 from models.files.toml_file import parse
 from models.mechanisms import CATALOGUE, Scale, load_mechanisms
 from models.mechanisms.user_files import check_placeable
@@ -131,7 +131,7 @@ def test_any_text_and_number_survives_the_file(
         calibration=[Estimate(name="mesh", value=value, stderr=stderr, unit=says, prior=prior)],
         recordings={name: "f" * 64},
     )
-    assert validated(Correction, parse(correction_text(made), file="x"), file="x") == made
+    assert validate_section(Correction, parse(correction_text(made), file="x"), file="x") == made
 
 
 def test_files_of_version_0_1_0_are_read(tmp_path: Path) -> None:
