@@ -406,7 +406,7 @@ def test_a_mechanism_from_python(tmp_path: Path) -> None:
         ("exp(-worn)", "exec(worn)", "mechanism 'belt_guard'.law: not allowed here: 'exec"),
         ("exp(-worn)", "exp(-worn", "mechanism 'belt_guard'.law: .* is not an expression"),
         ("schema = 1", f"schema = 1\n{AGAIN}", "'belt_guard' is there 2 times"),
-        ("strength * n**exponent", "20 * n**exponent", "its law must hold 'strength'"),
+        ("strength * n**exponent", "20 * n**exponent", "its law must contain 'strength'"),
         ('places = ["oil", "each bearings"]', 'places = ["oill"]', "no place in this gearbox.*'oill'.*oil"),
         ("({place})", "({ort})", "'belt_guard' fails with KeyError: 'ort'"),
         ("n**exponent", "sped**exponent", "'belt_guard' uses 'sped'.*did you mean 'speed'"),
