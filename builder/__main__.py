@@ -1,6 +1,6 @@
 """``python -m builder VERB``: the command line of the gearbox thermal twin.
 
-Exit status 0: done. 2: the input is at fault, one message on stderr says what and what to do. 1: our own fault.
+Exit status 0: done. 2: the input is at fault, one message on stderr names the fault and what to do. 1: our own fault.
 """
 
 from __future__ import annotations

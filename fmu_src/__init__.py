@@ -1,1 +1,1 @@
-"""What runs inside an FMU. The builder copies these files, and those of ``models`` that they import, into it."""
+"""Code that runs inside an FMU. The builder copies these files, and those of ``models`` that they import, into it."""

@@ -1,4 +1,4 @@
-"""What the command line shows: progress on a terminal, tables, and faults of the input as one message."""
+"""Output of the command line: progress on a terminal, tables, and faults of the input as one message."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The verbs and their options. Each verb reads its input, calls one function of the house, and shows what came out."""
+"""The verbs and their options. Each verb reads its input, calls one function of this project, and shows the result."""
 
 from __future__ import annotations
 

@@ -24,10 +24,10 @@ MOST_NOTES = 8  # on the terminal
 
 
 class _HoldoutOfMany(click.Command):
-    """A command whose ``--holdout`` takes every word up to the next option, as its usage line says."""
+    """A command whose ``--holdout`` takes every word up to the next option, as in its usage line."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Give every held-out recording an option of its own, which is what click can read."""
+        """Put a separate ``--holdout`` before every held-out recording, because click reads one value per option."""
         words: list[str] = []
         held_out = False
         for place, word in enumerate(args):
@@ -50,9 +50,9 @@ class _HoldoutOfMany(click.Command):
 @click.option("--holdout", multiple=True, metavar="RECORDING...",
               help="To judge by: all up to the next option.  [default: the last quarter of each]")  # fmt: skip
 @click.option("--mapping", type=click.Path(path_type=Path, dir_okay=False), default=None, metavar="FILE",
-              help="What the columns mean.  [default: <stem>.toml or mapping.toml beside each]")  # fmt: skip
+              help="What the columns mean.  [default: <stem>.toml or mapping.toml next to each]")  # fmt: skip
 @click.option("--mechanisms", type=click.Path(path_type=Path, dir_okay=False), multiple=True,
-              metavar="FILE", help="Your own mechanisms (.toml or .py), beside the catalogue's.")  # fmt: skip
+              metavar="FILE", help="Your own mechanisms (.toml or .py), added to the catalogue's.")  # fmt: skip
 @click.option("--without-mechanism", "without", multiple=True, metavar="NAME",
               help="Leave one of the catalogue's mechanisms out; may be given several times.")  # fmt: skip
 @click.option("--output", type=click.Path(path_type=Path, file_okay=False), default=Path("out/diagnosis"),
@@ -114,8 +114,8 @@ def diagnose(
         *([mapping] if mapping else []),
     ]
     refuse_to_replace(given, [output / name for name in names_of_files((*train, *held))])
-    _tell_notes((*train, *held))
-    with atomic_folder(output) as stage, _told() as tell:
+    _print_notes((*train, *held))
+    with atomic_folder(output) as stage, _show_step() as tell:
         found = run(train, definition, holdout=held, false_alarm_rate=false_alarm_rate, catalogue=catalogue,
                     jobs=jobs, progress=tell)  # fmt: skip
         tell("writing the report")
@@ -127,8 +127,8 @@ def diagnose(
         console.out.print(f"wrote {output / name}")
 
 
-def _tell_notes(recordings: Sequence[Recording]) -> None:
-    """What was cleaned, assumed or not used; all of it stands in the report."""
+def _print_notes(recordings: Sequence[Recording]) -> None:
+    """Print the first notes on cleaned, assumed or unused data; the report has all of them."""
     notes = [f"{recording.name}: {note}" for recording in recordings for note in recording.notes]
     for note in notes[:MOST_NOTES]:
         console.err.print(f"note: {note}")
@@ -172,8 +172,8 @@ def _diagnose_fleet(
 
 
 @contextmanager
-def _told() -> Iterator[Callable[[str], None]]:
-    """What is being done, as a changing line on a terminal, nothing in a pipe."""
+def _show_step() -> Iterator[Callable[[str], None]]:
+    """Show the current step as a changing line on a terminal, nothing in a pipe."""
     if not console.err.is_terminal:
         yield lambda _: None
         return

@@ -33,7 +33,7 @@ Initial = float | Mapping[str, float] | None
 
 @dataclass(frozen=True)
 class Model:
-    """What a cycle is driven with.
+    """Model that a cycle is simulated with.
 
     Attributes
     ----------
@@ -130,7 +130,7 @@ def _fmu(path: Path) -> Model:
               )  # fmt: skip
 @click.option("--mapping", type=click.Path(path_type=Path, dir_okay=False), default=None, metavar="FILE",
               help="What the columns of a recording mean, with --gearbox.  [default: <stem>.toml or mapping.toml "
-                   "beside it]")  # fmt: skip
+                   "next to it]")  # fmt: skip
 @click.option("--correction", type=click.Path(path_type=Path, dir_okay=False), default=None,
               metavar="FILE", help="What diagnose found: the full model carries it.")  # fmt: skip
 @click.option("--plot", type=click.Path(path_type=Path), default=None, metavar="FILE", help="Plot: .png, .pdf or .svg.")
@@ -175,7 +175,7 @@ def simulate(
             plot_cycle(picture, columns, title=f"{model.title}: {files[-1].name}", groups=model.groups)
         write_table(output, columns)
     _show(columns)
-    _tell_assumed(columns, cycle)
+    _print_assumed_inputs(columns, cycle)
     _warn_of_domain(columns, model.domain)
     if initial is None:
         _warn_of_start(columns, recorded, model.nodes)
@@ -202,7 +202,7 @@ def _check_options(files: tuple[Path, ...], gearbox: str | None, mapping: Path |
 
 
 def _read_as_files(files: tuple[Path, ...], gearbox: str | None) -> tuple[Path, ...]:
-    """What is read, a part of a recording as its file."""
+    """Return the files that are read; a part of a recording counts as its file."""
     if gearbox is None:
         return files
     from diagnosis.recordings.as_cycle import files_of
@@ -211,7 +211,7 @@ def _read_as_files(files: tuple[Path, ...], gearbox: str | None) -> tuple[Path, 
 
 
 def _check_outputs(output: Path, plot: Path | None, inputs: list[Path]) -> None:
-    """Refuse what cannot be written: told before the work, not after it."""
+    """Refuse outputs that cannot be written, before the work and not after it."""
     if plot is not None and plot.suffix.lower() not in PLOTS:
         raise InputError(f"{plot}: plots are written as .png, .pdf or .svg")
     outputs = [output] if plot is None else [output, plot]
@@ -243,7 +243,7 @@ def _mean_over_time(time: Array, values: Array) -> float:
     return float(np.trapezoid(values, time) / span if span > 0.0 else values[0])
 
 
-def _tell_assumed(columns: Mapping[str, Array], cycle: Cycle) -> None:
+def _print_assumed_inputs(columns: Mapping[str, Array], cycle: Cycle) -> None:
     for name, (column, *_) in COLUMNS.items():
         if name not in cycle.inputs and column in columns:
             console.err.print(f"note: the cycle has no column {column}; {columns[column][0]:g} is assumed")
@@ -256,7 +256,7 @@ def _warn_of_domain(columns: Mapping[str, Array], domain: str) -> None:
 
 
 def _warn_of_start(columns: Mapping[str, Array], recorded: RecordedStart, nodes: tuple[str, ...]) -> None:
-    """Who drives a recording and says nothing of its start may take the cold start for the model's error."""
+    """Warn if no start is given and the recording starts warm: the cold start would look like a model error."""
     off = {name: abs(T - columns[f"T_{name}_degC"][0]) for name, T in recorded.temperatures.items() if name in nodes}
     worst = max(off, key=lambda name: off[name], default=None)
     if worst is None or off[worst] <= COLD_START_K:

@@ -83,17 +83,17 @@ def drive_fmu(
         table = _input_table(fmu, cycle)
         fmu.set_parameters(parameters or {})
         fmu.set_initial(float(table[0, fmu.inputs.index("T_ambient")]) if initial is None else initial)
-        return _driven(fmu, cycle.time, table, progress)
+        return _simulate_table(fmu, cycle.time, table, progress)
 
 
 def runs_here(path: Path) -> bool:
-    """Whether an FMU has a binary for this machine."""
+    """Return True if an FMU has a binary for this machine."""
     with ZipFile(path) as archive:
         return any(name.startswith(f"binaries/{host_platform()}/") for name in archive.namelist())
 
 
 def fmu_inputs(path: Path) -> tuple[str, ...]:
-    """Columns of a cycle that an FMU takes beside the usual ones (for :func:`models.files.cycle_file.read_cycle`).
+    """Return the columns of a cycle that only this FMU takes (for :func:`models.files.cycle_file.read_cycle`).
 
     Raises
     ------
@@ -225,7 +225,7 @@ class LoadedFmu:
 
 @contextmanager
 def loaded(path: Path) -> Iterator[LoadedFmu]:
-    """An FMU of this project, extracted to a folder of its own and instantiated; both are gone at the end.
+    """An FMU of this project, extracted to a temporary folder and instantiated; both are removed at the end.
 
     Raises
     ------
@@ -274,7 +274,9 @@ def loaded(path: Path) -> Iterator[LoadedFmu]:
                 fmu.slave.freeInstance()
 
 
-def _driven(fmu: LoadedFmu, time: Array, table: Array, progress: Callable[[int, int], None] | None) -> dict[str, Array]:
+def _simulate_table(
+    fmu: LoadedFmu, time: Array, table: Array, progress: Callable[[int, int], None] | None
+) -> dict[str, Array]:
     slave, n_rows = fmu.slave, len(time)
     slave.setupExperiment(startTime=float(time[0]))
     slave.enterInitializationMode()

@@ -1,1 +1,1 @@
-"""What all FMUs share: signals, model description, documentation, packaging."""
+"""Parts that all FMUs share: signals, model description, documentation, packaging."""

@@ -1,4 +1,4 @@
-"""What an FMU carries for people: ``documentation/``, its licences, the reference run and an icon."""
+"""Documentation inside an FMU: ``documentation/``, its licences, the reference run and an icon."""
 
 from __future__ import annotations
 

@@ -26,7 +26,7 @@ LOG_CATEGORIES: Mapping[str, str] = {
 
 @dataclass(frozen=True, kw_only=True)
 class Identity:
-    """What a model description says beside its signals.
+    """Content of a model description other than its signals.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""The table of signals: everything that an FMU takes and shows, said once.
+"""The table of signals: everything that an FMU takes and shows, in one place.
 
 From this table come the model description of every kind of FMU, the value references inside it, the columns that
 driving one gives, and the nomenclature in the documentation. Signals are in SI units at the FMI interface; the network
@@ -88,7 +88,7 @@ class Signal:
 
     @property
     def is_boolean(self) -> bool:
-        """Whether it is a Boolean; all others are Real."""
+        """True if the signal is a Boolean; all others are Real."""
         return self.role in ("in_domain", "initial_uniform")
 
     @property

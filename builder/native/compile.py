@@ -53,7 +53,7 @@ class Platform:
 
     @property
     def options(self) -> tuple[str, ...]:
-        """What this platform's linker wants."""
+        """Options of this platform's linker."""
         if self.suffix == ".so":
             return ("-fPIC", "-Wl,--no-undefined", "-Wl,--build-id=none", "-lm")
         return ("-fPIC",) if self.suffix == ".dylib" else ()
@@ -84,14 +84,14 @@ class Compiler:
 
 @dataclass(frozen=True)
 class Binaries:
-    """Shared libraries by the folder of their platform, and a line on what was left out, or ``""``."""
+    """Shared libraries by the folder of their platform, and a line on platforms that are missing, or ``""``."""
 
     libraries: Mapping[str, bytes]
     note: str
 
 
 def host_platform() -> str | None:
-    """The folder of this machine's platform; None where there is none."""
+    """Return the folder of this machine's platform; None if the platform is not known."""
     machine = {"amd64": "x86_64", "arm64": "aarch64"}.get(platform.machine().lower(), platform.machine().lower())
     system = {"linux": "linux", "darwin": "macos", "windows": "windows"}.get(platform.system().lower(), "")
     found = [p.folder for p in PLATFORMS.values() if p.target.startswith(f"{machine}-{system}")]
@@ -99,12 +99,12 @@ def host_platform() -> str | None:
 
 
 def chosen_platforms(text: str) -> tuple[str, ...]:
-    """What ``--platforms`` asks for: ``all``, ``host``, or folders separated by commas.
+    """Return the platforms that ``--platforms`` names: ``all``, ``host``, or folders separated by commas.
 
     Raises
     ------
     InputError
-        If a platform is not known, or this machine is none.
+        If a platform, or that of this machine for ``host``, is not known.
 
     Examples
     --------
@@ -129,7 +129,7 @@ def chosen_platforms(text: str) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class Plan:
-    """Which platforms are built, by which compiler, and a line on what is left out, or ``""``."""
+    """Platforms to build, their compiler, and a line on platforms that are missing, or ``""``."""
 
     compiler: Compiler
     platforms: tuple[str, ...]
@@ -216,7 +216,7 @@ def _library(sources: Mapping[str, bytes], compiler: Compiler, target: Platform)
     options = [*OPTIONS, *(("-target", target.target) if compiler.is_zig else ()), *target.options]
     folder = _cache_folder()
     if folder is None:
-        return _compiled(sources, compiler, options, target)
+        return _compile(sources, compiler, options, target)
     # zig is the same in every virtual environment, and another compiler's own options are part of its command.
     command = compiler.command[1:] if compiler.is_zig else compiler.command
     made_of = (compiler.version, command, options, sorted(sources.items()))
@@ -225,7 +225,7 @@ def _library(sources: Mapping[str, bytes], compiler: Compiler, target: Platform)
     try:
         return kept.read_bytes()
     except OSError:
-        library = _compiled(sources, compiler, options, target)
+        library = _compile(sources, compiler, options, target)
     try:
         with atomic_file(kept) as file:
             file.write_bytes(library)
@@ -249,7 +249,7 @@ def _cache_folder() -> Path | None:
     return Path(base) / "gearbox-thermal-twin"
 
 
-def _compiled(sources: Mapping[str, bytes], compiler: Compiler, options: Sequence[str], target: Platform) -> bytes:
+def _compile(sources: Mapping[str, bytes], compiler: Compiler, options: Sequence[str], target: Platform) -> bytes:
     with tempfile.TemporaryDirectory(prefix="twin-c-") as folder:
         for name, content in sources.items():
             Path(folder, name).write_bytes(content)

@@ -124,7 +124,7 @@ class _Data:
         texts = [value if isinstance(value, str) else number(value) if isinstance(value, float) else str(value)
                  for value in values]  # fmt: skip
         self.declared.append(f"extern const {kind} {name}[{max(len(texts), 1)}];")
-        self.defined.append(f"const {kind} {name}[{max(len(texts), 1)}] = {{{_wrapped(texts or ['0'])}}};")
+        self.defined.append(f"const {kind} {name}[{max(len(texts), 1)}] = {{{_wrap(texts or ['0'])}}};")
 
     def files(self) -> dict[str, str]:
         header = DATA_HEADER.format(defines="\n".join(self.defines), declared="\n".join(self.declared))
@@ -135,7 +135,7 @@ class _Data:
         }
 
 
-def _wrapped(texts: Sequence[str]) -> str:
+def _wrap(texts: Sequence[str]) -> str:
     lines, line = [], ""
     for text in texts:
         if len(line) + len(text) > 110:
@@ -338,7 +338,7 @@ class _Blocks:
             self.features.add(trained, use, kind, column)
         self.largest = max(self.largest, _largest_sum(trained))
         parts = _parts(trained)
-        n_passed = _filled(trained.passed.T).shape[1]
+        n_passed = _pad_columns(trained.passed.T).shape[1]
         for index, (first, second, outputs) in enumerate(parts):
             name = f"{trained.name}_{index}" if len(parts) > 1 else trained.name
             name = "".join(c if c.isalnum() else "_" for c in name).upper()
@@ -356,10 +356,10 @@ class _Blocks:
     def _weights(
         self, trained: Network, name: str, first: Indices, second: Indices, outputs: Indices
     ) -> tuple[int, int]:
-        w_1, b_1 = _filled(trained.weights[0][:, first]), _filled(trained.biases[0][None, first])
-        w_2 = _filled(_filled(trained.weights[1][np.ix_(first, second)].T).T)
-        b_2 = _filled(trained.biases[1][None, second])
-        w_3 = _filled(trained.weights[2][np.ix_(second, outputs)].T)
+        w_1, b_1 = _pad_columns(trained.weights[0][:, first]), _pad_columns(trained.biases[0][None, first])
+        w_2 = _pad_columns(_pad_columns(trained.weights[1][np.ix_(first, second)].T).T)
+        b_2 = _pad_columns(trained.biases[1][None, second])
+        w_3 = _pad_columns(trained.weights[2][np.ix_(second, outputs)].T)
         if name not in self.written:
             self.written.add(name)
             for array, values in {
@@ -369,10 +369,10 @@ class _Blocks:
                 "B2": -b_2,
                 "W3": w_3,
                 "B3": trained.biases[2][outputs],
-                "PASSED": _filled(trained.passed[:, outputs].T),
+                "PASSED": _pad_columns(trained.passed[:, outputs].T),
             }.items():
                 self.data.defined.append(
-                    f"static const double {name}_{array}[] = {{{_wrapped([number(v) for v in np.ravel(values)])}}};"
+                    f"static const double {name}_{array}[] = {{{_wrap([number(v) for v in np.ravel(values)])}}};"
                 )
         return w_1.shape[1], w_2.shape[1]
 
@@ -410,7 +410,7 @@ def _parts(trained: Network) -> list[tuple[Indices, Indices, Indices]]:
     return [(first, second, outputs) for first, second, outputs in parts if len(outputs)]
 
 
-def _filled(matrix: Array) -> Array:
+def _pad_columns(matrix: Array) -> Array:
     """A matrix with columns of zeros up to a multiple of the lanes."""
     return np.pad(matrix, [(0, 0), (0, -matrix.shape[1] % LANES)])
 

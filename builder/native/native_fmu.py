@@ -95,7 +95,7 @@ def build_native_fmu(
     network : ThermalNetwork or None
         The thermal network, where it is neither the gearbox's nominal nor the corrected one
     correction : Correction or None
-        What a diagnosis found; the FMU has it and says so
+        Findings of a diagnosis; the FMU contains them and its documentation lists them
     platforms : str
         See :func:`builder.native.compile.compile_libraries`
 
@@ -185,9 +185,9 @@ def _variable(signal: Signal) -> str:
     low, high = max(signal.minimum, -float_info.max), min(signal.maximum, float_info.max)
     numbers = (float(signal.start or 0.0), low, high, signal.nominal or 1.0)
     kind = "BOOLEAN" if signal.is_boolean else "REAL"
-    name, unit = (_quoted(text) for text in (signal.name, signal.unit or ""))
+    name, unit = (_quote(text) for text in (signal.name, signal.unit or ""))
     return f"{{{name}, {unit}, {kind}, {settable}, {', '.join(number(n) for n in numbers)}}}"
 
 
-def _quoted(text: str) -> str:
+def _quote(text: str) -> str:
     return json.dumps(text).replace("?", "\\?")  # C99 has trigraphs

@@ -14,7 +14,7 @@ from itertools import combinations
 
 @dataclass(frozen=True, kw_only=True)
 class Structure:
-    """What is linked to what.
+    """Couplings of the parts of a network.
 
     Attributes
     ----------
@@ -33,8 +33,8 @@ class Structure:
     def elimination(self) -> tuple[tuple[int, tuple[int, ...]], ...]:
         """Parts in the order of their elimination, each with the later ones that it is coupled to by then.
 
-        The part whose elimination couples the fewest others anew goes first (minimum fill): the factors stay sparse,
-        and the chain of numbers that wait for each other short.
+        The part whose elimination adds the fewest couplings goes first (minimum fill): the factors stay sparse, and the
+        chain of numbers that wait for each other short.
         """
         coupled: dict[int, set[int]] = {part: set() for part in range(self.n_parts)}
         for a, b in self.links:
@@ -147,5 +147,5 @@ def _pair(a: int, b: int) -> tuple[int, int]:
 
 
 def _fill(coupled: Mapping[int, Set[int]], pivot: int) -> int:
-    """How many pairs of parts the elimination of a part couples anew."""
+    """Return the number of couplings that the elimination of a part adds."""
     return sum(b not in coupled[a] for a, b in combinations(coupled[pivot], 2))

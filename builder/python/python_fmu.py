@@ -82,7 +82,7 @@ def build_python_fmu(
     network : ThermalNetwork or None
         The thermal network, where it is neither the gearbox's nominal nor the corrected one
     correction : Correction or None
-        What a diagnosis found; the FMU has it and says so
+        Findings of a diagnosis; the FMU contains them and its documentation lists them
 
     Returns
     -------

@@ -208,7 +208,7 @@ def published_numbers(study: Study) -> Iterator[Part]:
     missed = [row.quantity for row in rows if not row.met]
     yield (
         "The paper prints no results that could be compared one by one; these sources do. tests/validation holds them"
-        " as tests. Tolerances are those of the sources: half a unit of the last printed digit unless the table says"
+        " as tests. Tolerances are those of the sources: half a unit of the last printed digit unless the table states"
         " more."
     )
     yield Check(

@@ -102,7 +102,7 @@ def _definition(gearbox: Gearbox, key: str, rows: Sequence[Row]) -> Iterator[Par
         f"{met} of them are those of the definition" + (f"; not: {', '.join(wrong)}." if wrong else "."),
         not wrong,
         {"printed": len(rows), "equal": met},
-        "The definition departs from the print; its file says why.",
+        "The definition departs from the print; its file states why.",
     )
     yield Table(key, ("quantity", "printed", "ours", "where ours comes from"), shown, texts=True)
 

@@ -93,7 +93,7 @@ def mixed_hypercube(
     for column, (kind, (low, high)) in enumerate(zip(dense, low_high, strict=True)):
         switch = switches.index(column) if kind == "log" else len(switches)
         below = low * (low / high) ** EDGE if kind == "log" else low
-        spaced = np.maximum(_spaced(kind, unit[:, column], below, high, viscosity), low)
+        spaced = np.maximum(_place_in_range(kind, unit[:, column], below, high, viscosity), low)
         uniform = low + unit[:, column] * (high - low)
         points[:, column] = np.where(part >> switch & 1 == 0, spaced, uniform)
     return points
@@ -136,7 +136,7 @@ def _unit_hypercube(count: int, inputs: int, seed: int) -> Array:
     return np.asarray(qmc.LatinHypercube(inputs, rng=np.random.default_rng([seed, 0])).random(count))
 
 
-def _spaced(kind: Feature, unit: Array, low: float, high: float, viscosity: tuple[float, float]) -> Array:
+def _place_in_range(kind: Feature, unit: Array, low: float, high: float, viscosity: tuple[float, float]) -> Array:
     """Points between the bounds that are uniform in a feature that is monotonous there."""
     grid = np.linspace(low, high, GRID) if kind != "log" else np.geomspace(low, high, GRID)
     value = feature_values(kind, grid, viscosity)

@@ -72,7 +72,7 @@ class Preset:
         ends; without, min-max scaling and uniform points, as in the paper
     hidden : mapping of str to (int, int)
         Units of the hidden layers by kind of network (mesh, no_load, bearing); where a kind is not named, by output
-        (mesh_sliding ...): every output then has hidden units of its own, which fit it better for the same work
+        (mesh_sliding ...): every output then has separate hidden units, which fit it better for the same work
     max_iter, starts, start_iterations, patience, tolerance
         See :class:`builder.surrogate.levenberg_marquardt.LevenbergMarquardtRegressor`
     domain : Domain, optional
@@ -128,7 +128,7 @@ def preset_named(name: str) -> Preset:
     Raises
     ------
     InputError
-        If there is none of that name.
+        If no preset has that name.
     """
     if name not in PRESETS:
         raise InputError(f"there is no training preset {name!r}{did_you_mean(name, PRESETS)}")

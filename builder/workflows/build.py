@@ -51,7 +51,7 @@ class CycleErrors:
 
 @dataclass(frozen=True, kw_only=True)
 class BuildReport:
-    """What a build made and how good it is.
+    """Result of a build: its files and their accuracy.
 
     Attributes
     ----------
@@ -177,23 +177,23 @@ def build(
     network = corrected_network(gearbox, correction)
     seconds: dict[str, float] = {}
     with atomic_folder(folder) as stage:
-        with _timed("train", seconds), _spoken() as tell:
+        with _measure_time("train", seconds), _show_messages() as tell:
             training = train_surrogate(
                 gearbox, preset=preset, samples=samples, seed=seed,
                 jobs=jobs, dask=dask, progress=tell,
             )  # fmt: skip
         fmus = {kind: stage / f"{name}{SUFFIX[kind]}.fmu" for kind in kinds}
-        with _timed("export", seconds):
+        with _measure_time("export", seconds):
             networks = export_onnx(training, stage / "networks", version=project_version())
         for kind, path in fmus.items():
-            with _timed(f"package, {kind} FMU", seconds), _spoken() as tell:
+            with _measure_time(f"package, {kind} FMU", seconds), _show_messages() as tell:
                 tell(f"packaging the {kind} FMU")
                 if kind == "python":
                     build_python_fmu(gearbox, training, networks, path, correction=correction)
                 else:
                     build_native_fmu(gearbox, training, networks, path, platforms=platforms, correction=correction)
         cycle, losses = reference_cycle(gearbox), gearbox.losses()
-        with _timed("reference cycle, full model", seconds), console.progress_bar("full model") as progress:
+        with _measure_time("reference cycle, full model", seconds), console.progress_bar("full model") as progress:
             full = network.simulate(cycle, losses=losses, initial=COLD_START, progress=progress).columns()
         cycles = {}
         for kind, path in fmus.items():
@@ -203,7 +203,7 @@ def build(
                 )
                 continue
             label = f"{kind} FMU in FMPy"
-            with _timed(f"reference cycle, {label}", seconds), console.progress_bar(label) as progress:
+            with _measure_time(f"reference cycle, {label}", seconds), console.progress_bar(label) as progress:
                 driven = drive_fmu(path, cycle, initial=COLD_START, progress=progress)
             cycles[path.name] = cycle_errors(driven, full)
             write_table(stage / f"drive_cycle{SUFFIX[kind]}.csv", driven)
@@ -222,7 +222,7 @@ def build(
 
 def _left_from_before(folder: Path, files: Sequence[Path]) -> list[str]:
     return [
-        f"{path} is of an earlier build: report.json and networks/ no longer tell about it"
+        f"{path} is of an earlier build: report.json and networks/ no longer describe it"
         for path in sorted(folder.glob("*.fmu"))
         if path not in files
     ]
@@ -242,14 +242,14 @@ def cycle_errors(driven: Mapping[str, Array], reference: Mapping[str, Array]) ->
 
 
 @contextmanager
-def _timed(step: str, seconds: dict[str, float]) -> Iterator[None]:
+def _measure_time(step: str, seconds: dict[str, float]) -> Iterator[None]:
     begin = time.perf_counter()
     yield
     seconds[step] = time.perf_counter() - begin
 
 
 @contextmanager
-def _spoken() -> Iterator[Any]:
+def _show_messages() -> Iterator[Any]:
     """Stages of long work as a changing line on a terminal, nothing in a pipe."""
     if not console.err.is_terminal:
         yield lambda _: None

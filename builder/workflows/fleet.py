@@ -277,7 +277,7 @@ def show_summary(rows: Sequence[Row]) -> None:
     """Print the summary."""
     console.table(
         "Fleet; errors of held-out temperatures in K",
-        ["gearbox", "verdict", "found", "heat W", "as delivered", "calibrated", "with what was found"],
+        ["gearbox", "verdict", "found", "heat W", "as delivered", "calibrated", "with findings"],
         [
             [r.gearbox, r.verdict.replace("_", " "), r.found, _number(r.heat_W, 1),
              *(_number(v, 2) for v in (r.rmse_before_K, r.rmse_calibrated_K, r.rmse_after_K))]

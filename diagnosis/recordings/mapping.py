@@ -33,7 +33,7 @@ from pydantic import Field, field_validator, model_validator
 
 from diagnosis.recordings.quantities import AUXILIARY, IGNORE, UNITS, dimension_of, looks_like_kelvin, range_of
 from models.base.errors import InputError, did_you_mean
-from models.definition.messages import validated
+from models.definition.messages import validate_section
 from models.definition.sections import Name, Section
 from models.files import toml_file
 from models.files.table_file import TextForm
@@ -174,7 +174,7 @@ def read_mapping(path: Path) -> RecordingMapping:
     values = toml_file.parse(toml_file.read_text(path), file=str(path))
     if "schema" not in values:
         raise InputError(f"{path}: has no 'schema = {SCHEMA}', so it is not known to be a mapping file of this version")
-    return validated(RecordingMapping, _with_tuples(values), file=str(path))
+    return validate_section(RecordingMapping, _with_tuples(values), file=str(path))
 
 
 def _with_tuples(node: Any) -> Any:
@@ -206,7 +206,7 @@ def mapping_of_definition(values: Mapping[str, Any]) -> RecordingMapping:
     """
     if not values:
         return RecordingMapping()
-    return validated(RecordingMapping, _with_tuples(dict(values)), file="[recording] of the gearbox definition")
+    return validate_section(RecordingMapping, _with_tuples(dict(values)), file="[recording] of the gearbox definition")
 
 
 def reduced_to(mapping: RecordingMapping, columns: Iterable[str]) -> RecordingMapping:

@@ -40,14 +40,14 @@ def load_twin(resources: Path, digests: Mapping[str, str], laws: Mapping[str, An
     DamagedFmu
         If a file is missing, damaged or of another build, or onnxruntime cannot run a network.
     """
-    files = {name: _checked(resources / name, digest) for name, digest in digests.items()}
+    files = {name: _read_verified(resources / name, digest) for name, digest in digests.items()}
     data = json.loads(files[DATA])
     losses = OnnxLosses.from_dict(data["losses"])
     evaluators = {network.name: _session(f"{network.name}.onnx", files) for network in losses.networks}
     return Twin(data, laws, losses.with_evaluators(evaluators))
 
 
-def _checked(path: Path, digest: str) -> bytes:
+def _read_verified(path: Path, digest: str) -> bytes:
     try:
         content = path.read_bytes()
     except OSError as error:

@@ -117,7 +117,7 @@ class GearboxSlave(Fmi2Slave):  # type: ignore[misc,unused-ignore]
                 self.log(text, Fmi2Status.error)
 
     def _unknown(self, vrs: list[int]) -> bool:
-        """Whether a value reference is none of ours: an exception would be fatal, and the next call kill the host."""
+        """Log and return True if a value reference is unknown; an exception would be fatal to the host."""
         unknown = [vr for vr in vrs if not 0 <= vr < len(self._twin.slots)]
         if unknown:
             self.log(f"there is no variable with value reference {unknown[0]}; the call does nothing", Fmi2Status.error)

@@ -25,7 +25,7 @@ TIME_TOLERANCE = 1e-6  # of the time itself, where a host's clock and ours are c
 
 
 class Refused(Exception):
-    """What the host asked for cannot be done; the text says why and what to do. The state is as before."""
+    """Refusal of a call of the host; the text gives the reason and what to do. The state is as before."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,7 +76,7 @@ class Slot:
 
 
 class Losses(Protocol):
-    """What the twin needs of its losses; :class:`models.portable.surrogate.SurrogateLosses` has it too."""
+    """Interface of the losses to the twin; :class:`models.portable.surrogate.SurrogateLosses` has it too."""
 
     @property
     def temperature_nodes(self) -> tuple[str, ...]:

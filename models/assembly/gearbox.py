@@ -21,7 +21,7 @@ from models.assembly.gearbox_network import build_network
 from models.assembly.parametric import ParametricLosses, build_parametric_network
 from models.base.errors import InputError, did_you_mean
 from models.definition.definition_file import read_values, refuse
-from models.definition.messages import validated
+from models.definition.messages import validate_section
 from models.definition.parametric_sections import KEY, ParametricDefinition
 from models.definition.sections import Ambient, Bearing, Housing, Node, Oil, Seal, Shaft, Stage, Training
 from models.definition.values_with_source import Annotations, join
@@ -218,11 +218,11 @@ class Gearbox:
         values: Any = self.values
         for path, value in changes.items():
             try:
-                values = _replaced(values, path.split("."), _plain(value))
+                values = _replace_value(values, path.split("."), _plain(value))
             except LookupError:
                 hint = did_you_mean(path, self.leaves)
                 raise InputError(f"{self.file}: {path} is not a value of this gearbox{hint}") from None
-        definition = _validated(values, file=self.file)
+        definition = _validate(values, file=self.file)
         changed = dict.fromkeys(changes, CHANGED_SOURCE)
         notes = Annotations(sources={**self.sources, **changed}, priors=dict(self.priors))
         given = {leaf for leaf, _ in _leaves(values) if any(f"{leaf}.".startswith(f"{path}.") for path in changes)}
@@ -324,17 +324,17 @@ def read_gearbox(text: str, *, file: str) -> Gearbox:
         With the faults of the text, one per line.
     """
     values, notes = read_values(text, file=file)
-    definition = _validated(values, file=file)
+    definition = _validate(values, file=file)
     gearbox = Gearbox(definition, notes, frozenset(path for path, _ in _leaves(values)), file)
     whole = [path for path in notes.priors if isinstance(gearbox.leaves[path], int)]
     refuse(((path, "is a whole number and cannot have an sd") for path in whole), values, file=file)
     return gearbox
 
 
-def _validated(values: Mapping[str, Any], *, file: str) -> Definition | ParametricDefinition:
+def _validate(values: Mapping[str, Any], *, file: str) -> Definition | ParametricDefinition:
     if KEY in values:
-        return validated(ParametricDefinition, values, file=file)
-    return validated(Definition, values, file=file)
+        return validate_section(ParametricDefinition, values, file=file)
+    return validate_section(Definition, values, file=file)
 
 
 def _leaves(values: Any, path: str = "") -> Iterator[tuple[str, Any]]:
@@ -349,7 +349,7 @@ def _leaves(values: Any, path: str = "") -> Iterator[tuple[str, Any]]:
         yield path, values
 
 
-def _replaced(values: Any, keys: Sequence[str], new: Any) -> Any:
+def _replace_value(values: Any, keys: Sequence[str], new: Any) -> Any:
     """Return nested tables and lists with one value exchanged, or with one more key in an existing table.
 
     Raises
@@ -361,10 +361,10 @@ def _replaced(values: Any, keys: Sequence[str], new: Any) -> Any:
         return new
     key, *below = keys
     if isinstance(values, Mapping) and (key in values or not below):
-        return {**values, key: _replaced(values.get(key), below, new)}
+        return {**values, key: _replace_value(values.get(key), below, new)}
     if isinstance(values, tuple) and key.isdecimal() and int(key) < len(values):
         index = int(key)
-        return (*values[:index], _replaced(values[index], below, new), *values[index + 1 :])
+        return (*values[:index], _replace_value(values[index], below, new), *values[index + 1 :])
     raise LookupError(key)
 
 

@@ -10,7 +10,7 @@ LONGEST_SHOWN = 60
 
 
 class InputError(ValueError):
-    """What the user gave cannot be used; the message says what, where, which limit, and what to do.
+    """Error in the user's input; the message names the input, its place, the limit, and what to do.
 
     The command line prints the message and exits with status 2.
     """

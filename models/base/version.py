@@ -26,7 +26,7 @@ def project_version() -> str:
 
 
 def _checkout() -> dict[str, Any]:
-    """The table of the project that this runs from; empty where it is installed, whatever lies beside it there."""
+    """Return the project table of the checkout; empty if installed, even if a foreign pyproject.toml lies there."""
     file = CHECKOUT / "pyproject.toml"
     project = tomllib.loads(file.read_text(encoding="utf-8")).get("project", {}) if file.is_file() else {}
     return project if project.get("name") == DISTRIBUTION else {}

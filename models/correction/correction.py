@@ -18,7 +18,7 @@ from pydantic import Field, StringConstraints, model_validator
 from models.assembly.gearbox import Gearbox
 from models.base.atomic_write import atomic_file
 from models.base.errors import InputError, did_you_mean
-from models.definition.messages import validated
+from models.definition.messages import validate_section
 from models.definition.sections import Name, OneOrMore, Section, Text
 from models.files.toml_file import parse_schema_1, read_text
 from models.network.laws import Parameter
@@ -68,8 +68,8 @@ class FoundParameter(LawParameter):
 class Finding(LawTable):
     """``[[finding]]``: physics that was left out, or a fault of an instrument.
 
-    `mechanism`, `family`, `place` and `says` are for people, see :class:`models.mechanisms.Mechanism`; the other keys
-    are those of :class:`models.terms.term.Term`.
+    The first four keys are for people, see :class:`models.mechanisms.Mechanism`; the others, from `label` on, are those
+    of :class:`models.terms.term.Term`.
     """
 
     mechanism: Text
@@ -112,8 +112,8 @@ class Finding(LawTable):
             E.g. a mechanism at its place
         estimates : mapping of str to (float, float)
             Value and standard error of every parameter of the term
-        mechanism, family, place, says, probability
-            See the class
+
+        The keywords are the fields of the class.
 
         Raises
         ------
@@ -317,7 +317,9 @@ def read_correction(path: str | Path, network: ThermalNetwork, *, made_for: Gear
         network; with file, key and reason.
     """
     file = str(path)
-    correction = validated(Correction, parse_schema_1(read_text(Path(path)), file=file, kind="corrections"), file=file)
+    correction = validate_section(
+        Correction, parse_schema_1(read_text(Path(path)), file=file, kind="corrections"), file=file
+    )
     try:
         if made_for is not None:
             correction.check_made_for(made_for)

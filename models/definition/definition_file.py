@@ -72,7 +72,7 @@ def _filled_from_earlier(tables: Any, key: str, notes: Annotations) -> Any:
             earlier = {t["name"]: t for t in filled if isinstance(t, dict) and isinstance(t.get("name"), str)}
             model = earlier.get(own["like"]) if isinstance(own["like"], str) else None
             if model is None:
-                hint = did_you_mean(str(own["like"]), earlier) if earlier else "; there is none before it"
+                hint = did_you_mean(str(own["like"]), earlier) if earlier else f"; no {key} comes before it"
                 notes.faults.append((f"{key}.{index}.like", f"{shown(own['like'])} is no earlier {key}{hint}"))
             own = {**(model or {}), **{k: v for k, v in own.items() if k != "like"}}
         filled.append(own)
@@ -92,11 +92,11 @@ def _filled_from_named_oil(own: dict[str, Any], notes: Annotations) -> dict[str,
         return own
     open_keys = [key for key in values if key not in own and ALTERNATIVES.get(key) not in own]
     notes.sources.update({f"oil.{key}": oil_notes.source_of(key) for key in open_keys})
-    notes.sources.update(_moved(oil_notes.sources, open_keys))
-    notes.priors.update(_moved(oil_notes.priors, open_keys))
+    notes.sources.update(_rename_oil_paths(oil_notes.sources, open_keys))
+    notes.priors.update(_rename_oil_paths(oil_notes.priors, open_keys))
     return own | {key: values[key] for key in open_keys}
 
 
-def _moved(recorded: Mapping[str, T], keys: Sequence[str]) -> dict[str, T]:
+def _rename_oil_paths(recorded: Mapping[str, T], keys: Sequence[str]) -> dict[str, T]:
     """Return the annotations at or below some keys of an oil, by their paths in the gearbox."""
     return {f"oil.{path}": item for path, item in recorded.items() if path.partition(".")[0] in keys}

@@ -39,7 +39,7 @@ NAMES = ("name", "label")  # keys that name the entries of lists
 LONGEST_NAME = 40
 
 
-def validated(section: type[S], values: Any, *, file: str) -> S:
+def validate_section(section: type[S], values: Any, *, file: str) -> S:
     """Return the validated table.
 
     Parameters
@@ -59,10 +59,10 @@ def validated(section: type[S], values: Any, *, file: str) -> S:
     try:
         return section.model_validate(values)
     except ValidationError as error:
-        raise explained(error, values, file=file) from error
+        raise input_error(error, values, file=file) from error
 
 
-def explained(error: ValidationError, values: Any, *, file: str) -> InputError:
+def input_error(error: ValidationError, values: Any, *, file: str) -> InputError:
     """Return the message about a table that is not valid, for the person who wrote the file."""
     lines = []
     for detail in error.errors(include_url=False):

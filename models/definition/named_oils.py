@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 from models.base.errors import InputError, did_you_mean
-from models.definition.messages import validated
+from models.definition.messages import validate_section
 from models.definition.sections import Fluid
 from models.definition.values_with_source import Annotations, strip
 from models.files.toml_file import known_names, packaged, parse, read_text
@@ -54,7 +54,7 @@ def named_oil(name: str) -> Fluid:
     >>> named_oil("M100").limiting_shear_coefficient
     0.047
     """
-    return validated(Fluid, read_oil(name)[0], file=f"{name}.toml")
+    return validate_section(Fluid, read_oil(name)[0], file=f"{name}.toml")
 
 
 def lubricant(fluid: Fluid) -> Oil:

@@ -111,7 +111,7 @@ def column_names(path: Path, separator: str = PLAIN.separator) -> tuple[str, ...
             from pyarrow import parquet
 
             return tuple(parquet.read_schema(path).names)
-        with _opened(path) as text:
+        with _open_text(path) as text:
             return tuple(_fields(_Lines(path, text).next_filled(), separator))
     except (InputError, ImportError, csv.Error, *UNREADABLE):
         return ()
@@ -184,7 +184,7 @@ def _check_names(path: Path, names: list[str]) -> None:
 _EMPTY = "is empty; a header line with column names and rows are needed"
 
 
-def _opened(path: Path) -> io.TextIOWrapper:
+def _open_text(path: Path) -> io.TextIOWrapper:
     file = gzip.open(path, "rb") if kind_of(path) == ".csv.gz" else path.open("rb")  # noqa: SIM115  closed with the text
     return io.TextIOWrapper(cast(IO[bytes], file), encoding="utf-8-sig", errors="surrogateescape")
 
@@ -242,7 +242,7 @@ def _fields(line: str, separator: str) -> list[str]:
 
 
 def _text_chunks(path: Path, form: TextForm) -> Iterator[pd.DataFrame]:
-    with _opened(path) as text:
+    with _open_text(path) as text:
         lines = _Lines(path, text)
         _check_head(path, lines, form)
         try:

@@ -83,7 +83,7 @@ def centre_distance(z: tuple[int, int], m_n: float, alpha_n: float, x_sum: float
     Returns
     -------
     float
-        Centre distance, [m]; NaN if the shifts are so negative that there is none
+        Centre distance, [m]; NaN if the shifts are too negative for the teeth to mesh
 
     Examples
     --------

@@ -7,7 +7,7 @@ axial compression of the tooth and of the turn of its foundation; the two teeth 
 
 Validity. The tooth is an involute down to the base circle and a radial flank from there to the root circle (the fillet
 is left out: the tooth is a little too soft). The foundation's polynomials were fitted for 1.4 <= r_f / r_bore <= 7 and
-0.01 <= theta_f <= 0.12 rad; :func:`foundation_notes` says where a pair leaves this range. Nothing is clipped. The
+0.01 <= theta_f <= 0.12 rad; :func:`foundation_notes` reports where a pair leaves this range. Nothing is clipped. The
 Hertzian part is linear, so the stiffness does not depend on the load. No tip relief, no coupling between
 neighbouring teeth through the gear body.
 """

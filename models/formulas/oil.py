@@ -1,4 +1,4 @@
-"""What a lubricant is: viscosity, density, heat and pressure-viscosity behaviour.
+"""Lubricant properties: viscosity, density, heat capacity and conductivity, pressure-viscosity behaviour.
 
 Temperatures are in degC, pressures in Pa. The plain functions are the formulas, one each; :class:`Oil` holds the
 constants of one lubricant and offers the same properties as methods. Functions that the thermal network needs as

@@ -54,7 +54,7 @@ def churning_niemann(*, e: float, b: float, v_t: Numeric) -> Array:
 def churning_niemann_printed(*, e: float, b: float, v_t: Numeric, omega: Numeric) -> Array:
     """The paper's eq. (6) to the letter, ``omega e v_t^1.5 b / 2.72e-6`` in SI: 748 kW for the FZG wheel at 8.3 m/s.
 
-    Kept so that the print can be shown beside the reading; parameters as :func:`churning_niemann`, `omega` in rad/s.
+    Kept to compare the print with our reading of it; parameters as :func:`churning_niemann`, `omega` in rad/s.
 
     Examples
     --------

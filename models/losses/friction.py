@@ -279,7 +279,7 @@ RZ_OVER_RA = 6.0  # customary for ground flanks; the paper gives Ra only
 
 @dataclass(frozen=True, kw_only=True)
 class ContactState:
-    """What happens at the contact points; every field of shape (N, n_points).
+    """State of the contact points; every field of shape (N, n_points).
 
     Attributes
     ----------

@@ -80,7 +80,7 @@ class TermInput:
 
 @dataclass(frozen=True, kw_only=True)
 class LossKind:
-    """What all terms of one law have in common.
+    """Properties that all loss terms of one law share.
 
     Attributes
     ----------

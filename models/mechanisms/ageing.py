@@ -1,4 +1,4 @@
-"""What changes with time and wear."""
+"""Mechanisms of ageing and wear."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ def _life(scale: Scale) -> Parameter:
     return positive("life", 0.3 * d, sd=0.8, unit="s", grid=(0.04 * d, 0.12 * d, 0.4 * d, 1.2 * d))
 
 
-def _turning(n: sp.Expr, exponent: sp.Expr) -> sp.Expr:
-    """What wears while shafts turn, by hours (exponent 0), by revolutions (1) or between."""
+def _wear_rate(n: sp.Expr, exponent: sp.Expr) -> sp.Expr:
+    """Rate of wear while the shafts turn: by hours (exponent 0), by revolutions (1) or between."""
     return sp.tanh(RUNNING * n) * n**exponent
 
 
@@ -54,7 +54,7 @@ run_in_seals = Mechanism(
         _life(scale),
         plain("exponent", 0.5, sd=0.4, lower=0.0, upper=1.5, grid=(0.0, 1.0)),
     ),
-    states=(Memory(name="worn", rate=lambda s: _turning(s.n, s.exponent) / s.life),),
+    states=(Memory(name="worn", rate=lambda s: _wear_rate(s.n, s.exponent) / s.life),),
     law=lambda s: s.strength * sp.exp(-s.worn),
     says="New seal lips press harder: their friction starts higher and falls while the shafts turn.",
     reference="Freudenberg: 1.5 times the settled torque during the first hours; the exponential form is ours, and so "
@@ -102,7 +102,7 @@ gear_wear = Mechanism(
         plain("exponent", 1.0, sd=0.3, lower=0.3, upper=2.5),
         plain("speed_exponent", 0.5, sd=0.4, lower=0.0, upper=1.5, grid=(0.0, 1.0)),
     ),
-    states=(Memory(name="worn", rate=lambda s: _turning(s.n, s.speed_exponent) * s.m / s.duration_ref),),
+    states=(Memory(name="worn", rate=lambda s: _wear_rate(s.n, s.speed_exponent) * s.m / s.duration_ref),),
     law=lambda s: s.strength * sp.Max(s.worn, 0.0) ** s.exponent,
     says="The flanks wear or pit: sliding friction grows with the work done.",
     reference="Archard: wear ~ load times sliding distance; its effect on friction is a hypothesis, and so is that it "

@@ -100,7 +100,7 @@ def soft_hysteresis(value: Any, state: Any, *, at: Any, band: Any, above: float,
 
 
 def two_point(name: str, *, reads: str = "T_oil", above: float = 1.0) -> Memory:
-    """What a two-point control around `set_point` remembers: `above` beyond its `band`, ``1 - above`` below it."""
+    """Return the memory of a two-point control around `set_point`: `above` beyond its `band`, else ``1 - above``."""
 
     def control(s: Any) -> dict[str, Any]:
         return {"value": getattr(s, reads), "state": getattr(s, name), "at": s.set_point, "band": s.band,

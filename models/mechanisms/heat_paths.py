@@ -21,7 +21,7 @@ foundation_conduction = Mechanism(
     parameters=lambda scale: (strength(0.4 * scale.conductance, "W/K", "conductance to the foundation"),),
     law=lambda s: s.strength,
     says="Heat leaves through the feet into the foundation ({place}).",
-    reference="Navet et al. 2020: 2 to 10 W/K beside 7 W/K to air on the FZG rig; from memory",
+    reference="Navet et al. 2020: 2 to 10 W/K, compared with 7 W/K to air, on the FZG rig; from memory",
     experiment=COOL_DOWN + "; the part on the foundation is the cooler one",
     separate_by={
         "air_cooling_change": "hold one state with the fan on and off: conduction stays",
@@ -156,7 +156,7 @@ bearing_seat_contact = Mechanism(
     law=lambda s: s.strength,
     says="The bearing's seat passes another amount of heat into the housing than its ring would ({place}).",
     reference="fit and constriction: 0.3 to 1 of the ring's conductance; estimate",
-    experiment="hold a high load and measure the bearing against the housing beside it",
+    experiment="hold a high load and measure the bearing against the housing next to it",
 )
 
 motor_flange = Mechanism(

@@ -67,7 +67,7 @@ sensor_gain = _sensor(
     says="The sensor at {place} shows a wrong share of the rise above ambient: heat flows along its leads, or its gain "
     "is off.",
     reference="stem conduction of a thermocouple: 1 to 5 % of the rise; estimate",
-    experiment="insulate the leads, or press a second sensor beside it",
+    experiment="insulate the leads, or press a second sensor on next to it",
 )
 
 sensor_lag = _sensor(
@@ -78,7 +78,7 @@ sensor_lag = _sensor(
     law=lambda s: s.strength,
     says="The sensor at {place} answers late: it has bad contact or a heavy sheath.",
     reference="first order, 30 to 120 s",
-    experiment="step the torque and compare with a fast sensor beside it",
+    experiment="step the torque and compare with a fast sensor next to it",
     signed=False,
 )
 
@@ -171,7 +171,7 @@ ambient_follows_outdoor = Mechanism(
     law=lambda s: s.strength * (s.T_outdoor + s.above - s.T_ambient),
     says="The air at the gearbox was not recorded, or elsewhere: it goes with the outdoor air, some kelvin above it.",
     reference="ventilated enclosure: its air is the outdoor air and a rise; the constant rise is ours",
-    experiment="hang a probe beside the gearbox for some days",
+    experiment="hang a probe next to the gearbox for some days",
 )
 
 ambient_probe_heated = _input(

@@ -1,7 +1,7 @@
 """A mechanism: a named piece of physics that a real gearbox may show and the nominal model leaves out.
 
 It is a declaration: where it may sit, a law, its parameters with priors, one sentence for a test engineer, a reference,
-and the experiment that tells it from others. :meth:`Mechanism.placed` puts it into a network.
+and the experiment that distinguishes it from others. :meth:`Mechanism.placed` puts it into a network.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ ABSENT = symbol("absent")
 
 @dataclass(frozen=True, kw_only=True)
 class Memory:
-    """What a mechanism remembers; the laws read it by its name and must not depend on the strength.
+    """Extra state of a mechanism; the laws read it by its name and must not depend on the strength.
 
     Attributes
     ----------
@@ -66,7 +66,7 @@ class Mechanism:
     parameters : callable of :class:`Scale`
         Parameters by local names, ``strength`` first; its `sd` is the size that the effect typically has
     law : callable of :class:`~models.network.laws.Signals`, or sympy expression
-        Beside the network's signals it has the parameters and memories by their local names, ``T_here`` and ``T_there``
+        Reads the network's signals and, by their local names, the parameters and memories; also ``T_here``, ``T_there``
         (mean temperatures at the place and the other end), ``T_<group>``, ``ambient_ref`` [degC], ``duration_ref`` [s],
         and in ratios to the scale ``n`` (magnitude of speed), ``m`` (of torque), ``x`` (time since the start of the
         recording) and ``nu`` (viscosity of the oil at its temperature)
@@ -84,11 +84,9 @@ class Mechanism:
     states : tuple of Memory
     form, of_measurement
         See :class:`~models.terms.term.Term`
-    says : str
-        One sentence a test engineer understands; ``{place}`` stands for the place
     reference : str
     separate_by : mapping of str to str
-        Experiment that tells it from another mechanism, by the other's name
+        Experiment that distinguishes it from another mechanism, by the other's name
     experiment : str
         Experiment that shows it best, for all others
     """
@@ -99,6 +97,7 @@ class Mechanism:
     places: tuple[str, ...]
     parameters: Parameters
     law: LawLike
+    #: One sentence that a test engineer understands; ``{place}`` is replaced by the place
     says: str
     reference: str
     experiment: str
@@ -144,13 +143,13 @@ class Mechanism:
         common, traced = _aliases(network, scale), cache(partial(trace, stand_in=self.name))
         placed = [self._at(network, scale, spot, common, traced) for spot in found]
         if any(symbol(p.strength.name) not in p.expression.free_symbols for p in placed):
-            raise InputError(f"mechanism {self.name!r}: its law must hold {STRENGTH!r}, which says how large it is")
+            raise InputError(f"mechanism {self.name!r}: its law must contain {STRENGTH!r}, the size of the effect")
         return tuple(
             p for p in placed if p.target and not any(ABSENT in law.free_symbols for law in p.written.values())
         )
 
     def separation(self, other: str) -> str:
-        """The experiment that would tell this mechanism from another one."""
+        """Return the experiment that would distinguish this mechanism from another one."""
         return self.separate_by.get(other, self.experiment)
 
     def _at(
@@ -287,7 +286,7 @@ class Placed(Term):
 
 
 def _aliases(network: ThermalNetwork, scale: Scale) -> dict[str, sp.Expr]:
-    """What a law of the catalogue may use beside the network's own signals."""
+    """Names that a law of the catalogue may use in addition to the network's own signals."""
     aliases = {
         "n": sp.Abs(symbol("speed")) / scale.speed,
         "m": sp.Abs(symbol("torque")) / scale.torque,

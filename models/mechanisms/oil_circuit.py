@@ -214,7 +214,7 @@ heater_thermostat = Mechanism(
     law=lambda s: s.strength * s.heating * sp.exp(-((STANDING * s.n) ** 2)),
     says="An electric heater keeps the oil warm while the gearbox stands.",
     reference="two-point control",
-    experiment="let it stand until it would be cold: the oil stays at a temperature of its own",
+    experiment="let it stand until it would be cold: the oil stays at the heater's temperature",
     separate_by={"hot_neighbour": "let it stand: a heater makes the oil the warmest part, a neighbour another one"},
 )
 

@@ -1,8 +1,8 @@
 """Forms for what is in no catalogue: a heat in any part, or a conductance to the air, as a function of the signals.
 
 They are scored with the catalogue and have to beat it clearly: a law that an engineer knows is worth more than a form.
-None is physics; each says with what the heat goes, so that someone may recognise it: monomials and hinges as in sparse
-regression, peaks, and what follows a change or fades, since no function of the present can tell that.
+None is physics; each shows which signal the heat varies with, so that someone may recognise it: monomials and hinges as
+in sparse regression, peaks, and responses that follow a change or fade, which no function of the present can describe.
 """
 
 from __future__ import annotations
@@ -76,7 +76,7 @@ def _peak(value: Any, at: Any, width: Any) -> sp.Expr:
 
 
 def _rise(s: Any) -> sp.Expr:
-    """Of the temperature above the surroundings, in ratio to a typical one."""
+    """Temperature rise above the surroundings, as a ratio to a typical one."""
     return (s.T_here - s.ambient_ref) / TYPICAL_RISE
 
 

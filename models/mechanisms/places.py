@@ -50,7 +50,7 @@ class Spot:
 
 
 def spots(network: ThermalNetwork, kind: Kind, pattern: str, channels: Sequence[str]) -> tuple[Spot, ...]:
-    """All places of a network that a pattern stands for.
+    """Return all places of a network that match a pattern.
 
     Parameters
     ----------

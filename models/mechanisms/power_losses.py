@@ -162,7 +162,7 @@ bearing_additive = Mechanism(
     law=lambda s: s.strength / (1.0 + (s.n * s.nu / s.fade) ** 2),
     says="The oil's additives change the bearings' friction where the film is thin: at low speed and with warm oil.",
     reference="Fernandes et al. 2013: mu_bl 0.05 and mu_EHL 0.012 in SKF's model; the fade with speed times viscosity "
-    "stands for SKF's exp(-2.6e-8 (n nu)^1.4 d_m)",
+    "replaces SKF's exp(-2.6e-8 (n nu)^1.4 d_m)",
     experiment="hold a high torque at very low speed with warm oil",
 )
 

@@ -1,4 +1,4 @@
-"""What sun, rain, fans and the air around do to the housing."""
+"""Mechanisms of the surroundings: sun, rain, fans and ambient air at the housing."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from models.mechanisms.mechanism import Mechanism
 FAMILY = "surroundings"
 HOUR_S = 3600.0
 WETTED_S = 300.0  # after which a shower has wetted everything
-STANDSTILL_DAY = "let it stand for a day with an ambient probe on each side"
+STANDSTILL_DAY = "leave it at standstill for a day with an ambient probe on each side"
 
 solar_soak = Mechanism(
     name="solar_soak",

@@ -11,7 +11,7 @@ from pydantic import Field, model_validator
 
 from models.assembly.gearbox import Gearbox
 from models.base.errors import InputError
-from models.definition.messages import validated
+from models.definition.messages import validate_section
 from models.definition.sections import Name, OneOrMore, Section, Text
 from models.files.toml_file import parse_schema_1, read_text
 from models.mechanisms.forms import LARGEST, strength
@@ -194,7 +194,7 @@ def check_placeable(mechanisms: Iterable[Mechanism], gearbox: Gearbox, file: str
 
 def _from_toml(path: Path) -> tuple[Mechanism, ...]:
     document = parse_schema_1(read_text(path), file=str(path), kind="mechanisms")
-    return tuple(table.mechanism for table in validated(MechanismFile, document, file=str(path)).mechanism)
+    return tuple(table.mechanism for table in validate_section(MechanismFile, document, file=str(path)).mechanism)
 
 
 def _from_python(path: Path) -> tuple[Mechanism, ...]:

@@ -91,7 +91,7 @@ class Signals:
 
 @dataclass(frozen=True)
 class NumericLaw:
-    """A law that could not be traced: a callable of :class:`Signals` holding numbers, and the symbol it stands for."""
+    """A law that could not be traced: a callable of numeric :class:`Signals`, and the symbol in its place."""
 
     function: Callable[[Signals], Any]
     stand_in: sp.Symbol
@@ -109,7 +109,7 @@ def trace(law: LawLike, names: Iterable[str], stand_in: str) -> tuple[sp.Expr, N
     names : iterable of str
         Signals and parameters that the network has
     stand_in : str
-        Name of the symbol that stands for the law where it cannot be traced
+        Name of the symbol that replaces the law if it cannot be traced
 
     Returns
     -------
@@ -129,7 +129,7 @@ def trace(law: LawLike, names: Iterable[str], stand_in: str) -> tuple[sp.Expr, N
     """
     known = {name: symbol(name) for name in names}
     if not callable(law):
-        return _checked(sp.sympify(law), known, stand_in), None
+        return _check_expression(sp.sympify(law), known, stand_in), None
     try:
         value = law(Signals(known))
     except InputError:
@@ -143,7 +143,7 @@ def trace(law: LawLike, names: Iterable[str], stand_in: str) -> tuple[sp.Expr, N
         except (sp.SympifyError, TypeError, ValueError):
             expression = None
     if isinstance(expression, sp.Expr) and _agrees(expression, law, known):
-        return _checked(expression, known, stand_in), None
+        return _check_expression(expression, known, stand_in), None
     numeric = NumericLaw(law, symbol(stand_in))
     try:
         sample: Array = np.asarray(law(Signals(dict.fromkeys(known, 1.0))), dtype=np.float64)
@@ -157,7 +157,7 @@ def trace(law: LawLike, names: Iterable[str], stand_in: str) -> tuple[sp.Expr, N
 
 
 def _agrees(expression: sp.Expr, law: Callable[[Signals], Any], known: Mapping[str, sp.Symbol]) -> bool:
-    """Whether a traced law gives on numbers what its callable gives.
+    """Return True if a traced law and its callable give equal values on numbers.
 
     ``1.0 if s.valve else 0.0`` does not fail on symbols, which all count as true: the trace would lose a branch.
     """
@@ -172,7 +172,7 @@ def _agrees(expression: sp.Expr, law: Callable[[Signals], Any], known: Mapping[s
     return True
 
 
-def _checked(expression: sp.Expr, known: Mapping[str, sp.Symbol], name: str) -> sp.Expr:
+def _check_expression(expression: sp.Expr, known: Mapping[str, sp.Symbol], name: str) -> sp.Expr:
     # A sympy expression may come with plain symbols; they mean the signals of the same name.
     expression = expression.subs({s: known[s.name] for s in expression.free_symbols if s.name in known})
     for free in sorted(s.name for s in expression.free_symbols - set(known.values())):

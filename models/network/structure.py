@@ -1,4 +1,4 @@
-"""What a thermal network consists of: nodes, links and sources, each with a symbolic law."""
+"""Parts of a thermal network: nodes, links and sources, each with a symbolic law."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from models.network.laws import NumericLaw, Parameter, Signals, symbol
 
 
 class Losses(Protocol):
-    """What a network needs of a loss model: the full one (F-PL) and a surrogate (ROM-PL) both have it."""
+    """Interface of a loss model to a network; the full model (F-PL) and the surrogate (ROM-PL) both have it."""
 
     @property
     def components(self) -> tuple[str, ...]:
@@ -80,7 +80,7 @@ class Source:
 
 @dataclass(frozen=True, kw_only=True)
 class ExtraState:
-    """A memory of the network beside its temperatures.
+    """A state of the network in addition to its temperatures.
 
     Attributes
     ----------
@@ -120,11 +120,11 @@ class Network:
         Names for several nodes together, e.g. ``housing``
     states : tuple of ExtraState
     numeric_laws : mapping of str to NumericLaw
-        Laws that could not be traced, by the symbol that stands for them
+        Laws that could not be traced, by the symbol in their place
     operating : mapping of str to sympy.Expr
         ``speed`` or ``torque`` as the losses see it, where that is not the input itself
     recording : mapping
-        How recordings of this gearbox name their columns, as in a mapping file, where the definition says so
+        How recordings of this gearbox name their columns, as in a mapping file, if the definition states it
     """
 
     nodes: tuple[Node, ...]

@@ -30,7 +30,7 @@ class Laws:
     sources, losses_of_sources : tuple of str, tuple of bool
         Names of the sources, and which of them are mechanical losses
     inputs, parameters, states : tuple of str
-        Names of the inputs beside time (speed and torque first), parameters, and extra states
+        Names of the inputs without time (speed and torque first), parameters, and extra states
     boundary : callable
         common signals -> temperatures of the boundaries, [degC]
     exchange : callable

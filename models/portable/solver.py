@@ -1,6 +1,6 @@
 """Time integration of a thermal network. numpy only: this file also runs inside the FMU.
 
-The network is stiff (a mesh node of 0.1 s beside a housing of 50 min) and its right-hand side is dear (a full loss
+The network is stiff (time constants: mesh 0.1 s, housing 50 min) and its right-hand side is dear (a full loss
 model), so the scheme is linearly implicit with the conductance matrix alone as its Jacobian: ROS2 of Verwer, Spee, Blom
 and Hundsdorfer (SIAM J. Sci. Comput. 20, 1999), second order whatever matrix is used, L-stable, two evaluations per
 step. The step size follows the embedded first-order solution, so the communication step does not matter.
@@ -52,7 +52,7 @@ class Balance:
 
 
 class System(Protocol):
-    """What the solver needs to know of a network."""
+    """Interface of a network to the solver."""
 
     def balance(self, time: float, inputs: Array, states: Array) -> Balance:
         """Heat balance at `time` [s] with `inputs`, shape (n_inputs,), and `states`, shape (..., n)."""

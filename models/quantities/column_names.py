@@ -30,7 +30,7 @@ def meant(name: str, lacking: Iterable[str], *, near: float, near_stem: float = 
     Returns
     -------
     str
-        Empty if there is none
+        Empty if no name is similar
 
     Examples
     --------

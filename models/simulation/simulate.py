@@ -168,7 +168,7 @@ def simulate(
         Values of tunable parameters; arrays simulate B variants at once
     trained : Training or None
         Range that the definition names; outside it the result's `domain_distance` is above 0 also where the losses
-        have no domain of their own, as the full model
+        have no own domain, as the full model
     progress : callable or None
         Called with (rows done, rows in all) now and then
 

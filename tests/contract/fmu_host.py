@@ -77,8 +77,8 @@ class Host:
 
     @property
     def said(self) -> list[tuple[int, str]]:
-        heard, self.fmu.messages[:] = list(self.fmu.messages), []
-        return heard
+        messages, self.fmu.messages[:] = list(self.fmu.messages), []
+        return messages
 
 
 @contextmanager

@@ -16,11 +16,8 @@ from fmpy.validation import validate_fmu
 
 from builder.drive.driver import drive_fmu
 from builder.fmi.signals import signal_table
-from builder.native.native_fmu import build_native_fmu
-from builder.python.python_fmu import build_python_fmu
 from builder.surrogate.train import TrainingResult
 from models.assembly.gearbox import Gearbox
-from models.base.errors import InputError
 from models.files.cycle import Cycle
 from tests.contract.conftest import Illegal
 from tests.contract.fmu_host import DISCARD, LOADED, Host, hosted
@@ -378,12 +375,3 @@ def test_the_reference_run_is_what_fmpy_finds(path: Path, tmp_path: Path) -> Non
     assert result["time"].tolist() == expected["time"].tolist()
     for name in names:
         np.testing.assert_allclose(result[name], expected[name], rtol=1e-7, atol=1e-7, err_msg=name)
-
-
-@pytest.mark.parametrize("build", [build_python_fmu, partial(build_native_fmu, platforms="host")])
-def test_a_failed_build_leaves_no_file(
-    build: Callable[..., object], fzg: Gearbox, fzg_training: TrainingResult, tmp_path: Path
-) -> None:
-    with pytest.raises(InputError, match=r"mesh\.onnx"):
-        build(fzg, fzg_training, [], tmp_path / "fzg.fmu")
-    assert list(tmp_path.iterdir()) == []

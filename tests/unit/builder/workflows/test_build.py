@@ -47,5 +47,5 @@ def test_an_fmu_that_cannot_run_here_is_built_and_that_is_told(
     assert "earlier build" not in shown.err
     again = build(fzg, tmp_path, name="other")
     assert [note for note in again.notes if "earlier" in note] == [
-        f"{tmp_path / 'fzg.fmu'} is of an earlier build: report.json and networks/ no longer tell about it"
+        f"{tmp_path / 'fzg.fmu'} is of an earlier build: report.json and networks/ no longer describe it"
     ]

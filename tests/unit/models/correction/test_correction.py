@@ -20,7 +20,7 @@ from models.correction.correction import (
     read_correction,
     write_correction,
 )
-from models.definition.messages import validated
+from models.definition.messages import validate_section
 from models.files.toml_file import parse
 from models.mechanisms import CATALOGUE, Scale, load_mechanisms
 from models.mechanisms.user_files import check_placeable
@@ -131,7 +131,7 @@ def test_any_text_and_number_survives_the_file(
         calibration=[Estimate(name="mesh", value=value, stderr=stderr, unit=says, prior=prior)],
         recordings={name: "f" * 64},
     )
-    assert validated(Correction, parse(correction_text(made), file="x"), file="x") == made
+    assert validate_section(Correction, parse(correction_text(made), file="x"), file="x") == made
 
 
 def test_files_of_version_0_1_0_are_read(tmp_path: Path) -> None:
@@ -407,7 +407,7 @@ def test_a_mechanism_from_python(tmp_path: Path) -> None:
         ("exp(-worn)", "exec(worn)", "mechanism 'belt_guard'.law: not allowed here: 'exec"),
         ("exp(-worn)", "exp(-worn", "mechanism 'belt_guard'.law: .* is not an expression"),
         ("schema = 1", f"schema = 1\n{AGAIN}", "'belt_guard' is there 2 times"),
-        ("strength * n**exponent", "20 * n**exponent", "its law must hold 'strength'"),
+        ("strength * n**exponent", "20 * n**exponent", "its law must contain 'strength'"),
         ('places = ["oil", "each bearings"]', 'places = ["oill"]', "no place in this gearbox.*'oill'.*oil"),
         ("({place})", "({ort})", "'belt_guard' fails with KeyError: 'ort'"),
         ("n**exponent", "sped**exponent", "'belt_guard' uses 'sped'.*did you mean 'speed'"),
