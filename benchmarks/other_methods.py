@@ -38,7 +38,6 @@ from diagnosis.proof.scoring.answers import Answer
 from diagnosis.proof.scoring.counts import Count, Median
 from diagnosis.proof.scoring.rules import RULES, ScoredCase
 from diagnosis.proof.scoring.score import far_of, near_nodes
-from diagnosis.recordings.quantities import LOSS
 from diagnosis.recordings.read import read_recordings
 from diagnosis.results.findings import node_of
 from diagnosis.setup.case import Case, first, prepare
@@ -46,6 +45,7 @@ from models.assembly.gearbox import load_gearbox
 from models.base.parallel import run_parallel
 from models.base.types import Array
 from models.mechanisms import CATALOGUE
+from models.quantities.quantities import TOTAL_LOSS, is_total_loss
 
 METHODS: Mapping[str, str] = {"naive": "naive residual regression", "sparse": "sparse regression (pysindy)"}
 ERRORS: Mapping[str, str] = {"calibrated_K": "calibration only", "black_box_K": "black-box residual network"}
@@ -107,7 +107,7 @@ def _sparse(case: Case, base: Explanation, candidates: Sequence[Hypothesis]) -> 
     """Heat that is missing at the likeliest node, regressed sparsely on the catalogue's heats there."""
     marginal, pieces = Marginal.of(base.fit), base.problem.pieces
     knots = knots_of(pieces)
-    kinds = (True, False) if LOSS in case.channels else (False,)
+    kinds = (True, False) if TOTAL_LOSS in case.channels else (False,)
     missing = max(
         (latent_heat(base.problem.model, base.fit, marginal, part.name, loss_W=case.loss_W, is_loss=is_loss,
                      knots=knots) for part in case.nominal.parts for is_loss in kinds),
@@ -162,7 +162,7 @@ def _errors(even: Case, base: Explanation) -> dict[str, float | None]:
 
     The network goes from inputs, their fading memories and the calibrated prediction to the residual.
     """
-    temperatures = [i for i, name in enumerate(even.channels) if name != LOSS]
+    temperatures = [i for i, name in enumerate(even.channels) if not is_total_loss(name)]
 
     def table(problem: Problem) -> tuple[Array, Array]:
         return _table([predict(problem, i, base.fit.z) for i in range(len(problem.pieces))], temperatures)

@@ -18,10 +18,11 @@ from models.base.errors import InputError
 from models.base.types import Array
 from models.correction.correction import read_correction
 from models.definition.sections import Training
-from models.files.cycle import COLUMNS, Cycle
+from models.files.cycle import Cycle
 from models.files.cycle_file import RecordedStart, read_cycle_and_start, read_initial
 from models.files.output_files import refuse_to_replace, write_table
 from models.files.table_file import kind_of
+from models.quantities.quantities import INPUTS
 from models.simulation.start_temperatures import start_temperatures
 
 RECORDED = "recorded"  # --initial: as the cycle's own file says
@@ -220,7 +221,7 @@ def _check_outputs(output: Path, plot: Path | None, inputs: list[Path]) -> None:
 
 
 def _show(columns: Mapping[str, Array]) -> None:
-    inputs = [name for name, *_ in COLUMNS.values()]
+    inputs = [quantity.column for quantity in INPUTS.values()]
     shown = [n for n in columns if n.startswith("T_") and n.endswith("_degC") and n not in inputs]
     temperatures = {n[2:-5]: columns[n] for n in shown}
     rows = [[n, f"{v[0]:.1f}", f"{v.max():.1f}", f"{v[-1]:.1f}"] for n, v in temperatures.items()]
@@ -244,7 +245,7 @@ def _mean_over_time(time: Array, values: Array) -> float:
 
 
 def _print_assumed_inputs(columns: Mapping[str, Array], cycle: Cycle) -> None:
-    for name, (column, *_) in COLUMNS.items():
+    for name, column in ((name, quantity.column) for name, quantity in INPUTS.items()):
         if name not in cycle.inputs and column in columns:
             console.err.print(f"note: the cycle has no column {column}; {columns[column][0]:g} is assumed")
 

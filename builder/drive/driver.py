@@ -30,7 +30,7 @@ from builder.native.compile import host_platform
 from models.base.errors import InputError, did_you_mean
 from models.base.types import Array
 from models.files.cycle import Cycle
-from models.quantities.fmi_units import UNITS
+from models.quantities.units import UNITS
 from models.simulation.start_temperatures import start_temperatures
 
 logger = logging.getLogger(__name__)

@@ -13,7 +13,8 @@ from math import isfinite
 from xml.etree.ElementTree import Element, SubElement, fromstring, indent, tostring
 
 from builder.fmi.signals import Signal, SignalTable
-from models.quantities.fmi_units import TYPES, UNITS
+from models.quantities.quantities import TYPES
+from models.quantities.units import UNITS
 
 LOG_CATEGORIES: Mapping[str, str] = {
     "logStatusWarning": "The operating point left the range that the networks were trained on",
@@ -123,7 +124,7 @@ def _units(root: Element, table: SignalTable) -> None:
         if name not in used:
             continue
         element = SubElement(definitions, "Unit", name=name)
-        base = SubElement(element, "BaseUnit", {base: str(exponent) for base, exponent in unit.base.items()})
+        base = SubElement(element, "BaseUnit", {base: str(exponent) for base, exponent in (unit.base or {}).items()})
         _set_affine(base, unit.factor, unit.offset)
         if unit.display is not None:
             display, factor, offset = unit.display

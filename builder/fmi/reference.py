@@ -16,7 +16,7 @@ from models.base.types import Array
 from models.network.compiled import law_source
 from models.network.laws import compile_function
 from models.portable.surrogate import SurrogateLosses
-from models.quantities.fmi_units import UNITS
+from models.quantities.units import UNITS
 from models.simulation.simulate import input_table
 from models.simulation.thermal_network import ThermalNetwork
 

@@ -2,7 +2,7 @@
 
 From this table come the model description of every kind of FMU, the value references inside it, the columns that
 driving one gives, and the nomenclature in the documentation. Signals are in SI units at the FMI interface; the network
-and all files work in the units of the file columns (1/min, degC), and :data:`models.quantities.fmi_units.UNITS`
+and all files work in the units of the file columns (1/min, degC), and :data:`models.quantities.units.UNITS`
 converts.
 """
 
@@ -19,9 +19,9 @@ import sympy as sp
 
 from models.assembly.gearbox import Gearbox
 from models.base.errors import InputError, did_you_mean
-from models.files.cycle import COLUMNS
 from models.portable.surrogate import SurrogateLosses
-from models.quantities.fmi_units import SAME_UNIT, TYPES, UNITS
+from models.quantities.quantities import INPUTS, TYPES, quantity_of_signal
+from models.quantities.units import UNITS, fmi_symbol
 from models.simulation.thermal_network import ThermalNetwork
 
 START_TEMPERATURE = 293.15  # K
@@ -48,9 +48,9 @@ class Signal:
         another model than a gearbox's network
     description : str
     type : str or None
-        Key of :data:`models.quantities.fmi_units.TYPES`; None for a Boolean and for a Real of `unit`
+        Key of :data:`models.quantities.quantities.TYPES`; None for a Boolean and for a Real of `unit`
     unit : str or None
-        Key of :data:`models.quantities.fmi_units.UNITS`; None for a Boolean, and where the network does not say
+        Key of :data:`models.quantities.units.UNITS`; None for a Boolean, and where the network does not say
     causality, variability, initial : str
         As FMI 2.0 defines them; `initial` is "" where FMI gives it
     start : float, bool or None
@@ -194,22 +194,13 @@ def result_column(name: str) -> str | None:
     >>> result_column("oil.T"), result_column("loss.total"), result_column("loss.seal_1"), result_column("heat.extra")
     ('T_oil_degC', 'P_loss_W', 'P_loss_seal_1_W', None)
     """
-    if name in ("in_domain", "efficiency"):
-        return name
-    if name == "torque_loss":
-        return "torque_loss_Nm"
-    if name == "loss.total":
-        return "P_loss_W"
-    if name.endswith(".T"):
-        return f"T_{name[:-2].strip(chr(39))}_degC"
-    if name.startswith("loss."):
-        return f"P_loss_{name[5:].strip(chr(39))}_W"
-    return None
+    quantity = quantity_of_signal(name)
+    return None if quantity is None else quantity.column
 
 
 def input_column(name: str) -> str:
     """Column of a cycle file for an input of an FMU: its usual one, else its own name."""
-    return COLUMNS[name][0] if name in COLUMNS else name.strip("'")
+    return INPUTS[name].column if name in INPUTS else name.strip("'")
 
 
 def signal_table(
@@ -272,21 +263,22 @@ class _Table:
         if signal not in self.domain:
             return None
         low, high = self.domain[signal]
-        unit = UNITS[{"speed": "rad/s", "torque": "N.m", "temperature": "K"}[signal]]
+        unit = UNITS[TYPES[signal.capitalize()].unit]
         return unit.from_column(low), unit.from_column(high)
 
     def _inputs(self) -> Iterator[Signal]:
-        known = {
-            "speed": ("Speed", "Speed of the input shaft; its sign does not change the losses"),
-            "torque": ("Torque", "Torque at the input shaft; positive with positive speed drives"),
-            "T_ambient": ("Temperature", "Ambient temperature, in kelvin"),
-            "air_speed": ("AirSpeed", "Speed of the air along the housing"),
+        texts = {
+            "speed": "Speed of the input shaft; its sign does not change the losses",
+            "torque": "Torque at the input shaft; positive with positive speed drives",
+            "T_ambient": "Ambient temperature, in kelvin",
+            "air_speed": "Speed of the air along the housing",
         }
         defaults = {"speed": 0.0, "torque": 0.0, **self.network.inputs}
         for name in self.inputs:
-            kind, text = known.get(name, (None, f"Input {name}, in the unit of its column"))
+            kind = INPUTS[name].type if name in INPUTS else None
+            text = texts.get(name, f"Input {name}, in the unit of its column")
             unit = TYPES[kind].unit if kind else None
-            low, high = COLUMNS[name][1:3] if name in COLUMNS else (-inf, inf)
+            low, high = (INPUTS[name].low, INPUTS[name].high) if name in INPUTS else (-inf, inf)
             convert = UNITS[unit].from_column if unit else float
             yield Signal(
                 name=fmi_name(name), role="input", of=name, description=text, type=kind, unit=unit, causality="input",
@@ -378,7 +370,7 @@ class _Table:
 
     def _factors(self) -> Iterator[Signal]:
         for parameter in self.network.parameters:
-            unit = SAME_UNIT.get(parameter.unit, parameter.unit)
+            unit = fmi_symbol(parameter.unit)
             text = parameter.description or parameter.name
             yield Signal(
                 name=self.parameters[parameter.name], role="factor", of=parameter.name,

@@ -11,7 +11,7 @@ from builder.fmi.signals import Signal, SignalTable
 from fmu_src.python.twin import LISTS
 from models.network.compiled import compile_laws, law_source
 from models.portable.surrogate import SurrogateLosses
-from models.quantities.fmi_units import UNITS
+from models.quantities.units import UNITS
 from models.simulation.thermal_network import ThermalNetwork
 
 

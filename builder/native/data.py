@@ -18,7 +18,7 @@ from builder.native.structure import Structure
 from models.base.types import Array
 from models.network.compiled import c_law_source, law_expressions
 from models.portable.surrogate import KELVIN, LN10, Feature, Network, SurrogateLosses, Use, feature_values
-from models.quantities.fmi_units import UNITS
+from models.quantities.units import UNITS
 from models.simulation.thermal_network import ThermalNetwork
 
 Indices = NDArray[np.intp]

@@ -14,8 +14,8 @@ from diagnosis.decision.holdout import Judge
 from diagnosis.decision.stage import LEAST_SHARE, Stage
 from diagnosis.forward.observation import reading_columns, readings
 from diagnosis.forward.term_on_grid import TermOnGrid
-from diagnosis.recordings.quantities import LOSS
 from diagnosis.setup.case import Case
+from models.quantities.quantities import is_total_loss
 
 # All set on development cases (seed 1 of `conceal`) and by the four open ones; the proof draws others.
 SECOND_GAIN = 10.0  # log evidence that each further effect has to bring
@@ -174,7 +174,9 @@ def _matters(case: Case, fit: Explanation, h: Hypothesis, times: float = 1.0) ->
             T = part.trajectory.response(heat)
             changes.append(part.shown(reading_columns(model, part.trajectory, part.sensors, T, loss))[:, :, 0])
     change = np.sqrt(np.mean(np.concatenate(changes) ** 2, axis=0))
-    least = times * np.array([SMALLEST_HEAT * case.loss_W if name == LOSS else SMALLEST_K for name in case.channels])
+    least = times * np.array(
+        [SMALLEST_HEAT * case.loss_W if is_total_loss(name) else SMALLEST_K for name in case.channels]
+    )
     heats = heats_of(fit, h)  # none of a fault of an instrument: there the error of the reading counts alone
     warms = bool(heats) and float(np.mean(np.abs(np.concatenate(heats)))) > times * SMALLEST_HEAT * case.loss_W
     return warms or bool((change > least).any())

@@ -12,9 +12,9 @@ from diagnosis.forward.trajectory import ROUNDS
 from diagnosis.inference.posterior import Linearised, Problem
 from diagnosis.inference.predict import overall_rmse, predict
 from diagnosis.inference.whitening import Whitening
-from diagnosis.recordings.quantities import LOSS
 from diagnosis.setup.case import Case
 from models.base.types import Array
+from models.quantities.quantities import is_total_loss
 
 
 def at_holdout(case: Case, explanation: Explanation) -> Problem:
@@ -91,7 +91,7 @@ class Judge:
     def _rmse(self, explanation: Explanation) -> float:
         """Root mean square error of the held-out temperatures, free-running, [K]; infinite without a prediction."""
         problem = at_holdout(self.case, explanation)
-        temperatures = [i for i, name in enumerate(self.case.channels) if name != LOSS]
+        temperatures = [i for i, name in enumerate(self.case.channels) if not is_total_loss(name)]
         try:
             predictions = [predict(problem, i, explanation.fit.z, guess=course)
                            for i, course in enumerate(self._courses)]  # fmt: skip

@@ -35,10 +35,10 @@ from diagnosis.decision.beside import Found, settled_beside
 from diagnosis.decision.holdout import Judge
 from diagnosis.decision.stage import OPEN_PENALTY, Stage, log_e_value, penalised
 from diagnosis.inference.evidence import Marginal
-from diagnosis.recordings.quantities import LOSS
 from diagnosis.setup.case import Case, first, floored
 from models.base.parallel import run_parallel, starting_processes
 from models.mechanisms import OPEN_FORMS, Mechanism
+from models.quantities.quantities import TOTAL_LOSS
 
 # Set on development cases (seed 1 of `conceal`) and by the four open ones, what is about open forms and the calibration
 # on opened proofs (seeds 2033 and 2034); a proof draws others.
@@ -103,7 +103,7 @@ def threshold_at(false_alarm_rate: float) -> float:
 
 def candidates_of(case: Case, catalogue: Mapping[str, Mechanism]) -> tuple[Hypothesis, ...]:
     """Every mechanism and every open form at each of its places."""
-    forms = [form for form in OPEN_FORMS if LOSS in case.channels or not form.is_loss]
+    forms = [form for form in OPEN_FORMS if TOTAL_LOSS in case.channels or not form.is_loss]
     return tuple(
         hypothesis_of(placed)
         for mechanism in (*catalogue.values(), *forms)

@@ -17,9 +17,9 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from diagnosis.recordings.quantities import LOSS
 from diagnosis.recordings.recording import Recording
 from models.base.types import Array
+from models.quantities.quantities import is_total_loss
 
 INTERVAL_S = 20.0
 SAMPLES = 5  # of the inputs per interval, at which losses are computed: they are not linear in speed
@@ -287,7 +287,7 @@ def _thinned(even: Array, time: Array, inputs: Mapping[str, Array], values: Mapp
     jumped = np.maximum.accumulate(np.where(happens, at, -count))
     settled = (at - jumped) * INTERVAL_S > SETTLING_S
     for name, rows in values.items():
-        bends, turns = _bends(_cell_means(rows, cell, count), LEAST_BEND_W if name == LOSS else LEAST_BEND_K)
+        bends, turns = _bends(_cell_means(rows, cell, count), LEAST_BEND_W if is_total_loss(name) else LEAST_BEND_K)
         happens |= (settled & bends) | turns
     chosen, k, calm = [0], 0, 0
     upcoming = np.append(np.flatnonzero(happens), count)

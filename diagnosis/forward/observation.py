@@ -9,8 +9,8 @@ import numpy as np
 from diagnosis.forward.network_on_grid import NetworkOnGrid
 from diagnosis.forward.recurrence import lagged
 from diagnosis.forward.trajectory import Trajectory
-from diagnosis.recordings.quantities import LOSS
 from models.base.types import Array
+from models.quantities.quantities import is_total_loss
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,7 +45,7 @@ def readings(model: NetworkOnGrid, trajectory: Trajectory, sensors: Sensors) -> 
     """What the sensors read along a trajectory, shape (K + 1, channels), [degC] or [W]."""
     read = np.empty((len(trajectory.T), len(sensors.channels)))
     for index, name in enumerate(sensors.channels):
-        read[:, index] = delayed_loss(trajectory, sensors.loss_delay) * sensors.loss_gain if name == LOSS else (
+        read[:, index] = delayed_loss(trajectory, sensors.loss_delay) * sensors.loss_gain if is_total_loss(name) else (
             lagged(trajectory.T[:, model.parts.index(name)], trajectory.piece.steps, sensors.lag[index]))  # fmt: skip
     return np.asarray(read + sensors.bias)
 
@@ -71,7 +71,7 @@ def reading_columns(
     """
     read = np.empty((len(T), len(sensors.channels), T.shape[-1]))
     for index, name in enumerate(sensors.channels):
-        if name == LOSS:
+        if is_total_loss(name):
             middle = 0.5 * (T[1:] + T[:-1])
             loss = np.einsum("kn,knc->kc", trajectory.loss_slope, middle) + direct_loss
             read[:, index] = total_at_points(loss) * sensors.loss_gain

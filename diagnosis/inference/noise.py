@@ -10,9 +10,9 @@ from scipy.optimize import nnls
 from diagnosis.forward.grid import Piece, slow_rows, white_sd
 from diagnosis.forward.network_on_grid import NetworkOnGrid
 from diagnosis.inference.whitening import Noise
-from diagnosis.recordings.quantities import LOSS
 from diagnosis.recordings.recording import Recording
 from models.base.types import Array
+from models.quantities.quantities import is_total_loss
 
 LOWEST_SD_K, LOWEST_SD_W = 0.02, 0.5
 FEWEST_ROWS, DEFAULT_LOSS_RELATIVE = 50, 0.02
@@ -33,7 +33,7 @@ def loss_noise(recordings: Sequence[Recording]) -> tuple[float, float]:
     seconds, levels = [], []
     for recording in recordings:
         for channel in recording.channels:
-            if channel.name == LOSS:
+            if is_total_loss(channel.name):
                 for rows in recording.segments:
                     values = channel.values[rows]
                     seconds.append(np.diff(values, 2))
@@ -56,7 +56,7 @@ def channel_noise(recordings: Sequence[Recording], channels: Sequence[str]) -> M
     """White noise of one row of every temperature, [K]: as the rows show it, or as stated where they are too few."""
     result = {}
     for name in channels:
-        if name == LOSS:
+        if is_total_loss(name):
             continue  # see loss_noise: it goes with the loss
         found = [c for r in recordings for c in r.channels if c.name == name]
         stated = [c.noise for c in found if c.noise is not None]
@@ -98,13 +98,13 @@ def noise_of(
     if parametric:
         heat_sd = np.where(heavy, PARAMETRIC_FRACTION * loss_W, PARAMETRIC_K * _conductances(model, piece))
     known = np.array([name in piece.channels for name in model.parts])
-    first = piece.measured[0, [name != LOSS for name in piece.channels]]
+    first = piece.measured[0, [not is_total_loss(name) for name in piece.channels]]
     hot = float(np.nanmax(first)) if np.isfinite(first).any() else 50.0
     ambient = _ambient(model, piece)
     unknown = START_UNKNOWN_K + START_UNKNOWN_SHARE * abs(hot - ambient)
     return Noise(
         channel_sd=np.array([white.get(name, loss_noise[0]) for name in piece.channels]),
-        floor_sd=np.array([LOWEST_SD_W if name == LOSS else LOWEST_SD_K for name in piece.channels]),
+        floor_sd=np.array([LOWEST_SD_W if is_total_loss(name) else LOWEST_SD_K for name in piece.channels]),
         loss_relative_sd=loss_noise[1],
         heat_sd=heat_sd,
         heat_time=HEAT_TIME_S,

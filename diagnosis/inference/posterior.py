@@ -19,9 +19,9 @@ from diagnosis.forward.term_on_grid import TermOnGrid, moved_heat
 from diagnosis.forward.trajectory import ROUNDS, Trajectory, parameter_heats, settled_balance, simulate
 from diagnosis.inference.unknowns import Unknown, Unknowns, shifted
 from diagnosis.inference.whitening import Noise, Whitening
-from diagnosis.recordings.quantities import LOSS
 from models.base.errors import InputError
 from models.base.types import Array
+from models.quantities.quantities import TOTAL_LOSS
 from models.terms.term import Term
 
 ITERATIONS = 8
@@ -249,10 +249,10 @@ class Problem:
             if item.role == "bias":
                 columns[:, sensors.channels.index(item.target), index] = scale
             elif item.role == "loss_gain":
-                columns[:, sensors.channels.index(LOSS), index] = total_at_points(trajectory.loss) * scale
+                columns[:, sensors.channels.index(TOTAL_LOSS), index] = total_at_points(trajectory.loss) * scale
             elif item.role == "loss_delay":
                 column = delay_column(trajectory, sensors.loss_delay) * sensors.loss_gain
-                columns[:, sensors.channels.index(LOSS), index] = column * scale
+                columns[:, sensors.channels.index(TOTAL_LOSS), index] = column * scale
             elif item.role == "lag":
                 channel = sensors.channels.index(item.target)
                 node = model.parts.index(item.target)

@@ -14,8 +14,8 @@ from diagnosis.forward.grid import Piece, stands_for
 from diagnosis.forward.observation import Sensors, reading_columns, readings
 from diagnosis.forward.trajectory import Trajectory, complete_start, free_running, simulate
 from diagnosis.inference.posterior import Problem
-from diagnosis.recordings.quantities import LOSS
 from models.base.types import Array
+from models.quantities.quantities import is_total_loss
 
 START_S = 600.0
 LEFT_ALONE_SD_K = 2.0
@@ -110,7 +110,7 @@ def _start(
     early = problem.changed(pieces=[piece.until(until) if i == index else piece
                                     for i, piece in enumerate(problem.pieces)])  # fmt: skip
     piece, noise = early.pieces[index], problem.noise[index]
-    temperatures = [i for i, name in enumerate(piece.channels) if name != LOSS]
+    temperatures = [i for i, name in enumerate(piece.channels) if not is_total_loss(name)]
     seen = np.isfinite(piece.measured[:, temperatures])
     channel_sd, precision = noise.channel_sd[temperatures], np.diag(1.0 / sd**2)
     values = problem.unknowns.network_values(model.network, z)

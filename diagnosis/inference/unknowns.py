@@ -15,9 +15,9 @@ import numpy as np
 
 from diagnosis.forward.grid import Piece
 from diagnosis.forward.observation import Sensors
-from diagnosis.recordings.quantities import LOSS
 from models.base.types import Array
 from models.network.laws import Parameter
+from models.quantities.quantities import TOTAL_LOSS, is_total_loss
 from models.simulation.thermal_network import ThermalNetwork
 
 Role = Literal["network", "bias", "lag", "loss_gain", "loss_delay", "torque_gain", "ambient_offset", "term"]
@@ -181,14 +181,14 @@ def unknowns_of(
     lags, bias_sd = lags or {}, bias_sd or {}
     items = [Unknown(role="network", target=p.name, parameter=p) for p in network.parameters if p.sd > 0.0]
     for name in channels:
-        if name == LOSS:
+        if is_total_loss(name):
             gain = Parameter(name="loss_gain", start=1.0, sd=LOSS_GAIN_SD, lower=0.5, upper=2.0, log=False)
             offset = _normal("bias_P_loss", "W", 0.0, LOSS_OFFSET_SD_W)
-            items += [Unknown(role="loss_gain", target=LOSS, parameter=gain),
-                      Unknown(role="bias", target=LOSS, parameter=offset)]  # fmt: skip
+            items += [Unknown(role="loss_gain", target=TOTAL_LOSS, parameter=gain),
+                      Unknown(role="bias", target=TOTAL_LOSS, parameter=offset)]  # fmt: skip
             if not slow:
                 delay = _normal("delay_P_loss", "s", 0.0, LOSS_DELAY_ROWS * interval)
-                items.append(Unknown(role="loss_delay", target=LOSS, parameter=delay))
+                items.append(Unknown(role="loss_delay", target=TOTAL_LOSS, parameter=delay))
         else:
             items.append(
                 Unknown(

@@ -21,8 +21,8 @@ import numpy as np
 from diagnosis.forward.network_on_grid import NetworkOnGrid
 from diagnosis.forward.observation import Sensors, total_at_points
 from diagnosis.forward.trajectory import Trajectory
-from diagnosis.recordings.quantities import LOSS
 from models.base.types import Array
+from models.quantities.quantities import is_total_loss
 
 MISSING_VARIANCE = 1e12
 JUMP_SHARE = 0.3  # of a change within one interval: whether it came early or late in it is not known
@@ -155,7 +155,7 @@ def reading_variance(model: NetworkOnGrid, trajectory: Trajectory, sensors: Sens
     piece = trajectory.piece
     variance = noise.channel_sd**2 / np.maximum(piece.counts, 1.0) + noise.floor_sd**2
     for index, name in enumerate(sensors.channels):
-        if name == LOSS:
+        if is_total_loss(name):
             total = trajectory.loss
             at = total_at_points(total)
             variance[:, index] += (noise.loss_relative_sd * at) ** 2 / np.maximum(piece.counts[:, index], 1.0)
@@ -174,7 +174,7 @@ def _observation(model: NetworkOnGrid, trajectory: Trajectory, sensors: Sensors,
     points = len(trajectory.T)
     H = np.zeros((points, len(sensors.channels), size))
     for index, name in enumerate(sensors.channels):
-        if name == LOSS:
+        if is_total_loss(name):
             slope = trajectory.loss_slope
             H[:, index, : model.n] = total_at_points(slope)
         else:

@@ -6,19 +6,19 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from diagnosis.recordings.mapping import RecordingMapping, mapping_beside, mapping_of_definition
-from diagnosis.recordings.quantities import LOSS
 from diagnosis.recordings.read import name_parts, read_recording
 from diagnosis.recordings.recording import Recording
 from diagnosis.recordings.time_axis import ISO_NAMES, STANDARD, moment_text, split_path
 from models.base.errors import InputError
-from models.files.cycle import COLUMNS, REQUIRED, Cycle
+from models.files.cycle import REQUIRED, Cycle
 from models.files.cycle_file import RecordedStart, read_cycle_and_start
 from models.files.table_file import KINDS, column_names
+from models.quantities.quantities import INPUTS, is_total_loss
 
 if TYPE_CHECKING:
     from models.simulation.thermal_network import ThermalNetwork
 
-NEEDED = (STANDARD, *(COLUMNS[signal][0] for signal in REQUIRED))  # columns of a plain cycle
+NEEDED = (STANDARD, *(INPUTS[signal].column for signal in REQUIRED))  # columns of a plain cycle
 MOST_SHOWN = 3  # pieces of a recording with gaps
 
 
@@ -61,13 +61,13 @@ def read_cycle_or_recording(
         With all problems of the file; or if a recording has gaps, with the pieces between them.
     """
     if mapping is None and not _is_recording(text, mapping_of_definition(network.recording)):
-        return *read_cycle_and_start(text, tuple(name for name in network.inputs if name not in COLUMNS)), ()
+        return *read_cycle_and_start(text, tuple(name for name in network.inputs if name not in INPUTS)), ()
     recording = read_recording(text, network, mapping=mapping, to_compare=False)
     if len(recording.segments) > 1:
         raise InputError(f"{text}: {_gaps(recording)}")
     piece = recording.segments[0]
     cycle = Cycle(recording.time[piece], {name: values[piece] for name, values in recording.inputs.items()})
-    temperatures = [(c.name, c.column, c.values[piece]) for c in recording.channels if c.name != LOSS]
+    temperatures = [(c.name, c.column, c.values[piece]) for c in recording.channels if not is_total_loss(c.name)]
     start = RecordedStart.first_of(recording.path, temperatures, recording.rows[piece])
     return cycle, start, (*recording.notes, *_clock_notes(recording))
 

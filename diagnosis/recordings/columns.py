@@ -11,11 +11,13 @@ from numpy.typing import NDArray
 
 from diagnosis.recordings.cleaning import rows_text
 from diagnosis.recordings.mapping import Column, RecordingMapping
-from diagnosis.recordings.quantities import AUXILIARY, IGNORE, LOSS, UNITS, dimension_of, looks_like_kelvin, range_of
+from diagnosis.recordings.quantities import AUXILIARY, IGNORE, looks_like_kelvin
 from models.base.errors import Problems, did_you_mean
 from models.base.types import Array
-from models.files.cycle import COLUMNS, REQUIRED
+from models.files.cycle import REQUIRED
 from models.quantities.column_names import meant
+from models.quantities.quantities import INPUTS, TOTAL_LOSS, column_of, dimension_of, quantity_of
+from models.quantities.units import units_in_files
 
 if TYPE_CHECKING:
     from models.simulation.thermal_network import ThermalNetwork
@@ -33,13 +35,13 @@ def input_names(network: ThermalNetwork) -> tuple[str, ...]:
 
 def measurable(network: ThermalNetwork) -> tuple[str, ...]:
     """Return the quantities that can be measured: ``T_<node>`` and ``P_loss``."""
-    return (*(f"T_{part.name}" for part in network.parts), LOSS)
+    return (*(f"T_{part.name}" for part in network.parts), TOTAL_LOSS)
 
 
 def standard_names(network: ThermalNetwork) -> dict[str, str]:
     """Return the column of every quantity without a mapping file."""
-    names = {signal: COLUMNS[signal][0] if signal in COLUMNS else signal for signal in input_names(network)}
-    return names | {q: f"{q}_degC" if q.startswith("T_") else f"{q}_W" for q in measurable(network)}
+    names = {signal: INPUTS[signal].column if signal in INPUTS else signal for signal in input_names(network)}
+    return names | {q: column_of(q) for q in measurable(network)}
 
 
 def match_columns(
@@ -84,7 +86,7 @@ def match_columns(
     for signal in REQUIRED:
         if signal not in found:
             shown = ", ".join(other[:40] for other in sorted(present)[:20])
-            problems.add(f"column {COLUMNS[signal][0]} is missing; it has: {shown}")
+            problems.add(f"column {INPUTS[signal].column} is missing; it has: {shown}")
     rest = [n for n in present if n not in roles and n not in mapping.columns and n != time_column]
     _report_unused(rest, lacking, problems, notes)
     return roles | {name: Column(quantity=AUXILIARY) for name in rest}
@@ -199,7 +201,7 @@ def quantity_values(
     values[outside] = np.nan
     unit = unit_of_file if column.unit is None else column.unit
     dimension = dimension_of(column.quantity)
-    units = UNITS[dimension] if dimension else {}
+    units = units_in_files(dimension)
     if unit and units and unit not in units:
         problems.add(f"column {name} has the unit {unit!r}, which is no unit of {dimension}{did_you_mean(unit, units)}")
         return None
@@ -260,7 +262,7 @@ def _possible(
             'subtract 273.15, or give unit = "K" in a mapping file'
         )
         return values
-    possible = range_of(quantity)
+    possible = quantity_of(quantity)
     if possible is None:
         return values
     wrong = np.isfinite(values) & ((values < possible.low) | (values > possible.high))

@@ -18,8 +18,8 @@ from diagnosis.recordings.quantities import ISO
 from diagnosis.recordings.time_axis import RECORDING_KINDS, Clock, Part, clock_of, inside, part_of
 from models.base.errors import InputError, Problems, did_you_mean
 from models.base.types import Array
-from models.files.cycle import COLUMNS
 from models.files.table_file import check_file, kind_of, read_chunks, together
+from models.quantities.quantities import INPUTS
 
 
 @dataclass(kw_only=True, eq=False)
@@ -114,7 +114,9 @@ def open_recording(path: Path, mapping: Path | None, usual: RecordingMapping) ->
     start: float | None = None
     units: Mapping[str, str] = {}
     if kind in (".mf4", ".mdf"):
-        base = next((name for name, column in found.columns.items() if column.quantity == "speed"), COLUMNS["speed"][0])
+        base = next(
+            (name for name, column in found.columns.items() if column.quantity == "speed"), INPUTS["speed"].column
+        )
         mdf = read_mdf(path, base=base)
         chunks, start, units = iter([mdf.table]), mdf.start, mdf.units
     else:

@@ -31,12 +31,14 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
-from diagnosis.recordings.quantities import AUXILIARY, IGNORE, UNITS, dimension_of, looks_like_kelvin, range_of
+from diagnosis.recordings.quantities import AUXILIARY, IGNORE, looks_like_kelvin
 from models.base.errors import InputError, did_you_mean
 from models.definition.messages import validate_section
 from models.definition.sections import Name, Section
 from models.files import toml_file
 from models.files.table_file import TextForm
+from models.quantities.quantities import dimension_of, quantity_of
+from models.quantities.units import units_in_files
 
 SCHEMA = 1
 FOLDER_FILE = "mapping.toml"
@@ -79,7 +81,7 @@ class Column(Section):
         dimension = dimension_of(self.quantity)
         if dimension is None or self.quantity in (AUXILIARY, IGNORE):
             return self
-        units = UNITS[dimension]
+        units = units_in_files(dimension)
         if self.unit is not None and self.unit not in units:
             raise ValueError(f"unit {self.unit!r} is no unit of {dimension}{did_you_mean(self.unit, units)}")
         return self
@@ -155,7 +157,7 @@ class RecordingMapping(Section):
 
 
 def _constant_faults(name: str, value: float) -> Iterator[str]:
-    possible = range_of(name)
+    possible = quantity_of(name)
     if looks_like_kelvin(name, value, value):
         yield f"{name} = {value:g} looks like kelvin, but constants are in degC; write {value - 273.15:g}"
     elif possible is not None and not possible.low <= value <= possible.high:

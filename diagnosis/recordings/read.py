@@ -23,12 +23,12 @@ from diagnosis.recordings.cleaning import (
 from diagnosis.recordings.columns import standard_names
 from diagnosis.recordings.file import open_recording, set_to_one_clock, sha256_of, stem_of
 from diagnosis.recordings.mapping import RecordingMapping, mapping_of_definition
-from diagnosis.recordings.quantities import LOSS, dimension_of
 from diagnosis.recordings.recording import Channel, Recording
 from diagnosis.recordings.rows import RecordedRows, joined, read_rows
 from diagnosis.recordings.time_axis import split_path
 from models.base.errors import InputError, Problems
 from models.files.cycle import REQUIRED
+from models.quantities.quantities import is_temperature, is_total_loss
 
 if TYPE_CHECKING:
     from models.simulation.thermal_network import ThermalNetwork
@@ -220,9 +220,9 @@ def _remove_spikes(found: RecordedRows, gap: float) -> None:
     steady = steady_rows({name: found.values[name] for name in REQUIRED})
     pieces = time_pieces(found.seconds, gap)
     for quantity, values in found.values.items():
-        if quantity == LOSS:
+        if is_total_loss(quantity):
             wrong = np.concatenate([spikes_of_loss(values[piece], steady[piece]) for piece in pieces])
-        elif dimension_of(quantity) == "temperature":
+        elif is_temperature(quantity):
             wrong = np.concatenate([spikes_of_temperature(values[piece]) for piece in pieces])
         else:
             continue
@@ -233,7 +233,7 @@ def _remove_spikes(found: RecordedRows, gap: float) -> None:
 
 
 def _note_stuck(found: RecordedRows, network: ThermalNetwork) -> None:
-    temperatures = {q: found.values[q] for q in found.measured(network) if q != LOSS}
+    temperatures = {q: found.values[q] for q in found.measured(network) if not is_total_loss(q)}
     for quantity, (first, end, other, moved) in stuck_rows(found.seconds, temperatures).items():
         hours = (found.seconds[end - 1] - found.seconds[first]) / 3600.0
         found.notes.append(

@@ -13,10 +13,11 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from diagnosis.recordings.quantities import ISO, UNITS
+from diagnosis.recordings.quantities import ISO
 from models.base.errors import InputError, Problems
 from models.base.types import Array
 from models.files.table_file import KINDS, is_file
+from models.quantities.units import units_in_files
 
 RECORDING_KINDS = (*KINDS, ".mf4", ".mdf")
 STANDARD = "time_s"
@@ -147,7 +148,7 @@ class Clock:
     def seconds(self, values: pd.Series) -> Array:
         """Convert a time column, shape (rows,), to [s], dates since 1970; NaN for a cell that is no time."""
         if not self.is_date:
-            return _numbers(values) * UNITS["time"][self.unit][0]
+            return _numbers(values) * units_in_files("time")[self.unit][0]
         if pd.api.types.is_datetime64_any_dtype(values.dtype):
             stamps = pd.to_datetime(values, utc=True)
         else:

@@ -8,12 +8,13 @@ from typing import Any
 
 from diagnosis.results.number_format import NONE, SUPERSCRIPTS
 from models.mechanisms import OPEN_FORMS
+from models.quantities.quantities import TOTAL_LOSS
 
 DAY, HOUR, MINUTE = 86_400.0, 3600.0, 60.0
 WEEKS_S, LONG_S, SHORT_S = 14.0 * DAY, 2.0 * HOUR, 5.0 * MINUTE  # above: in days, in hours; below: in seconds
 RARELY, NEVER = 1e-4, 1e-12  # chances below: as a power of ten; no longer told apart
 UNITS = {"1": "", "degC": "°C", "W/degC": "W/K", "N m": "N m", "N.m": "N m", "rpm": "1/min"}
-LOSS = "P_loss"
+LOSS = TOTAL_LOSS
 PARAMETER = "parameter"
 OPEN_NAMES = {form.name for form in OPEN_FORMS}
 

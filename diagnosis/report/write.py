@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from diagnosis.recordings.quantities import LOSS
 from diagnosis.recordings.recording import Recording
 from diagnosis.results.result import Diagnosis
 from models.assembly.gearbox import Gearbox
 from models.correction.correction import Correction, Estimate, Finding, write_correction
+from models.quantities.quantities import is_total_loss
 
 SHAPE = "shape_"
 REPORT, NUMBERS, CORRECTION = "report.html", "diagnosis.json", "correction.toml"
@@ -69,7 +69,7 @@ def prediction_table(diagnosis: Diagnosis, recording: Recording) -> pd.DataFrame
         for course in courses:
             inside = (recording.time >= course.time[0]) & (recording.time <= course.time[-1] + 1e-6)
             values[inside] = np.interp(recording.time[inside], course.time, course.after[name])
-        columns["P_loss_W" if name == LOSS else f"T_{name}_degC"] = values
+        columns["P_loss_W" if is_total_loss(name) else f"T_{name}_degC"] = values
     return pd.DataFrame(columns)
 
 

@@ -20,7 +20,6 @@ from diagnosis.inference.noise import HEAT_FRACTION, PARAMETRIC_FRACTION, PARAME
 from diagnosis.inference.posterior import Problem
 from diagnosis.inference.predict import Prediction, overall_rmse, predict, rmse
 from diagnosis.inference.shapes import shape_terms
-from diagnosis.recordings.quantities import LOSS
 from diagnosis.recordings.recording import Recording
 from diagnosis.results.findings import finding_of, node_of
 from diagnosis.results.identifiable import scale_notes
@@ -41,8 +40,8 @@ from diagnosis.setup.case import FLOORS, Case, heat_over_time
 from models.base.parallel import run_parallel
 from models.base.types import Array
 from models.base.version import project_version
-from models.files.cycle import COLUMNS
 from models.mechanisms import OPEN_FORM, Mechanism
+from models.quantities.quantities import INPUTS, TOTAL_LOSS, is_total_loss
 
 ENOUGH_VISIBLE = 0.2  # of the catalogue, for a "consistent" that means something
 REMAINING_W_SHARE = 0.03  # of the typical loss: a smaller remainder is not worth a word
@@ -182,7 +181,7 @@ def _remaining(
 def _latents(case: Case, explanation: Explanation) -> tuple[LatentHeat, ...]:
     """Unknown heat in every part, as mechanical loss (where the loss is measured) and not."""
     marginal, knots = Marginal.of(explanation.fit), knots_of(explanation.problem.pieces)
-    kinds = (True, False) if LOSS in case.channels else (False,)
+    kinds = (True, False) if TOTAL_LOSS in case.channels else (False,)
     return tuple(
         latent_heat(explanation.problem.model, explanation.fit, marginal, part.name, loss_W=case.loss_W,
                     is_loss=is_loss, knots=knots)
@@ -327,7 +326,7 @@ def _predicted(
 
 def _fits(case: Case, predictions: Predictions, which: str) -> Fits:
     per_state, overall = {}, {}
-    temperatures = [i for i, name in enumerate(case.channels) if name != LOSS]
+    temperatures = [i for i, name in enumerate(case.channels) if not is_total_loss(name)]
     for state, predicted in predictions[which].items():
         nothing = [np.zeros((0, len(case.channels)))]
         residual = np.concatenate([p.residual for p in predicted] or nothing)
@@ -423,7 +422,9 @@ def _next_test(
     assumed: Collection[str],
 ) -> str:  # fmt: skip
     if verdict == "unexplained" and "T_ambient" in assumed:
-        return f"record {COLUMNS['T_ambient'][0]}: a constant stands for it, and what the air did is missed elsewhere"
+        return (
+            f"record {INPUTS['T_ambient'].column}: a constant stands for it, and what the air did is missed elsewhere"
+        )
     for finding in findings:
         if finding.confusable_with and finding.confusable_with[0].probability >= 0.05:
             return finding.confusable_with[0].separate_by

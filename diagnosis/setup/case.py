@@ -16,11 +16,11 @@ from diagnosis.inference.predict import START_S
 from diagnosis.inference.shapes import shape_terms
 from diagnosis.inference.unknowns import Unknowns, unknowns_of
 from diagnosis.inference.whitening import Whitening
-from diagnosis.recordings.quantities import LOSS
 from diagnosis.recordings.recording import Recording
 from models.assembly.gearbox import Gearbox
 from models.base.types import Array
 from models.mechanisms import Scale
+from models.quantities.quantities import TOTAL_LOSS, is_total_loss
 from models.simulation.thermal_network import Losses, ThermalNetwork
 
 STANDSTILL_RPM = 10.0
@@ -82,7 +82,7 @@ def prepare(
         network = term.apply(network)
     model = NetworkOnGrid(network, losses)
     measured = {c.name for r in recordings for c in r.channels}
-    channels = tuple(name for name in (*model.parts, LOSS) if name in measured)
+    channels = tuple(name for name in (*model.parts, TOTAL_LOSS) if name in measured)
     stated = [c for r in recordings for c in r.channels]
     unknowns = _wider_capacities(unknowns_of(
         network, channels, lags={c.name: c.lag_s for c in stated if c.lag_s is not None},
@@ -90,7 +90,7 @@ def prepare(
         interval=scale.interval, ambient_assumed=any("T_ambient" in r.assumed for r in recordings),
     ))  # fmt: skip
     white = channel_noise(recordings, channels)
-    loss_sd = loss_noise(recordings) if LOSS in channels else (0.0, 0.0)
+    loss_sd = loss_noise(recordings) if TOTAL_LOSS in channels else (0.0, 0.0)
     loss_W = typical_loss(model, recordings)
     problems = []
     learnt, judged = (pieces(given, model.laws.inputs, channels, even=even) for given in (recordings, holdout))
@@ -102,7 +102,7 @@ def prepare(
             [noise_of(model, p, white, loss_W, loss_noise=loss_sd, parametric=gearbox.is_parametric) for p in cut],
             [start_guess(model, p) for p in cut],
         ))  # fmt: skip
-    temperatures = [white[name] for name in channels if name != LOSS]
+    temperatures = [white[name] for name in channels if not is_total_loss(name)]
     return Case(
         gearbox=gearbox, nominal=nominal, losses=losses, scale=scale, channels=channels, train=problems[0],
         holdout=problems[1], loss_W=loss_W, noise_K=float(np.median(temperatures)) if temperatures else 0.0,
@@ -150,7 +150,7 @@ def typical_loss(model: NetworkOnGrid, recordings: Sequence[Recording]) -> float
     for recording in recordings:
         rows = slice(None, None, max(1, len(recording.time) // 500))
         speed, torque = recording.inputs["speed"][rows], recording.inputs["torque"][rows]
-        known = {c.name: c.values[rows] for c in recording.channels if c.name != LOSS}
+        known = {c.name: c.values[rows] for c in recording.channels if not is_total_loss(c.name)}
         T = np.nan_to_num(known.get("oil", next(iter(known.values()), np.full(len(speed), 60.0))), nan=60.0)
         power = model.losses.power(speed, torque, np.repeat(T[:, None], len(model.loss_nodes), axis=1)).sum(axis=-1)
         values.append(power[np.abs(speed) > STANDSTILL_RPM])

@@ -14,10 +14,10 @@ import numpy as np
 from diagnosis.forward.grid import Piece
 from diagnosis.forward.network_on_grid import NetworkOnGrid
 from diagnosis.forward.trajectory import simulate
-from diagnosis.recordings.quantities import LOSS
 from diagnosis.recordings.recording import Recording
 from models.base.errors import InputError
 from models.base.types import Array
+from models.quantities.quantities import TOTAL_LOSS as LOSS
 from models.simulation.thermal_network import Losses, ThermalNetwork
 
 ROWS = 200  # of the thinned recording that is simulated

@@ -12,14 +12,8 @@ from numpy.typing import ArrayLike
 from models.base.errors import InputError, Problems
 from models.base.types import Array
 from models.quantities.column_names import meant
+from models.quantities.quantities import INPUTS
 
-# signal -> (column of a file, plausible range, what a value outside it usually is)
-COLUMNS: dict[str, tuple[str, float, float, str]] = {
-    "speed": ("speed_rpm", -2.0e5, 2.0e5, "1/min"),
-    "torque": ("torque_Nm", -1.0e7, 1.0e7, "N m"),
-    "T_ambient": ("T_ambient_degC", -90.0, 200.0, "degC; kelvin are not meant"),
-    "air_speed": ("air_speed_m_s", 0.0, 200.0, "m/s"),
-}
 REQUIRED = ("speed", "torque")
 
 MOST_ROWS = 5_000_000  # of a refined cycle, as of a table that is read
@@ -73,7 +67,9 @@ class Cycle:
         run.csv: time_s goes from 1 to 1 at row 3; it must increase from row to row
         """
         problems = Problems(name)
-        wanted = {"time": "time_s"} | {signal: spec[0] for signal, spec in COLUMNS.items()} | {c: c for c in extra}
+        wanted = (
+            {"time": "time_s"} | {name: quantity.column for name, quantity in INPUTS.items()} | {c: c for c in extra}
+        )
         _check_names([str(key) for key in columns], list(wanted.values()), problems)
         arrays: dict[str, Array] = {}
         for signal, column in wanted.items():
@@ -86,7 +82,7 @@ class Cycle:
             for signal, values in arrays.items():
                 if len(values) != len(time):
                     problems.add(f"{wanted[signal]} has {len(values)} rows, but time_s has {len(time)}")
-        for signal in [s for s in COLUMNS if s in arrays]:
+        for signal in [s for s in INPUTS if s in arrays]:
             _check_range(signal, arrays[signal], problems)
         problems.stop_if_any()
         return cls(cast(Array, time), arrays)
@@ -143,7 +139,7 @@ def _rounded_up(seconds: float) -> str:
 
 
 def _check_names(have: list[str], wanted: list[str], problems: Problems) -> None:
-    for column in ("time_s", *(COLUMNS[signal][0] for signal in REQUIRED)):
+    for column in ("time_s", *(INPUTS[signal].column for signal in REQUIRED)):
         if column not in have:
             problems.add(f"column {column} is missing; it has: {', '.join(sorted(have))}")
     absent = [column for column in wanted if column not in have]
@@ -165,7 +161,9 @@ def _check_time(time: Array, problems: Problems) -> None:
 
 
 def _check_range(signal: str, values: Array, problems: Problems) -> None:
-    column, low, high, unit = COLUMNS[signal]
+    quantity = INPUTS[signal]
+    column, low, high = quantity.column, quantity.low, quantity.high
+    unit = f"{quantity.unit}; {quantity.note}" if quantity.note else quantity.unit
     wrong = np.flatnonzero((values < low) | (values > high))
     if len(wrong):
         row = int(wrong[0])

@@ -14,9 +14,10 @@ from typing import Literal, TypeAlias
 import sympy as sp
 
 from models.base.errors import InputError
-from models.mechanisms.places import LOSS_CHANNEL, Spot, spots
+from models.mechanisms.places import Spot, spots
 from models.mechanisms.scale import Scale
 from models.network.laws import LawLike, NumericLaw, Parameter, symbol, trace
+from models.quantities.quantities import TOTAL_LOSS
 from models.simulation.thermal_network import ExtraState, ThermalNetwork
 from models.terms.term import Form, Kind, Term, equation
 
@@ -138,7 +139,7 @@ class Mechanism:
         (('oil',), 'windage_oil_strength')
         """
         if channels is None:
-            channels = (*(part.name for part in network.parts), LOSS_CHANNEL)
+            channels = (*(part.name for part in network.parts), TOTAL_LOSS)
         found = [spot for pattern in self.places for spot in spots(network, self.kind, pattern, channels)]
         common, traced = _aliases(network, scale), cache(partial(trace, stand_in=self.name))
         placed = [self._at(network, scale, spot, common, traced) for spot in found]

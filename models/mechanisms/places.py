@@ -25,7 +25,6 @@ from models.network.laws import symbol
 from models.simulation.thermal_network import BASE_SIGNALS, ThermalNetwork
 from models.terms.term import Kind
 
-LOSS_CHANNEL = "P_loss"
 EACH, FACTOR, ALL_LOSSES, ALL_PARTS = "each ", "factor ", "losses", "parts"
 
 

@@ -11,12 +11,13 @@ from numpy.typing import ArrayLike
 from models.base.errors import InputError, did_you_mean
 from models.base.types import Array
 from models.definition.sections import Training
-from models.files.cycle import COLUMNS, Cycle
+from models.files.cycle import Cycle
 from models.network.compiled import compile_laws
 from models.network.structure import Losses, Network
 from models.portable import solver
 from models.portable.evaluation import NetworkSystem, efficiency, torque_loss
 from models.portable.surrogate import range_distance
+from models.quantities.quantities import INPUTS, TOTAL_LOSS, column_of
 from models.simulation.start_temperatures import start_temperatures
 
 STEADY_TOLERANCE_K, STEADY_DISTANCE_K = 1e-9, 1e-6
@@ -127,13 +128,13 @@ class Result:
 
     def columns(self) -> dict[str, Array]:
         """The result as the columns of a file, in the order of the file contract."""
-        names = {signal: spec[0] for signal, spec in COLUMNS.items()}
         table = {"time_s": self.time}
-        table |= {names.get(signal, signal): values for signal, values in self.inputs.items()}
-        table |= {f"T_{node}_degC": T for node, T in self.temperatures.items()}
-        table |= {"P_loss_W": self.loss} | {f"P_loss_{name}_W": P for name, P in self.losses.items()}
-        table |= {"torque_loss_Nm": self.torque_loss, "efficiency": self.efficiency}
-        return table | {"in_domain": np.asarray(self.domain_distance <= 0.0)}
+        table |= {INPUTS[name].column if name in INPUTS else name: values for name, values in self.inputs.items()}
+        computed = {f"T_{node}": T for node, T in self.temperatures.items()}
+        computed |= {TOTAL_LOSS: self.loss} | {f"P_loss_{name}": P for name, P in self.losses.items()}
+        computed |= {"torque_loss": self.torque_loss, "efficiency": self.efficiency}
+        computed |= {"in_domain": np.asarray(self.domain_distance <= 0.0)}
+        return table | {column_of(name): values for name, values in computed.items()}
 
 
 def input_table(network: Network, cycle: Cycle) -> Array:
@@ -186,7 +187,7 @@ def simulate(
     The network of Changenet et al. and Durand de Gevigney et al. that the paper follows, section 5.
     """
     if not isinstance(cycle, Cycle):
-        cycle = Cycle.from_columns(cycle, extra=tuple(n for n in network.inputs if n not in COLUMNS))
+        cycle = Cycle.from_columns(cycle, extra=tuple(n for n in network.inputs if n not in INPUTS))
     system = network_system(network, losses, parameters)
     table = input_table(network, cycle)
     if initial is None:

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 import zipfile
-from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 
 import numpy as np

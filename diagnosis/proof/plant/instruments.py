@@ -15,7 +15,6 @@ from diagnosis.proof.plant.plant import Plant
 from diagnosis.proof.plant.plant_run import Outcome, Run
 from models.base.types import Array
 
-LOSS = "P_loss"
 DECIMALS = {"speed_rpm": 1, "torque_Nm": 2, "T_ambient_degC": 1, "air_speed_m_s": 1, "P_loss_W": 1}
 
 

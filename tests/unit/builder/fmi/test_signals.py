@@ -10,7 +10,7 @@ from builder.surrogate.train import TrainingResult
 from models.assembly.gearbox import Gearbox
 from models.base.errors import InputError
 from models.network.laws import Parameter
-from models.quantities.fmi_units import UNITS
+from models.quantities.units import UNITS
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,169 @@
+"""The table of quantities: names, units, columns, ranges and labels of what is an input, measured or computed.
+
+The units inside are 1/min for speeds and degC for temperatures, otherwise SI: laws, corrections and files of users are
+written in them. A family (``T_{}``) has one quantity per node or component.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from math import inf
+from typing import Literal
+
+from models.quantities.units import INSIDE
+
+Observed = Literal["input", "temperature", "total loss", "computed"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Type:
+    """A declared type of FMI: quantity, unit, the unit to show, and what is common to all its signals."""
+
+    quantity: str
+    unit: str
+    display: str | None = None
+    nominal: float = 1.0
+    description: str
+
+
+TYPES: Mapping[str, Type] = {
+    "Speed": Type(
+        quantity="AngularVelocity", unit="rad/s", display="rpm", nominal=100.0, description="Speed of a shaft"
+    ),
+    "Torque": Type(quantity="Torque", unit="N.m", nominal=100.0, description="Torque in a shaft"),
+    "Temperature": Type(
+        quantity="ThermodynamicTemperature", unit="K", display="degC", nominal=300.0, description="Temperature"
+    ),
+    "AirSpeed": Type(quantity="Velocity", unit="m/s", description="Speed of air"),
+    "VehicleSpeed": Type(quantity="Velocity", unit="m/s", nominal=10.0, description="Speed of a vehicle"),
+    "Power": Type(quantity="Power", unit="W", nominal=100.0, description="Power or heat flow"),
+    "Ratio": Type(quantity="Ratio", unit="1", description="Number without unit"),
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Quantity:
+    """A quantity of a gearbox.
+
+    Attributes
+    ----------
+    name : str
+        Inside; with ``{}`` for a family
+    dimension : str
+        Key of :data:`models.quantities.units.INSIDE`, empty for a flag
+    column : str
+        Column of files
+    low, high : float
+        Plausible range, in the unit inside
+    note : str
+        What a value outside the range usually is
+    label : str
+        Of an axis
+    observed : str
+        Input, temperature of a node, total loss, or computed result
+    type : str or None
+        Key of :data:`TYPES`
+    fmi : str
+        Name of the FMI signal; empty if no FMU has it
+    """
+
+    name: str
+    dimension: str
+    column: str
+    low: float = -inf
+    high: float = inf
+    note: str = ""
+    label: str
+    observed: Observed
+    type: str | None = None
+    fmi: str = ""
+
+    @property
+    def unit(self) -> str:
+        """Unit inside and in files."""
+        return INSIDE.get(self.dimension, "")
+
+
+QUANTITIES: tuple[Quantity, ...] = (
+    Quantity(name="speed", dimension="speed", column="speed_rpm", low=-2.0e5, high=2.0e5, label="Input speed in 1/min",
+             observed="input", type="Speed", fmi="speed"),
+    Quantity(name="torque", dimension="torque", column="torque_Nm", low=-1.0e7, high=1.0e7,
+             label="Input torque in N m", observed="input", type="Torque", fmi="torque"),
+    Quantity(name="T_ambient", dimension="temperature", column="T_ambient_degC", low=-90.0, high=200.0,
+             note="kelvin are not meant", label="Ambient temperature in °C", observed="input", type="Temperature",
+             fmi="T_ambient"),
+    Quantity(name="air_speed", dimension="air speed", column="air_speed_m_s", low=0.0, high=200.0,
+             label="Air speed in m/s", observed="input", type="AirSpeed", fmi="air_speed"),
+    # Above 250 degC oil and steel of a gearbox are destroyed.
+    Quantity(name="T_{}", dimension="temperature", column="T_{}_degC", low=-90.0, high=250.0,
+             label="Temperature in °C", observed="temperature", type="Temperature", fmi="{}.T"),
+    Quantity(name="P_loss", dimension="power", column="P_loss_W", low=-1e7, high=1e7, label="Power loss in W",
+             observed="total loss", type="Power", fmi="loss.total"),
+    Quantity(name="P_loss_{}", dimension="power", column="P_loss_{}_W", label="Power loss in W", observed="computed",
+             type="Power", fmi="loss.{}"),
+    Quantity(name="torque_loss", dimension="torque", column="torque_loss_Nm", label="Loss torque in N m",
+             observed="computed", type="Torque", fmi="torque_loss"),
+    Quantity(name="efficiency", dimension="ratio", column="efficiency", label="Efficiency", observed="computed",
+             type="Ratio", fmi="efficiency"),
+    Quantity(name="in_domain", dimension="", column="in_domain", label="Inside the trained range",
+             observed="computed", fmi="in_domain"),
+)  # fmt: skip
+_BY_NAME = {quantity.name: quantity for quantity in QUANTITIES}
+_FAMILIES = [quantity for quantity in QUANTITIES if "{}" in quantity.name]
+INPUTS: Mapping[str, Quantity] = {q.name: q for q in QUANTITIES if q.observed == "input"}
+TOTAL_LOSS = next(quantity.name for quantity in QUANTITIES if quantity.observed == "total loss")
+
+
+def quantity_of(name: str) -> Quantity | None:
+    """Return a quantity by its name inside; None for an input of a user.
+
+    Examples
+    --------
+    >>> quantity_of("T_oil").column, quantity_of("P_loss").observed, quantity_of("oil_flow")
+    ('T_oil_degC', 'total loss', None)
+    """
+    return _BY_NAME.get(name) or _member(name, "name")
+
+
+def quantity_of_signal(fmi: str) -> Quantity | None:
+    """Return a quantity by its FMI signal; None if files have no column for it.
+
+    Examples
+    --------
+    >>> quantity_of_signal("oil.T").column, quantity_of_signal("loss.total").column, quantity_of_signal("heat.extra")
+    ('T_oil_degC', 'P_loss_W', None)
+    """
+    return next((q for q in QUANTITIES if q.fmi == fmi), None) or _member(fmi, "fmi")
+
+
+def _member(text: str, of: Literal["name", "fmi"]) -> Quantity | None:
+    for family in _FAMILIES:
+        before, _, after = getattr(family, of).partition("{}")
+        if text.startswith(before) and text.endswith(after):
+            member = text[len(before) : len(text) - len(after)].strip("'")
+            return replace(family, name=family.name.replace("{}", member), column=family.column.replace("{}", member),
+                           fmi=family.fmi.replace("{}", member))  # fmt: skip
+    return None
+
+
+def column_of(name: str) -> str:
+    """Return the column of a quantity; an input of a user has its own name."""
+    quantity = quantity_of(name)
+    return name if quantity is None else quantity.column
+
+
+def dimension_of(name: str) -> str | None:
+    """Return the dimension of a quantity, None if it may have any unit."""
+    quantity = quantity_of(name)
+    return None if quantity is None else quantity.dimension or None
+
+
+def is_temperature(name: str) -> bool:
+    """Return True for the temperature of a node or of the surroundings."""
+    return dimension_of(name) == "temperature"
+
+
+def is_total_loss(name: str) -> bool:
+    """Return True for the measured total loss; other channels of a diagnosis are named after their node."""
+    return name == TOTAL_LOSS
