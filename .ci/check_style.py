@@ -42,7 +42,7 @@ PHRASES = {
     r"\bspeaks? (?:for|against)\b": "supports, contradicts",
     r"\bas far as\b": "if, up to",
     r"\bin earnest\b": "really (or nothing)",
-    r"\bis none(?: of)?\b": "is not a",
+    r"(?<!there )\bis none\b": "is not a",
     r"\b(?:hears?|heard)\b": "receives, logs",
     r"\b(?:says|said)\b": "shows, contains, states",
     r"\bwhat (?:was|is|were|has|had) (?:found|told|said|shown|seen|left|meant)\b": "name the thing",

@@ -1,4 +1,4 @@
-"""What remembers along a recording: the states of laws, on all intervals at once and for many values of parameters.
+"""Internal states of laws along a recording (hysteresis, lags, counters), on all intervals, for many parameters.
 
 A state whose law is a straight line of itself (a hysteresis that holds, a first-order lag, a counter) is a linear
 recurrence over the intervals and needs no loop over them. It may feel states that stand before it. Any other one is
@@ -29,7 +29,7 @@ MOVED = 1e-3  # of a state, for the slope of its rate
 
 
 def update_of(state: ExtraState, *, blurred: bool) -> sp.Expr:
-    """What a state becomes after a step; itself if it does not switch."""
+    """Value of a state after a step; the state itself if it does not switch."""
     found = state.blurred if blurred and state.blurred is not None else state.update
     return symbol(state.name) if found is None else found
 
@@ -49,9 +49,9 @@ class Memories:
     arguments : sequence of str
         Names of all other signals, in the order in which :meth:`follow` gets them
     parts : sequence of str
-        Nodes whose temperatures are among them, one beside the other and in this order
+        Nodes whose temperatures are among them, adjacent and in this order
     boundary : mapping
-        What stands for the temperatures of boundaries
+        Expressions of the boundary temperatures
     """
 
     def __init__(
@@ -204,7 +204,7 @@ def _of_interval(row: Array | float, owner: NDArray[np.intp]) -> Array | float:
 
 
 def _in_turn(state: ExtraState, later: Sequence[ExtraState]) -> bool:
-    """Whether a state either switches or is driven, feels no later one, and is a straight line of itself."""
+    """True if a state switches or is driven, does not depend on a later state, and is linear in itself."""
     laws = [law for law in (state.rate, state.update, state.blurred) if law is not None]
     others = {symbol(other.name) for other in later}
     if any(law.free_symbols & others for law in laws) or (state.update is not None and not state.rate.is_zero):

@@ -82,7 +82,7 @@ class Piece:
         return np.diff(self.time)
 
     def until(self, time: float) -> Piece:
-        """The same up to a time [s], one interval at least."""
+        """The piece up to a time [s], with at least one interval."""
         count = max(int(np.searchsorted(self.time, time, side="right")), 2)
         return replace(
             self, time=self.time[:count], samples=self.samples[: count - 1], measured=self.measured[:count],
@@ -90,7 +90,7 @@ class Piece:
         )  # fmt: skip
 
     def finer(self) -> tuple[Piece, NDArray[np.intp]]:
-        """The same in intervals of about :data:`FREE_S`; of slow rows, as long as the samples of the inputs lie apart.
+        """The piece in intervals of about :data:`FREE_S`; for slow rows, of the sampling interval of the inputs.
 
         Returns
         -------
@@ -128,7 +128,7 @@ class Piece:
         return np.where(np.isfinite(measured), measured, T)
 
     def guide(self, parts: Sequence[str]) -> Array:
-        """What parts had where it was measured and the piece is guided, else NaN; shape (K + 1, parts), [degC]."""
+        """Measured temperatures of parts if the piece is guided, else NaN; shape (K + 1, parts), [degC]."""
         found = np.full((len(self.time), len(parts)), np.nan)
         for index, name in enumerate(self.channels):
             if self.guided and name in parts:
@@ -140,7 +140,7 @@ class Piece:
         return found
 
     def _without_sensor(self, measured: Array, lag: float) -> Array:
-        """What a part probably had: without the lag of its sensor, peaks and valleys not cut off.
+        """Estimated true temperature of a part: sensor lag removed, so that peaks are not cut off.
 
         Of the measured course alone: taken from the simulated one, it would be another one in every round.
         """
@@ -186,7 +186,7 @@ def pieces(
 
 
 def slow_rows(recordings: Sequence[Recording]) -> bool:
-    """Whether the rows of all recordings lie minutes apart."""
+    """True if the rows of all recordings lie minutes apart."""
     return bool(recordings) and all(float(np.median(np.diff(r.time))) > SLOW_S for r in recordings)
 
 
@@ -230,7 +230,7 @@ def _pieces_of(recording: Recording, inputs: Sequence[str], channels: Sequence[s
 
 
 def stands_for(time: Array) -> Array:
-    """Time that every grid point stands for, shape (K + 1,), [s]: half of the intervals beside it.
+    """Quadrature weight of each grid point (trapezoidal rule), shape (K + 1,), [s].
 
     Examples
     --------
@@ -301,7 +301,7 @@ def _thinned(even: Array, time: Array, inputs: Mapping[str, Array], values: Mapp
 
 
 def _cell_means(rows: Array, cell: NDArray[np.intp], count: int) -> Array:
-    """Means over cells, shape (count,); where there are none, between those beside."""
+    """Means over cells, shape (count,); empty cells are interpolated between their neighbours."""
     good = np.isfinite(rows)
     seen = np.bincount(cell[good], minlength=count)
     known = np.flatnonzero(seen)

@@ -227,14 +227,14 @@ class NetworkOnGrid:
         return LossTangent(**found, stronger=stronger)
 
     def _tangent(self, samples: Array, T: Array) -> LossTangent:
-        """Losses around temperatures, everything anew."""
+        """Losses and their slopes around temperatures, all rows recomputed."""
         power = self.loss_at(samples, T)
         slope, torque_slope = self._loss_slopes(samples, T, power)
         return LossTangent(T=T[:, self.loss_nodes], power=power, slope=slope, torque_slope=torque_slope,
                            samples=samples, stronger=np.zeros(len(T)))  # fmt: skip
 
     def _slow_tangent(self, samples: Array, T: Array, previous: LossTangent) -> LossTangent:
-        """All rows anew or none: where switches follow means over minutes, fits end elsewhere if few rows are."""
+        """Recompute all loss tangents or none: partial updates make fits of slow recordings converge elsewhere."""
         mine = T[:, self.loss_nodes]
         apart = float(np.abs(mine - previous.T).max(initial=0.0))
         if samples is previous.samples and apart < SLOW_NEAR_K:
@@ -294,7 +294,7 @@ class NetworkOnGrid:
 
     @cached_property
     def boundary(self) -> Mapping[sp.Symbol, sp.Expr]:
-        """Temperatures of all boundaries, [degC], by the signal that stands for each."""
+        """Expressions of all boundary temperatures, [degC], by their signal."""
         return {symbol(f"T_{n.name}"): n.temperature for n in self.network.nodes if n.temperature is not None}
 
     @cached_property
@@ -324,7 +324,7 @@ class NetworkOnGrid:
     def memory(
         self, piece: Piece, T: Array, seen: Array, values: Array, power: Array, before: Array | None = None
     ) -> Array:  # fmt: skip
-        """The states beside the temperatures, at the middles of the intervals.
+        """The extra states (those that are not temperatures) at the middles of the intervals.
 
         Parameters
         ----------
@@ -353,7 +353,7 @@ class NetworkOnGrid:
         return result
 
     def switching(self, *, blurred: bool) -> Callable[[Sequence[Any]], tuple[float, ...]]:
-        """What switches become, on plain numbers: of all signals in the order of the laws."""
+        """Values of switches after a step, from plain numbers: all signals in the order of the laws."""
         return self._picked([update_of(self.network.states[index], blurred=blurred) for index in self.switches])
 
     @cached_property

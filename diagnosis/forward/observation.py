@@ -1,4 +1,4 @@
-"""What the sensors would read along a trajectory, and the derivatives of that: nodes, lag, bias, total loss."""
+"""Readings of the sensors along a trajectory and their derivatives: nodes, lag, bias, total loss."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from models.quantities.quantities import is_total_loss
 
 @dataclass(frozen=True, kw_only=True)
 class Sensors:
-    """What every channel is like.
+    """Properties of every channel.
 
     Attributes
     ----------
@@ -36,13 +36,13 @@ class Sensors:
     loss_delay: float = 0.0
 
     def ideal(self) -> Sensors:
-        """The same channels without lag, bias, gain or delay."""
+        """These channels with ideal sensors: no lag, bias, gain or delay."""
         nothing = np.zeros(len(self.channels))
         return Sensors(channels=self.channels, lag=nothing, bias=nothing)
 
 
 def readings(model: NetworkOnGrid, trajectory: Trajectory, sensors: Sensors) -> Array:
-    """What the sensors read along a trajectory, shape (K + 1, channels), [degC] or [W]."""
+    """Readings of the sensors along a trajectory, shape (K + 1, channels), [degC] or [W]."""
     read = np.empty((len(trajectory.T), len(sensors.channels)))
     for index, name in enumerate(sensors.channels):
         read[:, index] = delayed_loss(trajectory, sensors.loss_delay) * sensors.loss_gain if is_total_loss(name) else (

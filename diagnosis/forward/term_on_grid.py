@@ -220,7 +220,7 @@ class TermOnGrid:
         return read
 
     def passed_on(self, trajectory: Trajectory, sensors: Sensors, changes: Array, values: Array) -> Array:
-        """What such a fault makes of changes of the readings, shape (K + 1, channels, ...): most of them are linear."""
+        """Changes of the readings as distorted by such a fault, shape (K + 1, channels, ...); most are linear."""
         term, time = self.term, trajectory.piece.time
         if term.form == "shift":
             return changes

@@ -18,6 +18,7 @@ import numpy as np
 from scipy.special import exprel
 
 from diagnosis.forward.grid import Piece
+from diagnosis.forward.matrix_exponential import exponential
 from diagnosis.forward.network_on_grid import HIGHEST_T, LOWEST_T, Balance, LossTangent, NetworkOnGrid
 from models.base.types import Array
 
@@ -231,7 +232,7 @@ def free_running(
 
 
 def _arrived(model: NetworkOnGrid, last: LossTangent, tangent: LossTangent, middle: Array) -> bool:
-    """Whether losses by the tangents of the last round are those at the temperatures that came out of it."""
+    """True if the losses of the last round's tangents equal those at the temperatures that it gave."""
     mine = middle[:, model.loss_nodes]
     off = np.abs(last.at(mine) - tangent.at(mine))
     return bool((off.mean(axis=0) <= LOSS_ARRIVED * np.abs(tangent.at(mine)).mean(axis=0)).all())
@@ -252,7 +253,7 @@ def _stepped(
     T, seen : Array, shape (K + 1, parts)
         Temperatures, and those that the switches followed, [degC]
     memory : Array, shape (K, states)
-        As given, but for what was found here
+        As given, except for the values computed here
     """
     switches, actuated, acting, kept = model.switches, model.actuated, model.acting, memory.copy()
     corners = list(product((0.0, 1.0), repeat=len(acting)))
@@ -421,43 +422,6 @@ def _walked(
         now = solved.decay[k] @ now + solved.driven[k]
         result[k + 1] = now
     return solved, result
-
-
-def exponential(matrix: Array, steps: Array) -> tuple[Array, Array]:
-    r"""Exact solution of ``x' = A x + b`` over an interval.
-
-    Parameters
-    ----------
-    matrix : Array, shape (K, n, n)
-        A, [1/s]
-    steps : Array, shape (K,)
-        h, [s]
-
-    Returns
-    -------
-    decay, gain : Array, shape (K, n, n)
-        :math:`e^{hA}` and :math:`\int_0^h e^{sA} ds` [s]: ``x(h) = decay x + gain b``
-
-    References
-    ----------
-    Taylor series of phi_1 with doubling, phi_1(2z) = (e^z + 1) phi_1(z) / 2; Hochbruck, Ostermann, Exponential
-    integrators, Acta Numerica 19 (2010).
-    """
-    z = matrix * steps[:, None, None]
-    largest = float(np.max(np.abs(z).sum(axis=-1), initial=0.0))
-    if not np.isfinite(largest):
-        raise ArithmeticError("the heat balance is no number with these parameters")
-    doublings = max(0, int(np.ceil(np.log2(max(largest, 1e-12) / 0.5))))
-    z = z / 2.0**doublings
-    identity = np.eye(matrix.shape[-1])
-    phi = np.broadcast_to(identity, z.shape).copy()
-    for order in range(9, 1, -1):  # Horner: phi_1 = 1 + z/2 (1 + z/3 (1 + ...))
-        phi = identity + (z / order) @ phi
-    decay = identity + z @ phi
-    for _ in range(doublings):
-        phi = 0.5 * (decay @ phi + phi)
-        decay = decay @ decay
-    return decay, phi * steps[:, None, None]
 
 
 def settled_balance(model: NetworkOnGrid, trajectory: Trajectory) -> Balance:

@@ -140,7 +140,7 @@ def auxiliary_numbers(cells: pd.Series, name: str, column: Column, notes: list[s
 
 
 def _numbers(cells: pd.Series, name: str, problems: Problems) -> Array | None:
-    """Return a column as numbers, shape (rows,), in the unit of the file; None and a problem if one is none."""
+    """Return a column as numbers, shape (rows,), in the unit of the file; None and a problem if a cell is no number."""
     rows = np.asarray(cells.index) + 1
     if pd.api.types.is_bool_dtype(cells.dtype) or pd.api.types.is_datetime64_any_dtype(cells.dtype):
         problems.add(f"{name} holds {cells.dtype} values (rows {rows[0]}-{rows[-1]}), not numbers")

@@ -212,7 +212,7 @@ def _add_unrecorded(found: RecordedRows, mapping: RecordingMapping, network: The
             found.values[name] = np.full(size, default)
             found.assumed.append(name)
             found.notes.append(
-                f"{standard_names(network)[name]} was not recorded; {default:g} is assumed, as the definition says"
+                f"{standard_names(network)[name]} was not recorded; {default:g} is assumed, as in the definition"
             )
 
 

@@ -1,4 +1,4 @@
-"""One effect found, told for people: place, sentence, equation, numbers, and what it could be mistaken for."""
+"""A finding for the report: place, sentence, equation, numbers, and the effects that it may be confused with."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def _node_of_parameter(case: Case, name: str) -> str:
 
 
 def rivals_of(stage: Stage, catalogue: Mapping[str, Mechanism], doubt: float = 0.0) -> tuple[Rival, ...]:
-    """What else would explain it, with what would separate it from what was accepted.
+    """Rival explanations, with the experiment that separates each from the accepted one.
 
     Parameters
     ----------
@@ -142,7 +142,7 @@ def _says(h: Hypothesis, values: Mapping[str, tuple[float, float]]) -> str:
 
 
 def _with_form(h: Hypothesis, values: Mapping[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:
-    """Values of what was found; the strength of a law with what its form may be wrong by; a fault has none."""
+    """Parameter values of a finding; a law's strength includes the error of its form, a sensor fault's does not."""
     if h.term is None or h.term.of_measurement:
         return dict(values)
     value, sd = values[h.term.strength.name]
@@ -150,7 +150,7 @@ def _with_form(h: Hypothesis, values: Mapping[str, tuple[float, float]]) -> dict
 
 
 def _with_bias(final: Explanation, h: Hypothesis) -> dict[str, tuple[float, float]]:
-    """Values of what was found; a bias that was found takes the sensor's ordinary tolerance with it."""
+    """Parameter values of a finding; a bias includes the sensor's ordinary tolerance."""
     values = final.values_of(h)
     term = h.term
     if term is None or term.form != "shift" or term.kind != "sensor" or len(term.parameters) != 1:

@@ -1,8 +1,8 @@
-"""What temperatures alone cannot tell: all heats, conductances and heat capacities times one factor.
+"""The unidentifiable direction of temperatures alone: all heats, conductances and capacities times one factor.
 
 ``C dT/dt = P + sum G dT`` keeps its solution when C, P and G grow together. Where nothing in watts was measured, and
-the definition does not fix a size, a recording tells ratios only (heat over capacity, conductance over capacity), and
-every watt in the result rests on the priors. Whether it is so is asked of the fit itself: the information that the
+the definition does not fix a size, a recording identifies ratios only (heat over capacity, conductance over capacity),
+and every watt in the result rests on the priors. Whether it is so is asked of the fit itself: the information that the
 recordings have along this direction is compared with what they have on the sizes one by one.
 """
 
@@ -22,7 +22,7 @@ LITTLE = 0.01  # of what the recordings know about the sizes one by one: a small
 
 
 def scale_direction(explanation: Explanation) -> Array:
-    """Change of the unknowns that multiplies every heat, conductance and capacity by e, as far as they can.
+    """Change of the unknowns that multiplies every heat, conductance and capacity by e, within their bounds.
 
     Returns
     -------
@@ -41,7 +41,7 @@ def scale_direction(explanation: Explanation) -> Array:
 
 
 def scale_notes(explanation: Explanation) -> tuple[str, ...]:
-    """One sentence where the recordings tell ratios only, nothing where they tell sizes.
+    """One sentence if the recordings identify ratios only; nothing if they identify sizes.
 
     Parameters
     ----------

@@ -84,5 +84,5 @@ def regime(acting: NDArray[np.bool_], signals: Mapping[str, tuple[Array, str]], 
                     words = f"{name} {side} {exact} {unit}"
     if best >= GOOD_ENOUGH:
         return words
-    return f"{share:.0%} of the time; no single threshold of {', '.join(signals)} tells when" + (
+    return f"{share:.0%} of the time; no single threshold of {', '.join(signals)} separates it" + (
         f" (nearest: {words})" if best > 0.75 else "")  # fmt: skip

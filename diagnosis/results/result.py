@@ -1,4 +1,4 @@
-"""What a diagnosis says: plain data, ready for ``diagnosis.json``, the report and a notebook."""
+"""The result of a diagnosis: plain data for ``diagnosis.json``, the report and a notebook."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ VERDICT_TEXT: Mapping[str, str] = {
     "parameter_error": "A known parameter of the model is outside what its definition allows.",
     "missing_physics": "The gearbox shows physics that the model leaves out.",
     "sensor_fault": "A sensor, clock or recorded input is at fault, not the gearbox.",
-    "unexplained": "Something is missing, and it is none of the physics in the catalogue.",
+    "unexplained": "Something is missing, and it matches no physics in the catalogue.",
     "insufficient_data": "These recordings are too short or too calm to decide.",
 }
 REFUSED = "refused (by the held-out recordings, as impossible, or as too small)"
 AHEAD = f"more probable by what was learnt from, but {REFUSED}"
 NOT_ACCEPTED = f"by what was learnt from, but it was {REFUSED}"
-PARTLY = "Part of what is missing was found; the rest is none of the physics in the catalogue."
+PARTLY = "Part of what is missing was found; the rest matches no physics in the catalogue."
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,7 +55,7 @@ class Rival:
     mechanism, place : str
     probability : float
     separate_by : str
-        The experiment or sensor that would tell the two apart
+        The experiment or sensor that would separate the two
     """
 
     mechanism: str
@@ -72,7 +72,7 @@ class Finding:
     ----------
     mechanism : str
         Name in the catalogue; ``parameter`` for a parameter out of its prior; of an open form its name
-    family, place, node, kind, says, reference : str
+    family, place, node, kind, reference : str
         `node`: the part of the network, or the channel, that it acts on
     equation : str
         LaTeX
@@ -86,7 +86,7 @@ class Finding:
         Mean magnitude over the training recordings with its standard error, and the largest one; 0 for a fault of an
         instrument
     heat : mapping of recording to (time [s], heat [W]) Arrays
-        Over time, of what was found; empty for faults of instruments
+        Heat of the finding over time; empty for sensor faults
     term : Term or None
         With the found values as its parameters' start
     """
@@ -96,6 +96,7 @@ class Finding:
     place: str
     node: str
     kind: str
+    #: The finding in one sentence.
     says: str
     reference: str
     equation: str
@@ -145,7 +146,7 @@ class MissingHeat:
     speed, torque, temperature : Array, shape (K,)
         Operating point: [1/min], [N m], and the node's temperature [degC]
     law : Array, shape (K,), or None
-        Heat of what was found there, [W]
+        Heat of the findings there, [W]
     """
 
     recording: str
@@ -173,7 +174,7 @@ class Course:
         [1/min], [N m]
     measured, before, calibrated, after : mapping of channel to Array, shape (rows,)
         [degC], or [W] for ``P_loss``; before: the model as delivered; calibrated: its parameters tuned inside their
-        priors; after: with what was found
+        priors; after: with the findings
     counts_from_s : float
         Rows before it served to find the start temperatures and do not count
     """
@@ -263,7 +264,7 @@ class Diagnosis:
     floor : str
         What structural floor was assumed
     misfit : float
-        Mean square of what is left in the training recordings or, where something was found, in the held-out ones,
+        Mean square of the residual in the training recordings or, where something was found, in the held-out ones,
         whichever is larger, in multiples of what noise and structural floor make of it; above 1 they are not explained
     remaining_p_value : float
         Of a further effect, if nothing more is missing; NaN where no further look was taken
@@ -371,7 +372,7 @@ class Diagnosis:
 
     @property
     def nearest(self) -> tuple[Ranked, ...]:
-        """What would explain the training data best, most probable first, where nothing was accepted."""
+        """Best explanations of the training data, most probable first, if nothing was accepted."""
         if self.findings or self.verdict in ("consistent", "insufficient_data"):
             return ()
         return tuple(one for one in self.ranking[:MOST_NEAREST] if one.probability >= NEAREST)
@@ -391,7 +392,7 @@ class Diagnosis:
             if fits.before == fits.before:
                 lines.append(
                     f"RMSE {name}: {fits.before:.2f} K as delivered, {fits.calibrated:.2f} K calibrated, "
-                    f"{fits.after:.2f} K with what was found (noise {self.noise_K:.2f} K)"
+                    f"{fits.after:.2f} K with the findings (noise {self.noise_K:.2f} K)"
                 )
         far = sorted((c for c in self.calibration if abs(c.shift_in_sd) > FAR_SD), key=lambda c: -abs(c.shift_in_sd))
         if far:

@@ -110,7 +110,7 @@ def prepare(
 
 
 def split(whole: Sequence[Piece]) -> tuple[tuple[Piece, ...], tuple[Piece, ...]]:
-    """The same pieces twice: the readings of the first part to learn from, those of the last to judge by.
+    """Split pieces in time: readings of the first part to learn from, those of the last part held out.
 
     The readings of the first minutes stay in both, for the start temperatures.
     """
@@ -180,7 +180,7 @@ def floored(explanation: Explanation) -> Explanation:
     Returns
     -------
     Explanation
-        Fitted anew where the floor changed, and where that has a solution
+        Fitted again if the noise floor changed and the fit has a solution
     """
     evidences = [_evidence(explanation, times) for times in FLOORS]
     best = int(np.argmax(evidences))

@@ -241,7 +241,7 @@ class Anatomy:
         """Forced and free heat transfer to air at the definition's air speed, 60 and 27 degC, [W/(m2 K)].
 
         Free: ``1.42 (dT / H)^0.25`` of a vertical wall (Holman, "Heat Transfer", simplified equations; from memory).
-        Forced: what is left of the definition's own correlation.
+        Forced: the remainder of the definition's own correlation.
         """
         housing, v_air = self.gearbox.housing, self.gearbox.ambient.air_speed_m_s
         T, T_a, length = 60.0, 27.0, housing.height_m

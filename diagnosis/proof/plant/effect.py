@@ -1,4 +1,4 @@
-"""What an effect is, and the grip by which it acts on the plant."""
+"""Effects, and the grip by which they act on the plant."""
 
 from __future__ import annotations
 

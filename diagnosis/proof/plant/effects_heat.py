@@ -273,7 +273,7 @@ HEAT_EFFECTS = (
     effect("cooler_shaft_driven", "link", at(OIL), share_of_shed(0.7), "a x^0.75 W/K to air", family="oil circuit",
            after=cooler_shaft_driven),
     effect("oil_tank", "link", at(OIL), share_of_shed(2.0, size=(2.0, 4.0), to_air=(0.10, 0.25)),
-           "a W/K while turning to a tank of its own capacity, which sheds to air", family="oil circuit",
+           "a W/K while turning to a tank with a separate capacity, which sheds to air", family="oil circuit",
            after=oil_tank),
     effect("oil_added", "source", at(OIL), relative(0.30, at_h=(0.6, 1.3)), "a of the filling, cold, at t = at_h",
            family="oil circuit", after=oil_added),

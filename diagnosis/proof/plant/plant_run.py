@@ -24,7 +24,7 @@ FILM_REFERENCE_K = 316.65  # film temperature at which the reference of the conv
 
 @dataclass(frozen=True, kw_only=True)
 class Individual:
-    """What makes one gearbox differ from another of the same definition.
+    """Parameters in which one gearbox differs from another of the same definition.
 
     Attributes
     ----------
@@ -75,7 +75,7 @@ class Run:
 
 @dataclass(frozen=True, kw_only=True)
 class Outcome:
-    """What one run did, the rows before the recording cut off.
+    """Result of one run without the rows before the recording.
 
     Attributes
     ----------

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from diagnosis.forward.grid import Piece, pieces
+from diagnosis.forward.matrix_exponential import exponential
 from diagnosis.forward.network_on_grid import SLOW_NEAR_K, SLOW_REACH_K, NetworkOnGrid, named_values
 from diagnosis.forward.recurrence import lagged
 from diagnosis.forward.term_on_grid import TermOnGrid
-from diagnosis.forward.trajectory import exponential, parameter_heats, settled_balance, simulate
+from diagnosis.forward.trajectory import parameter_heats, settled_balance, simulate
 from diagnosis.inference.shapes import shape_terms
 from models.assembly.gearbox import Gearbox
 from models.base.types import Array

@@ -16,7 +16,7 @@ def test_what_was_found_where_and_how_well_it_fits() -> None:
     assert "strength = 18.4 ± 1.1 W, " in lines[2] and lines[2].endswith(", mean |heat| = 21.0 ± 1.3 W")
     assert any(line.strip().startswith("not ruled out: pocketing at ") for line in lines)
     assert "Where: oil (0.96); speed above 2900 1/min" in lines
-    assert "RMSE held-out: 5.21 K as delivered, 3.62 K calibrated, 0.52 K with what was found (noise 0.20 K)" in lines
+    assert "RMSE held-out: 5.21 K as delivered, 3.62 K calibrated, 0.52 K with the findings (noise 0.20 K)" in lines
     assert lines[-1].startswith("Next: Hold 20 m/s")
     assert len(lines) <= 10
 
