@@ -19,6 +19,7 @@ from diagnosis.setup.plausibility import check_plausible
 from models.assembly.gearbox import Gearbox, load_gearbox
 from models.base.errors import InputError
 from models.mechanisms import CATALOGUE, Mechanism
+from models.quantities.quantities import is_total_loss
 
 Source = str | Path | Recording
 
@@ -102,7 +103,7 @@ def _read(sources: Source | Sequence[Source], gearbox: Gearbox) -> tuple[Recordi
 def _refuse_unusable(recordings: Sequence[Recording]) -> None:
     faults = [
         f"{r.path}: no temperature of the network is measured; columns T_<node>_degC are needed"
-        for r in recordings if not any(c.name != "P_loss" and np.isfinite(c.values).any() for c in r.channels)
+        for r in recordings if not any(not is_total_loss(c.name) and np.isfinite(c.values).any() for c in r.channels)
     ]  # fmt: skip
     if faults:
         raise InputError("\n".join(faults))

@@ -16,7 +16,7 @@ from models.base.errors import Problems, did_you_mean
 from models.base.types import Array
 from models.files.cycle import REQUIRED
 from models.quantities.column_names import meant
-from models.quantities.quantities import INPUTS, TOTAL_LOSS, column_of, dimension_of, quantity_of
+from models.quantities.quantities import INPUTS, TOTAL_LOSS, column_of, dimension_of, quantity_of, quantity_of_column
 from models.quantities.units import units_in_files
 
 if TYPE_CHECKING:
@@ -131,9 +131,19 @@ def _report_unused(rest: Sequence[str], lacking: Sequence[str], problems: Proble
 
 
 def auxiliary_numbers(cells: pd.Series, name: str, column: Column, notes: list[str]) -> Array | None:
-    """Return an auxiliary column as numbers, shape (rows,), in the unit of the file; None if it holds others."""
+    """Return an auxiliary column as numbers, shape (rows,), in the unit of the file; None if it holds others.
+
+    A column of the table of quantities (``torque_out_Nm``) loses its impossible values.
+    """
     if pd.api.types.is_numeric_dtype(cells.dtype):
-        return np.asarray(cells.to_numpy(dtype=np.float64, na_value=np.nan) * column.scale)
+        values = np.asarray(cells.to_numpy(dtype=np.float64, na_value=np.nan) * column.scale)
+        quantity = quantity_of_column(name)
+        wrong = np.zeros(len(values), bool) if quantity is None else (values < quantity.low) | (values > quantity.high)
+        if quantity is not None and wrong.any():
+            where = rows_text(np.asarray(cells.index)[wrong] + 1)
+            limits = f"{quantity.low:g} ... {quantity.high:g} {quantity.unit}"
+            notes.append(f"{name}: {int(wrong.sum())} values ({where}) outside {limits} taken as missing")
+        return np.where(wrong, np.nan, values)
     if cells.notna().any():
         notes.append(f"column {name[:80]} is not numeric; ignored")
     return None

@@ -104,6 +104,8 @@ QUANTITIES: tuple[Quantity, ...] = (
              type="Power", fmi="loss.{}"),
     Quantity(name="torque_loss", dimension="torque", column="torque_loss_Nm", label="Loss torque in N m",
              observed="computed", type="Torque", fmi="torque_loss"),
+    Quantity(name="torque_out", dimension="torque", column="torque_out_Nm", low=-1.0e8, high=1.0e8,
+             label="Output torque in N m", observed="computed", type="Torque"),
     Quantity(name="efficiency", dimension="ratio", column="efficiency", label="Efficiency", observed="computed",
              type="Ratio", fmi="efficiency"),
     Quantity(name="in_domain", dimension="", column="in_domain", label="Inside the trained range",
@@ -145,6 +147,17 @@ def _member(text: str, of: Literal["name", "fmi"]) -> Quantity | None:
             return replace(family, name=family.name.replace("{}", member), column=family.column.replace("{}", member),
                            fmi=family.fmi.replace("{}", member))  # fmt: skip
     return None
+
+
+def quantity_of_column(column: str) -> Quantity | None:
+    """Return a quantity, no family, by its column.
+
+    Examples
+    --------
+    >>> quantity_of_column("torque_out_Nm").name, quantity_of_column("pump_A")
+    ('torque_out', None)
+    """
+    return next((quantity for quantity in QUANTITIES if quantity.column == column), None)
 
 
 def column_of(name: str) -> str:

@@ -126,13 +126,33 @@ class Result:
         """Efficiency [-], shape (..., N); see :func:`models.portable.evaluation.efficiency`."""
         return efficiency(self.loss, self.inputs["speed"], self.inputs["torque"])
 
-    def columns(self) -> dict[str, Array]:
-        """The result as the columns of a file, in the order of the file contract."""
+    def torque_out(self, ratio: float) -> Array:
+        """Return the torque at the output shaft [N m], shape (..., N).
+
+        Its power is that of the input shaft less the loss, as in :func:`models.portable.evaluation.efficiency`: when
+        coasting the output shaft gives the loss as well. Negative if a driving input gives less than the loss.
+
+        Parameters
+        ----------
+        ratio : float
+            Speed of the input shaft over speed of the output shaft, [-]
+        """
+        return np.asarray(ratio * (self.inputs["torque"] - self.torque_loss))
+
+    def columns(self, *, ratio: float | None = None) -> dict[str, Array]:
+        """Return the result as the columns of a file, in the order of the file contract.
+
+        Parameters
+        ----------
+        ratio : float or None
+            Speed of the input shaft over speed of the output shaft, [-]; with it the output torque is a column too
+        """
         table = {"time_s": self.time}
         table |= {INPUTS[name].column if name in INPUTS else name: values for name, values in self.inputs.items()}
         computed = {f"T_{node}": T for node, T in self.temperatures.items()}
         computed |= {TOTAL_LOSS: self.loss} | {f"P_loss_{name}": P for name, P in self.losses.items()}
         computed |= {"torque_loss": self.torque_loss, "efficiency": self.efficiency}
+        computed |= {} if ratio is None else {"torque_out": self.torque_out(ratio)}
         computed |= {"in_domain": np.asarray(self.domain_distance <= 0.0)}
         return table | {column_of(name): values for name, values in computed.items()}
 

@@ -186,3 +186,13 @@ def test_more_rows_do_not_change_the_results_at_the_old_ones() -> None:
             assert dense[name][own] == pytest.approx(values, abs=0.1), name
         elif name.startswith("P_"):
             assert dense[name][own] == pytest.approx(values, rel=5e-4), name
+
+
+def test_output_torque_balances_the_loss_whoever_drives() -> None:
+    cycle = CYCLE | {"speed_rpm": [1500.0, 1500.0, -1500.0], "torque_Nm": [200.0, -200.0, -200.0]}
+    result = NETWORK.simulate(cycle, losses=LOSSES, initial=20.0)
+    omega = np.pi / 30.0 * result.inputs["speed"]
+    power_in, power_out = omega * result.inputs["torque"], omega / 1.5 * result.columns(ratio=1.5)["torque_out_Nm"]
+    np.testing.assert_allclose(power_out, power_in - result.loss, rtol=1e-12)
+    useful = np.where(power_in > 0.0, power_out / power_in, power_in / power_out)
+    np.testing.assert_allclose(useful, result.efficiency, rtol=1e-12)
