@@ -27,7 +27,6 @@ KELVIN = 273.15
 LN10 = float(np.log(10.0))
 
 Feature = Literal["value", "log", "log_kelvin", "viscosity"]
-FEATURES: tuple[Feature, ...] = ("value", "log", "log_kelvin", "viscosity")
 Evaluator = Callable[[Array], Array]
 """Rows of one network's inputs, shape (N, inputs), to its outputs, shape (N, outputs)."""
 
