@@ -20,10 +20,15 @@ KNOTS = np.array([
     [600.0, 0.08, 0.06],
 ])  # fmt: skip
 COLD_START = 20.0  # degC
+# Without geometry: time [s] and share of the way from an input's default to its level.
+RAMP = np.array([[0.0, 0.0], [60.0, 0.0], [120.0, 1.0], [420.0, 1.0], [480.0, 0.0], [600.0, 0.0]])
 
 
 def reference_cycle(gearbox: Gearbox, *, step_s: float = 1.0) -> Cycle:
     """The reference cycle of a gearbox, scaled to its training bounds.
+
+    Without geometry, all inputs go from their defaults to a level and back: speed and torque to their typical
+    operation, an input with a range of the definition halfway to the bound that is further away.
 
     Parameters
     ----------
@@ -44,6 +49,10 @@ def reference_cycle(gearbox: Gearbox, *, step_s: float = 1.0) -> Cycle:
     (601, 280.0)
     """
     time = np.linspace(0.0, KNOTS[-1, 0], round(KNOTS[-1, 0] / step_s) + 1)
+    if gearbox.is_parametric:
+        share = np.interp(time, RAMP[:, 0], RAMP[:, 1])
+        levels = _levels(gearbox)
+        return Cycle(time, {name: default + share * (level - default) for name, (default, level) in levels.items()})
     speed = np.interp(time, KNOTS[:, 0], KNOTS[:, 1]) * gearbox.training.speed_rpm[1]
     torque = np.interp(time, KNOTS[:, 0], KNOTS[:, 2]) * gearbox.training.torque_Nm[1]
     columns = {
@@ -54,3 +63,10 @@ def reference_cycle(gearbox: Gearbox, *, step_s: float = 1.0) -> Cycle:
         "air_speed_m_s": np.full_like(time, gearbox.ambient.air_speed_m_s),
     }
     return Cycle.from_columns(columns)
+
+
+def _levels(gearbox: Gearbox) -> dict[str, tuple[float, float]]:
+    """Default and level of every input of a gearbox without geometry."""
+    speed, torque = gearbox.typical_operation
+    held = {name: (default, default) for name, default in gearbox.network().inputs.items()}
+    return {"speed": (0.0, speed), "torque": (0.0, torque), **held}

@@ -80,17 +80,15 @@ def c_law_source(network: Network, places: Mapping[str, str]) -> dict[str, str]:
     Raises
     ------
     InputError
-        If a heat capacity is missing or depends on more than parameters, a law uses a function that C lacks, or speed
-        or torque is shifted: the losses of a native FMU read the inputs themselves.
+        If a heat capacity is missing or depends on more than parameters, or a law uses a function that C lacks.
     """
-    if network.operating:
-        shifted = " and ".join(network.operating)
-        raise InputError(
-            f"a native FMU cannot shift {shifted} for its losses; give it the true one, or build --target python"
-        )
+    functions = law_expressions(network)
+    if network.components:  # the losses of a native FMU always read speed and torque through this law
+        arguments, _ = functions["boundary"]
+        functions["operating"] = arguments, _operating(network)
     return {
         name: c_function_source(name, {argument: places[argument] for argument in arguments}, expressions)
-        for name, (arguments, expressions) in law_expressions(network).items()
+        for name, (arguments, expressions) in functions.items()
     }
 
 
@@ -129,8 +127,13 @@ def law_expressions(network: Network) -> dict[str, tuple[list[str], list[sp.Expr
         "fixed": (parameters, [*constant, *capacities]),
     }
     if network.operating:
-        functions["operating"] = (common, [network.operating.get(name, symbol(name)) for name in ("speed", "torque")])
+        functions["operating"] = (common, _operating(network))
     return functions
+
+
+def _operating(network: Network) -> list[sp.Expr]:
+    """Speed and torque as the losses see them."""
+    return [network.operating.get(name, symbol(name)) for name in ("speed", "torque")]
 
 
 def structure(network: Network) -> tuple[Array, Array, Array]:
