@@ -47,7 +47,9 @@ def documentation(
     }
 
 
-def _index(gearbox: Gearbox, table: SignalTable, identity: Identity, training: TrainingResult | None, kind: Kind) -> str:
+def _index(
+    gearbox: Gearbox, table: SignalTable, identity: Identity, training: TrainingResult | None, kind: Kind
+) -> str:
     networks = "" if training is None else (
         f", networks: preset {training.preset.name}, {training.preset.samples} samples each, seed {training.seed}"
     )  # fmt: skip

@@ -14,7 +14,6 @@ from models.base.types import Array
 from models.portable import solver
 from models.portable.evaluation import NoLosses
 from models.portable.surrogate import KELVIN, SurrogateLosses
-from models.quantities.units import UNITS
 from models.simulation.simulate import Result, evaluate, initial_states, input_table, network_system
 from models.simulation.thermal_network import ThermalNetwork
 
@@ -58,8 +57,8 @@ def reference_run(
     )  # fmt: skip
     inputs, outputs = table.of_role("input"), [signal for signal in table if signal.causality == "output"]
     return ReferenceRun(
-        {"time": cycle.time} | {s.name: _from_column(rows[:, i], s.unit) for i, s in enumerate(inputs)},
-        {"time": cycle.time} | {s.name: _from_column(_values(result, s), s.unit) for s in outputs},
+        {"time": cycle.time} | {s.name: _at_fmi(s, rows[:, i]) for i, s in enumerate(inputs)},
+        {"time": cycle.time} | {s.name: _at_fmi(s, _values(result, s)) for s in outputs},
     )
 
 
@@ -84,5 +83,6 @@ def csv(columns: Mapping[str, Array]) -> bytes:
     return ("\n".join(lines) + "\n").encode()
 
 
-def _from_column(values: Array, unit: str | None) -> Array:
-    return values if unit is None else (values - UNITS[unit].column[2]) / UNITS[unit].column[1]
+def _at_fmi(signal: Signal, values: Array) -> Array:
+    scale, offset = signal.to_inner
+    return (values - offset) / scale

@@ -6,6 +6,7 @@ import numpy as np
 
 from models.assembly.gearbox import Gearbox
 from models.files.cycle import Cycle
+from models.quantities.quantities import GEARBOX_INPUTS, Input
 
 # time [s], speed and torque as shares of the upper training bounds: cold start at low load, a phase of constant power,
 # high torque, and back to the load of the start. The paper prints the curve without numbers.
@@ -67,6 +68,16 @@ def reference_cycle(gearbox: Gearbox, *, step_s: float = 1.0) -> Cycle:
 
 def _levels(gearbox: Gearbox) -> dict[str, tuple[float, float]]:
     """Default and level of every input of a gearbox without geometry."""
-    speed, torque = gearbox.typical_operation
-    held = {name: (default, default) for name, default in gearbox.network().inputs.items()}
-    return {"speed": (0.0, speed), "torque": (0.0, torque), **held}
+    typical = dict(zip(("speed", "torque"), gearbox.typical_operation, strict=True))
+    return {
+        name: (given.default, typical[name] if name in typical else _inside(given))
+        for name, given in gearbox.network().inputs.items()
+    }
+
+
+def _inside(given: Input) -> float:
+    """A value well inside the range of an input and away from its default; the default where there is no range."""
+    low, high = given.quantity.low, given.quantity.high
+    if given.name in GEARBOX_INPUTS or not np.isfinite(high - low):
+        return given.default
+    return 0.5 * (given.default + (high if high - given.default >= given.default - low else low))

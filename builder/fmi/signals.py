@@ -11,7 +11,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from math import inf
 from typing import Literal
 
@@ -20,8 +20,8 @@ import sympy as sp
 from models.base.errors import InputError, did_you_mean
 from models.network.laws import symbol
 from models.portable.surrogate import SurrogateLosses
-from models.quantities.quantities import INPUTS, TYPES, quantity_of_signal
-from models.quantities.units import UNITS, fmi_symbol
+from models.quantities.quantities import GEARBOX_INPUTS, TYPES, column_of, quantity_of_signal
+from models.quantities.units import UNITS, Unit, conversion, find_unit, fmi_symbol
 from models.simulation.thermal_network import ThermalNetwork
 
 START_TEMPERATURE = 293.15  # K
@@ -63,6 +63,10 @@ class Signal:
         Column of cycle and result files
     depends, depends_initially : tuple of str
         Signals that an output depends on directly, and at initialization
+    inner_unit : str or None
+        Unit in the network, if it is not that of file columns
+    display_unit : str or None
+        Unit in which a tool should show it, if it is not that of `type`; "" for none
     reference : int
         FMI value reference, its place in the table
     """
@@ -84,6 +88,8 @@ class Signal:
     column: str | None = None
     depends: tuple[str, ...] = ()
     depends_initially: tuple[str, ...] = ()
+    inner_unit: str | None = None
+    display_unit: str | None = None
     reference: int = -1
 
     @property
@@ -93,8 +99,21 @@ class Signal:
 
     @property
     def display(self) -> str | None:
-        """Unit in which a tool should show it, where that is not `unit`."""
+        """Unit in which a tool should show it, if that is not `unit`."""
+        if self.display_unit is not None:
+            return self.display_unit or None
         return TYPES[self.type].display if self.type is not None else None
+
+    @property
+    def to_inner(self) -> tuple[float, float]:
+        """Factor and offset from the value at the FMI to the unit of the network."""
+        unit = UNITS.get(self.unit or "")
+        # Only signals of the network's own quantities are converted; a parameter stays in the unit of its law.
+        if unit is None or self.role == "factor":
+            return 1.0, 0.0
+        if self.inner_unit is None:
+            return unit.column[1:]
+        return conversion(unit, find_unit(self.inner_unit, unit.dimension))
 
 
 class SignalTable:
@@ -200,12 +219,7 @@ def result_column(name: str) -> str | None:
 
 def input_column(name: str) -> str:
     """Column of a cycle file for an input of an FMU: its usual one, else its own name."""
-    return INPUTS[name].column if name in INPUTS else name.strip("'")
-
-
-def input_names(network: ThermalNetwork) -> tuple[str, ...]:
-    """Inputs of a network in the order in which its laws take them."""
-    return ("speed", "torque", *network.inputs)
+    return column_of(name.strip("'"))
 
 
 def signal_table(network: ThermalNetwork, losses: SurrogateLosses | None = None) -> SignalTable:
@@ -232,13 +246,19 @@ def signal_table(network: ThermalNetwork, losses: SurrogateLosses | None = None)
     return SignalTable(list(_Table(network, losses).signals()))
 
 
+def _convert(unit: Unit, to: Unit, value: float) -> float:
+    """Convert a value to another unit, to 12 digits."""
+    factor, offset = conversion(to, unit)
+    return float(f"{(value - offset) / factor:.12g}")
+
+
 class _Table:
     """The network at hand while its signals are listed."""
 
     def __init__(self, network: ThermalNetwork, losses: SurrogateLosses | None) -> None:
         self.network = network
         self.losses = losses
-        self.inputs = input_names(network)
+        self.inputs = tuple(network.inputs)
         self.parameters = {parameter.name: self._parameter_name(parameter.name) for parameter in network.parameters}
         self.boundaries = {node.name: node.temperature for node in network.nodes if node.temperature is not None}
         self.loss_heats = [source.heat for source in network.sources if source.is_loss]
@@ -260,7 +280,9 @@ class _Table:
         if self.losses is None:
             return None
         bounds = {"speed": ("Speed", self.losses.speed_bounds), "torque": ("Torque", self.losses.torque_bounds)}
-        bounds |= {f"T_{node}": ("Temperature", self.losses.temperature_bounds) for node in self.losses.temperature_nodes}
+        bounds |= {
+            f"T_{node}": ("Temperature", self.losses.temperature_bounds) for node in self.losses.temperature_nodes
+        }
         if name not in bounds:
             return None
         kind, (low, high) = bounds[name]
@@ -274,18 +296,19 @@ class _Table:
             "T_ambient": "Ambient temperature, in kelvin",
             "air_speed": "Speed of the air along the housing",
         }
-        defaults = {"speed": 0.0, "torque": 0.0, **self.network.inputs}
-        for name in self.inputs:
-            kind = INPUTS[name].type if name in INPUTS else None
-            text = texts.get(name, f"Input {name}, in the unit of its column")
-            unit = TYPES[kind].unit if kind else None
-            low, high = (INPUTS[name].low, INPUTS[name].high) if name in INPUTS else (-inf, inf)
-            convert = UNITS[unit].from_column if unit else float
+        for name, given in self.network.inputs.items():
+            quantity = given.quantity
+            kind = TYPES[quantity.type or "Ratio"]
+            unit, own = find_unit(kind.unit, quantity.dimension), find_unit(quantity.unit, quantity.dimension)
+            at_fmi = partial(_convert, own, unit)
+            display = None if name in GEARBOX_INPUTS else quantity.unit * (quantity.unit != kind.unit)
             yield Signal(
-                name=fmi_name(name), role="input", of=name, description=text, type=kind, unit=unit, causality="input",
-                variability="continuous", initial="", start=convert(defaults[name]), minimum=convert(low),
-                maximum=convert(high), domain=self._domain(name), column=input_column(name),
-                nominal=TYPES[kind].nominal if kind else None,
+                name=fmi_name(name), role="input", of=name,
+                description=given.description or texts.get(name, name.replace("_", " ")), type=quantity.type,
+                unit=kind.unit, inner_unit=quantity.unit, display_unit=display, causality="input",
+                variability="continuous", initial="",
+                start=at_fmi(given.default), minimum=at_fmi(quantity.low), maximum=at_fmi(quantity.high),
+                domain=self._domain(name), column=given.column, nominal=kind.nominal,
             )  # fmt: skip
 
     def _output(self, *, name: str, role: Role, of: str = "", kind: str | None, description: str, expression: sp.Expr,
@@ -306,6 +329,7 @@ class _Table:
         names = {s.name for s in expression.free_symbols}
         if any(name.startswith("P_") and name[2:] in self.network.components for name in names):
             names |= {s.name for s in self._operating_point().free_symbols}
+        names |= {s.name for name, law in self.network.derived.items() if name in names for s in law.free_symbols}
         names |= {s.name for node, T in self.boundaries.items() if f"T_{node}" in names for s in T.free_symbols}
         inputs = tuple(fmi_name(name) for name in self.inputs if name in names)
         return inputs, tuple(fmi for name, fmi in self.parameters.items() if name in names)

@@ -13,12 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
-from builder.fmi.signals import Role, Signal, SignalTable, input_names
+from builder.fmi.signals import Role, Signal, SignalTable
 from builder.native.structure import Structure
 from models.base.types import Array
 from models.network.compiled import c_law_source, law_expressions
 from models.portable.surrogate import KELVIN, LN10, Feature, Network, SurrogateLosses, Use, feature_values
-from models.quantities.units import UNITS
 from models.simulation.thermal_network import ThermalNetwork
 
 Indices = NDArray[np.intp]
@@ -160,7 +159,7 @@ def _network_data(data: _Data, network: ThermalNetwork) -> Structure:
     number_of = {name: index for index, name in enumerate([*parts, *boundaries])}
     fixed, varying = _links(network)
     sizes = {
-        "N_INPUTS": len(input_names(network)),
+        "N_INPUTS": len(network.inputs),
         "N_PARTS": len(parts),
         "N_BOUNDARIES": len(boundaries),
         "N_PARAMETERS": len(network.parameters),
@@ -206,7 +205,7 @@ def _laws(network: ThermalNetwork) -> str:
     """The order of the arguments is that of the struct Signals of thermal_network.h."""
     groups = [
         ["time"],
-        input_names(network),
+        [*network.inputs],
         [f"T_{part.name}" for part in network.parts],
         [parameter.name for parameter in network.parameters],
         [state.name for state in network.states],
@@ -231,7 +230,7 @@ def _place_data(data: _Data, table: SignalTable, network: ThermalNetwork) -> Non
         data.array("Place", name, (_place(by_role[role, of]) for of in names))
 
     parts = [part.name for part in network.parts]
-    inputs = input_names(network)
+    inputs = list(network.inputs)
     places("INPUTS", "input", inputs)
     places("FACTOR", "factor", (parameter.name for parameter in network.parameters))
     places("START", "start_temperature", parts)
@@ -251,9 +250,7 @@ def _place_data(data: _Data, table: SignalTable, network: ThermalNetwork) -> Non
 
 
 def _place(signal: Signal) -> str:
-    unit = UNITS.get(signal.unit or "")
-    # Only signals of the network's own quantities are converted; a parameter stays in the unit of its law.
-    _, scale, offset = unit.column if unit is not None and signal.role != "factor" else ("", 1.0, 0.0)
+    scale, offset = signal.to_inner
     return f"{{{signal.reference}, {number(scale)}, {number(offset)}}}"
 
 

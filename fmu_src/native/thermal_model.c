@@ -46,7 +46,7 @@ static void start_values(const Model *model, ThermalState *thermal) {
 static ModelStatus prepare(Model *model) {
     Scratch *scratch = model->scratch;
     if (model->changed & CHANGED_PARAMETERS) {
-        double parameters[AT_LEAST_ONE(N_PARAMETERS)];
+        double parameters[AT_LEAST_ONE(N_PARAMETERS)] = {0.0};
         const char *fault;
         for (int i = 0; i < N_PARAMETERS; i++) parameters[i] = inner(model, FACTOR[i]);
         fault = network_set(&scratch->network, parameters);
@@ -141,7 +141,7 @@ ModelStatus model_step(Model *model, double duration) {
     State *state = model->state;
     Scratch *scratch = model->scratch;
     ThermalState thermal = state->thermal;
-    double before[AT_LEAST_ONE(N_INPUTS)], inputs[AT_LEAST_ONE(N_INPUTS)], failed_at;
+    double before[AT_LEAST_ONE(N_INPUTS)] = {0.0}, inputs[AT_LEAST_ONE(N_INPUTS)] = {0.0}, failed_at;
     const char *fault;
     if (prepare(model) != MODEL_OK) return MODEL_REFUSED;
     for (int i = 0; i < N_INPUTS; i++) {
@@ -183,7 +183,7 @@ ModelStatus model_outputs(Model *model) {
     const State *state = model->state;
     Scratch *scratch = model->scratch;
     ThermalState thermal = state->thermal;
-    double inputs[AT_LEAST_ONE(N_INPUTS)];
+    double inputs[AT_LEAST_ONE(N_INPUTS)] = {0.0};
     const Balance *balance;
     if (prepare(model) != MODEL_OK) return MODEL_REFUSED;
     if (state->started == 0.0) start_values(model, &thermal);

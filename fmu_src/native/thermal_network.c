@@ -74,6 +74,8 @@ static void find_balance(const Network *network, Balance *balance, double time, 
         const LossPoint point = loss_point(at);
         network->loss_power(point.speed, point.torque, point.T, at->power);
     }
+#else
+    (void)network;
 #endif
     law_boundary((const double *)at, balance->T_boundary);
     law_heat((const double *)at, balance->heat);
@@ -103,7 +105,7 @@ const char *network_advance(Network *network, ThermalState *state, double time, 
         /* Two even steps instead of a full one and a sliver. */
         const double h = step >= remaining ? remaining : smaller(step, 0.5 * remaining);
         double factors[N_FACTORS];
-        double now_inputs[AT_LEAST_ONE(N_INPUTS)], then_inputs[AT_LEAST_ONE(N_INPUTS)];
+        double now_inputs[AT_LEAST_ONE(N_INPUTS)] = {0.0}, then_inputs[AT_LEAST_ONE(N_INPUTS)] = {0.0};
         double k_1[N_PARTS], k_2[N_PARTS], both[N_PARTS];
         double rate_1[AT_LEAST_ONE(N_MEMORY)], rate_2[AT_LEAST_ONE(N_MEMORY)];
         const double share = elapsed / duration, later_share = smaller((elapsed + h) / duration, 1.0);

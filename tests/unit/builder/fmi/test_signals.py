@@ -82,7 +82,7 @@ def test_terms_of_a_user_get_signals(fzg: Gearbox) -> None:
         .with_source("oil", lambda s: -s.cooling * s.flow * s.T_ambient, name="oil-cooler 1")
     )
     table = signal_table(network)
-    assert (table["flow"].start, table["flow"].unit, table["flow"].column) == (2.5, None, "flow")
+    assert (table["flow"].start, table["flow"].unit, table["flow"].column) == (2.5, "1", "flow")
     cooling = table["factor.cooling"]
     assert (cooling.unit, cooling.start, cooling.minimum, cooling.maximum) == ("W/K", 4.0, 0.0, 10.0)
     heat = table["heat.'oil-cooler 1'"]
