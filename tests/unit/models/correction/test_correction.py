@@ -240,7 +240,7 @@ def test_a_fit_may_end_at_its_bounds_and_not_beyond(value: float, possible: bool
 
 def test_the_limits_are_those_of_the_fmu() -> None:
     """A value beyond them would silently widen the FMU's limits."""
-    table = signal_table(RIG)
+    table = signal_table(NETWORK)
     for p in NETWORK.parameters:
         signal = table[f"factor.{p.name}"]
         assert (signal.minimum, signal.maximum) == (p.lower, p.upper)
