@@ -16,7 +16,7 @@ from builder.base import console
 from builder.drive.driver import drive_fmu, runs_here
 from builder.drive.plots import plot_cycle
 from builder.fmi.reference_cycle import COLD_START, reference_cycle
-from builder.native.compile import plan_for
+from builder.native.compile import NoCompilerError, plan_for
 from builder.native.native_fmu import build_native_fmu
 from builder.python.python_fmu import build_python_fmu
 from builder.surrogate.onnx_export import export_onnx
@@ -60,6 +60,8 @@ class BuildReport:
     cycles : mapping of FMU file name to CycleErrors
     seconds : mapping of step to float
     files : tuple of Path
+    purpose : str
+        One line on which FMU is for what
     notes : tuple of str
         On platforms that were left out, and what could not be tried here
     correction : mapping or None
@@ -71,6 +73,7 @@ class BuildReport:
     cycles: Mapping[str, CycleErrors]
     seconds: Mapping[str, float]
     files: tuple[Path, ...]
+    purpose: str
     notes: tuple[str, ...] = ()
     correction: Mapping[str, Any] | None = None
 
@@ -107,6 +110,7 @@ class BuildReport:
         console.table("Time", ["step", "s"], [[step, f"{value:.2f}"] for step, value in self.seconds.items()])
         for file in self.files:
             console.out.print(f"wrote {file}")
+        console.out.print(self.purpose)
         for note in self.notes:
             console.err.print(f"note: {note}", style="yellow")
 
@@ -130,8 +134,8 @@ def build(
     folder: Path,
     *,
     name: str,
-    target: str = "python",
-    platforms: str = "all",
+    target: str = "both",
+    platforms: str = "host",
     preset: str = "default",
     samples: int | None = None,
     seed: int = 0,
@@ -151,7 +155,7 @@ def build(
     name : str
         Name of the FMU's file
     target : str
-        Kind of FMU: ``python``, ``native`` or ``both``
+        Kind of FMU: ``python``, ``native`` or ``both``; without a compiler, ``both`` is the Python FMU alone
     platforms : str
         Of a native FMU, see :func:`builder.native.compile.plan_for`
     preset, samples, seed, jobs, dask
@@ -171,9 +175,17 @@ def build(
     kinds = {"python": ("python",), "native": ("native",), "both": ("python", "native")}.get(target)
     if kinds is None:
         raise InputError(f"target {target!r} is not known; python, native and both are")
-    notes = []
-    if "native" in kinds and (note := plan_for(platforms).note):  # a missing compiler is told before the training
-        notes.append(f"native FMU {note}")
+    notes, built_for = [], ()
+    if "native" in kinds:  # before the training: a missing compiler is known early
+        try:
+            plan = plan_for(platforms)
+            built_for, note = plan.platforms, plan.note
+        except NoCompilerError as error:
+            if target == "native":
+                raise
+            kinds, note = ("python",), f"is not built: {error}"
+        if note:
+            notes.append(f"native FMU {note}")
     network = corrected_network(gearbox, correction)
     seconds: dict[str, float] = {}
     with atomic_folder(folder) as stage:
@@ -211,13 +223,24 @@ def build(
             plot = stage / f"drive_cycle{SUFFIX[kind]}.png"
             plot_cycle(plot, driven, title=title, groups=network.groups, reference=full)
         report = BuildReport(
-            gearbox=gearbox.name, training=training, cycles=cycles, seconds=seconds, files=(), notes=tuple(notes),
+            gearbox=gearbox.name, training=training, cycles=cycles, seconds=seconds, files=(),
+            purpose=_purpose({kind: path.name for kind, path in fmus.items()}, built_for), notes=tuple(notes),
             correction=None if correction is None else correction.summary(),
         )  # fmt: skip
         (stage / "report.json").write_text(json.dumps(report.as_dict(), indent=2) + "\n", encoding="utf-8")
         made = sorted(path.relative_to(stage) for path in stage.rglob("*") if path.is_file())
     files = tuple(folder / path for path in made)
     return replace(report, files=files, notes=(*report.notes, *_left_from_before(folder, files)))
+
+
+def _purpose(names: Mapping[str, str], platforms: Sequence[str]) -> str:
+    """Say which FMU is for what, in one line."""
+    needs = {
+        "native": f"needs no other software, for {', '.join(platforms)}"
+        + ("" if len(platforms) > 1 else " (--platforms all: for all)"),
+        "python": "runs on Python with numpy and onnxruntime",
+    }
+    return "; ".join(f"{names[kind]} {text}" for kind, text in needs.items() if kind in names)
 
 
 def _left_from_before(folder: Path, files: Sequence[Path]) -> list[str]:
