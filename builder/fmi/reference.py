@@ -4,19 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from builder.fmi.reference_cycle import reference_cycle
-from builder.fmi.signals import SignalTable
-from fmu_src.python.twin import Twin
+from builder.fmi.signals import START_TEMPERATURE, Signal, SignalTable
 from models.assembly.gearbox import Gearbox
 from models.base.types import Array
-from models.network.compiled import law_source
-from models.network.laws import compile_function
-from models.portable.surrogate import SurrogateLosses
-from models.simulation.simulate import input_table
+from models.portable import solver
+from models.portable.evaluation import NoLosses
+from models.portable.surrogate import KELVIN, SurrogateLosses
+from models.simulation.simulate import Result, evaluate, initial_states, input_table, network_system
 from models.simulation.thermal_network import ThermalNetwork
 
 STEP_S = 10.0
@@ -35,37 +33,49 @@ class ReferenceRun:
 
 
 def reference_run(
-    gearbox: Gearbox, network: ThermalNetwork, table: SignalTable, data: Mapping[str, Any], losses: SurrogateLosses
+    gearbox: Gearbox, network: ThermalNetwork, table: SignalTable, losses: SurrogateLosses | None
 ) -> ReferenceRun:
-    """Run the reference cycle through the code and the networks of an FMU.
+    """Run the reference cycle through the network of an FMU, inputs held in each step as FMI holds them.
 
     Parameters
     ----------
     gearbox, network, table, losses
         What the FMU is made of
-    data : mapping
-        As the FMU carries it (:func:`builder.fmi.twin_data.twin_data`)
     """
     cycle = reference_cycle(gearbox, step_s=STEP_S)
-    twin = Twin(data, _functions(network), losses)
-    inputs, outputs = table.of_role("input"), [s for s in table if s.causality == "output"]
+    surrogate = NoLosses() if losses is None else losses
+    system = network_system(network, surrogate)
     rows = input_table(network, cycle)
-    scales, offsets = np.array([signal.to_inner for signal in inputs]).T
-    si = (rows - offsets) / scales
-    references = [signal.reference for signal in outputs]
-    twin.set([signal.reference for signal in inputs], si[0].tolist())
-    twin.start(float(cycle.time[0]))
-    twin.initialize()
-    values = [twin.get(references)]
-    for row in range(len(cycle) - 1):
-        twin.set([signal.reference for signal in inputs], si[row].tolist())
-        twin.step(float(cycle.time[row]), float(cycle.time[row + 1] - cycle.time[row]))
-        values.append(twin.get(references))
-    columns = np.array(values)
+    states = [solver.start(initial_states(network, START_TEMPERATURE - KELVIN))]
+    for begin, end, row in zip(cycle.time[:-1], cycle.time[1:], rows[:-1], strict=True):
+        states.append(solver.advance(system, states[-1], float(begin), float(end - begin), row, row))
+    result = evaluate(
+        network, surrogate, None, time=cycle.time, table=np.concatenate((rows[:1], rows[:-1])),
+        states=np.stack([state.states for state in states]),
+        heat=np.array([[state.heat_in for state in states], [state.heat_out for state in states]]),
+    )  # fmt: skip
+    inputs, outputs = table.of_role("input"), [signal for signal in table if signal.causality == "output"]
     return ReferenceRun(
-        {"time": cycle.time} | {signal.name: si[:, i] for i, signal in enumerate(inputs)},
-        {"time": cycle.time} | {signal.name: columns[:, i] for i, signal in enumerate(outputs)},
+        {"time": cycle.time} | {signal.name: _outside(signal, rows[:, i]) for i, signal in enumerate(inputs)},
+        {"time": cycle.time} | {signal.name: _outside(signal, _output(result, signal)) for signal in outputs},
     )
+
+
+def _output(result: Result, signal: Signal) -> Array:
+    """An output over time in the network's unit."""
+    named = {"temperature": result.temperatures, "loss": result.losses, "heat": result.extra_heat}
+    if signal.role in named:
+        return named[signal.role][signal.of]
+    if signal.role == "in_domain":
+        return np.asarray(result.domain_distance <= 0.0, dtype=float)
+    attribute = "loss" if signal.role == "total_loss" else signal.role
+    return np.asarray(getattr(result, attribute))
+
+
+def _outside(signal: Signal, values: Array) -> Array:
+    """Values in the network's unit as the FMU shows them."""
+    scale, offset = signal.to_inner
+    return (values - offset) / scale
 
 
 def csv(columns: Mapping[str, Array]) -> bytes:
@@ -74,7 +84,3 @@ def csv(columns: Mapping[str, Array]) -> bytes:
     rows: Sequence[Sequence[float]] = np.stack(list(columns.values()), axis=-1).tolist()
     lines += [",".join(f"{value:.9g}" for value in row) for row in rows]
     return ("\n".join(lines) + "\n").encode()
-
-
-def _functions(network: ThermalNetwork) -> dict[str, Any]:
-    return {name: compile_function(source, name) for name, source in law_source(network, vector=False).items()}
