@@ -10,6 +10,7 @@ import hashlib
 import sys
 from collections.abc import Mapping
 from dataclasses import fields
+from functools import lru_cache
 from pathlib import Path
 from types import ModuleType
 from typing import Any, ClassVar, NamedTuple
@@ -67,7 +68,8 @@ class GearboxSlave(Fmi2Slave):  # type: ignore[misc,unused-ignore]
         self._calculated = [variable for variable in variables if not variable.settable]
         self._given_at = np.flatnonzero([variable.settable for variable in variables])
         self._calculated_at = np.flatnonzero([not variable.settable for variable in variables])
-        self._minimum, self._maximum, self._scale, self._offset = np.array([v[6:] for v in self._given]).T
+        self._minimum, self._maximum = np.array([(v.minimum, v.maximum) for v in self._given]).T
+        self._scale, self._offset = np.array([(v.scale, v.offset) for v in self._given]).T
         self._lowest = self._minimum - BOUND_TOLERANCE * np.maximum(1.0, np.abs(self._minimum))
         self._highest = self._maximum + BOUND_TOLERANCE * np.maximum(1.0, np.abs(self._maximum))
         place = {(variable.role, variable.of): index for index, variable in enumerate(self._given)}
@@ -76,11 +78,11 @@ class GearboxSlave(Fmi2Slave):  # type: ignore[misc,unused-ignore]
         self._starts = [place["start_temperature", name] for name in laws.parts]
         self._loss_nodes = [laws.parts.index(name) for name in self._losses.temperature_nodes]
         self._uniform, self._common = place["initial_uniform", ""], place["initial_temperature", ""]
-        self._calculated_scale, self._calculated_offset = np.array([v[8:] for v in self._calculated]).T
+        self._calculated_scale, self._calculated_offset = np.array([(v.scale, v.offset) for v in self._calculated]).T
         self._values = np.array([variable.start for variable in variables])
         self._system: NetworkSystem | None = None
         self._state: solver.State | None = None  # None before the first step: start temperatures can still be set
-        self._time = 0.0
+        self._time = self._distance = 0.0  # distance from the range of training, at the calculated values
         self._outside = self._fresh = False
 
     # ------------------------------------------------------------------ simulation
@@ -102,15 +104,15 @@ class GearboxSlave(Fmi2Slave):  # type: ignore[misc,unused-ignore]
             system, inputs, before = self._present()
             with np.errstate(all="ignore"):
                 state = solver.advance(system, before, current_time, step_size, inputs, inputs)
-                distance = self._distance(system, current_time + step_size, inputs, state.states)
         except UNUSABLE as error:
             self.log(f"the step from {current_time:g} s is refused, the state is unchanged: {error}",
                      Fmi2Status.discard)  # fmt: skip
             return False
-        self._state, self._time, self._fresh = state, current_time + step_size, False
-        if distance > 0.0 and not self._outside:
+        self._state, self._time = state, current_time + step_size
+        self._calculate()
+        if self._distance > 0.0 and not self._outside:
             self._warn(system, inputs, state.states)
-        self._outside = distance > 0.0
+        self._outside = self._distance > 0.0
         return True
 
     def _present(self) -> tuple[NetworkSystem, Array, solver.State]:
@@ -129,12 +131,6 @@ class GearboxSlave(Fmi2Slave):  # type: ignore[misc,unused-ignore]
             T = [inner[self._common if uniform else start] for start in self._starts]
             state = solver.start(np.array([*T, *self.generated.MEMORY_START]))
         return self._system, inner[self._inputs], state
-
-    def _distance(self, system: NetworkSystem, time: float, inputs: Array, states: Array) -> float:
-        """How far the operating point is outside the range of training, [-]."""
-        if not system.laws.components:
-            return 0.0
-        return float(self._losses.domain_distance(*system.operating(time, inputs, states), states[self._loss_nodes]))
 
     def _warn(self, system: NetworkSystem, inputs: Array, states: Array) -> None:
         """Log the operating point and the range of training that it left."""
@@ -188,10 +184,11 @@ class GearboxSlave(Fmi2Slave):  # type: ignore[misc,unused-ignore]
         with np.errstate(all="ignore"):
             heats, _ = system.flows(time, inputs, states)
             boundaries = system.boundary_temperatures(time, inputs, states)
-            distance = self._distance(system, time, inputs, states)
+            point = (*system.operating(time, inputs, states), states[self._loss_nodes]) if laws.components else ()
+            self._distance = float(self._losses.domain_distance(*point)) if point else 0.0
         is_loss = np.array(laws.losses_of_sources, dtype=bool)
         loss = heats[is_loss].sum()
-        found = {"total_loss": loss, "domain_distance": distance, "in_domain": distance <= 0.0}
+        found = {"total_loss": loss, "domain_distance": self._distance, "in_domain": self._distance <= 0.0}
         if {"speed", "torque"} <= set(laws.inputs):
             speed, torque = (inputs[laws.inputs.index(name)] for name in ("speed", "torque"))
             found |= {"torque_loss": torque_loss(loss, speed), "efficiency": efficiency(loss, speed, torque)}
@@ -251,7 +248,11 @@ def _network(path: Path, digest: str) -> Evaluator:
     options.intra_op_num_threads = options.inter_op_num_threads = 1
     options.log_severity_level = ERRORS_ONLY
     session = onnxruntime.InferenceSession(content, options, providers=["CPUExecutionProvider"])
-    names = [output.name for output in session.get_outputs()]
-    source = session.get_inputs()[0].name
+    names, source = [output.name for output in session.get_outputs()], session.get_inputs()[0]
 
-    return lambda rows: np.asarray(session.run(names, {source: rows})[0])
+    @lru_cache(maxsize=1)  # a step begins at the operating point whose outputs have just been read
+    def run(rows: bytes) -> Array:
+        given = np.frombuffer(rows).reshape(-1, source.shape[1])
+        return np.asarray(session.run(names, {source.name: given})[0])
+
+    return lambda rows: run(rows.tobytes())
