@@ -32,7 +32,8 @@ class CommonParts:
     Attributes
     ----------
     network : ThermalNetwork
-    losses : SurrogateLosses
+    losses : SurrogateLosses or None
+        None for a network without loss components
     table : SignalTable
     identity : Identity
     pages : mapping of path to bytes
@@ -40,7 +41,7 @@ class CommonParts:
     """
 
     network: ThermalNetwork
-    losses: SurrogateLosses
+    losses: SurrogateLosses | None
     table: SignalTable
     identity: Identity
     pages: Mapping[str, bytes]
@@ -48,7 +49,7 @@ class CommonParts:
 
 def common_parts(
     gearbox: Gearbox,
-    training: TrainingResult,
+    training: TrainingResult | None,
     networks: Sequence[Path],
     output: Path,
     *,
@@ -62,8 +63,8 @@ def common_parts(
     Parameters
     ----------
     gearbox : Gearbox
-    training : TrainingResult
-        The trained surrogate
+    training : TrainingResult or None
+        The trained surrogate; None for a network without loss components
     networks : sequence of Path
         Its ONNX files
     output : Path
@@ -83,9 +84,9 @@ def common_parts(
         If the network has laws that are no expressions, or the networks are another gearbox's.
     """
     network = corrected_network(gearbox, correction) if network is None else network
-    losses = training.losses
+    losses = None if training is None else training.losses
     refuse_mismatch(network, losses, networks)
-    table = signal_table(gearbox, network, losses)
+    table = signal_table(network, losses)
     identity = gearbox_identity(gearbox, output, flags, correction)
     reference = reference_run(gearbox, network, table, losses)
     pages = documentation(gearbox, table, identity, training, reference, kind=kind)
@@ -97,7 +98,8 @@ def gearbox_identity(
 ) -> Identity:
     """Description of an FMU of a gearbox."""
     version = project_version()
-    model = "reduced-order twin of a detailed loss model" + ("" if correction is None else f", {correction.words}")
+    model = "thermal network" if gearbox.is_parametric else "reduced-order twin of a detailed loss model"
+    model += "" if correction is None else f", {correction.words}"
     return Identity(
         model_name=gearbox.name,
         model_identifier=model_identifier(output.stem),
@@ -123,7 +125,7 @@ def model_identifier(name: str) -> str:
     return plain if re.match(r"[A-Za-z]", plain) else f"gearbox_{plain}"
 
 
-def refuse_mismatch(network: ThermalNetwork, losses: SurrogateLosses, networks: Sequence[Path]) -> None:
+def refuse_mismatch(network: ThermalNetwork, losses: SurrogateLosses | None, networks: Sequence[Path]) -> None:
     """Refuse laws that are no expressions, and networks of another gearbox.
 
     Raises
@@ -135,9 +137,10 @@ def refuse_mismatch(network: ThermalNetwork, losses: SurrogateLosses, networks: 
             f"{', '.join(network.numeric_laws)}: this law branches on values or calls numpy, so it simulates but "
             "cannot go into an FMU; write it with arithmetic, sympy functions and sympy.Piecewise"
         )
-    if tuple(losses.components) != tuple(network.components):
+    if (() if losses is None else tuple(losses.components)) != tuple(network.components):
         raise InputError("the networks were trained for another gearbox; train them for this one")
-    missing = {f"{trained.name}.onnx" for trained in losses.networks} - {path.name for path in networks}
+    trained = () if losses is None else losses.networks
+    missing = {f"{one.name}.onnx" for one in trained} - {path.name for path in networks}
     if missing:
         raise InputError(f"the ONNX files {', '.join(sorted(missing))} are missing; export the networks again")
 

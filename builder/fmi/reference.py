@@ -33,49 +33,46 @@ class ReferenceRun:
 
 
 def reference_run(
-    gearbox: Gearbox, network: ThermalNetwork, table: SignalTable, losses: SurrogateLosses | None
+    gearbox: Gearbox, network: ThermalNetwork, table: SignalTable, surrogate: SurrogateLosses | None
 ) -> ReferenceRun:
-    """Run the reference cycle through the network of an FMU, inputs held in each step as FMI holds them.
+    """Run the reference cycle through the network of an FMU.
 
     Parameters
     ----------
-    gearbox, network, table, losses
+    gearbox, network, table, surrogate
         What the FMU is made of
     """
     cycle = reference_cycle(gearbox, step_s=STEP_S)
-    surrogate = NoLosses() if losses is None else losses
-    system = network_system(network, surrogate)
+    losses = NoLosses() if surrogate is None else surrogate
     rows = input_table(network, cycle)
-    states = [solver.start(initial_states(network, START_TEMPERATURE - KELVIN))]
+    system = network_system(network, losses)
+    starts = initial_states(network, START_TEMPERATURE - KELVIN)
+    held = np.concatenate((rows[:1], rows[:-1]))  # at the end of a step its inputs still hold
+    states = [solver.start(starts)]
     for begin, end, row in zip(cycle.time[:-1], cycle.time[1:], rows[:-1], strict=True):
         states.append(solver.advance(system, states[-1], float(begin), float(end - begin), row, row))
     result = evaluate(
-        network, surrogate, None, time=cycle.time, table=np.concatenate((rows[:1], rows[:-1])),
-        states=np.stack([state.states for state in states]),
-        heat=np.array([[state.heat_in for state in states], [state.heat_out for state in states]]),
+        network, losses, None, time=cycle.time, table=held, states=np.stack([s.states for s in states]),
+        heat=np.stack([[s.heat_in, s.heat_out] for s in states], axis=-1),
     )  # fmt: skip
     inputs, outputs = table.of_role("input"), [signal for signal in table if signal.causality == "output"]
     return ReferenceRun(
-        {"time": cycle.time} | {signal.name: _outside(signal, rows[:, i]) for i, signal in enumerate(inputs)},
-        {"time": cycle.time} | {signal.name: _outside(signal, _output(result, signal)) for signal in outputs},
+        {"time": cycle.time} | {s.name: _at_fmi(s, rows[:, i]) for i, s in enumerate(inputs)},
+        {"time": cycle.time} | {s.name: _at_fmi(s, _values(result, s)) for s in outputs},
     )
 
 
-def _output(result: Result, signal: Signal) -> Array:
-    """An output over time in the network's unit."""
-    named = {"temperature": result.temperatures, "loss": result.losses, "heat": result.extra_heat}
-    if signal.role in named:
-        return named[signal.role][signal.of]
+def _values(result: Result, signal: Signal) -> Array:
+    """An output over time in the network's units."""
+    families = {"temperature": result.temperatures, "loss": result.losses, "heat": result.extra_heat}
+    if signal.role in families:
+        return families[signal.role][signal.of]
     if signal.role == "in_domain":
         return np.asarray(result.domain_distance <= 0.0, dtype=float)
-    attribute = "loss" if signal.role == "total_loss" else signal.role
-    return np.asarray(getattr(result, attribute))
-
-
-def _outside(signal: Signal, values: Array) -> Array:
-    """Values in the network's unit as the FMU shows them."""
-    scale, offset = signal.to_inner
-    return (values - offset) / scale
+    single = {"total_loss": "loss", "torque_loss": "torque_loss", "efficiency": "efficiency",
+              "domain_distance": "domain_distance"}  # fmt: skip
+    values: Array = getattr(result, single[signal.role])
+    return values
 
 
 def csv(columns: Mapping[str, Array]) -> bytes:
@@ -84,3 +81,8 @@ def csv(columns: Mapping[str, Array]) -> bytes:
     rows: Sequence[Sequence[float]] = np.stack(list(columns.values()), axis=-1).tolist()
     lines += [",".join(f"{value:.9g}" for value in row) for row in rows]
     return ("\n".join(lines) + "\n").encode()
+
+
+def _at_fmi(signal: Signal, values: Array) -> Array:
+    scale, offset = signal.to_inner
+    return (values - offset) / scale

@@ -1,4 +1,4 @@
-"""A gearbox and its trained networks as an FMU: FMI 2.0 co-simulation, run by Python through pythonfmu.
+"""A thermal network and its trained loss networks as an FMU: FMI 2.0 co-simulation, run by Python through pythonfmu.
 
 The FMU is the same file, byte for byte, for the same definition, networks and version.
 """
@@ -81,14 +81,14 @@ FLAGS = {
 
 def build_python_fmu(
     gearbox: Gearbox,
-    training: TrainingResult,
+    training: TrainingResult | None,
     networks: Sequence[Path],
     output: Path,
     *,
     network: ThermalNetwork | None = None,
     correction: Correction | None = None,
 ) -> Path:
-    """Package a gearbox as an FMU that needs Python, numpy and onnxruntime where it is used.
+    """Package the thermal network of a gearbox as an FMU that needs Python, numpy and onnxruntime where it is used.
 
     Parameters
     ----------

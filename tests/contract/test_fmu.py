@@ -33,9 +33,9 @@ def test_fmpy_finds_no_problem(path: Path) -> None:
     assert validate_fmu(str(path)) == []
 
 
-def test_variables_are_those_of_the_table(path: Path, fzg: Gearbox) -> None:
+def test_variables_are_those_of_the_table(path: Path, fzg: Gearbox, fzg_training: TrainingResult) -> None:
     description = read_model_description(str(path))
-    table = signal_table(fzg)
+    table = signal_table(fzg.network(), fzg_training.losses)
     assert [v.name for v in description.modelVariables] == [s.name for s in table]
     for variable, signal in zip(description.modelVariables, table, strict=True):
         assert variable.valueReference == signal.reference
@@ -265,3 +265,13 @@ def test_the_reference_run_is_what_fmpy_finds(path: Path, tmp_path: Path) -> Non
     assert result["time"].tolist() == expected["time"].tolist()
     for name in names:
         np.testing.assert_allclose(result[name], expected[name], rtol=1e-7, atol=1e-7, err_msg=name)
+
+
+def test_native_and_python_fmu_agree(fzg_fmu: Path, fzg_native: Path) -> None:
+    """At held inputs, inside and outside the range of training."""
+    with hosted(fzg_fmu, {"factor.bearing": 1.7}) as python, hosted(fzg_native, {"factor.bearing": 1.7}) as native:
+        for speed, duration in ((300.0, 1.0), (310.0, 60.0), (-20.0, 0.3), (0.0, 30.0), (1000.0, 200.0)):
+            for host in (python, native):
+                host.set(speed=speed)
+                host.step(duration)
+            assert python.outputs() == pytest.approx(native.outputs(), rel=1e-9, abs=1e-9)
