@@ -10,6 +10,7 @@ from typing import Any
 
 from builder.fmi.documentation import Kind, documentation
 from builder.fmi.model_description import Identity
+from builder.fmi.recorded import recorded_file
 from builder.fmi.reference import reference_run
 from builder.fmi.signals import SignalTable
 from builder.surrogate.train import TrainingResult
@@ -54,9 +55,12 @@ def gearbox_pages(
     *,
     kind: Kind,
 ) -> dict[str, bytes]:
-    """Documentation of an FMU of a gearbox, by path in the archive; `data` is that of :func:`builder.fmi.twin_data`."""
+    """Documentation of an FMU of a gearbox, and what it knows of recordings, by path in the archive.
+
+    `data` is that of :func:`builder.fmi.twin_data`.
+    """
     reference = reference_run(gearbox, network, table, data, training.losses)
-    return documentation(gearbox, table, identity, training, reference, kind=kind)
+    return documentation(gearbox, table, identity, training, reference, kind=kind) | recorded_file(network)
 
 
 def model_identifier(name: str) -> str:

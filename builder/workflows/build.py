@@ -175,7 +175,8 @@ def build(
     kinds = {"python": ("python",), "native": ("native",), "both": ("python", "native")}.get(target)
     if kinds is None:
         raise InputError(f"target {target!r} is not known; python, native and both are")
-    notes, built_for = [], ()
+    notes: list[str] = []
+    built_for: tuple[str, ...] = ()
     if "native" in kinds:  # before the training: a missing compiler is known early
         try:
             plan = plan_for(platforms)

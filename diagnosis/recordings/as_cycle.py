@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Set
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+from diagnosis.recordings.machine import RecordedMachine
 from diagnosis.recordings.mapping import RecordingMapping, mapping_beside, mapping_of_definition
 from diagnosis.recordings.read import name_parts, read_recording
 from diagnosis.recordings.recording import Recording
@@ -15,9 +15,6 @@ from models.files.cycle import Cycle
 from models.files.cycle_file import RecordedStart, read_cycle_and_start
 from models.files.table_file import KINDS, column_names
 from models.quantities.quantities import is_total_loss
-
-if TYPE_CHECKING:
-    from models.simulation.thermal_network import ThermalNetwork
 
 MOST_SHOWN = 3  # pieces of a recording with gaps
 
@@ -34,15 +31,15 @@ def files_of(text: Path) -> tuple[Path, ...]:
 
 
 def read_cycle_or_recording(
-    text: Path, network: ThermalNetwork, *, mapping: Path | None = None
+    text: Path, network: RecordedMachine, *, mapping: Path | None = None
 ) -> tuple[Cycle, RecordedStart, tuple[str, ...]]:
-    """Read the inputs of a network over time from a plain cycle or from a recording.
+    """Read the inputs of a machine over time from a plain cycle or from a recording.
 
     Parameters
     ----------
     text : Path
         File (.csv, .csv.gz, .parquet, .mf4), files ``FILE+FILE``, or a part, ``FILE@start..end``
-    network : ThermalNetwork
+    network : RecordedMachine
         Defines nodes and inputs, and the usual mapping of its recordings
     mapping : Path or None
         Mapping file of a recording; by default the one next to it, else that of the definition
