@@ -360,14 +360,16 @@ def _simulate_table(
 
 def _pieces(names: Sequence[str], duration: float, begin: Array, end: Array) -> int:
     """Into how many pieces a row is cut: of 0.5 s where an input ramps, longer where it changes little; 0 at rest."""
-    change = max(abs(b - a) / LARGEST_CHANGE.get(n, 1.0) for n, a, b in zip(names, begin, end, strict=True))
+    changes = (abs(b - a) / LARGEST_CHANGE.get(n, 1.0) for n, a, b in zip(names, begin, end, strict=True))
+    change = max(changes, default=0.0)
     return min(int(np.ceil(duration / LONGEST_HELD_S)), int(np.ceil(change)))
 
 
 def _input_table(fmu: LoadedFmu, cycle: Cycle) -> Array:
     """Inputs in the FMU's order, start values where the cycle has none, shape (N, inputs)."""
     starts = zip(fmu.inputs, fmu.defaults(), strict=True)
-    return np.stack([cycle.inputs.get(name, np.full(len(cycle), start)) for name, start in starts], axis=-1)
+    columns = [cycle.inputs.get(name, np.full(len(cycle), start)) for name, start in starts]
+    return np.reshape(columns, (len(columns), len(cycle))).T
 
 
 def _starts(variables: Mapping[str, Any]) -> dict[str, Any]:

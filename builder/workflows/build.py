@@ -41,12 +41,13 @@ class CycleErrors:
     temperature_K : mapping of node to float
         Largest difference, [K]
     loss_mean, loss_worst : float
-        Mean and largest difference of the total loss, relative to the full model's at that moment, [-]
+        Mean and largest difference of the total loss, relative to the full model's at that moment, [-]; None without
+        a loss
     """
 
     temperature_K: Mapping[str, float]
-    loss_mean: float
-    loss_worst: float
+    loss_mean: float | None
+    loss_worst: float | None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,7 +57,8 @@ class BuildReport:
     Attributes
     ----------
     gearbox : str
-    training : TrainingResult
+    training : TrainingResult or None
+        None without geometry: the FMU has the laws themselves
     cycles : mapping of FMU file name to CycleErrors
     seconds : mapping of step to float
     files : tuple of Path
@@ -69,7 +71,7 @@ class BuildReport:
     """
 
     gearbox: str
-    training: TrainingResult
+    training: TrainingResult | None
     cycles: Mapping[str, CycleErrors]
     seconds: Mapping[str, float]
     files: tuple[Path, ...]
@@ -80,7 +82,7 @@ class BuildReport:
     def as_dict(self) -> dict[str, Any]:
         """The report without timings, so that the same build gives the same file."""
         return {
-            **self.training.as_dict(),
+            **({} if self.training is None else self.training.as_dict()),
             "correction": self.correction,
             "reference_cycle": {
                 name: {
@@ -94,17 +96,8 @@ class BuildReport:
 
     def show(self) -> None:
         """Print the summary."""
-        rows = [
-            [r.component, f"{r.r_squared:.6f}", *(f"{100.0 * v:.2f}" for v in
-             (r.median, r.percentile_95, r.corner_median, r.corner_percentile_95))]
-            for r in self.training.report
-        ]  # fmt: skip
-        console.table(
-            f"Networks against the full model on {self.training.preset.judged} separate points: relative errors\n"
-            "(corner: the lowest tenth of every input)",
-            ["loss", "R²", "median %", "p95 %", "corner median %", "corner p95 %"],
-            rows,
-        )
+        if self.training is not None:
+            self._show_networks(self.training)
         if self.cycles:
             self._show_cycles()
         console.table("Time", ["step", "s"], [[step, f"{value:.2f}"] for step, value in self.seconds.items()])
@@ -114,18 +107,35 @@ class BuildReport:
         for note in self.notes:
             console.err.print(f"note: {note}", style="yellow")
 
+    @staticmethod
+    def _show_networks(training: TrainingResult) -> None:
+        rows = [
+            [r.component, f"{r.r_squared:.6f}", *(f"{100.0 * v:.2f}" for v in
+             (r.median, r.percentile_95, r.corner_median, r.corner_percentile_95))]
+            for r in training.report
+        ]  # fmt: skip
+        console.table(
+            f"Networks against the full model on {training.preset.judged} separate points: relative errors\n"
+            "(corner: the lowest tenth of every input)",
+            ["loss", "R²", "median %", "p95 %", "corner median %", "corner p95 %"],
+            rows,
+        )
+
     def _show_cycles(self) -> None:
         worst = [max(cycle.temperature_K.items(), key=lambda item: item[1]) for cycle in self.cycles.values()]
         cycles = self.cycles.values()
+        rows = [["temperature, worst node", *(f"{value:.3f} K ({node})" for node, value in worst)]]
+        if all("oil" in cycle.temperature_K for cycle in cycles):
+            rows.append(["temperature, oil", *(f"{cycle.temperature_K['oil']:.3f} K" for cycle in cycles)])
+        for label, values in (
+            ("mean", [cycle.loss_mean for cycle in cycles]), ("worst", [cycle.loss_worst for cycle in cycles])
+        ):  # fmt: skip
+            known = [f"{100.0 * value:.2f} %" for value in values if value is not None]
+            rows += [[f"total loss, {label}", *known]] if known else []
         console.table(
             "FMU against the full model, 600 s reference cycle from 20 °C",
             ["quantity", *(f"difference, {name}" for name in self.cycles)],
-            [
-                ["temperature, worst node", *(f"{value:.3f} K ({node})" for node, value in worst)],
-                ["temperature, oil", *(f"{cycle.temperature_K['oil']:.3f} K" for cycle in cycles)],
-                ["total loss, mean", *(f"{100.0 * cycle.loss_mean:.2f} %" for cycle in cycles)],
-                ["total loss, worst", *(f"{100.0 * cycle.loss_worst:.2f} %" for cycle in cycles)],
-            ],
+            rows,
         )
 
 
@@ -143,7 +153,7 @@ def build(
     dask: str | None = None,
     correction: Correction | None = None,
 ) -> BuildReport:
-    """Train the networks of `gearbox`, build its FMU and try it on the reference cycle.
+    """Build the FMUs of `gearbox` and try them on the reference cycle; with geometry, train their networks first.
 
     Parameters
     ----------
@@ -172,40 +182,30 @@ def build(
     InputError
         If the folder cannot be written to or the options are at fault.
     """
-    kinds = {"python": ("python",), "native": ("native",), "both": ("python", "native")}.get(target)
-    if kinds is None:
-        raise InputError(f"target {target!r} is not known; python, native and both are")
-    notes: list[str] = []
-    built_for: tuple[str, ...] = ()
-    if "native" in kinds:  # before the training: a missing compiler is known early
-        try:
-            plan = plan_for(platforms)
-            built_for, note = plan.platforms, plan.note
-        except NoCompilerError as error:
-            if target == "native":
-                raise
-            kinds, note = ("python",), f"is not built: {error}"
-        if note:
-            notes.append(f"native FMU {note}")
+    kinds, built_for, notes = _planned(target, platforms)
     network = corrected_network(gearbox, correction)
+    inside = gearbox.network_of_laws(network) if gearbox.is_parametric else network
     seconds: dict[str, float] = {}
     with atomic_folder(folder) as stage:
-        with _measure_time("train", seconds), _show_messages() as tell:
-            training = train_surrogate(
-                gearbox, preset=preset, samples=samples, seed=seed,
-                jobs=jobs, dask=dask, progress=tell,
-            )  # fmt: skip
+        training, networks = None, tuple[Path, ...]()
+        if not gearbox.is_parametric:
+            with _measure_time("train", seconds), _show_messages() as tell:
+                training = train_surrogate(
+                    gearbox, preset=preset, samples=samples, seed=seed, jobs=jobs, dask=dask, progress=tell
+                )
+            with _measure_time("export", seconds):
+                networks = export_onnx(training, stage / "networks", version=project_version())
         fmus = {kind: stage / f"{name}{SUFFIX[kind]}.fmu" for kind in kinds}
-        with _measure_time("export", seconds):
-            networks = export_onnx(training, stage / "networks", version=project_version())
         for kind, path in fmus.items():
             with _measure_time(f"package, {kind} FMU", seconds), _show_messages() as tell:
                 tell(f"packaging the {kind} FMU")
                 if kind == "python":
-                    build_python_fmu(gearbox, training, networks, path, correction=correction)
+                    build_python_fmu(gearbox, training, networks, path, network=inside, correction=correction)
                 else:
-                    build_native_fmu(gearbox, training, networks, path, platforms=platforms, correction=correction)
-        cycle, losses = reference_cycle(gearbox), gearbox.losses()
+                    build_native_fmu(
+                        gearbox, training, networks, path, network=inside, platforms=platforms, correction=correction
+                    )
+        cycle, losses = reference_cycle(gearbox), gearbox.loss_laws()
         with _measure_time("reference cycle, full model", seconds), console.progress_bar("full model") as progress:
             full = network.simulate(cycle, losses=losses, initial=COLD_START, progress=progress).columns()
         cycles = {}
@@ -222,7 +222,7 @@ def build(
             write_table(stage / f"drive_cycle{SUFFIX[kind]}.csv", driven)
             title = f"{gearbox.name}\n600 s reference cycle, {kind} FMU and full model"
             plot = stage / f"drive_cycle{SUFFIX[kind]}.png"
-            plot_cycle(plot, driven, title=title, groups=network.groups, reference=full)
+            plot_cycle(plot, driven, title=title, groups=network.groups, inputs=network.inputs, reference=full)
         report = BuildReport(
             gearbox=gearbox.name, training=training, cycles=cycles, seconds=seconds, files=(),
             purpose=_purpose({kind: path.name for kind, path in fmus.items()}, built_for), notes=tuple(notes),
@@ -232,6 +232,30 @@ def build(
         made = sorted(path.relative_to(stage) for path in stage.rglob("*") if path.is_file())
     files = tuple(folder / path for path in made)
     return replace(report, files=files, notes=(*report.notes, *_left_from_before(folder, files)))
+
+
+def _planned(target: str, platforms: str) -> tuple[tuple[str, ...], tuple[str, ...], list[str]]:
+    """Kinds of FMU that can be built here, platforms of the native one, and notes on what is left out.
+
+    Called before the training, so that a missing compiler is known early.
+
+    Raises
+    ------
+    InputError
+        If the target is not known, or what is asked for explicitly cannot be built.
+    """
+    kinds = {"python": ("python",), "native": ("native",), "both": ("python", "native")}.get(target)
+    if kinds is None:
+        raise InputError(f"target {target!r} is not known; python, native and both are")
+    if "native" not in kinds:
+        return kinds, (), []
+    try:
+        plan = plan_for(platforms)
+    except NoCompilerError as error:
+        if target == "native":
+            raise
+        return ("python",), (), [f"native FMU is not built: {error}"]
+    return kinds, plan.platforms, [f"native FMU {plan.note}"] if plan.note else []
 
 
 def _purpose(names: Mapping[str, str], platforms: Sequence[str]) -> str:
@@ -257,12 +281,13 @@ def cycle_errors(driven: Mapping[str, Array], reference: Mapping[str, Array]) ->
     nodes = [
         name for name in reference if name.startswith("T_") and name.endswith("_degC") and name != "T_ambient_degC"
     ]
-    loss = np.abs(driven["P_loss_W"] - reference["P_loss_W"]) / reference["P_loss_W"]
-    return CycleErrors(
-        temperature_K={name[2:-5]: float(np.max(np.abs(driven[name] - reference[name]))) for name in nodes},
-        loss_mean=float(loss.mean()),
-        loss_worst=float(loss.max()),
-    )
+    temperatures = {name[2:-5]: float(np.max(np.abs(driven[name] - reference[name]))) for name in nodes}
+    loss = reference.get("P_loss_W", np.zeros(1))
+    lost = loss > 0.0
+    if not lost.any():
+        return CycleErrors(temperature_K=temperatures, loss_mean=None, loss_worst=None)
+    off = np.abs(driven["P_loss_W"] - loss)[lost] / loss[lost]
+    return CycleErrors(temperature_K=temperatures, loss_mean=float(off.mean()), loss_worst=float(off.max()))
 
 
 @contextmanager

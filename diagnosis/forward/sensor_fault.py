@@ -9,7 +9,7 @@ import numpy as np
 from diagnosis.forward.recurrence import lagged
 from models.base.types import Array
 from models.network.laws import compile_function, function_source
-from models.quantities.quantities import column_of, is_total_loss
+from models.quantities.quantities import column_of, is_total_loss, node_of_channel
 from models.terms.term import Term
 
 AS_RECORDED = "_as_recorded"  # ending of columns of readings
@@ -68,9 +68,11 @@ def columns_as_recorded(columns: Mapping[str, Array], terms: Iterable[Term]) -> 
     """
     time = columns["time_s"]
     temperatures = {name[:-5]: T for name, T in columns.items() if name.startswith("T_") and name.endswith("_degC")}
+    nodes = {name[2:] for name in temperatures}
     read: dict[str, Array] = {}
     for term in terms:
-        channels = [channel for channel in term.target if _true_column(channel) in columns]
+        true = {channel: _column(node_of_channel(channel, nodes)) for channel in term.target}
+        channels = [channel for channel in term.target if true[channel] in columns]
         if term.kind != "sensor" or not channels:
             continue
         parameters = {p.name: p.start for p in term.parameters}
@@ -78,7 +80,7 @@ def columns_as_recorded(columns: Mapping[str, Array], terms: Iterable[Term]) -> 
         names = sorted(symbol.name for symbol in term.expression.free_symbols)
         function = compile_function(function_source("law", names, [term.expression], vector=True), "law")
         law = np.broadcast_to(np.asarray(function(*(signals[name] for name in names))[0], dtype=float), time.shape)
-        readings = np.stack([read.get(name, columns[_true_column(name)]) for name in channels], axis=-1)
+        readings = np.stack([read.get(name, columns[true[name]]) for name in channels], axis=-1)
         if term.form == "shift":
             readings = readings + law[:, None]
         readings = passed_on(term, law, time, readings, range(len(channels)))
@@ -87,9 +89,5 @@ def columns_as_recorded(columns: Mapping[str, Array], terms: Iterable[Term]) -> 
 
 
 def _column(channel: str) -> str:
-    """Column of a channel: a node, ``<node>@<sensor>``, or the total loss."""
+    """Column of a channel: a node, one of its sensors, or the total loss."""
     return column_of(channel if is_total_loss(channel) else f"T_{channel}")
-
-
-def _true_column(channel: str) -> str:
-    return _column(channel.partition("@")[0])

@@ -40,7 +40,7 @@ def fault(form: Form, *target: str, law: str, size: float) -> Term:
             [fault("shift", "oil", law="size", size=2.0), fault("stuck", "oil", law="size", size=1.0)],
             {OIL_READ: np.full(100, OIL[0] + 2.0)},
         ),
-        ([fault("shift", "oil@sump", law="size", size=2.0)], {"T_oil@sump_degC_as_recorded": OIL + 2.0}),
+        ([fault("shift", "oil__sump", law="size", size=2.0)], {"T_oil__sump_degC_as_recorded": OIL + 2.0}),
         ([fault("shift", "bearing_1", law="size", size=2.0)], {}),
     ],
 )
