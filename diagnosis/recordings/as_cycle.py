@@ -11,10 +11,11 @@ from diagnosis.recordings.read import name_parts, read_recording
 from diagnosis.recordings.recording import Recording
 from diagnosis.recordings.time_axis import ISO_NAMES, STANDARD, moment_text, split_path
 from models.base.errors import InputError
+from models.base.types import Array
 from models.files.cycle import Cycle
 from models.files.cycle_file import RecordedStart, read_cycle_and_start
 from models.files.table_file import KINDS, column_names
-from models.quantities.quantities import is_total_loss
+from models.quantities.quantities import is_total_loss, node_of_channel
 
 MOST_SHOWN = 3  # pieces of a recording with gaps
 
@@ -65,8 +66,13 @@ def read_cycle_or_recording(
         raise InputError(f"{text}: {_gaps(recording)}")
     piece = recording.segments[0]
     cycle = Cycle(recording.time[piece], {name: values[piece] for name, values in recording.inputs.items()})
-    temperatures = [(c.name, c.column, c.values[piece]) for c in recording.channels if not is_total_loss(c.name)]
-    start = RecordedStart.first_of(recording.path, temperatures, recording.rows[piece])
+    nodes = [part.name for part in network.parts]
+    first: dict[str, tuple[str, str, Array]] = {}  # the first of several sensors at a node
+    for channel in recording.channels:
+        if not is_total_loss(channel.name):
+            node = node_of_channel(channel.name, nodes)
+            first.setdefault(node, (node, channel.column, channel.values[piece]))
+    start = RecordedStart.first_of(recording.path, first.values(), recording.rows[piece])
     return cycle, start, (*recording.notes, *_clock_notes(recording))
 
 
