@@ -332,7 +332,7 @@ class Twin:
         uniform = self.values[self._single["initial_uniform"]] != 0.0
         common = self._single["initial_temperature"]
         T = [self._inner(common if uniform else index) for index in self._starts]
-        return self._system, inputs, solver.start(np.array([*T, *self._state_starts]))
+        return self._system, inputs, solver.start(np.array([*T, *self._state_starts]), len(self._laws.boundaries))
 
     def _faults(self, indices: Sequence[int]) -> list[str]:
         found = (self.slots[i].fault(self.values[i]) for i in indices if self.slots[i].settable)
@@ -389,7 +389,7 @@ class Twin:
                 "states": state.states.tolist(),
                 "step": float(state.step),
                 "heat_in": float(state.heat_in),
-                "heat_out": float(state.heat_out),
+                "heat_out": state.heat_out.tolist(),
             },
         }  # fmt: skip
 
