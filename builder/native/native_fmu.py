@@ -76,7 +76,7 @@ def build_native_fmu(
     *,
     network: ThermalNetwork | None = None,
     correction: Correction | None = None,
-    platforms: str = "all",
+    platforms: str = "host",
 ) -> NativeBuild:
     """Package the thermal network of a gearbox as a native FMU.
 
@@ -125,7 +125,7 @@ def build_native_archive(
     identity: Identity,
     sources: Mapping[str, str],
     pages: Mapping[str, bytes],
-    platforms: str = "all",
+    platforms: str = "host",
 ) -> NativeBuild:
     """Compile a model with the FMI layer and package it.
 

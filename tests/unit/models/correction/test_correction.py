@@ -24,9 +24,9 @@ from models.definition.messages import validate_section
 from models.files.toml_file import parse
 from models.mechanisms import CATALOGUE, Scale, load_mechanisms
 from models.mechanisms.user_files import check_placeable
+from models.network.expressions import expression_text, parse_expression
 from models.network.laws import Parameter, symbol
 from models.simulation.thermal_network import ExtraState
-from models.terms.expressions import expression_text, parse_expression
 from models.terms.term import Term
 
 RIG = load_gearbox("fzg")
