@@ -305,7 +305,7 @@ class _Table:
             at_fmi = partial(_convert, own, unit)
             display = None if name in GEARBOX_INPUTS else quantity.unit * (quantity.unit != kind.unit)
             yield Signal(
-                name=fmi_name(name), role="input", of=name,
+                name=quantity.fmi, role="input", of=name,
                 description=given.description or texts.get(name, name.replace("_", " ")), type=quantity.type,
                 unit=kind.unit, inner_unit=quantity.unit, display_unit=display, causality="input",
                 variability="continuous", initial="",
@@ -333,7 +333,7 @@ class _Table:
             names |= {s.name for s in self._operating_point().free_symbols}
         names |= {s.name for name, law in self.network.derived.items() if name in names for s in law.free_symbols}
         names |= {s.name for node, T in self.boundaries.items() if f"T_{node}" in names for s in T.free_symbols}
-        inputs = tuple(fmi_name(name) for name in self.inputs if name in names)
+        inputs = tuple(given.quantity.fmi for name, given in self.network.inputs.items() if name in names)
         return inputs, tuple(fmi for name, fmi in self.parameters.items() if name in names)
 
     def _temperatures(self) -> Iterator[Signal]:
