@@ -10,6 +10,7 @@ from pathlib import Path
 
 from builder.fmi.documentation import Kind, documentation
 from builder.fmi.model_description import Identity
+from builder.fmi.recorded import recorded_file
 from builder.fmi.reference import reference_run
 from builder.fmi.signals import SignalTable, signal_table
 from builder.surrogate.train import TrainingResult
@@ -37,7 +38,7 @@ class CommonParts:
     table : SignalTable
     identity : Identity
     pages : mapping of path to bytes
-        Documentation by path in the archive
+        Documentation, and what the FMU knows of recordings, by path in the archive
     """
 
     network: ThermalNetwork
@@ -89,7 +90,7 @@ def common_parts(
     table = signal_table(network, losses)
     identity = gearbox_identity(gearbox, output, flags, correction)
     reference = reference_run(gearbox, network, table, losses)
-    pages = documentation(gearbox, table, identity, training, reference, kind=kind)
+    pages = documentation(gearbox, table, identity, training, reference, kind=kind) | recorded_file(network)
     return CommonParts(network=network, losses=losses, table=table, identity=identity, pages=pages)
 
 
