@@ -95,11 +95,37 @@ const Balance *network_balance(Network *network, double time, const double *inpu
     return &network->now;
 }
 
+void network_outflow(Network *network, double *flow) {
+    Balance *const now = &network->now;
+    find_gain(now);
+    structure_outflow(now->conductance, now->at.T, now->T_boundary, flow);
+}
+
+/* Add the heat of an accepted step h, with the stages k_1 and k_2 and the weights of the temperatures: whatever leaves
+   the nodes arrives at the boundaries, to rounding. */
+static void add_heat(Heat *heat, const Balance *now, const Balance *then, const double *k_1, const double *k_2,
+                     double h) {
+    const double none[AT_LEAST_ONE(N_BOUNDARIES)] = {0.0};
+    double out_1[AT_LEAST_ONE(N_BOUNDARIES)], out_2[AT_LEAST_ONE(N_BOUNDARIES)], slope[AT_LEAST_ONE(N_BOUNDARIES)];
+    double T[N_PARTS], change[N_PARTS];
+    for (int i = 0; i < N_PARTS; i++) {
+        T[i] = now->at.T[i] + GAMMA * h * k_1[i];
+        change[i] = GAMMA * h * k_2[i];
+    }
+    structure_outflow(now->conductance, T, now->T_boundary, out_1);
+    structure_outflow(then->conductance, then->at.T, then->T_boundary, out_2);
+    structure_outflow(now->conductance, change, none, slope);
+    for (int i = 0; i < N_BOUNDARIES; i++)
+        heat->out[i] += h * (1.5 * out_1[i] + 0.5 * (out_2[i] - 2.0 * out_1[i] + slope[i]));
+    for (int i = 0; i < N_SOURCES; i++) heat->in += 0.5 * h * (now->heat[i] + then->heat[i]);
+}
+
 const char *network_advance(Network *network, ThermalState *state, double time, double duration, const double *begin,
-                            const double *end, double *failed_at) {
+                            const double *end, Heat *exchanged, double *failed_at) {
     Balance *const now = &network->now, *const then = &network->then;
     const double *const capacity = network->capacity;
     double elapsed = 0.0;
+    memset(exchanged, 0, sizeof *exchanged);
     while (elapsed < duration) {
         const double remaining = duration - elapsed, step = larger(state->step, SHORTEST_STEP_S);
         /* Two even steps instead of a full one and a sliver. */
@@ -150,6 +176,7 @@ const char *network_advance(Network *network, ThermalState *state, double time, 
             continue;
         }
         elapsed = h == remaining ? duration : elapsed + h;
+        add_heat(exchanged, now, then, k_1, k_2, h);
         for (int i = 0; i < N_PARTS; i++) state->T[i] += h * (1.5 * k_1[i] + 0.5 * k_2[i]);
         for (int i = 0; i < N_MEMORY; i++) state->memory[i] += h * (1.5 * rate_1[i] + 0.5 * rate_2[i]);
         /* A short communication step says nothing about the step that the network would allow. */

@@ -29,6 +29,11 @@ typedef struct {
     double gain[N_PARTS];                                  /* W: net heat into the parts */
 } Balance;
 
+/* Heat of the sources and to each boundary, J. */
+typedef struct {
+    double in, out[AT_LEAST_ONE(N_BOUNDARIES)];
+} Heat;
+
 /* A network with parameter values. */
 typedef struct {
 #if N_COMPONENTS
@@ -58,10 +63,13 @@ const Balance *network_balance(Network *network, double time, const double *inpu
 LossPoint network_loss_point(const Network *network, double time, const double *inputs, const ThermalState *state);
 #endif
 
-/* Integrate over `duration`, the inputs going straight from `begin` to `end`; gives NULL, or why it cannot be done, and
-   *failed_at. */
+/* Heat flow to each boundary at the moment of the last network_balance, W. */
+void network_outflow(Network *network, double *flow);
+
+/* Integrate over `duration`, the inputs going straight from `begin` to `end`, and find the heat that is exchanged
+   meanwhile; gives NULL, or why it cannot be done, and *failed_at. */
 const char *network_advance(Network *network, ThermalState *state, double time, double duration, const double *begin,
-                            const double *end, double *failed_at);
+                            const double *end, Heat *exchanged, double *failed_at);
 
 #if defined __GNUC__ && !defined _WIN32
 #pragma GCC visibility pop

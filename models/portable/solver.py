@@ -38,9 +38,9 @@ class Balance:
         Its Jacobian with respect to the states at fixed conductances and losses, [1/s]
     heat_in : Array, shape (...)
         Sum of all sources, [W]
-    heat_out : Array, shape (...)
-        Heat to the boundary nodes, [W]
-    heat_out_slope : Array, shape (..., n)
+    heat_out : Array, shape (..., boundaries)
+        Heat to each boundary node, [W]
+    heat_out_slope : Array, shape (..., boundaries, n)
         Its derivative with respect to the states at fixed conductances, [W/K]
     """
 
@@ -73,8 +73,10 @@ class State:
         Node temperatures [degC], then extra states
     step : float
         Step size that the last step recommends, [s]
-    heat_in, heat_out : Array, shape (...)
-        Heat brought in and given off since the start, [J]
+    heat_in : Array, shape (...)
+        Heat that the sources have brought in since the start, [J]
+    heat_out : Array, shape (..., boundaries)
+        Heat given to each boundary since the start, [J]
     """
 
     states: Array
@@ -83,10 +85,11 @@ class State:
     heat_out: Array
 
 
-def start(states: Array) -> State:
-    """The state at the start of a simulation, `states` of shape (..., n)."""
-    zero = np.zeros(states.shape[:-1])
-    return State(states=np.array(states, dtype=float), step=FIRST_STEP_S, heat_in=zero, heat_out=zero)
+def start(states: Array, boundaries: int) -> State:
+    """The state at the start of a simulation, `states` of shape (..., n), of a network with some boundaries."""
+    shape = states.shape[:-1]
+    none, none_out = np.zeros(shape), np.zeros((*shape, boundaries))
+    return State(states=np.array(states, dtype=float), step=FIRST_STEP_S, heat_in=none, heat_out=none_out)
 
 
 def advance(system: System, state: State, time: float, duration: float, inputs: Array, inputs_end: Array) -> State:
@@ -135,8 +138,8 @@ def advance(system: System, state: State, time: float, duration: float, inputs: 
             state = replace(state, step=next_step)
             continue
         elapsed = duration if h == remaining else elapsed + h
-        out_1 = now.heat_out + GAMMA * h * _dot(now.heat_out_slope, k_1)
-        out_2 = then.heat_out - 2.0 * out_1 + GAMMA * h * _dot(now.heat_out_slope, k_2)
+        out_1 = now.heat_out + GAMMA * h * _times(now.heat_out_slope, k_1)
+        out_2 = then.heat_out - 2.0 * out_1 + GAMMA * h * _times(now.heat_out_slope, k_2)
         state = State(
             states=system.updated(time + elapsed, later_inputs, state.states + h * (1.5 * k_1 + 0.5 * k_2)),
             # A short communication step says nothing about the step that the network would allow.
@@ -150,7 +153,3 @@ def advance(system: System, state: State, time: float, duration: float, inputs: 
 
 def _times(matrix: Array, vector: Array) -> Array:
     return np.asarray(matrix @ vector if vector.ndim == 1 else (matrix @ vector[..., None])[..., 0])
-
-
-def _dot(a: Array, b: Array) -> Array:
-    return np.asarray((a * b).sum(axis=-1))

@@ -21,6 +21,7 @@ from models.files.cycle import Cycle
 from models.portable.evaluation import NoLosses
 from models.quantities.quantities import usual_inputs
 from models.simulation.thermal_network import ThermalNetwork
+from tests.contract.fmu_host import check_reference_run
 from tests.contract.networks import thermostat
 
 ANY = load_gearbox("la_haute_borne")  # gives a name and a hash
@@ -103,6 +104,12 @@ def test_outputs_are_those_that_the_network_has(path: Path, network: ThermalNetw
     assert not {"in_domain", "domain_distance"} & names
     assert ("loss.total" in names) == any(source.is_loss for source in network.sources)
     assert ({"torque_loss", "efficiency"} <= names) == ("speed" in network.inputs)
+
+
+def test_the_reference_run_is_what_fmpy_finds(path: Path, tmp_path: Path) -> None:
+    check_reference_run(path, tmp_path)
+    page = (tmp_path / "documentation/index.html").read_text(encoding="utf-8")
+    assert "networks" not in page
 
 
 def simulated(path: Path, network: ThermalNetwork) -> np.ndarray:

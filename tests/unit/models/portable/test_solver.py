@@ -15,7 +15,7 @@ from models.portable.solver import Balance, State
 
 @dataclass
 class Linear:
-    """``dT/dt = input - rate * T`` per state; heat in is the input, heat out ``rate * T`` (unit capacities)."""
+    """``dT/dt = input - rate * T`` per state of unit capacity; each gives its heat ``rate * T`` to its own boundary."""
 
     rates: Array
     update: Callable[[Array], Array] | None = None
@@ -29,8 +29,8 @@ class Linear:
             derivative=inputs[0] - self.rates * states,
             matrix=np.broadcast_to(-self.jacobian * np.diag(self.rates), (*states.shape, n)),
             heat_in=np.full(states.shape[:-1], n * inputs[0]),
-            heat_out=(self.rates * states).sum(axis=-1),
-            heat_out_slope=np.broadcast_to(self.jacobian * self.rates, states.shape),
+            heat_out=self.rates * states,
+            heat_out_slope=np.broadcast_to(self.jacobian * np.diag(self.rates), (*states.shape, n)),
         )
 
     def updated(self, time: float, inputs: Array, states: Array) -> Array:
@@ -38,13 +38,15 @@ class Linear:
 
 
 def run(system: Linear, duration: float, start: Array, first: float = 0.0, last: float = 0.0) -> State:
-    return solver.advance(system, solver.start(start), 0.0, duration, np.array([first]), np.array([last]))
+    return solver.advance(
+        system, solver.start(start, start.shape[-1]), 0.0, duration, np.array([first]), np.array([last])
+    )
 
 
 def with_steps(system: Linear, h: float, count: int, monkeypatch: pytest.MonkeyPatch) -> Array:
     """Steps of one size: the tolerance is put out of reach, and every step asked for by itself."""
     monkeypatch.setattr(solver, "TOLERANCE_K", 1e12)
-    state = solver.start(np.array([1.0]))
+    state = solver.start(np.array([1.0]), 1)
     for i in range(count):
         state = State(state.states, 1e9, state.heat_in, state.heat_out)
         state = solver.advance(system, state, i * h, h, np.array([i * h]), np.array([(i + 1) * h]))
@@ -76,7 +78,7 @@ def test_heat_is_conserved_to_rounding() -> None:
     start = np.array([50.0, -10.0])
     state = run(Linear(np.array([5.0, 0.01]), jacobian=0.7), 40.0, start, 1.0, 9.0)
     stored = (state.states - start).sum()
-    assert stored == pytest.approx(float(state.heat_in - state.heat_out), abs=1e-9)
+    assert stored == pytest.approx(float(state.heat_in - state.heat_out.sum()), abs=1e-9)
     assert state.heat_in == pytest.approx(2 * 40.0 * 5.0, rel=1e-12)  # a ramp is integrated exactly
 
 
@@ -106,7 +108,7 @@ def test_no_duration_changes_nothing() -> None:
 
 
 def test_step_size_outlives_a_short_communication_step() -> None:
-    system, state = Linear(np.array([1e-3])), solver.start(np.array([10.0]))
+    system, state = Linear(np.array([1e-3])), solver.start(np.array([10.0]), 1)
     u = np.zeros(1)
     state = solver.advance(system, state, 0.0, 600.0, u, u)
     grown = state.step
