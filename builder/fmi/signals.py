@@ -9,8 +9,8 @@ converts.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import inf
 from typing import Literal
@@ -63,6 +63,8 @@ class Signal:
         Column of cycle and result files
     depends, depends_initially : tuple of str
         Signals that an output depends on directly, and at initialization
+    linear : mapping of str to str
+        Those that it is linear in: "constant" where the factor is a number, "tunable" where it follows parameters
     reference : int
         FMI value reference, its place in the table
     """
@@ -84,6 +86,7 @@ class Signal:
     column: str | None = None
     depends: tuple[str, ...] = ()
     depends_initially: tuple[str, ...] = ()
+    linear: Mapping[str, str] = field(default_factory=dict)
     reference: int = -1
 
     @property
@@ -297,8 +300,20 @@ class _Table:
             name=name, role=role, of=of, description=description, type=kind, unit=TYPES[kind].unit if kind else None,
             causality="output", variability="continuous" if kind else "discrete", initial="calculated", minimum=minimum,
             maximum=maximum, nominal=TYPES[kind].nominal if kind else None, domain=domain, column=result_column(name),
-            depends=inputs, depends_initially=(*inputs, *parameters, *starts),
+            depends=inputs, depends_initially=(*inputs, *parameters, *starts), linear=self._linear(expression),
         )  # fmt: skip
+
+    def _linear(self, expression: sp.Expr) -> dict[str, str]:
+        """How an expression depends on the inputs that it is linear in; none where it has losses of the networks."""
+        expression = expression.subs({f"T_{node}": T for node, T in self.boundaries.items()})
+        if any(s.name.startswith("P_") for s in expression.free_symbols):
+            return {}
+        kinds = {}
+        for symbol in (s for s in expression.free_symbols if s.name in self.inputs):
+            factors = {s.name for s in sp.diff(expression, symbol).free_symbols}
+            if factors <= set(self.parameters):
+                kinds[fmi_name(symbol.name)] = "tunable" if factors else "constant"
+        return kinds
 
     def _direct(self, expression: sp.Expr) -> tuple[tuple[str, ...], tuple[str, ...]]:
         """Inputs and parameters that an expression depends on without a detour through the temperatures of parts."""
@@ -332,14 +347,15 @@ class _Table:
                 description=f"Loss: {named}" if source.is_loss else f"Heat into {source.node}: {named}",
                 minimum=0.0 if source.name in self.network.components else -inf,
             )  # fmt: skip
-        yield self._output(name="torque_loss", role="torque_loss", kind="Torque", expression=total,
+        speed, torque = sp.Symbol("speed"), sp.Symbol("torque")
+        yield self._output(name="torque_loss", role="torque_loss", kind="Torque", expression=total / speed,
                            description="Loss torque at the input shaft, signed as the speed")  # fmt: skip
         yield self._output(name="efficiency", role="efficiency", kind="Ratio", minimum=0.0, maximum=1.0,
-                           expression=total + sp.Symbol("speed") * sp.Symbol("torque"),
+                           expression=total / (speed * torque),
                            description="Power out over power in; 0 without power")  # fmt: skip
 
     def _quality(self) -> Iterator[Signal]:
-        point = sp.Symbol("speed") + sp.Symbol("torque")
+        point = sp.Symbol("speed") * sp.Symbol("torque")
         yield self._output(
             name="in_domain", role="in_domain", kind=None, expression=point,
             description="Whether the operating point is inside the range that the networks were trained on",

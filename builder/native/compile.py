@@ -12,13 +12,14 @@ import os
 import platform
 import shlex
 import shutil
+import struct
 import subprocess
 import sys
 import tempfile
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import cache, partial
+from functools import cache
 from pathlib import Path
 
 from models.base.atomic_write import atomic_file
@@ -29,6 +30,7 @@ GET_ZIG = "install ziglang: python -m pip install ziglang"
 # NaN and infinity keep their meaning: no -ffast-math. Nobody reads errno or floating-point exceptions.
 OPTIONS = (
     "-std=c99", "-O3", "-fno-unroll-loops", "-fno-math-errno", "-fno-trapping-math", "-ffp-contract=fast",
+    "-DFMI2_OVERRIDE_FUNCTION_PREFIX", "-DFMI3_OVERRIDE_FUNCTION_PREFIX",
     "-fvisibility=hidden", "-fno-asynchronous-unwind-tables", "-fno-ident", "-g0", "-shared", "-s",
 )  # fmt: skip
 
@@ -39,37 +41,31 @@ class Platform:
 
     Attributes
     ----------
-    folder : str
-        Below ``binaries/`` in an FMU: of FMI 2.0, or where that has none of FMI 3.0
-    target : str
-        As zig names it, with the oldest glibc that is supported
+    targets : mapping of str to str
+        Processors: folder below ``binaries/`` in FMI 3.0, and the target as zig names it, with the oldest system that
+        is supported. In FMI 2.0 all are in one folder, those of macOS in one universal library
     suffix : str
         Of a shared library
     """
 
-    folder: str
-    target: str
+    targets: Mapping[str, str]
     suffix: str
 
-    @property
-    def options(self) -> tuple[str, ...]:
-        """Options of this platform's linker."""
+    def options(self, name: str) -> tuple[str, ...]:
+        """Options of this platform's linker for a library called `name`."""
         if self.suffix == ".so":
             return ("-fPIC", "-Wl,--no-undefined", "-Wl,--build-id=none", "-lm")
-        return ("-fPIC",) if self.suffix == ".dylib" else ()
+        return ("-fPIC", f"-Wl,-install_name,@rpath/{name}.dylib") if self.suffix == ".dylib" else ()
 
 
+# By the folder below binaries/ in FMI 2.0
 PLATFORMS = {
-    p.folder: p
-    for p in (
-        Platform("linux64", "x86_64-linux-gnu.2.17", ".so"),
-        Platform("win64", "x86_64-windows-gnu", ".dll"),
-        Platform("win32", "x86-windows-gnu", ".dll"),
-        Platform("darwin64", "x86_64-macos", ".dylib"),
-        Platform("aarch64-linux", "aarch64-linux-gnu.2.17", ".so"),
-        Platform("aarch64-darwin", "aarch64-macos", ".dylib"),
-        Platform("aarch64-windows", "aarch64-windows-gnu", ".dll"),
-    )
+    "linux64": Platform({"x86_64-linux": "x86_64-linux-gnu.2.17"}, ".so"),
+    "win64": Platform({"x86_64-windows": "x86_64-windows-gnu"}, ".dll"),
+    "win32": Platform({"x86-windows": "x86-windows-gnu"}, ".dll"),
+    "darwin64": Platform({"x86_64-darwin": "x86_64-macos.11.0", "aarch64-darwin": "aarch64-macos.11.0"}, ".dylib"),
+    "aarch64-linux": Platform({"aarch64-linux": "aarch64-linux-gnu.2.17"}, ".so"),
+    "aarch64-windows": Platform({"aarch64-windows": "aarch64-windows-gnu"}, ".dll"),
 }
 
 
@@ -84,18 +80,21 @@ class Compiler:
 
 @dataclass(frozen=True)
 class Binaries:
-    """Shared libraries by the folder of their platform, and a line on platforms that are missing, or ``""``."""
+    """Shared libraries by their path below ``binaries/``, and a line on platforms that are missing, or ``""``."""
 
     libraries: Mapping[str, bytes]
     note: str
 
 
-def host_platform() -> str | None:
-    """Return the folder of this machine's platform; None if the platform is not known."""
+def _host_processor() -> str:
+    """Folder of this machine in FMI 3.0."""
     machine = {"amd64": "x86_64", "arm64": "aarch64"}.get(platform.machine().lower(), platform.machine().lower())
-    system = {"linux": "linux", "darwin": "macos", "windows": "windows"}.get(platform.system().lower(), "")
-    found = [p.folder for p in PLATFORMS.values() if p.target.startswith(f"{machine}-{system}")]
-    return found[0] if system and found else None
+    return f"{machine}-{platform.system().lower()}"
+
+
+def host_platform() -> str | None:
+    """Return this machine's platform; None if it is not known."""
+    return next((name for name, of in PLATFORMS.items() if _host_processor() in of.targets), None)
 
 
 def chosen_platforms(text: str) -> tuple[str, ...]:
@@ -161,7 +160,9 @@ def plan_for(platforms: str) -> Plan:
     return Plan(own, (host,), f"built for {host} only; for {', '.join(left_out)} {GET_ZIG}" if left_out else "")
 
 
-def compile_libraries(sources: Mapping[str, bytes], platforms: str = "all") -> Binaries:
+def compile_libraries(
+    sources: Mapping[str, bytes], platforms: str = "all", *, name: str = "library", fmi: int = 2
+) -> Binaries:
     """Compile C sources to shared libraries.
 
     Parameters
@@ -170,6 +171,10 @@ def compile_libraries(sources: Mapping[str, bytes], platforms: str = "all") -> B
         C files and headers, all of one folder
     platforms : str
         See :func:`plan_for`
+    name : str
+        Of the library, without suffix
+    fmi : int
+        Version of FMI, 2 or 3, that the folders are for
 
     Returns
     -------
@@ -181,9 +186,32 @@ def compile_libraries(sources: Mapping[str, bytes], platforms: str = "all") -> B
         If there is no compiler for what is asked, or it fails.
     """
     plan = plan_for(platforms)
+    processors = [
+        (folder, processor)
+        for folder in plan.platforms
+        for processor in PLATFORMS[folder].targets
+        if plan.compiler.is_zig or processor == _host_processor()
+    ]
     with ThreadPoolExecutor(max_workers=os.cpu_count()) as pool:
-        libraries = list(pool.map(partial(_library, sources, plan.compiler), [PLATFORMS[p] for p in plan.platforms]))
-    return Binaries(dict(zip(plan.platforms, libraries, strict=True)), plan.note)
+        libraries = list(pool.map(lambda place: _library(sources, plan.compiler, *place, name), processors))
+    found: dict[str, list[bytes]] = {}
+    for (folder, processor), library in zip(processors, libraries, strict=True):
+        path = f"{folder if fmi == 2 else processor}/{name}{PLATFORMS[folder].suffix}"
+        found.setdefault(path, []).append(library)
+    joined = {path: parts[0] if len(parts) == 1 else universal_binary(parts) for path, parts in found.items()}
+    return Binaries(joined, plan.note)
+
+
+def universal_binary(libraries: Sequence[bytes]) -> bytes:
+    """Join Mach-O libraries of several processors in one file, as ``lipo`` does (``mach-o/fat.h``)."""
+    alignment = 14  # 2^14 bytes: a page of an ARM Mac
+    head, body = struct.pack(">II", 0xCAFEBABE, len(libraries)), b""
+    first = 1 << alignment
+    for library in libraries:
+        processor, variant = struct.unpack_from("<II", library, 4)
+        head += struct.pack(">IIIII", processor, variant, first + len(body), len(library), alignment)
+        body += library + bytes(-len(library) % first)
+    return head.ljust(first, b"\0") + body
 
 
 @cache
@@ -212,20 +240,22 @@ def _output(command: Sequence[str]) -> str:
     return subprocess.run(command, capture_output=True, text=True, check=False).stdout  # noqa: S603 - a compiler
 
 
-def _library(sources: Mapping[str, bytes], compiler: Compiler, target: Platform) -> bytes:
-    options = [*OPTIONS, *(("-target", target.target) if compiler.is_zig else ()), *target.options]
-    folder = _cache_folder()
-    if folder is None:
-        return _compile(sources, compiler, options, target)
+def _library(sources: Mapping[str, bytes], compiler: Compiler, folder: str, processor: str, name: str) -> bytes:
+    target = PLATFORMS[folder]
+    chosen = ("-target", target.targets[processor]) if compiler.is_zig else ()
+    options = [*OPTIONS, *chosen, *target.options(name)]
+    cache_folder = _cache_folder()
+    if cache_folder is None:
+        return _compile(sources, compiler, options, processor, f"{name}{target.suffix}")
     # zig is the same in every virtual environment, and another compiler's own options are part of its command.
     command = compiler.command[1:] if compiler.is_zig else compiler.command
     made_of = (compiler.version, command, options, sorted(sources.items()))
     digest = hashlib.sha256(repr(made_of).encode()).hexdigest()
-    kept = folder / f"{digest}{target.suffix}"
+    kept = cache_folder / f"{digest}{target.suffix}"
     try:
         return kept.read_bytes()
     except OSError:
-        library = _compile(sources, compiler, options, target)
+        library = _compile(sources, compiler, options, processor, f"{name}{target.suffix}")
     try:
         with atomic_file(kept) as file:
             file.write_bytes(library)
@@ -249,17 +279,18 @@ def _cache_folder() -> Path | None:
     return Path(base) / "gearbox-thermal-twin"
 
 
-def _compile(sources: Mapping[str, bytes], compiler: Compiler, options: Sequence[str], target: Platform) -> bytes:
+def _compile(
+    sources: Mapping[str, bytes], compiler: Compiler, options: Sequence[str], processor: str, output: str
+) -> bytes:
     with tempfile.TemporaryDirectory(prefix="twin-c-") as folder:
         for name, content in sources.items():
             Path(folder, name).write_bytes(content)
-        names = sorted(name for name in sources if name.endswith(".c"))
-        output = f"library{target.suffix}"  # relative names: no path of this machine gets into the library
+        names = sorted(name for name in sources if name.endswith(".c"))  # relative: no path gets into the library
         libraries = [option for option in options if option.startswith("-l")]
         others = [option for option in options if option not in libraries]
         command = [*compiler.command, *others, "-o", output, *names, *libraries]
         done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)  # noqa: S603
         if done.returncode != 0:
             said = "\n".join((done.stderr or done.stdout).splitlines()[:20])
-            raise InputError(f"{' '.join(compiler.command)} cannot compile the FMU for {target.folder}:\n{said}")
+            raise InputError(f"{' '.join(compiler.command)} cannot compile the FMU for {processor}:\n{said}")
         return Path(folder, output).read_bytes()

@@ -29,6 +29,8 @@ DATA_HEADER = """\
 #ifndef MODEL_DATA_H
 #define MODEL_DATA_H
 
+#include "linker_names.h"
+
 #define AT_LEAST_ONE(n) ((n) > 0 ? (n) : 1) /* C has no empty arrays */
 {defines}
 
@@ -46,13 +48,7 @@ typedef struct {{
     const double *w_1, *b_1, *w_2, *b_2, *w_3, *b_3, *passed;
 }} Block;
 
-#if defined __GNUC__ && !defined _WIN32
-#pragma GCC visibility push(hidden)
-#endif
 {declared}
-#if defined __GNUC__ && !defined _WIN32
-#pragma GCC visibility pop
-#endif
 #endif
 """
 LAWS_HEADER = """\
@@ -60,13 +56,9 @@ LAWS_HEADER = """\
 #ifndef LAWS_H
 #define LAWS_H
 
-#if defined __GNUC__ && !defined _WIN32
-#pragma GCC visibility push(hidden)
-#endif
+#include "linker_names.h"
+
 {functions}
-#if defined __GNUC__ && !defined _WIN32
-#pragma GCC visibility pop
-#endif
 #endif
 """
 LAWS = """\
@@ -123,7 +115,7 @@ class _Data:
         """A constant array; an empty one gets an element that is not read, as C has no empty arrays."""
         texts = [value if isinstance(value, str) else number(value) if isinstance(value, float) else str(value)
                  for value in values]  # fmt: skip
-        self.declared.append(f"extern const {kind} {name}[{max(len(texts), 1)}];")
+        self.declared.append(f"INTERNAL extern const {kind} {name}[{max(len(texts), 1)}];")
         self.defined.append(f"const {kind} {name}[{max(len(texts), 1)}] = {{{_wrap(texts or ['0'])}}};")
 
     def files(self) -> dict[str, str]:
@@ -194,7 +186,7 @@ def _links(network: ThermalNetwork) -> tuple[list[tuple[str, str]], list[tuple[s
 def _laws_header() -> str:
     laws = [f"void law_{name}(const double *restrict s, double *restrict y)"
             for name in ("boundary", "exchange", "heat", "fixed")]  # fmt: skip
-    return LAWS_HEADER.format(functions="\n".join(f"{line};" for line in (*laws, *Structure.signatures())))
+    return LAWS_HEADER.format(functions="\n".join(f"INTERNAL {line};" for line in (*laws, *Structure.signatures())))
 
 
 def _laws(network: ThermalNetwork) -> str:
@@ -235,7 +227,7 @@ def _place_data(data: _Data, table: SignalTable, network: ThermalNetwork) -> Non
     heats = (by_role["loss" if source.is_loss else "heat", source.name] for source in network.sources)
     data.array("Place", "HEAT_OUTPUT", (_place(signal) for signal in heats))
     initial = table.of_role("initial_temperature")[0]
-    data.declared.append("extern const Place INITIAL_TEMPERATURE;")
+    data.declared.append("INTERNAL extern const Place INITIAL_TEMPERATURE;")
     data.defined.append(f"const Place INITIAL_TEMPERATURE = {_place(initial)};")
     for role in ("initial_uniform", "total_loss", "torque_loss", "efficiency", "in_domain", "domain_distance"):
         data.define(role.upper(), by_role[role, ""].reference)

@@ -15,6 +15,7 @@ COMPILER = shutil.which("gcc") or shutil.which("clang")
 TIMEOUT_S = 300  # of a host; none takes more than seconds
 OPTIONS = ("-std=gnu99", "-O1", "-g", "-Wall", "-Wextra", "-Wno-unused-function")
 
+SHARED = "-DFMI2_OVERRIDE_FUNCTION_PREFIX"  # names of the FMI functions as in a shared library
 SANITIZED = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-fno-omit-frame-pointer")
 
 needs_compiler = pytest.mark.skipif(COMPILER is None, reason="no C compiler (gcc or clang)")
@@ -57,7 +58,7 @@ def compiled(name: str, fmu: Unpacked, output: Path, *options: str) -> Path:
 def sanitized(fmu: Unpacked, library: Path) -> Path:
     """The library of an FMU, compiled from its own sources with the sanitizers."""
     sources = sorted((fmu.folder / "sources").glob("*.c"))
-    options = ["-std=c99", "-O1", "-g", "-Wall", "-Wextra", "-Werror", *SANITIZED, "-shared", "-fPIC"]
+    options = ["-std=c99", "-O1", "-g", "-Wall", "-Wextra", "-Werror", SHARED, *SANITIZED, "-shared", "-fPIC"]
     run([str(COMPILER), *options, "-o", library, *sources, "-lm"])
     return library
 

@@ -204,7 +204,7 @@ def test_the_windows_library_gives_the_same_under_wine(
 ) -> None:
     sources = {path.name: path.read_bytes() for path in (fmu.folder / "sources").iterdir()}
     library, host = tmp_path / "fzg.dll", tmp_path / "play.exe"
-    library.write_bytes(compile_libraries(sources, "win64").libraries["win64"])
+    library.write_bytes(compile_libraries(sources, "win64").libraries["win64/library.dll"])
     zig = [sys.executable, "-m", "ziglang", "cc", "-target", "x86_64-windows-gnu", "-O1", "-w"]
     run([*zig, f"-I{fmu.folder / 'sources'}", "-o", host, SOURCES / "play.c"])
     environment = os.environ | {"WINEPREFIX": str(tmp_path / "prefix"), "WINEDEBUG": "-all"}
