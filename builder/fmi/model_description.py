@@ -14,7 +14,7 @@ from xml.etree.ElementTree import Element, SubElement, fromstring, indent, tostr
 
 from builder.fmi.signals import Signal, SignalTable
 from models.quantities.quantities import TYPES, Type
-from models.quantities.units import UNITS
+from models.quantities.units import UNITS, conversion, find_unit
 
 DEPENDENCY_KINDS = ("constant", "tunable")
 INITIAL_DEPENDENCY_KINDS = ("constant",)  # parameters may change before the simulation starts
@@ -129,8 +129,9 @@ def add_log_categories(root: Element) -> None:
 
 def add_experiment(root: Element, identity: Identity) -> None:
     """The default experiment."""
-    numbers = {"stopTime": identity.stop_time, "tolerance": identity.tolerance, "stepSize": identity.step_size}
-    SubElement(root, "DefaultExperiment", startTime="0", **{name: number(value) for name, value in numbers.items()})
+    experiment = {"stopTime": identity.stop_time, "tolerance": identity.tolerance, "stepSize": identity.step_size}
+    attributes = {name: number(value) for name, value in experiment.items()}
+    SubElement(root, "DefaultExperiment", {"startTime": "0"} | attributes)
 
 
 def add_co_simulation(root: Element, identity: Identity) -> Element:
@@ -152,9 +153,9 @@ def _co_simulation(root: Element, identity: Identity) -> None:
 def add_units(root: Element, table: SignalTable) -> None:
     """The units that signals have, with their base units and display units."""
     definitions = SubElement(root, "UnitDefinitions")
-    used = {signal.unit for signal in table}
     for name, unit in UNITS.items():
-        if name not in used:
+        signals = [signal for signal in table if signal.unit == name]
+        if not signals:
             continue
         element = SubElement(definitions, "Unit", name=name)
         base = SubElement(element, "BaseUnit", {base: str(exponent) for base, exponent in (unit.base or {}).items()})
@@ -162,6 +163,10 @@ def add_units(root: Element, table: SignalTable) -> None:
         if unit.display is not None:
             display, factor, offset = unit.display
             _set_affine(SubElement(element, "DisplayUnit", name=display), factor, offset)
+        own = {s.display for s in signals if s.display_unit and s.display_unit != (unit.display or ("",))[0]}
+        for display in sorted(name for name in own if name is not None):
+            to_display = conversion(unit, find_unit(display, unit.dimension))
+            _set_affine(SubElement(element, "DisplayUnit", name=display), *to_display)
 
 
 def _types(root: Element, table: SignalTable) -> None:

@@ -16,7 +16,6 @@ from models.base.types import Array
 from models.network.compiled import law_source
 from models.network.laws import compile_function
 from models.portable.surrogate import SurrogateLosses
-from models.quantities.units import UNITS
 from models.simulation.simulate import input_table
 from models.simulation.thermal_network import ThermalNetwork
 
@@ -51,7 +50,8 @@ def reference_run(
     twin = Twin(data, _functions(network), losses)
     inputs, outputs = table.of_role("input"), [s for s in table if s.causality == "output"]
     rows = input_table(network, cycle)
-    si = np.stack([_from_column(rows[:, i], signal.unit) for i, signal in enumerate(inputs)], axis=-1)
+    scales, offsets = np.array([signal.to_inner for signal in inputs]).T
+    si = (rows - offsets) / scales
     references = [signal.reference for signal in outputs]
     twin.set([signal.reference for signal in inputs], si[0].tolist())
     twin.start(float(cycle.time[0]))
@@ -78,7 +78,3 @@ def csv(columns: Mapping[str, Array]) -> bytes:
 
 def _functions(network: ThermalNetwork) -> dict[str, Any]:
     return {name: compile_function(source, name) for name, source in law_source(network, vector=False).items()}
-
-
-def _from_column(values: Array, unit: str | None) -> Array:
-    return values if unit is None else (values - UNITS[unit].column[2]) / UNITS[unit].column[1]

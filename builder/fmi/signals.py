@@ -11,7 +11,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from math import inf
 from typing import Literal
 
@@ -20,8 +20,8 @@ import sympy as sp
 from models.assembly.gearbox import Gearbox
 from models.base.errors import InputError, did_you_mean
 from models.portable.surrogate import SurrogateLosses
-from models.quantities.quantities import INPUTS, TYPES, quantity_of_signal
-from models.quantities.units import UNITS, fmi_symbol
+from models.quantities.quantities import GEARBOX_INPUTS, TYPES, column_of, quantity_of_signal
+from models.quantities.units import UNITS, Unit, conversion, find_unit, fmi_symbol
 from models.simulation.thermal_network import ThermalNetwork
 
 START_TEMPERATURE = 293.15  # K
@@ -65,6 +65,10 @@ class Signal:
         Signals that an output depends on directly, and at initialization
     linear : mapping of str to str
         Those that it is linear in: "constant" where the factor is a number, "tunable" where it follows parameters
+    inner_unit : str or None
+        Unit in the network, if it is not that of file columns
+    display_unit : str or None
+        Unit in which a tool should show it, if it is not that of `type`; "" for none
     reference : int
         FMI value reference, its place in the table
     """
@@ -87,6 +91,8 @@ class Signal:
     depends: tuple[str, ...] = ()
     depends_initially: tuple[str, ...] = ()
     linear: Mapping[str, str] = field(default_factory=dict)
+    inner_unit: str | None = None
+    display_unit: str | None = None
     reference: int = -1
 
     @property
@@ -96,8 +102,21 @@ class Signal:
 
     @property
     def display(self) -> str | None:
-        """Unit in which a tool should show it, where that is not `unit`."""
+        """Unit in which a tool should show it, if that is not `unit`."""
+        if self.display_unit is not None:
+            return self.display_unit or None
         return TYPES[self.type].display if self.type is not None else None
+
+    @property
+    def to_inner(self) -> tuple[float, float]:
+        """Factor and offset from the value at the FMI to the unit of the network."""
+        unit = UNITS.get(self.unit or "")
+        # Only signals of the network's own quantities are converted; a parameter stays in the unit of its law.
+        if unit is None or self.role == "factor":
+            return 1.0, 0.0
+        if self.inner_unit is None:
+            return unit.column[1:]
+        return conversion(unit, find_unit(self.inner_unit, unit.dimension))
 
 
 class SignalTable:
@@ -203,7 +222,7 @@ def result_column(name: str) -> str | None:
 
 def input_column(name: str) -> str:
     """Column of a cycle file for an input of an FMU: its usual one, else its own name."""
-    return INPUTS[name].column if name in INPUTS else name.strip("'")
+    return column_of(name.strip("'"))
 
 
 def signal_table(
@@ -239,13 +258,19 @@ def signal_table(
     return SignalTable(list(_Table(gearbox, network, domain).signals()))
 
 
+def _convert(unit: Unit, to: Unit, value: float) -> float:
+    """Convert a value to another unit, to 12 digits."""
+    factor, offset = conversion(to, unit)
+    return float(f"{(value - offset) / factor:.12g}")
+
+
 class _Table:
     """The network at hand while its signals are listed."""
 
     def __init__(self, gearbox: Gearbox, network: ThermalNetwork, domain: tuple[tuple[float, float], ...]) -> None:
         self.network = network
         self.domain = dict(zip(("speed", "torque", "temperature"), domain, strict=True))
-        self.inputs = ("speed", "torque", *network.inputs)
+        self.inputs = tuple(network.inputs)
         self.parameters = {parameter.name: self._parameter_name(parameter.name) for parameter in network.parameters}
         self.boundaries = {node.name: node.temperature for node in network.nodes if node.temperature is not None}
         self.loss_nodes = gearbox.losses().temperature_nodes
@@ -276,18 +301,19 @@ class _Table:
             "T_ambient": "Ambient temperature, in kelvin",
             "air_speed": "Speed of the air along the housing",
         }
-        defaults = {"speed": 0.0, "torque": 0.0, **self.network.inputs}
-        for name in self.inputs:
-            kind = INPUTS[name].type if name in INPUTS else None
-            text = texts.get(name, f"Input {name}, in the unit of its column")
-            unit = TYPES[kind].unit if kind else None
-            low, high = (INPUTS[name].low, INPUTS[name].high) if name in INPUTS else (-inf, inf)
-            convert = UNITS[unit].from_column if unit else float
+        for name, given in self.network.inputs.items():
+            quantity = given.quantity
+            kind = TYPES[quantity.type or "Ratio"]
+            unit, own = find_unit(kind.unit, quantity.dimension), find_unit(quantity.unit, quantity.dimension)
+            at_fmi = partial(_convert, own, unit)
+            display = None if name in GEARBOX_INPUTS else quantity.unit * (quantity.unit != kind.unit)
             yield Signal(
-                name=fmi_name(name), role="input", of=name, description=text, type=kind, unit=unit, causality="input",
-                variability="continuous", initial="", start=convert(defaults[name]), minimum=convert(low),
-                maximum=convert(high), domain=self._domain(name), column=input_column(name),
-                nominal=TYPES[kind].nominal if kind else None,
+                name=fmi_name(name), role="input", of=name,
+                description=given.description or texts.get(name, name.replace("_", " ")), type=quantity.type,
+                unit=kind.unit, inner_unit=quantity.unit, display_unit=display, causality="input",
+                variability="continuous", initial="",
+                start=at_fmi(given.default), minimum=at_fmi(quantity.low), maximum=at_fmi(quantity.high),
+                domain=self._domain(name), column=given.column, nominal=kind.nominal,
             )  # fmt: skip
 
     def _output(self, *, name: str, role: Role, of: str = "", kind: str | None, description: str, expression: sp.Expr,
@@ -305,8 +331,9 @@ class _Table:
 
     def _linear(self, expression: sp.Expr) -> dict[str, str]:
         """How an expression depends on the inputs that it is linear in; none where it has losses of the networks."""
-        expression = expression.subs({f"T_{node}": T for node, T in self.boundaries.items()})
-        if any(s.name.startswith("P_") for s in expression.free_symbols):
+        known = {f"T_{node}": temperature for node, temperature in self.boundaries.items()}
+        expression = expression.subs({s: known[s.name] for s in expression.free_symbols if s.name in known})
+        if any(s.name[2:] in self.network.components for s in expression.free_symbols):
             return {}
         kinds = {}
         for symbol in (s for s in expression.free_symbols if s.name in self.inputs):

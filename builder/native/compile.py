@@ -19,7 +19,7 @@ import tempfile
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 
 from models.base.atomic_write import atomic_file
@@ -193,7 +193,7 @@ def compile_libraries(
         if plan.compiler.is_zig or processor == _host_processor()
     ]
     with ThreadPoolExecutor(max_workers=os.cpu_count()) as pool:
-        libraries = list(pool.map(lambda place: _library(sources, plan.compiler, *place, name), processors))
+        libraries = list(pool.map(partial(_library, sources, plan.compiler, name), processors))
     found: dict[str, list[bytes]] = {}
     for (folder, processor), library in zip(processors, libraries, strict=True):
         path = f"{folder if fmi == 2 else processor}/{name}{PLATFORMS[folder].suffix}"
@@ -240,7 +240,8 @@ def _output(command: Sequence[str]) -> str:
     return subprocess.run(command, capture_output=True, text=True, check=False).stdout  # noqa: S603 - a compiler
 
 
-def _library(sources: Mapping[str, bytes], compiler: Compiler, folder: str, processor: str, name: str) -> bytes:
+def _library(sources: Mapping[str, bytes], compiler: Compiler, name: str, place: tuple[str, str]) -> bytes:
+    folder, processor = place
     target = PLATFORMS[folder]
     chosen = ("-target", target.targets[processor]) if compiler.is_zig else ()
     options = [*OPTIONS, *chosen, *target.options(name)]

@@ -18,7 +18,6 @@ from builder.native.structure import Structure
 from models.base.types import Array
 from models.network.compiled import c_law_source, law_expressions
 from models.portable.surrogate import KELVIN, LN10, Feature, Network, SurrogateLosses, Use, feature_values
-from models.quantities.units import UNITS
 from models.simulation.thermal_network import ThermalNetwork
 
 Indices = NDArray[np.intp]
@@ -146,7 +145,7 @@ def _network_data(data: _Data, network: ThermalNetwork) -> Structure:
     number_of = {name: index for index, name in enumerate([*parts, *boundaries])}
     fixed, varying = _links(network)
     sizes = {
-        "N_INPUTS": 2 + len(network.inputs),
+        "N_INPUTS": len(network.inputs),
         "N_PARTS": len(parts),
         "N_BOUNDARIES": len(boundaries),
         "N_PARAMETERS": len(network.parameters),
@@ -193,7 +192,7 @@ def _laws(network: ThermalNetwork) -> str:
     """The order of the arguments is that of the struct Signals of thermal_network.h."""
     groups = [
         ["time"],
-        ["speed", "torque", *network.inputs],
+        [*network.inputs],
         [f"T_{part.name}" for part in network.parts],
         [parameter.name for parameter in network.parameters],
         [state.name for state in network.states],
@@ -218,7 +217,7 @@ def _place_data(data: _Data, table: SignalTable, network: ThermalNetwork) -> Non
         data.array("Place", name, (_place(by_role[role, of]) for of in names))
 
     parts = [part.name for part in network.parts]
-    places("INPUTS", "input", ("speed", "torque", *network.inputs))
+    places("INPUTS", "input", network.inputs)
     places("FACTOR", "factor", (parameter.name for parameter in network.parameters))
     places("START", "start_temperature", parts)
     places("PART_TEMPERATURE", "temperature", parts)
@@ -234,9 +233,7 @@ def _place_data(data: _Data, table: SignalTable, network: ThermalNetwork) -> Non
 
 
 def _place(signal: Signal) -> str:
-    unit = UNITS.get(signal.unit or "")
-    # Only signals of the network's own quantities are converted; a parameter stays in the unit of its law.
-    _, scale, offset = unit.column if unit is not None and signal.role != "factor" else ("", 1.0, 0.0)
+    scale, offset = signal.to_inner
     return f"{{{signal.reference}, {number(scale)}, {number(offset)}}}"
 
 

@@ -10,9 +10,10 @@ import sympy as sp
 from numpy.typing import ArrayLike
 
 from models.base.types import Array
-from models.definition.parametric_sections import Loss, ParametricDefinition, Path
+from models.definition.parametric_sections import Boundary, Loss, ParametricDefinition, Path
 from models.formulas.oil import T_HIGHEST, T_LOWEST, kinematic_viscosity_d341
 from models.network.laws import Parameter, symbol
+from models.quantities.quantities import GEARBOX_INPUTS, Input, named_input, usual_inputs
 from models.simulation.thermal_network import Link, Node, Source, ThermalNetwork
 
 GROUPS = ("housing", "bearings", "returns")
@@ -96,6 +97,16 @@ def build_parametric_network(definition: ParametricDefinition, priors: Mapping[s
     return _Builder(definition, priors).network()
 
 
+def _air(boundary: Boundary) -> Input:
+    """The temperature of a boundary as an input."""
+    if boundary.input in GEARBOX_INPUTS:
+        return usual_inputs(**{boundary.input: boundary.temperature_degC})[boundary.input]
+    return named_input(
+        boundary.input, "temperature", low=-90.0, high=250.0, default=boundary.temperature_degC,
+        description=f"Temperature of {boundary.name.replace('_', ' ')}",
+    )  # fmt: skip
+
+
 class _Builder:
     """Assembles the network of one definition."""
 
@@ -122,7 +133,7 @@ class _Builder:
             sources=tuple(sources),
             parameters=tuple(self.parameters),
             components=ParametricLosses(definition).components,
-            inputs={b.input: b.temperature_degC for b in definition.boundary},
+            inputs=usual_inputs(speed=0.0, torque=0.0) | {b.input: _air(b) for b in definition.boundary},
             groups={g: names for g in GROUPS if (names := tuple(p.name for p in definition.part if p.group == g))},
             recording=definition.recording,
         )

@@ -22,7 +22,7 @@ from dataclasses import dataclass
 from itertools import combinations
 
 from models.network.laws import symbol
-from models.simulation.thermal_network import BASE_SIGNALS, ThermalNetwork
+from models.simulation.thermal_network import ThermalNetwork
 from models.terms.term import Kind
 
 EACH, FACTOR, ALL_LOSSES, ALL_PARTS = "each ", "factor ", "losses", "parts"
@@ -76,7 +76,7 @@ def spots(network: ThermalNetwork, kind: Kind, pattern: str, channels: Sequence[
     elif kind == "link_factor":
         found = _links(network, pattern)
     elif kind == "signal":
-        known = pattern in (*BASE_SIGNALS, *network.inputs)
+        known = pattern in (*network.inputs, *network.derived)
         found = iter([Spot(name=pattern, target=(pattern,))] if known else [])
     else:
         found = _channels(network, pattern, channels)

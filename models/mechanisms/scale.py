@@ -118,7 +118,7 @@ class Scale:
         boundaries = {node.name for node in network.nodes if node.temperature is not None}
         here = {symbol(f"T_{name}"): ambient for name in boundaries}
         here |= {symbol(f"T_{part.name}"): ambient + TYPICAL_RISE for part in network.parts}
-        here |= {symbol(name): value for name, value in network.inputs.items()}
+        here |= {symbol(name): given.default for name, given in network.inputs.items()}
         here |= {symbol("speed"): speed, symbol("torque"): torque, symbol("time"): 0.0}
         outward = [link.conductance for link in network.links if boundaries & set(link.nodes)]
         conductance = float(sum(law.xreplace(start | here).evalf() for law in outward))

@@ -199,7 +199,7 @@ def model(generated: dict[str, str], library: Library) -> ctypes.CDLL:
 def test_laws_of_a_network_are_those_of_python(network: ThermalNetwork, model: ctypes.CDLL) -> None:
     laws = compile_laws(network, vector=False)
     arguments = {name: names for name, (names, _) in law_expressions(network).items()}
-    groups = [["time"], ["speed", "torque", *network.inputs], [f"T_{p.name}" for p in network.parts],
+    groups = [["time"], [*network.inputs], [f"T_{p.name}" for p in network.parts],
               [p.name for p in network.parameters], [s.name for s in network.states] or ["-"],
               [f"P_{name}" for name in network.components]]  # fmt: skip
     order = [name for group in groups for name in group]
