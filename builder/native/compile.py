@@ -30,7 +30,6 @@ GET_ZIG = "install ziglang: python -m pip install ziglang"
 # NaN and infinity keep their meaning: no -ffast-math. Nobody reads errno or floating-point exceptions.
 OPTIONS = (
     "-std=c99", "-O3", "-fno-unroll-loops", "-fno-math-errno", "-fno-trapping-math", "-ffp-contract=fast",
-    "-DFMI2_OVERRIDE_FUNCTION_PREFIX", "-DFMI3_OVERRIDE_FUNCTION_PREFIX",
     "-fvisibility=hidden", "-fno-asynchronous-unwind-tables", "-fno-ident", "-g0", "-shared", "-s",
 )  # fmt: skip
 

@@ -15,7 +15,6 @@ COMPILER = shutil.which("gcc") or shutil.which("clang")
 TIMEOUT_S = 300  # of a host; none takes more than seconds
 OPTIONS = ("-std=gnu99", "-O1", "-g", "-Wall", "-Wextra", "-Wno-unused-function")
 
-SHARED = "-DFMI2_OVERRIDE_FUNCTION_PREFIX"  # names of the FMI functions as in a shared library
 SANITIZED = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-fno-omit-frame-pointer")
 
 needs_compiler = pytest.mark.skipif(COMPILER is None, reason="no C compiler (gcc or clang)")
@@ -29,7 +28,7 @@ class Unpacked:
         self.description = fmpy.read_model_description(str(folder))
         self.variables = {v.name: v for v in self.description.modelVariables}
         name = f"{self.description.coSimulation.modelIdentifier}{fmpy.sharedLibraryExtension}"
-        self.library = folder / "binaries" / fmpy.platform / name
+        (self.library,) = folder.glob(f"binaries/*/{name}")
 
     @property
     def arguments(self) -> list[str]:
@@ -48,7 +47,7 @@ def unpacked(path: Path, folder: Path) -> Unpacked:
     return Unpacked(folder)
 
 
-def compiled(name: str, fmu: Unpacked, output: Path, *options: str) -> Path:
+def compiled(name: str, fmu: Unpacked, output: Path, *options: str | Path) -> Path:
     """A host of ``native_host/``, with the FMI headers that the FMU carries."""
     headers = f"-I{fmu.folder / 'sources'}"
     run([str(COMPILER), *OPTIONS, *options, headers, "-o", output, SOURCES / f"{name}.c", "-ldl", "-lm", "-lpthread"])
@@ -58,9 +57,18 @@ def compiled(name: str, fmu: Unpacked, output: Path, *options: str) -> Path:
 def sanitized(fmu: Unpacked, library: Path) -> Path:
     """The library of an FMU, compiled from its own sources with the sanitizers."""
     sources = sorted((fmu.folder / "sources").glob("*.c"))
-    options = ["-std=c99", "-O1", "-g", "-Wall", "-Wextra", "-Werror", SHARED, *SANITIZED, "-shared", "-fPIC"]
+    options = ["-std=c99", "-O1", "-g", "-Wall", "-Wextra", "-Werror", *SANITIZED, "-shared", "-fPIC"]
     run([str(COMPILER), *options, "-o", library, *sources, "-lm"])
     return library
+
+
+def objects(fmu: Unpacked, folder: Path, version: int) -> list[Path]:
+    """The sources of an FMU compiled for static linking, with the prefix that the standard asks for."""
+    prefix = f"-DFMI{version}_FUNCTION_PREFIX={fmu.description.coSimulation.modelIdentifier}_"
+    folder.mkdir()
+    sources = sorted((fmu.folder / "sources").glob("*.c"))
+    run([str(COMPILER), "-std=c99", "-O2", "-Wall", "-Wextra", "-Werror", prefix, "-c", *sources], cwd=folder)
+    return sorted(folder.glob("*.o"))
 
 
 def run(command: Sequence[str | Path], **options: object) -> str:
