@@ -38,7 +38,7 @@ logger = logging.getLogger(__name__)
 
 LONGEST_HELD_S = 0.5  # a piece in which an input changes
 LARGEST_CHANGE = {"speed": 25.0, "torque": 5.0}  # [1/min], [N m]: a slower ramp is held longer
-NEEDED = {"speed": "input", "torque": "input", "T_ambient": "input", "loss.total": "output", "initial.T": "parameter"}
+NEEDED = {"initial.uniform": "parameter", "initial.T": "parameter"}
 WARNING, DISCARD = 1, 2
 PROGRESS_ROWS = 50
 
@@ -63,7 +63,8 @@ def drive_fmu(
     cycle : Cycle
         Inputs in the units of file columns; straight lines between the rows
     initial : float, mapping of node name to float, or None
-        Temperatures at the first row, [degC]; by default the first ambient temperature
+        Temperatures at the first row, [degC]; by default the first ambient temperature, for an FMU without this input
+        its own start temperature
     parameters : mapping of name to float, or None
         Tunable factors, by their name in the network or at the FMI interface
     progress : callable or None
@@ -83,7 +84,10 @@ def drive_fmu(
     with loaded(path) as fmu:
         table = _input_table(fmu, cycle)
         fmu.set_parameters(parameters or {})
-        fmu.set_initial(float(table[0, fmu.inputs.index("T_ambient")]) if initial is None else initial)
+        if initial is None and "T_ambient" in fmu.inputs:
+            initial = float(table[0, fmu.inputs.index("T_ambient")])
+        if initial is not None:
+            fmu.set_initial(initial)
         return _simulate_table(fmu, cycle.time, table, progress)
 
 
@@ -335,14 +339,16 @@ def _simulate_table(
 
 def _pieces(names: Sequence[str], duration: float, begin: Array, end: Array) -> int:
     """Into how many pieces a row is cut: of 0.5 s where an input ramps, longer where it changes little; 0 at rest."""
-    change = max(abs(b - a) / LARGEST_CHANGE.get(n, 1.0) for n, a, b in zip(names, begin, end, strict=True))
+    changes = (abs(b - a) / LARGEST_CHANGE.get(n, 1.0) for n, a, b in zip(names, begin, end, strict=True))
+    change = max(changes, default=0.0)
     return min(int(np.ceil(duration / LONGEST_HELD_S)), int(np.ceil(change)))
 
 
 def _input_table(fmu: LoadedFmu, cycle: Cycle) -> Array:
     """Inputs in the FMU's order, start values where the cycle has none, shape (N, inputs)."""
     starts = zip(fmu.inputs, fmu.defaults(), strict=True)
-    return np.stack([cycle.inputs.get(name, np.full(len(cycle), start)) for name, start in starts], axis=-1)
+    columns = [cycle.inputs.get(name, np.full(len(cycle), start)) for name, start in starts]
+    return np.reshape(columns, (len(columns), len(cycle))).T
 
 
 def _starts(variables: Mapping[str, Any]) -> dict[str, Any]:

@@ -17,8 +17,8 @@ from typing import Literal
 
 import sympy as sp
 
-from models.assembly.gearbox import Gearbox
 from models.base.errors import InputError, did_you_mean
+from models.network.laws import symbol
 from models.portable.surrogate import SurrogateLosses
 from models.quantities.quantities import GEARBOX_INPUTS, TYPES, column_of, quantity_of_signal
 from models.quantities.units import UNITS, Unit, conversion, find_unit, fmi_symbol
@@ -28,6 +28,8 @@ START_TEMPERATURE = 293.15  # K
 INITIAL = ("initial.uniform", "initial.T")
 HEADER = ("signal", "kind", "unit", "shown in", "column of files", "start", "range", "trained on", "meaning")
 LOWEST_START, HIGHEST_START = 173.15, 773.15  # K; what lies outside is most likely degC
+
+MAYBE_LINEAR = ("temperature", "total_loss", "loss", "heat")  # roles of outputs that are their expressions
 
 Role = Literal[
     "input", "temperature", "total_loss", "loss", "heat", "torque_loss", "efficiency", "in_domain", "domain_distance",
@@ -161,9 +163,9 @@ class SignalTable:
         Examples
         --------
         >>> from models.assembly.gearbox import load_gearbox
-        >>> lines = signal_table(load_gearbox("fzg")).markdown().splitlines()
+        >>> lines = signal_table(load_gearbox("fzg").network()).markdown().splitlines()
         >>> lines[2][:72]
-        '| `speed` | input | rad/s | rpm | `speed_rpm` | 0 | -20944 ... 20944 | 0'
+        '| `speed` | input | rad/s | rpm | `speed_rpm` | 0 | -20944 ... 20944 |  '
         """
         header, *rows = nomenclature(self)
         lines = ["| " + " | ".join(header) + " |", "|" + "---|" * len(header)]
@@ -225,18 +227,14 @@ def input_column(name: str) -> str:
     return column_of(name.strip("'"))
 
 
-def signal_table(
-    gearbox: Gearbox, network: ThermalNetwork | None = None, losses: SurrogateLosses | None = None
-) -> SignalTable:
-    """The signals of a gearbox.
+def signal_table(network: ThermalNetwork, losses: SurrogateLosses | None = None) -> SignalTable:
+    """The signals of a thermal network.
 
     Parameters
     ----------
-    gearbox : Gearbox
-    network : ThermalNetwork or None
-        Its network, where it is not the nominal one
+    network : ThermalNetwork
     losses : SurrogateLosses or None
-        The trained losses, whose domain is shown; by default that of the definition's ``[training]``
+        The trained networks of its losses, whose range of training is shown; None if it has none
 
     Raises
     ------
@@ -246,16 +244,11 @@ def signal_table(
     Examples
     --------
     >>> from models.assembly.gearbox import load_gearbox
-    >>> table = signal_table(load_gearbox("fzg"))
+    >>> table = signal_table(load_gearbox("fzg").network())
     >>> table["oil.T"].unit, table["oil.T"].column
     ('K', 'T_oil_degC')
     """
-    network = gearbox.network() if network is None else network
-    training = gearbox.training
-    domain = (training.speed_rpm, training.torque_Nm, training.temperature_degC)
-    if losses is not None:
-        domain = (losses.speed_bounds, losses.torque_bounds, losses.temperature_bounds)
-    return SignalTable(list(_Table(gearbox, network, domain).signals()))
+    return SignalTable(list(_Table(network, losses).signals()))
 
 
 def _convert(unit: Unit, to: Unit, value: float) -> float:
@@ -267,13 +260,13 @@ def _convert(unit: Unit, to: Unit, value: float) -> float:
 class _Table:
     """The network at hand while its signals are listed."""
 
-    def __init__(self, gearbox: Gearbox, network: ThermalNetwork, domain: tuple[tuple[float, float], ...]) -> None:
+    def __init__(self, network: ThermalNetwork, losses: SurrogateLosses | None) -> None:
         self.network = network
-        self.domain = dict(zip(("speed", "torque", "temperature"), domain, strict=True))
+        self.losses = losses
         self.inputs = tuple(network.inputs)
         self.parameters = {parameter.name: self._parameter_name(parameter.name) for parameter in network.parameters}
         self.boundaries = {node.name: node.temperature for node in network.nodes if node.temperature is not None}
-        self.loss_nodes = gearbox.losses().temperature_nodes
+        self.loss_heats = [source.heat for source in network.sources if source.is_loss]
 
     def signals(self) -> Iterator[Signal]:
         yield from self._inputs()
@@ -287,11 +280,18 @@ class _Table:
                          variability="continuous", initial="calculated", nominal=max(abs(state.start), 1.0),
                          description=f"Memory {state.name} of the thermal network")  # fmt: skip
 
-    def _domain(self, signal: str) -> tuple[float, float] | None:
-        if signal not in self.domain:
+    def _domain(self, name: str) -> tuple[float, float] | None:
+        """Range of training of an input or of the temperature of a node, in SI units."""
+        if self.losses is None:
             return None
-        low, high = self.domain[signal]
-        unit = UNITS[TYPES[signal.capitalize()].unit]
+        bounds = {"speed": ("Speed", self.losses.speed_bounds), "torque": ("Torque", self.losses.torque_bounds)}
+        bounds |= {
+            f"T_{node}": ("Temperature", self.losses.temperature_bounds) for node in self.losses.temperature_nodes
+        }
+        if name not in bounds:
+            return None
+        kind, (low, high) = bounds[name]
+        unit = UNITS[TYPES[kind].unit]
         return unit.from_column(low), unit.from_column(high)
 
     def _inputs(self) -> Iterator[Signal]:
@@ -326,7 +326,8 @@ class _Table:
             name=name, role=role, of=of, description=description, type=kind, unit=TYPES[kind].unit if kind else None,
             causality="output", variability="continuous" if kind else "discrete", initial="calculated", minimum=minimum,
             maximum=maximum, nominal=TYPES[kind].nominal if kind else None, domain=domain, column=result_column(name),
-            depends=inputs, depends_initially=(*inputs, *parameters, *starts), linear=self._linear(expression),
+            depends=inputs, depends_initially=(*inputs, *parameters, *starts),
+            linear=self._linear(expression) if role in MAYBE_LINEAR else {},
         )  # fmt: skip
 
     def _linear(self, expression: sp.Expr) -> dict[str, str]:
@@ -336,18 +337,19 @@ class _Table:
         if any(s.name[2:] in self.network.components for s in expression.free_symbols):
             return {}
         kinds = {}
-        for symbol in (s for s in expression.free_symbols if s.name in self.inputs):
-            factors = {s.name for s in sp.diff(expression, symbol).free_symbols}
+        for given in (s for s in expression.free_symbols if s.name in self.inputs):
+            factors = {s.name for s in sp.diff(expression, given).free_symbols}
             if factors <= set(self.parameters):
-                kinds[fmi_name(symbol.name)] = "tunable" if factors else "constant"
+                kinds[fmi_name(given.name)] = "tunable" if factors else "constant"
         return kinds
 
     def _direct(self, expression: sp.Expr) -> tuple[tuple[str, ...], tuple[str, ...]]:
         """Inputs and parameters that an expression depends on without a detour through the temperatures of parts."""
         names = {s.name for s in expression.free_symbols}
-        names |= {s.name for node, T in self.boundaries.items() if f"T_{node}" in names for s in T.free_symbols}
         if any(name.startswith("P_") and name[2:] in self.network.components for name in names):
-            names |= {"speed", "torque"}
+            names |= {s.name for s in self._operating_point().free_symbols}
+        names |= {s.name for name, law in self.network.derived.items() if name in names for s in law.free_symbols}
+        names |= {s.name for node, T in self.boundaries.items() if f"T_{node}" in names for s in T.free_symbols}
         inputs = tuple(fmi_name(name) for name in self.inputs if name in names)
         return inputs, tuple(fmi for name, fmi in self.parameters.items() if name in names)
 
@@ -358,14 +360,14 @@ class _Table:
                 name=f"{fmi_name(node.name)}.T", role="temperature", of=node.name, kind="Temperature", minimum=0.0,
                 description=f"Temperature of {node.name.replace('_', ' ')}" + (" (boundary)" if boundary else ""),
                 expression=sp.Integer(0) if node.temperature is None else node.temperature, needs_state=not boundary,
-                domain=self._domain("temperature") if node.name in self.loss_nodes else None,
+                domain=self._domain(f"T_{node.name}"),
             )  # fmt: skip
 
     def _powers(self) -> Iterator[Signal]:
-        losses = [source for source in self.network.sources if source.is_loss]
-        total = sum((source.heat for source in losses), sp.Integer(0))
-        yield self._output(name="loss.total", role="total_loss", kind="Power", description="Sum of all losses",
-                           expression=total)  # fmt: skip
+        total = sum(self.loss_heats, sp.Integer(0))
+        if self.loss_heats:
+            yield self._output(name="loss.total", role="total_loss", kind="Power", description="Sum of all losses",
+                               expression=total)  # fmt: skip
         for source in self.network.sources:
             named = source.name.replace("_", " ")
             yield self._output(
@@ -374,18 +376,26 @@ class _Table:
                 description=f"Loss: {named}" if source.is_loss else f"Heat into {source.node}: {named}",
                 minimum=0.0 if source.name in self.network.components else -inf,
             )  # fmt: skip
-        speed, torque = sp.Symbol("speed"), sp.Symbol("torque")
-        yield self._output(name="torque_loss", role="torque_loss", kind="Torque", expression=total / speed,
+        if not self.loss_heats or not {"speed", "torque"} <= set(self.inputs):
+            return
+        yield self._output(name="torque_loss", role="torque_loss", kind="Torque", expression=total / symbol("speed"),
                            description="Loss torque at the input shaft, signed as the speed")  # fmt: skip
         yield self._output(name="efficiency", role="efficiency", kind="Ratio", minimum=0.0, maximum=1.0,
-                           expression=total / (speed * torque),
+                           expression=total + symbol("speed") * symbol("torque"),
                            description="Power out over power in; 0 without power")  # fmt: skip
 
+    def _operating_point(self) -> sp.Expr:
+        """An expression of what speed and torque depend on as the losses see them."""
+        shifted = self.network.operating
+        return sum((shifted.get(name, symbol(name)) for name in ("speed", "torque")), sp.Integer(0))
+
     def _quality(self) -> Iterator[Signal]:
-        point = sp.Symbol("speed") * sp.Symbol("torque")
+        if not self.network.components:
+            return
+        point = self._operating_point()
         yield self._output(
             name="in_domain", role="in_domain", kind=None, expression=point,
-            description="Whether the operating point is inside the range that the networks were trained on",
+            description="True if the operating point is inside the range that the networks were trained on",
         )  # fmt: skip
         yield self._output(
             name="domain_distance", role="domain_distance", kind="Ratio", minimum=0.0, expression=point,
@@ -402,7 +412,7 @@ class _Table:
 
         yield Signal(name="initial.uniform", role="initial_uniform", causality="parameter", variability="fixed",
                      initial="exact", start=True,
-                     description="Whether all nodes start at initial.T; else each at its own T_start")  # fmt: skip
+                     description="True: all nodes start at initial.T; false: each at its T_start")  # fmt: skip
         yield fixed("initial.T", "initial_temperature", "Temperature of all nodes at the start, if initial.uniform")
         for part in self.network.parts:
             text = f"Temperature of {part.name.replace('_', ' ')} at the start, unless initial.uniform"

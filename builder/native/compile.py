@@ -20,6 +20,7 @@ from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cache, partial
+from importlib.resources import files
 from pathlib import Path
 
 from models.base.atomic_write import atomic_file
@@ -27,10 +28,19 @@ from models.base.errors import InputError, did_you_mean
 
 CACHE_VARIABLE = "GEARBOX_TWIN_CACHE"
 GET_ZIG = "install ziglang: python -m pip install ziglang"
+INCLUDES_STANDARD_HEADERS = {"one.c": b"#include <math.h>\n#include <stdio.h>\nint one(void) { return 1; }\n"}
 # NaN and infinity keep their meaning: no -ffast-math. Nobody reads errno or floating-point exceptions.
 OPTIONS = (
     "-std=c99", "-O3", "-fno-unroll-loops", "-fno-math-errno", "-fno-trapping-math", "-ffp-contract=fast",
-    "-fvisibility=hidden", "-fno-asynchronous-unwind-tables", "-fno-ident", "-g0", "-shared", "-s",
+    "-fvisibility=hidden", "-fno-asynchronous-unwind-tables", "-fno-ident", "-g0",
+)  # fmt: skip
+# A DLL that zig links with its C library has MinGW's static one inside, which takes 80 s of processor time per
+# platform to build. Windows' own C library and WINDOWS_RUNTIME are enough.
+WINDOWS_RUNTIME = "windows_runtime.c"
+WINDOWS_LINK = (
+    "-nostdlib", "-lcompiler_rt",
+    *(f"-lapi-ms-win-crt-{name}-l1-1-0"
+      for name in ("convert", "heap", "math", "runtime", "stdio", "string", "utility")),
 )  # fmt: skip
 
 
@@ -50,12 +60,6 @@ class Platform:
     targets: Mapping[str, str]
     suffix: str
 
-    def options(self, name: str) -> tuple[str, ...]:
-        """Options of this platform's linker for a library called `name`."""
-        if self.suffix == ".so":
-            return ("-fPIC", "-Wl,--no-undefined", "-Wl,--build-id=none", "-lm")
-        return ("-fPIC", f"-Wl,-install_name,@rpath/{name}.dylib") if self.suffix == ".dylib" else ()
-
 
 # By the folder below binaries/ in FMI 2.0
 PLATFORMS = {
@@ -66,6 +70,56 @@ PLATFORMS = {
     "aarch64-linux": Platform({"aarch64-linux": "aarch64-linux-gnu.2.17"}, ".so"),
     "aarch64-windows": Platform({"aarch64-windows": "aarch64-windows-gnu"}, ".dll"),
 }
+
+
+@dataclass(frozen=True)
+class Library:
+    """A shared library to be compiled: for one processor of a platform.
+
+    Attributes
+    ----------
+    folder : str
+        Of the platform, key of :data:`PLATFORMS`
+    processor : str
+        Key of :attr:`Platform.targets`
+    name : str
+        Without suffix
+    """
+
+    folder: str
+    processor: str
+    name: str
+
+    @property
+    def file(self) -> str:
+        """Name of the file."""
+        return f"{self.name}{PLATFORMS[self.folder].suffix}"
+
+    @property
+    def target(self) -> str:
+        """Target as zig names it."""
+        return PLATFORMS[self.folder].targets[self.processor]
+
+    @property
+    def is_windows(self) -> bool:
+        """True for the platforms of Windows."""
+        return self.file.endswith(".dll")
+
+    @property
+    def code_options(self) -> tuple[str, ...]:
+        """Options that compile for this platform."""
+        return () if self.is_windows else ("-fPIC",)
+
+    @property
+    def link_options(self) -> tuple[str, ...]:
+        """Options of this platform's linker, libraries last."""
+        if self.file.endswith(".so"):
+            return ("-Wl,--no-undefined", "-Wl,--build-id=none", "-lm")
+        return () if self.is_windows else (f"-Wl,-install_name,@rpath/{self.file}",)
+
+
+class NoCompilerError(InputError):
+    """There is no C compiler on this machine that native FMUs could be compiled with."""
 
 
 @dataclass(frozen=True)
@@ -145,14 +199,16 @@ def plan_for(platforms: str) -> Plan:
 
     Raises
     ------
+    NoCompilerError
+        If there is no compiler at all.
     InputError
-        If there is no compiler for what is asked.
+        If a platform is not known, or only ziglang can compile for it.
     """
     wanted, host, zig, own = chosen_platforms(platforms), host_platform(), _zig(), _own_compiler()
     if zig is not None and not (platforms == "host" and own is not None):
         return Plan(zig, wanted)
     if own is None:
-        raise InputError(f"a native FMU needs a C compiler, and there is no cc, gcc, clang or CC; {GET_ZIG}")
+        raise NoCompilerError(f"a native FMU needs a C compiler, and no cc, gcc or clang works here; {GET_ZIG}")
     if host is None or host not in wanted:
         raise InputError(f"this machine's own compiler cannot build for {', '.join(wanted)}; {GET_ZIG}")
     left_out = [name for name in wanted if name != host]
@@ -160,7 +216,7 @@ def plan_for(platforms: str) -> Plan:
 
 
 def compile_libraries(
-    sources: Mapping[str, bytes], platforms: str = "all", *, name: str = "library", fmi: int = 2
+    sources: Mapping[str, bytes], platforms: str = "host", *, name: str = "library", fmi: int = 2
 ) -> Binaries:
     """Compile C sources to shared libraries.
 
@@ -185,18 +241,18 @@ def compile_libraries(
         If there is no compiler for what is asked, or it fails.
     """
     plan = plan_for(platforms)
-    processors = [
-        (folder, processor)
+    wanted = [
+        Library(folder, processor, name)
         for folder in plan.platforms
         for processor in PLATFORMS[folder].targets
         if plan.compiler.is_zig or processor == _host_processor()
     ]
     with ThreadPoolExecutor(max_workers=os.cpu_count()) as pool:
-        libraries = list(pool.map(partial(_library, sources, plan.compiler, name), processors))
+        compiled = list(pool.map(partial(_library, sources, plan.compiler), wanted))
     found: dict[str, list[bytes]] = {}
-    for (folder, processor), library in zip(processors, libraries, strict=True):
-        path = f"{folder if fmi == 2 else processor}/{name}{PLATFORMS[folder].suffix}"
-        found.setdefault(path, []).append(library)
+    for library, content in zip(wanted, compiled, strict=True):
+        folder = library.folder if fmi == 2 else library.processor
+        found.setdefault(f"{folder}/{library.file}", []).append(content)
     joined = {path: parts[0] if len(parts) == 1 else universal_binary(parts) for path, parts in found.items()}
     return Binaries(joined, plan.note)
 
@@ -222,40 +278,60 @@ def _zig() -> Compiler | None:
 
 
 def _own_compiler() -> Compiler | None:
+    """Return the compiler that CC names, else the first of cc, gcc and clang that compiles a file.
+
+    Raises
+    ------
+    InputError
+        If CC names no command.
+    """
     named = os.environ.get("CC")
     try:
-        own = [shlex.split(named)] if named else [["cc"], ["gcc"], ["clang"]]
+        own = [tuple(shlex.split(named))] if named else [("cc",), ("gcc",), ("clang",)]
     except ValueError as error:
         raise InputError(f"CC is {named!r}, which cannot be read ({error}); correct it or unset it") from error
     for command in own:
         if command and shutil.which(command[0]):
-            return Compiler(tuple(command), _output([*command, "--version"]), is_zig=False)
+            compiler = Compiler(command, _output([*command, "--version"]), is_zig=False)
+            if named or _works(compiler):
+                return compiler
     if named:
         raise InputError(f"CC is {named!r}, which cannot be found; correct it or unset it")
     return None
+
+
+@cache
+def _works(compiler: Compiler) -> bool:
+    """Return True if a compiler is there with the headers and libraries of C."""
+    host = host_platform()
+    try:
+        return host is not None and bool(
+            _compile(INCLUDES_STANDARD_HEADERS, compiler, Library(host, _host_processor(), "one"))
+        )
+    except InputError:
+        return False
 
 
 def _output(command: Sequence[str]) -> str:
     return subprocess.run(command, capture_output=True, text=True, check=False).stdout  # noqa: S603 - a compiler
 
 
-def _library(sources: Mapping[str, bytes], compiler: Compiler, name: str, place: tuple[str, str]) -> bytes:
-    folder, processor = place
-    target = PLATFORMS[folder]
-    chosen = ("-target", target.targets[processor]) if compiler.is_zig else ()
-    options = [*OPTIONS, *chosen, *target.options(name)]
-    cache_folder = _cache_folder()
-    if cache_folder is None:
-        return _compile(sources, compiler, options, processor, f"{name}{target.suffix}")
+def _library(sources: Mapping[str, bytes], compiler: Compiler, wanted: Library) -> bytes:
+    if compiler.is_zig and wanted.is_windows:
+        runtime = (files("fmu_src") / "native" / WINDOWS_RUNTIME).read_bytes()
+        sources = {**sources, WINDOWS_RUNTIME: runtime}
+    folder = _cache_folder()
+    if folder is None:
+        return _compile(sources, compiler, wanted)
     # zig is the same in every virtual environment, and another compiler's own options are part of its command.
     command = compiler.command[1:] if compiler.is_zig else compiler.command
-    made_of = (compiler.version, command, options, sorted(sources.items()))
+    made_of = (compiler.version, command, _commands(["*.c"], compiler, wanted), sorted(sources.items()))
     digest = hashlib.sha256(repr(made_of).encode()).hexdigest()
-    kept = cache_folder / f"{digest}{target.suffix}"
+    kept = folder / f"{digest}-{wanted.file}"
     try:
         return kept.read_bytes()
     except OSError:
-        library = _compile(sources, compiler, options, processor, f"{name}{target.suffix}")
+        library = _compile(sources, compiler, wanted)
     try:
         with atomic_file(kept) as file:
             file.write_bytes(library)
@@ -279,18 +355,28 @@ def _cache_folder() -> Path | None:
     return Path(base) / "gearbox-thermal-twin"
 
 
-def _compile(
-    sources: Mapping[str, bytes], compiler: Compiler, options: Sequence[str], processor: str, output: str
-) -> bytes:
+def _compile(sources: Mapping[str, bytes], compiler: Compiler, library: Library) -> bytes:
     with tempfile.TemporaryDirectory(prefix="twin-c-") as folder:
         for name, content in sources.items():
             Path(folder, name).write_bytes(content)
-        names = sorted(name for name in sources if name.endswith(".c"))  # relative: no path gets into the library
-        libraries = [option for option in options if option.startswith("-l")]
-        others = [option for option in options if option not in libraries]
-        command = [*compiler.command, *others, "-o", output, *names, *libraries]
-        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)  # noqa: S603
-        if done.returncode != 0:
-            said = "\n".join((done.stderr or done.stdout).splitlines()[:20])
-            raise InputError(f"{' '.join(compiler.command)} cannot compile the FMU for {processor}:\n{said}")
-        return Path(folder, output).read_bytes()
+        for options in _commands(sorted(name for name in sources if name.endswith(".c")), compiler, library):
+            command = [*compiler.command, *options]
+            done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)  # noqa: S603
+            if done.returncode != 0:
+                said = "\n".join((done.stderr or done.stdout).splitlines()[:20])
+                raise InputError(
+                    f"{' '.join(compiler.command)} cannot compile the FMU for {library.processor}:\n{said}"
+                )
+        return Path(folder, library.file).read_bytes()
+
+
+def _commands(names: Sequence[str], compiler: Compiler, library: Library) -> list[list[str]]:
+    """Options of the compiler's runs; all names are relative: no path of this machine gets into the library."""
+    machine = ["-target", library.target] if compiler.is_zig else []
+    code = [*machine, *OPTIONS, *library.code_options]
+    link = [*machine, "-shared", "-s", "-o", library.file]
+    if compiler.is_zig and library.is_windows:
+        objects = [f"{name}.obj" for name in names]
+        compiled = [[*code, "-c", name, "-o", made] for name, made in zip(names, objects, strict=True)]
+        return [*compiled, [*link, "-O3", *objects, *WINDOWS_LINK]]
+    return [[*code, *link, *names, *library.link_options]]

@@ -15,7 +15,7 @@ from diagnosis.recordings.quantities import AUXILIARY, IGNORE, looks_like_kelvin
 from models.base.errors import Problems, did_you_mean
 from models.base.types import Array
 from models.quantities.column_names import meant
-from models.quantities.quantities import TOTAL_LOSS, Quantity, quantity_of, quantity_of_column
+from models.quantities.quantities import TOTAL_LOSS, Quantity, node_of_channel, quantity_of, quantity_of_column
 from models.quantities.units import units_in_files
 
 if TYPE_CHECKING:
@@ -28,8 +28,9 @@ CODES, CODED = 3, 0.5  # so many different impossible values, in up to this shar
 
 
 def is_measurable(name: str, network: ThermalNetwork) -> bool:
-    """Return True for ``T_<node>`` (also of one of several sensors, ``T_<node>@<sensor>``) and ``P_loss``."""
-    return name.partition("@")[0] in {*(f"T_{part.name}" for part in network.parts), TOTAL_LOSS}
+    """Return True for ``T_<node>`` (also of one of several sensors, ``T_<node>__<sensor>``) and ``P_loss``."""
+    known = {*(f"T_{part.name}" for part in network.parts), TOTAL_LOSS}
+    return node_of_channel(name, known) in known
 
 
 def quantities_of(network: ThermalNetwork) -> dict[str, Quantity]:

@@ -38,7 +38,7 @@ from models.definition.messages import validate_section
 from models.definition.sections import Name, Section
 from models.files import toml_file
 from models.files.table_file import TextForm
-from models.quantities.quantities import quantity_of
+from models.quantities.quantities import SENSOR, quantity_of
 from models.quantities.units import units_in_files
 
 SCHEMA = 1
@@ -66,8 +66,8 @@ class Column(Section):
 
     @property
     def channel(self) -> str:
-        """The quantity, with the name of the sensor if it has one: ``T_oil@sump_probe``."""
-        return self.quantity if self.sensor is None else f"{self.quantity}@{self.sensor}"
+        """The quantity, with the name of the sensor if it has one: ``T_oil__sump_probe``."""
+        return self.quantity if self.sensor is None else f"{self.quantity}{SENSOR}{self.sensor}"
 
     @model_validator(mode="after")
     def _sensor_measures_a_node(self) -> Self:

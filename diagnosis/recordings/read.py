@@ -27,7 +27,7 @@ from diagnosis.recordings.recording import Channel, Recording
 from diagnosis.recordings.rows import RecordedRows, joined, read_rows
 from diagnosis.recordings.time_axis import split_path
 from models.base.errors import InputError, Problems
-from models.quantities.quantities import is_total_loss
+from models.quantities.quantities import is_total_loss, node_of_channel
 
 if TYPE_CHECKING:
     from models.simulation.thermal_network import ThermalNetwork
@@ -221,7 +221,7 @@ def _remove_spikes(found: RecordedRows, network: ThermalNetwork, gap: float) -> 
     for quantity, values in found.values.items():
         if is_total_loss(quantity):
             wrong = np.concatenate([spikes_of_loss(values[piece], steady[piece]) for piece in pieces])
-        elif known[quantity.partition("@")[0]].is_temperature:
+        elif known[node_of_channel(quantity, known)].is_temperature:
             wrong = np.concatenate([spikes_of_temperature(values[piece]) for piece in pieces])
         else:
             continue

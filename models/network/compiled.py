@@ -80,17 +80,15 @@ def c_law_source(network: Network, places: Mapping[str, str]) -> dict[str, str]:
     Raises
     ------
     InputError
-        If a heat capacity is missing or depends on more than parameters, a law uses a function that C lacks, or speed
-        or torque is shifted: the losses of a native FMU read the inputs themselves.
+        If a heat capacity is missing or depends on more than parameters, or a law uses a function that C lacks.
     """
-    if network.operating:
-        shifted = " and ".join(network.operating)
-        raise InputError(
-            f"a native FMU cannot shift {shifted} for its losses; give it the true one, or build --target python"
-        )
+    functions = law_expressions(network)
+    operating = functions.pop("operating", (functions["boundary"][0], [symbol("speed"), symbol("torque")]))
+    if network.components:
+        functions["operating"] = operating
     return {
         name: c_function_source(name, {argument: places[argument] for argument in arguments}, expressions)
-        for name, (arguments, expressions) in law_expressions(network).items()
+        for name, (arguments, expressions) in functions.items()
     }
 
 

@@ -6,7 +6,7 @@ written in them. A family (``T_{}``) has one quantity per node or component.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 from dataclasses import dataclass, replace
 from math import inf
 from typing import Literal
@@ -266,6 +266,20 @@ def column_of(name: str) -> str:
     """Return the column of a quantity; an input of a user has its own name."""
     quantity = quantity_of(name)
     return name if quantity is None else quantity.column
+
+
+SENSOR = "__"  # between the node and the name of one of several sensors at it
+
+
+def node_of_channel(name: str, nodes: Container[str]) -> str:
+    """Return the node that a channel measures, by its name or ``<node>__<sensor>``.
+
+    Examples
+    --------
+    >>> node_of_channel("oil", ["oil"]), node_of_channel("oil__sump_probe", ["oil"])
+    ('oil', 'oil')
+    """
+    return name if name in nodes else name.rpartition(SENSOR)[0] or name
 
 
 def is_total_loss(name: str) -> bool:

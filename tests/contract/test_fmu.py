@@ -33,9 +33,9 @@ def test_fmpy_finds_no_problem(path: Path) -> None:
     assert validate_fmu(str(path)) == []
 
 
-def test_variables_are_those_of_the_table(path: Path, fzg: Gearbox) -> None:
+def test_variables_are_those_of_the_table(path: Path, fzg: Gearbox, fzg_training: TrainingResult) -> None:
     description = read_model_description(str(path))
-    table = signal_table(fzg)
+    table = signal_table(fzg.network(), fzg_training.losses)
     assert [v.name for v in description.modelVariables] == [s.name for s in table]
     for variable, signal in zip(description.modelVariables, table, strict=True):
         assert variable.valueReference == signal.reference

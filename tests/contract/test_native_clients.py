@@ -23,7 +23,7 @@ from tests.contract.native_hosts import COMPILER, SOURCES, Unpacked, compiled, n
 
 AGREEMENT = 1e-9  # of every output, relative to its value or 1
 STEPS = 600
-WINE = shutil.which("wine64") or shutil.which("wine") or shutil.which("/usr/lib/wine/wine64")  # the last of Debian
+WINE = shutil.which("wine64", path=f"{os.environ['PATH']}{os.pathsep}/usr/lib/wine") or shutil.which("wine")
 
 
 @pytest.fixture(scope="module")
@@ -233,7 +233,7 @@ def test_two_fmus_are_linked_into_one_program(
 # ---------------------------------------------------------------------- Windows, under wine
 
 
-@pytest.mark.slow  # zig compiles its C library for Windows first, which takes minutes
+@pytest.mark.slow  # zig compiles its C library for the host first, which takes a minute and a half
 @pytest.mark.skipif(WINE is None, reason="no wine (Debian: wine64)")
 @pytest.mark.skipif(find_spec("ziglang") is None, reason="no ziglang, which cross-compiles")
 def test_the_windows_library_gives_the_same_under_wine(
