@@ -51,6 +51,7 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> Library:
             "-Wextra",
             "-Werror",
             "-fPIC",
+            "-shared",
             "-o",
             "test.so",
             "test.c",
