@@ -225,7 +225,7 @@ def build(
             plot_cycle(plot, driven, title=title, groups=network.groups, inputs=network.inputs, reference=full)
         report = BuildReport(
             gearbox=gearbox.name, training=training, cycles=cycles, seconds=seconds, files=(),
-            purpose=_purpose({kind: path.name for kind, path in fmus.items()}, built_for), notes=tuple(notes),
+            purpose=_purpose({kind: path.name for kind, path in fmus.items()}, built_for, networks), notes=tuple(notes),
             correction=None if correction is None else correction.summary(),
         )  # fmt: skip
         (stage / "report.json").write_text(json.dumps(report.as_dict(), indent=2) + "\n", encoding="utf-8")
@@ -258,12 +258,12 @@ def _planned(target: str, platforms: str) -> tuple[tuple[str, ...], tuple[str, .
     return kinds, plan.platforms, [f"native FMU {plan.note}"] if plan.note else []
 
 
-def _purpose(names: Mapping[str, str], platforms: Sequence[str]) -> str:
+def _purpose(names: Mapping[str, str], platforms: Sequence[str], networks: Sequence[Path]) -> str:
     """Say which FMU is for what, in one line."""
     needs = {
         "native": f"needs no other software, for {', '.join(platforms)}"
         + ("" if len(platforms) > 1 else " (--platforms all: for all)"),
-        "python": "runs on Python with numpy and onnxruntime",
+        "python": "runs on Python with numpy" + (" and onnxruntime" if networks else ""),
     }
     return "; ".join(f"{names[kind]} {text}" for kind, text in needs.items() if kind in names)
 

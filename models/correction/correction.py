@@ -176,14 +176,14 @@ class Finding(LawTable):
 class Correction(Section):
     """The whole file: findings and calibrated parameters of one gearbox.
 
-    `gearbox` has the hash of the definition's values (:attr:`models.assembly.gearbox.Gearbox.hash`), `recordings`
-    those of the
-    recordings that were used, `version` is that of the program that wrote it.
+    `gearbox` has the hash of the definition's values (:attr:`models.assembly.gearbox.Gearbox.hash`); a file written by
+    hand may leave it out. `recordings` has those of the recordings that were used, `version` is that of the program
+    that wrote it.
     """
 
     schema_number: Literal[1] = Field(default=1, alias="schema")
     version: str = ""
-    gearbox: Identity
+    gearbox: Identity | None = None
     recordings: tuple[Identity, ...] = Field(default=(), alias="recording")
     calibration: tuple[Estimate, ...] = Field(default=(), alias="calibrated")
     findings: tuple[Finding, ...] = Field(default=(), alias="finding")
@@ -254,7 +254,7 @@ class Correction(Section):
         InputError
             If the values of the definitions differ.
         """
-        if gearbox.hash != self.gearbox.sha256:
+        if self.gearbox is not None and gearbox.hash != self.gearbox.sha256:
             raise InputError(
                 f"the correction was made for {self.gearbox.name!r} with definition {self.gearbox.sha256[:12]}, but "
                 f"{gearbox.name!r} is {gearbox.hash[:12]}; use the definition it was made for, or diagnose again"
@@ -266,6 +266,11 @@ class Correction(Section):
             "sha256": hashlib.sha256(correction_text(self).encode()).hexdigest(),
             "findings": [f"{f.mechanism} at {f.place}" for f in self.findings if f.mechanism != "shape"],
         }
+
+    @property
+    def has_physics(self) -> bool:
+        """True if it changes the machine, and not only what instruments show of it."""
+        return bool(self.calibration) or not all(finding.of_measurement for finding in self.findings)
 
     @property
     def words(self) -> str:
@@ -299,6 +304,18 @@ def corrected_network(gearbox: Gearbox, correction: Correction | None) -> Therma
     return gearbox.network() if correction is None else correction.network(gearbox)
 
 
+def parse_correction(path: str | Path) -> Correction:
+    """Read a correction without a look at what it corrects.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read or is not a correction; with file, key and reason.
+    """
+    file = str(path)
+    return validate_section(Correction, parse_schema_1(read_text(Path(path)), file=file, kind="corrections"), file=file)
+
+
 def read_correction(path: str | Path, network: ThermalNetwork, *, made_for: Gearbox | None = None) -> Correction:
     """Read a correction.
 
@@ -316,16 +333,13 @@ def read_correction(path: str | Path, network: ThermalNetwork, *, made_for: Gear
         If the file cannot be read, is not a correction, was made for another gearbox, or cannot be applied to the
         network; with file, key and reason.
     """
-    file = str(path)
-    correction = validate_section(
-        Correction, parse_schema_1(read_text(Path(path)), file=file, kind="corrections"), file=file
-    )
+    correction = parse_correction(path)
     try:
         if made_for is not None:
             correction.check_made_for(made_for)
         correction.apply(network, as_recorded=True)
     except InputError as error:
-        raise InputError("\n".join(f"{file}: {line}" for line in str(error).splitlines())) from error
+        raise InputError("\n".join(f"{path}: {line}" for line in str(error).splitlines())) from error
     return correction
 
 

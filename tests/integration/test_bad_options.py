@@ -110,7 +110,7 @@ WRONG = {
         "zip.fmu cycle.csv": "zip.fmu: is not an FMU",
         "FMU cycle.csv --initial 293": "if kelvin are meant, give 19.85",
         "FMU cycle.csv --initial T_some.csv": "start temperatures are missing for: housing_lower",
-        "FMU cycle.csv --correction found.toml": "--correction goes with --gearbox",
+        "FMU cycle.csv --correction found.toml": "was not built with found.toml, which changes the physics",
         "FMU gap.csv": "gap.csv: T_ambient_degC is nan at row 1",
     },
     "build-fmu": {
