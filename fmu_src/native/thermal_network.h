@@ -1,4 +1,4 @@
-/* Heat balance and time integration of a thermal network; the scheme of models/solver.py. */
+/* Heat balance and time integration of a thermal network; the scheme of models/portable/solver.py. */
 #ifndef THERMAL_NETWORK_H
 #define THERMAL_NETWORK_H
 
@@ -40,7 +40,7 @@ typedef struct {
 #if N_COMPONENTS
     LossPower *loss_power;
 #endif
-    double capacity[N_PARTS];
+    double capacity[N_PARTS], weight[N_PARTS]; /* J/K; of the errors in the step control */
     Balance now, then;
 } Network;
 
