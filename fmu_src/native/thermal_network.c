@@ -12,6 +12,7 @@
 #define TOLERANCE_K 0.03
 #define FULL_WEIGHT_J_K 20.0
 #define MOST_STEPS 100000
+#define STILL_K 0.1
 #define SHORTEST_STEP_S 1e-6
 #define SAFETY 0.9
 #define SHRINK 0.2
@@ -64,19 +65,31 @@ LossPoint network_loss_point(Network *network, double time, const double *inputs
 }
 #endif
 
-/* Fill `balance` for a moment, unless it holds that moment already. */
+#if N_COMPONENTS
+/* Losses at a moment: those of `near` (may be NULL) where speed and torque are the same and no temperature that they
+   depend on is more than STILL_K away. */
+static void find_losses(const Network *network, Balance *balance, const Balance *near) {
+    int still = near != NULL;
+    balance->point = loss_point(&balance->at);
+    still = still && near->point.speed == balance->point.speed && near->point.torque == balance->point.torque;
+    for (int i = 0; i < N_LOSS_NODES; i++) still = still && fabs(near->point.T[i] - balance->point.T[i]) <= STILL_K;
+    if (still)
+        memcpy(balance->at.power, near->at.power, sizeof balance->at.power);
+    else
+        network->loss_power(balance->point.speed, balance->point.torque, balance->point.T, balance->at.power);
+}
+#endif
+
+/* Fill `balance` for a moment, unless it holds that moment already; `near` as for find_losses. */
 static void find_balance(const Network *network, Balance *balance, double time, const double *inputs,
-                         const ThermalState *state) {
+                         const ThermalState *state, const Balance *near) {
     Signals *at = &balance->at;
-    if (balance->valid && (at->time == time || !LAWS_USE_TIME)
+    if (!near && balance->valid && (at->time == time || !LAWS_USE_TIME)
         && !memcmp(at->inputs, inputs, N_INPUTS * sizeof(double)) && !memcmp(at->T, state->T, sizeof at->T)
         && !memcmp(at->memory, state->memory, sizeof at->memory)) return;
     set_moment(at, time, inputs, state);
 #if N_COMPONENTS
-    {
-        const LossPoint point = loss_point(at);
-        network->loss_power(point.speed, point.torque, point.T, at->power);
-    }
+    find_losses(network, balance, near);
 #else
     (void)network;
 #endif
@@ -94,7 +107,7 @@ static void find_gain(Balance *balance) {
 }
 
 const Balance *network_balance(Network *network, double time, const double *inputs, const ThermalState *state) {
-    find_balance(network, &network->now, time, inputs, state);
+    find_balance(network, &network->now, time, inputs, state, NULL);
     return &network->now;
 }
 
@@ -150,7 +163,7 @@ const char *network_advance(Network *network, ThermalState *state, double time, 
         if (tried++ == MOST_STEPS) return "the communication step needs more than 100000 steps; make it shorter. They end";
         ramp(begin, end, early / duration, now_inputs);
         ramp(begin, end, late / duration, then_inputs);
-        find_balance(network, now, time + early, now_inputs, state);
+        find_balance(network, now, time + early, now_inputs, state, NULL);
         find_gain(now);
         structure_factorize(now->conductance, capacity, GAMMA * h, factors);
         structure_solve(factors, now->gain, k_1);
@@ -159,7 +172,7 @@ const char *network_advance(Network *network, ThermalState *state, double time, 
             rate_1[i] = now->heat[N_SOURCES + i];
             later.memory[i] = state->memory[i] + h * rate_1[i];
         }
-        find_balance(network, then, time + late, then_inputs, &later);
+        find_balance(network, then, time + late, then_inputs, &later, now);
         find_gain(then);
         for (int i = 0; i < N_PARTS; i++) k_2[i] = then->gain[i] - 2.0 * capacity[i] * k_1[i];
         structure_solve(factors, k_2, k_2);
@@ -191,7 +204,7 @@ const char *network_advance(Network *network, ThermalState *state, double time, 
         state->step = h < step ? larger(next_step, step) : next_step;
         if (LAWS_UPDATE) {
             ramp(begin, end, elapsed / duration, now_inputs);
-            find_balance(network, now, time + elapsed, now_inputs, state);
+            find_balance(network, now, time + elapsed, now_inputs, state, NULL);
             memcpy(state->memory, now->heat + N_SOURCES + N_MEMORY, N_MEMORY * sizeof(double));
         }
     }

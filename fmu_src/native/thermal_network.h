@@ -24,6 +24,9 @@ typedef struct {
 typedef struct {
     int valid, has_gain; /* outputs need no gain */
     Signals at;
+#if N_COMPONENTS
+    LossPoint point;
+#endif
     double heat[AT_LEAST_ONE(N_SOURCES + 2 * N_MEMORY)]; /* W; then the rates of the memories and their updates */
     double T_boundary[AT_LEAST_ONE(N_BOUNDARIES)];
     double conductance[AT_LEAST_ONE(N_FIXED + N_VARYING)]; /* W/K */

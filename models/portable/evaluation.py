@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 # Relative: inside an FMU these files form a package of another, unique name.
-from .solver import Balance, error_weights
+from .solver import Balance, LossesAt, error_weights
 
 Array = NDArray[np.float64]
 RPM = np.pi / 30.0
@@ -178,10 +178,14 @@ class NetworkSystem:
         signals = self._with_numeric(self._common(time, inputs, states), power)
         return self._flows(signals, power, states.shape[:-1])
 
-    def balance(self, time: float, inputs: Array, states: Array) -> Balance:
+    def balance(self, time: float, inputs: Array, states: Array, near: Balance | None = None) -> Balance:
         """Heat balance; see :class:`models.portable.solver.System`."""
         n, m, shape = self.n_parts, self.n_boundaries, states.shape[:-1]
-        power = self.power(time, inputs, states)
+        point = (*self.operating(time, inputs, states), states[..., self._loss_nodes])
+        if near is not None and near.losses is not None and near.losses.still(*point):
+            power = near.losses.power
+        else:
+            power = self.losses.power(*point)
         common = self._common(time, inputs, states)
         signals = self._with_numeric(common, power)
         if self.vector:
@@ -208,6 +212,7 @@ class NetworkSystem:
             heat_in=heats.sum(axis=-1),
             heat_out=heat_out,
             heat_out_slope=to_boundary,
+            losses=LossesAt(*point, power),
         )
 
     def updated(self, time: float, inputs: Array, states: Array) -> Array:

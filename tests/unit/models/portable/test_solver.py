@@ -27,7 +27,7 @@ class Linear:
     def error_weights(self) -> Array:
         return np.full(len(self.rates), self.weights)
 
-    def balance(self, time: float, inputs: Array, states: Array) -> Balance:
+    def balance(self, time: float, inputs: Array, states: Array, near: Balance | None = None) -> Balance:
         self.calls += 1
         n = states.shape[-1]
         return Balance(
