@@ -1,4 +1,4 @@
-"""The loop ends in the FMU: built with a correction and driven over a recording, it errs as the corrected model does."""
+"""The loop ends in the FMU: built with a correction and driven over a recording, it errs as the corrected model."""
 
 from __future__ import annotations
 
