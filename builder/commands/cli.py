@@ -47,6 +47,9 @@ def commands() -> None:
               help="Folder for the FMU and what belongs to it.  [default: out/<gearbox>]")  # fmt: skip
 @click.option("--correction", type=click.Path(path_type=Path, dir_okay=False), default=None, metavar="FILE",
               help="What diagnose found: the FMU carries it.")  # fmt: skip
+@click.option("--couple", multiple=True, metavar="BOUNDARY",
+              help="Take the temperature of this boundary from an input BOUNDARY.T_in, to couple the FMU with another "
+                   "model (may be given several times).")  # fmt: skip
 @click.option("--preset", type=click.Choice(["default", "paper"]), default="default", show_default=True,
               help="Networks: default, or as printed in the paper (400 points, 2 x 5).")  # fmt: skip
 @click.option("--samples", type=click.IntRange(min=50, max=1_000_000), default=None, metavar="N",
@@ -61,6 +64,7 @@ def build_fmu(
     fmi: str | None,
     output: Path | None,
     correction: Path | None,
+    couple: tuple[str, ...],
     preset: str,
     samples: int | None,
     seed: int,
@@ -90,6 +94,7 @@ def build_fmu(
         jobs=jobs,
         dask=dask,
         correction=found,
+        couple=couple,
     )
     report.show()
 

@@ -32,7 +32,8 @@ LOWEST_START, HIGHEST_START = 173.15, 773.15  # K; what lies outside is most lik
 MAYBE_LINEAR = ("temperature", "total_loss", "loss", "heat")  # roles of outputs that are their expressions
 
 Role = Literal[
-    "input", "temperature", "total_loss", "loss", "heat", "torque_loss", "efficiency", "in_domain", "domain_distance",
+    "input", "temperature", "total_loss", "loss", "heat", "heat_flow", "heat_to_boundary",
+    "heat_in", "heat_stored", "torque_loss", "efficiency", "in_domain", "domain_distance",
     "initial_uniform", "initial_temperature", "start_temperature", "factor", "state", "other",
 ]  # fmt: skip
 
@@ -272,6 +273,7 @@ class _Table:
         yield from self._inputs()
         yield from self._temperatures()
         yield from self._powers()
+        yield from self._heats()
         yield from self._quality()
         yield from self._initial()
         yield from self._factors()
@@ -308,7 +310,7 @@ class _Table:
             at_fmi = partial(_convert, own, unit)
             display = None if name in GEARBOX_INPUTS else quantity.unit * (quantity.unit != kind.unit)
             yield Signal(
-                name=fmi_name(name), role="input", of=name,
+                name=quantity.fmi, role="input", of=name,
                 description=given.description or texts.get(name, name.replace("_", " ")), type=quantity.type,
                 unit=kind.unit, inner_unit=quantity.unit, display_unit=display, causality="input",
                 variability="continuous", initial="",
@@ -350,7 +352,7 @@ class _Table:
             names |= {s.name for s in self._operating_point().free_symbols}
         names |= {s.name for name, law in self.network.derived.items() if name in names for s in law.free_symbols}
         names |= {s.name for node, T in self.boundaries.items() if f"T_{node}" in names for s in T.free_symbols}
-        inputs = tuple(fmi_name(name) for name in self.inputs if name in names)
+        inputs = tuple(given.quantity.fmi for name, given in self.network.inputs.items() if name in names)
         return inputs, tuple(fmi for name, fmi in self.parameters.items() if name in names)
 
     def _temperatures(self) -> Iterator[Signal]:
@@ -383,6 +385,33 @@ class _Table:
         yield self._output(name="efficiency", role="efficiency", kind="Ratio", minimum=0.0, maximum=1.0,
                            expression=total + symbol("speed") * symbol("torque"),
                            description="Power out over power in; 0 without power")  # fmt: skip
+
+    def _heats(self) -> Iterator[Signal]:
+        """What flows to the boundaries, and the terms of the energy balance; none depends on the inputs at a moment."""
+        for node in self.boundaries:
+            name, text = fmi_name(node), node.replace("_", " ")
+            flow = self._output(
+                name=f"{name}.heat_flow", role="heat_flow", of=node, kind="Power", expression=self._outflow(node),
+                description=f"Heat flow to {text}, mean over the last step",
+            )  # fmt: skip
+            yield replace(flow, depends=())
+            yield self._output(
+                name=f"{name}.heat", role="heat_to_boundary", of=node, kind="Energy", expression=sp.Integer(0),
+                needs_state=False, description=f"Heat given to {text} since the start",
+            )  # fmt: skip
+        totals: dict[Role, str] = {
+            "heat_in": "Heat brought in by all sources since the start",
+            "heat_stored": "Heat stored in all nodes since the start: heat_in less the heat given to the boundaries",
+        }
+        for role, text in totals.items():
+            yield self._output(name=role, role=role, kind="Energy", expression=sp.Integer(0), needs_state=False,
+                               description=text)  # fmt: skip
+
+    def _outflow(self, boundary: str) -> sp.Expr:
+        """An expression of what the heat flow to a boundary depends on."""
+        temperature = self.boundaries[boundary]
+        links = [link.conductance for link in self.network.links if boundary in link.nodes]
+        return sum((conductance * temperature for conductance in links), sp.Integer(0))
 
     def _operating_point(self) -> sp.Expr:
         """An expression of what speed and torque depend on as the losses see them."""

@@ -155,6 +155,7 @@ def build(
     jobs: int = 1,
     dask: str | None = None,
     correction: Correction | None = None,
+    couple: Sequence[str] = (),
 ) -> BuildReport:
     """Build the FMUs of `gearbox` and try them on the reference cycle; with geometry, train their networks first.
 
@@ -178,6 +179,8 @@ def build(
         See :func:`builder.surrogate.train.train_surrogate`
     correction : Correction or None
         What a diagnosis found: the FMU and the full model it is compared with carry it
+    couple : sequence of str
+        Boundaries whose temperature becomes an input, ``<boundary>.T_in``
 
     Returns
     -------
@@ -190,6 +193,8 @@ def build(
     """
     kinds, built_for, notes = _planned(target, platforms, fmi)
     network = corrected_network(gearbox, correction)
+    for boundary in couple:
+        network = network.with_coupled_boundary(boundary)
     inside = gearbox.network_of_laws(network) if gearbox.is_parametric else network
     seconds: dict[str, float] = {}
     with atomic_folder(folder) as stage:

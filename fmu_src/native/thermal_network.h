@@ -1,4 +1,4 @@
-/* Heat balance and time integration of a thermal network; the scheme of models/solver.py. */
+/* Heat balance and time integration of a thermal network; the scheme of models/portable/solver.py. */
 #ifndef THERMAL_NETWORK_H
 #define THERMAL_NETWORK_H
 
@@ -30,12 +30,17 @@ typedef struct {
     double gain[N_PARTS];                                  /* W: net heat into the parts */
 } Balance;
 
+/* Heat of the sources and to each boundary, J. */
+typedef struct {
+    double in, out[AT_LEAST_ONE(N_BOUNDARIES)];
+} Heat;
+
 /* A network with parameter values. */
 typedef struct {
 #if N_COMPONENTS
     LossPower *loss_power;
 #endif
-    double capacity[N_PARTS];
+    double capacity[N_PARTS], weight[N_PARTS]; /* J/K; of the errors in the step control */
     Balance now, then;
 } Network;
 
@@ -56,9 +61,12 @@ INTERNAL LossPoint network_loss_point(const Network *network, double time, const
                                       const ThermalState *state);
 #endif
 
-/* Integrate over `duration`, the inputs going straight from `begin` to `end`; gives NULL, or why it cannot be done, and
-   *failed_at. */
+/* Heat flow to each boundary at the moment of the last network_balance, W. */
+INTERNAL void network_outflow(Network *network, double *flow);
+
+/* Integrate over `duration`, the inputs going straight from `begin` to `end`, and find the heat that is exchanged
+   meanwhile; gives NULL, or why it cannot be done, and *failed_at. */
 INTERNAL const char *network_advance(Network *network, ThermalState *state, double time, double duration,
-                                     const double *begin, const double *end, double *failed_at);
+                                     const double *begin, const double *end, Heat *exchanged, double *failed_at);
 
 #endif
