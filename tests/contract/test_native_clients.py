@@ -148,11 +148,14 @@ def test_libcosimpy_simulates(fzg_native: Path, fmu: Unpacked, inputs: pd.DataFr
 # ---------------------------------------------------------------------- ecos
 
 
-def test_ecos_simulates(fzg_native: Path, fmu: Unpacked, inputs: pd.DataFrame, expected: np.ndarray) -> None:
+@pytest.mark.parametrize("fixture", ["fzg_native", "fzg_native3"])
+def test_ecos_simulates(
+    fixture: str, fmu: Unpacked, inputs: pd.DataFrame, expected: np.ndarray, request: pytest.FixtureRequest
+) -> None:
     ecospy = ecos()
     names, rows = fmu.named("output"), []
     with ecospy.EcosSimulationStructure() as structure:
-        structure.add_model("gearbox", str(fzg_native))
+        structure.add_model("gearbox", str(request.getfixturevalue(fixture)))
         with ecospy.EcosSimulation(structure=structure, step_size=1.0) as simulation:
             simulation.init()
             for row in inputs.iloc[:-1, 1:].to_dict("records"):
