@@ -245,7 +245,7 @@ def build(
 
 
 def _planned(target: str, platforms: str, fmi: str) -> tuple[tuple[str, ...], tuple[str, ...], list[str]]:
-    """Kinds of FMU that can be built here, platforms of the native one, and notes on what is left out.
+    """Kinds of FMU that can be built here, platforms of the native one, and notes on omitted platforms.
 
     Called before the training, so that a missing compiler is known early.
 
