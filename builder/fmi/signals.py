@@ -368,7 +368,7 @@ class _Table:
                            description="Power out over power in; 0 without power")  # fmt: skip
 
     def _heats(self) -> Iterator[Signal]:
-        """What flows to the boundaries, and the terms of the energy balance; none depends on the inputs at a moment."""
+        """Heat to the boundaries and the terms of the energy balance; none depends on the inputs at a moment."""
         for node in self.boundaries:
             name, text = fmi_name(node), node.replace("_", " ")
             flow = self._output(
