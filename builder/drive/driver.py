@@ -24,6 +24,7 @@ import fmpy
 import numpy as np
 from fmpy import fmi2
 from fmpy.fmi1 import FMICallException
+from fmpy.fmi3 import FMU3Slave
 
 from builder.fmi.recorded import recorded_columns
 from builder.fmi.signals import input_column, result_column
@@ -93,7 +94,12 @@ def drive_fmu(
 def runs_here(path: Path) -> bool:
     """Return True if an FMU has a binary for this machine."""
     with ZipFile(path) as archive:
-        return any(name.startswith(f"binaries/{host_platform()}/") for name in archive.namelist())
+        return any(name.startswith(tuple(f"{folder}/" for folder in _binary_folders())) for name in archive.namelist())
+
+
+def _binary_folders() -> tuple[str, ...]:
+    """Folders of this machine's binaries: of FMI 3.0, then of FMI 2.0 (FMPy takes those of x86 on ARM)."""
+    return f"binaries/{fmpy.platform_tuple}", f"binaries/{host_platform()}"
 
 
 def fmu_machine(path: Path) -> DescribedMachine:
@@ -154,7 +160,7 @@ class LoadedFmu:
     ----------
     path : Path
     description : fmpy.model_description.ModelDescription
-    slave : fmpy.fmi2.FMU2Slave
+    slave : fmpy.fmi2.FMU2Slave or Slave3
     messages : list of (int, str)
         Status and text, not shown yet
     doing : str
@@ -174,9 +180,8 @@ class LoadedFmu:
         self._inputs = [v for v in variables if v.causality == "input"]
         self.inputs = [v.name.strip("'") for v in self._inputs]
         self._outputs = [v for v in variables if v.causality == "output" and result_column(v.name) is not None]
-        self._references = {
-            kind: [v.valueReference for v in self._outputs if v.type == kind] for kind in ("Real", "Boolean")
-        }
+        self._booleans = [v.valueReference for v in self._outputs if v.type == "Boolean"]
+        self._reals = [v.valueReference for v in self._outputs if v.type != "Boolean"]
         self._input_references = [v.valueReference for v in self._inputs]
         self._orders = [1] * len(self._inputs)
         self._to_si = [_affine(v) for v in self._inputs]
@@ -201,13 +206,15 @@ class LoadedFmu:
 
     def outputs(self) -> tuple[list[float], list[int]]:
         """Reals in the FMU's own units, and Booleans."""
-        return self.slave.getReal(self._references["Real"]), self.slave.getBoolean(self._references["Boolean"])
+        return self.slave.getReal(self._reals), self.slave.getBoolean(self._booleans)
 
     def columns(self, rows: Sequence[tuple[list[float], list[int]]]) -> dict[str, Array]:
         """Columns of rows of :meth:`outputs`, in the order of the FMU."""
         reals, booleans = (iter(np.array(values).T) for values in zip(*rows, strict=True))
         return {
-            str(result_column(v.name)): _to_column(v, next(reals)) if v.type == "Real" else next(booleans).astype(bool)
+            str(result_column(v.name)): next(booleans).astype(bool)
+            if v.type == "Boolean"
+            else _to_column(v, next(reals))
             for v in self._outputs
         }
 
@@ -245,6 +252,10 @@ class LoadedFmu:
         scale, offset = UNITS[variable.unit].column[1:]
         self.slave.setReal([variable.valueReference], [(float(value) - offset) / scale])
 
+    def log(self, _environment: int | None, status: int, _category: bytes, message: bytes) -> None:
+        """Add a message, as FMI 3.0 passes it on."""
+        self.messages.append((status, message.decode("utf-8", "replace").strip()))
+
     def report_messages(self, when: str) -> None:
         """Pass the FMU's warnings on.
 
@@ -260,6 +271,21 @@ class LoadedFmu:
         for status, text in messages:
             if status == WARNING:
                 logger.warning("%s: %s", self.path, text)
+
+
+class Slave3(FMU3Slave):  # type: ignore[misc]
+    """An FMU of FMI 3.0 in FMPy, with the names of FMI 2.0."""
+
+    getReal, setReal = FMU3Slave.getFloat64, FMU3Slave.setFloat64
+    start = 0.0
+
+    def setupExperiment(self, startTime: float) -> None:
+        """Keep the start time, which FMI 3.0 takes in the next call."""
+        self.start = startTime
+
+    def enterInitializationMode(self) -> None:
+        """Begin the initialisation."""
+        super().enterInitializationMode(startTime=self.start)
 
 
 @contextmanager
@@ -278,23 +304,25 @@ def loaded(path: Path) -> Iterator[LoadedFmu]:
         with _damage_reported(path):
             fmpy.extract(str(path), folder)
         identifier = fmu.description.coSimulation.modelIdentifier
-        # FMI 2.0 names the folders of ARM as FMI 3.0 does; FMPy alone would take those of x86.
-        names = [Path(folder, "binaries", name, identifier + fmpy.sharedLibraryExtension)
-                 for name in (fmpy.platform_tuple, fmpy.platform)]  # fmt: skip
+        names = [Path(folder, name, identifier + fmpy.sharedLibraryExtension) for name in _binary_folders()]
         binary = next((name for name in names if name.is_file()), names[-1])
         if not binary.is_file():
             raise InputError(f"{path}: has no binary for {fmpy.platform}; build the FMU for this machine")
         try:
-            fmu.slave = fmi2.FMU2Slave(
+            fmu.slave = (fmi2.FMU2Slave if fmu.description.fmiVersion == "2.0" else Slave3)(
                 guid=fmu.description.guid, modelIdentifier=identifier, unzipDirectory=folder, instanceName=path.stem,
                 libraryPath=str(binary),
             )  # fmt: skip
         except Exception as error:  # fmpy raises plain Exception
             raise InputError(f"{path}: its binary cannot be loaded: {error}") from error
-        fmu.slave.component = fmu.slave.fmi2Instantiate(
-            path.stem.encode(), fmi2.fmi2CoSimulation, fmu.description.guid.encode(), _uri(Path(folder, "resources")),
-            byref(callbacks), False, True,
-        )  # fmt: skip
+        if isinstance(fmu.slave, Slave3):
+            with suppress(Exception):  # plain Exception, where it cannot be instantiated
+                fmu.slave.instantiate(loggingOn=True, logMessage=fmu.log)
+        else:
+            fmu.slave.component = fmu.slave.fmi2Instantiate(
+                path.stem.encode(), fmi2.fmi2CoSimulation, fmu.description.guid.encode(),
+                _uri(Path(folder, "resources")), byref(callbacks), False, True,
+            )  # fmt: skip
         if not fmu.slave.component:
             fmu.slave.freeLibrary()
             fmu.report_messages("it cannot be instantiated")
@@ -327,7 +355,6 @@ def _simulate_table(
     fmu.report_messages("its start values")
     outputs = [fmu.outputs()]
     fmu.report_messages(f"at {time[0]:g} s")
-    component, do_step = slave.component, slave.fmi2DoStep
     for row in range(n_rows - 1):
         begin, end = float(time[row]), float(time[row + 1])
         change = table[row + 1] - table[row]
@@ -337,18 +364,18 @@ def _simulate_table(
             fmu.set_inputs(table[row].tolist())
             if change.any():
                 fmu.set_rates((change / (end - begin)).tolist())
-            do_step(component, begin, end - begin, 1)
+            slave.doStep(begin, end - begin)
         elif pieces == 0:
-            do_step(component, begin, end - begin, 1)
+            slave.doStep(begin, end - begin)
         else:
             half = (end - begin) / (2 * pieces)
-            do_step(component, begin, half, 1)
+            slave.doStep(begin, half)
             for piece in range(1, pieces):
                 share = piece / pieces
                 fmu.set_inputs(((1.0 - share) * table[row] + share * table[row + 1]).tolist())
-                do_step(component, begin + (2 * piece - 1) * half, 2.0 * half, 1)
+                slave.doStep(begin + (2 * piece - 1) * half, 2.0 * half)
             fmu.set_inputs(table[row + 1].tolist())
-            do_step(component, end - half, half, 1)
+            slave.doStep(end - half, half)
         outputs.append(fmu.outputs())
         if fmu.messages:
             fmu.report_messages(f"at {end:g} s")
@@ -389,9 +416,10 @@ def _description(path: Path) -> Any:
         raise InputError(f"{path}: cannot be read ({error.strerror})") from error
     with _damage_reported(path), path.open("rb") as file:  # which fmpy would leave open where it fails
         description = fmpy.read_model_description(file, validate=False)
-    if description.fmiVersion != "2.0" or description.coSimulation is None:
+    if not description.fmiVersion.startswith(("2.", "3.")) or description.coSimulation is None:
         raise InputError(
-            f"{path}: is an FMU of FMI {description.fmiVersion}; FMI 2.0 for co-simulation, as of build-fmu, is needed"
+            f"{path}: is an FMU of FMI {description.fmiVersion}; FMI 2.0 or 3.0 for co-simulation, as of build-fmu, is "
+            "needed"
         )
     names = {v.name: v.causality for v in description.modelVariables}
     missing = [name for name, causality in NEEDED.items() if names.get(name) != causality]

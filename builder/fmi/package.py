@@ -56,7 +56,7 @@ def common_parts(
     *,
     network: ThermalNetwork | None,
     correction: Correction | None,
-    flags: Mapping[str, bool],
+    flags: Mapping[str, bool | int],
     kind: Kind,
 ) -> CommonParts:
     """Parts of the FMU of a gearbox that do not depend on its kind.
@@ -74,7 +74,7 @@ def common_parts(
         The thermal network, if it is neither the gearbox's nominal nor the corrected one
     correction : Correction or None
         Findings of a diagnosis; the FMU contains them and its documentation lists them
-    flags : mapping of str to bool
+    flags : mapping of str to bool or int
         Capabilities for the model description
     kind : Kind
         Kind of the FMU, for its documentation
@@ -95,7 +95,7 @@ def common_parts(
 
 
 def gearbox_identity(
-    gearbox: Gearbox, output: Path, flags: Mapping[str, bool], correction: Correction | None
+    gearbox: Gearbox, output: Path, flags: Mapping[str, bool | int], correction: Correction | None
 ) -> Identity:
     """Description of an FMU of a gearbox."""
     version = project_version()

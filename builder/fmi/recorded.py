@@ -1,4 +1,4 @@
-"""What an FMU knows of the recordings of its machine: the inputs that they must have, and their usual mapping."""
+"""Data of an FMU about the recordings of its machine: the inputs that they must have, and their usual mapping."""
 
 from __future__ import annotations
 

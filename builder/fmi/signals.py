@@ -9,8 +9,8 @@ converts.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from math import inf
 from typing import Literal
@@ -28,6 +28,8 @@ START_TEMPERATURE = 293.15  # K
 INITIAL = ("initial.uniform", "initial.T")
 HEADER = ("signal", "kind", "unit", "shown in", "column of files", "start", "range", "trained on", "meaning")
 LOWEST_START, HIGHEST_START = 173.15, 773.15  # K; what lies outside is most likely degC
+
+MAYBE_LINEAR = ("temperature", "total_loss", "loss", "heat")  # roles of outputs that are their expressions
 
 Role = Literal[
     "input", "temperature", "total_loss", "loss", "heat", "heat_flow", "heat_to_boundary",
@@ -64,6 +66,8 @@ class Signal:
         Column of cycle and result files
     depends, depends_initially : tuple of str
         Signals that an output depends on directly, and at initialization
+    linear : mapping of str to str
+        Those that it is linear in: "constant" where the factor is a number, "tunable" where it follows parameters
     inner_unit : str or None
         Unit in the network, if it is not that of file columns
     display_unit : str or None
@@ -89,6 +93,7 @@ class Signal:
     column: str | None = None
     depends: tuple[str, ...] = ()
     depends_initially: tuple[str, ...] = ()
+    linear: Mapping[str, str] = field(default_factory=dict)
     inner_unit: str | None = None
     display_unit: str | None = None
     reference: int = -1
@@ -324,7 +329,21 @@ class _Table:
             causality="output", variability="continuous" if kind else "discrete", initial="calculated", minimum=minimum,
             maximum=maximum, nominal=TYPES[kind].nominal if kind else None, domain=domain, column=result_column(name),
             depends=inputs, depends_initially=(*inputs, *parameters, *starts),
+            linear=self._linear(expression) if role in MAYBE_LINEAR else {},
         )  # fmt: skip
+
+    def _linear(self, expression: sp.Expr) -> dict[str, str]:
+        """How an expression depends on the inputs that it is linear in; none where it has losses of the networks."""
+        known = {f"T_{node}": temperature for node, temperature in self.boundaries.items()}
+        expression = expression.subs({s: known[s.name] for s in expression.free_symbols if s.name in known})
+        if any(s.name[2:] in self.network.components for s in expression.free_symbols):
+            return {}
+        kinds = {}
+        for given in (s for s in expression.free_symbols if s.name in self.inputs):
+            factors = {s.name for s in sp.diff(expression, given).free_symbols}
+            if factors <= set(self.parameters):
+                kinds[fmi_name(given.name)] = "tunable" if factors else "constant"
+        return kinds
 
     def _direct(self, expression: sp.Expr) -> tuple[tuple[str, ...], tuple[str, ...]]:
         """Inputs and parameters that an expression depends on without a detour through the temperatures of parts."""
@@ -361,10 +380,10 @@ class _Table:
             )  # fmt: skip
         if not self.loss_heats or not {"speed", "torque"} <= set(self.inputs):
             return
-        yield self._output(name="torque_loss", role="torque_loss", kind="Torque", expression=total,
+        yield self._output(name="torque_loss", role="torque_loss", kind="Torque", expression=total / symbol("speed"),
                            description="Loss torque at the input shaft, signed as the speed")  # fmt: skip
         yield self._output(name="efficiency", role="efficiency", kind="Ratio", minimum=0.0, maximum=1.0,
-                           expression=total + sp.Symbol("speed") * sp.Symbol("torque"),
+                           expression=total + symbol("speed") * symbol("torque"),
                            description="Power out over power in; 0 without power")  # fmt: skip
 
     def _heats(self) -> Iterator[Signal]:

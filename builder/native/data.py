@@ -33,6 +33,8 @@ DATA_HEADER = """\
 #ifndef MODEL_DATA_H
 #define MODEL_DATA_H
 
+#include "linker_names.h"
+
 #define AT_LEAST_ONE(n) ((n) > 0 ? (n) : 1) /* C has no empty arrays */
 {defines}
 
@@ -50,13 +52,7 @@ typedef struct {{
     const double *w_1, *b_1, *w_2, *b_2, *w_3, *b_3, *passed;
 }} Block;
 
-#if defined __GNUC__ && !defined _WIN32
-#pragma GCC visibility push(hidden)
-#endif
 {declared}
-#if defined __GNUC__ && !defined _WIN32
-#pragma GCC visibility pop
-#endif
 #endif
 """
 LAWS_HEADER = """\
@@ -64,13 +60,9 @@ LAWS_HEADER = """\
 #ifndef LAWS_H
 #define LAWS_H
 
-#if defined __GNUC__ && !defined _WIN32
-#pragma GCC visibility push(hidden)
-#endif
+#include "linker_names.h"
+
 {functions}
-#if defined __GNUC__ && !defined _WIN32
-#pragma GCC visibility pop
-#endif
 #endif
 """
 LAWS = """\
@@ -129,7 +121,7 @@ class _Data:
         """A constant array; an empty one gets an element that is not read, as C has no empty arrays."""
         texts = [value if isinstance(value, str) else number(value) if isinstance(value, float) else str(value)
                  for value in values]  # fmt: skip
-        self.declared.append(f"extern const {kind} {name}[{max(len(texts), 1)}];")
+        self.declared.append(f"INTERNAL extern const {kind} {name}[{max(len(texts), 1)}];")
         self.defined.append(f"const {kind} {name}[{max(len(texts), 1)}] = {{{_wrap(texts or ['0'])}}};")
 
     def files(self) -> dict[str, str]:
@@ -200,7 +192,7 @@ def _links(network: ThermalNetwork) -> tuple[list[tuple[str, str]], list[tuple[s
 
 def _laws_header() -> str:
     laws = [f"void law_{name}(const double *restrict s, double *restrict y)" for name in LAW_NAMES]
-    return LAWS_HEADER.format(functions="\n".join(f"{line};" for line in (*laws, *Structure.signatures())))
+    return LAWS_HEADER.format(functions="\n".join(f"INTERNAL {line};" for line in (*laws, *Structure.signatures())))
 
 
 def _laws(network: ThermalNetwork) -> str:
@@ -245,7 +237,7 @@ def _place_data(data: _Data, table: SignalTable, network: ThermalNetwork) -> Non
     heats = (by_role["loss" if source.is_loss else "heat", source.name] for source in network.sources)
     data.array("Place", "HEAT_OUTPUT", (_place(signal) for signal in heats))
     initial = table.of_role("initial_temperature")[0]
-    data.declared.append("extern const Place INITIAL_TEMPERATURE;")
+    data.declared.append("INTERNAL extern const Place INITIAL_TEMPERATURE;")
     data.defined.append(f"const Place INITIAL_TEMPERATURE = {_place(initial)};")
     for signal in table.of_role(*SINGLE):
         data.define(signal.role.upper(), signal.reference)

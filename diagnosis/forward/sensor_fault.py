@@ -1,4 +1,4 @@
-"""What a recorder with faulty sensors shows of a machine: readings with the terms of kind ``sensor``."""
+"""Readings of a recorder with faulty sensors: readings with the terms of kind ``sensor``."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def passed_on(term: Term, law: Array, time: Array, changes: Array, channels: Seq
 
 
 def columns_as_recorded(columns: Mapping[str, Array], terms: Iterable[Term]) -> dict[str, Array]:
-    """Return what a recorder with faulty sensors shows of a simulated cycle.
+    """Return the readings of faulty sensors over a simulated cycle.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What the reader of recordings needs to know of a machine; a thermal network and an FMU give it."""
+"""Interface of a machine to the reader of recordings; a thermal network and an FMU give it."""
 
 from __future__ import annotations
 

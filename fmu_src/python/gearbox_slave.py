@@ -16,7 +16,6 @@ from types import ModuleType
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
-import onnxruntime
 from pythonfmu import Fmi2Slave
 from pythonfmu.enums import Fmi2Status
 
@@ -254,6 +253,9 @@ def _load_losses(resources: Path, generated: ModuleType) -> Any:
 
 
 def _network(path: Path, digest: str) -> Evaluator:
+    """A network of the FMU in onnxruntime, its file checked to the byte."""
+    import onnxruntime  # here: an FMU without networks does not need it
+
     content = path.read_bytes() if path.is_file() else b""
     if hashlib.sha256(content).hexdigest() != digest:
         raise ValueError(f"{path} is missing, damaged or of another FMU; extract or build the FMU again")

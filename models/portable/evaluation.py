@@ -12,7 +12,8 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from .solver import Balance  # relative: inside an FMU these files form a package of another, unique name
+# Relative: inside an FMU these files form a package of another, unique name.
+from .solver import Balance, error_weights
 
 Array = NDArray[np.float64]
 RPM = np.pi / 30.0
@@ -147,6 +148,8 @@ class NetworkSystem:
         if not (np.isfinite(fixed).all() and (self.capacities > 0.0).all()):
             raise ValueError("heat capacities must be positive and conductances finite; check the parameters")
         self._per_capacity = 1.0 / self.capacities
+        memory = np.ones((*self.capacities.shape[:-1], self.n_states))
+        self.error_weights = np.concatenate((error_weights(self.capacities), memory), axis=-1)
         self._conductances = np.zeros((*batch, n_links))
         self._conductances[..., constant] = fixed[..., : len(constant)]
 

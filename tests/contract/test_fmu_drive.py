@@ -223,7 +223,7 @@ def test_model_exchange_is_refused(fzg_fmu: Path, tmp_path: Path) -> None:
     start, end = xml.index(b"<CoSimulation"), xml.index(b"<UnitDefinitions")
     exchange = xml[:start] + b'<ModelExchange modelIdentifier="fzg"/>' + xml[end:]
     path = rewritten(fzg_fmu, tmp_path / "exchange.fmu", {"modelDescription.xml": exchange})
-    with pytest.raises(InputError, match=r"FMI 2\.0 for co-simulation"):
+    with pytest.raises(InputError, match=r"FMI 2\.0 or 3\.0 for co-simulation"):
         drive_fmu(path, cycle())
 
 

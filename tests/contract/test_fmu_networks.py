@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zipfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -127,6 +128,8 @@ def simulated(path: Path, network: ThermalNetwork) -> np.ndarray:
 def test_the_python_fmu_agrees_with_the_native_one(path: Path, network: ThermalNetwork, tmp_path: Path) -> None:
     python = build_python_fmu(ANY, None, (), tmp_path / "thermal.fmu", network=network)
     assert validate_fmu(str(python)) == []
+    with zipfile.ZipFile(python) as archive:
+        assert b"onnxruntime" not in archive.read("resources/requirements.txt")
     expected, found = simulated(path, network), simulated(python, network)
     assert expected["time"][-1] == 900.0
     for name in expected.dtype.names:

@@ -16,7 +16,7 @@ import sympy as sp
 from builder.fmi.signals import signal_table
 from builder.native.compile import OPTIONS
 from builder.native.data import model_sources
-from builder.native.native_fmu import LOSS_NETWORKS, THERMAL_MODEL, native_source
+from builder.native.native_fmu import LOSS_NETWORKS, THERMAL_MODEL, linker_names, native_source
 from builder.native.structure import Structure
 from builder.surrogate.onnx_export import onnx_evaluator
 from builder.surrogate.train import TrainingResult
@@ -51,6 +51,7 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> Library:
             "-Wextra",
             "-Werror",
             "-fPIC",
+            "-shared",
             "-o",
             "test.so",
             "test.c",
@@ -179,6 +180,7 @@ def generated(network: ThermalNetwork, fzg: Gearbox, surrogate: SurrogateLosses)
 def model(generated: dict[str, str], library: Library) -> ctypes.CDLL:
     """Laws, structure and losses of a network, with functions that a test can call."""
     files = {name: native_source(name) for name in THERMAL_MODEL + LOSS_NETWORKS} | generated
+    files["linker_names.h"] = linker_names(files, "test")
     text = """
         #include "laws.h"
         #include "loss_networks.h"
