@@ -333,7 +333,7 @@ class _Table:
         )  # fmt: skip
 
     def _linear(self, expression: sp.Expr) -> dict[str, str]:
-        """How an expression depends on the inputs that it is linear in; none where it has losses of the networks."""
+        """How an expression depends on the inputs that it is linear in; empty if it has losses of the networks."""
         known = {f"T_{node}": temperature for node, temperature in self.boundaries.items()}
         expression = expression.subs({s: known[s.name] for s in expression.free_symbols if s.name in known})
         if any(s.name[2:] in self.network.components for s in expression.free_symbols):

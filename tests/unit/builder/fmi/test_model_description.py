@@ -73,7 +73,7 @@ def test_flags_and_sources_are_the_callers(table: SignalTable, root: ET.Element)
 
 def test_units_have_base_units_and_display_units(root: ET.Element) -> None:
     units = {unit.get("name"): unit for unit in root.iterfind("UnitDefinitions/Unit")}
-    assert set(units) == {"rad/s", "N.m", "K", "m/s", "W", "1"}
+    assert set(units) == {"rad/s", "N.m", "K", "m/s", "W", "J", "1"}
     watt, kelvin, speed = (units[name] for name in ("W", "K", "rad/s"))
     assert dict(watt[0].attrib) == {"kg": "1", "m": "2", "s": "-3"}
     assert watt[1].attrib == {"name": "kW", "factor": "0.001"}
