@@ -77,8 +77,7 @@ class ThermalNetwork(Network):
         """
         laws = {node.name: node.temperature for node in self.nodes if node.temperature is not None}
         if name not in laws:
-            known = f"; boundaries are {', '.join(laws)}" if laws else "; it has no boundaries"
-            raise InputError(f"{name!r} is not a boundary of this network{did_you_mean(name, laws)}{known}")
+            raise InputError(f"{name!r} is not a boundary of this network{did_you_mean(name, laws)}")
         values = {"time": 0.0} | {key: given.default for key, given in self.inputs.items()}
         values |= {parameter.name: parameter.start for parameter in self.parameters}
         law = laws[name].xreplace({symbol(key): expression for key, expression in self.derived.items()})

@@ -208,7 +208,7 @@ EXTENSIONS: list[tuple[Callable[[], object], str]] = [
     (lambda: NETWORK.with_boundary("sea", lambda s: float(s.time)), "must be an expression"),
     (
         lambda: NETWORK.with_coupled_boundary("oil"),
-        "'oil' is not a boundary of this network; boundaries are air, frame",
+        "'oil' is not a boundary of this network; known are: air, frame",
     ),
     (lambda: NETWORK.with_input("speed", 1.0), "has a signal 'speed' already"),
     (lambda: NETWORK.with_input("lambda", 1.0), "'lambda' cannot be a signal"),
