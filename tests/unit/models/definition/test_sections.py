@@ -19,7 +19,8 @@ DEFAULTS: dict[type[Section], dict[str, float]] = {
     Material: {"youngs_modulus_GPa": 206.0, "poisson": 0.3, "density_kg_m3": 7830.0, "specific_heat_J_kgK": 465.0,
                "conductivity_W_mK": 46.0},
     Shaft: {"conductivity_W_mK": 46.0},
-    Housing: {"density_kg_m3": 7200.0, "specific_heat_J_kgK": 500.0, "foundation_conductance_W_K": 0.0},  # grey cast iron
+    # grey cast iron
+    Housing: {"density_kg_m3": 7200.0, "specific_heat_J_kgK": 500.0, "foundation_conductance_W_K": 0.0},
     Stage: {"helix_angle_deg": 0.0},
 }  # fmt: skip
 
