@@ -16,6 +16,7 @@ from diagnosis.results.assemble import assembled
 from diagnosis.results.result import Diagnosis
 from diagnosis.setup.case import prepare
 from diagnosis.setup.plausibility import check_plausible
+from diagnosis.setup.shaft import shafts, with_shaft
 from models.assembly.gearbox import Gearbox, load_gearbox
 from models.base.errors import InputError
 from models.mechanisms import CATALOGUE, Mechanism
@@ -72,9 +73,11 @@ def diagnose(
     check_shared_rows(train, held)
     _refuse_unusable(train)
     # Models without geometry have too wide priors for a check of temperatures.
+    network = gearbox.network()
     check_plausible(
-        [*train, *held], gearbox.network(), gearbox.loss_laws(), judge_temperatures=not gearbox.is_parametric
-    )
+        shafts([*train, *held], network), with_shaft(network), gearbox.loss_laws(),
+        judge_temperatures=not gearbox.is_parametric,
+    )  # fmt: skip
     progress("reading the recordings and setting up the inference")
     case = prepare(gearbox, train, held)
     _refuse_too_short(train, case.train.pieces)

@@ -79,7 +79,7 @@ def cycle_table() -> SignalTable:
     return SignalTable([_output("speed", "m/s", "Speed of the drive cycle at this moment", kind="VehicleSpeed")])
 
 
-def build_vehicle_fmu(output: Path, *, platforms: str = "all") -> NativeBuild:
+def build_vehicle_fmu(output: Path, *, platforms: str = "host") -> NativeBuild:
     """A light vehicle as a native FMU.
 
     Parameters
@@ -106,7 +106,7 @@ def build_vehicle_fmu(output: Path, *, platforms: str = "all") -> NativeBuild:
     return _build(output, table, "Light vehicle", text, sources, platforms)
 
 
-def build_cycle_fmu(output: Path, time: ArrayLike, speed: ArrayLike, *, platforms: str = "all") -> NativeBuild:
+def build_cycle_fmu(output: Path, time: ArrayLike, speed: ArrayLike, *, platforms: str = "host") -> NativeBuild:
     """A drive cycle as a native FMU with one output, straight between its rows.
 
     Parameters

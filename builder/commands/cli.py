@@ -35,12 +35,12 @@ def commands() -> None:
 
 @commands.command("build-fmu")
 @click.option("--gearbox", default="fzg", show_default=True, metavar="NAME|FILE", help=GEARBOX_HELP)
-@click.option("--target", type=click.Choice(["python", "native", "both"]), default="python", show_default=True,
-              help="Kind of FMU: python (pythonfmu, ONNX networks in onnxruntime), native (C; no Python where it "
-                   "runs), or both.")  # fmt: skip
+@click.option("--target", type=click.Choice(["python", "native", "both"]), default="both", show_default=True,
+              help="Kind of FMU: native (C; needs no other software), python (pythonfmu, ONNX networks in "
+                   "onnxruntime), or both; both is python alone without a C compiler or ziglang.")  # fmt: skip
 @click.option("--platforms", default=None, metavar="all|host|LIST",
-              help="Of a native FMU: all (with ziglang, else this machine's), host, e.g. win64,win32.  "
-                   "[default: all]")  # fmt: skip
+              help="Of a native FMU: host (this machine's), all (with ziglang), or a list such as win64,win32.  "
+                   "[default: host]")  # fmt: skip
 @click.option("--output", type=click.Path(path_type=Path, file_okay=False), default=None, metavar="DIR",
               help="Folder for the FMU and what belongs to it.  [default: out/<gearbox>]")  # fmt: skip
 @click.option("--correction", type=click.Path(path_type=Path, dir_okay=False), default=None, metavar="FILE",
@@ -68,7 +68,7 @@ def build_fmu(
     from builder.workflows.build import build  # imports scikit-learn and onnx, which the other verbs need not wait for
 
     if platforms is not None and target == "python":
-        raise click.UsageError("--platforms is about native FMUs: give it with --target native or both")
+        raise click.UsageError("--platforms is about native FMUs; give it without --target python")
     definition = load_gearbox(gearbox)
     found = None if correction is None else read_correction(correction, definition.network(), made_for=definition)
     folder = output if output is not None else Path("out") / Path(gearbox).stem
@@ -77,7 +77,7 @@ def build_fmu(
         folder,
         name=Path(gearbox).stem,
         target=target,
-        platforms=platforms or "all",
+        platforms=platforms or "host",
         preset=preset,
         samples=samples,
         seed=seed,

@@ -22,7 +22,7 @@ from models.files.cycle import Cycle
 from models.files.cycle_file import RecordedStart, read_cycle_and_start, read_initial
 from models.files.output_files import refuse_to_replace, write_table
 from models.files.table_file import kind_of
-from models.quantities.quantities import INPUTS
+from models.quantities.quantities import GEARBOX_INPUTS
 from models.simulation.start_temperatures import start_temperatures
 
 RECORDED = "recorded"  # --initial: as the cycle's own file says
@@ -101,14 +101,14 @@ def _fmu(path: Path) -> Model:
         fmu_nodes,
     )
 
-    extra = fmu_inputs(path)
+    inputs = fmu_inputs(path)
 
     def run(cycle: Cycle, initial: Initial, progress: console.Report) -> dict[str, Array]:
         return drive_fmu(path, cycle, initial=initial, progress=progress)
 
     return Model(
         title=path.name,
-        read=lambda file: (*read_cycle_and_start(file, extra), ()),
+        read=lambda file: (*read_cycle_and_start(file, inputs), ()),
         nodes=fmu_nodes(path),
         domain="the surrogate's training domain",
         run=run,
@@ -221,7 +221,7 @@ def _check_outputs(output: Path, plot: Path | None, inputs: list[Path]) -> None:
 
 
 def _show(columns: Mapping[str, Array]) -> None:
-    inputs = [quantity.column for quantity in INPUTS.values()]
+    inputs = [given.column for given in GEARBOX_INPUTS.values()]
     shown = [n for n in columns if n.startswith("T_") and n.endswith("_degC") and n not in inputs]
     temperatures = {n[2:-5]: columns[n] for n in shown}
     rows = [[n, f"{v[0]:.1f}", f"{v.max():.1f}", f"{v[-1]:.1f}"] for n, v in temperatures.items()]
@@ -245,7 +245,7 @@ def _mean_over_time(time: Array, values: Array) -> float:
 
 
 def _print_assumed_inputs(columns: Mapping[str, Array], cycle: Cycle) -> None:
-    for name, column in ((name, quantity.column) for name, quantity in INPUTS.items()):
+    for name, column in ((name, given.column) for name, given in GEARBOX_INPUTS.items()):
         if name not in cycle.inputs and column in columns:
             console.err.print(f"note: the cycle has no column {column}; {columns[column][0]:g} is assumed")
 

@@ -14,7 +14,7 @@ import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from ctypes import byref
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
@@ -30,14 +30,15 @@ from builder.native.compile import host_platform
 from models.base.errors import InputError, did_you_mean
 from models.base.types import Array
 from models.files.cycle import Cycle
-from models.quantities.units import UNITS
+from models.quantities.quantities import GEARBOX_INPUTS, INPUT_KINDS, Input, named_input
+from models.quantities.units import UNITS, conversion, find_unit
 from models.simulation.start_temperatures import start_temperatures
 
 logger = logging.getLogger(__name__)
 
 LONGEST_HELD_S = 0.5  # a piece in which an input changes
 LARGEST_CHANGE = {"speed": 25.0, "torque": 5.0}  # [1/min], [N m]: a slower ramp is held longer
-NEEDED = {"speed": "input", "torque": "input", "T_ambient": "input", "loss.total": "output", "initial.T": "parameter"}
+NEEDED = {"initial.uniform": "parameter", "initial.T": "parameter"}
 WARNING, DISCARD = 1, 2
 PROGRESS_ROWS = 50
 
@@ -62,7 +63,8 @@ def drive_fmu(
     cycle : Cycle
         Inputs in the units of file columns; straight lines between the rows
     initial : float, mapping of node name to float, or None
-        Temperatures at the first row, [degC]; by default the first ambient temperature
+        Temperatures at the first row, [degC]; by default the first ambient temperature, for an FMU without this input
+        its own start temperature
     parameters : mapping of name to float, or None
         Tunable factors, by their name in the network or at the FMI interface
     progress : callable or None
@@ -82,7 +84,10 @@ def drive_fmu(
     with loaded(path) as fmu:
         table = _input_table(fmu, cycle)
         fmu.set_parameters(parameters or {})
-        fmu.set_initial(float(table[0, fmu.inputs.index("T_ambient")]) if initial is None else initial)
+        if initial is None and "T_ambient" in fmu.inputs:
+            initial = float(table[0, fmu.inputs.index("T_ambient")])
+        if initial is not None:
+            fmu.set_initial(initial)
         return _simulate_table(fmu, cycle.time, table, progress)
 
 
@@ -92,16 +97,32 @@ def runs_here(path: Path) -> bool:
         return any(name.startswith(f"binaries/{host_platform()}/") for name in archive.namelist())
 
 
-def fmu_inputs(path: Path) -> tuple[str, ...]:
-    """Return the columns of a cycle that only this FMU takes (for :func:`models.files.cycle_file.read_cycle`).
+def fmu_inputs(path: Path) -> dict[str, Input]:
+    """Return the inputs of an FMU as :func:`models.files.cycle_file.read_cycle` takes them.
 
     Raises
     ------
     InputError
         If the file is not an FMU of this project.
     """
-    inputs = [v.name for v in _description(Path(path)).modelVariables if v.causality == "input"]
-    return tuple(input_column(name) for name in inputs if input_column(name) == name.strip("'"))
+    inputs = [v for v in _description(Path(path)).modelVariables if v.causality == "input"]
+    return {v.name.strip("'"): _input(v) for v in inputs}
+
+
+def _input(variable: Any) -> Input:
+    """An input of an FMU: of the table of quantities, else named, in the unit that tools show."""
+    name = variable.name.strip("'")
+    if name in GEARBOX_INPUTS:
+        known = GEARBOX_INPUTS[name]
+        return replace(known, default=_to_column(variable, float(variable.start)))
+    dimension = UNITS[variable.unit].dimension if variable.unit in UNITS else "ratio"
+    kind = next(kind for kind, (own, _) in INPUT_KINDS.items() if own == dimension)
+    bounds = (variable.min, variable.max, variable.start)
+    low, high, start = (_to_column(variable, float(text)) if text is not None else None for text in bounds)
+    return named_input(
+        name, kind, unit=variable.displayUnit or variable.unit or "", low=-np.inf if low is None else low,
+        high=np.inf if high is None else high, default=start or 0.0,
+    )  # fmt: skip
 
 
 def fmu_nodes(path: Path) -> tuple[str, ...]:
@@ -148,7 +169,7 @@ class LoadedFmu:
         }
         self._input_references = [v.valueReference for v in self._inputs]
         self._orders = [1] * len(self._inputs)
-        self._to_si = [UNITS[v.unit].column[1:] if v.unit in UNITS else (1.0, 0.0) for v in self._inputs]
+        self._to_si = [_affine(v) for v in self._inputs]
 
     def defaults(self) -> list[float]:
         """Start values of the inputs in the units of file columns."""
@@ -318,14 +339,16 @@ def _simulate_table(
 
 def _pieces(names: Sequence[str], duration: float, begin: Array, end: Array) -> int:
     """Into how many pieces a row is cut: of 0.5 s where an input ramps, longer where it changes little; 0 at rest."""
-    change = max(abs(b - a) / LARGEST_CHANGE.get(n, 1.0) for n, a, b in zip(names, begin, end, strict=True))
+    changes = (abs(b - a) / LARGEST_CHANGE.get(n, 1.0) for n, a, b in zip(names, begin, end, strict=True))
+    change = max(changes, default=0.0)
     return min(int(np.ceil(duration / LONGEST_HELD_S)), int(np.ceil(change)))
 
 
 def _input_table(fmu: LoadedFmu, cycle: Cycle) -> Array:
     """Inputs in the FMU's order, start values where the cycle has none, shape (N, inputs)."""
     starts = zip(fmu.inputs, fmu.defaults(), strict=True)
-    return np.stack([cycle.inputs.get(name, np.full(len(cycle), start)) for name, start in starts], axis=-1)
+    columns = [cycle.inputs.get(name, np.full(len(cycle), start)) for name, start in starts]
+    return np.reshape(columns, (len(columns), len(cycle))).T
 
 
 def _starts(variables: Mapping[str, Any]) -> dict[str, Any]:
@@ -407,5 +430,15 @@ def _logged_to(messages: list[tuple[int, str]]) -> Iterator[Any]:
 
 
 def _to_column(variable: Any, value: Any) -> Any:
-    scale, offset = UNITS[variable.unit].column[1:] if variable.unit in UNITS else (1.0, 0.0)
+    scale, offset = _affine(variable)
     return value * scale + offset
+
+
+def _affine(variable: Any) -> tuple[float, float]:
+    """Factor and offset from an FMU's own unit to that of file columns: that which tools show, for a named input."""
+    if variable.unit not in UNITS:
+        return 1.0, 0.0
+    unit = UNITS[variable.unit]
+    if variable.causality != "input" or variable.name in GEARBOX_INPUTS:
+        return unit.column[1:]
+    return conversion(unit, find_unit(variable.displayUnit or variable.unit, unit.dimension))

@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from models.base.types import Array
+from models.quantities.quantities import GEARBOX_INPUTS, Input
 
 # Okabe and Ito's palette: told apart by people with any colour vision, and in grey by order of lightness.
 PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#6B6B6B")
@@ -37,6 +38,7 @@ def plot_cycle(
     *,
     title: str,
     groups: Mapping[str, tuple[str, ...]],
+    inputs: Mapping[str, Input] = GEARBOX_INPUTS,
     reference: Mapping[str, Array] | None = None,
     reference_name: str = "full model",
 ) -> None:
@@ -51,27 +53,33 @@ def plot_cycle(
     title : str
     groups : mapping of str to tuple of str
         Nodes that are drawn together, e.g. ``bearings``; of each group the first and the last are drawn
+    inputs : mapping of str to Input
+        Of the machine; the first two that drive it are drawn
     reference : mapping of column name to Array, or None
         A second result, drawn as small circles
     reference_name : str
     """
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(8.0, 8.5), layout="constrained")
-        inputs, losses, temperatures = figure.subplots(3, 1, sharex=True, height_ratios=(1.0, 1.6, 2.0))
+        has_loss = "P_loss_W" in columns
+        heights = (1.0, 1.6, 2.0) if has_loss else (1.0, 2.6)
+        driving, *between, temperatures = figure.subplots(len(heights), 1, sharex=True, height_ratios=heights)
         figure.suptitle(title, fontsize=11)
         scale, unit = _time_scale(columns["time_s"])
         time = columns["time_s"] * scale
-        _inputs(inputs, time, columns)
-        _curves(losses, time, _loss_curves(columns), reference, scale)
-        losses.set_ylabel("Power loss in W")
-        losses.set_ylim(bottom=0.0)
+        _inputs(driving, time, columns, inputs)
+        for losses in between:
+            _curves(losses, time, _loss_curves(columns), reference, scale)
+            losses.set_ylabel("Power loss in W")
+            losses.set_ylim(bottom=0.0)
         _curves(temperatures, time, _temperature_curves(columns, groups), reference, scale)
         temperatures.set_ylabel("Temperature in °C")
         temperatures.set_xlabel(f"Time in {unit}")
         temperatures.set_xlim(time[0], time[-1])
         if reference is not None:
-            losses.plot([], [], **DOTS, label=reference_name)
-            losses.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
+            named = between[0] if between else temperatures
+            named.plot([], [], **DOTS, label=reference_name)
+            named.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
         kind = path.suffix.removeprefix(".").lower() or "png"
         figure.savefig(path, format=kind, dpi=150, metadata={"Software": None} if kind == "png" else None)
 
@@ -80,14 +88,18 @@ def _time_scale(time: Array) -> tuple[float, str]:
     return (1.0 / 3600.0, "h") if time[-1] - time[0] > 7200.0 else (1.0, "s")
 
 
-def _inputs(axes: Axes, time: Array, columns: Mapping[str, Array]) -> None:
-    axes.plot(time, columns["speed_rpm"], color=PALETTE[0])
-    axes.set_ylabel("Speed in 1/min", color=PALETTE[0])
-    torque = axes.twinx()
-    torque.spines["right"].set_visible(True)
-    torque.grid(visible=False)
-    torque.plot(time, columns["torque_Nm"], color=PALETTE[1], linestyle="--")
-    torque.set_ylabel("Torque in N m", color=PALETTE[1])
+def _inputs(axes: Axes, time: Array, columns: Mapping[str, Array], inputs: Mapping[str, Input]) -> None:
+    """Draw the first two inputs that are no temperature; without any the first one."""
+    driving = [given for given in inputs.values() if not given.quantity.is_temperature] or list(inputs.values())
+    shown = [given for given in driving if given.column in columns][:2]
+    for place, given, colour, line in zip((axes, None), shown, PALETTE, LINES, strict=False):
+        at = place or axes.twinx()
+        at.plot(time, columns[given.column], color=colour, linestyle=line)
+        label = given.quantity.label.removeprefix("Input ")
+        at.set_ylabel(label[:1].upper() + label[1:], color=colour)
+        if place is None:
+            at.spines["right"].set_visible(True)
+            at.grid(visible=False)
 
 
 def _loss_curves(columns: Mapping[str, Array]) -> dict[str, tuple[Array, tuple[str, ...]]]:

@@ -20,7 +20,7 @@ from models.base.version import DISTRIBUTION, license_text
 
 ICON_PX, OVERSAMPLED, ICON_COLOURS = 128, 4, 64
 
-TEMPLATE = "documentation.html"
+TEMPLATE, VALIDITY, OUTSIDE = "documentation.html", "validity.html", "outside.html"
 Kind = Literal["python", "native"]
 
 
@@ -28,7 +28,7 @@ def documentation(
     gearbox: Gearbox,
     table: SignalTable,
     identity: Identity,
-    training: TrainingResult,
+    training: TrainingResult | None,
     reference: ReferenceRun,
     *,
     kind: Kind,
@@ -47,7 +47,34 @@ def documentation(
     }
 
 
-def _index(gearbox: Gearbox, table: SignalTable, identity: Identity, training: TrainingResult, kind: Kind) -> str:
+def _index(
+    gearbox: Gearbox, table: SignalTable, identity: Identity, training: TrainingResult | None, kind: Kind
+) -> str:
+    networks = "" if training is None else (
+        f", networks: preset {training.preset.name}, {training.preset.samples} samples each, seed {training.seed}"
+    )  # fmt: skip
+    provenance = f"Definition {gearbox.hash[:16]}{networks}. Made by {identity.generation_tool}."
+    template, of_kind = (_text(name) for name in (TEMPLATE, f"{kind}.html"))
+    stepping, needs = of_kind.split("<!-- needs -->\n")
+    return Template(template).substitute(
+        stepping=stepping.rstrip(),
+        needs=needs.rstrip(),
+        title=escape(identity.model_name),
+        description=escape(identity.description),
+        provenance=escape(provenance),
+        validity="" if training is None else _validity(training),
+        outside="" if training is None else _text(OUTSIDE).rstrip(),
+        step=f"{STEP_S:g}",
+        variables=_table(nomenclature(table)),
+    )
+
+
+def _text(name: str) -> str:
+    return (files("fmu_src") / name).read_text(encoding="utf-8")
+
+
+def _validity(training: TrainingResult) -> str:
+    """The range of training and the errors of the networks in it."""
     losses = training.losses
     bounds = {
         "speed of the input shaft": (losses.speed_bounds, "1/min"),
@@ -61,24 +88,7 @@ def _index(gearbox: Gearbox, table: SignalTable, identity: Identity, training: T
         (row.component, f"{row.r_squared:.6f}", f"{row.median:.2%}", f"{row.percentile_95:.2%}")
         for row in training.report
     ]
-    preset = training.preset
-    provenance = (
-        f"Definition {gearbox.hash[:16]}, networks: preset {preset.name}, {preset.samples} samples each, seed "
-        f"{training.seed}. Made by {identity.generation_tool}."
-    )
-    template, of_kind = ((files("fmu_src") / name).read_text(encoding="utf-8") for name in (TEMPLATE, f"{kind}.html"))
-    stepping, needs = of_kind.split("<!-- needs -->\n")
-    return Template(template).substitute(
-        stepping=stepping.rstrip(),
-        needs=needs.rstrip(),
-        title=escape(identity.model_name),
-        description=escape(identity.description),
-        provenance=escape(provenance),
-        validity=_table(validity),
-        errors=_table(errors),
-        step=f"{STEP_S:g}",
-        variables=_table(nomenclature(table)),
-    )
+    return Template(_text(VALIDITY)).substitute(validity=_table(validity), errors=_table(errors)).rstrip()
 
 
 def _table(rows: list[tuple[str, ...]]) -> str:

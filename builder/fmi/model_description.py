@@ -14,7 +14,7 @@ from xml.etree.ElementTree import Element, SubElement, fromstring, indent, tostr
 
 from builder.fmi.signals import Signal, SignalTable
 from models.quantities.quantities import TYPES
-from models.quantities.units import UNITS
+from models.quantities.units import UNITS, conversion, find_unit
 
 LOG_CATEGORIES: Mapping[str, str] = {
     "logStatusWarning": "The operating point left the range that the networks were trained on",
@@ -119,9 +119,9 @@ def _co_simulation(root: Element, identity: Identity) -> None:
 
 def _units(root: Element, table: SignalTable) -> None:
     definitions = SubElement(root, "UnitDefinitions")
-    used = {signal.unit for signal in table}
     for name, unit in UNITS.items():
-        if name not in used:
+        signals = [signal for signal in table if signal.unit == name]
+        if not signals:
             continue
         element = SubElement(definitions, "Unit", name=name)
         base = SubElement(element, "BaseUnit", {base: str(exponent) for base, exponent in (unit.base or {}).items()})
@@ -129,6 +129,10 @@ def _units(root: Element, table: SignalTable) -> None:
         if unit.display is not None:
             display, factor, offset = unit.display
             _set_affine(SubElement(element, "DisplayUnit", name=display), factor, offset)
+        own = {s.display for s in signals if s.display_unit and s.display_unit != (unit.display or ("",))[0]}
+        for display in sorted(name for name in own if name is not None):
+            to_display = conversion(unit, find_unit(display, unit.dimension))
+            _set_affine(SubElement(element, "DisplayUnit", name=display), *to_display)
 
 
 def _types(root: Element, table: SignalTable) -> None:

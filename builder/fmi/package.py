@@ -6,7 +6,6 @@ import re
 import zipfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 from builder.fmi.documentation import Kind, documentation
 from builder.fmi.model_description import Identity
@@ -30,7 +29,8 @@ def gearbox_identity(
 ) -> Identity:
     """Description of an FMU of a gearbox."""
     version = project_version()
-    model = "reduced-order twin of a detailed loss model" + ("" if correction is None else f", {correction.words}")
+    model = "thermal network" if gearbox.is_parametric else "reduced-order twin of a detailed loss model"
+    model += "" if correction is None else f", {correction.words}"
     return Identity(
         model_name=gearbox.name,
         model_identifier=model_identifier(output.stem),
@@ -49,13 +49,12 @@ def gearbox_pages(
     network: ThermalNetwork,
     table: SignalTable,
     identity: Identity,
-    training: TrainingResult,
-    data: Mapping[str, Any],
+    training: TrainingResult | None,
     *,
     kind: Kind,
 ) -> dict[str, bytes]:
-    """Documentation of an FMU of a gearbox, by path in the archive; `data` is that of :func:`builder.fmi.twin_data`."""
-    reference = reference_run(gearbox, network, table, data, training.losses)
+    """Documentation of an FMU of a gearbox, by path in the archive."""
+    reference = reference_run(gearbox, network, table, None if training is None else training.losses)
     return documentation(gearbox, table, identity, training, reference, kind=kind)
 
 
@@ -71,7 +70,7 @@ def model_identifier(name: str) -> str:
     return plain if re.match(r"[A-Za-z]", plain) else f"gearbox_{plain}"
 
 
-def refuse_mismatch(network: ThermalNetwork, losses: SurrogateLosses, networks: Sequence[Path]) -> None:
+def refuse_mismatch(network: ThermalNetwork, losses: SurrogateLosses | None, networks: Sequence[Path]) -> None:
     """Refuse laws that are no expressions, and networks of another gearbox.
 
     Raises
@@ -83,9 +82,10 @@ def refuse_mismatch(network: ThermalNetwork, losses: SurrogateLosses, networks: 
             f"{', '.join(network.numeric_laws)}: this law branches on values or calls numpy, so it simulates but "
             "cannot go into an FMU; write it with arithmetic, sympy functions and sympy.Piecewise"
         )
-    if tuple(losses.components) != tuple(network.components):
+    if (() if losses is None else tuple(losses.components)) != tuple(network.components):
         raise InputError("the networks were trained for another gearbox; train them for this one")
-    missing = {f"{trained.name}.onnx" for trained in losses.networks} - {path.name for path in networks}
+    trained = () if losses is None else losses.networks
+    missing = {f"{one.name}.onnx" for one in trained} - {path.name for path in networks}
     if missing:
         raise InputError(f"the ONNX files {', '.join(sorted(missing))} are missing; export the networks again")
 

@@ -4,20 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from builder.fmi.reference_cycle import reference_cycle
-from builder.fmi.signals import SignalTable
-from fmu_src.python.twin import Twin
+from builder.fmi.signals import START_TEMPERATURE, Signal, SignalTable
 from models.assembly.gearbox import Gearbox
 from models.base.types import Array
-from models.network.compiled import law_source
-from models.network.laws import compile_function
-from models.portable.surrogate import SurrogateLosses
-from models.quantities.units import UNITS
-from models.simulation.simulate import input_table
+from models.portable import solver
+from models.portable.evaluation import NoLosses
+from models.portable.surrogate import KELVIN, SurrogateLosses
+from models.simulation.simulate import Result, evaluate, initial_states, input_table, network_system
 from models.simulation.thermal_network import ThermalNetwork
 
 STEP_S = 10.0
@@ -36,36 +33,46 @@ class ReferenceRun:
 
 
 def reference_run(
-    gearbox: Gearbox, network: ThermalNetwork, table: SignalTable, data: Mapping[str, Any], losses: SurrogateLosses
+    gearbox: Gearbox, network: ThermalNetwork, table: SignalTable, surrogate: SurrogateLosses | None
 ) -> ReferenceRun:
-    """Run the reference cycle through the code and the networks of an FMU.
+    """Run the reference cycle through the network of an FMU.
 
     Parameters
     ----------
-    gearbox, network, table, losses
+    gearbox, network, table, surrogate
         What the FMU is made of
-    data : mapping
-        As the FMU carries it (:func:`builder.fmi.twin_data.twin_data`)
     """
     cycle = reference_cycle(gearbox, step_s=STEP_S)
-    twin = Twin(data, _functions(network), losses)
-    inputs, outputs = table.of_role("input"), [s for s in table if s.causality == "output"]
+    losses = NoLosses() if surrogate is None else surrogate
     rows = input_table(network, cycle)
-    si = np.stack([_from_column(rows[:, i], signal.unit) for i, signal in enumerate(inputs)], axis=-1)
-    references = [signal.reference for signal in outputs]
-    twin.set([signal.reference for signal in inputs], si[0].tolist())
-    twin.start(float(cycle.time[0]))
-    twin.initialize()
-    values = [twin.get(references)]
-    for row in range(len(cycle) - 1):
-        twin.set([signal.reference for signal in inputs], si[row].tolist())
-        twin.step(float(cycle.time[row]), float(cycle.time[row + 1] - cycle.time[row]))
-        values.append(twin.get(references))
-    columns = np.array(values)
+    system = network_system(network, losses)
+    starts = initial_states(network, START_TEMPERATURE - KELVIN)
+    held = np.concatenate((rows[:1], rows[:-1]))  # at the end of a step its inputs still hold
+    states = [solver.start(starts)]
+    for begin, end, row in zip(cycle.time[:-1], cycle.time[1:], rows[:-1], strict=True):
+        states.append(solver.advance(system, states[-1], float(begin), float(end - begin), row, row))
+    result = evaluate(
+        network, losses, None, time=cycle.time, table=held, states=np.stack([s.states for s in states]),
+        heat=np.stack([[s.heat_in, s.heat_out] for s in states], axis=-1),
+    )  # fmt: skip
+    inputs, outputs = table.of_role("input"), [signal for signal in table if signal.causality == "output"]
     return ReferenceRun(
-        {"time": cycle.time} | {signal.name: si[:, i] for i, signal in enumerate(inputs)},
-        {"time": cycle.time} | {signal.name: columns[:, i] for i, signal in enumerate(outputs)},
+        {"time": cycle.time} | {s.name: _at_fmi(s, rows[:, i]) for i, s in enumerate(inputs)},
+        {"time": cycle.time} | {s.name: _at_fmi(s, _values(result, s)) for s in outputs},
     )
+
+
+def _values(result: Result, signal: Signal) -> Array:
+    """An output over time in the network's units."""
+    families = {"temperature": result.temperatures, "loss": result.losses, "heat": result.extra_heat}
+    if signal.role in families:
+        return families[signal.role][signal.of]
+    if signal.role == "in_domain":
+        return np.asarray(result.domain_distance <= 0.0, dtype=float)
+    single = {"total_loss": "loss", "torque_loss": "torque_loss", "efficiency": "efficiency",
+              "domain_distance": "domain_distance"}  # fmt: skip
+    values: Array = getattr(result, single[signal.role])
+    return values
 
 
 def csv(columns: Mapping[str, Array]) -> bytes:
@@ -76,9 +83,6 @@ def csv(columns: Mapping[str, Array]) -> bytes:
     return ("\n".join(lines) + "\n").encode()
 
 
-def _functions(network: ThermalNetwork) -> dict[str, Any]:
-    return {name: compile_function(source, name) for name, source in law_source(network, vector=False).items()}
-
-
-def _from_column(values: Array, unit: str | None) -> Array:
-    return values if unit is None else (values - UNITS[unit].column[2]) / UNITS[unit].column[1]
+def _at_fmi(signal: Signal, values: Array) -> Array:
+    scale, offset = signal.to_inner
+    return (values - offset) / scale

@@ -6,6 +6,7 @@ import numpy as np
 
 from models.assembly.gearbox import Gearbox
 from models.files.cycle import Cycle
+from models.quantities.quantities import GEARBOX_INPUTS, Input
 
 # time [s], speed and torque as shares of the upper training bounds: cold start at low load, a phase of constant power,
 # high torque, and back to the load of the start. The paper prints the curve without numbers.
@@ -20,10 +21,15 @@ KNOTS = np.array([
     [600.0, 0.08, 0.06],
 ])  # fmt: skip
 COLD_START = 20.0  # degC
+# Without geometry: time [s] and share of the way from an input's default to its level.
+RAMP = np.array([[0.0, 0.0], [60.0, 0.0], [120.0, 1.0], [420.0, 1.0], [480.0, 0.0], [600.0, 0.0]])
 
 
 def reference_cycle(gearbox: Gearbox, *, step_s: float = 1.0) -> Cycle:
     """The reference cycle of a gearbox, scaled to its training bounds.
+
+    Without geometry, all inputs go from their defaults to a level and back: speed and torque to their typical
+    operation, an input with a range of the definition halfway to the bound that is further away.
 
     Parameters
     ----------
@@ -44,6 +50,10 @@ def reference_cycle(gearbox: Gearbox, *, step_s: float = 1.0) -> Cycle:
     (601, 280.0)
     """
     time = np.linspace(0.0, KNOTS[-1, 0], round(KNOTS[-1, 0] / step_s) + 1)
+    if gearbox.is_parametric:
+        share = np.interp(time, RAMP[:, 0], RAMP[:, 1])
+        levels = _levels(gearbox)
+        return Cycle(time, {name: default + share * (level - default) for name, (default, level) in levels.items()})
     speed = np.interp(time, KNOTS[:, 0], KNOTS[:, 1]) * gearbox.training.speed_rpm[1]
     torque = np.interp(time, KNOTS[:, 0], KNOTS[:, 2]) * gearbox.training.torque_Nm[1]
     columns = {
@@ -54,3 +64,20 @@ def reference_cycle(gearbox: Gearbox, *, step_s: float = 1.0) -> Cycle:
         "air_speed_m_s": np.full_like(time, gearbox.ambient.air_speed_m_s),
     }
     return Cycle.from_columns(columns)
+
+
+def _levels(gearbox: Gearbox) -> dict[str, tuple[float, float]]:
+    """Default and level of every input of a gearbox without geometry."""
+    typical = dict(zip(("speed", "torque"), gearbox.typical_operation, strict=True))
+    return {
+        name: (given.default, typical[name] if name in typical else _inside(given))
+        for name, given in gearbox.network().inputs.items()
+    }
+
+
+def _inside(given: Input) -> float:
+    """A value well inside the range of an input and away from its default; the default where there is no range."""
+    low, high = given.quantity.low, given.quantity.high
+    if given.name in GEARBOX_INPUTS or not np.isfinite(high - low):
+        return given.default
+    return 0.5 * (given.default + (high if high - given.default >= given.default - low else low))

@@ -11,17 +11,17 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from math import inf
 from typing import Literal
 
 import sympy as sp
 
-from models.assembly.gearbox import Gearbox
 from models.base.errors import InputError, did_you_mean
+from models.network.laws import symbol
 from models.portable.surrogate import SurrogateLosses
-from models.quantities.quantities import INPUTS, TYPES, quantity_of_signal
-from models.quantities.units import UNITS, fmi_symbol
+from models.quantities.quantities import GEARBOX_INPUTS, TYPES, column_of, quantity_of_signal
+from models.quantities.units import UNITS, Unit, conversion, find_unit, fmi_symbol
 from models.simulation.thermal_network import ThermalNetwork
 
 START_TEMPERATURE = 293.15  # K
@@ -63,6 +63,10 @@ class Signal:
         Column of cycle and result files
     depends, depends_initially : tuple of str
         Signals that an output depends on directly, and at initialization
+    inner_unit : str or None
+        Unit in the network, if it is not that of file columns
+    display_unit : str or None
+        Unit in which a tool should show it, if it is not that of `type`; "" for none
     reference : int
         FMI value reference, its place in the table
     """
@@ -84,6 +88,8 @@ class Signal:
     column: str | None = None
     depends: tuple[str, ...] = ()
     depends_initially: tuple[str, ...] = ()
+    inner_unit: str | None = None
+    display_unit: str | None = None
     reference: int = -1
 
     @property
@@ -93,8 +99,21 @@ class Signal:
 
     @property
     def display(self) -> str | None:
-        """Unit in which a tool should show it, where that is not `unit`."""
+        """Unit in which a tool should show it, if that is not `unit`."""
+        if self.display_unit is not None:
+            return self.display_unit or None
         return TYPES[self.type].display if self.type is not None else None
+
+    @property
+    def to_inner(self) -> tuple[float, float]:
+        """Factor and offset from the value at the FMI to the unit of the network."""
+        unit = UNITS.get(self.unit or "")
+        # Only signals of the network's own quantities are converted; a parameter stays in the unit of its law.
+        if unit is None or self.role == "factor":
+            return 1.0, 0.0
+        if self.inner_unit is None:
+            return unit.column[1:]
+        return conversion(unit, find_unit(self.inner_unit, unit.dimension))
 
 
 class SignalTable:
@@ -139,9 +158,9 @@ class SignalTable:
         Examples
         --------
         >>> from models.assembly.gearbox import load_gearbox
-        >>> lines = signal_table(load_gearbox("fzg")).markdown().splitlines()
+        >>> lines = signal_table(load_gearbox("fzg").network()).markdown().splitlines()
         >>> lines[2][:72]
-        '| `speed` | input | rad/s | rpm | `speed_rpm` | 0 | -20944 ... 20944 | 0'
+        '| `speed` | input | rad/s | rpm | `speed_rpm` | 0 | -20944 ... 20944 |  '
         """
         header, *rows = nomenclature(self)
         lines = ["| " + " | ".join(header) + " |", "|" + "---|" * len(header)]
@@ -200,21 +219,17 @@ def result_column(name: str) -> str | None:
 
 def input_column(name: str) -> str:
     """Column of a cycle file for an input of an FMU: its usual one, else its own name."""
-    return INPUTS[name].column if name in INPUTS else name.strip("'")
+    return column_of(name.strip("'"))
 
 
-def signal_table(
-    gearbox: Gearbox, network: ThermalNetwork | None = None, losses: SurrogateLosses | None = None
-) -> SignalTable:
-    """The signals of a gearbox.
+def signal_table(network: ThermalNetwork, losses: SurrogateLosses | None = None) -> SignalTable:
+    """The signals of a thermal network.
 
     Parameters
     ----------
-    gearbox : Gearbox
-    network : ThermalNetwork or None
-        Its network, where it is not the nominal one
+    network : ThermalNetwork
     losses : SurrogateLosses or None
-        The trained losses, whose domain is shown; by default that of the definition's ``[training]``
+        The trained networks of its losses, whose range of training is shown; None if it has none
 
     Raises
     ------
@@ -224,28 +239,29 @@ def signal_table(
     Examples
     --------
     >>> from models.assembly.gearbox import load_gearbox
-    >>> table = signal_table(load_gearbox("fzg"))
+    >>> table = signal_table(load_gearbox("fzg").network())
     >>> table["oil.T"].unit, table["oil.T"].column
     ('K', 'T_oil_degC')
     """
-    network = gearbox.network() if network is None else network
-    training = gearbox.training
-    domain = (training.speed_rpm, training.torque_Nm, training.temperature_degC)
-    if losses is not None:
-        domain = (losses.speed_bounds, losses.torque_bounds, losses.temperature_bounds)
-    return SignalTable(list(_Table(gearbox, network, domain).signals()))
+    return SignalTable(list(_Table(network, losses).signals()))
+
+
+def _convert(unit: Unit, to: Unit, value: float) -> float:
+    """Convert a value to another unit, to 12 digits."""
+    factor, offset = conversion(to, unit)
+    return float(f"{(value - offset) / factor:.12g}")
 
 
 class _Table:
     """The network at hand while its signals are listed."""
 
-    def __init__(self, gearbox: Gearbox, network: ThermalNetwork, domain: tuple[tuple[float, float], ...]) -> None:
+    def __init__(self, network: ThermalNetwork, losses: SurrogateLosses | None) -> None:
         self.network = network
-        self.domain = dict(zip(("speed", "torque", "temperature"), domain, strict=True))
-        self.inputs = ("speed", "torque", *network.inputs)
+        self.losses = losses
+        self.inputs = tuple(network.inputs)
         self.parameters = {parameter.name: self._parameter_name(parameter.name) for parameter in network.parameters}
         self.boundaries = {node.name: node.temperature for node in network.nodes if node.temperature is not None}
-        self.loss_nodes = gearbox.losses().temperature_nodes
+        self.loss_heats = [source.heat for source in network.sources if source.is_loss]
 
     def signals(self) -> Iterator[Signal]:
         yield from self._inputs()
@@ -259,11 +275,18 @@ class _Table:
                          variability="continuous", initial="calculated", nominal=max(abs(state.start), 1.0),
                          description=f"Memory {state.name} of the thermal network")  # fmt: skip
 
-    def _domain(self, signal: str) -> tuple[float, float] | None:
-        if signal not in self.domain:
+    def _domain(self, name: str) -> tuple[float, float] | None:
+        """Range of training of an input or of the temperature of a node, in SI units."""
+        if self.losses is None:
             return None
-        low, high = self.domain[signal]
-        unit = UNITS[TYPES[signal.capitalize()].unit]
+        bounds = {"speed": ("Speed", self.losses.speed_bounds), "torque": ("Torque", self.losses.torque_bounds)}
+        bounds |= {
+            f"T_{node}": ("Temperature", self.losses.temperature_bounds) for node in self.losses.temperature_nodes
+        }
+        if name not in bounds:
+            return None
+        kind, (low, high) = bounds[name]
+        unit = UNITS[TYPES[kind].unit]
         return unit.from_column(low), unit.from_column(high)
 
     def _inputs(self) -> Iterator[Signal]:
@@ -273,18 +296,19 @@ class _Table:
             "T_ambient": "Ambient temperature, in kelvin",
             "air_speed": "Speed of the air along the housing",
         }
-        defaults = {"speed": 0.0, "torque": 0.0, **self.network.inputs}
-        for name in self.inputs:
-            kind = INPUTS[name].type if name in INPUTS else None
-            text = texts.get(name, f"Input {name}, in the unit of its column")
-            unit = TYPES[kind].unit if kind else None
-            low, high = (INPUTS[name].low, INPUTS[name].high) if name in INPUTS else (-inf, inf)
-            convert = UNITS[unit].from_column if unit else float
+        for name, given in self.network.inputs.items():
+            quantity = given.quantity
+            kind = TYPES[quantity.type or "Ratio"]
+            unit, own = find_unit(kind.unit, quantity.dimension), find_unit(quantity.unit, quantity.dimension)
+            at_fmi = partial(_convert, own, unit)
+            display = None if name in GEARBOX_INPUTS else quantity.unit * (quantity.unit != kind.unit)
             yield Signal(
-                name=fmi_name(name), role="input", of=name, description=text, type=kind, unit=unit, causality="input",
-                variability="continuous", initial="", start=convert(defaults[name]), minimum=convert(low),
-                maximum=convert(high), domain=self._domain(name), column=input_column(name),
-                nominal=TYPES[kind].nominal if kind else None,
+                name=fmi_name(name), role="input", of=name,
+                description=given.description or texts.get(name, name.replace("_", " ")), type=quantity.type,
+                unit=kind.unit, inner_unit=quantity.unit, display_unit=display, causality="input",
+                variability="continuous", initial="",
+                start=at_fmi(given.default), minimum=at_fmi(quantity.low), maximum=at_fmi(quantity.high),
+                domain=self._domain(name), column=given.column, nominal=kind.nominal,
             )  # fmt: skip
 
     def _output(self, *, name: str, role: Role, of: str = "", kind: str | None, description: str, expression: sp.Expr,
@@ -303,9 +327,10 @@ class _Table:
     def _direct(self, expression: sp.Expr) -> tuple[tuple[str, ...], tuple[str, ...]]:
         """Inputs and parameters that an expression depends on without a detour through the temperatures of parts."""
         names = {s.name for s in expression.free_symbols}
-        names |= {s.name for node, T in self.boundaries.items() if f"T_{node}" in names for s in T.free_symbols}
         if any(name.startswith("P_") and name[2:] in self.network.components for name in names):
-            names |= {"speed", "torque"}
+            names |= {s.name for s in self._operating_point().free_symbols}
+        names |= {s.name for name, law in self.network.derived.items() if name in names for s in law.free_symbols}
+        names |= {s.name for node, T in self.boundaries.items() if f"T_{node}" in names for s in T.free_symbols}
         inputs = tuple(fmi_name(name) for name in self.inputs if name in names)
         return inputs, tuple(fmi for name, fmi in self.parameters.items() if name in names)
 
@@ -316,14 +341,14 @@ class _Table:
                 name=f"{fmi_name(node.name)}.T", role="temperature", of=node.name, kind="Temperature", minimum=0.0,
                 description=f"Temperature of {node.name.replace('_', ' ')}" + (" (boundary)" if boundary else ""),
                 expression=sp.Integer(0) if node.temperature is None else node.temperature, needs_state=not boundary,
-                domain=self._domain("temperature") if node.name in self.loss_nodes else None,
+                domain=self._domain(f"T_{node.name}"),
             )  # fmt: skip
 
     def _powers(self) -> Iterator[Signal]:
-        losses = [source for source in self.network.sources if source.is_loss]
-        total = sum((source.heat for source in losses), sp.Integer(0))
-        yield self._output(name="loss.total", role="total_loss", kind="Power", description="Sum of all losses",
-                           expression=total)  # fmt: skip
+        total = sum(self.loss_heats, sp.Integer(0))
+        if self.loss_heats:
+            yield self._output(name="loss.total", role="total_loss", kind="Power", description="Sum of all losses",
+                               expression=total)  # fmt: skip
         for source in self.network.sources:
             named = source.name.replace("_", " ")
             yield self._output(
@@ -332,17 +357,26 @@ class _Table:
                 description=f"Loss: {named}" if source.is_loss else f"Heat into {source.node}: {named}",
                 minimum=0.0 if source.name in self.network.components else -inf,
             )  # fmt: skip
+        if not self.loss_heats or not {"speed", "torque"} <= set(self.inputs):
+            return
         yield self._output(name="torque_loss", role="torque_loss", kind="Torque", expression=total,
                            description="Loss torque at the input shaft, signed as the speed")  # fmt: skip
         yield self._output(name="efficiency", role="efficiency", kind="Ratio", minimum=0.0, maximum=1.0,
                            expression=total + sp.Symbol("speed") * sp.Symbol("torque"),
                            description="Power out over power in; 0 without power")  # fmt: skip
 
+    def _operating_point(self) -> sp.Expr:
+        """An expression of what speed and torque depend on as the losses see them."""
+        shifted = self.network.operating
+        return sum((shifted.get(name, symbol(name)) for name in ("speed", "torque")), sp.Integer(0))
+
     def _quality(self) -> Iterator[Signal]:
-        point = sp.Symbol("speed") + sp.Symbol("torque")
+        if not self.network.components:
+            return
+        point = self._operating_point()
         yield self._output(
             name="in_domain", role="in_domain", kind=None, expression=point,
-            description="Whether the operating point is inside the range that the networks were trained on",
+            description="True if the operating point is inside the range that the networks were trained on",
         )  # fmt: skip
         yield self._output(
             name="domain_distance", role="domain_distance", kind="Ratio", minimum=0.0, expression=point,
@@ -359,7 +393,7 @@ class _Table:
 
         yield Signal(name="initial.uniform", role="initial_uniform", causality="parameter", variability="fixed",
                      initial="exact", start=True,
-                     description="Whether all nodes start at initial.T; else each at its own T_start")  # fmt: skip
+                     description="True: all nodes start at initial.T; false: each at its T_start")  # fmt: skip
         yield fixed("initial.T", "initial_temperature", "Temperature of all nodes at the start, if initial.uniform")
         for part in self.network.parts:
             text = f"Temperature of {part.name.replace('_', ' ')} at the start, unless initial.uniform"

@@ -11,7 +11,6 @@ from builder.fmi.signals import Signal, SignalTable
 from fmu_src.python.twin import LISTS
 from models.network.compiled import compile_laws, law_source
 from models.portable.surrogate import SurrogateLosses
-from models.quantities.units import UNITS
 from models.simulation.thermal_network import ThermalNetwork
 
 
@@ -38,9 +37,7 @@ def twin_data(
 def _slot(signal: Signal) -> dict[str, Any]:
     """One signal for :class:`fmu_src.python.twin.Slot`."""
     settable = {"input": "input", "parameter": signal.variability}.get(signal.causality, "")
-    unit = UNITS.get(signal.unit or "")
-    # Only signals of the network's own quantities are converted; a parameter stays in the unit of its law.
-    name, scale, offset = unit.column if unit is not None and signal.role != "factor" else (signal.unit or "", 1.0, 0.0)
+    scale, offset = signal.to_inner
     return {
         "name": signal.name,
         "role": signal.role,
@@ -53,7 +50,6 @@ def _slot(signal: Signal) -> dict[str, Any]:
         "maximum": min(signal.maximum, sys.float_info.max),
         "scale": scale,
         "offset": offset,
-        "inner_unit": name,
     }
 
 

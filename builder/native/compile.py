@@ -19,6 +19,7 @@ from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cache, partial
+from importlib.resources import files
 from pathlib import Path
 
 from models.base.atomic_write import atomic_file
@@ -26,10 +27,19 @@ from models.base.errors import InputError, did_you_mean
 
 CACHE_VARIABLE = "GEARBOX_TWIN_CACHE"
 GET_ZIG = "install ziglang: python -m pip install ziglang"
+INCLUDES_STANDARD_HEADERS = {"one.c": b"#include <math.h>\n#include <stdio.h>\nint one(void) { return 1; }\n"}
 # NaN and infinity keep their meaning: no -ffast-math. Nobody reads errno or floating-point exceptions.
 OPTIONS = (
     "-std=c99", "-O3", "-fno-unroll-loops", "-fno-math-errno", "-fno-trapping-math", "-ffp-contract=fast",
-    "-fvisibility=hidden", "-fno-asynchronous-unwind-tables", "-fno-ident", "-g0", "-shared", "-s",
+    "-fvisibility=hidden", "-fno-asynchronous-unwind-tables", "-fno-ident", "-g0",
+)  # fmt: skip
+# A DLL that zig links with its C library has MinGW's static one inside, which takes 80 s of processor time per
+# platform to build. Windows' own C library and WINDOWS_RUNTIME are enough.
+WINDOWS_RUNTIME = "windows_runtime.c"
+WINDOWS_LINK = (
+    "-nostdlib", "-lcompiler_rt",
+    *(f"-lapi-ms-win-crt-{name}-l1-1-0"
+      for name in ("convert", "heap", "math", "runtime", "stdio", "string", "utility")),
 )  # fmt: skip
 
 
@@ -52,11 +62,19 @@ class Platform:
     suffix: str
 
     @property
-    def options(self) -> tuple[str, ...]:
-        """Options of this platform's linker."""
-        if self.suffix == ".so":
-            return ("-fPIC", "-Wl,--no-undefined", "-Wl,--build-id=none", "-lm")
-        return ("-fPIC",) if self.suffix == ".dylib" else ()
+    def is_windows(self) -> bool:
+        """True for the platforms of Windows."""
+        return self.suffix == ".dll"
+
+    @property
+    def code_options(self) -> tuple[str, ...]:
+        """Options that compile for this platform."""
+        return () if self.is_windows else ("-fPIC",)
+
+    @property
+    def link_options(self) -> tuple[str, ...]:
+        """Options of this platform's linker, libraries last."""
+        return ("-Wl,--no-undefined", "-Wl,--build-id=none", "-lm") if self.suffix == ".so" else ()
 
 
 PLATFORMS = {
@@ -71,6 +89,10 @@ PLATFORMS = {
         Platform("aarch64-windows", "aarch64-windows-gnu", ".dll"),
     )
 }
+
+
+class NoCompilerError(InputError):
+    """There is no C compiler on this machine that native FMUs could be compiled with."""
 
 
 @dataclass(frozen=True)
@@ -147,21 +169,23 @@ def plan_for(platforms: str) -> Plan:
 
     Raises
     ------
+    NoCompilerError
+        If there is no compiler at all.
     InputError
-        If there is no compiler for what is asked.
+        If a platform is not known, or only ziglang can compile for it.
     """
     wanted, host, zig, own = chosen_platforms(platforms), host_platform(), _zig(), _own_compiler()
     if zig is not None and not (platforms == "host" and own is not None):
         return Plan(zig, wanted)
     if own is None:
-        raise InputError(f"a native FMU needs a C compiler, and there is no cc, gcc, clang or CC; {GET_ZIG}")
+        raise NoCompilerError(f"a native FMU needs a C compiler, and no cc, gcc or clang works here; {GET_ZIG}")
     if host is None or host not in wanted:
         raise InputError(f"this machine's own compiler cannot build for {', '.join(wanted)}; {GET_ZIG}")
     left_out = [name for name in wanted if name != host]
     return Plan(own, (host,), f"built for {host} only; for {', '.join(left_out)} {GET_ZIG}" if left_out else "")
 
 
-def compile_libraries(sources: Mapping[str, bytes], platforms: str = "all") -> Binaries:
+def compile_libraries(sources: Mapping[str, bytes], platforms: str = "host") -> Binaries:
     """Compile C sources to shared libraries.
 
     Parameters
@@ -195,17 +219,36 @@ def _zig() -> Compiler | None:
 
 
 def _own_compiler() -> Compiler | None:
+    """Return the compiler that CC names, else the first of cc, gcc and clang that compiles a file.
+
+    Raises
+    ------
+    InputError
+        If CC names no command.
+    """
     named = os.environ.get("CC")
     try:
-        own = [shlex.split(named)] if named else [["cc"], ["gcc"], ["clang"]]
+        own = [tuple(shlex.split(named))] if named else [("cc",), ("gcc",), ("clang",)]
     except ValueError as error:
         raise InputError(f"CC is {named!r}, which cannot be read ({error}); correct it or unset it") from error
     for command in own:
         if command and shutil.which(command[0]):
-            return Compiler(tuple(command), _output([*command, "--version"]), is_zig=False)
+            compiler = Compiler(command, _output([*command, "--version"]), is_zig=False)
+            if named or _works(compiler):
+                return compiler
     if named:
         raise InputError(f"CC is {named!r}, which cannot be found; correct it or unset it")
     return None
+
+
+@cache
+def _works(compiler: Compiler) -> bool:
+    """Return True if a compiler is there with the headers and libraries of C."""
+    host = host_platform()
+    try:
+        return host is not None and bool(_compile(INCLUDES_STANDARD_HEADERS, compiler, PLATFORMS[host]))
+    except InputError:
+        return False
 
 
 def _output(command: Sequence[str]) -> str:
@@ -213,19 +256,21 @@ def _output(command: Sequence[str]) -> str:
 
 
 def _library(sources: Mapping[str, bytes], compiler: Compiler, target: Platform) -> bytes:
-    options = [*OPTIONS, *(("-target", target.target) if compiler.is_zig else ()), *target.options]
+    if compiler.is_zig and target.is_windows:
+        runtime = (files("fmu_src") / "native" / WINDOWS_RUNTIME).read_bytes()
+        sources = {**sources, WINDOWS_RUNTIME: runtime}
     folder = _cache_folder()
     if folder is None:
-        return _compile(sources, compiler, options, target)
+        return _compile(sources, compiler, target)
     # zig is the same in every virtual environment, and another compiler's own options are part of its command.
     command = compiler.command[1:] if compiler.is_zig else compiler.command
-    made_of = (compiler.version, command, options, sorted(sources.items()))
+    made_of = (compiler.version, command, _commands(["*.c"], compiler, target), sorted(sources.items()))
     digest = hashlib.sha256(repr(made_of).encode()).hexdigest()
     kept = folder / f"{digest}{target.suffix}"
     try:
         return kept.read_bytes()
     except OSError:
-        library = _compile(sources, compiler, options, target)
+        library = _compile(sources, compiler, target)
     try:
         with atomic_file(kept) as file:
             file.write_bytes(library)
@@ -249,17 +294,26 @@ def _cache_folder() -> Path | None:
     return Path(base) / "gearbox-thermal-twin"
 
 
-def _compile(sources: Mapping[str, bytes], compiler: Compiler, options: Sequence[str], target: Platform) -> bytes:
+def _compile(sources: Mapping[str, bytes], compiler: Compiler, target: Platform) -> bytes:
     with tempfile.TemporaryDirectory(prefix="twin-c-") as folder:
         for name, content in sources.items():
             Path(folder, name).write_bytes(content)
-        names = sorted(name for name in sources if name.endswith(".c"))
-        output = f"library{target.suffix}"  # relative names: no path of this machine gets into the library
-        libraries = [option for option in options if option.startswith("-l")]
-        others = [option for option in options if option not in libraries]
-        command = [*compiler.command, *others, "-o", output, *names, *libraries]
-        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)  # noqa: S603
-        if done.returncode != 0:
-            said = "\n".join((done.stderr or done.stdout).splitlines()[:20])
-            raise InputError(f"{' '.join(compiler.command)} cannot compile the FMU for {target.folder}:\n{said}")
-        return Path(folder, output).read_bytes()
+        for options in _commands(sorted(name for name in sources if name.endswith(".c")), compiler, target):
+            command = [*compiler.command, *options]
+            done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)  # noqa: S603
+            if done.returncode != 0:
+                said = "\n".join((done.stderr or done.stdout).splitlines()[:20])
+                raise InputError(f"{' '.join(compiler.command)} cannot compile the FMU for {target.folder}:\n{said}")
+        return Path(folder, f"library{target.suffix}").read_bytes()
+
+
+def _commands(names: Sequence[str], compiler: Compiler, target: Platform) -> list[list[str]]:
+    """Options of the compiler's runs; all names are relative: no path of this machine gets into the library."""
+    machine = ["-target", target.target] if compiler.is_zig else []
+    code = [*machine, *OPTIONS, *target.code_options]
+    link = [*machine, "-shared", "-s", "-o", f"library{target.suffix}"]
+    if compiler.is_zig and target.is_windows:
+        objects = [f"{name}.obj" for name in names]
+        compiled = [[*code, "-c", name, "-o", made] for name, made in zip(names, objects, strict=True)]
+        return [*compiled, [*link, "-O3", *objects, *WINDOWS_LINK]]
+    return [[*code, *link, *names, *target.link_options]]

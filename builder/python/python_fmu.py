@@ -97,7 +97,7 @@ def build_python_fmu(
     """
     network = corrected_network(gearbox, correction) if network is None else network
     refuse_mismatch(network, training.losses, networks)
-    table = signal_table(gearbox, network, training.losses)
+    table = signal_table(network, training.losses)
     identity = gearbox_identity(gearbox, output, FLAGS, correction)
     data = twin_data(table, network, training.losses, definition=gearbox.hash)
     files = {DATA: to_json(data)} | {path.name: path.read_bytes() for path in networks}
@@ -108,7 +108,7 @@ def build_python_fmu(
         (stage / "modelDescription.xml").write_bytes(xml)
         (stage / "requirements.txt").write_text(REQUIREMENTS, encoding="utf-8")
         built = _build_with_pythonfmu(slave, stage, Path(scratch) / f"{identity.model_identifier}.fmu")
-    package_fmu(output, xml, built, gearbox_pages(gearbox, network, table, identity, training, data, kind="python"))
+    package_fmu(output, xml, built, gearbox_pages(gearbox, network, table, identity, training, kind="python"))
     return output
 
 

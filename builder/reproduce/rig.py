@@ -159,7 +159,8 @@ def thermal_network(study: Study) -> Iterator[Part]:
     speed, torque = float(study.pinion_speed[MIDDLE]), float(study.pinion_torque[MEDIUM])
     steady = network.steady_state(losses=study.full, speed=speed, torque=torque)
     signals = {f"T_{name}": float(T[0, 0]) for name, T in steady.temperatures.items()}
-    signals |= {"time": 0.0, "speed": speed, "torque": torque, **network.inputs}
+    signals |= {"time": 0.0, **{name: given.default for name, given in network.inputs.items()}}
+    signals |= {"speed": speed, "torque": torque}
     signals |= {parameter.name: parameter.start for parameter in network.parameters}
     values = {symbol(name): value for name, value in signals.items()}
     conductance = {link.nodes: float(link.conductance.subs(values)) for link in network.links}

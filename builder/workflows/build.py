@@ -16,7 +16,7 @@ from builder.base import console
 from builder.drive.driver import drive_fmu, runs_here
 from builder.drive.plots import plot_cycle
 from builder.fmi.reference_cycle import COLD_START, reference_cycle
-from builder.native.compile import plan_for
+from builder.native.compile import NoCompilerError, plan_for
 from builder.native.native_fmu import build_native_fmu
 from builder.python.python_fmu import build_python_fmu
 from builder.surrogate.onnx_export import export_onnx
@@ -41,12 +41,13 @@ class CycleErrors:
     temperature_K : mapping of node to float
         Largest difference, [K]
     loss_mean, loss_worst : float
-        Mean and largest difference of the total loss, relative to the full model's at that moment, [-]
+        Mean and largest difference of the total loss, relative to the full model's at that moment, [-]; None without
+        a loss
     """
 
     temperature_K: Mapping[str, float]
-    loss_mean: float
-    loss_worst: float
+    loss_mean: float | None
+    loss_worst: float | None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,10 +57,13 @@ class BuildReport:
     Attributes
     ----------
     gearbox : str
-    training : TrainingResult
+    training : TrainingResult or None
+        None without geometry: the FMU has the laws themselves
     cycles : mapping of FMU file name to CycleErrors
     seconds : mapping of step to float
     files : tuple of Path
+    purpose : str
+        One line on which FMU is for what
     notes : tuple of str
         On platforms that were left out, and what could not be tried here
     correction : mapping or None
@@ -67,17 +71,18 @@ class BuildReport:
     """
 
     gearbox: str
-    training: TrainingResult
+    training: TrainingResult | None
     cycles: Mapping[str, CycleErrors]
     seconds: Mapping[str, float]
     files: tuple[Path, ...]
+    purpose: str
     notes: tuple[str, ...] = ()
     correction: Mapping[str, Any] | None = None
 
     def as_dict(self) -> dict[str, Any]:
         """The report without timings, so that the same build gives the same file."""
         return {
-            **self.training.as_dict(),
+            **({} if self.training is None else self.training.as_dict()),
             "correction": self.correction,
             "reference_cycle": {
                 name: {
@@ -91,37 +96,46 @@ class BuildReport:
 
     def show(self) -> None:
         """Print the summary."""
-        rows = [
-            [r.component, f"{r.r_squared:.6f}", *(f"{100.0 * v:.2f}" for v in
-             (r.median, r.percentile_95, r.corner_median, r.corner_percentile_95))]
-            for r in self.training.report
-        ]  # fmt: skip
-        console.table(
-            f"Networks against the full model on {self.training.preset.judged} separate points: relative errors\n"
-            "(corner: the lowest tenth of every input)",
-            ["loss", "R²", "median %", "p95 %", "corner median %", "corner p95 %"],
-            rows,
-        )
+        if self.training is not None:
+            self._show_networks(self.training)
         if self.cycles:
             self._show_cycles()
         console.table("Time", ["step", "s"], [[step, f"{value:.2f}"] for step, value in self.seconds.items()])
         for file in self.files:
             console.out.print(f"wrote {file}")
+        console.out.print(self.purpose)
         for note in self.notes:
             console.err.print(f"note: {note}", style="yellow")
+
+    @staticmethod
+    def _show_networks(training: TrainingResult) -> None:
+        rows = [
+            [r.component, f"{r.r_squared:.6f}", *(f"{100.0 * v:.2f}" for v in
+             (r.median, r.percentile_95, r.corner_median, r.corner_percentile_95))]
+            for r in training.report
+        ]  # fmt: skip
+        console.table(
+            f"Networks against the full model on {training.preset.judged} separate points: relative errors\n"
+            "(corner: the lowest tenth of every input)",
+            ["loss", "R²", "median %", "p95 %", "corner median %", "corner p95 %"],
+            rows,
+        )
 
     def _show_cycles(self) -> None:
         worst = [max(cycle.temperature_K.items(), key=lambda item: item[1]) for cycle in self.cycles.values()]
         cycles = self.cycles.values()
+        rows = [["temperature, worst node", *(f"{value:.3f} K ({node})" for node, value in worst)]]
+        if all("oil" in cycle.temperature_K for cycle in cycles):
+            rows.append(["temperature, oil", *(f"{cycle.temperature_K['oil']:.3f} K" for cycle in cycles)])
+        for label, values in (
+            ("mean", [cycle.loss_mean for cycle in cycles]), ("worst", [cycle.loss_worst for cycle in cycles])
+        ):  # fmt: skip
+            known = [f"{100.0 * value:.2f} %" for value in values if value is not None]
+            rows += [[f"total loss, {label}", *known]] if known else []
         console.table(
             "FMU against the full model, 600 s reference cycle from 20 °C",
             ["quantity", *(f"difference, {name}" for name in self.cycles)],
-            [
-                ["temperature, worst node", *(f"{value:.3f} K ({node})" for node, value in worst)],
-                ["temperature, oil", *(f"{cycle.temperature_K['oil']:.3f} K" for cycle in cycles)],
-                ["total loss, mean", *(f"{100.0 * cycle.loss_mean:.2f} %" for cycle in cycles)],
-                ["total loss, worst", *(f"{100.0 * cycle.loss_worst:.2f} %" for cycle in cycles)],
-            ],
+            rows,
         )
 
 
@@ -130,8 +144,8 @@ def build(
     folder: Path,
     *,
     name: str,
-    target: str = "python",
-    platforms: str = "all",
+    target: str = "both",
+    platforms: str = "host",
     preset: str = "default",
     samples: int | None = None,
     seed: int = 0,
@@ -139,7 +153,7 @@ def build(
     dask: str | None = None,
     correction: Correction | None = None,
 ) -> BuildReport:
-    """Train the networks of `gearbox`, build its FMU and try it on the reference cycle.
+    """Build the FMUs of `gearbox` and try them on the reference cycle; with geometry, train their networks first.
 
     Parameters
     ----------
@@ -151,7 +165,7 @@ def build(
     name : str
         Name of the FMU's file
     target : str
-        Kind of FMU: ``python``, ``native`` or ``both``
+        Kind of FMU: ``python``, ``native`` or ``both``; without a compiler, ``both`` is the Python FMU alone
     platforms : str
         Of a native FMU, see :func:`builder.native.compile.plan_for`
     preset, samples, seed, jobs, dask
@@ -168,31 +182,30 @@ def build(
     InputError
         If the folder cannot be written to or the options are at fault.
     """
-    kinds = {"python": ("python",), "native": ("native",), "both": ("python", "native")}.get(target)
-    if kinds is None:
-        raise InputError(f"target {target!r} is not known; python, native and both are")
-    notes = []
-    if "native" in kinds and (note := plan_for(platforms).note):  # a missing compiler is told before the training
-        notes.append(f"native FMU {note}")
+    kinds, built_for, notes = _planned(target, platforms)
     network = corrected_network(gearbox, correction)
+    inside = gearbox.network_of_laws(network) if gearbox.is_parametric else network
     seconds: dict[str, float] = {}
     with atomic_folder(folder) as stage:
-        with _measure_time("train", seconds), _show_messages() as tell:
-            training = train_surrogate(
-                gearbox, preset=preset, samples=samples, seed=seed,
-                jobs=jobs, dask=dask, progress=tell,
-            )  # fmt: skip
+        training, networks = None, tuple[Path, ...]()
+        if not gearbox.is_parametric:
+            with _measure_time("train", seconds), _show_messages() as tell:
+                training = train_surrogate(
+                    gearbox, preset=preset, samples=samples, seed=seed, jobs=jobs, dask=dask, progress=tell
+                )
+            with _measure_time("export", seconds):
+                networks = export_onnx(training, stage / "networks", version=project_version())
         fmus = {kind: stage / f"{name}{SUFFIX[kind]}.fmu" for kind in kinds}
-        with _measure_time("export", seconds):
-            networks = export_onnx(training, stage / "networks", version=project_version())
         for kind, path in fmus.items():
             with _measure_time(f"package, {kind} FMU", seconds), _show_messages() as tell:
                 tell(f"packaging the {kind} FMU")
                 if kind == "python":
-                    build_python_fmu(gearbox, training, networks, path, correction=correction)
+                    build_python_fmu(gearbox, training, networks, path, network=inside, correction=correction)
                 else:
-                    build_native_fmu(gearbox, training, networks, path, platforms=platforms, correction=correction)
-        cycle, losses = reference_cycle(gearbox), gearbox.losses()
+                    build_native_fmu(
+                        gearbox, training, networks, path, network=inside, platforms=platforms, correction=correction
+                    )
+        cycle, losses = reference_cycle(gearbox), gearbox.loss_laws()
         with _measure_time("reference cycle, full model", seconds), console.progress_bar("full model") as progress:
             full = network.simulate(cycle, losses=losses, initial=COLD_START, progress=progress).columns()
         cycles = {}
@@ -209,15 +222,50 @@ def build(
             write_table(stage / f"drive_cycle{SUFFIX[kind]}.csv", driven)
             title = f"{gearbox.name}\n600 s reference cycle, {kind} FMU and full model"
             plot = stage / f"drive_cycle{SUFFIX[kind]}.png"
-            plot_cycle(plot, driven, title=title, groups=network.groups, reference=full)
+            plot_cycle(plot, driven, title=title, groups=network.groups, inputs=network.inputs, reference=full)
         report = BuildReport(
-            gearbox=gearbox.name, training=training, cycles=cycles, seconds=seconds, files=(), notes=tuple(notes),
+            gearbox=gearbox.name, training=training, cycles=cycles, seconds=seconds, files=(),
+            purpose=_purpose({kind: path.name for kind, path in fmus.items()}, built_for), notes=tuple(notes),
             correction=None if correction is None else correction.summary(),
         )  # fmt: skip
         (stage / "report.json").write_text(json.dumps(report.as_dict(), indent=2) + "\n", encoding="utf-8")
         made = sorted(path.relative_to(stage) for path in stage.rglob("*") if path.is_file())
     files = tuple(folder / path for path in made)
     return replace(report, files=files, notes=(*report.notes, *_left_from_before(folder, files)))
+
+
+def _planned(target: str, platforms: str) -> tuple[tuple[str, ...], tuple[str, ...], list[str]]:
+    """Kinds of FMU that can be built here, platforms of the native one, and notes on what is left out.
+
+    Called before the training, so that a missing compiler is known early.
+
+    Raises
+    ------
+    InputError
+        If the target is not known, or what is asked for explicitly cannot be built.
+    """
+    kinds = {"python": ("python",), "native": ("native",), "both": ("python", "native")}.get(target)
+    if kinds is None:
+        raise InputError(f"target {target!r} is not known; python, native and both are")
+    if "native" not in kinds:
+        return kinds, (), []
+    try:
+        plan = plan_for(platforms)
+    except NoCompilerError as error:
+        if target == "native":
+            raise
+        return ("python",), (), [f"native FMU is not built: {error}"]
+    return kinds, plan.platforms, [f"native FMU {plan.note}"] if plan.note else []
+
+
+def _purpose(names: Mapping[str, str], platforms: Sequence[str]) -> str:
+    """Say which FMU is for what, in one line."""
+    needs = {
+        "native": f"needs no other software, for {', '.join(platforms)}"
+        + ("" if len(platforms) > 1 else " (--platforms all: for all)"),
+        "python": "runs on Python with numpy and onnxruntime",
+    }
+    return "; ".join(f"{names[kind]} {text}" for kind, text in needs.items() if kind in names)
 
 
 def _left_from_before(folder: Path, files: Sequence[Path]) -> list[str]:
@@ -233,12 +281,13 @@ def cycle_errors(driven: Mapping[str, Array], reference: Mapping[str, Array]) ->
     nodes = [
         name for name in reference if name.startswith("T_") and name.endswith("_degC") and name != "T_ambient_degC"
     ]
-    loss = np.abs(driven["P_loss_W"] - reference["P_loss_W"]) / reference["P_loss_W"]
-    return CycleErrors(
-        temperature_K={name[2:-5]: float(np.max(np.abs(driven[name] - reference[name]))) for name in nodes},
-        loss_mean=float(loss.mean()),
-        loss_worst=float(loss.max()),
-    )
+    temperatures = {name[2:-5]: float(np.max(np.abs(driven[name] - reference[name]))) for name in nodes}
+    loss = reference.get("P_loss_W", np.zeros(1))
+    lost = loss > 0.0
+    if not lost.any():
+        return CycleErrors(temperature_K=temperatures, loss_mean=None, loss_worst=None)
+    off = np.abs(driven["P_loss_W"] - loss)[lost] / loss[lost]
+    return CycleErrors(temperature_K=temperatures, loss_mean=float(off.mean()), loss_worst=float(off.max()))
 
 
 @contextmanager

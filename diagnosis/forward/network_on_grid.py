@@ -15,6 +15,7 @@ from diagnosis.forward.grid import Piece
 from models.base.types import Array
 from models.network.compiled import compile_laws, structure
 from models.network.laws import compile_function, function_source, symbol
+from models.quantities.quantities import node_of_channel
 from models.simulation.thermal_network import BASE_SIGNALS, Losses, ThermalNetwork
 
 STEADY = 0.01  # relative change of speed or torque within an interval
@@ -110,6 +111,10 @@ class NetworkOnGrid:
         self._apart = _apart(losses)
         self.is_loss = np.array(self.laws.losses_of_sources, dtype=bool)
         self.start = np.array([p.start for p in network.parameters])
+
+    def part_index(self, channel: str) -> int:
+        """Index of the part that a channel measures."""
+        return self.parts.index(node_of_channel(channel, self.parts))
 
     # ------------------------------------------------------------------ heat balance on all intervals
     # Temperatures, losses, memories and parameters may each be many at once: a further first axis, V.

@@ -46,7 +46,7 @@ def readings(model: NetworkOnGrid, trajectory: Trajectory, sensors: Sensors) -> 
     read = np.empty((len(trajectory.T), len(sensors.channels)))
     for index, name in enumerate(sensors.channels):
         read[:, index] = delayed_loss(trajectory, sensors.loss_delay) * sensors.loss_gain if is_total_loss(name) else (
-            lagged(trajectory.T[:, model.parts.index(name)], trajectory.piece.steps, sensors.lag[index]))  # fmt: skip
+            lagged(trajectory.T[:, model.part_index(name)], trajectory.piece.steps, sensors.lag[index]))  # fmt: skip
     return np.asarray(read + sensors.bias)
 
 
@@ -76,7 +76,7 @@ def reading_columns(
             loss = np.einsum("kn,knc->kc", trajectory.loss_slope, middle) + direct_loss
             read[:, index] = total_at_points(loss) * sensors.loss_gain
         else:
-            read[:, index] = lagged(T[:, model.parts.index(name)], trajectory.piece.steps, sensors.lag[index])
+            read[:, index] = lagged(T[:, model.part_index(name)], trajectory.piece.steps, sensors.lag[index])
     return read
 
 

@@ -12,7 +12,7 @@ from diagnosis.forward.network_on_grid import NetworkOnGrid
 from diagnosis.inference.whitening import Noise
 from diagnosis.recordings.recording import Recording
 from models.base.types import Array
-from models.quantities.quantities import is_total_loss
+from models.quantities.quantities import is_total_loss, node_of_channel
 
 LOWEST_SD_K, LOWEST_SD_W = 0.02, 0.5
 FEWEST_ROWS, DEFAULT_LOSS_RELATIVE = 50, 0.02
@@ -97,7 +97,8 @@ def noise_of(
     heat_sd = np.where(heavy, HEAT_FRACTION * loss_W, 0.0)
     if parametric:
         heat_sd = np.where(heavy, PARAMETRIC_FRACTION * loss_W, PARAMETRIC_K * _conductances(model, piece))
-    known = np.array([name in piece.channels for name in model.parts])
+    measured = {node_of_channel(name, model.parts) for name in piece.channels}
+    known = np.array([name in measured for name in model.parts])
     first = piece.measured[0, [not is_total_loss(name) for name in piece.channels]]
     hot = float(np.nanmax(first)) if np.isfinite(first).any() else 50.0
     ambient = _ambient(model, piece)
@@ -123,12 +124,12 @@ def _conductances(model: NetworkOnGrid, piece: Piece) -> Array:
 
 def start_guess(model: NetworkOnGrid, piece: Piece) -> Array:
     """Start temperatures of all parts: as measured, else the mean of what is, [degC]."""
-    first = {}
+    first: dict[str, float] = {}
     for index, name in enumerate(piece.channels):
         seen = piece.measured[:, index]
         seen = seen[np.isfinite(seen)]
-        if name in model.parts and len(seen):
-            first[name] = float(seen[0])
+        if not is_total_loss(name) and len(seen):
+            first.setdefault(node_of_channel(name, model.parts), float(seen[0]))
     middle = float(np.mean(list(first.values()))) if first else _ambient(model, piece)
     return np.array([first.get(name, middle) for name in model.parts])
 

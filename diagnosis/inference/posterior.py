@@ -255,7 +255,7 @@ class Problem:
                 columns[:, sensors.channels.index(TOTAL_LOSS), index] = column * scale
             elif item.role == "lag":
                 channel = sensors.channels.index(item.target)
-                node = model.parts.index(item.target)
+                node = model.part_index(item.target)
                 columns[:, channel, index] = lag_column(trajectory, node, sensors.lag[channel]) * scale
 
     @staticmethod

@@ -161,7 +161,7 @@ def shifted(samples: Array, inputs: Sequence[str], role: str, value: float) -> A
 def unknowns_of(
     network: ThermalNetwork, channels: Sequence[str], *, lags: Mapping[str, float] | None = None,
     bias_sd: Mapping[str, float] | None = None, slow: bool = False, interval: float = 10.0,
-    ambient_assumed: bool = False,
+    ambient_assumed: bool = False, torque_gain: Parameter | None = None,
 ) -> Unknowns:  # fmt: skip
     """The usual unknowns of a network and its sensors.
 
@@ -177,6 +177,8 @@ def unknowns_of(
         Between rows, [s]
     ambient_assumed : bool
         Whether the ambient temperature was not recorded
+    torque_gain : Parameter or None
+        Factor on a torque that follows from a power
     """
     lags, bias_sd = lags or {}, bias_sd or {}
     items = [Unknown(role="network", target=p.name, parameter=p) for p in network.parameters if p.sd > 0.0]
@@ -207,7 +209,8 @@ def unknowns_of(
             items.append(Unknown(role="lag", target=name, parameter=lag))
     torque = Parameter(name="torque_gain", start=1.0, sd=TORQUE_GAIN_SD, lower=0.5, upper=2.0, log=False,
                        description="true over recorded torque")  # fmt: skip
-    items.append(Unknown(role="torque_gain", target="torque", parameter=torque))
+    if network.components:
+        items.append(Unknown(role="torque_gain", target="torque", parameter=torque_gain or torque))
     if "T_ambient" in network.inputs:
         ambient = _normal("ambient_offset", "K", 0.0, AMBIENT_ASSUMED_SD_K if ambient_assumed else AMBIENT_SD_K)
         items.append(Unknown(role="ambient_offset", target="T_ambient", parameter=ambient))

@@ -164,7 +164,7 @@ def reading_variance(model: NetworkOnGrid, trajectory: Trajectory, sensors: Sens
             jump = np.maximum(jump, np.maximum(np.roll(jump, 1), np.roll(jump, -1)))
             variance[:, index] += (JUMP_SHARE * jump) ** 2
         else:
-            moved = np.abs(np.diff(trajectory.T[:, model.parts.index(name)]))
+            moved = np.abs(np.diff(trajectory.T[:, model.part_index(name)]))
             variance[:, index] += (JUMP_SHARE * np.maximum(np.append(moved, 0.0), np.append(0.0, moved))) ** 2
     return np.asarray(variance)
 
@@ -178,5 +178,5 @@ def _observation(model: NetworkOnGrid, trajectory: Trajectory, sensors: Sensors,
             slope = trajectory.loss_slope
             H[:, index, : model.n] = total_at_points(slope)
         else:
-            H[:, index, model.parts.index(name)] = 1.0
+            H[:, index, model.part_index(name)] = 1.0
     return H

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Set
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,15 +11,14 @@ from diagnosis.recordings.read import name_parts, read_recording
 from diagnosis.recordings.recording import Recording
 from diagnosis.recordings.time_axis import ISO_NAMES, STANDARD, moment_text, split_path
 from models.base.errors import InputError
-from models.files.cycle import REQUIRED, Cycle
+from models.files.cycle import Cycle
 from models.files.cycle_file import RecordedStart, read_cycle_and_start
 from models.files.table_file import KINDS, column_names
-from models.quantities.quantities import INPUTS, is_total_loss
+from models.quantities.quantities import is_total_loss
 
 if TYPE_CHECKING:
     from models.simulation.thermal_network import ThermalNetwork
 
-NEEDED = (STANDARD, *(INPUTS[signal].column for signal in REQUIRED))  # columns of a plain cycle
 MOST_SHOWN = 3  # pieces of a recording with gaps
 
 
@@ -60,8 +60,9 @@ def read_cycle_or_recording(
     InputError
         With all problems of the file; or if a recording has gaps, with the pieces between them.
     """
-    if mapping is None and not _is_recording(text, mapping_of_definition(network.recording)):
-        return *read_cycle_and_start(text, tuple(name for name in network.inputs if name not in INPUTS)), ()
+    needed = {STANDARD, *(given.column for given in network.inputs.values() if given.required)}
+    if mapping is None and not _is_recording(text, needed, mapping_of_definition(network.recording)):
+        return *read_cycle_and_start(text, network.inputs), ()
     recording = read_recording(text, network, mapping=mapping, to_compare=False)
     if len(recording.segments) > 1:
         raise InputError(f"{text}: {_gaps(recording)}")
@@ -72,7 +73,7 @@ def read_cycle_or_recording(
     return cycle, start, (*recording.notes, *_clock_notes(recording))
 
 
-def _is_recording(text: Path, usual: RecordingMapping) -> bool:
+def _is_recording(text: Path, needed: Set[str], usual: RecordingMapping) -> bool:
     """Return True if a file must be read as a recording.
 
     So are parts, joined files and formats other than tables; files with a column that a mapping names; and files that
@@ -87,8 +88,8 @@ def _is_recording(text: Path, usual: RecordingMapping) -> bool:
     if own is not None:
         # The mapping may be there for other files of the folder.
         as_it_splits = column_names(text, own.csv.separator)
-        is_meant = not (_named(own) or set(NEEDED)).isdisjoint(as_it_splits)
-        return is_meant or not names.issuperset(NEEDED)
+        is_meant = not (_named(own) or needed).isdisjoint(as_it_splits)
+        return is_meant or not names.issuperset(needed)
     has_dates = STANDARD not in names and not names.isdisjoint(ISO_NAMES)
     return has_dates or not names.isdisjoint(_named(usual))
 

@@ -14,9 +14,8 @@ from diagnosis.recordings.mapping import Column, RecordingMapping
 from diagnosis.recordings.quantities import AUXILIARY, IGNORE, looks_like_kelvin
 from models.base.errors import Problems, did_you_mean
 from models.base.types import Array
-from models.files.cycle import REQUIRED
 from models.quantities.column_names import meant
-from models.quantities.quantities import INPUTS, TOTAL_LOSS, column_of, dimension_of, quantity_of, quantity_of_column
+from models.quantities.quantities import TOTAL_LOSS, Quantity, node_of_channel, quantity_of, quantity_of_column
 from models.quantities.units import units_in_files
 
 if TYPE_CHECKING:
@@ -28,20 +27,22 @@ FEW = 0.01  # share of rows that may be impossible
 CODES, CODED = 3, 0.5  # so many different impossible values, in up to this share of rows, are codes of a logger
 
 
-def input_names(network: ThermalNetwork) -> tuple[str, ...]:
-    """Return the inputs of a network as signals, speed and torque first."""
-    return (*REQUIRED, *(name for name in network.inputs if name not in REQUIRED))
+def is_measurable(name: str, network: ThermalNetwork) -> bool:
+    """Return True for ``T_<node>`` (also of one of several sensors, ``T_<node>__<sensor>``) and ``P_loss``."""
+    known = {*(f"T_{part.name}" for part in network.parts), TOTAL_LOSS}
+    return node_of_channel(name, known) in known
 
 
-def measurable(network: ThermalNetwork) -> tuple[str, ...]:
-    """Return the quantities that can be measured: ``T_<node>`` and ``P_loss``."""
-    return (*(f"T_{part.name}" for part in network.parts), TOTAL_LOSS)
+def quantities_of(network: ThermalNetwork) -> dict[str, Quantity]:
+    """Return the inputs of a network and what can be measured, by name."""
+    measured = (quantity_of(name) for name in (*(f"T_{part.name}" for part in network.parts), TOTAL_LOSS))
+    known = {q.name: q for q in measured if q is not None}
+    return known | {name: given.quantity for name, given in network.inputs.items()}
 
 
 def standard_names(network: ThermalNetwork) -> dict[str, str]:
     """Return the column of every quantity without a mapping file."""
-    names = {signal: INPUTS[signal].column if signal in INPUTS else signal for signal in input_names(network)}
-    return names | {q: column_of(q) for q in measurable(network)}
+    return {name: quantity.column for name, quantity in quantities_of(network).items()}
 
 
 def match_columns(
@@ -83,10 +84,10 @@ def match_columns(
         else:
             lacking.append(name)
     found = taken | {column.quantity for column in roles.values()} | set(mapping.constants)
-    for signal in REQUIRED:
-        if signal not in found:
+    for signal, given in network.inputs.items():
+        if given.required and signal not in found:
             shown = ", ".join(other[:40] for other in sorted(present)[:20])
-            problems.add(f"column {INPUTS[signal].column} is missing; it has: {shown}")
+            problems.add(f"column {given.column} is missing; it has: {shown}")
     rest = [n for n in present if n not in roles and n not in mapping.columns and n != time_column]
     _report_unused(rest, lacking, problems, notes)
     return roles | {name: Column(quantity=AUXILIARY) for name in rest}
@@ -95,7 +96,7 @@ def match_columns(
 def _mapped_columns(
     present: Sequence[str], mapping: RecordingMapping, network: ThermalNetwork, problems: Problems
 ) -> dict[str, Column]:
-    known = {*input_names(network), *measurable(network), AUXILIARY, IGNORE}
+    known = {*quantities_of(network), AUXILIARY, IGNORE}
     roles: dict[str, Column] = {}
     for name, column in mapping.columns.items():
         if name not in present:
@@ -108,8 +109,8 @@ def _mapped_columns(
         else:
             roles[name] = column
     for name in mapping.constants:
-        if name not in input_names(network):
-            hint = did_you_mean(name, input_names(network))
+        if name not in network.inputs:
+            hint = did_you_mean(name, network.inputs)
             problems.add(f"constant {name!r} of its mapping file is no input of this gearbox{hint}")
     return roles
 
@@ -177,6 +178,7 @@ def quantity_values(
     cells: pd.Series,
     name: str,
     column: Column,
+    quantity: Quantity,
     unit_of_file: str | None,
     outside: NDArray[np.bool_],
     problems: Problems,
@@ -192,6 +194,7 @@ def quantity_values(
         Of the column
     column : Column
         What the mapping states of it
+    quantity : Quantity
     unit_of_file : str or None
         Unit that the file itself names
     outside : array of bool, shape (rows,)
@@ -210,13 +213,14 @@ def quantity_values(
         return None
     values[outside] = np.nan
     unit = unit_of_file if column.unit is None else column.unit
-    dimension = dimension_of(column.quantity)
-    units = units_in_files(dimension)
+    units = units_in_files(quantity.dimension, quantity.unit)
     if unit and units and unit not in units:
-        problems.add(f"column {name} has the unit {unit!r}, which is no unit of {dimension}{did_you_mean(unit, units)}")
+        problems.add(
+            f"column {name} has the unit {unit!r}, which is no unit of {quantity.dimension}{did_you_mean(unit, units)}"
+        )
         return None
-    factor, offset = units.get(unit or "", (1.0, 0.0))
-    return _possible(values * (column.scale * factor) + offset, column.quantity, name, rows, problems, notes)
+    factor, offset = units.get(unit, (1.0, 0.0)) if unit else (1.0, 0.0)
+    return _possible(values * (column.scale * factor) + offset, quantity, name, rows, problems, notes)
 
 
 def _keep_valid(
@@ -240,7 +244,7 @@ def _keep_valid(
 
 
 def _possible(
-    values: Array, quantity: str, name: str, rows: NDArray[np.int64], problems: Problems, notes: list[str]
+    values: Array, quantity: Quantity, name: str, rows: NDArray[np.int64], problems: Problems, notes: list[str]
 ) -> Array:
     """Replace impossible values by NaN; many of them, or none possible, are a problem.
 
@@ -248,8 +252,9 @@ def _possible(
     ----------
     values : Array, shape (rows,)
         In the unit inside; NaN where missing
-    quantity, name : str
-        What it is, and its column
+    quantity : Quantity
+    name : str
+        Its column
     rows : array of int, shape (rows,)
         Numbers of the rows, for messages
     problems : Problems
@@ -272,16 +277,13 @@ def _possible(
             'subtract 273.15, or give unit = "K" in a mapping file'
         )
         return values
-    possible = quantity_of(quantity)
-    if possible is None:
-        return values
-    wrong = np.isfinite(values) & ((values < possible.low) | (values > possible.high))
+    wrong = np.isfinite(values) & ((values < quantity.low) | (values > quantity.high))
     count = int(wrong.sum())
     if not count:
         return values
     first = int(np.flatnonzero(wrong)[0])
     where = f"{count} of {len(values)} values ({rows_text(rows[wrong])})"
-    limits = f"{possible.low:g} ... {possible.high:g} {possible.unit}"
+    limits = f"{quantity.low:g} ... {quantity.high:g} {quantity.unit}"
     is_code = len(np.unique(values[wrong])) <= CODES and count <= CODED * len(good)
     if count > max(FEW * len(good), 1) and not is_code:
         hint = "; looks like kelvin" if looks_like_kelvin(quantity, values[first], values[first]) else ""

@@ -19,7 +19,6 @@ from diagnosis.recordings.time_axis import RECORDING_KINDS, Clock, Part, clock_o
 from models.base.errors import InputError, Problems, did_you_mean
 from models.base.types import Array
 from models.files.table_file import check_file, kind_of, read_chunks, together
-from models.quantities.quantities import INPUTS
 
 
 @dataclass(kw_only=True, eq=False)
@@ -114,9 +113,7 @@ def open_recording(path: Path, mapping: Path | None, usual: RecordingMapping) ->
     start: float | None = None
     units: Mapping[str, str] = {}
     if kind in (".mf4", ".mdf"):
-        base = next(
-            (name for name, column in found.columns.items() if column.quantity == "speed"), INPUTS["speed"].column
-        )
+        base = next((name for name, column in found.columns.items() if column.quantity == "speed"), "speed_rpm")
         mdf = read_mdf(path, base=base)
         chunks, start, units = iter([mdf.table]), mdf.start, mdf.units
     else:

@@ -7,10 +7,11 @@ rows = ["2017-08-01..2018-01-12"]     # seconds or ISO 8601; by default all
 missing = ["---", "Bad"]              # further texts for a missing value
 time = { column = "time_utc", unit = "iso8601" }
 csv = { separator = ";", decimal = "," }
-constants = { T_ambient = 20.0 }      # inputs that were not recorded, in 1/min, N m, degC, m/s
+constants = { T_ambient = 20.0 }      # inputs that were not recorded, in the unit of their standard column
 
 [columns.Gost_avg]
-quantity = "T_oil"                    # speed, torque, T_ambient, air_speed, T_<node>, P_loss, auxiliary or ignore
+quantity = "T_oil"                    # an input by its name, T_<node>, P_loss, auxiliary or ignore
+sensor = "sump_probe"                 # only if several sensors measure one node
 unit = "degC"
 noise = 0.3                           # white standard deviation of one row, [K] or [W]
 resolution = 0.1                      # [K] or [W]
@@ -37,7 +38,7 @@ from models.definition.messages import validate_section
 from models.definition.sections import Name, Section
 from models.files import toml_file
 from models.files.table_file import TextForm
-from models.quantities.quantities import dimension_of, quantity_of
+from models.quantities.quantities import SENSOR, quantity_of
 from models.quantities.units import units_in_files
 
 SCHEMA = 1
@@ -52,6 +53,7 @@ class Column(Section):
     """Table ``[columns.NAME]``: one column of the file."""
 
     quantity: Name
+    sensor: Name | None = None
     unit: str | None = None
     scale: Annotated[float, Field(ge=-1e9, le=1e9)] = 1.0
     noise: Positive | None = None
@@ -61,6 +63,17 @@ class Column(Section):
     bias_sd: NotNegative | None = None
     valid: tuple[float, float] | None = None
     rows: tuple[str, ...] | None = None
+
+    @property
+    def channel(self) -> str:
+        """The quantity, with the name of the sensor if it has one: ``T_oil__sump_probe``."""
+        return self.quantity if self.sensor is None else f"{self.quantity}{SENSOR}{self.sensor}"
+
+    @model_validator(mode="after")
+    def _sensor_measures_a_node(self) -> Self:
+        if self.sensor is not None and not (self.quantity.startswith("T_") and len(self.quantity) > 2):
+            raise ValueError(f"sensor = {self.sensor!r} names one of several at a node; quantity must be T_<node>")
+        return self
 
     @field_validator("scale")
     @classmethod
@@ -78,12 +91,12 @@ class Column(Section):
 
     @model_validator(mode="after")
     def _unit_is_known(self) -> Self:
-        dimension = dimension_of(self.quantity)
-        if dimension is None or self.quantity in (AUXILIARY, IGNORE):
+        known = quantity_of(self.quantity)  # units of inputs that a definition names are checked with the columns
+        if known is None or not known.dimension or self.unit is None:
             return self
-        units = units_in_files(dimension)
-        if self.unit is not None and self.unit not in units:
-            raise ValueError(f"unit {self.unit!r} is no unit of {dimension}{did_you_mean(self.unit, units)}")
+        units = units_in_files(known.dimension, known.unit)
+        if self.unit not in units:
+            raise ValueError(f"unit {self.unit!r} is no unit of {known.dimension}{did_you_mean(self.unit, units)}")
         return self
 
 
@@ -142,10 +155,13 @@ class RecordingMapping(Section):
             quantity = column.quantity
             if quantity in self.constants:
                 faults.append(f"{quantity} is a constant and the column {name!r}; keep one")
-            if quantity in by_quantity:
-                faults.append(f"columns {by_quantity[quantity]!r} and {name!r} are both {quantity}; keep one")
+            if column.channel in by_quantity:
+                faults.append(
+                    f"columns {by_quantity[column.channel]!r} and {name!r} are both {quantity}; keep one, or give each "
+                    "sensor at the node a name (sensor = ...)"
+                )
             elif quantity not in (AUXILIARY, IGNORE):
-                by_quantity[quantity] = name
+                by_quantity[column.channel] = name
         if faults:
             raise ValueError("; ".join(faults))
         return self
@@ -158,9 +174,11 @@ class RecordingMapping(Section):
 
 def _constant_faults(name: str, value: float) -> Iterator[str]:
     possible = quantity_of(name)
-    if looks_like_kelvin(name, value, value):
+    if possible is None:
+        return
+    if looks_like_kelvin(possible, value, value):
         yield f"{name} = {value:g} looks like kelvin, but constants are in degC; write {value - 273.15:g}"
-    elif possible is not None and not possible.low <= value <= possible.high:
+    elif not possible.low <= value <= possible.high:
         limits = f"{possible.low:g} to {possible.high:g} {possible.unit}"
         yield f"{name} = {value:g} {possible.unit} is not possible; {limits} is, and constants have that unit"
 

@@ -20,15 +20,14 @@ from diagnosis.recordings.cleaning import (
     stuck_rows,
     time_pieces,
 )
-from diagnosis.recordings.columns import standard_names
+from diagnosis.recordings.columns import quantities_of
 from diagnosis.recordings.file import open_recording, set_to_one_clock, sha256_of, stem_of
 from diagnosis.recordings.mapping import RecordingMapping, mapping_of_definition
 from diagnosis.recordings.recording import Channel, Recording
 from diagnosis.recordings.rows import RecordedRows, joined, read_rows
 from diagnosis.recordings.time_axis import split_path
 from models.base.errors import InputError, Problems
-from models.files.cycle import REQUIRED
-from models.quantities.quantities import is_temperature, is_total_loss
+from models.quantities.quantities import is_total_loss, node_of_channel
 
 if TYPE_CHECKING:
     from models.simulation.thermal_network import ThermalNetwork
@@ -136,7 +135,7 @@ def read_recording(
     usual = GAP_STEPS * float(np.median(np.diff(found.seconds)))
     gap = stated if stated is not None else max(SHORTEST_GAP_S, usual)
     resolutions = {quantity: resolution_of(found.values[quantity]) for quantity in found.measured(network)}
-    _remove_spikes(found, gap)
+    _remove_spikes(found, network, gap)
     _note_stuck(found, network)
     found = _with_known_inputs(found, network, gap)
     segments = _segments(found, gap)
@@ -207,22 +206,22 @@ def _add_unrecorded(found: RecordedRows, mapping: RecordingMapping, network: The
     size = len(found.seconds)
     for name, value in mapping.constants.items():
         found.values[name] = np.full(size, value)
-    for name, default in network.inputs.items():
+    for name, given in network.inputs.items():
         if name not in found.values:
-            found.values[name] = np.full(size, default)
+            found.values[name] = np.full(size, given.default)
             found.assumed.append(name)
-            found.notes.append(
-                f"{standard_names(network)[name]} was not recorded; {default:g} is assumed, as in the definition"
-            )
+            found.notes.append(f"{given.column} was not recorded; {given.default:g} is assumed, as in the definition")
 
 
-def _remove_spikes(found: RecordedRows, gap: float) -> None:
-    steady = steady_rows({name: found.values[name] for name in REQUIRED})
+def _remove_spikes(found: RecordedRows, network: ThermalNetwork, gap: float) -> None:
+    driving = [name for name, given in network.inputs.items() if given.required] or list(network.inputs)
+    steady = steady_rows({"time": found.seconds * 0.0} | {name: found.values[name] for name in driving})
+    known = quantities_of(network)
     pieces = time_pieces(found.seconds, gap)
     for quantity, values in found.values.items():
         if is_total_loss(quantity):
             wrong = np.concatenate([spikes_of_loss(values[piece], steady[piece]) for piece in pieces])
-        elif is_temperature(quantity):
+        elif known[node_of_channel(quantity, known)].is_temperature:
             wrong = np.concatenate([spikes_of_temperature(values[piece]) for piece in pieces])
         else:
             continue
@@ -256,7 +255,7 @@ def _with_known_inputs(found: RecordedRows, network: ThermalNetwork, gap: float)
     partial = []
     for name in found.inputs(network):
         values, column = found.values[name], found.names.get(name, name)
-        filled, known = bridged(time, values, gap if name in REQUIRED else SLOW_GAPS * gap)
+        filled, known = bridged(time, values, gap if network.inputs[name].required else SLOW_GAPS * gap)
         found.values[name] = filled
         missing, lost = int(np.isnan(values).sum()), rows[~known]
         if missing:

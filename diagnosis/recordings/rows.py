@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.recordings.columns import auxiliary_numbers, input_names, match_columns, measurable, quantity_values
+from diagnosis.recordings.columns import auxiliary_numbers, is_measurable, match_columns, quantities_of, quantity_values
 from diagnosis.recordings.file import RecordingFile
 from diagnosis.recordings.mapping import Column
 from diagnosis.recordings.quantities import AUXILIARY, IGNORE
@@ -55,11 +55,11 @@ class RecordedRows:
 
     def inputs(self, network: ThermalNetwork) -> list[str]:
         """Return the inputs in it."""
-        return [name for name in self.values if name in input_names(network)]
+        return [name for name in self.values if name in network.inputs]
 
     def measured(self, network: ThermalNetwork) -> list[str]:
         """Return the measured quantities in it."""
-        return [name for name in self.values if name in measurable(network) and name not in input_names(network)]
+        return [name for name in self.values if is_measurable(name, network) and name not in network.inputs]
 
 
 def read_rows(
@@ -84,6 +84,7 @@ def read_rows(
     if clock is not None:
         check_time(table[clock.column], seconds, clock, problems)
     present = [str(column) for column in table.columns]
+    known = quantities_of(network)
     roles = match_columns(present, clock.column if clock else "", file.mapping, network, problems, notes)
     for name, role in roles.items():
         if role.quantity == AUXILIARY:
@@ -91,12 +92,13 @@ def read_rows(
             if auxiliary is not None:
                 found.auxiliary[name] = auxiliary
         elif role.quantity != IGNORE:
-            found.names[role.quantity], found.roles[role.quantity] = name, role
+            found.names[role.channel], found.roles[role.channel] = name, role
             outside = ~file.in_rows_of(name, role, seconds, first_s)
-            values = quantity_values(table[name], name, role, file.units.get(name), outside, problems, notes)
+            quantity = known[role.quantity]
+            values = quantity_values(table[name], name, role, quantity, file.units.get(name), outside, problems, notes)
             if values is not None:
-                found.values[role.quantity] = values
-    if to_compare and not any(q.startswith("T_") and q in measurable(network) for q in found.names):
+                found.values[role.channel] = values
+    if to_compare and not any(q.startswith("T_") and is_measurable(q, network) for q in found.names):
         problems.add(
             "no temperature was measured: a column T_<node>_degC is needed, of the nodes "
             + ", ".join(part.name for part in network.parts)

@@ -57,7 +57,7 @@ def _shared(one: Recording, other: Recording, mine: NDArray[np.uint64], theirs: 
 
 def _distinct_rows(recording: Recording) -> NDArray[np.uint64]:
     """Hash every four rows as measured, without the time: two of them are never equal by chance."""
-    columns = [recording.inputs["speed"], recording.inputs["torque"]]
+    columns = list(recording.inputs.values())[:2]
     columns += [channel.values for channel in sorted(recording.channels, key=lambda channel: channel.name)]
     row = np.zeros(len(columns[0]), dtype=np.uint64)
     for column in columns:

@@ -148,7 +148,7 @@ class Clock:
     def seconds(self, values: pd.Series) -> Array:
         """Convert a time column, shape (rows,), to [s], dates since 1970; NaN for a cell that is no time."""
         if not self.is_date:
-            return _numbers(values) * units_in_files("time")[self.unit][0]
+            return _numbers(values) * units_in_files("time", "s")[self.unit][0]
         if pd.api.types.is_datetime64_any_dtype(values.dtype):
             stamps = pd.to_datetime(values, utc=True)
         else:

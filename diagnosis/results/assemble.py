@@ -41,7 +41,7 @@ from models.base.parallel import run_parallel
 from models.base.types import Array
 from models.base.version import project_version
 from models.mechanisms import OPEN_FORM, Mechanism
-from models.quantities.quantities import INPUTS, TOTAL_LOSS, is_total_loss
+from models.quantities.quantities import TOTAL_LOSS, is_total_loss
 
 ENOUGH_VISIBLE = 0.2  # of the catalogue, for a "consistent" that means something
 REMAINING_W_SHARE = 0.03  # of the typical loss: a smaller remainder is not worth a word
@@ -422,9 +422,7 @@ def _next_test(
     assumed: Collection[str],
 ) -> str:  # fmt: skip
     if verdict == "unexplained" and "T_ambient" in assumed:
-        return (
-            f"record {INPUTS['T_ambient'].column}: a constant stands for it, and what the air did is missed elsewhere"
-        )
+        return "record T_ambient_degC: a constant stands for it, and what the air did is missed elsewhere"
     for finding in findings:
         if finding.confusable_with and finding.confusable_with[0].probability >= 0.05:
             return finding.confusable_with[0].separate_by

@@ -17,6 +17,7 @@ from diagnosis.inference.shapes import shape_terms
 from diagnosis.inference.unknowns import Unknowns, unknowns_of
 from diagnosis.inference.whitening import Whitening
 from diagnosis.recordings.recording import Recording
+from diagnosis.setup.shaft import shafts, torque_gain, with_shaft
 from models.assembly.gearbox import Gearbox
 from models.base.types import Array
 from models.mechanisms import Scale
@@ -75,19 +76,23 @@ def prepare(
     even : bool
         Whether all intervals shall be of one length, see :func:`diagnosis.forward.grid.pieces`
     """
-    nominal, losses = gearbox.network(), gearbox.loss_laws()
+    as_defined, losses = gearbox.network(), gearbox.loss_laws()
+    nominal = with_shaft(as_defined)
+    recordings, holdout = shafts(recordings, as_defined), shafts(holdout, as_defined)
     scale = scale_of(gearbox, recordings)
     network = nominal
     for term in shape_terms(nominal, scale):
         network = term.apply(network)
     model = NetworkOnGrid(network, losses)
     measured = {c.name for r in recordings for c in r.channels}
-    channels = tuple(name for name in (*model.parts, TOTAL_LOSS) if name in measured)
+    temperatures = sorted((c for c in measured if not is_total_loss(c)), key=lambda c: (model.part_index(c), c))
+    channels = (*temperatures, *([TOTAL_LOSS] if TOTAL_LOSS in measured else []))
     stated = [c for r in recordings for c in r.channels]
     unknowns = _wider_capacities(unknowns_of(
         network, channels, lags={c.name: c.lag_s for c in stated if c.lag_s is not None},
         bias_sd={c.name: c.bias_sd for c in stated if c.bias_sd is not None}, slow=slow_rows(recordings),
         interval=scale.interval, ambient_assumed=any("T_ambient" in r.assumed for r in recordings),
+        torque_gain=torque_gain(as_defined),
     ))  # fmt: skip
     white = channel_noise(recordings, channels)
     loss_sd = loss_noise(recordings) if TOTAL_LOSS in channels else (0.0, 0.0)
@@ -102,10 +107,10 @@ def prepare(
             [noise_of(model, p, white, loss_W, loss_noise=loss_sd, parametric=gearbox.is_parametric) for p in cut],
             [start_guess(model, p) for p in cut],
         ))  # fmt: skip
-    temperatures = [white[name] for name in channels if not is_total_loss(name)]
+    noises = [white[name] for name in channels if not is_total_loss(name)]
     return Case(
         gearbox=gearbox, nominal=nominal, losses=losses, scale=scale, channels=channels, train=problems[0],
-        holdout=problems[1], loss_W=loss_W, noise_K=float(np.median(temperatures)) if temperatures else 0.0,
+        holdout=problems[1], loss_W=loss_W, noise_K=float(np.median(noises)) if noises else 0.0,
     )  # fmt: skip
 
 

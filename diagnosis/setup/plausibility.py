@@ -161,7 +161,7 @@ def _simulated(
     loss : Array, shape (rows - 1,)
         Total loss in the intervals, [W]
     """
-    first = {name: float(T[np.isfinite(T)][0]) for name, T in measured.items()}
+    first = {model.parts[model.part_index(name)]: float(T[np.isfinite(T)][0]) for name, T in measured.items()}
     other = float(np.mean(list(first.values()))) if first else float(values["T_ambient"][0])
     inputs = np.stack([values[name] for name in model.laws.inputs], axis=-1)
     piece = Piece(
@@ -174,5 +174,5 @@ def _simulated(
             trajectory = simulate(model, piece, model.start, start)
     except ArithmeticError:
         return {name: np.full(len(time), RUNAWAY_DEGC) for name in measured}, np.full(len(time) - 1, np.inf)
-    temperatures = {name: trajectory.T[:, model.parts.index(name)] for name in measured}
+    temperatures = {name: trajectory.T[:, model.part_index(name)] for name in measured}
     return temperatures, trajectory.balance.sources[:, model.is_loss].sum(axis=-1)

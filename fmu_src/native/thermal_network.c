@@ -29,23 +29,54 @@ const char *network_set(Network *network, const double *parameters) {
         memcpy(balances[i]->conductance, fixed, N_FIXED * sizeof(double));
         memcpy(balances[i]->at.parameters, parameters, N_PARAMETERS * sizeof(double));
     }
+#if N_COMPONENTS
     if (!network->loss_power) network->loss_power = loss_power_here();
+#endif
     return NULL;
 }
+
+/* Set a moment: all that the laws depend on but parameters and losses. */
+static void set_moment(Signals *at, double time, const double *inputs, const ThermalState *state) {
+    at->time = time;
+    memcpy(at->inputs, inputs, N_INPUTS * sizeof(double));
+    memcpy(at->T, state->T, sizeof at->T);
+    memcpy(at->memory, state->memory, sizeof at->memory);
+}
+
+#if N_COMPONENTS
+static LossPoint loss_point(const Signals *at) {
+    double operating[2];
+    LossPoint point;
+    law_operating((const double *)at, operating);
+    point.speed = operating[0];
+    point.torque = operating[1];
+    for (int i = 0; i < N_LOSS_NODES; i++) point.T[i] = at->T[LOSS_NODE[i]];
+    return point;
+}
+
+LossPoint network_loss_point(const Network *network, double time, const double *inputs, const ThermalState *state) {
+    Signals at = network->now.at;
+    set_moment(&at, time, inputs, state);
+    return loss_point(&at);
+}
+#endif
 
 /* Fill `balance` for a moment, unless it holds that moment already. */
 static void find_balance(const Network *network, Balance *balance, double time, const double *inputs,
                          const ThermalState *state) {
     Signals *at = &balance->at;
-    double T[N_LOSS_NODES];
-    if (balance->valid && (at->time == time || !LAWS_USE_TIME) && !memcmp(at->inputs, inputs, sizeof at->inputs)
-        && !memcmp(at->T, state->T, sizeof at->T) && !memcmp(at->memory, state->memory, sizeof at->memory)) return;
-    at->time = time;
-    memcpy(at->inputs, inputs, sizeof at->inputs);
-    memcpy(at->T, state->T, sizeof at->T);
-    memcpy(at->memory, state->memory, sizeof at->memory);
-    for (int i = 0; i < N_LOSS_NODES; i++) T[i] = state->T[LOSS_NODE[i]];
-    network->loss_power(inputs[0], inputs[1], T, at->power);
+    if (balance->valid && (at->time == time || !LAWS_USE_TIME)
+        && !memcmp(at->inputs, inputs, N_INPUTS * sizeof(double)) && !memcmp(at->T, state->T, sizeof at->T)
+        && !memcmp(at->memory, state->memory, sizeof at->memory)) return;
+    set_moment(at, time, inputs, state);
+#if N_COMPONENTS
+    {
+        const LossPoint point = loss_point(at);
+        network->loss_power(point.speed, point.torque, point.T, at->power);
+    }
+#else
+    (void)network;
+#endif
     law_boundary((const double *)at, balance->T_boundary);
     law_heat((const double *)at, balance->heat);
     balance->valid = 1;
@@ -73,7 +104,8 @@ const char *network_advance(Network *network, ThermalState *state, double time, 
         const double remaining = duration - elapsed, step = larger(state->step, SHORTEST_STEP_S);
         /* Two even steps instead of a full one and a sliver. */
         const double h = step >= remaining ? remaining : smaller(step, 0.5 * remaining);
-        double factors[N_FACTORS], now_inputs[N_INPUTS], then_inputs[N_INPUTS];
+        double factors[N_FACTORS];
+        double now_inputs[AT_LEAST_ONE(N_INPUTS)] = {0.0}, then_inputs[AT_LEAST_ONE(N_INPUTS)] = {0.0};
         double k_1[N_PARTS], k_2[N_PARTS], both[N_PARTS];
         double rate_1[AT_LEAST_ONE(N_MEMORY)], rate_2[AT_LEAST_ONE(N_MEMORY)];
         const double share = elapsed / duration, later_share = smaller((elapsed + h) / duration, 1.0);

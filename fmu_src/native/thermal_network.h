@@ -2,20 +2,28 @@
 #ifndef THERMAL_NETWORK_H
 #define THERMAL_NETWORK_H
 
-#include "loss_networks.h"
 #include "model_data.h"
+
+#if N_COMPONENTS /* the losses are trained networks */
+#include "loss_networks.h"
+
+/* What the losses depend on: speed [1/min] and torque [N m] as they see them, and temperatures of LOSS_NODE [degC]. */
+typedef struct {
+    double speed, torque, T[N_LOSS_NODES];
+} LossPoint;
+#endif
 
 /* What goes into the laws, in the order of their arguments. */
 typedef struct {
-    double time, inputs[N_INPUTS], T[N_PARTS], parameters[AT_LEAST_ONE(N_PARAMETERS)], memory[AT_LEAST_ONE(N_MEMORY)],
-        power[N_COMPONENTS];
+    double time, inputs[AT_LEAST_ONE(N_INPUTS)], T[N_PARTS], parameters[AT_LEAST_ONE(N_PARAMETERS)],
+        memory[AT_LEAST_ONE(N_MEMORY)], power[AT_LEAST_ONE(N_COMPONENTS)];
 } Signals;
 
 /* The heat balance at one moment. */
 typedef struct {
     int valid, has_gain; /* outputs need no gain */
     Signals at;
-    double heat[N_SOURCES + 2 * N_MEMORY]; /* W; then the rates of the memories and their updates */
+    double heat[AT_LEAST_ONE(N_SOURCES + 2 * N_MEMORY)]; /* W; then the rates of the memories and their updates */
     double T_boundary[AT_LEAST_ONE(N_BOUNDARIES)];
     double conductance[AT_LEAST_ONE(N_FIXED + N_VARYING)]; /* W/K */
     double gain[N_PARTS];                                  /* W: net heat into the parts */
@@ -23,7 +31,9 @@ typedef struct {
 
 /* A network with parameter values. */
 typedef struct {
+#if N_COMPONENTS
     LossPower *loss_power;
+#endif
     double capacity[N_PARTS];
     Balance now, then;
 } Network;
@@ -42,6 +52,11 @@ const char *network_set(Network *network, const double *parameters);
 
 /* Sources, boundaries and losses at a moment. */
 const Balance *network_balance(Network *network, double time, const double *inputs, const ThermalState *state);
+
+#if N_COMPONENTS
+/* What the losses depend on at a moment. */
+LossPoint network_loss_point(const Network *network, double time, const double *inputs, const ThermalState *state);
+#endif
 
 /* Integrate over `duration`, the inputs going straight from `begin` to `end`; gives NULL, or why it cannot be done, and
    *failed_at. */

@@ -42,8 +42,6 @@ class Slot:
     minimum, maximum : float
     scale, offset : float
         Value in the network's unit = scale * value + offset
-    inner_unit : str
-        The network's unit, for messages
     """
 
     name: str
@@ -57,7 +55,6 @@ class Slot:
     maximum: float
     scale: float
     offset: float
-    inner_unit: str
 
     def fault(self, value: float) -> str | None:
         """Why `value` cannot be used, or None."""

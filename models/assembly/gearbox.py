@@ -18,7 +18,12 @@ import numpy as np
 
 from models.assembly.gearbox_definition import Definition
 from models.assembly.gearbox_network import build_network
-from models.assembly.parametric import ParametricLosses, build_parametric_network
+from models.assembly.parametric import (
+    ParametricLosses,
+    build_parametric_network,
+    law_faults,
+    with_losses_as_laws,
+)
 from models.base.errors import InputError, did_you_mean
 from models.definition.definition_file import read_values, refuse
 from models.definition.messages import validate_section
@@ -28,6 +33,7 @@ from models.definition.values_with_source import Annotations, join
 from models.files.toml_file import known_names, packaged, read_text
 from models.formulas.oil import Oil as Lubricant
 from models.losses.loss_model import LossModel
+from models.portable.evaluation import NoLosses
 from models.simulation.thermal_network import Losses, ThermalNetwork
 
 FOLDER = "gearboxes"
@@ -93,7 +99,7 @@ class Gearbox:
     @property
     def ambient_degC(self) -> float:
         """Temperature of the surroundings where a cycle or a recording names none."""
-        return self.definition.ambient.temperature_degC
+        return self.definition.ambient_degC
 
     @property
     def oil(self) -> Oil:
@@ -153,7 +159,9 @@ class Gearbox:
     @cached_property
     def values(self) -> Mapping[str, Any]:
         """All values as plain tables, defaults included, absent ones left out."""
-        return self.definition.model_dump(by_alias=True, exclude_none=True)
+        dumped = self.definition.model_dump(by_alias=True, exclude_none=True)
+        # Lists that a definition without geometry leaves out are no part of its hash.
+        return {key: value for key, value in dumped.items() if value != () or not self.is_parametric}
 
     @cached_property
     def leaves(self) -> Mapping[str, Any]:
@@ -232,7 +240,7 @@ class Gearbox:
     def typical_operation(self) -> tuple[float, float]:
         """Speed [1/min] and torque [N m]: half of what surrogates are trained to, without geometry the reference."""
         if isinstance(self.definition, ParametricDefinition):
-            return self.definition.reference.speed_rpm, self.definition.reference.torque_Nm
+            return self.definition.operation.speed_rpm, self.definition.operation.torque_Nm
         return 0.5 * max(self.training.speed_rpm), 0.5 * max(self.training.torque_Nm)
 
     @property
@@ -252,8 +260,16 @@ class Gearbox:
         return LossModel.from_definition(self.geometry)
 
     def loss_laws(self) -> Losses:
-        """Return the losses of its network: the full model, or without geometry the parametric laws."""
-        return ParametricLosses(self.definition) if isinstance(self.definition, ParametricDefinition) else self.losses()
+        """Return the losses of its network: the full model, without geometry the parametric laws, or none."""
+        if not isinstance(self.definition, ParametricDefinition):
+            return self.losses()
+        return ParametricLosses(self.definition) if self.definition.loss else NoLosses()
+
+    def network_of_laws(self, network: ThermalNetwork) -> ThermalNetwork:
+        """Return a network of this machine (without geometry) whose losses are laws of its sources, as FMUs need it."""
+        if not isinstance(self.definition, ParametricDefinition):
+            raise TypeError("the losses of a gearbox with geometry are no laws")
+        return with_losses_as_laws(network, self.definition)
 
     def network(self) -> ThermalNetwork:
         """Return the thermal network of this gearbox."""
@@ -333,7 +349,9 @@ def read_gearbox(text: str, *, file: str) -> Gearbox:
 
 def _validate(values: Mapping[str, Any], *, file: str) -> Definition | ParametricDefinition:
     if KEY in values:
-        return validate_section(ParametricDefinition, values, file=file)
+        definition = validate_section(ParametricDefinition, values, file=file)
+        refuse(law_faults(definition), values, file=file)
+        return definition
     return validate_section(Definition, values, file=file)
 
 

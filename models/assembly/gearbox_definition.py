@@ -68,6 +68,11 @@ class Definition(Section):
     training: Training
 
     @property
+    def ambient_degC(self) -> float:
+        """Temperature of the surroundings where a recording names none."""
+        return self.ambient.temperature_degC
+
+    @property
     def all_factors(self) -> Mapping[str, float]:
         """Every tunable factor of the thermal network by name; 1 if the file does not name it."""
         return {name: self.factors.get(name, 1.0) for name in self.factor_names}

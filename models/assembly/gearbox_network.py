@@ -29,6 +29,7 @@ from models.losses.bearing import OIL_FLOW_HEAT, oil_flow_max
 from models.losses.loss_model import LossModel, loss_factors
 from models.losses.loss_term import MESH, OIL, RPM, SPEED_FLOOR_RPM, TORQUE_FLOOR_NM
 from models.network.laws import Parameter, symbol
+from models.quantities.quantities import usual_inputs
 from models.simulation.thermal_network import Link, Node, Source, ThermalNetwork
 
 AIR, FRAME = "air", "frame"
@@ -94,10 +95,12 @@ class _Builder:
             sources=tuple(self.sources()),
             parameters=tuple(self.parameters()),
             components=self.losses.components,
-            inputs={
-                "T_ambient": gearbox.ambient.temperature_degC,
-                "air_speed": gearbox.ambient.air_speed_m_s,
-            },
+            inputs=usual_inputs(
+                speed=0.0,
+                torque=0.0,
+                T_ambient=gearbox.ambient.temperature_degC,
+                air_speed=gearbox.ambient.air_speed_m_s,
+            ),
             groups={
                 "housing": self.housing_parts,
                 "bearings": tuple(bearing.name for bearing in gearbox.bearing),

@@ -3,21 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import sympy as sp
 from numpy.typing import ArrayLike
 
+from models.base.errors import InputError, did_you_mean
 from models.base.types import Array
-from models.definition.parametric_sections import Loss, ParametricDefinition, Path
+from models.definition.parametric_sections import Heat, Loss, ParametricDefinition, Path, TorqueFromPower
 from models.formulas.oil import T_HIGHEST, T_LOWEST, kinematic_viscosity_d341
+from models.network.expressions import parse_expression
 from models.network.laws import Parameter, symbol
+from models.quantities.units import find_unit
 from models.simulation.thermal_network import Link, Node, Source, ThermalNetwork
 
 GROUPS = ("housing", "bearings", "returns")
 RUN_POWER = 8  # sharpness of the step of a conductance from standstill to running, over speed
 RATIOS = (0.02, 50.0)  # of speed, torque or viscosity, beyond which an exponent's deviation has no further effect
+SLOWEST_RPM = 1.0  # below it a torque from a power is that at it
+RPM = np.pi / 30.0
 FARTHEST = 1000.0  # limits of a factor; its prior keeps it much nearer to 1
 
 
@@ -58,7 +63,7 @@ class ParametricLosses:
 
     def power(self, speed: ArrayLike, torque: ArrayLike, temperatures: ArrayLike) -> Array:
         """Losses [W], shape (..., components), at speed [1/min], torque [N m] and temperatures [degC]."""
-        reference, nodes = self.definition.reference, self.temperature_nodes
+        reference, nodes = self.definition.operation, self.temperature_nodes
         T = np.asarray(temperatures, dtype=float)
         n = np.abs(np.asarray(speed, dtype=float)) / reference.speed_rpm
         m = np.abs(np.asarray(torque, dtype=float)) / reference.torque_Nm
@@ -96,17 +101,76 @@ def build_parametric_network(definition: ParametricDefinition, priors: Mapping[s
     return _Builder(definition, priors).network()
 
 
+def law_faults(definition: ParametricDefinition) -> list[tuple[str, str]]:
+    """Return laws of a definition that cannot be used, as dotted path and message."""
+    temperatures = [f"T_{part.name}" for part in definition.part] + [f"T_{b.name}" for b in definition.boundary]
+    known = ["time", *definition.inputs, *temperatures, *(parameter.name for parameter in definition.parameter)]
+    known += [] if definition.torque is None else ["torque"]
+    laws = [(f"heat.{i}.heat_W", heat.heat_W) for i, heat in enumerate(definition.heat)]
+    laws += [(f"link.{i}.factor", path.factor) for i, path in enumerate(definition.link) if path.factor is not None]
+    faults = []
+    for path, text in laws:
+        try:
+            used = sorted(s.name for s in parse_expression(text).free_symbols)
+        except InputError as error:
+            faults.append((path, str(error)))
+            continue
+        faults += [
+            (path, f"{name!r} is no input and no temperature of this definition{did_you_mean(name, known)}")
+            for name in used
+            if name not in known
+        ]
+    return faults
+
+
+def with_losses_as_laws(network: ThermalNetwork, definition: ParametricDefinition) -> ThermalNetwork:
+    """Return a network of a definition, perhaps corrected, in which each loss is a law of its source.
+
+    The formula is that of :class:`ParametricLosses`.
+    """
+    operation, constants = definition.operation, definition.viscosity_constants
+    n, m = sp.Abs(symbol("speed")) / operation.speed_rpm, sp.Abs(symbol("torque")) / operation.torque_Nm
+    nu_ref = kinematic_viscosity_d341(operation.temperature_degC, *constants)
+    laws = {}
+    for loss in definition.loss:
+        T = sp.Min(sp.Max(symbol(f"T_{loss.part}"), T_LOWEST), T_HIGHEST)
+        nu = kinematic_viscosity_d341(T, *constants, xp=sp) / nu_ref
+        no_load = loss.no_load_W * n**loss.speed_exponent * nu**loss.viscosity_exponent
+        laws[symbol(f"P_{loss.name}_no_load")] = sp.Piecewise((no_load, n > 0), (sp.Float(0.0), True))
+        laws[symbol(f"P_{loss.name}_load")] = loss.load_W * n * m**loss.torque_exponent
+    # Losses see a shifted speed or torque (a fault of an instrument); as laws they contain the shift.
+    seen = {symbol(name): law for name, law in network.operating.items()}
+    laws = {name: law.xreplace(seen) for name, law in laws.items()}
+    return replace(
+        network,
+        components=(),
+        operating={},
+        sources=tuple(replace(source, heat=source.heat.xreplace(laws)) for source in network.sources),
+        states=tuple(
+            replace(state, rate=state.rate.xreplace(laws),
+                    update=None if state.update is None else state.update.xreplace(laws))
+            for state in network.states
+        ),
+    )  # fmt: skip
+
+
 class _Builder:
     """Assembles the network of one definition."""
 
     def __init__(self, definition: ParametricDefinition, priors: Mapping[str, float]) -> None:
         self.definition, self.priors = definition, priors
         self.parameters: list[Parameter] = []
-        self.n = sp.Abs(symbol("speed")) / definition.reference.speed_rpm
-        self.m = sp.Abs(symbol("torque")) / definition.reference.torque_Nm
+        self.n = sp.Abs(symbol("speed")) / definition.operation.speed_rpm
+        self.m = sp.Abs(symbol("torque")) / definition.operation.torque_Nm
 
     def network(self) -> ThermalNetwork:
         definition = self.definition
+        for index, given in enumerate(definition.parameter):
+            sd = self.priors.get(f"parameter.{index}.start", 0.0) / given.start
+            self.parameters.append(Parameter(
+                name=given.name, unit=given.unit, start=given.start, lower=given.start / FARTHEST,
+                upper=given.start * FARTHEST, sd=sd, description=given.description or given.name.replace("_", " "),
+            ))  # fmt: skip
         boundaries = [Node(name=b.name, temperature=symbol(b.input)) for b in definition.boundary]
         parts = [
             Node(name=part.name, capacity=part.heat_capacity_J_K * self._factor(
@@ -116,13 +180,16 @@ class _Builder:
         ]  # fmt: skip
         links = [self._link(index, path) for index, path in enumerate(definition.link)]
         sources = [source for index, loss in enumerate(definition.loss) for source in self._sources(index, loss)]
+        sources += [source for index, heat in enumerate(definition.heat) for source in self._heats(index, heat)]
+        derived = {} if definition.torque is None else {"torque": self._torque(definition.torque)}
         return ThermalNetwork(
             nodes=(*boundaries, *parts),
             links=tuple(links),
             sources=tuple(sources),
             parameters=tuple(self.parameters),
             components=ParametricLosses(definition).components,
-            inputs={b.input: b.temperature_degC for b in definition.boundary},
+            inputs=definition.inputs,
+            derived=derived,
             groups={g: names for g in GROUPS if (names := tuple(p.name for p in definition.part if p.group == g))},
             recording=definition.recording,
         )
@@ -138,16 +205,38 @@ class _Builder:
                 f"standstill_{name}", f"link.{index}.standstill_share", path.standstill_share,
                 f"factor on the share of the conductance {a} - {b} at standstill", highest=1.0 / path.standstill_share,
             )  # fmt: skip
-            speed = sp.Abs(symbol("speed")) / self.definition.reference.running_rpm
+            speed = sp.Abs(symbol("speed")) / self.definition.operation.running_rpm
             running = speed**RUN_POWER / (1 + speed**RUN_POWER)
             G = G * (share + (1 - share) * running)
+        if path.factor is not None:
+            G = G * parse_expression(path.factor)
         return Link(name=f"{a}-{b}", nodes=(a, b), conductance=sp.sympify(G))
+
+    def _torque(self, given: TorqueFromPower) -> sp.Expr:
+        efficiency = given.efficiency * self._factor(
+            "efficiency",
+            "torque.efficiency",
+            given.efficiency,
+            f"factor on the efficiency from {given.power} to torque",
+        )
+        unit = find_unit(self.definition.inputs[given.power].quantity.unit, "power")
+        omega = sp.Max(sp.Abs(symbol("speed")), SLOWEST_RPM) * RPM
+        return efficiency * unit.factor * symbol(given.power) / omega
+
+    def _heats(self, index: int, heat: Heat) -> Iterator[Source]:
+        gain = heat.gain * self._factor(
+            f"{heat.name}_gain", f"heat.{index}.gain", heat.gain, f"factor on the heat {heat.name}"
+        )
+        law = gain * parse_expression(heat.heat_W) / len(heat.parts)
+        for part in heat.parts:
+            name = heat.name if len(heat.parts) == 1 else f"{heat.name}_{part}"
+            yield Source(name=name, node=part, heat=sp.sympify(law), is_loss=False)
 
     def _sources(self, index: int, loss: Loss) -> Iterator[Source]:
         path = f"loss.{index}"
         constants = self.definition.viscosity_constants
         T = sp.Min(sp.Max(symbol(f"T_{loss.part}"), T_LOWEST), T_HIGHEST)
-        nu_ref = kinematic_viscosity_d341(self.definition.reference.temperature_degC, *constants)
+        nu_ref = kinematic_viscosity_d341(self.definition.operation.temperature_degC, *constants)
         nu = kinematic_viscosity_d341(T, *constants, xp=sp) / nu_ref
         no_load = self._factor(f"{loss.name}_no_load", f"{path}.no_load_W", loss.no_load_W, f"no-load loss {loss.name}")
         no_load *= self._tilt(f"{loss.name}_speed_exponent", f"{path}.speed_exponent", self.n)

@@ -21,9 +21,9 @@ from models.base.errors import InputError, did_you_mean
 from models.definition.messages import validate_section
 from models.definition.sections import Name, OneOrMore, Section, Text
 from models.files.toml_file import parse_schema_1, read_text
+from models.network.expressions import Law
 from models.network.laws import Parameter
 from models.simulation.thermal_network import ExtraState, ThermalNetwork
-from models.terms.expressions import Law
 from models.terms.law_file import LawParameter, LawState, LawTable
 from models.terms.term import FACTORS, Term
 

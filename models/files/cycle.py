@@ -12,9 +12,7 @@ from numpy.typing import ArrayLike
 from models.base.errors import InputError, Problems
 from models.base.types import Array
 from models.quantities.column_names import meant
-from models.quantities.quantities import INPUTS
-
-REQUIRED = ("speed", "torque")
+from models.quantities.quantities import GEARBOX_INPUTS, Input
 
 MOST_ROWS = 5_000_000  # of a refined cycle, as of a table that is read
 SHORTEST_INTERVAL_S = 1e-5  # times in files have six decimals
@@ -31,7 +29,7 @@ class Cycle:
     time : Array, shape (N,)
         [s], strictly increasing
     inputs : mapping of signal name to Array, shape (N,)
-        ``speed`` [1/min], ``torque`` [N m], ``T_ambient`` [degC], ``air_speed`` [m/s] and further named inputs
+        As ``speed`` [1/min], ``torque`` [N m], ``T_ambient`` [degC]; named inputs in the unit of their definition
     """
 
     time: Array
@@ -39,18 +37,19 @@ class Cycle:
 
     @classmethod
     def from_columns(
-        cls, columns: Mapping[str, ArrayLike], *, name: str = "cycle", extra: tuple[str, ...] = ()
+        cls, columns: Mapping[str, ArrayLike], *, name: str = "cycle", inputs: Mapping[str, Input] = GEARBOX_INPUTS
     ) -> Cycle:
         """Read a cycle from named columns (a dict, a pandas data frame).
 
         Parameters
         ----------
         columns : mapping of column name to ArrayLike, shape (N,)
-            ``time_s``, ``speed_rpm``, ``torque_Nm`` and, where known, ``T_ambient_degC`` and ``air_speed_m_s``
+            ``time_s``, those that the inputs require (``speed_rpm``, ``torque_Nm``) and, if known, the others
+            (``T_ambient_degC``)
         name : str
             Its name in messages, e.g. the file
-        extra : tuple of str
-            Further columns that the network has as inputs, read under their own name
+        inputs : mapping of str to Input
+            Of the network; by default those of a gearbox with geometry
 
         Raises
         ------
@@ -67,10 +66,9 @@ class Cycle:
         run.csv: time_s goes from 1 to 1 at row 3; it must increase from row to row
         """
         problems = Problems(name)
-        wanted = (
-            {"time": "time_s"} | {name: quantity.column for name, quantity in INPUTS.items()} | {c: c for c in extra}
-        )
-        _check_names([str(key) for key in columns], list(wanted.values()), problems)
+        wanted = {"time": "time_s"} | {name: given.column for name, given in inputs.items()}
+        needed = ["time_s", *(given.column for given in inputs.values() if given.required)]
+        _check_names([str(key) for key in columns], list(wanted.values()), needed, problems)
         arrays: dict[str, Array] = {}
         for signal, column in wanted.items():
             values = _numbers(columns[column], column, problems) if column in columns else None
@@ -82,8 +80,8 @@ class Cycle:
             for signal, values in arrays.items():
                 if len(values) != len(time):
                     problems.add(f"{wanted[signal]} has {len(values)} rows, but time_s has {len(time)}")
-        for signal in [s for s in INPUTS if s in arrays]:
-            _check_range(signal, arrays[signal], problems)
+        for signal, values in arrays.items():
+            _check_range(inputs[signal], values, problems)
         problems.stop_if_any()
         return cls(cast(Array, time), arrays)
 
@@ -138,8 +136,8 @@ def _rounded_up(seconds: float) -> str:
     return f"{np.ceil(seconds / unit) * unit:g}"
 
 
-def _check_names(have: list[str], wanted: list[str], problems: Problems) -> None:
-    for column in ("time_s", *(INPUTS[signal].column for signal in REQUIRED)):
+def _check_names(have: list[str], wanted: list[str], needed: list[str], problems: Problems) -> None:
+    for column in needed:
         if column not in have:
             problems.add(f"column {column} is missing; it has: {', '.join(sorted(have))}")
     absent = [column for column in wanted if column not in have]
@@ -160,8 +158,8 @@ def _check_time(time: Array, problems: Problems) -> None:
         )
 
 
-def _check_range(signal: str, values: Array, problems: Problems) -> None:
-    quantity = INPUTS[signal]
+def _check_range(given: Input, values: Array, problems: Problems) -> None:
+    quantity = given.quantity
     column, low, high = quantity.column, quantity.low, quantity.high
     unit = f"{quantity.unit}; {quantity.note}" if quantity.note else quantity.unit
     wrong = np.flatnonzero((values < low) | (values > high))

@@ -14,6 +14,7 @@ from models.base.errors import InputError
 from models.base.types import Array
 from models.files.cycle import Cycle
 from models.files.table_file import read_table
+from models.quantities.quantities import GEARBOX_INPUTS, Input
 
 DECIMALS = 6  # of results: a millionth of a kelvin or a watt
 
@@ -77,12 +78,12 @@ class RecordedStart:
         return {name: known.get(name, mean) for name in nodes}
 
 
-def read_cycle(path: Path, extra: tuple[str, ...] = ()) -> Cycle:
+def read_cycle(path: Path, inputs: Mapping[str, Input] = GEARBOX_INPUTS) -> Cycle:
     """Read a cycle; see :meth:`models.files.cycle.Cycle.from_columns`."""
-    return read_cycle_and_start(path, extra)[0]
+    return read_cycle_and_start(path, inputs)[0]
 
 
-def read_cycle_and_start(path: Path, extra: tuple[str, ...] = ()) -> tuple[Cycle, RecordedStart]:
+def read_cycle_and_start(path: Path, inputs: Mapping[str, Input] = GEARBOX_INPUTS) -> tuple[Cycle, RecordedStart]:
     """Read a cycle, and the first node temperatures (columns ``T_<node>_degC``) in its file.
 
     Raises
@@ -91,10 +92,11 @@ def read_cycle_and_start(path: Path, extra: tuple[str, ...] = ()) -> tuple[Cycle
         See :meth:`models.files.cycle.Cycle.from_columns` and :func:`models.files.table_file.read_table`.
     """
     table = read_table(path)
-    cycle = Cycle.from_columns({str(c): table[c].to_numpy() for c in table.columns}, name=str(path), extra=extra)
+    cycle = Cycle.from_columns({str(c): table[c].to_numpy() for c in table.columns}, name=str(path), inputs=inputs)
     measured = (
         (name[2:-5], name, pd.to_numeric(table[name], errors="coerce").to_numpy(dtype=np.float64, na_value=np.nan))
         for name in _temperature_columns(table)
+        if name not in {given.column for given in inputs.values()}
     )
     return cycle, RecordedStart.first_of(path, measured, np.asarray(table.index) + 1)
 

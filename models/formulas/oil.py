@@ -70,6 +70,9 @@ def d341_constants(T_1: float, nu_1: float, T_2: float, nu_2: float) -> tuple[fl
     return y_1 + n * x_1, n
 
 
+TYPICAL_OIL = d341_constants(40.0, 100.0, 100.0, 11.2)  # ISO VG 100, mineral
+
+
 def kinematic_viscosity_d341(T: Any, m: float, n: float, xp: ModuleType = np) -> Any:
     r"""Kinematic viscosity after ASTM D341, :math:`\lg\lg(\nu+0.7) = m - n\lg\Theta`.
 

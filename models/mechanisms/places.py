@@ -22,7 +22,8 @@ from dataclasses import dataclass
 from itertools import combinations
 
 from models.network.laws import symbol
-from models.simulation.thermal_network import BASE_SIGNALS, ThermalNetwork
+from models.quantities.quantities import node_of_channel
+from models.simulation.thermal_network import ThermalNetwork
 from models.terms.term import Kind
 
 EACH, FACTOR, ALL_LOSSES, ALL_PARTS = "each ", "factor ", "losses", "parts"
@@ -76,7 +77,7 @@ def spots(network: ThermalNetwork, kind: Kind, pattern: str, channels: Sequence[
     elif kind == "link_factor":
         found = _links(network, pattern)
     elif kind == "signal":
-        known = pattern in (*BASE_SIGNALS, *network.inputs)
+        known = pattern in (*network.inputs, *network.derived)
         found = iter([Spot(name=pattern, target=(pattern,))] if known else [])
     else:
         found = _channels(network, pattern, channels)
@@ -173,7 +174,8 @@ def _between(name: str, chosen: dict[str, tuple[str, str]]) -> Spot:
 
 
 def _channels(network: ThermalNetwork, pattern: str, channels: Sequence[str]) -> Iterator[Spot]:
-    nodes = [name for name in channels if name in network.node_names]
+    nodes = [name for name in channels if node_of_channel(name, network.node_names) in network.node_names]
+    at = {name: node_of_channel(name, network.node_names) for name in nodes}
     if pattern == "clock":
         # The loss comes from the rig's own torque meters, on one clock with speed and torque, more often than not.
         if nodes:
@@ -182,8 +184,8 @@ def _channels(network: ThermalNetwork, pattern: str, channels: Sequence[str]) ->
             yield Spot(name="clock_of_all", target=tuple(channels))
     elif pattern == "pair":
         for pair in combinations(nodes, 2):
-            yield Spot(name="_".join(pair), target=pair, here=pair[:1], there=pair[1:])
+            yield Spot(name="_".join(pair), target=pair, here=(at[pair[0]],), there=(at[pair[1]],))
     else:
         chosen = nodes if pattern == "each thermometer" else channels
         for name in chosen:
-            yield Spot(name=name, target=(name,), here=(name,) if name in nodes else ())
+            yield Spot(name=name, target=(name,), here=(at[name],) if name in nodes else ())

@@ -9,14 +9,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 import sympy as sp
 
-from models.formulas.oil import d341_constants, kinematic_viscosity_d341
+from models.formulas.oil import TYPICAL_OIL, kinematic_viscosity_d341
 from models.network.laws import symbol
 
 if TYPE_CHECKING:
     from models.assembly.gearbox import Gearbox
     from models.simulation.thermal_network import Losses, ThermalNetwork
 
-TYPICAL_OIL = d341_constants(40.0, 100.0, 100.0, 11.2)  # ISO VG 100, mineral
 HOTTEST, COOLEST_RISE, TYPICAL_RISE = 100.0, 20.0, 50.0  # degC, K, K
 TEN_HOURS = 36000.0
 EXPONENTS = (-1.0, 1.0)  # within which a loss may go with the viscosity
@@ -118,7 +117,7 @@ class Scale:
         boundaries = {node.name for node in network.nodes if node.temperature is not None}
         here = {symbol(f"T_{name}"): ambient for name in boundaries}
         here |= {symbol(f"T_{part.name}"): ambient + TYPICAL_RISE for part in network.parts}
-        here |= {symbol(name): value for name, value in network.inputs.items()}
+        here |= {symbol(name): given.default for name, given in network.inputs.items()}
         here |= {symbol("speed"): speed, symbol("torque"): torque, symbol("time"): 0.0}
         outward = [link.conductance for link in network.links if boundaries & set(link.nodes)]
         conductance = float(sum(law.xreplace(start | here).evalf() for law in outward))

@@ -17,8 +17,8 @@ from models.files.toml_file import parse_schema_1, read_text
 from models.mechanisms.forms import LARGEST, strength
 from models.mechanisms.mechanism import STRENGTH, Mechanism, Memory
 from models.mechanisms.scale import Scale
+from models.network.expressions import Law
 from models.network.laws import Parameter
-from models.terms.expressions import Law
 from models.terms.law_file import LawParameter, LawTable
 
 Positive = Annotated[float, Field(gt=0.0)]

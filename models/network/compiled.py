@@ -40,7 +40,7 @@ def laws_of(network: Network, functions: Mapping[str, Callable[..., tuple[Any, .
         components=network.components,
         sources=tuple(source.name for source in network.sources),
         losses_of_sources=tuple(source.is_loss for source in network.sources),
-        inputs=("speed", "torque", *network.inputs),
+        inputs=tuple(network.inputs),
         parameters=tuple(parameter.name for parameter in network.parameters),
         states=tuple(state.name for state in network.states),
         varying=tuple(index for index, varies in enumerate(_varying(network)) if varies),
@@ -80,38 +80,42 @@ def c_law_source(network: Network, places: Mapping[str, str]) -> dict[str, str]:
     Raises
     ------
     InputError
-        If a heat capacity is missing or depends on more than parameters, a law uses a function that C lacks, or speed
-        or torque is shifted: the losses of a native FMU read the inputs themselves.
+        If a heat capacity is missing or depends on more than parameters, or a law uses a function that C lacks.
     """
-    if network.operating:
-        shifted = " and ".join(network.operating)
-        raise InputError(
-            f"a native FMU cannot shift {shifted} for its losses; give it the true one, or build --target python"
-        )
+    functions = law_expressions(network)
+    operating = functions.pop("operating", (functions["boundary"][0], [symbol("speed"), symbol("torque")]))
+    if network.components:
+        functions["operating"] = operating
     return {
         name: c_function_source(name, {argument: places[argument] for argument in arguments}, expressions)
-        for name, (arguments, expressions) in law_expressions(network).items()
+        for name, (arguments, expressions) in functions.items()
     }
 
 
 def law_expressions(network: Network) -> dict[str, tuple[list[str], list[sp.Expr]]]:
     """Arguments, in order, and expressions of the functions of :class:`~models.portable.evaluation.Laws` by name.
 
-    ``operating`` is there only where speed or torque is shifted.
+    ``operating`` is there only if speed or torque is shifted or derived.
 
     Raises
     ------
     InputError
         If a heat capacity is missing or depends on more than parameters.
     """
-    boundary = {symbol(f"T_{node.name}"): node.temperature for node in network.nodes if node.temperature is not None}
+    derived = {symbol(name): law for name, law in network.derived.items()}
+    boundary = {
+        symbol(f"T_{node.name}"): node.temperature.xreplace(derived)
+        for node in network.nodes
+        if node.temperature is not None
+    }
+    known = derived | boundary
     parameters = [parameter.name for parameter in network.parameters]
     parts = [f"T_{part.name}" for part in network.parts]
     common = [*BASE_SIGNALS, *network.inputs, *parts, *parameters, *(state.name for state in network.states)]
     with_numeric = [*common, *network.numeric_laws]
     losses = [f"P_{name}" for name in network.components]
     varies = _varying(network)
-    conductances = [link.conductance.xreplace(boundary) for link in network.links]
+    conductances = [link.conductance.xreplace(known) for link in network.links]
     capacities = []
     for part in network.parts:
         if part.capacity is None or {s.name for s in part.capacity.free_symbols} - set(parameters):
@@ -119,7 +123,7 @@ def law_expressions(network: Network) -> dict[str, tuple[list[str], list[sp.Expr
         capacities.append(part.capacity)
     memory = [state.rate for state in network.states]
     memory += [symbol(state.name) if state.update is None else state.update for state in network.states]
-    heats = [expression.xreplace(boundary) for expression in [*(source.heat for source in network.sources), *memory]]
+    heats = [expression.xreplace(known) for expression in [*(source.heat for source in network.sources), *memory]]
     moving = [c for c, varying in zip(conductances, varies, strict=True) if varying]
     constant = [c for c, varying in zip(conductances, varies, strict=True) if not varying]
     functions = {
@@ -128,8 +132,9 @@ def law_expressions(network: Network) -> dict[str, tuple[list[str], list[sp.Expr
         "heat": ([*with_numeric, *losses], heats),
         "fixed": (parameters, [*constant, *capacities]),
     }
-    if network.operating:
-        functions["operating"] = (common, [network.operating.get(name, symbol(name)) for name in ("speed", "torque")])
+    if operating := {**network.derived, **network.operating}:
+        seen = [operating.get(name, symbol(name)).xreplace(known) for name in ("speed", "torque")]
+        functions["operating"] = (common, seen)
     return functions
 
 

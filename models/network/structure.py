@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from models.base.types import Array
 from models.network.laws import NumericLaw, Parameter, Signals, symbol
+from models.quantities.quantities import Input
 
 
 class Losses(Protocol):
@@ -101,7 +102,7 @@ class ExtraState:
     blurred: sp.Expr | None = None
 
 
-BASE_SIGNALS = ("time", "speed", "torque")
+BASE_SIGNALS = ("time",)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -114,15 +115,17 @@ class Network:
     parameters : tuple of Parameter
     components : tuple of str
         Losses that the sources may use as the signal ``P_<component>``
-    inputs : mapping of str to float
-        Further inputs and the value each has where a cycle does not give it
+    inputs : mapping of str to Input
+        By the name that laws use, in the order of the solver's columns
+    derived : mapping of str to sympy.Expr
+        Signals that follow from inputs and parameters, as a torque from an electrical power
     groups : mapping of str to tuple of str
         Names for several nodes together, e.g. ``housing``
     states : tuple of ExtraState
     numeric_laws : mapping of str to NumericLaw
         Laws that could not be traced, by the symbol in their place
     operating : mapping of str to sympy.Expr
-        ``speed`` or ``torque`` as the losses see it, where that is not the input itself
+        ``speed`` or ``torque`` as the losses see it, if that is not the input itself
     recording : mapping
         How recordings of this gearbox name their columns, as in a mapping file, if the definition states it
     """
@@ -132,7 +135,8 @@ class Network:
     sources: tuple[Source, ...] = ()
     parameters: tuple[Parameter, ...] = ()
     components: tuple[str, ...] = ()
-    inputs: Mapping[str, float] = field(default_factory=dict)
+    inputs: Mapping[str, Input] = field(default_factory=dict)
+    derived: Mapping[str, sp.Expr] = field(default_factory=dict)
     groups: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     states: tuple[ExtraState, ...] = ()
     numeric_laws: Mapping[str, NumericLaw] = field(default_factory=dict)
@@ -155,6 +159,7 @@ class Network:
         return (
             *BASE_SIGNALS,
             *self.inputs,
+            *self.derived,
             *(f"T_{name}" for name in self.node_names),
             *(f"P_{name}" for name in self.components),
             *(parameter.name for parameter in self.parameters),

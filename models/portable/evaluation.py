@@ -30,7 +30,7 @@ class Laws:
     sources, losses_of_sources : tuple of str, tuple of bool
         Names of the sources, and which of them are mechanical losses
     inputs, parameters, states : tuple of str
-        Names of the inputs without time (speed and torque first), parameters, and extra states
+        Names of the inputs without time, parameters, and extra states
     boundary : callable
         common signals -> temperatures of the boundaries, [degC]
     exchange : callable
@@ -50,7 +50,7 @@ class Laws:
     numeric : tuple of callable
         Laws that were not traced: mapping of all signals by name -> number
     operating : callable or None
-        common signals -> speed [1/min] and torque [N m] as the losses see them; None: the inputs themselves
+        common signals -> speed [1/min] and torque [N m] as the losses see them; None: the inputs of these names
 
     Notes
     -----
@@ -92,6 +92,22 @@ class LossSource(Protocol):
         ...
 
 
+class NoLosses:
+    """Losses of a network whose heat sources are all laws: none."""
+
+    components: tuple[str, ...] = ()
+    temperature_nodes: tuple[str, ...] = ()
+    reads: tuple[frozenset[str], ...] = ()
+
+    def power(self, speed: Any, torque: Any, temperatures: Any) -> Array:  # noqa: ARG002
+        """Losses of no component, shape (..., 0)."""
+        return np.zeros((*np.shape(temperatures)[:-1], 0))
+
+    def domain_distance(self, speed: Any, torque: Any, temperatures: Any) -> Array:  # noqa: ARG002
+        """Zero everywhere, shape (...)."""
+        return np.zeros(np.shape(temperatures)[:-1])
+
+
 class NetworkSystem:
     """A network, its losses and parameter values: a :class:`models.portable.solver.System`.
 
@@ -127,7 +143,7 @@ class NetworkSystem:
             slice(n * n, n * (n + m)),
             slice(n * (n + m), None),
         )
-        self._loss_nodes = np.array([laws.parts.index(name) for name in losses.temperature_nodes])
+        self._loss_nodes = np.array([laws.parts.index(name) for name in losses.temperature_nodes], dtype=int)
         self._varying = np.array(laws.varying, dtype=int)
         constant = [index for index in range(n_links) if index not in laws.varying]
         batch = np.broadcast_shapes(*(np.shape(value) for value in parameters)) if vector else ()
@@ -141,13 +157,16 @@ class NetworkSystem:
 
     def power(self, time: Any, inputs: Array, states: Array) -> Array:
         """Nominal losses [W], shape (..., components)."""
+        if not self.laws.components:
+            return np.zeros((*states.shape[:-1], 0))
         speed, torque = self.operating(time, inputs, states)
         return self.losses.power(speed, torque, states[..., self._loss_nodes])
 
     def operating(self, time: Any, inputs: Array, states: Array) -> tuple[Array, Array]:
         """Speed [1/min] and torque [N m] as the losses see them, each of shape (...)."""
         if self.laws.operating is None:
-            return inputs[..., 0], inputs[..., 1]
+            speed, torque = (self.laws.inputs.index(name) for name in ("speed", "torque"))
+            return inputs[..., speed], inputs[..., torque]
         values = self._stacked(self.laws.operating(*self._common(time, inputs, states)), states.shape[:-1])
         return values[..., 0], values[..., 1]
 

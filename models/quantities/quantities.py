@@ -6,12 +6,12 @@ written in them. A family (``T_{}``) has one quantity per node or component.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 from dataclasses import dataclass, replace
 from math import inf
 from typing import Literal
 
-from models.quantities.units import INSIDE
+from models.quantities.units import INSIDE, find_unit
 
 Observed = Literal["input", "temperature", "total loss", "computed"]
 
@@ -38,6 +38,9 @@ TYPES: Mapping[str, Type] = {
     "AirSpeed": Type(quantity="Velocity", unit="m/s", description="Speed of air"),
     "VehicleSpeed": Type(quantity="Velocity", unit="m/s", nominal=10.0, description="Speed of a vehicle"),
     "Power": Type(quantity="Power", unit="W", nominal=100.0, description="Power or heat flow"),
+    "VolumeFlow": Type(quantity="VolumeFlowRate", unit="m3/s", nominal=1e-4, description="Volume flow of a fluid"),
+    "MassFlow": Type(quantity="MassFlowRate", unit="kg/s", nominal=0.1, description="Mass flow of a fluid"),
+    "Pressure": Type(quantity="Pressure", unit="Pa", nominal=1e5, description="Pressure of a fluid"),
     "Ratio": Type(quantity="Ratio", unit="1", description="Number without unit"),
 }
 
@@ -62,6 +65,8 @@ class Quantity:
         Of an axis
     observed : str
         Input, temperature of a node, total loss, or computed result
+    own_unit : str
+        Unit inside and in files if it is not that of the dimension; of inputs that a definition names
     type : str or None
         Key of :data:`TYPES`
     fmi : str
@@ -76,13 +81,19 @@ class Quantity:
     note: str = ""
     label: str
     observed: Observed
+    own_unit: str = ""
     type: str | None = None
     fmi: str = ""
 
     @property
     def unit(self) -> str:
         """Unit inside and in files."""
-        return INSIDE.get(self.dimension, "")
+        return self.own_unit or INSIDE.get(self.dimension, "")
+
+    @property
+    def is_temperature(self) -> bool:
+        """True for the temperature of a node, of the surroundings or of a fluid."""
+        return self.dimension == "temperature"
 
 
 QUANTITIES: tuple[Quantity, ...] = (
@@ -113,8 +124,99 @@ QUANTITIES: tuple[Quantity, ...] = (
 )  # fmt: skip
 _BY_NAME = {quantity.name: quantity for quantity in QUANTITIES}
 _FAMILIES = [quantity for quantity in QUANTITIES if "{}" in quantity.name]
-INPUTS: Mapping[str, Quantity] = {q.name: q for q in QUANTITIES if q.observed == "input"}
 TOTAL_LOSS = next(quantity.name for quantity in QUANTITIES if quantity.observed == "total loss")
+# What an input of a definition may be: dimension and FMI type by the word for it.
+INPUT_KINDS: Mapping[str, tuple[str, str]] = {
+    "speed": ("speed", "Speed"), "torque": ("torque", "Torque"), "temperature": ("temperature", "Temperature"),
+    "power": ("power", "Power"), "air speed": ("air speed", "AirSpeed"), "volume flow": ("volume flow", "VolumeFlow"),
+    "mass flow": ("mass flow", "MassFlow"), "pressure": ("pressure", "Pressure"), "ratio": ("ratio", "Ratio"),
+    "switch": ("ratio", "Ratio"),
+}  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class Input:
+    """An input of a machine.
+
+    Attributes
+    ----------
+    quantity : Quantity
+        Its name, unit, column and plausible range
+    default : float
+        Value where a cycle or a recording does not give it, in the unit inside
+    required : bool
+        True if a cycle must give it
+    description : str
+    """
+
+    quantity: Quantity
+    default: float
+    required: bool = False
+    description: str = ""
+
+    @property
+    def name(self) -> str:
+        """Name in laws."""
+        return self.quantity.name
+
+    @property
+    def column(self) -> str:
+        """Column of files."""
+        return self.quantity.column
+
+
+def named_input(
+    name: str, kind: str, *, unit: str = "", low: float = -inf, high: float = inf, default: float = 0.0,
+    required: bool = False, description: str = "",
+) -> Input:  # fmt: skip
+    """Return an input that is not in the table of quantities.
+
+    Parameters
+    ----------
+    name : str
+        In laws, in files and at the FMI
+    kind : str
+        Key of :data:`INPUT_KINDS`
+    unit : str
+        Of laws, files, range and default; by default the unit inside of its dimension
+    low, high, default : float
+        In that unit
+    required : bool
+        True if a cycle must give it
+    description : str
+
+    Examples
+    --------
+    >>> named_input("oil_flow", "volume flow", unit="l/min", low=0.0, high=60.0).quantity.unit
+    'l/min'
+    """
+    dimension, kind_at_fmi = INPUT_KINDS[kind]
+    symbol = find_unit(unit or INSIDE[dimension], dimension).symbol
+    quantity = Quantity(
+        name=name, dimension=dimension, column=name, low=low, high=high, observed="input", type=kind_at_fmi, fmi=name,
+        own_unit=symbol, label=f"{name.replace('_', ' ')} in {symbol}",
+    )  # fmt: skip
+    return Input(quantity=quantity, default=default, required=required, description=description)
+
+
+def usual_inputs(**defaults: float) -> dict[str, Input]:
+    """Return inputs of the table of quantities by name, with their defaults; speed and torque are required.
+
+    Examples
+    --------
+    >>> inputs = usual_inputs(speed=0.0, T_ambient=20.0)
+    >>> inputs["T_ambient"].column, inputs["speed"].required
+    ('T_ambient_degC', True)
+    """
+    return {
+        name: Input(quantity=_BY_NAME[name], default=default, required=name in REQUIRED)
+        for name, default in defaults.items()
+    }
+
+
+REQUIRED = ("speed", "torque")  # of a machine that has them
+# Of a gearbox with geometry; the air's are those of its definition.
+GEARBOX_INPUTS: Mapping[str, Input] = usual_inputs(speed=0.0, torque=0.0, T_ambient=20.0, air_speed=0.0)
 
 
 def quantity_of(name: str) -> Quantity | None:
@@ -166,15 +268,18 @@ def column_of(name: str) -> str:
     return name if quantity is None else quantity.column
 
 
-def dimension_of(name: str) -> str | None:
-    """Return the dimension of a quantity, None if it may have any unit."""
-    quantity = quantity_of(name)
-    return None if quantity is None else quantity.dimension or None
+SENSOR = "__"  # between the node and the name of one of several sensors at it
 
 
-def is_temperature(name: str) -> bool:
-    """Return True for the temperature of a node or of the surroundings."""
-    return dimension_of(name) == "temperature"
+def node_of_channel(name: str, nodes: Container[str]) -> str:
+    """Return the node that a channel measures, by its name or ``<node>__<sensor>``.
+
+    Examples
+    --------
+    >>> node_of_channel("oil", ["oil"]), node_of_channel("oil__sump_probe", ["oil"])
+    ('oil', 'oil')
+    """
+    return name if name in nodes else name.rpartition(SENSOR)[0] or name
 
 
 def is_total_loss(name: str) -> bool:

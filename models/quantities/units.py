@@ -11,10 +11,12 @@ from dataclasses import dataclass
 from functools import cached_property
 from math import pi
 
+from models.base.errors import InputError
+
 KELVIN = 273.15
 INSIDE: Mapping[str, str] = {
     "time": "s", "speed": "1/min", "torque": "N m", "temperature": "degC", "air speed": "m/s", "power": "W",
-    "ratio": "1",
+    "ratio": "1", "volume flow": "m3/s", "mass flow": "kg/s", "pressure": "Pa",
 }  # fmt: skip
 
 
@@ -55,7 +57,7 @@ class Unit:
         if inside == self.symbol or inside in self.aliases:
             return inside, 1.0, 0.0
         to = next(unit for unit in TABLE if unit.dimension == self.dimension and inside in (unit.symbol, *unit.aliases))
-        return inside, self.factor / to.factor, (self.offset - to.offset) / to.factor
+        return inside, *conversion(self, to)
 
     def to_column(self, value: float) -> float:
         """Convert a value to the unit of file columns.
@@ -87,6 +89,9 @@ TABLE: tuple[Unit, ...] = (
     Unit(symbol="m/s", dimension="air speed", base={"m": 1, "s": -1}),
     Unit(symbol="W", dimension="power", base=_POWER, display=("kW", 1e-3, 0.0)),
     Unit(symbol="1", aliases=("-", ""), dimension="ratio", base={}),
+    Unit(symbol="m3/s", dimension="volume flow", base={"m": 3, "s": -1}, display=("l/min", 6e4, 0.0)),
+    Unit(symbol="kg/s", dimension="mass flow", base={"kg": 1, "s": -1}),
+    Unit(symbol="Pa", dimension="pressure", base={"kg": 1, "m": -1, "s": -2}, display=("bar", 1e-5, 0.0)),
     # Of a vehicle.
     Unit(symbol="m", base={"m": 1}),
     Unit(symbol="m2", base={"m": 2}),
@@ -116,6 +121,17 @@ TABLE: tuple[Unit, ...] = (
     Unit(symbol="MW", dimension="power", factor=1e6),
     Unit(symbol="mW", dimension="power", factor=1e-3),
     Unit(symbol="hp", dimension="power", factor=745.69987),
+    Unit(symbol="%", dimension="ratio", factor=1e-2),
+    Unit(symbol="l/min", dimension="volume flow", factor=1.0 / 6e4),
+    Unit(symbol="l/h", dimension="volume flow", factor=1.0 / 3.6e6),
+    Unit(symbol="l/s", dimension="volume flow", factor=1e-3),
+    Unit(symbol="m3/h", dimension="volume flow", factor=1.0 / 3600.0),
+    Unit(symbol="kg/h", dimension="mass flow", factor=1.0 / 3600.0),
+    Unit(symbol="kg/min", dimension="mass flow", factor=1.0 / 60.0),
+    Unit(symbol="kPa", dimension="pressure", factor=1e3),
+    Unit(symbol="bar", dimension="pressure", factor=1e5),
+    Unit(symbol="MPa", dimension="pressure", factor=1e6),
+    Unit(symbol="psi", dimension="pressure", factor=6894.757293168),
     Unit(symbol="ms", dimension="time", factor=1e-3),
     Unit(symbol="min", dimension="time", factor=60.0),
     Unit(symbol="h", dimension="time", factor=3600.0),
@@ -136,17 +152,53 @@ def fmi_symbol(text: str) -> str:
     return text if text in UNITS else next((unit.symbol for unit in UNITS.values() if text in unit.aliases), text)
 
 
-def units_in_files(dimension: str | None) -> dict[str, tuple[float, float]]:
-    """Return the units that a column may have, with factor and offset to the unit inside; empty if any.
+def find_unit(text: str, dimension: str) -> Unit:
+    """Return the unit that a text means in a dimension.
+
+    Raises
+    ------
+    InputError
+        If the dimension has no unit of that spelling.
 
     Examples
     --------
-    >>> units_in_files("air speed")["m/s"], sorted(units_in_files("power")), units_in_files(None)
+    >>> find_unit("rpm", "speed").symbol, find_unit("1/s", "speed").symbol
+    ('1/min', 'Hz')
+    """
+    own = [unit for unit in TABLE if unit.dimension == dimension]
+    for unit in own:
+        if text in (unit.symbol, *unit.aliases):
+            return unit
+    raise InputError(f"{text!r} is no unit of {dimension}; known are {', '.join(unit.symbol for unit in own)}")
+
+
+def conversion(unit: Unit, to: Unit) -> tuple[float, float]:
+    """Return factor and offset from one unit to another of the same dimension.
+
+    Examples
+    --------
+    >>> conversion(find_unit("kW", "power"), find_unit("W", "power"))
+    (1000.0, 0.0)
+    """
+    if unit is to:
+        return 1.0, 0.0
+    return unit.factor / to.factor, (unit.offset - to.offset) / to.factor
+
+
+def units_in_files(dimension: str | None, unit: str) -> dict[str, tuple[float, float]]:
+    """Return the units that a column may have, with factor and offset to `unit`; empty if any.
+
+    Examples
+    --------
+    >>> units_in_files("air speed", "m/s")["m/s"], sorted(units_in_files("power", "W")), units_in_files(None, "")
     ((1.0, 0.0), ['MW', 'W', 'hp', 'kW', 'mW'], {})
     """
+    if not dimension:
+        return {}
+    to = find_unit(unit, dimension)
     return {
-        symbol: unit.column[1:]
+        symbol: conversion(unit, to)
         for unit in TABLE
-        if dimension and unit.dimension == dimension
+        if unit.dimension == dimension
         for symbol in (unit.symbol, *unit.aliases)
     }

@@ -17,7 +17,7 @@ from models.network.structure import Losses, Network
 from models.portable import solver
 from models.portable.evaluation import NetworkSystem, efficiency, torque_loss
 from models.portable.surrogate import range_distance
-from models.quantities.quantities import INPUTS, TOTAL_LOSS, column_of
+from models.quantities.quantities import TOTAL_LOSS, column_of
 from models.simulation.start_temperatures import start_temperatures
 
 STEADY_TOLERANCE_K, STEADY_DISTANCE_K = 1e-9, 1e-6
@@ -117,6 +117,11 @@ class Result:
         return np.asarray(sum(self.losses.values()))
 
     @property
+    def has_shaft(self) -> bool:
+        """True if the machine has losses and a shaft of recorded speed and torque."""
+        return bool(self.losses) and {"speed", "torque"} <= self.inputs.keys()
+
+    @property
     def torque_loss(self) -> Array:
         """Loss torque at the input shaft [N m], shape (..., N); see :func:`models.portable.evaluation.torque_loss`."""
         return torque_loss(self.loss, self.inputs["speed"])
@@ -148,20 +153,22 @@ class Result:
             Speed of the input shaft over speed of the output shaft, [-]; with it the output torque is a column too
         """
         table = {"time_s": self.time}
-        table |= {INPUTS[name].column if name in INPUTS else name: values for name, values in self.inputs.items()}
+        table |= {column_of(name): values for name, values in self.inputs.items()}
         computed = {f"T_{node}": T for node, T in self.temperatures.items()}
-        computed |= {TOTAL_LOSS: self.loss} | {f"P_loss_{name}": P for name, P in self.losses.items()}
-        computed |= {"torque_loss": self.torque_loss, "efficiency": self.efficiency}
-        computed |= {} if ratio is None else {"torque_out": self.torque_out(ratio)}
+        if self.losses:
+            computed |= {TOTAL_LOSS: self.loss} | {f"P_loss_{name}": P for name, P in self.losses.items()}
+        if self.has_shaft:
+            computed |= {"torque_loss": self.torque_loss, "efficiency": self.efficiency}
+            computed |= {} if ratio is None else {"torque_out": self.torque_out(ratio)}
         computed |= {"in_domain": np.asarray(self.domain_distance <= 0.0)}
         return table | {column_of(name): values for name, values in computed.items()}
 
 
 def input_table(network: Network, cycle: Cycle) -> Array:
-    """Inputs of a cycle as one table, defaults filled in, shape (N, 2 + inputs): speed, torque, further inputs."""
-    columns = [cycle.inputs["speed"], cycle.inputs["torque"]]
-    columns += [cycle.inputs.get(name, np.full(len(cycle), default)) for name, default in network.inputs.items()]
-    return np.stack(columns, axis=-1)
+    """Inputs of a cycle as one table in the order of the network, defaults filled in, shape (N, inputs)."""
+    rows = len(cycle)
+    columns = [cycle.inputs.get(name, np.full(rows, given.default)) for name, given in network.inputs.items()]
+    return np.stack(columns, axis=-1) if columns else np.zeros((rows, 0))
 
 
 def simulate(
@@ -207,11 +214,11 @@ def simulate(
     The network of Changenet et al. and Durand de Gevigney et al. that the paper follows, section 5.
     """
     if not isinstance(cycle, Cycle):
-        cycle = Cycle.from_columns(cycle, extra=tuple(n for n in network.inputs if n not in INPUTS))
+        cycle = Cycle.from_columns(cycle, inputs=network.inputs)
     system = network_system(network, losses, parameters)
     table = input_table(network, cycle)
     if initial is None:
-        initial = float(table[0, 2 + list(network.inputs).index("T_ambient")])
+        initial = float(surroundings(system, table[:1], vector=system.vector)[0])
     batch = np.broadcast_shapes(*(np.shape(value) for value in system.parameters))
     first = initial_states(network, initial)
     state = solver.start(np.broadcast_to(first, (*batch, len(first))))
@@ -229,6 +236,16 @@ def simulate(
     return evaluate(
         network, losses, parameters, time=cycle.time, table=table, states=states, heat=heat, trained=trained
     )
+
+
+def surroundings(system: NetworkSystem, table: Array, *, vector: bool) -> Array:
+    """Temperatures around the machine [degC], shape (N,), at inputs of shape (N, inputs): ambient, or a boundary."""
+    if "T_ambient" in system.laws.inputs:
+        return table[:, system.laws.inputs.index("T_ambient")]
+    nothing = np.zeros((len(table), system.n_parts + system.n_states))
+    if vector:
+        return system.boundary_temperatures(0.0, table, nothing)[..., 0]
+    return np.array([system.boundary_temperatures(0.0, row, nothing[0])[0] for row in table])
 
 
 def evaluate(
@@ -250,8 +267,7 @@ def evaluate(
         As for :func:`simulate`
     time : Array, shape (N,)
         [s]
-    table : Array, shape (..., N, 2 + inputs)
-        Speed, torque and further inputs
+    table : Array, shape (..., N, inputs)
     states : Array, shape (..., N, n)
     heat : Array, shape (2, ..., N)
         Heat brought in and given off since the start, [J]
@@ -266,11 +282,13 @@ def evaluate(
     n_parts = system.n_parts
     part, given = iter(np.moveaxis(states[..., :n_parts], -1, 0)), iter(np.moveaxis(boundary, -1, 0))
     loss_nodes = [system.laws.parts.index(name) for name in losses.temperature_nodes]
-    point = (*system.operating(time, wide, states), states[..., loss_nodes])
-    distance = losses.domain_distance(*point)
-    if trained is not None:
-        bounds = trained.speed_rpm, trained.torque_Nm, trained.temperature_degC
-        distance = np.maximum(distance, range_distance(*point, *bounds))
+    distance = np.zeros(states.shape[:-1])
+    if losses.components:
+        point = (*system.operating(time, wide, states), states[..., loss_nodes])
+        distance = losses.domain_distance(*point)
+        if trained is not None:
+            bounds = trained.speed_rpm, trained.torque_Nm, trained.temperature_degC
+            distance = np.maximum(distance, range_distance(*point, *bounds))
     return Result(
         time=time,
         inputs=dict(zip(system.laws.inputs, np.moveaxis(table, -1, 0), strict=True)),
@@ -288,8 +306,8 @@ def steady_state(
     network: Network,
     *,
     losses: Losses,
-    speed: ArrayLike,
-    torque: ArrayLike,
+    speed: ArrayLike = 0.0,
+    torque: ArrayLike = 0.0,
     inputs: Mapping[str, ArrayLike] | None = None,
     parameters: Mapping[str, ArrayLike] | None = None,
     max_iterations: int = 2000,
@@ -301,7 +319,7 @@ def steady_state(
     network : Network
     losses : Losses
     speed, torque : ArrayLike, shape () or (B,)
-        Of the input shaft, [1/min] and [N m]
+        Of the input shaft, [1/min] and [N m], if the machine has these inputs
     inputs : mapping of input name to ArrayLike, shape () or (B,), or None
         Further inputs, e.g. ``T_ambient``
     parameters : mapping of name to ArrayLike, shape () or (B,), or None
@@ -332,7 +350,8 @@ def steady_state(
     for name in given:
         if name not in network.inputs:
             raise InputError(f"{name!r} is not an input of this network{did_you_mean(name, network.inputs)}")
-    columns = [speed, torque, *(given.get(name, default) for name, default in network.inputs.items())]
+    given = {"speed": speed, "torque": torque} | given
+    columns = [given.get(name, known.default) for name, known in network.inputs.items()]
     shapes = [np.shape(c) for c in columns] + [np.shape(v) for v in (parameters or {}).values()]
     shape = np.broadcast_shapes(*shapes)
     if len(shape) > 1:
@@ -342,7 +361,7 @@ def steady_state(
     wide = {p.name: np.broadcast_to(np.asarray((parameters or {}).get(p.name, p.start), float), rows)
             for p in network.parameters}  # fmt: skip
     system = network_system(network, losses, wide, vector=True)
-    T = np.repeat(table[:, 2 + list(network.inputs).index("T_ambient")][:, None], system.n_parts, axis=1)
+    T = np.repeat(surroundings(system, table, vector=True)[:, None], system.n_parts, axis=1)
     step, previous, moved = FIRST_PSEUDO_STEP_S, np.inf, np.inf
     for iteration in range(max_iterations):
         balance = system.balance(0.0, table, T)

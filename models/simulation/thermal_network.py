@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from keyword import iskeyword
+from math import inf
 
 import sympy as sp
 from numpy.typing import ArrayLike
@@ -21,6 +22,7 @@ from models.definition.sections import Training
 from models.files.cycle import Cycle
 from models.network.laws import LawLike, NumericLaw, Parameter, symbol, trace
 from models.network.structure import BASE_SIGNALS, ExtraState, Link, Losses, Network, Node, Source
+from models.quantities.quantities import INPUT_KINDS, named_input
 from models.simulation.simulate import Result, simulate, steady_state
 
 __all__ = ["BASE_SIGNALS", "ExtraState", "Link", "Losses", "Node", "Source", "ThermalNetwork"]
@@ -43,16 +45,40 @@ class ThermalNetwork(Network):
     def with_boundary(self, name: str, temperature: LawLike) -> ThermalNetwork:
         """A network with one more boundary node of known `temperature` [degC], a law of time, inputs and parameters."""
         self._new_node(name)
-        allowed = (*BASE_SIGNALS, *self.inputs, *(p.name for p in self.parameters))
+        allowed = (*BASE_SIGNALS, *self.inputs, *self.derived, *(p.name for p in self.parameters))
         expression, numeric = trace(temperature, allowed, f"temperature_{name}")
         if numeric is not None:
             raise InputError(f"the temperature of boundary {name!r} must be an expression; no branches or numpy calls")
         return replace(self, nodes=(*self.nodes, Node(name=name, temperature=expression)))
 
-    def with_input(self, name: str, default: float) -> ThermalNetwork:
-        """A network with one more input signal, e.g. a measured column, that laws may use."""
+    def with_input(
+        self, name: str, default: float, *, quantity: str = "ratio", unit: str = "", low: float = -inf,
+        high: float = inf,
+    ) -> ThermalNetwork:  # fmt: skip
+        """A network with one more input signal, e.g. a measured column, that laws may use.
+
+        Parameters
+        ----------
+        name : str
+        default : float
+            Where a cycle does not give it
+        quantity : str
+            Key of :data:`models.quantities.quantities.INPUT_KINDS`
+        unit : str
+            Of laws and files; by default the unit inside of the quantity
+        low, high : float
+            Plausible range
+
+        Raises
+        ------
+        InputError
+            If the name is taken or no name of a signal, or the quantity or unit is unknown.
+        """
         self._new_name(name, self.signals, "signal")
-        return replace(self, inputs={**self.inputs, name: default})
+        if quantity not in INPUT_KINDS:
+            raise InputError(f"quantity {quantity!r} of input {name!r} is unknown{did_you_mean(quantity, INPUT_KINDS)}")
+        added = named_input(name, quantity, unit=unit, low=low, high=high, default=default)
+        return replace(self, inputs={**self.inputs, name: added})
 
     def with_parameter(self, parameter: Parameter) -> ThermalNetwork:
         """A network with one more tunable parameter that laws may use by its name."""
@@ -242,7 +268,7 @@ class ThermalNetwork(Network):
         Parameters
         ----------
         name : str
-            ``speed``, ``torque`` or a further input
+            An input, or a torque that follows from others
         law : callable of :class:`~models.network.laws.Signals`, sympy expression, or number
             What is added, in the unit of the input
 
@@ -258,7 +284,7 @@ class ThermalNetwork(Network):
         >>> warm.nodes[0].temperature
         T_ambient + 2.0
         """
-        known = ("speed", "torque", *self.inputs)
+        known = (*self.inputs, *self.derived)
         if name not in known:
             raise InputError(f"{name!r} is not an input of this network{did_you_mean(name, known)}")
         shift, numeric = trace(law, self.signals, f"shift_{name}")
@@ -269,6 +295,8 @@ class ThermalNetwork(Network):
         boundary = {symbol(f"T_{node.name}"): node.temperature for node in self.nodes if node.temperature is not None}
         seen = {symbol(name): symbol(name) + shift.xreplace(boundary)}
         operating = {key: law.xreplace(seen) for key, law in self.operating.items()}
+        if name in self.derived:
+            return replace(self, derived={**self.derived, name: self.derived[name] + shift.xreplace(boundary)})
         if name in ("speed", "torque"):
             operating.setdefault(name, seen[symbol(name)])
         return replace(
@@ -284,6 +312,7 @@ class ThermalNetwork(Network):
                 for state in self.states
             ),
             operating=operating,
+            derived={key: law.xreplace(seen) for key, law in self.derived.items()},
         )  # fmt: skip
 
     # ------------------------------------------------------------------ use
@@ -307,8 +336,8 @@ class ThermalNetwork(Network):
         self,
         *,
         losses: Losses,
-        speed: ArrayLike,
-        torque: ArrayLike,
+        speed: ArrayLike = 0.0,
+        torque: ArrayLike = 0.0,
         inputs: Mapping[str, ArrayLike] | None = None,
         parameters: Mapping[str, ArrayLike] | None = None,
     ) -> Result:

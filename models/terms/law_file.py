@@ -9,7 +9,7 @@ from __future__ import annotations
 import sympy as sp
 
 from models.definition.sections import Name, Section, Text
-from models.terms.expressions import Law
+from models.network.expressions import Law
 from models.terms.term import Form, Kind
 
 

@@ -33,9 +33,9 @@ def test_fmpy_finds_no_problem(path: Path) -> None:
     assert validate_fmu(str(path)) == []
 
 
-def test_variables_are_those_of_the_table(path: Path, fzg: Gearbox) -> None:
+def test_variables_are_those_of_the_table(path: Path, fzg: Gearbox, fzg_training: TrainingResult) -> None:
     description = read_model_description(str(path))
-    table = signal_table(fzg)
+    table = signal_table(fzg.network(), fzg_training.losses)
     assert [v.name for v in description.modelVariables] == [s.name for s in table]
     for variable, signal in zip(description.modelVariables, table, strict=True):
         assert variable.valueReference == signal.reference
@@ -337,7 +337,7 @@ def test_a_network_with_every_kind_of_law_runs_as_in_python(
     assert validate_fmu(str(path)) == []
     time = np.arange(0.0, 121.0)
     columns = {"time_s": time, "speed_rpm": 0.0 * time + 2000.0, "torque_Nm": 0.0 * time + 200.0, "pump_flow": time}
-    cycle = Cycle.from_columns(columns, extra=("pump_flow",))
+    cycle = Cycle.from_columns(columns, inputs=network.inputs)
     expected = network.simulate(cycle, losses=fzg_training.losses, initial=25.0)
     driven = drive_fmu(path, cycle, initial=25.0)
     assert list(driven) == list(expected.columns())

@@ -21,7 +21,7 @@ from tests.contract.native_hosts import SOURCES, Unpacked, compiled, needs_compi
 
 AGREEMENT = 1e-9  # of every output, relative to its value or 1
 STEPS = 600
-WINE = shutil.which("wine64") or shutil.which("wine")
+WINE = shutil.which("wine64", path=f"{os.environ['PATH']}{os.pathsep}/usr/lib/wine") or shutil.which("wine")
 
 
 @pytest.fixture(scope="module")
@@ -196,7 +196,7 @@ def test_a_host_in_c_simulates(fmu: Unpacked, inputs: pd.DataFrame, expected: np
 # ---------------------------------------------------------------------- Windows, under wine
 
 
-@pytest.mark.slow  # zig compiles its C library for Windows first, which takes minutes
+@pytest.mark.slow  # zig compiles its C library for the host first, which takes a minute and a half
 @pytest.mark.skipif(WINE is None, reason="no wine (Debian: wine64)")
 @pytest.mark.skipif(find_spec("ziglang") is None, reason="no ziglang, which cross-compiles")
 def test_the_windows_library_gives_the_same_under_wine(

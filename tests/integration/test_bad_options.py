@@ -116,8 +116,8 @@ WRONG = {
     "build-fmu": {
         "--correction parameter.toml": "the correction calibrates 'mush'",
         "--gearbox box.toml": "box.toml: source is missing",
-        "--target native --platforms win46": "platform 'win46' is not known; did you mean 'win64'?",
-        "--platforms host": "--platforms is about native FMUs",
+        "--platforms win46": "platform 'win46' is not known; did you mean 'win64'?",
+        "--target python --platforms host": "--platforms is about native FMUs",
         "--output file/out": "file/out: cannot be written",
         "--dask nonsense": "no dask scheduler answers at nonsense",
     },

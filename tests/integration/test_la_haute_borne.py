@@ -97,7 +97,7 @@ def test_an_air_cooler_with_a_thermostat_is_found_and_holds_on_the_other_machine
 @pytest.fixture(scope="module")
 def without_air(farm: Path) -> Diagnosis:
     """The other way round: the nacelle's temperature is taken away, and the definition's constant stands in for it."""
-    constant = load_gearbox("la_haute_borne").network().inputs["T_ambient"]
+    constant = load_gearbox("la_haute_borne").network().inputs["T_ambient"].default
     train, holdout = (
         replace(r, inputs={**r.inputs, "T_ambient": np.full(len(r.time), constant)}, assumed=(*r.assumed, "T_ambient"))
         for r in (

@@ -146,7 +146,7 @@ def test_a_recording_with_a_mapping(tmp_path: Path, network: ThermalNetwork, whe
     assert start.temperatures == {"oil": pytest.approx(40.0), "pinion": 45.0}
     assert start.rows == {"oil": 1, "pinion": 3}
     assert start.columns == {"oil": "Sumpf", "pinion": "T_pinion_degC"}
-    assert set(cycle.inputs) == {"speed", "torque", *network.inputs}
+    assert set(cycle.inputs) == {*network.inputs}
     assert len(notes) == 2
     assert "not used, being no input and no node of this gearbox: Pumpe" in notes[0]
     assert "air_speed_m_s was not recorded; 2 is assumed" in notes[1]

@@ -70,11 +70,11 @@ def test_build_passes_correction_preset_and_platforms_on(
     write_correction(correction, tmp_path / "correction.toml")
     usual = ("build-fmu", "--output", tmp_path / "out")
     invoked(*usual)
-    invoked(*usual, "--correction", tmp_path / "correction.toml", "--preset", "paper", "--target", "both",
+    invoked(*usual, "--correction", tmp_path / "correction.toml", "--preset", "paper", "--target", "native",
             "--platforms", "win64", "--samples", 300, "--seed", 4)  # fmt: skip
     plain, special = asked
     names = ("target", "platforms", "preset", "samples", "seed")
-    assert tuple(plain[name] for name in names) == ("python", "all", "default", None, 0)
-    assert tuple(special[name] for name in names) == ("both", "win64", "paper", 300, 4)
+    assert tuple(plain[name] for name in names) == ("both", "host", "default", None, 0)
+    assert tuple(special[name] for name in names) == ("native", "win64", "paper", 300, 4)
     assert plain["correction"] is None
     assert [(c.name, c.value) for c in special["correction"].calibration] == [("mesh", 1.07)]

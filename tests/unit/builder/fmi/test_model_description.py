@@ -9,6 +9,7 @@ from fmpy.validation import validate_fmu
 
 from builder.fmi.model_description import Identity, model_description
 from builder.fmi.signals import SignalTable, signal_table
+from builder.surrogate.train import TrainingResult
 from models.assembly.gearbox import Gearbox
 
 IDENTITY = Identity(
@@ -29,8 +30,8 @@ def parsed(xml: bytes) -> ET.Element:
 
 
 @pytest.fixture(scope="module")
-def table(fzg: Gearbox) -> SignalTable:
-    return signal_table(fzg)
+def table(fzg: Gearbox, fzg_training: TrainingResult) -> SignalTable:
+    return signal_table(fzg.network(), fzg_training.losses)
 
 
 @pytest.fixture(scope="module")

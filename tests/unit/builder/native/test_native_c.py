@@ -15,8 +15,8 @@ import sympy as sp
 
 from builder.fmi.signals import signal_table
 from builder.native.compile import OPTIONS
-from builder.native.data import gearbox_sources
-from builder.native.native_fmu import GEARBOX_MODEL, native_source
+from builder.native.data import model_sources
+from builder.native.native_fmu import LOSS_NETWORKS, THERMAL_MODEL, native_source
 from builder.native.structure import Structure
 from builder.surrogate.onnx_export import onnx_evaluator
 from builder.surrogate.train import TrainingResult
@@ -172,13 +172,13 @@ def surrogate(fzg_training: TrainingResult) -> SurrogateLosses:
 
 @pytest.fixture(scope="module")
 def generated(network: ThermalNetwork, fzg: Gearbox, surrogate: SurrogateLosses) -> dict[str, str]:
-    return gearbox_sources(signal_table(fzg, network, surrogate), network, surrogate)
+    return model_sources(signal_table(network, surrogate), network, surrogate)
 
 
 @pytest.fixture(scope="module")
 def model(generated: dict[str, str], library: Library) -> ctypes.CDLL:
     """Laws, structure and losses of a network, with functions that a test can call."""
-    files = {name: native_source(name) for name in GEARBOX_MODEL} | generated
+    files = {name: native_source(name) for name in THERMAL_MODEL + LOSS_NETWORKS} | generated
     text = """
         #include "laws.h"
         #include "loss_networks.h"
@@ -198,7 +198,7 @@ def model(generated: dict[str, str], library: Library) -> ctypes.CDLL:
 def test_laws_of_a_network_are_those_of_python(network: ThermalNetwork, model: ctypes.CDLL) -> None:
     laws = compile_laws(network, vector=False)
     arguments = {name: names for name, (names, _) in law_expressions(network).items()}
-    groups = [["time"], ["speed", "torque", *network.inputs], [f"T_{p.name}" for p in network.parts],
+    groups = [["time"], [*network.inputs], [f"T_{p.name}" for p in network.parts],
               [p.name for p in network.parameters], [s.name for s in network.states] or ["-"],
               [f"P_{name}" for name in network.components]]  # fmt: skip
     order = [name for group in groups for name in group]
@@ -284,4 +284,4 @@ def test_losses_are_those_of_numpy_and_onnxruntime(
 def test_generated_text_is_the_same_every_time(
     generated: dict[str, str], network: ThermalNetwork, fzg: Gearbox, surrogate: SurrogateLosses
 ) -> None:
-    assert gearbox_sources(signal_table(fzg, network, surrogate), network, surrogate) == generated
+    assert model_sources(signal_table(network, surrogate), network, surrogate) == generated

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from zipfile import ZipFile
 
@@ -10,7 +11,8 @@ import pytest
 
 from builder.drive import driver as fmu_drive
 from builder.drive.driver import runs_here
-from builder.native.compile import host_platform
+from builder.native import compile as native_compile
+from builder.native.compile import CACHE_VARIABLE, NoCompilerError, host_platform
 from builder.surrogate.train import TrainingResult
 from builder.workflows import build as builder_build
 from builder.workflows.build import build, cycle_errors
@@ -38,14 +40,39 @@ def test_an_fmu_that_cannot_run_here_is_built_and_that_is_told(
     assert runs_here(fzg_fmu) == (host_platform() in there)
     monkeypatch.setattr(fmu_drive, "host_platform", lambda: "aarch64-darwin")
     monkeypatch.setattr(builder_build, "train_surrogate", lambda *_, **__: fzg_training)
-    report = build(fzg, tmp_path, name="fzg")
+    report = build(fzg, tmp_path, name="fzg", target="python")
     report.show()
     shown = capsys.readouterr()
     assert (tmp_path / "fzg.fmu").is_file() and not (tmp_path / "drive_cycle.csv").exists()
     assert "reference cycle from 20" not in shown.out
     assert "note: the python FMU has no binary for this machine" in " ".join(shown.err.split())
     assert "earlier build" not in shown.err
-    again = build(fzg, tmp_path, name="other")
+    again = build(fzg, tmp_path, name="other", target="python")
     assert [note for note in again.notes if "earlier" in note] == [
         f"{tmp_path / 'fzg.fmu'} is of an earlier build: report.json and networks/ no longer describe it"
     ]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="a script as compiler")
+@pytest.mark.parametrize("has_broken_compiler", [False, True])
+def test_without_a_compiler_the_python_fmu_is_built_and_one_line_says_how_to_get_the_native_one(
+    fzg: Gearbox, fzg_training: TrainingResult, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    has_broken_compiler: bool,
+) -> None:  # fmt: skip
+    tools = tmp_path / "tools"
+    tools.mkdir()
+    if has_broken_compiler:  # as gcc without the headers of C
+        (tools / "cc").write_text("#!/bin/sh\nexit 1\n")
+        (tools / "cc").chmod(0o755)
+    monkeypatch.setenv("PATH", str(tools))
+    monkeypatch.setenv(CACHE_VARIABLE, "off")
+    monkeypatch.delenv("CC", raising=False)
+    monkeypatch.setattr(native_compile, "_zig", lambda: None)
+    monkeypatch.setattr(builder_build, "train_surrogate", lambda *_, **__: fzg_training)
+    report = build(fzg, tmp_path / "out", name="fzg")
+    assert [path.name for path in report.files if path.suffix == ".fmu"] == ["fzg.fmu"]
+    assert report.purpose == "fzg.fmu runs on Python with numpy and onnxruntime"
+    assert [note for note in report.notes if "python -m pip install ziglang" in note] == [report.notes[0]]
+    with pytest.raises(NoCompilerError, match="no cc, gcc or clang works here; install ziglang"):
+        build(fzg, tmp_path / "native", name="fzg", target="native")
+    assert not (tmp_path / "native").exists()

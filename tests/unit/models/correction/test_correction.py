@@ -24,9 +24,9 @@ from models.definition.messages import validate_section
 from models.files.toml_file import parse
 from models.mechanisms import CATALOGUE, Scale, load_mechanisms
 from models.mechanisms.user_files import check_placeable
+from models.network.expressions import expression_text, parse_expression
 from models.network.laws import Parameter, symbol
 from models.simulation.thermal_network import ExtraState
-from models.terms.expressions import expression_text, parse_expression
 from models.terms.term import Term
 
 RIG = load_gearbox("fzg")
@@ -240,7 +240,7 @@ def test_a_fit_may_end_at_its_bounds_and_not_beyond(value: float, possible: bool
 
 def test_the_limits_are_those_of_the_fmu() -> None:
     """A value beyond them would silently widen the FMU's limits."""
-    table = signal_table(RIG)
+    table = signal_table(NETWORK)
     for p in NETWORK.parameters:
         signal = table[f"factor.{p.name}"]
         assert (signal.minimum, signal.maximum) == (p.lower, p.upper)

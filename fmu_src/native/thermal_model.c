@@ -1,5 +1,7 @@
-/* The gearbox twin as a model for the FMI layer: values in SI units outside, the thermal network in its own units. */
-#include "loss_networks.h"
+/* A thermal network as a model for the FMI layer: values in SI units outside, the network in its own units.
+
+   model_data.h defines IN_DOMAIN if the losses are trained networks, TOTAL_LOSS if a source is a loss, and TORQUE_LOSS
+   if there is also a shaft with speed and torque. */
 #include "model.h"
 #include "thermal_network.h"
 
@@ -12,7 +14,7 @@
 #define FIRST_STEP_S 0.1
 
 typedef struct {
-    double started, outside; /* 0 or 1: the simulation has begun; it was told that the range of training was left */
+    double started, outside; /* 0 or 1: the simulation has begun; the range of training has been left */
     ThermalState thermal;
 } State;
 
@@ -44,7 +46,7 @@ static void start_values(const Model *model, ThermalState *thermal) {
 static ModelStatus prepare(Model *model) {
     Scratch *scratch = model->scratch;
     if (model->changed & CHANGED_PARAMETERS) {
-        double parameters[AT_LEAST_ONE(N_PARAMETERS)];
+        double parameters[AT_LEAST_ONE(N_PARAMETERS)] = {0.0};
         const char *fault;
         for (int i = 0; i < N_PARAMETERS; i++) parameters[i] = inner(model, FACTOR[i]);
         fault = network_set(&scratch->network, parameters);
@@ -95,93 +97,116 @@ ModelStatus model_start(Model *model) {
     return unused_starts(model);
 }
 
-static void loss_temperatures(const ThermalState *thermal, double *T) {
-    for (int i = 0; i < N_LOSS_NODES; i++) T[i] = thermal->T[LOSS_NODE[i]];
+#ifdef IN_DOMAIN
+static double domain_distance(const LossPoint *point) {
+    return loss_domain_distance(point->speed, point->torque, point->T);
 }
 
 /* A warning of the operating point that was found outside the range of training at `time`. */
-static ModelStatus excursion(Model *model, double time, const double *inputs, const double *T) {
+static ModelStatus excursion(Model *model, double time, const LossPoint *point) {
     const char *separator = " ";
     char *text = model->message;
     text[0] = '\0';
     append(text, "at %g s the operating point is outside the range that the networks were trained on:", time);
-    if (fabs(inputs[0]) > SPEED_HIGH) {
-        append(text, "%sspeed %g 1/min (to %g)", separator, inputs[0], SPEED_HIGH);
+    if (fabs(point->speed) > SPEED_HIGH) {
+        append(text, "%sspeed %g 1/min (to %g)", separator, point->speed, SPEED_HIGH);
         separator = ", ";
     }
-    if (fabs(inputs[1]) > TORQUE_HIGH) {
-        append(text, "%storque %g N m (to %g)", separator, inputs[1], TORQUE_HIGH);
+    if (fabs(point->torque) > TORQUE_HIGH) {
+        append(text, "%storque %g N m (to %g)", separator, point->torque, TORQUE_HIGH);
         separator = ", ";
     }
     for (int i = 0; i < N_LOSS_NODES; i++) {
-        if (T[i] >= T_LOW && T[i] <= T_HIGH) continue;
-        append(text, "%s%s %.1f degC (%g to %g)", separator, LOSS_NODE_NAME[i], T[i], T_LOW, T_HIGH);
+        if (point->T[i] >= T_LOW && point->T[i] <= T_HIGH) continue;
+        append(text, "%s%s %.1f degC (%g to %g)", separator, LOSS_NODE_NAME[i], point->T[i], T_LOW, T_HIGH);
         separator = ", ";
     }
     append(text, ". Losses are held at the edge of the range; in_domain and domain_distance show how long");
     return MODEL_WARNING;
 }
 
+/* One warning when the range of training is left during a step, of the first moment that was seen; none while the
+   operating point stays outside. */
+static ModelStatus watch_domain(Model *model, const LossPoint *begin, const LossPoint *end, double duration) {
+    State *state = model->state;
+    const int was_outside = state->outside != 0.0;
+    state->outside = domain_distance(end) > 0.0;
+    if (was_outside) return MODEL_OK;
+    if (domain_distance(begin) > 0.0) return excursion(model, model->time, begin);
+    return state->outside != 0.0 ? excursion(model, model->time + duration, end) : MODEL_OK;
+}
+#endif
+
 ModelStatus model_step(Model *model, double duration) {
     State *state = model->state;
     Scratch *scratch = model->scratch;
     ThermalState thermal = state->thermal;
-    const int was_outside = state->outside != 0.0;
-    double before[N_INPUTS], inputs[N_INPUTS], T[N_LOSS_NODES], T_before[N_LOSS_NODES], failed_at;
+    double before[AT_LEAST_ONE(N_INPUTS)] = {0.0}, inputs[AT_LEAST_ONE(N_INPUTS)] = {0.0}, failed_at;
     const char *fault;
-    int at_once;
     if (prepare(model) != MODEL_OK) return MODEL_REFUSED;
     for (int i = 0; i < N_INPUTS; i++) {
         before[i] = inner(model, INPUTS[i]);
         inputs[i] = inner_after(model, INPUTS[i], duration);
     }
-    loss_temperatures(&thermal, T_before);
-    at_once = !was_outside && loss_domain_distance(before[0], before[1], T_before) > 0.0;
     fault = network_advance(&scratch->network, &thermal, model->time, duration, before, inputs, &failed_at);
     if (fault) {
         snprintf(model->message, MESSAGE_SIZE, "the heat balance cannot be solved from %g s on: %s at %g s",
                  model->time, fault, failed_at);
         return MODEL_REFUSED;
     }
-    state->thermal = thermal;
     for (int i = 0; i < N_INPUTS; i++)
         model->values[INPUTS[i].reference] = value_after(model, INPUTS[i].reference, duration);
-    loss_temperatures(&thermal, T);
-    state->outside = loss_domain_distance(inputs[0], inputs[1], T) > 0.0;
-    /* One warning when the range is left, of the first moment that it was seen; none while it stays outside. */
-    if (at_once) return excursion(model, model->time, before, T_before);
-    if (state->outside != 0.0 && !was_outside) return excursion(model, model->time + duration, inputs, T);
+#ifdef IN_DOMAIN
+    {
+        const LossPoint begin = network_loss_point(&scratch->network, model->time, before, &state->thermal);
+        const LossPoint end = network_loss_point(&scratch->network, model->time + duration, inputs, &thermal);
+        state->thermal = thermal;
+        return watch_domain(model, &begin, &end, duration);
+    }
+#else
+    state->thermal = thermal;
     return MODEL_OK;
+#endif
 }
+
+#ifdef TORQUE_LOSS
+/* Loss torque, linear through zero below 1 rpm as the losses are, and efficiency. */
+static void shaft_outputs(Model *model, double speed, double torque, double loss) {
+    const double omega = speed * RPM, power = omega * torque;
+    const double useful = power < 0.0 ? -power : fmax(power - loss, 0.0), given = power < 0.0 ? loss - power : power;
+    model->values[TORQUE_LOSS] = loss * ((omega > 0.0) - (omega < 0.0)) / fmax(fabs(omega), RPM);
+    model->values[EFFICIENCY] = given > 0.0 ? useful / given : 0.0;
+}
+#endif
 
 ModelStatus model_outputs(Model *model) {
     const State *state = model->state;
     Scratch *scratch = model->scratch;
     ThermalState thermal = state->thermal;
-    double inputs[N_INPUTS], T[N_LOSS_NODES], loss = 0.0, omega, power, useful, given, distance;
+    double inputs[AT_LEAST_ONE(N_INPUTS)] = {0.0};
     const Balance *balance;
     if (prepare(model) != MODEL_OK) return MODEL_REFUSED;
     if (state->started == 0.0) start_values(model, &thermal);
     for (int i = 0; i < N_INPUTS; i++) inputs[i] = inner(model, INPUTS[i]);
-    loss_temperatures(&thermal, T);
     balance = network_balance(&scratch->network, model->time, inputs, &thermal);
     for (int i = 0; i < N_PARTS; i++) show(model, PART_TEMPERATURE[i], thermal.T[i]);
     for (int i = 0; i < N_BOUNDARIES; i++) show(model, BOUNDARY_TEMPERATURE[i], balance->T_boundary[i]);
     for (int i = 0; i < N_MEMORY; i++) show(model, MEMORY_OUTPUT[i], thermal.memory[i]);
-    for (int i = 0; i < N_SOURCES; i++) {
-        show(model, HEAT_OUTPUT[i], balance->heat[i]);
-        if (SOURCE_IS_LOSS[i]) loss += balance->heat[i];
+    for (int i = 0; i < N_SOURCES; i++) show(model, HEAT_OUTPUT[i], balance->heat[i]);
+#ifdef TOTAL_LOSS
+    model->values[TOTAL_LOSS] = 0.0;
+    for (int i = 0; i < N_SOURCES; i++)
+        if (SOURCE_IS_LOSS[i]) model->values[TOTAL_LOSS] += balance->heat[i];
+#endif
+#ifdef TORQUE_LOSS
+    shaft_outputs(model, inputs[SPEED_INPUT], inputs[TORQUE_INPUT], model->values[TOTAL_LOSS]);
+#endif
+#ifdef IN_DOMAIN
+    {
+        const LossPoint point = network_loss_point(&scratch->network, model->time, inputs, &thermal);
+        model->values[DOMAIN_DISTANCE] = domain_distance(&point);
+        model->values[IN_DOMAIN] = model->values[DOMAIN_DISTANCE] <= 0.0;
     }
-    /* The loss torque goes linearly through zero below 1 rpm, as the losses do. */
-    omega = inputs[0] * RPM;
-    power = omega * inputs[1];
-    useful = power < 0.0 ? -power : fmax(power - loss, 0.0);
-    given = power < 0.0 ? loss - power : power;
-    distance = loss_domain_distance(inputs[0], inputs[1], T);
-    model->values[TOTAL_LOSS] = loss;
-    model->values[TORQUE_LOSS] = loss * ((omega > 0.0) - (omega < 0.0)) / fmax(fabs(omega), RPM);
-    model->values[EFFICIENCY] = given > 0.0 ? useful / given : 0.0;
-    model->values[DOMAIN_DISTANCE] = distance;
-    model->values[IN_DOMAIN] = distance <= 0.0;
+#endif
     return MODEL_OK;
 }
