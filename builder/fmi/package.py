@@ -5,23 +5,92 @@ from __future__ import annotations
 import re
 import zipfile
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from builder.fmi.documentation import Kind, documentation
 from builder.fmi.model_description import Identity
 from builder.fmi.reference import reference_run
-from builder.fmi.signals import SignalTable
+from builder.fmi.signals import SignalTable, signal_table
 from builder.surrogate.train import TrainingResult
 from models.assembly.gearbox import Gearbox
 from models.base.atomic_write import atomic_file
 from models.base.errors import InputError
 from models.base.version import project_version
-from models.correction.correction import Correction
+from models.correction.correction import Correction, corrected_network
 from models.portable.surrogate import SurrogateLosses
 from models.simulation.thermal_network import ThermalNetwork
 
 AUTHOR = "gearbox-thermal-twin"
 EARLIEST = (1980, 1, 1, 0, 0, 0)  # time of files in a zip file
+
+
+@dataclass(frozen=True, kw_only=True)
+class CommonParts:
+    """Parts that the FMU of a gearbox has in all kinds, and what the parts of one kind follow from.
+
+    Attributes
+    ----------
+    network : ThermalNetwork
+    losses : SurrogateLosses or None
+        None for a network without loss components
+    table : SignalTable
+    identity : Identity
+    pages : mapping of path to bytes
+        Documentation by path in the archive
+    """
+
+    network: ThermalNetwork
+    losses: SurrogateLosses | None
+    table: SignalTable
+    identity: Identity
+    pages: Mapping[str, bytes]
+
+
+def common_parts(
+    gearbox: Gearbox,
+    training: TrainingResult | None,
+    networks: Sequence[Path],
+    output: Path,
+    *,
+    network: ThermalNetwork | None,
+    correction: Correction | None,
+    flags: Mapping[str, bool],
+    kind: Kind,
+) -> CommonParts:
+    """Parts of the FMU of a gearbox that do not depend on its kind.
+
+    Parameters
+    ----------
+    gearbox : Gearbox
+    training : TrainingResult or None
+        The trained surrogate; None for a network without loss components
+    networks : sequence of Path
+        Its ONNX files
+    output : Path
+        The FMU; its stem becomes the model identifier
+    network : ThermalNetwork or None
+        The thermal network, if it is neither the gearbox's nominal nor the corrected one
+    correction : Correction or None
+        Findings of a diagnosis; the FMU contains them and its documentation lists them
+    flags : mapping of str to bool
+        Capabilities for the model description
+    kind : Kind
+        Kind of the FMU, for its documentation
+
+    Raises
+    ------
+    InputError
+        If the network has laws that are no expressions, or the networks are another gearbox's.
+    """
+    network = corrected_network(gearbox, correction) if network is None else network
+    losses = None if training is None else training.losses
+    refuse_mismatch(network, losses, networks)
+    table = signal_table(network, losses)
+    identity = gearbox_identity(gearbox, output, flags, correction)
+    reference = reference_run(gearbox, network, table, losses)
+    pages = documentation(gearbox, table, identity, training, reference, kind=kind)
+    return CommonParts(network=network, losses=losses, table=table, identity=identity, pages=pages)
 
 
 def gearbox_identity(
@@ -42,20 +111,6 @@ def gearbox_identity(
         generation_tool=f"gearbox-thermal-twin {version}",
         flags=flags,
     )
-
-
-def gearbox_pages(
-    gearbox: Gearbox,
-    network: ThermalNetwork,
-    table: SignalTable,
-    identity: Identity,
-    training: TrainingResult | None,
-    *,
-    kind: Kind,
-) -> dict[str, bytes]:
-    """Documentation of an FMU of a gearbox, by path in the archive."""
-    reference = reference_run(gearbox, network, table, None if training is None else training.losses)
-    return documentation(gearbox, table, identity, training, reference, kind=kind)
 
 
 def model_identifier(name: str) -> str:

@@ -15,13 +15,13 @@ from pathlib import Path
 from sys import float_info
 
 from builder.fmi.model_description import Identity, guid_of, model_description
-from builder.fmi.package import gearbox_identity, gearbox_pages, package_fmu, refuse_mismatch
-from builder.fmi.signals import Signal, SignalTable, signal_table
+from builder.fmi.package import common_parts, package_fmu
+from builder.fmi.signals import Signal, SignalTable
 from builder.native.compile import PLATFORMS, compile_libraries
 from builder.native.data import model_sources, number
 from builder.surrogate.train import TrainingResult
 from models.assembly.gearbox import Gearbox
-from models.correction.correction import Correction, corrected_network
+from models.correction.correction import Correction
 from models.simulation.thermal_network import ThermalNetwork
 
 FLAGS = {
@@ -82,17 +82,8 @@ def build_native_fmu(
 
     Parameters
     ----------
-    gearbox : Gearbox
-    training : TrainingResult or None
-        The trained surrogate; None for a network without loss components
-    networks : sequence of Path
-        Its ONNX files, from which the weights are read
-    output : Path
-        The FMU; its stem becomes the model identifier
-    network : ThermalNetwork or None
-        The thermal network, where it is neither the gearbox's nominal nor the corrected one
-    correction : Correction or None
-        Findings of a diagnosis; the FMU contains them and its documentation lists them
+    gearbox, training, networks, output, network, correction
+        See :func:`builder.fmi.package.common_parts`
     platforms : str
         See :func:`builder.native.compile.compile_libraries`
 
@@ -102,18 +93,17 @@ def build_native_fmu(
         If the folder cannot be written to, the network has laws that are no expressions, the networks are another
         gearbox's, or there is no compiler.
     """
-    network = corrected_network(gearbox, correction) if network is None else network
-    losses = None if training is None else training.losses
-    refuse_mismatch(network, losses, networks)
-    table = signal_table(network, losses)
-    identity = gearbox_identity(gearbox, output, FLAGS, correction)
-    written = THERMAL_MODEL if losses is None else THERMAL_MODEL + LOSS_NETWORKS
+    parts = common_parts(
+        gearbox, training, networks, output, network=network, correction=correction, flags=FLAGS, kind="native"
+    )
+    written = THERMAL_MODEL if parts.losses is None else THERMAL_MODEL + LOSS_NETWORKS
     return build_native_archive(
         output,
-        table=table,
-        identity=identity,
-        sources={name: native_source(name) for name in written} | model_sources(table, network, losses),
-        pages=gearbox_pages(gearbox, network, table, identity, training, kind="native"),
+        table=parts.table,
+        identity=parts.identity,
+        sources={name: native_source(name) for name in written}
+        | model_sources(parts.table, parts.network, parts.losses),
+        pages=parts.pages,
         platforms=platforms,
     )
 

@@ -176,14 +176,14 @@ class Finding(LawTable):
 class Correction(Section):
     """The whole file: findings and calibrated parameters of one gearbox.
 
-    `gearbox` has the hash of the definition's values (:attr:`models.assembly.gearbox.Gearbox.hash`), `recordings`
-    those of the
-    recordings that were used, `version` is that of the program that wrote it.
+    `gearbox` has the hash of the definition's values (:attr:`models.assembly.gearbox.Gearbox.hash`); a file written by
+    hand may leave it out. `recordings` has those of the recordings that were used, `version` is that of the program
+    that wrote it.
     """
 
     schema_number: Literal[1] = Field(default=1, alias="schema")
     version: str = ""
-    gearbox: Identity
+    gearbox: Identity | None = None
     recordings: tuple[Identity, ...] = Field(default=(), alias="recording")
     calibration: tuple[Estimate, ...] = Field(default=(), alias="calibrated")
     findings: tuple[Finding, ...] = Field(default=(), alias="finding")
@@ -254,7 +254,7 @@ class Correction(Section):
         InputError
             If the values of the definitions differ.
         """
-        if gearbox.hash != self.gearbox.sha256:
+        if self.gearbox is not None and gearbox.hash != self.gearbox.sha256:
             raise InputError(
                 f"the correction was made for {self.gearbox.name!r} with definition {self.gearbox.sha256[:12]}, but "
                 f"{gearbox.name!r} is {gearbox.hash[:12]}; use the definition it was made for, or diagnose again"

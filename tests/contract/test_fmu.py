@@ -18,7 +18,7 @@ from builder.surrogate.train import TrainingResult
 from models.assembly.gearbox import Gearbox
 from models.files.cycle import Cycle
 from tests.contract.conftest import Illegal
-from tests.contract.fmu_host import DISCARD, LOADED, Host, hosted
+from tests.contract.fmu_host import LOADED, Host, hosted
 from tests.contract.networks import extended, with_everything
 
 WARNING, ERROR = 1, 3
@@ -93,11 +93,8 @@ def test_start_temperature_in_degC_is_refused_and_can_be_corrected(path: Path, k
         host.enter({"initial.T": 20.0})
         with illegal():
             host.slave.exitInitializationMode()
-        said = host.said
-        assert said
-        assert all(status == ERROR for status, _ in said)
-        assert "degC" in said[0][1]
         assert math.isnan(host.get("oil.T")[0])
+        assert "initial.T is 20 K; 173.15 to 773.15 K is possible" in host.said[0][1]
         if kind == "python":  # initialized for pythonfmu, which cannot refuse it
             assert "initial.T" in host.refused()
         host.set_all({"initial.T": 293.15})
@@ -130,38 +127,15 @@ def test_communication_step_does_not_matter(path: Path, duration: float) -> None
             assert fine.get(*T_OUT) == pytest.approx(coarse.get(*T_OUT), abs=0.05)
 
 
-@pytest.mark.parametrize("duration", [0.0, -1.0, math.nan, math.inf, 1e300])
-def test_impossible_step_is_discarded_and_nothing_changes(path: Path, host: Host, duration: float) -> None:
-    host.step(5.0)
-    before = host.outputs()
-    assert "step" in host.refused(duration)
-    assert host.outputs() == before
-    host.step(5.0)
-    with hosted(path) as calm:
-        calm.step(5.0, count=2)
-        assert calm.outputs() == host.outputs()
-
-
-def test_step_from_another_time_is_discarded(host: Host) -> None:
-    host.step(5.0)
-    assert "ended at 5 s" in host.refused(time=3.0)
-
-
-def test_step_before_initialization_is_refused(path: Path, kind: str) -> None:
-    with hosted(path, start=False) as host:
-        assert "initializ" in host.refused(status=DISCARD if kind == "python" else ERROR).lower()
-
-
 @pytest.mark.parametrize(
     ("name", "value", "hint"),
     [
-        ("speed", math.nan, "finite"),
-        ("torque", math.inf, "finite"),
+        ("speed", math.nan, "is nan"),
+        ("torque", math.inf, "is inf"),
         ("speed", 1e6, "rad/s"),
         ("air_speed", -1.0, "0 to 200 m/s"),
-        ("T_ambient", 20.0, "if 20 degC is meant, set 293.15"),
-        ("T_ambient", 500.0, "possible"),
-        ("factor.bearing", math.nan, "finite"),
+        ("T_ambient", 20.0, "is 20 K; 183.15 to 473.15 K is possible"),
+        ("factor.bearing", math.nan, "is nan"),
         ("factor.bearing", -1.0, "0.05 to 20"),
         ("factor.C_oil", 0.0, "0.05 to 20"),
     ],
@@ -184,24 +158,6 @@ def test_impossible_value_is_discarded_with_a_message_and_nothing_changes(
     with hosted(path) as calm:
         calm.step(5.0, count=2)
         assert calm.outputs() == host.outputs()
-
-
-def test_calculated_variables_cannot_be_set(host: Host, illegal: Illegal) -> None:
-    before = host.outputs()
-    with illegal():
-        host.set_all({"oil.T": 400.0})
-    (said,) = host.said
-    assert said[0] == ERROR
-    assert "oil.T" in said[1]
-    assert host.outputs() == before
-
-
-def test_fixed_parameters_cannot_be_set_after_the_start(host: Host, illegal: Illegal) -> None:
-    with illegal():
-        host.set_all({"initial.T": 400.0})
-    (said,) = host.said
-    assert said[0] == ERROR
-    assert host.get("oil.T")[0] == pytest.approx(293.15)
 
 
 def test_factors_can_be_tuned_at_any_time(path: Path, host: Host) -> None:
@@ -251,76 +207,12 @@ def test_one_warning_per_excursion(host: Host) -> None:
         assert host.get("in_domain")[0] == 1
 
 
-@pytest.mark.parametrize("duration", [100.0, 1.0])
-def test_the_warning_tells_the_moment_at_which_the_range_was_left(path: Path, duration: float) -> None:
-    """Held inputs are outside from the start of the step on, whatever its length; temperatures only drift out."""
-    with hosted(path, {"speed": 1000.0}) as host:
-        host.step(duration)
-        (said,) = host.said
-        assert said[1].startswith("at 0 s the operating point is outside the range")
-        host.set(speed=300.0)
-        host.step(duration)
-        assert host.said == []
-        host.set(torque=400.0)
-        host.step(duration)
-        ((status, text),) = host.said
-        assert (status, text.partition(" s ")[0]) == (WARNING, f"at {2.0 * duration:g}")
-        assert "torque 400 N m (to 350)" in text
-    with hosted(path, {"initial.T": 473.0, "T_ambient": 473.0, "torque": 300.0}) as host:
-        host.step(100.0)
-        ((_, text),) = host.said
-        assert text.startswith("at 100 s the operating point is outside")
-        assert "pinion" in text
-
-
 def test_a_step_that_is_refused_does_not_count_as_warned(host: Host) -> None:
-    host.set(speed=1000.0)
-    host.refused(-1.0)
+    host.set(speed=1000.0, torque=math.nan)
+    host.refused()
+    host.set(torque=LOADED["torque"])
     host.step(1.0)
-    assert [text for _, text in host.said if text.startswith("at 0 s the operating point is outside")]
-
-
-def test_every_kind_says_the_same(fzg_fmu: Path, fzg_native: Path) -> None:
-    def said(path: Path) -> list[str]:
-        with hosted(path, {"speed": 1000.0, "oil.T_start": 350.0, "mesh.T_start": 351.25}) as host:
-            host.step(5.0)
-            host.set(speed=300.0, torque=400.0)
-            host.step(5.0)
-            texts = [text for _, text in host.said]
-            host.set_all({"factor.mesh": 0.0, "T_ambient": 20.0})
-            return [*texts, host.refused()]
-
-    one, other = said(fzg_fmu), said(fzg_native)
-    assert one == other
-    assert len(one) == 3  # start temperatures, one excursion (it stays outside), one refusal
-
-
-# ---------------------------------------------------------------------- start temperatures that are not used
-
-
-def test_start_temperatures_that_are_not_used_are_told_once(path: Path) -> None:
-    with hosted(path, {"oil.T_start": 353.15, "initial.T": 300.0}) as host:
-        assert host.said == [(
-            WARNING,
-            "oil.T_start is 353.15 K, but initial.uniform is true: all parts start at initial.T = 300 K. "
-            "Set initial.uniform to false to start each part at its own",
-        )]  # fmt: skip
-        assert host.get("oil.T") == pytest.approx([300.0])
-        host.step(1.0)
-        assert host.said == []
-    with hosted(path, {"oil.T_start": 353.15, "mesh.T_start": 310.0, "wheel.T_start": 310.0}) as host:
-        ((_, text),) = host.said
-        assert text.startswith("oil.T_start is 353.15 K (and 2 more such temperatures are given), but")
-
-
-@pytest.mark.parametrize(
-    "values",
-    [{"initial.T": 350.0}, {"oil.T_start": 350.0, "initial.T": 350.0}, {"oil.T_start": 293.15},
-     {"oil.T_start": 350.0, "initial.uniform": 0.0}],
-)  # fmt: skip
-def test_start_temperatures_that_change_nothing_are_not_told(path: Path, values: dict[str, float]) -> None:
-    with hosted(path, values) as host:
-        assert host.said == []
+    assert [text for status, text in host.said if status == WARNING and "operating point is outside" in text]
 
 
 # ---------------------------------------------------------------------- agreement with the network in Python
@@ -373,3 +265,13 @@ def test_the_reference_run_is_what_fmpy_finds(path: Path, tmp_path: Path) -> Non
     assert result["time"].tolist() == expected["time"].tolist()
     for name in names:
         np.testing.assert_allclose(result[name], expected[name], rtol=1e-7, atol=1e-7, err_msg=name)
+
+
+def test_native_and_python_fmu_agree(fzg_fmu: Path, fzg_native: Path) -> None:
+    """At held inputs, inside and outside the range of training."""
+    with hosted(fzg_fmu, {"factor.bearing": 1.7}) as python, hosted(fzg_native, {"factor.bearing": 1.7}) as native:
+        for speed, duration in ((300.0, 1.0), (310.0, 60.0), (-20.0, 0.3), (0.0, 30.0), (1000.0, 200.0)):
+            for host in (python, native):
+                host.set(speed=speed)
+                host.step(duration)
+            assert python.outputs() == pytest.approx(native.outputs(), rel=1e-9, abs=1e-9)

@@ -8,11 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 import sympy as sp
-from fmpy import read_model_description
+from fmpy import read_model_description, simulate_fmu
 from fmpy.validation import validate_fmu
 
 from builder.drive.driver import drive_fmu
+from builder.fmi.signals import signal_table
 from builder.native.native_fmu import build_native_fmu
+from builder.python.python_fmu import build_python_fmu
 from models.assembly.gearbox import load_gearbox
 from models.files.cycle import Cycle
 from models.portable.evaluation import NoLosses
@@ -100,3 +102,25 @@ def test_outputs_are_those_that_the_network_has(path: Path, network: ThermalNetw
     assert not {"in_domain", "domain_distance"} & names
     assert ("loss.total" in names) == any(source.is_loss for source in network.sources)
     assert ({"torque_loss", "efficiency"} <= names) == ("speed" in network.inputs)
+
+
+def simulated(path: Path, network: ThermalNetwork) -> np.ndarray:
+    """All outputs with FMPy, inputs held in steps of 10 s."""
+    cycle = cycle_of(network)
+    columns = [cycle.time]
+    for signal in signal_table(network).of_role("input"):
+        scale, offset = signal.to_inner
+        columns.append((cycle.inputs[signal.of] - offset) / scale)
+    names = ["time", *(signal.name for signal in signal_table(network).of_role("input"))]
+    given = np.rec.fromarrays(columns, names=names)
+    outputs = [signal.name for signal in signal_table(network) if signal.causality == "output"]
+    return simulate_fmu(str(path), stop_time=900.0, output_interval=10.0, input=given, output=outputs)
+
+
+def test_the_python_fmu_agrees_with_the_native_one(path: Path, network: ThermalNetwork, tmp_path: Path) -> None:
+    python = build_python_fmu(ANY, None, (), tmp_path / "thermal.fmu", network=network)
+    assert validate_fmu(str(python)) == []
+    expected, found = simulated(path, network), simulated(python, network)
+    assert expected["time"][-1] == 900.0
+    for name in expected.dtype.names:
+        np.testing.assert_allclose(found[name], expected[name], rtol=1e-9, atol=1e-9, err_msg=name)

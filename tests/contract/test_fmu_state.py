@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 
 import pytest
 
-from tests.contract.conftest import Illegal
 from tests.contract.fmu_host import LOADED, Host, hosted
 
 # ---------------------------------------------------------------------- the whole state
@@ -93,13 +91,3 @@ def test_instances_do_not_touch_each_other(path: Path) -> None:
             outputs.append(first.outputs())
         assert outputs == expected
         assert second.outputs()["oil.T"] > first.outputs()["oil.T"] + 10.0
-
-
-def test_an_unknown_value_reference_does_not_kill_the_host(host: Host, illegal: Illegal) -> None:
-    with illegal():
-        host.slave.setReal([99999], [1.0])
-    with illegal():
-        assert math.isnan(host.slave.getReal([99999])[0])
-    assert any("value reference 99999" in text for _, text in host.fmu.messages)
-    host.step(1.0)
-    assert math.isfinite(host.slave.getReal([host.fmu.variables["oil.T"].valueReference])[0])
