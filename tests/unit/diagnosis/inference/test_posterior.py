@@ -19,7 +19,7 @@ from diagnosis.inference.noise import noise_of
 from diagnosis.inference.posterior import Problem, _gauss_newton
 from diagnosis.inference.unknowns import Unknowns, unknowns_of
 from diagnosis.inference.whitening import Whitening
-from diagnosis.setup.case import Case, floored
+from diagnosis.setup.inference_setup import InferenceSetup, floored
 from models.assembly.gearbox import Gearbox
 from models.base.types import Array
 from models.mechanisms import CATALOGUE, Scale
@@ -177,7 +177,7 @@ def test_air_that_nobody_recorded_is_less_certain(problem: Problem) -> None:
 
 def test_judge_prefers_the_truth_and_survives_what_has_no_prediction(fzg: Gearbox, problem: Problem) -> None:
     right = calibrated(problem)
-    case = Case(
+    case = InferenceSetup(
         gearbox=fzg, nominal=fzg.network(), losses=fzg.losses(), scale=Scale.of(fzg), channels=CHANNELS, train=problem,
         holdout=problem, loss_W=250.0, noise_K=0.2,
     )  # fmt: skip

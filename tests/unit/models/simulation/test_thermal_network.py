@@ -147,8 +147,8 @@ def test_a_shifted_input_is_seen_everywhere(name: str, shift: float) -> None:
 
 
 def test_a_shift_reaches_the_update_for_mean_temperatures() -> None:
-    network = NETWORK.with_state("on", start=0.0, update=0.0, blurred=symbol("T_ambient") + 1.0)
-    assert network.with_signal_shift("T_ambient", 6.0).states[0].blurred == symbol("T_ambient") + 7.0
+    network = NETWORK.with_state("on", start=0.0, update=0.0, averaged_update=symbol("T_ambient") + 1.0)
+    assert network.with_signal_shift("T_ambient", 6.0).states[0].averaged_update == symbol("T_ambient") + 7.0
 
 
 def test_the_domain_is_that_of_what_the_losses_see() -> None:
