@@ -64,3 +64,4 @@ def test_the_resolution_is_found(quantum: float) -> None:
     values = quantum * np.round(np.random.default_rng(0).normal(300.0, 20.0, 500) / quantum)
     assert resolution_of(values) == pytest.approx(quantum, rel=1e-5)
     assert resolution_of(values[:1]) == 0.0
+    assert resolution_of(np.concatenate([values, values + 1e-9])) == pytest.approx(quantum, rel=1e-4)  # converted twice

@@ -146,6 +146,18 @@ def test_columns_that_nothing_asks_for_are_noted(tmp_path: Path, network: Therma
     assert note.endswith("x11 and 3 more")
 
 
+def test_an_impossible_value_of_a_computed_quantity_is_missing(tmp_path: Path, network: ThermalNetwork) -> None:
+    """The table of quantities has the range of the output torque; another column has none."""
+    kept = "".join(f'[columns.{name}]\nquantity = "auxiliary"\n' for name in ("torque_out_Nm", "pump"))
+    wrong = np.array([-1e9, 1e9, *[50.0] * 198])
+    recording = read(write(tmp_path / "run.csv", table().assign(torque_out_Nm=wrong, pump=wrong)), network, kept)
+    np.testing.assert_array_equal(recording.auxiliary["torque_out_Nm"], [np.nan, np.nan, *wrong[2:]])
+    np.testing.assert_array_equal(recording.auxiliary["pump"], wrong)
+    assert any(
+        note.startswith("torque_out_Nm: 2 values (rows 1-2) outside -1e+08 ... 1e+08 N m") for note in recording.notes
+    )
+
+
 def test_parts_of_a_file(tmp_path: Path, network: ThermalNetwork) -> None:
     source = table()
     path = write(tmp_path / "run.csv", source.assign(time_s=source["time_s"] + 100.0))
