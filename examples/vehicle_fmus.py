@@ -16,7 +16,7 @@ from builder.fmi.model_description import Identity
 from builder.fmi.package import AUTHOR, model_identifier, write_archive
 from builder.fmi.signals import Signal, SignalTable
 from builder.native.data import number
-from builder.native.native_fmu import FLAGS, NativeBuild, build_native_archive
+from builder.native.native_fmu import NativeBuild, build_native_archive
 from models.base.atomic_write import atomic_file
 from models.base.errors import InputError
 from models.base.version import license_text, project_version
@@ -203,7 +203,6 @@ def _build(
         license="MIT; see documentation/licenses",
         copyright="See documentation/licenses",
         generation_tool=f"gearbox-thermal-twin {version}",
-        flags=FLAGS,
         step_size=0.1,
     )
     pages = {"documentation/licenses/license.txt": license_text().encode()}

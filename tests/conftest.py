@@ -74,8 +74,8 @@ def build_fmu(fzg: Gearbox, fzg_training: TrainingResult, fzg_networks: tuple[Pa
 def build_native(fzg: Gearbox, fzg_training: TrainingResult, fzg_networks: tuple[Path, ...]) -> FmuBuilder:
     """Builds a native FMU at a path for this machine, of the default network or of another one."""
 
-    def build(path: Path, network: ThermalNetwork | None = None) -> Path:
-        return build_native_fmu(fzg, fzg_training, fzg_networks, path, network=network, platforms="host").path
+    def build(path: Path, network: ThermalNetwork | None = None, *, fmi: int = 2) -> Path:
+        return build_native_fmu(fzg, fzg_training, fzg_networks, path, network=network, platforms="host", fmi=fmi).path
 
     return build
 
@@ -83,6 +83,11 @@ def build_native(fzg: Gearbox, fzg_training: TrainingResult, fzg_networks: tuple
 @pytest.fixture(scope="session")
 def fzg_native(build_native: FmuBuilder, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return build_native(tmp_path_factory.mktemp("native") / "fzg.fmu")
+
+
+@pytest.fixture(scope="session")
+def fzg_native3(build_native: FmuBuilder, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return build_native(tmp_path_factory.mktemp("native3") / "fzg.fmu", fmi=3)
 
 
 @pytest.fixture(scope="session")

@@ -41,10 +41,15 @@ def commands() -> None:
 @click.option("--platforms", default=None, metavar="all|host|LIST",
               help="Of a native FMU: host (this machine's), all (with ziglang), or a list such as win64,win32.  "
                    "[default: host]")  # fmt: skip
+@click.option("--fmi", type=click.Choice(["2", "3", "both"]), default=None,
+              help="Version of a native FMU: 2 (2.0), 3 (3.0), or both in two files.  [default: 2]")  # fmt: skip
 @click.option("--output", type=click.Path(path_type=Path, file_okay=False), default=None, metavar="DIR",
               help="Folder for the FMU and what belongs to it.  [default: out/<gearbox>]")  # fmt: skip
 @click.option("--correction", type=click.Path(path_type=Path, dir_okay=False), default=None, metavar="FILE",
               help="What diagnose found: the FMU carries it.")  # fmt: skip
+@click.option("--couple", multiple=True, metavar="BOUNDARY",
+              help="Take the temperature of this boundary from an input BOUNDARY.T_in, to couple the FMU with another "
+                   "model (may be given several times).")  # fmt: skip
 @click.option("--preset", type=click.Choice(["default", "paper"]), default="default", show_default=True,
               help="Networks: default, or as printed in the paper (400 points, 2 x 5).")  # fmt: skip
 @click.option("--samples", type=click.IntRange(min=50, max=1_000_000), default=None, metavar="N",
@@ -56,8 +61,10 @@ def build_fmu(
     gearbox: str,
     target: str,
     platforms: str | None,
+    fmi: str | None,
     output: Path | None,
     correction: Path | None,
+    couple: tuple[str, ...],
     preset: str,
     samples: int | None,
     seed: int,
@@ -69,6 +76,8 @@ def build_fmu(
 
     if platforms is not None and target == "python":
         raise click.UsageError("--platforms is about native FMUs; give it without --target python")
+    if fmi is not None and target == "python":
+        raise click.UsageError("--fmi is about native FMUs, the Python FMU is FMI 2.0; give it without --target python")
     definition = load_gearbox(gearbox)
     found = None if correction is None else read_correction(correction, definition.network(), made_for=definition)
     folder = output if output is not None else Path("out") / Path(gearbox).stem
@@ -78,12 +87,14 @@ def build_fmu(
         name=Path(gearbox).stem,
         target=target,
         platforms=platforms or "host",
+        fmi=fmi or "2",
         preset=preset,
         samples=samples,
         seed=seed,
         jobs=jobs,
         dask=dask,
         correction=found,
+        couple=couple,
     )
     report.show()
 

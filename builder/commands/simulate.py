@@ -16,13 +16,13 @@ from models.assembly.gearbox import known_gearboxes, load_gearbox
 from models.base.atomic_write import atomic_file
 from models.base.errors import InputError
 from models.base.types import Array
-from models.correction.correction import read_correction
+from models.correction.correction import Correction, parse_correction, read_correction
 from models.definition.sections import Training
 from models.files.cycle import Cycle
-from models.files.cycle_file import RecordedStart, read_cycle_and_start, read_initial
+from models.files.cycle_file import RecordedStart, read_initial
 from models.files.output_files import refuse_to_replace, write_table
 from models.files.table_file import kind_of
-from models.quantities.quantities import GEARBOX_INPUTS
+from models.quantities.quantities import Input
 from models.simulation.start_temperatures import start_temperatures
 
 RECORDED = "recorded"  # --initial: as the cycle's own file says
@@ -42,6 +42,7 @@ class Model:
         Its name, for a plot
     read : callable
         From the file of a cycle, as named, to the cycle, its recorded start, and notes of what was read how
+    inputs : mapping of str to Input
     nodes : tuple of str
         Nodes that have a start temperature
     domain : str
@@ -54,6 +55,7 @@ class Model:
 
     title: str
     read: Callable[[Path], tuple[Cycle, RecordedStart, tuple[str, ...]]]
+    inputs: Mapping[str, Input]
     nodes: tuple[str, ...]
     domain: str
     run: Callable[[Cycle, Initial, console.Report], dict[str, Array]]
@@ -61,25 +63,25 @@ class Model:
 
 
 def _full_model(name_or_file: str, correction: Path | None, mapping: Path | None) -> Model:
-    from diagnosis.recordings.as_cycle import (
-        read_cycle_or_recording,  # imports the diagnosis; an FMU need not wait for it
-    )
+    from diagnosis.recordings.as_cycle import read_cycle_or_recording
 
     gearbox = load_gearbox(name_or_file)
-    network = gearbox.network()
+    network, found = gearbox.network(), None
     if correction is not None:
-        network = read_correction(correction, network, made_for=gearbox).network(gearbox)
-    nodes = tuple(part.name for part in network.parts)
+        found = read_correction(correction, network, made_for=gearbox)
+        network = found.network(gearbox)
     trained = None if gearbox.is_parametric else gearbox.training
 
     def run(cycle: Cycle, initial: Initial, progress: console.Report) -> dict[str, Array]:
         losses = gearbox.loss_laws()
-        return network.simulate(cycle, losses=losses, initial=initial, trained=trained, progress=progress).columns()
+        result = network.simulate(cycle, losses=losses, initial=initial, trained=trained, progress=progress)
+        return _with_readings(result.columns(), found)
 
     return Model(
         title=f"{gearbox.name}, full model",
         read=lambda file: read_cycle_or_recording(file, network, mapping=mapping),
-        nodes=nodes,
+        inputs=network.inputs,
+        nodes=tuple(part.name for part in network.parts),
         domain="the domain of the losses" if trained is None else _range_of(trained),
         run=run,
         groups=network.groups,
@@ -94,25 +96,39 @@ def _range_of(trained: Training) -> str:
     )
 
 
-def _fmu(path: Path) -> Model:
+def _fmu(path: Path, correction: Path | None, mapping: Path | None) -> Model:
     from builder.drive.driver import (  # imports fmpy; the full model need not wait for it
         drive_fmu,
-        fmu_inputs,
-        fmu_nodes,
+        fmu_machine,
+        refuse_other_correction,
     )
+    from diagnosis.recordings.as_cycle import read_cycle_or_recording
 
-    inputs = fmu_inputs(path)
+    machine, found = fmu_machine(path), None
+    if correction is not None:
+        found = parse_correction(correction)
+        refuse_other_correction(path, found, source=str(correction))
 
     def run(cycle: Cycle, initial: Initial, progress: console.Report) -> dict[str, Array]:
-        return drive_fmu(path, cycle, initial=initial, progress=progress)
+        return _with_readings(drive_fmu(path, cycle, initial=initial, progress=progress), found)
 
     return Model(
         title=path.name,
-        read=lambda file: (*read_cycle_and_start(file, inputs), ()),
-        nodes=fmu_nodes(path),
+        read=lambda file: read_cycle_or_recording(file, machine, mapping=mapping),
+        inputs=machine.inputs,
+        nodes=tuple(part.name for part in machine.parts),
         domain="the surrogate's training domain",
         run=run,
     )
+
+
+def _with_readings(columns: dict[str, Array], correction: Correction | None) -> dict[str, Array]:
+    """Add what the recorder shows of channels with a faulty sensor."""
+    if correction is None:
+        return columns
+    from diagnosis.forward.sensor_fault import columns_as_recorded
+
+    return columns | columns_as_recorded(columns, (finding.term for finding in correction.findings))
 
 
 @click.command("simulate")
@@ -130,10 +146,11 @@ def _fmu(path: Path) -> Model:
                    "nodes, whose last row counts (a result to be continued).  [default: first ambient temperature]",
               )  # fmt: skip
 @click.option("--mapping", type=click.Path(path_type=Path, dir_okay=False), default=None, metavar="FILE",
-              help="What the columns of a recording mean, with --gearbox.  [default: <stem>.toml or mapping.toml "
-                   "next to it]")  # fmt: skip
+              help="What the columns of a recording mean.  [default: <stem>.toml or mapping.toml next to it, else as "
+                   "the definition states]")  # fmt: skip
 @click.option("--correction", type=click.Path(path_type=Path, dir_okay=False), default=None,
-              metavar="FILE", help="What diagnose found: the full model carries it.")  # fmt: skip
+              metavar="FILE", help="What diagnose found: the full model carries it, an FMU was built with it. Channels "
+                                   "of faulty sensors have a column <column>_as_recorded as well.")  # fmt: skip
 @click.option("--plot", type=click.Path(path_type=Path), default=None, metavar="FILE", help="Plot: .png, .pdf or .svg.")
 def simulate(
     files: tuple[Path, ...],
@@ -148,14 +165,15 @@ def simulate(
     """Drive a CYCLE with an FMU, or with the full model of a gearbox (--gearbox).
 
     CYCLE is a table (.csv, .csv.gz, .parquet) with the columns time_s, speed_rpm, torque_Nm and, where known,
-    T_ambient_degC and air_speed_m_s. With --gearbox it may be a recording that diagnose reads as well, or a part of
-    one (FILE@start..end), or files that follow each other in time (FILE+FILE).
+    T_ambient_degC and air_speed_m_s; or the inputs that the definition names. It may be a recording that diagnose reads
+    as well, or a part of one (FILE@start..end), or files that follow each other in time (FILE+FILE).
     """
-    _check_options(files, gearbox, mapping, correction)
+    if len(files) > 2 or (len(files) == 2) == (gearbox is not None):
+        raise InputError("simulate takes FMU CYCLE, or --gearbox NAME|FILE and CYCLE")
     named = [Path(name) for name in (gearbox, initial, mapping, correction) if name is not None]
     _check_outputs(output, plot, inputs=[*_read_as_files(files, gearbox), *named])
     given = None if initial in (None, RECORDED) else read_initial(str(initial))
-    model = _fmu(files[0]) if gearbox is None else _full_model(gearbox, correction, mapping)
+    model = _fmu(files[0], correction, mapping) if gearbox is None else _full_model(gearbox, correction, mapping)
     cycle, recorded, notes = model.read(files[-1])
     for note in notes:
         console.err.print(f"note: {files[-1]}: {note}")
@@ -175,8 +193,8 @@ def simulate(
 
             plot_cycle(picture, columns, title=f"{model.title}: {files[-1].name}", groups=model.groups)
         write_table(output, columns)
-    _show(columns)
-    _print_assumed_inputs(columns, cycle)
+    _show(columns, model.inputs)
+    _print_assumed_inputs(columns, cycle, model.inputs)
     _warn_of_domain(columns, model.domain)
     if initial is None:
         _warn_of_start(columns, recorded, model.nodes)
@@ -186,29 +204,11 @@ def simulate(
     sys.stdout.flush()
 
 
-def _check_options(files: tuple[Path, ...], gearbox: str | None, mapping: Path | None, correction: Path | None) -> None:
-    if len(files) > 2 or (len(files) == 2) == (gearbox is not None):
-        raise InputError("simulate takes FMU CYCLE, or --gearbox NAME|FILE and CYCLE")
-    if gearbox is not None:
-        return
-    if correction is not None:
-        raise InputError(
-            "--correction goes with --gearbox; an FMU is built with its correction (build-fmu --correction)"
-        )
-    if mapping is not None:
-        raise InputError(
-            "--mapping goes with --gearbox; an FMU takes plain cycles: simulate the recording with --gearbox, and give "
-            "the result to the FMU"
-        )
-
-
 def _read_as_files(files: tuple[Path, ...], gearbox: str | None) -> tuple[Path, ...]:
     """Return the files that are read; a part of a recording counts as its file."""
-    if gearbox is None:
-        return files
     from diagnosis.recordings.as_cycle import files_of
 
-    return tuple(path for file in files for path in files_of(file))
+    return (*(files[:-1] if gearbox is None else ()), *files_of(files[-1]))
 
 
 def _check_outputs(output: Path, plot: Path | None, inputs: list[Path]) -> None:
@@ -220,9 +220,9 @@ def _check_outputs(output: Path, plot: Path | None, inputs: list[Path]) -> None:
     kind_of(output)
 
 
-def _show(columns: Mapping[str, Array]) -> None:
-    inputs = [given.column for given in GEARBOX_INPUTS.values()]
-    shown = [n for n in columns if n.startswith("T_") and n.endswith("_degC") and n not in inputs]
+def _show(columns: Mapping[str, Array], inputs: Mapping[str, Input]) -> None:
+    given = [known.column for known in inputs.values()]
+    shown = [n for n in columns if n.startswith("T_") and n.endswith("_degC") and n not in given]
     temperatures = {n[2:-5]: columns[n] for n in shown}
     rows = [[n, f"{v[0]:.1f}", f"{v.max():.1f}", f"{v[-1]:.1f}"] for n, v in temperatures.items()]
     console.table("Temperatures in degC", ["node", "first", "highest", "last"], rows)
@@ -235,7 +235,8 @@ def _show(columns: Mapping[str, Array]) -> None:
         ]
         for n, v in losses.items()
     ]
-    console.table("Losses in W", ["loss", "mean over time", "highest"], rows)
+    if rows:
+        console.table("Losses in W", ["loss", "mean over time", "highest"], rows)
 
 
 def _mean_over_time(time: Array, values: Array) -> float:
@@ -244,14 +245,14 @@ def _mean_over_time(time: Array, values: Array) -> float:
     return float(np.trapezoid(values, time) / span if span > 0.0 else values[0])
 
 
-def _print_assumed_inputs(columns: Mapping[str, Array], cycle: Cycle) -> None:
-    for name, column in ((name, given.column) for name, given in GEARBOX_INPUTS.items()):
-        if name not in cycle.inputs and column in columns:
+def _print_assumed_inputs(columns: Mapping[str, Array], cycle: Cycle, inputs: Mapping[str, Input]) -> None:
+    for name, column in ((name, given.column) for name, given in inputs.items()):
+        if name not in cycle.inputs:
             console.err.print(f"note: the cycle has no column {column}; {columns[column][0]:g} is assumed")
 
 
 def _warn_of_domain(columns: Mapping[str, Array], domain: str) -> None:
-    outside = int((~columns["in_domain"].astype(bool)).sum())
+    outside = int((~columns["in_domain"].astype(bool)).sum()) if "in_domain" in columns else 0
     if outside:
         _warn(f"{outside} of {len(columns['time_s'])} rows are outside {domain}; in_domain shows which")
 

@@ -24,11 +24,15 @@ import fmpy
 import numpy as np
 from fmpy import fmi2
 from fmpy.fmi1 import FMICallException
+from fmpy.fmi3 import FMU3Slave
 
+from builder.fmi.recorded import recorded_columns
 from builder.fmi.signals import input_column, result_column
 from builder.native.compile import host_platform
+from diagnosis.recordings.machine import DescribedMachine, Part
 from models.base.errors import InputError, did_you_mean
 from models.base.types import Array
+from models.correction.correction import Correction
 from models.files.cycle import Cycle
 from models.quantities.quantities import GEARBOX_INPUTS, INPUT_KINDS, Input, named_input
 from models.quantities.units import UNITS, conversion, find_unit
@@ -38,7 +42,7 @@ logger = logging.getLogger(__name__)
 
 LONGEST_HELD_S = 0.5  # a piece in which an input changes
 LARGEST_CHANGE = {"speed": 25.0, "torque": 5.0}  # [1/min], [N m]: a slower ramp is held longer
-NEEDED = {"initial.uniform": "parameter", "initial.T": "parameter"}
+NEEDED = {"initial.uniform": "parameter", "initial.T": "parameter"}  # of every FMU of this project
 WARNING, DISCARD = 1, 2
 PROGRESS_ROWS = 50
 
@@ -63,8 +67,8 @@ def drive_fmu(
     cycle : Cycle
         Inputs in the units of file columns; straight lines between the rows
     initial : float, mapping of node name to float, or None
-        Temperatures at the first row, [degC]; by default the first ambient temperature, for an FMU without this input
-        its own start temperature
+        Temperatures at the first row, [degC]; by default the first ambient temperature, or that of the FMU's first
+        boundary
     parameters : mapping of name to float, or None
         Tunable factors, by their name in the network or at the FMI interface
     progress : callable or None
@@ -84,32 +88,54 @@ def drive_fmu(
     with loaded(path) as fmu:
         table = _input_table(fmu, cycle)
         fmu.set_parameters(parameters or {})
-        if initial is None and "T_ambient" in fmu.inputs:
-            initial = float(table[0, fmu.inputs.index("T_ambient")])
-        if initial is not None:
-            fmu.set_initial(initial)
-        return _simulate_table(fmu, cycle.time, table, progress)
+        return _simulate_table(fmu, cycle.time, table, initial, progress)
 
 
 def runs_here(path: Path) -> bool:
     """Return True if an FMU has a binary for this machine."""
     with ZipFile(path) as archive:
-        return any(name.startswith(f"binaries/{host_platform()}/") for name in archive.namelist())
+        return any(name.startswith(tuple(f"{folder}/" for folder in _binary_folders())) for name in archive.namelist())
 
 
-def fmu_inputs(path: Path) -> dict[str, Input]:
-    """Return the inputs of an FMU as :func:`models.files.cycle_file.read_cycle` takes them.
+def _binary_folders() -> tuple[str, ...]:
+    """Folders of this machine's binaries: of FMI 3.0, then of FMI 2.0 (FMPy takes those of x86 on ARM)."""
+    return f"binaries/{fmpy.platform_tuple}", f"binaries/{host_platform()}"
+
+
+def fmu_machine(path: Path) -> DescribedMachine:
+    """Return what an FMU knows of recordings: inputs, nodes with a start temperature, the usual mapping.
 
     Raises
     ------
     InputError
         If the file is not an FMU of this project.
     """
-    inputs = [v for v in _description(Path(path)).modelVariables if v.causality == "input"]
-    return {v.name.strip("'"): _input(v) for v in inputs}
+    variables = _description(path).modelVariables
+    with _damage_reported(path):
+        recorded = recorded_columns(path)
+    inputs = [_input(v, recorded.required) for v in variables if v.causality == "input"]
+    return DescribedMachine(
+        inputs={given.name: given for given in inputs},
+        parts=tuple(Part(name) for name in _starts({v.name: v for v in variables})),
+        recording=recorded.mapping,
+    )
 
 
-def _input(variable: Any) -> Input:
+def refuse_other_correction(path: Path, correction: Correction, *, source: str) -> None:
+    """Refuse a correction that changes the machine if the FMU was not built with it.
+
+    Raises
+    ------
+    InputError
+    """
+    if correction.has_physics and correction.words not in (_description(path).description or ""):
+        raise InputError(
+            f"{path}: was not built with {source}, which changes the physics; build it again with build-fmu "
+            f"--correction {source}"
+        )
+
+
+def _input(variable: Any, required: Sequence[str]) -> Input:
     """An input of an FMU: of the table of quantities, else named, in the unit that tools show."""
     name = variable.name.strip("'")
     if name in GEARBOX_INPUTS:
@@ -121,19 +147,9 @@ def _input(variable: Any) -> Input:
     low, high, start = (_to_column(variable, float(text)) if text is not None else None for text in bounds)
     return named_input(
         name, kind, unit=variable.displayUnit or variable.unit or "", low=-np.inf if low is None else low,
-        high=np.inf if high is None else high, default=start or 0.0,
+        high=np.inf if high is None else high, default=start or 0.0, required=name in required,
+        description=variable.description or "",
     )  # fmt: skip
-
-
-def fmu_nodes(path: Path) -> tuple[str, ...]:
-    """Nodes of an FMU that have a start temperature.
-
-    Raises
-    ------
-    InputError
-        If the file is not an FMU of this project.
-    """
-    return tuple(_starts({v.name: v for v in _description(Path(path)).modelVariables}))
 
 
 @dataclass
@@ -144,7 +160,7 @@ class LoadedFmu:
     ----------
     path : Path
     description : fmpy.model_description.ModelDescription
-    slave : fmpy.fmi2.FMU2Slave
+    slave : fmpy.fmi2.FMU2Slave or Slave3
     messages : list of (int, str)
         Status and text, not shown yet
     doing : str
@@ -164,9 +180,8 @@ class LoadedFmu:
         self._inputs = [v for v in variables if v.causality == "input"]
         self.inputs = [v.name.strip("'") for v in self._inputs]
         self._outputs = [v for v in variables if v.causality == "output" and result_column(v.name) is not None]
-        self._references = {
-            kind: [v.valueReference for v in self._outputs if v.type == kind] for kind in ("Real", "Boolean")
-        }
+        self._booleans = [v.valueReference for v in self._outputs if v.type == "Boolean"]
+        self._reals = [v.valueReference for v in self._outputs if v.type != "Boolean"]
         self._input_references = [v.valueReference for v in self._inputs]
         self._orders = [1] * len(self._inputs)
         self._to_si = [_affine(v) for v in self._inputs]
@@ -191,13 +206,15 @@ class LoadedFmu:
 
     def outputs(self) -> tuple[list[float], list[int]]:
         """Reals in the FMU's own units, and Booleans."""
-        return self.slave.getReal(self._references["Real"]), self.slave.getBoolean(self._references["Boolean"])
+        return self.slave.getReal(self._reals), self.slave.getBoolean(self._booleans)
 
     def columns(self, rows: Sequence[tuple[list[float], list[int]]]) -> dict[str, Array]:
         """Columns of rows of :meth:`outputs`, in the order of the FMU."""
         reals, booleans = (iter(np.array(values).T) for values in zip(*rows, strict=True))
         return {
-            str(result_column(v.name)): _to_column(v, next(reals)) if v.type == "Real" else next(booleans).astype(bool)
+            str(result_column(v.name)): next(booleans).astype(bool)
+            if v.type == "Boolean"
+            else _to_column(v, next(reals))
             for v in self._outputs
         }
 
@@ -223,9 +240,21 @@ class LoadedFmu:
         for name, variable in starts.items():
             self._set_real(variable, temperatures[name])
 
+    def surroundings(self) -> float:
+        """Return the ambient temperature, else that of the first boundary, at the inputs that are set, [degC]."""
+        starts = _starts(self.variables)
+        temperatures = [v for v in self._outputs if v.name.endswith(".T")]
+        boundaries = (v for v in temperatures if v.name.removesuffix(".T").strip("'") not in starts)
+        variable = self.variables.get("T_ambient") or next(boundaries)
+        return float(_to_column(variable, self.slave.getReal([variable.valueReference])[0]))
+
     def _set_real(self, variable: Any, value: float) -> None:
         scale, offset = UNITS[variable.unit].column[1:]
         self.slave.setReal([variable.valueReference], [(float(value) - offset) / scale])
+
+    def log(self, _environment: int | None, status: int, _category: bytes, message: bytes) -> None:
+        """Add a message, as FMI 3.0 passes it on."""
+        self.messages.append((status, message.decode("utf-8", "replace").strip()))
 
     def report_messages(self, when: str) -> None:
         """Pass the FMU's warnings on.
@@ -244,6 +273,21 @@ class LoadedFmu:
                 logger.warning("%s: %s", self.path, text)
 
 
+class Slave3(FMU3Slave):  # type: ignore[misc]
+    """An FMU of FMI 3.0 in FMPy, with the names of FMI 2.0."""
+
+    getReal, setReal = FMU3Slave.getFloat64, FMU3Slave.setFloat64
+    start = 0.0
+
+    def setupExperiment(self, startTime: float) -> None:
+        """Keep the start time, which FMI 3.0 takes in the next call."""
+        self.start = startTime
+
+    def enterInitializationMode(self) -> None:
+        """Begin the initialisation."""
+        super().enterInitializationMode(startTime=self.start)
+
+
 @contextmanager
 def loaded(path: Path) -> Iterator[LoadedFmu]:
     """An FMU of this project, extracted to a temporary folder and instantiated; both are removed at the end.
@@ -257,25 +301,28 @@ def loaded(path: Path) -> Iterator[LoadedFmu]:
     path = Path(path)
     fmu = LoadedFmu(path, _description(path))
     with tempfile.TemporaryDirectory(prefix="twin-fmu-") as folder, _logged_to(fmu.messages) as callbacks:
-        _extract(path, Path(folder))
+        with _damage_reported(path):
+            fmpy.extract(str(path), folder)
         identifier = fmu.description.coSimulation.modelIdentifier
-        # FMI 2.0 names the folders of ARM as FMI 3.0 does; FMPy alone would take those of x86.
-        names = [Path(folder, "binaries", name, identifier + fmpy.sharedLibraryExtension)
-                 for name in (fmpy.platform_tuple, fmpy.platform)]  # fmt: skip
+        names = [Path(folder, name, identifier + fmpy.sharedLibraryExtension) for name in _binary_folders()]
         binary = next((name for name in names if name.is_file()), names[-1])
         if not binary.is_file():
             raise InputError(f"{path}: has no binary for {fmpy.platform}; build the FMU for this machine")
         try:
-            fmu.slave = fmi2.FMU2Slave(
+            fmu.slave = (fmi2.FMU2Slave if fmu.description.fmiVersion == "2.0" else Slave3)(
                 guid=fmu.description.guid, modelIdentifier=identifier, unzipDirectory=folder, instanceName=path.stem,
                 libraryPath=str(binary),
             )  # fmt: skip
         except Exception as error:  # fmpy raises plain Exception
             raise InputError(f"{path}: its binary cannot be loaded: {error}") from error
-        fmu.slave.component = fmu.slave.fmi2Instantiate(
-            path.stem.encode(), fmi2.fmi2CoSimulation, fmu.description.guid.encode(), _uri(Path(folder, "resources")),
-            byref(callbacks), False, True,
-        )  # fmt: skip
+        if isinstance(fmu.slave, Slave3):
+            with suppress(Exception):  # plain Exception, where it cannot be instantiated
+                fmu.slave.instantiate(loggingOn=True, logMessage=fmu.log)
+        else:
+            fmu.slave.component = fmu.slave.fmi2Instantiate(
+                path.stem.encode(), fmi2.fmi2CoSimulation, fmu.description.guid.encode(),
+                _uri(Path(folder, "resources")), byref(callbacks), False, True,
+            )  # fmt: skip
         if not fmu.slave.component:
             fmu.slave.freeLibrary()
             fmu.report_messages("it cannot be instantiated")
@@ -296,17 +343,18 @@ def loaded(path: Path) -> Iterator[LoadedFmu]:
 
 
 def _simulate_table(
-    fmu: LoadedFmu, time: Array, table: Array, progress: Callable[[int, int], None] | None
-) -> dict[str, Array]:
+    fmu: LoadedFmu, time: Array, table: Array, initial: float | Mapping[str, float] | None,
+    progress: Callable[[int, int], None] | None,
+) -> dict[str, Array]:  # fmt: skip
     slave, n_rows = fmu.slave, len(time)
     slave.setupExperiment(startTime=float(time[0]))
     slave.enterInitializationMode()
     fmu.set_inputs(table[0].tolist())
+    fmu.set_initial(fmu.surroundings() if initial is None else initial)
     slave.exitInitializationMode()
     fmu.report_messages("its start values")
     outputs = [fmu.outputs()]
     fmu.report_messages(f"at {time[0]:g} s")
-    component, do_step = slave.component, slave.fmi2DoStep
     for row in range(n_rows - 1):
         begin, end = float(time[row]), float(time[row + 1])
         change = table[row + 1] - table[row]
@@ -316,18 +364,18 @@ def _simulate_table(
             fmu.set_inputs(table[row].tolist())
             if change.any():
                 fmu.set_rates((change / (end - begin)).tolist())
-            do_step(component, begin, end - begin, 1)
+            slave.doStep(begin, end - begin)
         elif pieces == 0:
-            do_step(component, begin, end - begin, 1)
+            slave.doStep(begin, end - begin)
         else:
             half = (end - begin) / (2 * pieces)
-            do_step(component, begin, half, 1)
+            slave.doStep(begin, half)
             for piece in range(1, pieces):
                 share = piece / pieces
                 fmu.set_inputs(((1.0 - share) * table[row] + share * table[row + 1]).tolist())
-                do_step(component, begin + (2 * piece - 1) * half, 2.0 * half, 1)
+                slave.doStep(begin + (2 * piece - 1) * half, 2.0 * half)
             fmu.set_inputs(table[row + 1].tolist())
-            do_step(component, end - half, half, 1)
+            slave.doStep(end - half, half)
         outputs.append(fmu.outputs())
         if fmu.messages:
             fmu.report_messages(f"at {end:g} s")
@@ -366,15 +414,12 @@ def _description(path: Path) -> Any:
             raise InputError(f"{path}: no such file")
     except OSError as error:  # a name that is too long, a folder that may not be read
         raise InputError(f"{path}: cannot be read ({error.strerror})") from error
-    try:
-        with path.open("rb") as file:  # which fmpy would leave open where it fails
-            description = fmpy.read_model_description(file, validate=False)
-    except Exception as error:  # whatever zipfile, lxml or fmpy find, it is not an FMU
-        first = next(iter(str(error).splitlines()), type(error).__name__)
-        raise InputError(f"{path}: is not an FMU, or is damaged ({first}); build it again with build-fmu") from error
-    if description.fmiVersion != "2.0" or description.coSimulation is None:
+    with _damage_reported(path), path.open("rb") as file:  # which fmpy would leave open where it fails
+        description = fmpy.read_model_description(file, validate=False)
+    if not description.fmiVersion.startswith(("2.", "3.")) or description.coSimulation is None:
         raise InputError(
-            f"{path}: is an FMU of FMI {description.fmiVersion}; FMI 2.0 for co-simulation, as of build-fmu, is needed"
+            f"{path}: is an FMU of FMI {description.fmiVersion}; FMI 2.0 or 3.0 for co-simulation, as of build-fmu, is "
+            "needed"
         )
     names = {v.name: v.causality for v in description.modelVariables}
     missing = [name for name, causality in NEEDED.items() if names.get(name) != causality]
@@ -385,11 +430,13 @@ def _description(path: Path) -> Any:
     return description
 
 
-def _extract(path: Path, folder: Path) -> None:
+@contextmanager
+def _damage_reported(path: Path) -> Iterator[None]:
     try:
-        fmpy.extract(str(path), str(folder))
-    except Exception as error:  # fmpy raises plain Exception for unsafe paths, zipfile and zlib their own
-        raise InputError(f"{path}: is damaged ({error}); build it again with build-fmu") from error
+        yield
+    except Exception as error:  # whatever zipfile, json, lxml or fmpy find, it is not an FMU
+        first = next(iter(str(error).splitlines()), type(error).__name__)
+        raise InputError(f"{path}: is not an FMU, or is damaged ({first}); build it again with build-fmu") from error
 
 
 def _uri(resources: Path) -> bytes:

@@ -1,21 +1,23 @@
 """The ``modelDescription.xml`` of an FMU (FMI 2.0, co-simulation) from its table of signals.
 
-Knows nothing of what runs inside: a Python FMU and a native one differ in the flags and source files that they pass.
-The same arguments give the same bytes.
+Independent of the code inside: a Python FMU and a native one differ in the flags and source files that they pass. The
+same arguments give the same bytes. FMI 3.0: :mod:`builder.fmi.model_description3`.
 """
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import isfinite
 from xml.etree.ElementTree import Element, SubElement, fromstring, indent, tostring
 
 from builder.fmi.signals import Signal, SignalTable
-from models.quantities.quantities import TYPES
+from models.quantities.quantities import TYPES, Type
 from models.quantities.units import UNITS, conversion, find_unit
 
+DEPENDENCY_KINDS = ("constant", "tunable")
+INITIAL_DEPENDENCY_KINDS = ("constant",)  # parameters may change before the simulation starts
 LOG_CATEGORIES: Mapping[str, str] = {
     "logStatusWarning": "The operating point left the range that the networks were trained on",
     "logStatusDiscard": "A step was refused; the state is unchanged",
@@ -36,12 +38,14 @@ class Identity:
     model_identifier : str
         C identifier: name of the binaries
     description, version, author, license, copyright, generation_tool : str
-    flags : mapping of str to bool
+    flags : mapping of str to bool or int
         Attributes of ``CoSimulation``
     source_files : tuple of str
         Below ``sources/``, for an FMU that can be compiled
     stop_time, step_size : float
         Default experiment, [s]
+    tolerance : float
+        Of the default experiment, relative: that of the solver, .03 K at 300 K
     """
 
     model_name: str
@@ -52,10 +56,11 @@ class Identity:
     license: str
     copyright: str
     generation_tool: str
-    flags: Mapping[str, bool] = field(default_factory=dict)
+    flags: Mapping[str, bool | int] = field(default_factory=dict)
     source_files: tuple[str, ...] = ()
     stop_time: float = 600.0
     step_size: float = 1.0
+    tolerance: float = 1e-4
 
 
 def model_description(table: SignalTable, identity: Identity, *, content: bytes = b"") -> bytes:
@@ -73,14 +78,20 @@ def model_description(table: SignalTable, identity: Identity, *, content: bytes 
     bytes
         UTF-8; no date, so that the same FMU is the same file
     """
-    digest = hashlib.sha256(_xml(table, identity, guid="") + content).hexdigest()
+    return with_guid(lambda guid: _xml(table, identity, guid=guid), content)
+
+
+def with_guid(xml: Callable[[str], bytes], content: bytes) -> bytes:
+    """Insert a GUID, a hash of the content and of the XML with an empty GUID."""
+    digest = hashlib.sha256(xml("") + content).hexdigest()
     parts = (digest[:8], digest[8:12], digest[12:16], digest[16:20], digest[20:32])
-    return _xml(table, identity, guid="{" + "-".join(parts) + "}")
+    return xml("{" + "-".join(parts) + "}")
 
 
 def guid_of(xml: bytes) -> str:
-    """The GUID in a model description."""
-    return str(fromstring(xml).attrib["guid"])  # noqa: S314 - our own
+    """The GUID in a model description; in FMI 3.0 the instantiation token."""
+    attributes = fromstring(xml).attrib  # noqa: S314 - our own
+    return attributes.get("guid") or attributes["instantiationToken"]
 
 
 def _xml(table: SignalTable, identity: Identity, *, guid: str) -> bytes:
@@ -91,33 +102,56 @@ def _xml(table: SignalTable, identity: Identity, *, guid: str) -> bytes:
         variableNamingConvention="structured", numberOfEventIndicators="0",
     )  # fmt: skip
     _co_simulation(root, identity)
-    _units(root, table)
+    add_units(root, table)
     _types(root, table)
-    categories = SubElement(root, "LogCategories")
-    for name, meaning in LOG_CATEGORIES.items():
-        SubElement(categories, "Category", name=name, description=meaning)
-    SubElement(root, "DefaultExperiment", startTime="0", stopTime=_number(identity.stop_time),
-               stepSize=_number(identity.step_size))  # fmt: skip
+    add_log_categories(root)
+    add_experiment(root, identity)
     variables = SubElement(root, "ModelVariables")
     for signal in table:
         _variable(variables, signal)
     _structure(root, table)
+    return document(root)
+
+
+def document(root: Element) -> bytes:
+    """An XML file."""
     indent(root, space="  ")
     text: str = tostring(root, encoding="unicode")
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'.encode()
 
 
-def _co_simulation(root: Element, identity: Identity) -> None:
+def add_log_categories(root: Element) -> None:
+    """The log categories."""
+    categories = SubElement(root, "LogCategories")
+    for name, meaning in LOG_CATEGORIES.items():
+        SubElement(categories, "Category", name=name, description=meaning)
+
+
+def add_experiment(root: Element, identity: Identity) -> None:
+    """The default experiment."""
+    experiment = {"stopTime": identity.stop_time, "tolerance": identity.tolerance, "stepSize": identity.step_size}
+    attributes = {name: number(value) for name, value in experiment.items()}
+    SubElement(root, "DefaultExperiment", {"startTime": "0"} | attributes)
+
+
+def add_co_simulation(root: Element, identity: Identity) -> Element:
+    """Add the element of the abilities of the FMU."""
     element = SubElement(root, "CoSimulation", modelIdentifier=identity.model_identifier)
     for name, value in identity.flags.items():
-        element.set(name, _boolean(value))
+        element.set(name, boolean(value) if isinstance(value, bool) else str(value))
+    return element
+
+
+def _co_simulation(root: Element, identity: Identity) -> None:
+    element = add_co_simulation(root, identity)
     if identity.source_files:
         files = SubElement(element, "SourceFiles")
         for name in identity.source_files:
             SubElement(files, "File", name=name)
 
 
-def _units(root: Element, table: SignalTable) -> None:
+def add_units(root: Element, table: SignalTable) -> None:
+    """The units that signals have, with their base units and display units."""
     definitions = SubElement(root, "UnitDefinitions")
     for name, unit in UNITS.items():
         signals = [signal for signal in table if signal.unit == name]
@@ -142,10 +176,13 @@ def _types(root: Element, table: SignalTable) -> None:
         if name not in used:
             continue
         simple = SubElement(definitions, "SimpleType", name=name, description=kind.description)
-        real = SubElement(simple, "Real", quantity=kind.quantity, unit=kind.unit)
-        if kind.display is not None:
-            real.set("displayUnit", kind.display)
-        real.set("nominal", _number(kind.nominal))
+        SubElement(simple, "Real", type_attributes(kind))
+
+
+def type_attributes(kind: Type) -> dict[str, str]:
+    """Attributes of a declared type."""
+    display = {} if kind.display is None else {"displayUnit": kind.display}
+    return {"quantity": kind.quantity, "unit": kind.unit} | display | {"nominal": number(kind.nominal)}
 
 
 def _variable(parent: Element, signal: Signal) -> None:
@@ -155,12 +192,13 @@ def _variable(parent: Element, signal: Signal) -> None:
     )  # fmt: skip
     if signal.initial:
         variable.set("initial", signal.initial)
+    SubElement(variable, "Boolean" if signal.is_boolean else "Real", value_attributes(signal))
+
+
+def value_attributes(signal: Signal) -> dict[str, str]:
+    """Attributes of a signal's value: unit, bounds, start value."""
     if signal.is_boolean:
-        boolean = SubElement(variable, "Boolean")
-        if signal.start is not None:
-            boolean.set("start", _boolean(bool(signal.start)))
-        return
-    real = SubElement(variable, "Real")
+        return {} if signal.start is None else {"start": boolean(bool(signal.start))}
     kind = TYPES[signal.type] if signal.type is not None else None
     # Said again although the declared type says it: not every importer looks there.
     texts = {
@@ -170,37 +208,54 @@ def _variable(parent: Element, signal: Signal) -> None:
         "displayUnit": signal.display,
     }
     numbers = {"min": signal.minimum, "max": signal.maximum, "nominal": signal.nominal, "start": signal.start}
-    for name, text in texts.items():
-        if text is not None:
-            real.set(name, text)
-    for name, number in numbers.items():
-        if number is not None and isfinite(number):
-            real.set(name, _number(number))
+    return {name: text for name, text in texts.items() if text is not None} | {
+        name: number(value) for name, value in numbers.items() if value is not None and isfinite(value)
+    }
 
 
 def _structure(root: Element, table: SignalTable) -> None:
     structure = SubElement(root, "ModelStructure")
     outputs = [signal for signal in table if signal.causality == "output"]
-    _unknowns(SubElement(structure, "Outputs"), table, ((s, s.depends) for s in outputs))
-    _unknowns(SubElement(structure, "InitialUnknowns"), table, ((s, s.depends_initially) for s in outputs))
+    _unknowns(SubElement(structure, "Outputs"), table, ((s, s.depends, DEPENDENCY_KINDS) for s in outputs))
+    unknowns = SubElement(structure, "InitialUnknowns")
+    _unknowns(unknowns, table, ((s, s.depends_initially, INITIAL_DEPENDENCY_KINDS) for s in outputs))
 
 
-def _unknowns(parent: Element, table: SignalTable, unknowns: Iterable[tuple[Signal, Sequence[str]]]) -> None:
-    for signal, names in unknowns:
-        indices = sorted(table[name].reference + 1 for name in names)
-        SubElement(parent, "Unknown", index=str(signal.reference + 1), dependencies=" ".join(map(str, indices)))
+def _unknowns(
+    parent: Element, table: SignalTable, unknowns: Iterable[tuple[Signal, Sequence[str], Sequence[str]]]
+) -> None:
+    for signal, names, kinds in unknowns:
+        attributes = {"index": str(signal.reference + 1)}
+        SubElement(parent, "Unknown", attributes | dependencies(table, signal, names, kinds, first=1))
+
+
+def dependencies(
+    table: SignalTable, signal: Signal, names: Sequence[str], kinds: Sequence[str], *, first: int
+) -> dict[str, str]:
+    """Attributes of an unknown: the signals that it depends on, by their number from `first` on, and how.
+
+    Only kinds of `kinds` are named; without a kind a signal is "dependent", which is also what it means to name none.
+    """
+    found = sorted(names, key=lambda name: table[name].reference)
+    attributes = {"dependencies": " ".join(str(table[name].reference + first) for name in found)}
+    named = [kind if (kind := signal.linear.get(name, "")) in kinds else "dependent" for name in found]
+    if set(named) - {"dependent"}:
+        attributes["dependenciesKind"] = " ".join(named)
+    return attributes
 
 
 def _set_affine(element: Element, factor: float, offset: float) -> None:
     if factor != 1.0:
-        element.set("factor", _number(factor))
+        element.set("factor", number(factor))
     if offset != 0.0:
-        element.set("offset", _number(offset))
+        element.set("offset", number(offset))
 
 
-def _number(value: float) -> str:
+def number(value: float) -> str:
+    """A number in XML, exact to the last bit."""
     return repr(float(value)).removesuffix(".0")
 
 
-def _boolean(value: bool) -> str:
+def boolean(value: bool) -> str:
+    """A Boolean in XML."""
     return "true" if value else "false"

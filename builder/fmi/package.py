@@ -10,6 +10,7 @@ from pathlib import Path
 
 from builder.fmi.documentation import Kind, documentation
 from builder.fmi.model_description import Identity
+from builder.fmi.recorded import recorded_file
 from builder.fmi.reference import reference_run
 from builder.fmi.signals import SignalTable, signal_table
 from builder.surrogate.train import TrainingResult
@@ -37,7 +38,7 @@ class CommonParts:
     table : SignalTable
     identity : Identity
     pages : mapping of path to bytes
-        Documentation by path in the archive
+        Documentation, and what the FMU knows of recordings, by path in the archive
     """
 
     network: ThermalNetwork
@@ -55,7 +56,7 @@ def common_parts(
     *,
     network: ThermalNetwork | None,
     correction: Correction | None,
-    flags: Mapping[str, bool],
+    flags: Mapping[str, bool | int],
     kind: Kind,
 ) -> CommonParts:
     """Parts of the FMU of a gearbox that do not depend on its kind.
@@ -73,7 +74,7 @@ def common_parts(
         The thermal network, if it is neither the gearbox's nominal nor the corrected one
     correction : Correction or None
         Findings of a diagnosis; the FMU contains them and its documentation lists them
-    flags : mapping of str to bool
+    flags : mapping of str to bool or int
         Capabilities for the model description
     kind : Kind
         Kind of the FMU, for its documentation
@@ -89,12 +90,12 @@ def common_parts(
     table = signal_table(network, losses)
     identity = gearbox_identity(gearbox, output, flags, correction)
     reference = reference_run(gearbox, network, table, losses)
-    pages = documentation(gearbox, table, identity, training, reference, kind=kind)
+    pages = documentation(gearbox, table, identity, training, reference, kind=kind) | recorded_file(network)
     return CommonParts(network=network, losses=losses, table=table, identity=identity, pages=pages)
 
 
 def gearbox_identity(
-    gearbox: Gearbox, output: Path, flags: Mapping[str, bool], correction: Correction | None
+    gearbox: Gearbox, output: Path, flags: Mapping[str, bool | int], correction: Correction | None
 ) -> Identity:
     """Description of an FMU of a gearbox."""
     version = project_version()

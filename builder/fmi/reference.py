@@ -48,29 +48,35 @@ def reference_run(
     system = network_system(network, losses)
     starts = initial_states(network, START_TEMPERATURE - KELVIN)
     held = np.concatenate((rows[:1], rows[:-1]))  # at the end of a step its inputs still hold
-    states = [solver.start(starts)]
+    states = [solver.start(starts, system.n_boundaries)]
     for begin, end, row in zip(cycle.time[:-1], cycle.time[1:], rows[:-1], strict=True):
         states.append(solver.advance(system, states[-1], float(begin), float(end - begin), row, row))
     result = evaluate(
         network, losses, None, time=cycle.time, table=held, states=np.stack([s.states for s in states]),
-        heat=np.stack([[s.heat_in, s.heat_out] for s in states], axis=-1),
+        heat_in=np.array([s.heat_in for s in states]), heat_out=np.array([s.heat_out for s in states]),
     )  # fmt: skip
+    at_start = system.balance(float(cycle.time[0]), rows[0], starts).heat_out
+    means = np.diff([s.heat_out for s in states], axis=0) / np.diff(cycle.time)[:, None]
+    flows = dict(zip(system.laws.boundaries, np.vstack((at_start, means)).T, strict=True))
     inputs, outputs = table.of_role("input"), [signal for signal in table if signal.causality == "output"]
     return ReferenceRun(
         {"time": cycle.time} | {s.name: _at_fmi(s, rows[:, i]) for i, s in enumerate(inputs)},
-        {"time": cycle.time} | {s.name: _at_fmi(s, _values(result, s)) for s in outputs},
+        {"time": cycle.time} | {s.name: _at_fmi(s, _values(result, flows, s)) for s in outputs},
     )
 
 
-def _values(result: Result, signal: Signal) -> Array:
-    """An output over time in the network's units."""
-    families = {"temperature": result.temperatures, "loss": result.losses, "heat": result.extra_heat}
+def _values(result: Result, flows: Mapping[str, Array], signal: Signal) -> Array:
+    """An output over time in the network's units; `flows` are the mean heat flows to the boundaries."""
+    families = {
+        "temperature": result.temperatures, "loss": result.losses, "heat": result.extra_heat, "heat_flow": flows,
+        "heat_to_boundary": result.heat_to,
+    }  # fmt: skip
     if signal.role in families:
         return families[signal.role][signal.of]
     if signal.role == "in_domain":
         return np.asarray(result.domain_distance <= 0.0, dtype=float)
     single = {"total_loss": "loss", "torque_loss": "torque_loss", "efficiency": "efficiency",
-              "domain_distance": "domain_distance"}  # fmt: skip
+              "domain_distance": "domain_distance", "heat_in": "heat_in", "heat_stored": "heat_stored"}  # fmt: skip
     values: Array = getattr(result, single[signal.role])
     return values
 

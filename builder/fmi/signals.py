@@ -9,8 +9,8 @@ converts.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from math import inf
 from typing import Literal
@@ -29,8 +29,11 @@ INITIAL = ("initial.uniform", "initial.T")
 HEADER = ("signal", "kind", "unit", "shown in", "column of files", "start", "range", "trained on", "meaning")
 LOWEST_START, HIGHEST_START = 173.15, 773.15  # K; what lies outside is most likely degC
 
+MAYBE_LINEAR = ("temperature", "total_loss", "loss", "heat")  # roles of outputs that are their expressions
+
 Role = Literal[
-    "input", "temperature", "total_loss", "loss", "heat", "torque_loss", "efficiency", "in_domain", "domain_distance",
+    "input", "temperature", "total_loss", "loss", "heat", "heat_flow", "heat_to_boundary",
+    "heat_in", "heat_stored", "torque_loss", "efficiency", "in_domain", "domain_distance",
     "initial_uniform", "initial_temperature", "start_temperature", "factor", "state", "other",
 ]  # fmt: skip
 
@@ -63,6 +66,8 @@ class Signal:
         Column of cycle and result files
     depends, depends_initially : tuple of str
         Signals that an output depends on directly, and at initialization
+    linear : mapping of str to str
+        Those that it is linear in: "constant" where the factor is a number, "tunable" where it follows parameters
     inner_unit : str or None
         Unit in the network, if it is not that of file columns
     display_unit : str or None
@@ -88,6 +93,7 @@ class Signal:
     column: str | None = None
     depends: tuple[str, ...] = ()
     depends_initially: tuple[str, ...] = ()
+    linear: Mapping[str, str] = field(default_factory=dict)
     inner_unit: str | None = None
     display_unit: str | None = None
     reference: int = -1
@@ -267,6 +273,7 @@ class _Table:
         yield from self._inputs()
         yield from self._temperatures()
         yield from self._powers()
+        yield from self._heats()
         yield from self._quality()
         yield from self._initial()
         yield from self._factors()
@@ -303,7 +310,7 @@ class _Table:
             at_fmi = partial(_convert, own, unit)
             display = None if name in GEARBOX_INPUTS else quantity.unit * (quantity.unit != kind.unit)
             yield Signal(
-                name=fmi_name(name), role="input", of=name,
+                name=quantity.fmi, role="input", of=name,
                 description=given.description or texts.get(name, name.replace("_", " ")), type=quantity.type,
                 unit=kind.unit, inner_unit=quantity.unit, display_unit=display, causality="input",
                 variability="continuous", initial="",
@@ -322,7 +329,21 @@ class _Table:
             causality="output", variability="continuous" if kind else "discrete", initial="calculated", minimum=minimum,
             maximum=maximum, nominal=TYPES[kind].nominal if kind else None, domain=domain, column=result_column(name),
             depends=inputs, depends_initially=(*inputs, *parameters, *starts),
+            linear=self._linear(expression) if role in MAYBE_LINEAR else {},
         )  # fmt: skip
+
+    def _linear(self, expression: sp.Expr) -> dict[str, str]:
+        """Return how an expression depends on inputs that it is linear in; nothing if it reads losses of the networks."""
+        known = {f"T_{node}": temperature for node, temperature in self.boundaries.items()}
+        expression = expression.subs({s: known[s.name] for s in expression.free_symbols if s.name in known})
+        if any(s.name[2:] in self.network.components for s in expression.free_symbols):
+            return {}
+        kinds = {}
+        for given in (s for s in expression.free_symbols if s.name in self.inputs):
+            factors = {s.name for s in sp.diff(expression, given).free_symbols}
+            if factors <= set(self.parameters):
+                kinds[fmi_name(given.name)] = "tunable" if factors else "constant"
+        return kinds
 
     def _direct(self, expression: sp.Expr) -> tuple[tuple[str, ...], tuple[str, ...]]:
         """Inputs and parameters that an expression depends on without a detour through the temperatures of parts."""
@@ -331,7 +352,7 @@ class _Table:
             names |= {s.name for s in self._operating_point().free_symbols}
         names |= {s.name for name, law in self.network.derived.items() if name in names for s in law.free_symbols}
         names |= {s.name for node, T in self.boundaries.items() if f"T_{node}" in names for s in T.free_symbols}
-        inputs = tuple(fmi_name(name) for name in self.inputs if name in names)
+        inputs = tuple(given.quantity.fmi for name, given in self.network.inputs.items() if name in names)
         return inputs, tuple(fmi for name, fmi in self.parameters.items() if name in names)
 
     def _temperatures(self) -> Iterator[Signal]:
@@ -359,11 +380,38 @@ class _Table:
             )  # fmt: skip
         if not self.loss_heats or not {"speed", "torque"} <= set(self.inputs):
             return
-        yield self._output(name="torque_loss", role="torque_loss", kind="Torque", expression=total,
+        yield self._output(name="torque_loss", role="torque_loss", kind="Torque", expression=total / symbol("speed"),
                            description="Loss torque at the input shaft, signed as the speed")  # fmt: skip
         yield self._output(name="efficiency", role="efficiency", kind="Ratio", minimum=0.0, maximum=1.0,
-                           expression=total + sp.Symbol("speed") * sp.Symbol("torque"),
+                           expression=total + symbol("speed") * symbol("torque"),
                            description="Power out over power in; 0 without power")  # fmt: skip
+
+    def _heats(self) -> Iterator[Signal]:
+        """Heat to the boundaries and the terms of the energy balance, which depend on no input at a moment."""
+        for node in self.boundaries:
+            name, text = fmi_name(node), node.replace("_", " ")
+            flow = self._output(
+                name=f"{name}.heat_flow", role="heat_flow", of=node, kind="Power", expression=self._outflow(node),
+                description=f"Heat flow to {text}, mean over the last step",
+            )  # fmt: skip
+            yield replace(flow, depends=())
+            yield self._output(
+                name=f"{name}.heat", role="heat_to_boundary", of=node, kind="Energy", expression=sp.Integer(0),
+                needs_state=False, description=f"Heat given to {text} since the start",
+            )  # fmt: skip
+        totals: dict[Role, str] = {
+            "heat_in": "Heat brought in by all sources since the start",
+            "heat_stored": "Heat stored in all nodes since the start: heat_in less the heat given to the boundaries",
+        }
+        for role, text in totals.items():
+            yield self._output(name=role, role=role, kind="Energy", expression=sp.Integer(0), needs_state=False,
+                               description=text)  # fmt: skip
+
+    def _outflow(self, boundary: str) -> sp.Expr:
+        """An expression of what the heat flow to a boundary depends on."""
+        temperature = self.boundaries[boundary]
+        links = [link.conductance for link in self.network.links if boundary in link.nodes]
+        return sum((conductance * temperature for conductance in links), sp.Integer(0))
 
     def _operating_point(self) -> sp.Expr:
         """An expression of what speed and torque depend on as the losses see them."""

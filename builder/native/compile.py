@@ -12,6 +12,7 @@ import os
 import platform
 import shlex
 import shutil
+import struct
 import subprocess
 import sys
 import tempfile
@@ -49,22 +50,60 @@ class Platform:
 
     Attributes
     ----------
-    folder : str
-        Below ``binaries/`` in an FMU: of FMI 2.0, or where that has none of FMI 3.0
-    target : str
-        As zig names it, with the oldest glibc that is supported
+    targets : mapping of str to str
+        Processors: folder below ``binaries/`` in FMI 3.0, and the target as zig names it, with the oldest system that
+        is supported. In FMI 2.0 all are in one folder, those of macOS in one universal library
     suffix : str
         Of a shared library
     """
 
-    folder: str
-    target: str
+    targets: Mapping[str, str]
     suffix: str
+
+
+# By the folder below binaries/ in FMI 2.0
+PLATFORMS = {
+    "linux64": Platform({"x86_64-linux": "x86_64-linux-gnu.2.17"}, ".so"),
+    "win64": Platform({"x86_64-windows": "x86_64-windows-gnu"}, ".dll"),
+    "win32": Platform({"x86-windows": "x86-windows-gnu"}, ".dll"),
+    "darwin64": Platform({"x86_64-darwin": "x86_64-macos.11.0", "aarch64-darwin": "aarch64-macos.11.0"}, ".dylib"),
+    "aarch64-linux": Platform({"aarch64-linux": "aarch64-linux-gnu.2.17"}, ".so"),
+    "aarch64-windows": Platform({"aarch64-windows": "aarch64-windows-gnu"}, ".dll"),
+}
+
+
+@dataclass(frozen=True)
+class Library:
+    """A shared library to be compiled: for one processor of a platform.
+
+    Attributes
+    ----------
+    folder : str
+        Of the platform, key of :data:`PLATFORMS`
+    processor : str
+        Key of :attr:`Platform.targets`
+    name : str
+        Without suffix
+    """
+
+    folder: str
+    processor: str
+    name: str
+
+    @property
+    def file(self) -> str:
+        """Name of the file."""
+        return f"{self.name}{PLATFORMS[self.folder].suffix}"
+
+    @property
+    def target(self) -> str:
+        """Target as zig names it."""
+        return PLATFORMS[self.folder].targets[self.processor]
 
     @property
     def is_windows(self) -> bool:
         """True for the platforms of Windows."""
-        return self.suffix == ".dll"
+        return self.file.endswith(".dll")
 
     @property
     def code_options(self) -> tuple[str, ...]:
@@ -74,21 +113,9 @@ class Platform:
     @property
     def link_options(self) -> tuple[str, ...]:
         """Options of this platform's linker, libraries last."""
-        return ("-Wl,--no-undefined", "-Wl,--build-id=none", "-lm") if self.suffix == ".so" else ()
-
-
-PLATFORMS = {
-    p.folder: p
-    for p in (
-        Platform("linux64", "x86_64-linux-gnu.2.17", ".so"),
-        Platform("win64", "x86_64-windows-gnu", ".dll"),
-        Platform("win32", "x86-windows-gnu", ".dll"),
-        Platform("darwin64", "x86_64-macos", ".dylib"),
-        Platform("aarch64-linux", "aarch64-linux-gnu.2.17", ".so"),
-        Platform("aarch64-darwin", "aarch64-macos", ".dylib"),
-        Platform("aarch64-windows", "aarch64-windows-gnu", ".dll"),
-    )
-}
+        if self.file.endswith(".so"):
+            return ("-Wl,--no-undefined", "-Wl,--build-id=none", "-lm")
+        return () if self.is_windows else (f"-Wl,-install_name,@rpath/{self.file}",)
 
 
 class NoCompilerError(InputError):
@@ -106,18 +133,21 @@ class Compiler:
 
 @dataclass(frozen=True)
 class Binaries:
-    """Shared libraries by the folder of their platform, and a line on platforms that are missing, or ``""``."""
+    """Shared libraries by their path below ``binaries/``, and a line on platforms that are missing, or ``""``."""
 
     libraries: Mapping[str, bytes]
     note: str
 
 
-def host_platform() -> str | None:
-    """Return the folder of this machine's platform; None if the platform is not known."""
+def _host_processor() -> str:
+    """Folder of this machine in FMI 3.0."""
     machine = {"amd64": "x86_64", "arm64": "aarch64"}.get(platform.machine().lower(), platform.machine().lower())
-    system = {"linux": "linux", "darwin": "macos", "windows": "windows"}.get(platform.system().lower(), "")
-    found = [p.folder for p in PLATFORMS.values() if p.target.startswith(f"{machine}-{system}")]
-    return found[0] if system and found else None
+    return f"{machine}-{platform.system().lower()}"
+
+
+def host_platform() -> str | None:
+    """Return this machine's platform; None if it is not known."""
+    return next((name for name, of in PLATFORMS.items() if _host_processor() in of.targets), None)
 
 
 def chosen_platforms(text: str) -> tuple[str, ...]:
@@ -185,7 +215,9 @@ def plan_for(platforms: str) -> Plan:
     return Plan(own, (host,), f"built for {host} only; for {', '.join(left_out)} {GET_ZIG}" if left_out else "")
 
 
-def compile_libraries(sources: Mapping[str, bytes], platforms: str = "host") -> Binaries:
+def compile_libraries(
+    sources: Mapping[str, bytes], platforms: str = "host", *, name: str = "library", fmi: int = 2
+) -> Binaries:
     """Compile C sources to shared libraries.
 
     Parameters
@@ -194,6 +226,10 @@ def compile_libraries(sources: Mapping[str, bytes], platforms: str = "host") -> 
         C files and headers, all of one folder
     platforms : str
         See :func:`plan_for`
+    name : str
+        Of the library, without suffix
+    fmi : int
+        Version of FMI, 2 or 3, that the folders are for
 
     Returns
     -------
@@ -205,9 +241,32 @@ def compile_libraries(sources: Mapping[str, bytes], platforms: str = "host") -> 
         If there is no compiler for what is asked, or it fails.
     """
     plan = plan_for(platforms)
+    wanted = [
+        Library(folder, processor, name)
+        for folder in plan.platforms
+        for processor in PLATFORMS[folder].targets
+        if plan.compiler.is_zig or processor == _host_processor()
+    ]
     with ThreadPoolExecutor(max_workers=os.cpu_count()) as pool:
-        libraries = list(pool.map(partial(_library, sources, plan.compiler), [PLATFORMS[p] for p in plan.platforms]))
-    return Binaries(dict(zip(plan.platforms, libraries, strict=True)), plan.note)
+        compiled = list(pool.map(partial(_library, sources, plan.compiler), wanted))
+    found: dict[str, list[bytes]] = {}
+    for library, content in zip(wanted, compiled, strict=True):
+        folder = library.folder if fmi == 2 else library.processor
+        found.setdefault(f"{folder}/{library.file}", []).append(content)
+    joined = {path: parts[0] if len(parts) == 1 else universal_binary(parts) for path, parts in found.items()}
+    return Binaries(joined, plan.note)
+
+
+def universal_binary(libraries: Sequence[bytes]) -> bytes:
+    """Join Mach-O libraries of several processors in one file, as ``lipo`` does (``mach-o/fat.h``)."""
+    alignment = 14  # 2^14 bytes: a page of an ARM Mac
+    head, body = struct.pack(">II", 0xCAFEBABE, len(libraries)), b""
+    first = 1 << alignment
+    for library in libraries:
+        processor, variant = struct.unpack_from("<II", library, 4)
+        head += struct.pack(">IIIII", processor, variant, first + len(body), len(library), alignment)
+        body += library + bytes(-len(library) % first)
+    return head.ljust(first, b"\0") + body
 
 
 @cache
@@ -246,7 +305,9 @@ def _works(compiler: Compiler) -> bool:
     """Return True if a compiler is there with the headers and libraries of C."""
     host = host_platform()
     try:
-        return host is not None and bool(_compile(INCLUDES_STANDARD_HEADERS, compiler, PLATFORMS[host]))
+        return host is not None and bool(
+            _compile(INCLUDES_STANDARD_HEADERS, compiler, Library(host, _host_processor(), "one"))
+        )
     except InputError:
         return False
 
@@ -255,22 +316,22 @@ def _output(command: Sequence[str]) -> str:
     return subprocess.run(command, capture_output=True, text=True, check=False).stdout  # noqa: S603 - a compiler
 
 
-def _library(sources: Mapping[str, bytes], compiler: Compiler, target: Platform) -> bytes:
-    if compiler.is_zig and target.is_windows:
+def _library(sources: Mapping[str, bytes], compiler: Compiler, wanted: Library) -> bytes:
+    if compiler.is_zig and wanted.is_windows:
         runtime = (files("fmu_src") / "native" / WINDOWS_RUNTIME).read_bytes()
         sources = {**sources, WINDOWS_RUNTIME: runtime}
     folder = _cache_folder()
     if folder is None:
-        return _compile(sources, compiler, target)
+        return _compile(sources, compiler, wanted)
     # zig is the same in every virtual environment, and another compiler's own options are part of its command.
     command = compiler.command[1:] if compiler.is_zig else compiler.command
-    made_of = (compiler.version, command, _commands(["*.c"], compiler, target), sorted(sources.items()))
+    made_of = (compiler.version, command, _commands(["*.c"], compiler, wanted), sorted(sources.items()))
     digest = hashlib.sha256(repr(made_of).encode()).hexdigest()
-    kept = folder / f"{digest}{target.suffix}"
+    kept = folder / f"{digest}-{wanted.file}"
     try:
         return kept.read_bytes()
     except OSError:
-        library = _compile(sources, compiler, target)
+        library = _compile(sources, compiler, wanted)
     try:
         with atomic_file(kept) as file:
             file.write_bytes(library)
@@ -294,26 +355,28 @@ def _cache_folder() -> Path | None:
     return Path(base) / "gearbox-thermal-twin"
 
 
-def _compile(sources: Mapping[str, bytes], compiler: Compiler, target: Platform) -> bytes:
+def _compile(sources: Mapping[str, bytes], compiler: Compiler, library: Library) -> bytes:
     with tempfile.TemporaryDirectory(prefix="twin-c-") as folder:
         for name, content in sources.items():
             Path(folder, name).write_bytes(content)
-        for options in _commands(sorted(name for name in sources if name.endswith(".c")), compiler, target):
+        for options in _commands(sorted(name for name in sources if name.endswith(".c")), compiler, library):
             command = [*compiler.command, *options]
             done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)  # noqa: S603
             if done.returncode != 0:
                 said = "\n".join((done.stderr or done.stdout).splitlines()[:20])
-                raise InputError(f"{' '.join(compiler.command)} cannot compile the FMU for {target.folder}:\n{said}")
-        return Path(folder, f"library{target.suffix}").read_bytes()
+                raise InputError(
+                    f"{' '.join(compiler.command)} cannot compile the FMU for {library.processor}:\n{said}"
+                )
+        return Path(folder, library.file).read_bytes()
 
 
-def _commands(names: Sequence[str], compiler: Compiler, target: Platform) -> list[list[str]]:
+def _commands(names: Sequence[str], compiler: Compiler, library: Library) -> list[list[str]]:
     """Options of the compiler's runs; all names are relative: no path of this machine gets into the library."""
-    machine = ["-target", target.target] if compiler.is_zig else []
-    code = [*machine, *OPTIONS, *target.code_options]
-    link = [*machine, "-shared", "-s", "-o", f"library{target.suffix}"]
-    if compiler.is_zig and target.is_windows:
+    machine = ["-target", library.target] if compiler.is_zig else []
+    code = [*machine, *OPTIONS, *library.code_options]
+    link = [*machine, "-shared", "-s", "-o", library.file]
+    if compiler.is_zig and library.is_windows:
         objects = [f"{name}.obj" for name in names]
         compiled = [[*code, "-c", name, "-o", made] for name, made in zip(names, objects, strict=True)]
         return [*compiled, [*link, "-O3", *objects, *WINDOWS_LINK]]
-    return [[*code, *link, *names, *target.link_options]]
+    return [[*code, *link, *names, *library.link_options]]

@@ -18,7 +18,7 @@ class Structure:
 
     Attributes
     ----------
-    n_parts : int
+    n_parts, n_boundaries : int
     links : tuple of (int, int)
         Two different nodes that each conductance joins; parts by number, boundaries from `n_parts` on
     sources : tuple of int
@@ -26,6 +26,7 @@ class Structure:
     """
 
     n_parts: int
+    n_boundaries: int
     links: tuple[tuple[int, int], ...]
     sources: tuple[int, ...]
 
@@ -64,16 +65,22 @@ class Structure:
         return len(self._places)
 
     @staticmethod
-    def signatures() -> tuple[str, str, str]:
+    def signatures() -> tuple[str, str, str, str]:
         """C declarations of the functions, without semicolon."""
         gain = "(const double *g, const double *T, const double *T_boundary, const double *heat, double *restrict gain)"
+        outflow = "(const double *g, const double *T, const double *T_boundary, double *restrict flow)"
         factorize = "(const double *g, const double *capacity, double scale, double *restrict f)"
         solve = "(const double *restrict f, const double *q, double *x)"
-        return f"void structure_gain{gain}", f"void structure_factorize{factorize}", f"void structure_solve{solve}"
+        return (
+            f"void structure_gain{gain}",
+            f"void structure_outflow{outflow}",
+            f"void structure_factorize{factorize}",
+            f"void structure_solve{solve}",
+        )
 
     def source(self) -> str:
         """The C file."""
-        bodies = (self._gain(), self._factorize(), self._solve())
+        bodies = (self._gain(), self._outflow(), self._factorize(), self._solve())
         functions = [
             f"{signature} {{\n" + "".join(f"    {line}\n" for line in body) + "}\n"
             for signature, body in zip(self.signatures(), bodies, strict=True)
@@ -97,6 +104,18 @@ class Structure:
         for part, found in terms.items():
             yield f"gain[{part}] = {' '.join(found).removeprefix('+ ') or '0.0'};"
         yield "(void)T_boundary;"
+
+    def _outflow(self) -> Iterable[str]:
+        """Heat from the parts to every boundary."""
+        terms: dict[int, list[str]] = {boundary: [] for boundary in range(self.n_boundaries)}
+        for index, ends in enumerate(self.links):
+            part, boundary = sorted(ends)
+            if part < self.n_parts <= boundary:
+                flow = f"g[{index}]*({self._temperature(part)} - {self._temperature(boundary)})"
+                terms[boundary - self.n_parts].append(flow)
+        for boundary, found in terms.items():
+            yield f"flow[{boundary}] = {' + '.join(found) or '0.0'};"
+        yield "(void)g, (void)T, (void)T_boundary, (void)flow;"
 
     def _temperature(self, node: int) -> str:
         return f"T[{node}]" if node < self.n_parts else f"T_boundary[{node - self.n_parts}]"

@@ -31,7 +31,7 @@ COPIED = (
     "models/base/errors", "models/base/types", "models/portable/solver", "models/portable/evaluation",
     "models/portable/surrogate", "fmu_src/python/gearbox_slave",
 )  # fmt: skip
-REQUIREMENTS = "numpy>=2.1\nonnxruntime>=1.20\n"
+NUMPY, ONNXRUNTIME = "numpy>=2.1\n", "onnxruntime>=1.20\n"
 # pythonfmu 0.7.0 decrements the reference count of the module's globals once too often per instance; one reference is
 # added for each, without which the second or third instance crashes the host.
 SLAVE = """from {package} import generated
@@ -88,7 +88,7 @@ def build_python_fmu(
     network: ThermalNetwork | None = None,
     correction: Correction | None = None,
 ) -> Path:
-    """Package the thermal network of a gearbox as an FMU that needs Python, numpy and onnxruntime where it is used.
+    """Package the thermal network of a gearbox as an FMU that needs Python, numpy and for networks onnxruntime.
 
     Parameters
     ----------
@@ -119,7 +119,8 @@ def build_python_fmu(
     package = f"{identifier}_{digest[:16]}"
     slave = SLAVE.format(package=package, identifier=identifier)
     texts = {f"{package}/{name}": text for name, text in code.items()}
-    texts |= {f"{package}_slave.py": slave, "slavemodule.txt": f"{package}_slave", "requirements.txt": REQUIREMENTS}
+    requirements = NUMPY + (ONNXRUNTIME if onnx else "")
+    texts |= {f"{package}_slave.py": slave, "slavemodule.txt": f"{package}_slave", "requirements.txt": requirements}
     resources = {name: text.encode() for name, text in texts.items()} | onnx
     inside = {f"resources/{name}": content for name, content in resources.items()}
     package_fmu(output, xml, inside, _pythonfmu_files(identifier), parts.pages)

@@ -29,7 +29,9 @@ from models.base.version import project_version
 from models.correction.correction import Correction, corrected_network
 from models.files.output_files import write_table
 
-SUFFIX = {"python": "", "native": "_native"}  # of the files' names
+SUFFIX = {"python": "", "native": "_native", "native_fmi3": "_native_fmi3"}  # of the files' names
+LABEL = {"python": "python", "native": "native", "native_fmi3": "native FMI 3.0"}  # of the kinds, for people
+VERSIONS = {"2": ("native",), "3": ("native_fmi3",), "both": ("native", "native_fmi3")}  # native kinds by --fmi
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -146,12 +148,14 @@ def build(
     name: str,
     target: str = "both",
     platforms: str = "host",
+    fmi: str = "2",
     preset: str = "default",
     samples: int | None = None,
     seed: int = 0,
     jobs: int = 1,
     dask: str | None = None,
     correction: Correction | None = None,
+    couple: Sequence[str] = (),
 ) -> BuildReport:
     """Build the FMUs of `gearbox` and try them on the reference cycle; with geometry, train their networks first.
 
@@ -159,7 +163,8 @@ def build(
     ----------
     gearbox : Gearbox
     folder : Path
-        Where the files go: ``<name>.fmu`` (python), ``<name>_native.fmu``, ``networks/*.onnx``, ``drive_cycle.csv``,
+        Where the files go: ``<name>.fmu`` (python), ``<name>_native.fmu``, ``<name>_native_fmi3.fmu``,
+        ``networks/*.onnx``, ``drive_cycle.csv``,
         ``.png`` (``drive_cycle_native`` of the native FMU), ``report.json``. They appear together when all is done;
         files of an earlier build are replaced, others left alone
     name : str
@@ -168,10 +173,14 @@ def build(
         Kind of FMU: ``python``, ``native`` or ``both``; without a compiler, ``both`` is the Python FMU alone
     platforms : str
         Of a native FMU, see :func:`builder.native.compile.plan_for`
+    fmi : str
+        Version of the native FMU: ``2``, ``3`` or ``both``
     preset, samples, seed, jobs, dask
         See :func:`builder.surrogate.train.train_surrogate`
     correction : Correction or None
         What a diagnosis found: the FMU and the full model it is compared with carry it
+    couple : sequence of str
+        Boundaries whose temperature becomes an input, ``<boundary>.T_in``
 
     Returns
     -------
@@ -182,8 +191,10 @@ def build(
     InputError
         If the folder cannot be written to or the options are at fault.
     """
-    kinds, built_for, notes = _planned(target, platforms)
+    kinds, built_for, notes = _planned(target, platforms, fmi)
     network = corrected_network(gearbox, correction)
+    for boundary in couple:
+        network = network.with_coupled_boundary(boundary)
     inside = gearbox.network_of_laws(network) if gearbox.is_parametric else network
     seconds: dict[str, float] = {}
     with atomic_folder(folder) as stage:
@@ -197,19 +208,22 @@ def build(
                 networks = export_onnx(training, stage / "networks", version=project_version())
         fmus = {kind: stage / f"{name}{SUFFIX[kind]}.fmu" for kind in kinds}
         for kind, path in fmus.items():
-            with _measure_time(f"package, {kind} FMU", seconds), _show_messages() as tell:
-                tell(f"packaging the {kind} FMU")
+            with _measure_time(f"package, {LABEL[kind]} FMU", seconds), _show_messages() as tell:
+                tell(f"packaging the {LABEL[kind]} FMU")
                 if kind == "python":
                     build_python_fmu(gearbox, training, networks, path, network=inside, correction=correction)
                 else:
                     build_native_fmu(
-                        gearbox, training, networks, path, network=inside, platforms=platforms, correction=correction
-                    )
+                        gearbox, training, networks, path, network=inside, platforms=platforms,
+                        fmi=3 if kind == "native_fmi3" else 2, correction=correction,
+                    )  # fmt: skip
         cycle, losses = reference_cycle(gearbox), gearbox.loss_laws()
         with _measure_time("reference cycle, full model", seconds), console.progress_bar("full model") as progress:
             full = network.simulate(cycle, losses=losses, initial=COLD_START, progress=progress).columns()
         cycles = {}
         for kind, path in fmus.items():
+            if kind == "native_fmi3":  # its numbers are those of the native FMU of FMI 2.0
+                continue
             if not runs_here(path):
                 notes.append(
                     f"the {kind} FMU has no binary for this machine, so the reference cycle is not driven with it"
@@ -225,7 +239,7 @@ def build(
             plot_cycle(plot, driven, title=title, groups=network.groups, inputs=network.inputs, reference=full)
         report = BuildReport(
             gearbox=gearbox.name, training=training, cycles=cycles, seconds=seconds, files=(),
-            purpose=_purpose({kind: path.name for kind, path in fmus.items()}, built_for), notes=tuple(notes),
+            purpose=_purpose({kind: path.name for kind, path in fmus.items()}, built_for, networks), notes=tuple(notes),
             correction=None if correction is None else correction.summary(),
         )  # fmt: skip
         (stage / "report.json").write_text(json.dumps(report.as_dict(), indent=2) + "\n", encoding="utf-8")
@@ -234,8 +248,8 @@ def build(
     return replace(report, files=files, notes=(*report.notes, *_left_from_before(folder, files)))
 
 
-def _planned(target: str, platforms: str) -> tuple[tuple[str, ...], tuple[str, ...], list[str]]:
-    """Kinds of FMU that can be built here, platforms of the native one, and notes on what is left out.
+def _planned(target: str, platforms: str, fmi: str) -> tuple[tuple[str, ...], tuple[str, ...], list[str]]:
+    """Kinds of FMU that can be built here, platforms of the native one, and notes on targets left out.
 
     Called before the training, so that a missing compiler is known early.
 
@@ -244,10 +258,13 @@ def _planned(target: str, platforms: str) -> tuple[tuple[str, ...], tuple[str, .
     InputError
         If the target is not known, or what is asked for explicitly cannot be built.
     """
-    kinds = {"python": ("python",), "native": ("native",), "both": ("python", "native")}.get(target)
+    if fmi not in VERSIONS:
+        raise InputError(f"FMI {fmi} is not known; 2, 3 and both are")
+    native = VERSIONS[fmi]
+    kinds = {"python": ("python",), "native": native, "both": ("python", *native)}.get(target)
     if kinds is None:
         raise InputError(f"target {target!r} is not known; python, native and both are")
-    if "native" not in kinds:
+    if target == "python":
         return kinds, (), []
     try:
         plan = plan_for(platforms)
@@ -258,12 +275,14 @@ def _planned(target: str, platforms: str) -> tuple[tuple[str, ...], tuple[str, .
     return kinds, plan.platforms, [f"native FMU {plan.note}"] if plan.note else []
 
 
-def _purpose(names: Mapping[str, str], platforms: Sequence[str]) -> str:
+def _purpose(names: Mapping[str, str], platforms: Sequence[str], networks: Sequence[Path]) -> str:
     """Say which FMU is for what, in one line."""
+    native = f"needs no other software, for {', '.join(platforms)}"
+    native += "" if len(platforms) > 1 else " (--platforms all: for all)"
     needs = {
-        "native": f"needs no other software, for {', '.join(platforms)}"
-        + ("" if len(platforms) > 1 else " (--platforms all: for all)"),
-        "python": "runs on Python with numpy and onnxruntime",
+        "native": native,
+        "native_fmi3": f"is FMI 3.0, {native}",
+        "python": "runs on Python with numpy" + (" and onnxruntime" if networks else ""),
     }
     return "; ".join(f"{names[kind]} {text}" for kind, text in needs.items() if kind in names)
 

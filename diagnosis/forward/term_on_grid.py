@@ -14,7 +14,7 @@ from diagnosis.forward.extra_states import Memories
 from diagnosis.forward.grid import Piece
 from diagnosis.forward.network_on_grid import NetworkOnGrid
 from diagnosis.forward.observation import Sensors
-from diagnosis.forward.recurrence import lagged
+from diagnosis.forward.sensor_fault import passed_on
 from diagnosis.forward.trajectory import Trajectory
 from models.base.types import Array
 from models.network.laws import compile_function, function_source, symbol
@@ -221,28 +221,11 @@ class TermOnGrid:
 
     def passed_on(self, trajectory: Trajectory, sensors: Sensors, changes: Array, values: Array) -> Array:
         """Changes of the readings as distorted by such a fault, shape (K + 1, channels, ...); most are linear."""
-        term, time = self.term, trajectory.piece.time
-        if term.form == "shift":
+        if self.term.form == "shift":
             return changes
         law = self.law(trajectory, values[None, :], at_points=True)[0][0]
-        along = law.reshape(-1, *[1] * (changes.ndim - 2))
-        channels = [sensors.channels.index(name) for name in term.target]
-        changes = np.array(changes)
-        for index in channels:
-            before = changes[:, index]
-            if term.form == "lag":
-                changes[:, index] = lagged(before, trajectory.piece.steps, float(law[0]))
-            elif term.form == "clock":
-                at = np.interp(time - law, time, np.arange(len(time)))
-                low = np.minimum(at.astype(int), len(time) - 2)
-                share = (at - low).reshape(along.shape)
-                changes[:, index] = (1.0 - share) * before[low] + share * before[low + 1]
-            elif term.form == "stuck":
-                begin = int(np.argmax(law != 0.0))  # the reading is held as it was when the law set in
-                changes[:, index] = before + along * (before[begin] - before)
-        if term.form == "swapped":
-            changes[:, channels] += along[:, None] * (changes[:, channels[::-1]] - changes[:, channels])
-        return changes
+        channels = [sensors.channels.index(name) for name in self.term.target]
+        return passed_on(self.term, law, trajectory.piece.time, changes, channels)
 
 
 def input_slope(model: NetworkOnGrid, trajectory: Trajectory, name: str) -> tuple[Array, Array]:

@@ -4,20 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Set
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+from diagnosis.recordings.machine import RecordedMachine
 from diagnosis.recordings.mapping import RecordingMapping, mapping_beside, mapping_of_definition
 from diagnosis.recordings.read import name_parts, read_recording
 from diagnosis.recordings.recording import Recording
 from diagnosis.recordings.time_axis import ISO_NAMES, STANDARD, moment_text, split_path
 from models.base.errors import InputError
+from models.base.types import Array
 from models.files.cycle import Cycle
 from models.files.cycle_file import RecordedStart, read_cycle_and_start
 from models.files.table_file import KINDS, column_names
-from models.quantities.quantities import is_total_loss
-
-if TYPE_CHECKING:
-    from models.simulation.thermal_network import ThermalNetwork
+from models.quantities.quantities import is_total_loss, node_of_channel
 
 MOST_SHOWN = 3  # pieces of a recording with gaps
 
@@ -34,15 +32,15 @@ def files_of(text: Path) -> tuple[Path, ...]:
 
 
 def read_cycle_or_recording(
-    text: Path, network: ThermalNetwork, *, mapping: Path | None = None
+    text: Path, network: RecordedMachine, *, mapping: Path | None = None
 ) -> tuple[Cycle, RecordedStart, tuple[str, ...]]:
-    """Read the inputs of a network over time from a plain cycle or from a recording.
+    """Read the inputs of a machine over time from a plain cycle or from a recording.
 
     Parameters
     ----------
     text : Path
         File (.csv, .csv.gz, .parquet, .mf4), files ``FILE+FILE``, or a part, ``FILE@start..end``
-    network : ThermalNetwork
+    network : RecordedMachine
         Defines nodes and inputs, and the usual mapping of its recordings
     mapping : Path or None
         Mapping file of a recording; by default the one next to it, else that of the definition
@@ -68,8 +66,13 @@ def read_cycle_or_recording(
         raise InputError(f"{text}: {_gaps(recording)}")
     piece = recording.segments[0]
     cycle = Cycle(recording.time[piece], {name: values[piece] for name, values in recording.inputs.items()})
-    temperatures = [(c.name, c.column, c.values[piece]) for c in recording.channels if not is_total_loss(c.name)]
-    start = RecordedStart.first_of(recording.path, temperatures, recording.rows[piece])
+    nodes = [part.name for part in network.parts]
+    first: dict[str, tuple[str, str, Array]] = {}  # the first of several sensors at a node
+    for channel in recording.channels:
+        if not is_total_loss(channel.name):
+            node = node_of_channel(channel.name, nodes)
+            first.setdefault(node, (node, channel.column, channel.values[piece]))
+    start = RecordedStart.first_of(recording.path, first.values(), recording.rows[piece])
     return cycle, start, (*recording.notes, *_clock_notes(recording))
 
 

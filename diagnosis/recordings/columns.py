@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
 from diagnosis.recordings.cleaning import rows_text
+from diagnosis.recordings.machine import RecordedMachine
 from diagnosis.recordings.mapping import Column, RecordingMapping
 from diagnosis.recordings.quantities import AUXILIARY, IGNORE, looks_like_kelvin
 from models.base.errors import Problems, did_you_mean
@@ -18,29 +18,26 @@ from models.quantities.column_names import meant
 from models.quantities.quantities import TOTAL_LOSS, Quantity, node_of_channel, quantity_of, quantity_of_column
 from models.quantities.units import units_in_files
 
-if TYPE_CHECKING:
-    from models.simulation.thermal_network import ThermalNetwork
-
 NEAR = 0.85  # likeness of names that makes one a slip of the other
 MOST_NAMED = 12  # unused columns in a note
 FEW = 0.01  # share of rows that may be impossible
 CODES, CODED = 3, 0.5  # so many different impossible values, in up to this share of rows, are codes of a logger
 
 
-def is_measurable(name: str, network: ThermalNetwork) -> bool:
+def is_measurable(name: str, network: RecordedMachine) -> bool:
     """Return True for ``T_<node>`` (also of one of several sensors, ``T_<node>__<sensor>``) and ``P_loss``."""
     known = {*(f"T_{part.name}" for part in network.parts), TOTAL_LOSS}
     return node_of_channel(name, known) in known
 
 
-def quantities_of(network: ThermalNetwork) -> dict[str, Quantity]:
+def quantities_of(network: RecordedMachine) -> dict[str, Quantity]:
     """Return the inputs of a network and what can be measured, by name."""
     measured = (quantity_of(name) for name in (*(f"T_{part.name}" for part in network.parts), TOTAL_LOSS))
     known = {q.name: q for q in measured if q is not None}
     return known | {name: given.quantity for name, given in network.inputs.items()}
 
 
-def standard_names(network: ThermalNetwork) -> dict[str, str]:
+def standard_names(network: RecordedMachine) -> dict[str, str]:
     """Return the column of every quantity without a mapping file."""
     return {name: quantity.column for name, quantity in quantities_of(network).items()}
 
@@ -49,7 +46,7 @@ def match_columns(
     present: Sequence[str],
     time_column: str,
     mapping: RecordingMapping,
-    network: ThermalNetwork,
+    network: RecordedMachine,
     problems: Problems,
     notes: list[str],
 ) -> dict[str, Column]:
@@ -61,7 +58,7 @@ def match_columns(
         Columns of the file
     time_column : str
     mapping : RecordingMapping
-    network : ThermalNetwork
+    network : RecordedMachine
     problems : Problems
         Receives columns that are missing, unknown, named twice or misspelt
     notes : list of str
@@ -94,7 +91,7 @@ def match_columns(
 
 
 def _mapped_columns(
-    present: Sequence[str], mapping: RecordingMapping, network: ThermalNetwork, problems: Problems
+    present: Sequence[str], mapping: RecordingMapping, network: RecordedMachine, problems: Problems
 ) -> dict[str, Column]:
     known = {*quantities_of(network), AUXILIARY, IGNORE}
     roles: dict[str, Column] = {}

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -22,15 +21,13 @@ from diagnosis.recordings.cleaning import (
 )
 from diagnosis.recordings.columns import quantities_of
 from diagnosis.recordings.file import open_recording, set_to_one_clock, sha256_of, stem_of
+from diagnosis.recordings.machine import RecordedMachine
 from diagnosis.recordings.mapping import RecordingMapping, mapping_of_definition
 from diagnosis.recordings.recording import Channel, Recording
 from diagnosis.recordings.rows import RecordedRows, joined, read_rows
 from diagnosis.recordings.time_axis import split_path
 from models.base.errors import InputError, Problems
 from models.quantities.quantities import is_total_loss, node_of_channel
-
-if TYPE_CHECKING:
-    from models.simulation.thermal_network import ThermalNetwork
 
 FEWEST_ROWS = 3
 SHORTEST_GAP_S, GAP_STEPS = 60.0, 3.0  # a gap is longer than both, unless stated
@@ -40,7 +37,7 @@ LEAST_USABLE = 0.1  # share of the rows
 
 def read_recordings(
     paths: Sequence[str | Path],
-    network: ThermalNetwork,
+    network: RecordedMachine,
     *,
     mapping: Path | None = None,
     max_gap_s: float | None = None,
@@ -53,7 +50,7 @@ def read_recordings(
         One entry per recording: a file (.csv, .csv.gz, .parquet, .mf4); several files of one recording, joined in the
         order of time, ``FILE+FILE``; or a part of either, ``FILE@start..end`` (see
         :class:`diagnosis.recordings.time_axis.Part`)
-    network : ThermalNetwork
+    network : RecordedMachine
         Defines which nodes and inputs there are
     mapping : Path or None
         Mapping file for all of them (see :mod:`diagnosis.recordings.mapping`); by default ``<stem>.toml`` or
@@ -84,7 +81,7 @@ def read_recordings(
 
 
 def read_train_and_holdout(
-    train: Sequence[str | Path], holdout: Sequence[str | Path], network: ThermalNetwork, *, mapping: Path | None = None
+    train: Sequence[str | Path], holdout: Sequence[str | Path], network: RecordedMachine, *, mapping: Path | None = None
 ) -> tuple[tuple[Recording, ...], tuple[Recording, ...]]:
     """Read recordings for training and hold-out, no two of one name; see :func:`read_recordings`."""
     learnt, held = (read_recordings(paths, network, mapping=mapping) for paths in (train, holdout))
@@ -94,7 +91,7 @@ def read_train_and_holdout(
 
 def read_recording(
     text: str | Path,
-    network: ThermalNetwork,
+    network: RecordedMachine,
     *,
     name: str = "",
     mapping: Path | None = None,
@@ -107,7 +104,7 @@ def read_recording(
     ----------
     text : str or Path
         ``FILE``, ``FILE+FILE``, ``FILE@start..end``
-    network : ThermalNetwork
+    network : RecordedMachine
     name : str
     mapping : Path or None
     max_gap_s : float or None
@@ -201,7 +198,7 @@ def _names(paths: Sequence[str | Path]) -> list[str]:
 # ---------------------------------------------------------------------- cleaning
 
 
-def _add_unrecorded(found: RecordedRows, mapping: RecordingMapping, network: ThermalNetwork) -> None:
+def _add_unrecorded(found: RecordedRows, mapping: RecordingMapping, network: RecordedMachine) -> None:
     """Add the constants of the mapping, and the definition's values of inputs that were not recorded."""
     size = len(found.seconds)
     for name, value in mapping.constants.items():
@@ -213,7 +210,7 @@ def _add_unrecorded(found: RecordedRows, mapping: RecordingMapping, network: The
             found.notes.append(f"{given.column} was not recorded; {given.default:g} is assumed, as in the definition")
 
 
-def _remove_spikes(found: RecordedRows, network: ThermalNetwork, gap: float) -> None:
+def _remove_spikes(found: RecordedRows, network: RecordedMachine, gap: float) -> None:
     driving = [name for name, given in network.inputs.items() if given.required] or list(network.inputs)
     steady = steady_rows({"time": found.seconds * 0.0} | {name: found.values[name] for name in driving})
     known = quantities_of(network)
@@ -231,7 +228,7 @@ def _remove_spikes(found: RecordedRows, network: ThermalNetwork, gap: float) -> 
             found.notes.append(f"{name}: {int(wrong.sum())} outliers and dropouts in {where} taken as missing")
 
 
-def _note_stuck(found: RecordedRows, network: ThermalNetwork) -> None:
+def _note_stuck(found: RecordedRows, network: RecordedMachine) -> None:
     temperatures = {q: found.values[q] for q in found.measured(network) if not is_total_loss(q)}
     for quantity, (first, end, other, moved) in stuck_rows(found.seconds, temperatures).items():
         hours = (found.seconds[end - 1] - found.seconds[first]) / 3600.0
@@ -241,7 +238,7 @@ def _note_stuck(found: RecordedRows, network: ThermalNetwork) -> None:
         )
 
 
-def _with_known_inputs(found: RecordedRows, network: ThermalNetwork, gap: float) -> RecordedRows:
+def _with_known_inputs(found: RecordedRows, network: RecordedMachine, gap: float) -> RecordedRows:
     """Bridge short holes of the inputs, and drop the rows without inputs.
 
     Raises

@@ -6,21 +6,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.recordings.columns import auxiliary_numbers, is_measurable, match_columns, quantities_of, quantity_values
 from diagnosis.recordings.file import RecordingFile
+from diagnosis.recordings.machine import RecordedMachine
 from diagnosis.recordings.mapping import Column
 from diagnosis.recordings.quantities import AUXILIARY, IGNORE
 from diagnosis.recordings.time_axis import Clock, Part, check_time, moment_text
 from models.base.errors import InputError
 from models.base.types import Array
-
-if TYPE_CHECKING:
-    from models.simulation.thermal_network import ThermalNetwork
 
 
 @dataclass(kw_only=True, eq=False)
@@ -53,17 +50,17 @@ class RecordedRows:
     assumed: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
 
-    def inputs(self, network: ThermalNetwork) -> list[str]:
+    def inputs(self, network: RecordedMachine) -> list[str]:
         """Return the inputs in it."""
         return [name for name in self.values if name in network.inputs]
 
-    def measured(self, network: ThermalNetwork) -> list[str]:
+    def measured(self, network: RecordedMachine) -> list[str]:
         """Return the measured quantities in it."""
         return [name for name in self.values if is_measurable(name, network) and name not in network.inputs]
 
 
 def read_rows(
-    file: RecordingFile, parts: Sequence[Part], first_s: float, network: ThermalNetwork, *, to_compare: bool
+    file: RecordingFile, parts: Sequence[Part], first_s: float, network: RecordedMachine, *, to_compare: bool
 ) -> RecordedRows:
     """Read the rows of the parts: numbers in the units inside, without impossible values.
 

@@ -1,18 +1,17 @@
-/* What the FMI layer (fmi2_cosimulation.c) knows of a model: a table of variables and three functions.
+/* A model as the FMI layer (instance.c) sees it: a table of variables and three functions. Free of FMI.
 
-   Values stand in one array of doubles, one per variable in the order of the table; the place in the table is the FMI
-   value reference. The FMI layer guards them: whenever the model is called, all inputs and parameters are finite and
-   within their bounds but for rounding, fixed parameters have not changed since the start, and the calls come in an allowed order. */
+   Values stand in one array of doubles, one per variable in the order of the table; the place in the table is the value
+   reference. The FMI layer guards them: whenever the model is called, all inputs and parameters are finite and within
+   their bounds but for rounding, fixed parameters have not changed since the start, and the calls come in an allowed
+   order. */
 #ifndef MODEL_H
 #define MODEL_H
 
+#include "linker_names.h"
+
 #include <stddef.h>
 
-#if defined __GNUC__ && !defined _WIN32
-#pragma GCC visibility push(hidden) /* two FMUs in one process must not see each other's functions */
-#endif
-
-typedef enum { REAL, INTEGER, BOOLEAN } VariableType;
+typedef enum { REAL, BOOLEAN } VariableType;
 typedef enum { CALCULATED, INPUT, FIXED, TUNABLE } VariableAccess; /* FIXED: until the simulation starts */
 
 typedef struct {
@@ -43,9 +42,9 @@ typedef enum {
 } ModelStatus;
 
 /* Generated */
-extern const char model_guid[];
-extern const unsigned model_variable_count;
-extern const Variable model_variables[];
+INTERNAL extern const char model_guid[];
+INTERNAL extern const unsigned model_variable_count;
+INTERNAL extern const Variable model_variables[];
 
 /* A settable value `elapsed` s into the next step, within its bounds to the last bit: laws may take roots of it. */
 static inline double value_after(const Model *model, unsigned reference, double elapsed) {
@@ -55,19 +54,17 @@ static inline double value_after(const Model *model, unsigned reference, double 
 }
 
 /* Written with the model */
-extern const size_t model_state_size, model_scratch_size;
+INTERNAL extern const size_t model_state_size;
+INTERNAL extern const size_t model_scratch_size;
 
 /* Take the start values over into the state, at model->time. */
-ModelStatus model_start(Model *model);
+INTERNAL ModelStatus model_start(Model *model);
 
 /* Go on by `duration` s (> 0) from model->time. Inputs go from their values along their slopes; those that do have
    their end values afterwards. */
-ModelStatus model_step(Model *model, double duration);
+INTERNAL ModelStatus model_step(Model *model, double duration);
 
 /* Write the calculated values at model->time; before model_start those at the start. */
-ModelStatus model_outputs(Model *model);
+INTERNAL ModelStatus model_outputs(Model *model);
 
-#if defined __GNUC__ && !defined _WIN32
-#pragma GCC visibility pop
-#endif
 #endif

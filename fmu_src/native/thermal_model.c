@@ -14,8 +14,10 @@
 #define FIRST_STEP_S 0.1
 
 typedef struct {
-    double started, outside; /* 0 or 1: the simulation has begun; the range of training has been left */
+    double started, stepped, outside; /* 0 or 1: the simulation has begun; a step was done; the range of training is left */
     ThermalState thermal;
+    Heat total;                               /* since the start */
+    double flow[AT_LEAST_ONE(N_BOUNDARIES)]; /* W to each boundary, mean over the last step */
 } State;
 
 typedef struct {
@@ -141,6 +143,7 @@ ModelStatus model_step(Model *model, double duration) {
     State *state = model->state;
     Scratch *scratch = model->scratch;
     ThermalState thermal = state->thermal;
+    Heat exchanged;
     double before[AT_LEAST_ONE(N_INPUTS)] = {0.0}, inputs[AT_LEAST_ONE(N_INPUTS)] = {0.0}, failed_at;
     const char *fault;
     if (prepare(model) != MODEL_OK) return MODEL_REFUSED;
@@ -148,7 +151,8 @@ ModelStatus model_step(Model *model, double duration) {
         before[i] = inner(model, INPUTS[i]);
         inputs[i] = inner_after(model, INPUTS[i], duration);
     }
-    fault = network_advance(&scratch->network, &thermal, model->time, duration, before, inputs, &failed_at);
+    fault = network_advance(&scratch->network, &thermal, model->time, duration, before, inputs, &exchanged,
+                            &failed_at);
     if (fault) {
         snprintf(model->message, MESSAGE_SIZE, "the heat balance cannot be solved from %g s on: %s at %g s",
                  model->time, fault, failed_at);
@@ -156,6 +160,12 @@ ModelStatus model_step(Model *model, double duration) {
     }
     for (int i = 0; i < N_INPUTS; i++)
         model->values[INPUTS[i].reference] = value_after(model, INPUTS[i].reference, duration);
+    state->stepped = 1.0;
+    state->total.in += exchanged.in;
+    for (int i = 0; i < N_BOUNDARIES; i++) {
+        state->total.out[i] += exchanged.out[i];
+        state->flow[i] = exchanged.out[i] / duration;
+    }
 #ifdef IN_DOMAIN
     {
         const LossPoint begin = network_loss_point(&scratch->network, model->time, before, &state->thermal);
@@ -167,6 +177,16 @@ ModelStatus model_step(Model *model, double duration) {
     state->thermal = thermal;
     return MODEL_OK;
 #endif
+}
+
+/* Heat that the nodes hold above that of their start temperatures, J. */
+static double stored_heat(const Model *model, const ThermalState *thermal) {
+    const Scratch *scratch = model->scratch;
+    ThermalState first;
+    double stored = 0.0;
+    start_values(model, &first);
+    for (int i = 0; i < N_PARTS; i++) stored += scratch->network.capacity[i] * (thermal->T[i] - first.T[i]);
+    return stored;
 }
 
 #ifdef TORQUE_LOSS
@@ -183,7 +203,7 @@ ModelStatus model_outputs(Model *model) {
     const State *state = model->state;
     Scratch *scratch = model->scratch;
     ThermalState thermal = state->thermal;
-    double inputs[AT_LEAST_ONE(N_INPUTS)] = {0.0};
+    double inputs[AT_LEAST_ONE(N_INPUTS)] = {0.0}, flow[AT_LEAST_ONE(N_BOUNDARIES)] = {0.0};
     const Balance *balance;
     if (prepare(model) != MODEL_OK) return MODEL_REFUSED;
     if (state->started == 0.0) start_values(model, &thermal);
@@ -193,6 +213,14 @@ ModelStatus model_outputs(Model *model) {
     for (int i = 0; i < N_BOUNDARIES; i++) show(model, BOUNDARY_TEMPERATURE[i], balance->T_boundary[i]);
     for (int i = 0; i < N_MEMORY; i++) show(model, MEMORY_OUTPUT[i], thermal.memory[i]);
     for (int i = 0; i < N_SOURCES; i++) show(model, HEAT_OUTPUT[i], balance->heat[i]);
+    if (state->stepped == 0.0) network_outflow(&scratch->network, flow);
+    else memcpy(flow, state->flow, sizeof flow);
+    for (int i = 0; i < N_BOUNDARIES; i++) {
+        show(model, BOUNDARY_FLOW[i], flow[i]);
+        show(model, BOUNDARY_HEAT[i], state->total.out[i]);
+    }
+    model->values[HEAT_IN] = state->total.in;
+    model->values[HEAT_STORED] = stored_heat(model, &thermal);
 #ifdef TOTAL_LOSS
     model->values[TOTAL_LOSS] = 0.0;
     for (int i = 0; i < N_SOURCES; i++)

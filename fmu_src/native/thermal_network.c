@@ -2,7 +2,7 @@
 
    ROS2 of Verwer, Spee, Blom and Hundsdorfer (SIAM J. Sci. Comput. 20, 1999) with the conductance matrix as Jacobian:
    second order, L-stable, two balances per step, step size by the embedded first-order solution; constants and choices
-   are those of models/solver.py, which says more. Each step solves three systems (C + gamma h L) k = q with the
+   are those of models/portable/solver.py, which says more. Each step solves three systems (C + gamma h L) k = q with the
    symmetric conductance matrix L, by generated code that makes no product with a zero. */
 #include "thermal_network.h"
 #include "elementary.h"
@@ -10,6 +10,8 @@
 
 #define GAMMA 0.29289321881345247 /* 1 - sqrt(1/2) */
 #define TOLERANCE_K 0.03
+#define FULL_WEIGHT_J_K 20.0
+#define MOST_STEPS 100000
 #define SHORTEST_STEP_S 1e-6
 #define SAFETY 0.9
 #define SHRINK 0.2
@@ -24,6 +26,7 @@ const char *network_set(Network *network, const double *parameters) {
     for (int i = 0; i < N_PARTS; i++) fine = fine && fixed[N_FIXED + i] > 0.0;
     if (!fine) return "heat capacities must be positive and conductances finite; check the parameters";
     memcpy(network->capacity, fixed + N_FIXED, sizeof network->capacity);
+    for (int i = 0; i < N_PARTS; i++) network->weight[i] = smaller(network->capacity[i] / FULL_WEIGHT_J_K, 1.0);
     for (int i = 0; i < 2; i++) {
         balances[i]->valid = 0;
         memcpy(balances[i]->conductance, fixed, N_FIXED * sizeof(double));
@@ -95,11 +98,43 @@ const Balance *network_balance(Network *network, double time, const double *inpu
     return &network->now;
 }
 
+void network_outflow(Network *network, double *flow) {
+    Balance *const now = &network->now;
+    find_gain(now);
+    structure_outflow(now->conductance, now->at.T, now->T_boundary, flow);
+}
+
+/* Add the heat of an accepted step h, with the stages k_1 and k_2 and the weights of the temperatures: whatever leaves
+   the nodes arrives at the boundaries, to rounding. */
+static void add_heat(Heat *heat, const Balance *now, const Balance *then, const double *k_1, const double *k_2,
+                     double h) {
+    const double none[AT_LEAST_ONE(N_BOUNDARIES)] = {0.0};
+    double out_1[AT_LEAST_ONE(N_BOUNDARIES)], out_2[AT_LEAST_ONE(N_BOUNDARIES)], slope[AT_LEAST_ONE(N_BOUNDARIES)];
+    double T[N_PARTS], change[N_PARTS];
+    for (int i = 0; i < N_PARTS; i++) {
+        T[i] = now->at.T[i] + GAMMA * h * k_1[i];
+        change[i] = GAMMA * h * k_2[i];
+    }
+    structure_outflow(now->conductance, T, now->T_boundary, out_1);
+    structure_outflow(then->conductance, then->at.T, then->T_boundary, out_2);
+    structure_outflow(now->conductance, change, none, slope);
+    for (int i = 0; i < N_BOUNDARIES; i++)
+        heat->out[i] += h * (1.5 * out_1[i] + 0.5 * (out_2[i] - 2.0 * out_1[i] + slope[i]));
+    for (int i = 0; i < N_SOURCES; i++) heat->in += 0.5 * h * (now->heat[i] + then->heat[i]);
+}
+
+/* Inputs at a share of the way from `begin` to `end`. */
+static void ramp(const double *begin, const double *end, double share, double *inputs) {
+    for (int i = 0; i < N_INPUTS; i++) inputs[i] = begin[i] + (end[i] - begin[i]) * share;
+}
+
 const char *network_advance(Network *network, ThermalState *state, double time, double duration, const double *begin,
-                            const double *end, double *failed_at) {
+                            const double *end, Heat *exchanged, double *failed_at) {
     Balance *const now = &network->now, *const then = &network->then;
     const double *const capacity = network->capacity;
     double elapsed = 0.0;
+    int tried = 0;
+    memset(exchanged, 0, sizeof *exchanged);
     while (elapsed < duration) {
         const double remaining = duration - elapsed, step = larger(state->step, SHORTEST_STEP_S);
         /* Two even steps instead of a full one and a sliver. */
@@ -108,15 +143,14 @@ const char *network_advance(Network *network, ThermalState *state, double time, 
         double now_inputs[AT_LEAST_ONE(N_INPUTS)] = {0.0}, then_inputs[AT_LEAST_ONE(N_INPUTS)] = {0.0};
         double k_1[N_PARTS], k_2[N_PARTS], both[N_PARTS];
         double rate_1[AT_LEAST_ONE(N_MEMORY)], rate_2[AT_LEAST_ONE(N_MEMORY)];
-        const double share = elapsed / duration, later_share = smaller((elapsed + h) / duration, 1.0);
+        const double early = elapsed + GAMMA * h, late = elapsed + (1.0 - GAMMA) * h;
         double error = 0.0, sum = 0.0, next_step;
         ThermalState later = *state;
         *failed_at = time + elapsed;
-        for (int i = 0; i < N_INPUTS; i++) {
-            now_inputs[i] = begin[i] + (end[i] - begin[i]) * share;
-            then_inputs[i] = begin[i] + (end[i] - begin[i]) * later_share;
-        }
-        find_balance(network, now, time + elapsed, now_inputs, state);
+        if (tried++ == MOST_STEPS) return "the communication step needs more than 100000 steps; make it shorter. They end";
+        ramp(begin, end, early / duration, now_inputs);
+        ramp(begin, end, late / duration, then_inputs);
+        find_balance(network, now, time + early, now_inputs, state);
         find_gain(now);
         structure_factorize(now->conductance, capacity, GAMMA * h, factors);
         structure_solve(factors, now->gain, k_1);
@@ -125,7 +159,7 @@ const char *network_advance(Network *network, ThermalState *state, double time, 
             rate_1[i] = now->heat[N_SOURCES + i];
             later.memory[i] = state->memory[i] + h * rate_1[i];
         }
-        find_balance(network, then, time + elapsed + h, then_inputs, &later);
+        find_balance(network, then, time + late, then_inputs, &later);
         find_gain(then);
         for (int i = 0; i < N_PARTS; i++) k_2[i] = then->gain[i] - 2.0 * capacity[i] * k_1[i];
         structure_solve(factors, k_2, k_2);
@@ -133,7 +167,7 @@ const char *network_advance(Network *network, ThermalState *state, double time, 
         for (int i = 0; i < N_PARTS; i++) both[i] = capacity[i] * (k_1[i] + k_2[i]);
         structure_solve(factors, both, both);
         for (int i = 0; i < N_PARTS; i++) {
-            error = larger(error, fabs(both[i]));
+            error = larger(error, fabs(both[i]) * network->weight[i]);
             sum += both[i];
         }
         for (int i = 0; i < N_MEMORY; i++) {
@@ -150,12 +184,14 @@ const char *network_advance(Network *network, ThermalState *state, double time, 
             continue;
         }
         elapsed = h == remaining ? duration : elapsed + h;
+        add_heat(exchanged, now, then, k_1, k_2, h);
         for (int i = 0; i < N_PARTS; i++) state->T[i] += h * (1.5 * k_1[i] + 0.5 * k_2[i]);
         for (int i = 0; i < N_MEMORY; i++) state->memory[i] += h * (1.5 * rate_1[i] + 0.5 * rate_2[i]);
         /* A short communication step says nothing about the step that the network would allow. */
         state->step = h < step ? larger(next_step, step) : next_step;
         if (LAWS_UPDATE) {
-            find_balance(network, now, time + elapsed, then_inputs, state);
+            ramp(begin, end, elapsed / duration, now_inputs);
+            find_balance(network, now, time + elapsed, now_inputs, state);
             memcpy(state->memory, now->heat + N_SOURCES + N_MEMORY, N_MEMORY * sizeof(double));
         }
     }

@@ -1,7 +1,8 @@
-/* Heat balance and time integration of a thermal network; the scheme of models/solver.py. */
+/* Heat balance and time integration of a thermal network; the scheme of models/portable/solver.py. */
 #ifndef THERMAL_NETWORK_H
 #define THERMAL_NETWORK_H
 
+#include "linker_names.h"
 #include "model_data.h"
 
 #if N_COMPONENTS /* the losses are trained networks */
@@ -29,12 +30,17 @@ typedef struct {
     double gain[N_PARTS];                                  /* W: net heat into the parts */
 } Balance;
 
+/* Heat of the sources and to each boundary, J. */
+typedef struct {
+    double in, out[AT_LEAST_ONE(N_BOUNDARIES)];
+} Heat;
+
 /* A network with parameter values. */
 typedef struct {
 #if N_COMPONENTS
     LossPower *loss_power;
 #endif
-    double capacity[N_PARTS];
+    double capacity[N_PARTS], weight[N_PARTS]; /* J/K; of the errors in the step control */
     Balance now, then;
 } Network;
 
@@ -43,27 +49,24 @@ typedef struct {
     double T[N_PARTS], memory[AT_LEAST_ONE(N_MEMORY)], step;
 } ThermalState;
 
-#if defined __GNUC__ && !defined _WIN32
-#pragma GCC visibility push(hidden)
-#endif
-
 /* Take new parameter values; gives NULL, or what is wrong with them. */
-const char *network_set(Network *network, const double *parameters);
+INTERNAL const char *network_set(Network *network, const double *parameters);
 
 /* Sources, boundaries and losses at a moment. */
-const Balance *network_balance(Network *network, double time, const double *inputs, const ThermalState *state);
+INTERNAL const Balance *network_balance(Network *network, double time, const double *inputs, const ThermalState *state);
 
 #if N_COMPONENTS
 /* What the losses depend on at a moment. */
-LossPoint network_loss_point(const Network *network, double time, const double *inputs, const ThermalState *state);
+INTERNAL LossPoint network_loss_point(const Network *network, double time, const double *inputs,
+                                      const ThermalState *state);
 #endif
 
-/* Integrate over `duration`, the inputs going straight from `begin` to `end`; gives NULL, or why it cannot be done, and
-   *failed_at. */
-const char *network_advance(Network *network, ThermalState *state, double time, double duration, const double *begin,
-                            const double *end, double *failed_at);
+/* Heat flow to each boundary at the moment of the last network_balance, W. */
+INTERNAL void network_outflow(Network *network, double *flow);
 
-#if defined __GNUC__ && !defined _WIN32
-#pragma GCC visibility pop
-#endif
+/* Integrate over `duration`, the inputs going straight from `begin` to `end`, and find the heat that is exchanged
+   meanwhile; gives NULL, or why it cannot be done, and *failed_at. */
+INTERNAL const char *network_advance(Network *network, ThermalState *state, double time, double duration,
+                                     const double *begin, const double *end, Heat *exchanged, double *failed_at);
+
 #endif

@@ -16,7 +16,6 @@ from types import ModuleType
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
-import onnxruntime
 from pythonfmu import Fmi2Slave
 from pythonfmu.enums import Fmi2Status
 
@@ -82,6 +81,7 @@ class GearboxSlave(Fmi2Slave):  # type: ignore[misc,unused-ignore]
         self._values = np.array([variable.start for variable in variables])
         self._system: NetworkSystem | None = None
         self._state: solver.State | None = None  # None before the first step: start temperatures can still be set
+        self._flows: Array | None = None  # to the boundaries, [W], mean over the last step
         self._time = self._distance = 0.0  # distance from the range of training, at the calculated values
         self._outside = self._fresh = False
 
@@ -109,6 +109,7 @@ class GearboxSlave(Fmi2Slave):  # type: ignore[misc,unused-ignore]
                      Fmi2Status.discard)  # fmt: skip
             return False
         self._state, self._time = state, current_time + step_size
+        self._flows = (state.heat_out - before.heat_out) / step_size
         self._calculate()
         if self._distance > 0.0 and not self._outside:
             self._warn(system, inputs, state.states)
@@ -127,10 +128,15 @@ class GearboxSlave(Fmi2Slave):  # type: ignore[misc,unused-ignore]
             self._system = NetworkSystem(self.generated.LAWS, self._losses, factors, vector=False)
         state = self._state
         if state is None:
-            uniform = inner[self._uniform] == 1.0
-            T = [inner[self._common if uniform else start] for start in self._starts]
-            state = solver.start(np.array([*T, *self.generated.MEMORY_START]))
+            first = np.array([*self._start_temperatures(), *self.generated.MEMORY_START])
+            state = solver.start(first, self._system.n_boundaries)
         return self._system, inner[self._inputs], state
+
+    def _start_temperatures(self) -> Array:
+        """Temperatures of the parts at the start by the parameters `initial` and `T_start`, [degC]."""
+        inner = self._values[self._given_at] * self._scale + self._offset
+        T = inner[self._starts]
+        return np.full_like(T, inner[self._common]) if inner[self._uniform] == 1.0 else T
 
     def _warn(self, system: NetworkSystem, inputs: Array, states: Array) -> None:
         """Log the operating point and the range of training that it left."""
@@ -186,15 +192,20 @@ class GearboxSlave(Fmi2Slave):  # type: ignore[misc,unused-ignore]
             boundaries = system.boundary_temperatures(time, inputs, states)
             point = (*system.operating(time, inputs, states), states[self._loss_nodes]) if laws.components else ()
             self._distance = float(self._losses.domain_distance(*point)) if point else 0.0
+            flows = self._flows if self._flows is not None else system.balance(time, inputs, states).heat_out
+        stored = system.capacities @ (states[:n_parts] - self._start_temperatures())
         is_loss = np.array(laws.losses_of_sources, dtype=bool)
         loss = heats[is_loss].sum()
         found = {"total_loss": loss, "domain_distance": self._distance, "in_domain": self._distance <= 0.0}
+        found |= {"heat_in": state.heat_in, "heat_stored": stored}
         if {"speed", "torque"} <= set(laws.inputs):
             speed, torque = (inputs[laws.inputs.index(name)] for name in ("speed", "torque"))
             found |= {"torque_loss": torque_loss(loss, speed), "efficiency": efficiency(loss, speed, torque)}
         named = {
             "temperature": dict(zip((*laws.parts, *laws.boundaries), (*states[:n_parts], *boundaries), strict=True)),
             "loss": dict(zip(laws.sources, heats, strict=True)),
+            "heat_flow": dict(zip(laws.boundaries, flows, strict=True)),
+            "heat_to_boundary": dict(zip(laws.boundaries, state.heat_out, strict=True)),
             "state": dict(zip(laws.states, states[n_parts:], strict=True)),
         }
         named["heat"] = named["loss"]
@@ -212,6 +223,7 @@ class GearboxSlave(Fmi2Slave):  # type: ignore[misc,unused-ignore]
             "outside": self._outside,
             "values": self._values.tolist(),
             "state": saved,
+            "flows": None if self._flows is None else self._flows.tolist(),
         }
 
     def _set_fmu_state(self, state: Mapping[str, Any]) -> None:
@@ -221,6 +233,7 @@ class GearboxSlave(Fmi2Slave):  # type: ignore[misc,unused-ignore]
         # [()] makes a number of an array without dimensions and leaves others alone.
         restored: dict[str, Any] = {name: np.array(value)[()] for name, value in (saved or {}).items()}
         self._state = None if saved is None else solver.State(**restored)
+        self._flows = None if state["flows"] is None else np.array(state["flows"])
         self._values, self._time, self._outside = np.array(state["values"]), state["time"], state["outside"]
         self._fresh = False
 
@@ -240,6 +253,9 @@ def _load_losses(resources: Path, generated: ModuleType) -> Any:
 
 
 def _network(path: Path, digest: str) -> Evaluator:
+    """A network of the FMU in onnxruntime, its file checked to the byte."""
+    import onnxruntime  # here: an FMU without networks does not need it
+
     content = path.read_bytes() if path.is_file() else b""
     if hashlib.sha256(content).hexdigest() != digest:
         raise ValueError(f"{path} is missing, damaged or of another FMU; extract or build the FMU again")

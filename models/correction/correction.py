@@ -268,6 +268,11 @@ class Correction(Section):
         }
 
     @property
+    def has_physics(self) -> bool:
+        """True if it changes the machine, and not only what instruments show of it."""
+        return bool(self.calibration) or not all(finding.of_measurement for finding in self.findings)
+
+    @property
     def words(self) -> str:
         """Half a sentence about it, for an FMU that contains it."""
         summary = self.summary()
@@ -299,6 +304,18 @@ def corrected_network(gearbox: Gearbox, correction: Correction | None) -> Therma
     return gearbox.network() if correction is None else correction.network(gearbox)
 
 
+def parse_correction(path: str | Path) -> Correction:
+    """Read a correction without a look at what it corrects.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read or is not a correction; with file, key and reason.
+    """
+    file = str(path)
+    return validate_section(Correction, parse_schema_1(read_text(Path(path)), file=file, kind="corrections"), file=file)
+
+
 def read_correction(path: str | Path, network: ThermalNetwork, *, made_for: Gearbox | None = None) -> Correction:
     """Read a correction.
 
@@ -316,16 +333,13 @@ def read_correction(path: str | Path, network: ThermalNetwork, *, made_for: Gear
         If the file cannot be read, is not a correction, was made for another gearbox, or cannot be applied to the
         network; with file, key and reason.
     """
-    file = str(path)
-    correction = validate_section(
-        Correction, parse_schema_1(read_text(Path(path)), file=file, kind="corrections"), file=file
-    )
+    correction = parse_correction(path)
     try:
         if made_for is not None:
             correction.check_made_for(made_for)
         correction.apply(network, as_recorded=True)
     except InputError as error:
-        raise InputError("\n".join(f"{file}: {line}" for line in str(error).splitlines())) from error
+        raise InputError("\n".join(f"{path}: {line}" for line in str(error).splitlines())) from error
     return correction
 
 

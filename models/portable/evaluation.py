@@ -12,7 +12,8 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from .solver import Balance  # relative: inside an FMU these files form a package of another, unique name
+# Relative: inside an FMU these files form a package of another, unique name.
+from .solver import Balance, error_weights
 
 Array = NDArray[np.float64]
 RPM = np.pi / 30.0
@@ -133,16 +134,11 @@ class NetworkSystem:
         self.n_parts, self.n_states, self.n_boundaries = len(laws.parts), len(laws.states), len(laws.boundaries)
         n_links = laws.laplacian.shape[0]
         n, m = self.n_parts, self.n_boundaries
-        # One product of the conductances gives three things side by side: the heat that leaves the parts per part
-        # temperature, what comes from the boundaries per boundary temperature, and the sum of that per part.
-        to_boundary = laws.to_boundary
-        blocks = (laws.laplacian.reshape(n_links, -1), to_boundary.reshape(n_links, -1), to_boundary.sum(axis=-1))
+        # One product of the conductances gives the heat that leaves the parts per part temperature, and what comes from
+        # the boundaries per boundary temperature.
+        blocks = (laws.laplacian.reshape(n_links, -1), laws.to_boundary.reshape(n_links, -1))
         self._structure = np.concatenate(blocks, axis=1)
-        self._leaving, self._coupling, self._slope = (
-            slice(0, n * n),
-            slice(n * n, n * (n + m)),
-            slice(n * (n + m), None),
-        )
+        self._leaving, self._coupling = slice(0, n * n), slice(n * n, n * (n + m))
         self._loss_nodes = np.array([laws.parts.index(name) for name in losses.temperature_nodes], dtype=int)
         self._varying = np.array(laws.varying, dtype=int)
         constant = [index for index in range(n_links) if index not in laws.varying]
@@ -152,6 +148,8 @@ class NetworkSystem:
         if not (np.isfinite(fixed).all() and (self.capacities > 0.0).all()):
             raise ValueError("heat capacities must be positive and conductances finite; check the parameters")
         self._per_capacity = 1.0 / self.capacities
+        memory = np.ones((*self.capacities.shape[:-1], self.n_states))
+        self.error_weights = np.concatenate((error_weights(self.capacities), memory), axis=-1)
         self._conductances = np.zeros((*batch, n_links))
         self._conductances[..., constant] = fixed[..., : len(constant)]
 
@@ -194,23 +192,22 @@ class NetworkSystem:
         exchanged = conductances @ self._structure
         leaving = exchanged[..., self._leaving].reshape(*shape, n, n)
         coupling = exchanged[..., self._coupling].reshape(*shape, n, m)
-        slope = exchanged[..., self._slope]
+        to_boundary = np.swapaxes(coupling, -1, -2)
         heats, memory = self._flows(signals, power, shape)
         T, T_boundary = states[..., :n], self._stacked(self.laws.boundary(*common), shape)
-        from_boundary = _times(coupling, T_boundary)
-        rate = (heats @ self.laws.injection + from_boundary - _times(leaving, T)) * self._per_capacity
+        rate = (heats @ self.laws.injection + _times(coupling, T_boundary) - _times(leaving, T)) * self._per_capacity
         matrix = leaving * -self._per_capacity[..., None]
-        heat_out = slope * T - from_boundary
+        heat_out = _times(to_boundary, T) - to_boundary.sum(axis=-1) * T_boundary
         if self.n_states:
             rate = np.concatenate((rate, memory[..., : self.n_states]), axis=-1)
             matrix = np.pad(matrix, [(0, 0)] * len(shape) + [(0, self.n_states)] * 2)
-            slope = np.pad(slope, [(0, 0)] * len(shape) + [(0, self.n_states)])
+            to_boundary = np.pad(to_boundary, [(0, 0)] * (len(shape) + 1) + [(0, self.n_states)])
         return Balance(
             derivative=rate,
             matrix=matrix,
             heat_in=heats.sum(axis=-1),
-            heat_out=heat_out.sum(axis=-1),
-            heat_out_slope=slope,
+            heat_out=heat_out,
+            heat_out_slope=to_boundary,
         )
 
     def updated(self, time: float, inputs: Array, states: Array) -> Array:

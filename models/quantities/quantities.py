@@ -41,6 +41,7 @@ TYPES: Mapping[str, Type] = {
     "VolumeFlow": Type(quantity="VolumeFlowRate", unit="m3/s", nominal=1e-4, description="Volume flow of a fluid"),
     "MassFlow": Type(quantity="MassFlowRate", unit="kg/s", nominal=0.1, description="Mass flow of a fluid"),
     "Pressure": Type(quantity="Pressure", unit="Pa", nominal=1e5, description="Pressure of a fluid"),
+    "Energy": Type(quantity="Energy", unit="J", display="kJ", nominal=1e5, description="Heat or work"),
     "Ratio": Type(quantity="Ratio", unit="1", description="Number without unit"),
 }
 

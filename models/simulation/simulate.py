@@ -97,8 +97,10 @@ class Result:
         Sources that are no losses, [W]
     domain_distance : Array, shape (..., N)
         How far outside the loss model's domain, or the range that was named, as a fraction of its range; 0 inside
-    heat_in, heat_out, heat_stored : Array, shape (..., N)
-        Heat brought in by all sources, given to the boundaries and stored since the start, [J]
+    heat_to : mapping of boundary to Array, shape (..., N)
+        Heat given to each boundary since the start, [J]
+    heat_in, heat_stored : Array, shape (..., N)
+        Heat brought in by all sources and stored since the start, [J]
     """
 
     time: Array
@@ -107,14 +109,19 @@ class Result:
     losses: Mapping[str, Array]
     extra_heat: Mapping[str, Array]
     domain_distance: Array
+    heat_to: Mapping[str, Array]
     heat_in: Array
-    heat_out: Array
     heat_stored: Array
 
     @property
     def loss(self) -> Array:
         """Total loss [W], shape (..., N)."""
         return np.asarray(sum(self.losses.values()))
+
+    @property
+    def heat_out(self) -> Array:
+        """Heat given to all boundaries since the start [J], shape (..., N)."""
+        return np.asarray(sum(self.heat_to.values(), np.zeros_like(self.heat_in)))
 
     @property
     def has_shaft(self) -> bool:
@@ -221,21 +228,22 @@ def simulate(
         initial = float(surroundings(system, table[:1], vector=system.vector)[0])
     batch = np.broadcast_shapes(*(np.shape(value) for value in system.parameters))
     first = initial_states(network, initial)
-    state = solver.start(np.broadcast_to(first, (*batch, len(first))))
+    state = solver.start(np.broadcast_to(first, (*batch, len(first))), system.n_boundaries)
     n_rows = len(cycle)
     states = np.empty((*batch, n_rows, len(first)))
-    heat = np.zeros((2, *batch, n_rows))
+    heat_in, heat_out = np.zeros((*batch, n_rows)), np.zeros((*batch, n_rows, system.n_boundaries))
     states[..., 0, :] = state.states
     for row in range(n_rows - 1):
         t = float(cycle.time[row])
         state = solver.advance(system, state, t, float(cycle.time[row + 1]) - t, table[row], table[row + 1])
         states[..., row + 1, :] = state.states
-        heat[0, ..., row + 1], heat[1, ..., row + 1] = state.heat_in, state.heat_out
+        heat_in[..., row + 1], heat_out[..., row + 1, :] = state.heat_in, state.heat_out
         if progress is not None and (row % 50 == 49 or row == n_rows - 2):
             progress(row + 1, n_rows - 1)
     return evaluate(
-        network, losses, parameters, time=cycle.time, table=table, states=states, heat=heat, trained=trained
-    )
+        network, losses, parameters, time=cycle.time, table=table, states=states, heat_in=heat_in, heat_out=heat_out,
+        trained=trained,
+    )  # fmt: skip
 
 
 def surroundings(system: NetworkSystem, table: Array, *, vector: bool) -> Array:
@@ -256,7 +264,8 @@ def evaluate(
     time: Array,
     table: Array,
     states: Array,
-    heat: Array,
+    heat_in: Array,
+    heat_out: Array,
     trained: Training | None = None,
 ) -> Result:
     """All results that follow from inputs and states, over whole arrays at once.
@@ -269,8 +278,10 @@ def evaluate(
         [s]
     table : Array, shape (..., N, inputs)
     states : Array, shape (..., N, n)
-    heat : Array, shape (2, ..., N)
-        Heat brought in and given off since the start, [J]
+    heat_in : Array, shape (..., N)
+        Heat brought in since the start, [J]
+    heat_out : Array, shape (..., N, boundaries)
+        Heat given to each boundary since the start, [J]
     trained
         As for :func:`simulate`
     """
@@ -296,8 +307,8 @@ def evaluate(
         losses={s.name: heats[..., i] for i, s in enumerate(network.sources) if s.is_loss},
         extra_heat={s.name: heats[..., i] for i, s in enumerate(network.sources) if not s.is_loss},
         domain_distance=distance,
-        heat_in=heat[0],
-        heat_out=heat[1],
+        heat_to=dict(zip(system.laws.boundaries, np.moveaxis(heat_out, -1, 0), strict=True)),
+        heat_in=heat_in,
         heat_stored=((states - states[..., :1, :])[..., :n_parts] * system.capacities).sum(axis=-1),
     )
 
@@ -376,10 +387,10 @@ def steady_state(
             break
         T = T + change
         if moved <= STEADY_TOLERANCE_K and _distance(balance) <= STEADY_DISTANCE_K:
-            zero = np.zeros((2, *rows, 1))
             return evaluate(
-                network, losses, wide, time=np.zeros(1), table=table[:, None, :], states=T[:, None, :], heat=zero
-            )
+                network, losses, wide, time=np.zeros(1), table=table[:, None, :], states=T[:, None, :],
+                heat_in=np.zeros((*rows, 1)), heat_out=np.zeros((*rows, 1, system.n_boundaries)),
+            )  # fmt: skip
         # Longer steps while it settles, shorter ones where losses that rise with temperature make it overshoot.
         settling = moved < SETTLING * previous
         step = min(step * 3.0, LARGEST_PSEUDO_STEP_S) if settling else max(step / 4.0, SHORTEST_PSEUDO_STEP_S)

@@ -25,6 +25,7 @@ from models.network.structure import BASE_SIGNALS, ExtraState, Link, Losses, Net
 from models.quantities.quantities import INPUT_KINDS, named_input
 from models.simulation.simulate import Result, simulate, steady_state
 
+LOWEST_BOUNDARY, HIGHEST_BOUNDARY, USUAL_BOUNDARY = -90.0, 250.0, 20.0  # degC, of a coupled boundary
 __all__ = ["BASE_SIGNALS", "ExtraState", "Link", "Losses", "Node", "Source", "ThermalNetwork"]
 
 
@@ -50,6 +51,50 @@ class ThermalNetwork(Network):
         if numeric is not None:
             raise InputError(f"the temperature of boundary {name!r} must be an expression; no branches or numpy calls")
         return replace(self, nodes=(*self.nodes, Node(name=name, temperature=expression)))
+
+    def with_coupled_boundary(self, name: str) -> ThermalNetwork:
+        """A network that takes the temperature of a boundary from an input, for coupling with another model.
+
+        The input is ``T_<boundary>_in`` in laws, ``<boundary>.T_in`` at the FMI and in files [degC]; its default is
+        what the boundary's law gives at the defaults of the other inputs.
+
+        Parameters
+        ----------
+        name : str
+            A boundary node
+
+        Raises
+        ------
+        InputError
+            If the network has no such boundary.
+
+        Examples
+        --------
+        >>> from models.assembly.gearbox import load_gearbox
+        >>> network = load_gearbox("fzg").network().with_coupled_boundary("frame")
+        >>> network.inputs["T_frame_in"].default, [n.temperature for n in network.nodes if n.name == "frame"]
+        (27.0, [T_frame_in])
+        """
+        laws = {node.name: node.temperature for node in self.nodes if node.temperature is not None}
+        if name not in laws:
+            known = f"; boundaries are {', '.join(laws)}" if laws else "; it has no boundaries"
+            raise InputError(f"{name!r} is not a boundary of this network{did_you_mean(name, laws)}{known}")
+        values = {"time": 0.0} | {key: given.default for key, given in self.inputs.items()}
+        values |= {parameter.name: parameter.start for parameter in self.parameters}
+        law = laws[name].xreplace({symbol(key): expression for key, expression in self.derived.items()})
+        default = law.xreplace({symbol(key): sp.Float(value) for key, value in values.items()})
+        added = named_input(
+            f"T_{name}_in", "temperature", low=LOWEST_BOUNDARY, high=HIGHEST_BOUNDARY,
+            default=USUAL_BOUNDARY if default.free_symbols else float(default),
+            description=f"Temperature of {name.replace('_', ' ')}, from the model that {name}.heat_flow goes to",
+        )  # fmt: skip
+        port = f"{name}.T_in"
+        self._new_name(added.name, self.signals, "signal")
+        return replace(
+            self,
+            inputs={**self.inputs, added.name: replace(added, quantity=replace(added.quantity, column=port, fmi=port))},
+            nodes=tuple(replace(n, temperature=symbol(added.name)) if n.name == name else n for n in self.nodes),
+        )
 
     def with_input(
         self, name: str, default: float, *, quantity: str = "ratio", unit: str = "", low: float = -inf,

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import zipfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import pandas as pd
 import pytest
+from fmpy import simulate_fmu
 from fmpy.fmi1 import FMICallException
 
 from builder.drive.driver import LoadedFmu, loaded
@@ -88,3 +92,16 @@ def hosted(path: Path, values: dict[str, float] | None = None, *, start: bool = 
         if start:
             host.start(values, **options)
         yield host
+
+
+def check_reference_run(path: Path, folder: Path) -> None:
+    """Drive the inputs that the FMU carries with FMPy; its outputs must be those that it carries."""
+    with zipfile.ZipFile(path) as archive:
+        archive.extractall(folder, [name for name in archive.namelist() if name.startswith("documentation/")])
+    given = np.genfromtxt(folder / "documentation/reference_in.csv", delimiter=",", names=True, deletechars="")
+    expected = pd.read_csv(folder / "documentation/reference_out.csv")
+    names = [name for name in expected.columns if name != "time"]
+    result = simulate_fmu(str(path), stop_time=600.0, output_interval=10.0, input=given, output=names)
+    assert result["time"].tolist() == expected["time"].tolist()
+    for name in names:
+        np.testing.assert_allclose(result[name], expected[name], rtol=1e-7, atol=1e-7, err_msg=name)

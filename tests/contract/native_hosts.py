@@ -28,7 +28,7 @@ class Unpacked:
         self.description = fmpy.read_model_description(str(folder))
         self.variables = {v.name: v for v in self.description.modelVariables}
         name = f"{self.description.coSimulation.modelIdentifier}{fmpy.sharedLibraryExtension}"
-        self.library = folder / "binaries" / fmpy.platform / name
+        (self.library,) = folder.glob(f"binaries/*/{name}")
 
     @property
     def arguments(self) -> list[str]:
@@ -47,7 +47,7 @@ def unpacked(path: Path, folder: Path) -> Unpacked:
     return Unpacked(folder)
 
 
-def compiled(name: str, fmu: Unpacked, output: Path, *options: str) -> Path:
+def compiled(name: str, fmu: Unpacked, output: Path, *options: str | Path) -> Path:
     """A host of ``native_host/``, with the FMI headers that the FMU carries."""
     headers = f"-I{fmu.folder / 'sources'}"
     run([str(COMPILER), *OPTIONS, *options, headers, "-o", output, SOURCES / f"{name}.c", "-ldl", "-lm", "-lpthread"])
@@ -60,6 +60,15 @@ def sanitized(fmu: Unpacked, library: Path) -> Path:
     options = ["-std=c99", "-O1", "-g", "-Wall", "-Wextra", "-Werror", *SANITIZED, "-shared", "-fPIC"]
     run([str(COMPILER), *options, "-o", library, *sources, "-lm"])
     return library
+
+
+def objects(fmu: Unpacked, folder: Path, version: int) -> list[Path]:
+    """The sources of an FMU compiled for static linking, with the prefix that the standard asks for."""
+    prefix = f"-DFMI{version}_FUNCTION_PREFIX={fmu.description.coSimulation.modelIdentifier}_"
+    folder.mkdir()
+    sources = sorted((fmu.folder / "sources").glob("*.c"))
+    run([str(COMPILER), "-std=c99", "-O2", "-Wall", "-Wextra", "-Werror", prefix, "-c", *sources], cwd=folder)
+    return sorted(folder.glob("*.o"))
 
 
 def run(command: Sequence[str | Path], **options: object) -> str:

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import math
-import zipfile
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import pytest
-from fmpy import read_model_description, simulate_fmu
+from fmpy import read_model_description
 from fmpy.validation import validate_fmu
 
 from builder.drive.driver import drive_fmu
@@ -18,7 +16,7 @@ from builder.surrogate.train import TrainingResult
 from models.assembly.gearbox import Gearbox
 from models.files.cycle import Cycle
 from tests.contract.conftest import Illegal
-from tests.contract.fmu_host import LOADED, Host, hosted
+from tests.contract.fmu_host import LOADED, Host, check_reference_run, hosted
 from tests.contract.networks import extended, with_everything
 
 WARNING, ERROR = 1, 3
@@ -256,15 +254,7 @@ def test_a_network_with_every_kind_of_law_runs_as_in_python(
 
 
 def test_the_reference_run_is_what_fmpy_finds(path: Path, tmp_path: Path) -> None:
-    with zipfile.ZipFile(path) as archive:
-        archive.extractall(tmp_path, [name for name in archive.namelist() if name.startswith("documentation/")])
-    given = np.genfromtxt(tmp_path / "documentation/reference_in.csv", delimiter=",", names=True, deletechars="")
-    expected = pd.read_csv(tmp_path / "documentation/reference_out.csv")
-    names = [name for name in expected.columns if name != "time"]
-    result = simulate_fmu(str(path), stop_time=600.0, output_interval=10.0, input=given, output=names)
-    assert result["time"].tolist() == expected["time"].tolist()
-    for name in names:
-        np.testing.assert_allclose(result[name], expected[name], rtol=1e-7, atol=1e-7, err_msg=name)
+    check_reference_run(path, tmp_path)
 
 
 def test_native_and_python_fmu_agree(fzg_fmu: Path, fzg_native: Path) -> None:

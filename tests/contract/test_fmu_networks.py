@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zipfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -20,6 +21,7 @@ from models.files.cycle import Cycle
 from models.portable.evaluation import NoLosses
 from models.quantities.quantities import usual_inputs
 from models.simulation.thermal_network import ThermalNetwork
+from tests.contract.fmu_host import check_reference_run
 from tests.contract.networks import thermostat
 
 ANY = load_gearbox("la_haute_borne")  # gives a name and a hash
@@ -104,6 +106,12 @@ def test_outputs_are_those_that_the_network_has(path: Path, network: ThermalNetw
     assert ({"torque_loss", "efficiency"} <= names) == ("speed" in network.inputs)
 
 
+def test_the_reference_run_is_what_fmpy_finds(path: Path, tmp_path: Path) -> None:
+    check_reference_run(path, tmp_path)
+    page = (tmp_path / "documentation/index.html").read_text(encoding="utf-8")
+    assert "networks" not in page
+
+
 def simulated(path: Path, network: ThermalNetwork) -> np.ndarray:
     """All outputs with FMPy, inputs held in steps of 10 s."""
     cycle = cycle_of(network)
@@ -120,6 +128,8 @@ def simulated(path: Path, network: ThermalNetwork) -> np.ndarray:
 def test_the_python_fmu_agrees_with_the_native_one(path: Path, network: ThermalNetwork, tmp_path: Path) -> None:
     python = build_python_fmu(ANY, None, (), tmp_path / "thermal.fmu", network=network)
     assert validate_fmu(str(python)) == []
+    with zipfile.ZipFile(python) as archive:
+        assert b"onnxruntime" not in archive.read("resources/requirements.txt")
     expected, found = simulated(path, network), simulated(python, network)
     assert expected["time"][-1] == 900.0
     for name in expected.dtype.names:

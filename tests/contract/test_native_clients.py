@@ -7,6 +7,7 @@ import shutil
 import subprocess
 import sys
 import zipfile
+from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -16,8 +17,9 @@ import pytest
 from fmpy import simulate_fmu
 
 from builder.native.compile import compile_libraries
+from models.assembly.gearbox import Gearbox
 from tests.contract.fmu_host import hosted
-from tests.contract.native_hosts import SOURCES, Unpacked, compiled, needs_compiler, run, unpacked
+from tests.contract.native_hosts import COMPILER, SOURCES, Unpacked, compiled, needs_compiler, objects, run, unpacked
 
 AGREEMENT = 1e-9  # of every output, relative to its value or 1
 STEPS = 600
@@ -193,6 +195,41 @@ def test_a_host_in_c_simulates(fmu: Unpacked, inputs: pd.DataFrame, expected: np
     assert_agree(played([str(host)], fmu, fmu.library, inputs, tmp_path), expected, fmu.named("output"))
 
 
+@needs_compiler
+@pytest.mark.skipif(shutil.which("nm") is None, reason="needs nm")
+def test_two_fmus_are_linked_into_one_program(
+    fmu: Unpacked, fzg_native3: Path, build_native: Callable[..., Path], fzg: Gearbox, inputs: pd.DataFrame,
+    expected: np.ndarray, tmp_path: Path,
+) -> None:  # fmt: skip
+    network = fzg.network().with_source("oil", lambda s: 50.0, name="heater")
+    other = unpacked(build_native(tmp_path / "heated.fmu", network), tmp_path / "heated")
+    parts = {"fzg_": objects(fmu, tmp_path / "one", 2), "heated_": objects(other, tmp_path / "two", 2)}
+    third = objects(unpacked(fzg_native3, tmp_path / "fmi3"), tmp_path / "three", 3)
+    for prefix, files in (*parts.items(), ("fzg_", third)):
+        lines = run(["nm", "-g", "--defined-only", *files]).splitlines()
+        names = [line.split()[2] for line in lines if len(line.split()) == 3]
+        assert len(names) > 50 and not [name for name in names if not name.startswith(prefix)]
+    program = tmp_path / "linked"
+    linked = [file for files in parts.values() for file in files]
+    run([COMPILER, "-std=gnu99", "-O1", "-DONE=fzg_", "-DTWO=heated_", f"-I{fmu.folder / 'sources'}", "-w",
+         "-o", program, SOURCES / "linked.c", *linked, "-ldl", "-lm"])  # fmt: skip
+    file = tmp_path / "in.csv"
+    inputs.to_csv(file, index=False)
+    arguments: list[str] = []
+    for subject in (fmu, other):
+        columns = [subject.references(*inputs.columns[1:]), subject.references(*subject.named("output"))]
+        arguments += [subject.description.guid, *columns]
+    found = np.array([
+        [float(cell) for cell in line.rstrip(",").split(",")] for line in run([program, *arguments, file]).splitlines()
+    ])  # fmt: skip
+    names = fmu.named("output")
+    assert_agree(found[:, : len(names)], expected, names)
+    host = compiled("play", other, tmp_path / "play")
+    alone = played([str(host)], other, other.library, inputs, tmp_path)
+    assert_agree(found[:, len(names) :], alone, other.named("output"))
+    assert np.max(np.abs(found[-1, : len(names)] - alone[-1, : len(names)])) > 1.0  # they are different
+
+
 # ---------------------------------------------------------------------- Windows, under wine
 
 
@@ -204,7 +241,7 @@ def test_the_windows_library_gives_the_same_under_wine(
 ) -> None:
     sources = {path.name: path.read_bytes() for path in (fmu.folder / "sources").iterdir()}
     library, host = tmp_path / "fzg.dll", tmp_path / "play.exe"
-    library.write_bytes(compile_libraries(sources, "win64").libraries["win64"])
+    library.write_bytes(compile_libraries(sources, "win64").libraries["win64/library.dll"])
     zig = [sys.executable, "-m", "ziglang", "cc", "-target", "x86_64-windows-gnu", "-O1", "-w"]
     run([*zig, f"-I{fmu.folder / 'sources'}", "-o", host, SOURCES / "play.c"])
     environment = os.environ | {"WINEPREFIX": str(tmp_path / "prefix"), "WINEDEBUG": "-all"}

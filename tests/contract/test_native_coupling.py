@@ -1,4 +1,4 @@
-"""The gearbox in a vehicle: the example as users run it, in FMPy and in every other master that is installed."""
+"""The gearbox in a vehicle and in a room: the examples as users run them, in FMPy and in other masters."""
 
 from __future__ import annotations
 
@@ -9,7 +9,13 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+from builder.native.native_fmu import build_native_fmu
+from builder.surrogate.train import TrainingResult
 from tests.contract.native_hosts import run
+
+sys.path.append(str(Path(__file__).parents[2] / "examples"))
+import coupled_room
+from vehicle_fmus import write_system
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -33,3 +39,26 @@ def test_the_example_closes_its_energy_balance_and_masters_agree(fzg_native: Pat
     difference = re.search(r"differ by ([0-9.e+-]+)", shown)
     if difference is not None:
         assert float(difference[1]) < 2e-10
+
+
+def test_heat_goes_from_the_gearbox_into_the_room(
+    fzg_training: TrainingResult, fzg_networks: tuple[Path, ...], tmp_path: Path
+) -> None:
+    """Each FMU's balance closes, and what one gives off the other receives one step later, to rounding."""
+    gearbox = coupled_room.gearbox_on_feet()
+    network = gearbox.network().with_coupled_boundary("frame")
+    fmus = {
+        "gearbox": build_native_fmu(
+            gearbox, fzg_training, fzg_networks, tmp_path / "gearbox.fmu", network=network, platforms="host"
+        ).path,
+        "room": coupled_room.build_room(tmp_path / "room.fmu"),
+    }
+    rows = coupled_room.run(write_system(tmp_path / "room.ssp", EXAMPLES / "room.ssd", fmus), stop=3600.0)
+    given = [rows[f"gearbox.{boundary}.heat"] for boundary in ("air", "frame")]
+    lost, received = rows["gearbox.heat_in"], rows["room.heat_in"]
+    assert len(rows) == 360
+    assert min(heat[-1] for heat in given) > 1e4
+    assert rows["room.room.T"][-1] > rows["room.floor.T"][-1] > coupled_room.START_K
+    assert lost - sum(given) - rows["gearbox.heat_stored"] == pytest.approx(0.0, abs=1e-9 * lost[-1])
+    assert received - rows["room.outside.heat"] - rows["room.heat_stored"] == pytest.approx(0.0, abs=1e-9 * lost[-1])
+    assert received[1:] == pytest.approx(sum(given)[:-1] + received[0], rel=1e-9)

@@ -110,7 +110,7 @@ WRONG = {
         "zip.fmu cycle.csv": "zip.fmu: is not an FMU",
         "FMU cycle.csv --initial 293": "if kelvin are meant, give 19.85",
         "FMU cycle.csv --initial T_some.csv": "start temperatures are missing for: housing_lower",
-        "FMU cycle.csv --correction found.toml": "--correction goes with --gearbox",
+        "FMU cycle.csv --correction found.toml": "was not built with found.toml, which changes the physics",
         "FMU gap.csv": "gap.csv: T_ambient_degC is nan at row 1",
     },
     "build-fmu": {
@@ -118,6 +118,7 @@ WRONG = {
         "--gearbox box.toml": "box.toml: source is missing",
         "--platforms win46": "platform 'win46' is not known; did you mean 'win64'?",
         "--target python --platforms host": "--platforms is about native FMUs",
+        "--couple fram": "'fram' is not a boundary of this network; did you mean 'frame'?; boundaries are air, frame",
         "--output file/out": "file/out: cannot be written",
         "--dask nonsense": "no dask scheduler answers at nonsense",
     },

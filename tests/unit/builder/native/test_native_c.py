@@ -16,7 +16,7 @@ import sympy as sp
 from builder.fmi.signals import signal_table
 from builder.native.compile import OPTIONS
 from builder.native.data import model_sources
-from builder.native.native_fmu import LOSS_NETWORKS, THERMAL_MODEL, native_source
+from builder.native.native_fmu import LOSS_NETWORKS, THERMAL_MODEL, linker_names, native_source
 from builder.native.structure import Structure
 from builder.surrogate.onnx_export import onnx_evaluator
 from builder.surrogate.train import TrainingResult
@@ -51,6 +51,7 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> Library:
             "-Wextra",
             "-Werror",
             "-fPIC",
+            "-shared",
             "-o",
             "test.so",
             "test.c",
@@ -179,6 +180,7 @@ def generated(network: ThermalNetwork, fzg: Gearbox, surrogate: SurrogateLosses)
 def model(generated: dict[str, str], library: Library) -> ctypes.CDLL:
     """Laws, structure and losses of a network, with functions that a test can call."""
     files = {name: native_source(name) for name in THERMAL_MODEL + LOSS_NETWORKS} | generated
+    files["linker_names.h"] = linker_names(files, "test")
     text = """
         #include "laws.h"
         #include "loss_networks.h"
@@ -225,13 +227,15 @@ def test_elimination_solves_any_structure(library: Library, seed: int) -> None:
     n_parts, n_boundaries, n_links = int(rng.integers(1, 14)), 2, int(rng.integers(1, 40))
     ends = [rng.choice(n_parts + n_boundaries, 2, replace=False).tolist() for _ in range(n_links)]
     sources = rng.integers(0, n_parts, 3).tolist()
-    structure = Structure(n_parts=n_parts, links=tuple((a, b) for a, b in ends), sources=tuple(sources))
+    links = tuple((a, b) for a, b in ends)
+    structure = Structure(n_parts=n_parts, n_boundaries=n_boundaries, links=links, sources=tuple(sources))
     header = "".join(f"{line};\n" for line in structure.signatures())
     text = f"""
         #include "structure.c"
         void gain(const double *g, const double *T, const double *heat, double *y) {{
             structure_gain(g, T, T + {n_parts}, heat, y);
         }}
+        void outflow(const double *g, const double *T, double *y) {{ structure_outflow(g, T, T + {n_parts}, y); }}
         void solved(const double *g, const double *c, const double *q, double *x) {{
             double f[{structure.n_factors}];
             structure_factorize(g, c, 0.7, f);
@@ -247,6 +251,13 @@ def test_elimination_solves_any_structure(library: Library, seed: int) -> None:
     gain = -(full @ T)[:n_parts]
     np.add.at(gain, sources, heat)
     np.testing.assert_allclose(called(c.gain, g, T, heat, out=n_parts), gain, rtol=1e-12, atol=1e-9)
+    between = np.array([max(a, b) >= n_parts > min(a, b) for a, b in ends])
+    to_boundary = np.zeros((n_parts + n_boundaries,) * 2)
+    for (a, b), conductance in zip(ends, g * between, strict=True):
+        to_boundary[[a, b], [a, b]] += conductance
+        to_boundary[[a, b], [b, a]] -= conductance
+    outflow = -(to_boundary @ T)[n_parts:]
+    np.testing.assert_allclose(called(c.outflow, g, T, out=n_boundaries), outflow, rtol=1e-12, atol=1e-9)
     expected = np.linalg.solve(np.diag(capacity) + 0.7 * full[:n_parts, :n_parts], q)
     np.testing.assert_allclose(called(c.solved, g, capacity, q, out=n_parts), expected, rtol=1e-11, atol=1e-14)
 

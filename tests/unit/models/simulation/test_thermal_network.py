@@ -216,6 +216,10 @@ EXTENSIONS: list[tuple[Callable[[], object], str]] = [
     (lambda: NETWORK.with_boundary("air", 1.0), "has a node 'air' already"),
     (lambda: NETWORK.with_boundary("sea", lambda s: s.T_oil), "'T_oil' is not a signal"),
     (lambda: NETWORK.with_boundary("sea", lambda s: float(s.time)), "must be an expression"),
+    (
+        lambda: NETWORK.with_coupled_boundary("oil"),
+        "'oil' is not a boundary of this network; boundaries are air, frame",
+    ),
     (lambda: NETWORK.with_input("speed", 1.0), "has a signal 'speed' already"),
     (lambda: NETWORK.with_input("lambda", 1.0), "'lambda' cannot be a signal"),
     (lambda: NETWORK.with_parameter(Parameter(name="h_air")), "has a signal 'h_air' already"),

@@ -1,0 +1,93 @@
+"""Readings of a recorder with faulty sensors: readings with the terms of kind ``sensor``."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+
+import numpy as np
+
+from diagnosis.forward.recurrence import lagged
+from models.base.types import Array
+from models.network.laws import compile_function, function_source
+from models.quantities.quantities import column_of, is_total_loss, node_of_channel
+from models.terms.term import Term
+
+AS_RECORDED = "_as_recorded"  # ending of columns of readings
+
+
+def passed_on(term: Term, law: Array, time: Array, changes: Array, channels: Sequence[int]) -> Array:
+    """Return changes of the readings as a faulty sensor shows them; a shift leaves them as they are.
+
+    Parameters
+    ----------
+    term : Term
+        Of kind ``sensor``
+    law : Array, shape (K + 1,)
+        Its law at the points of time
+    time : Array, shape (K + 1,)
+        [s]
+    changes : Array, shape (K + 1, channels, ...)
+    channels : sequence of int
+        Places of the term's channels
+    """
+    if term.form == "shift":
+        return changes
+    along = law.reshape(-1, *[1] * (changes.ndim - 2))
+    changes = np.array(changes)
+    for index in channels:
+        before = changes[:, index]
+        if term.form == "lag":
+            changes[:, index] = lagged(before, np.diff(time), float(law[0]))
+        elif term.form == "clock":
+            at = np.interp(time - law, time, np.arange(len(time)))
+            low = np.minimum(at.astype(int), len(time) - 2)
+            share = (at - low).reshape(along.shape)
+            changes[:, index] = (1.0 - share) * before[low] + share * before[low + 1]
+        elif term.form == "stuck":
+            begin = int(np.argmax(law != 0.0))  # the reading is held as it was when the law set in
+            changes[:, index] = before + along * (before[begin] - before)
+    if term.form == "swapped":
+        changes[:, channels] += along[:, None] * (changes[:, channels[::-1]] - changes[:, channels])
+    return changes
+
+
+def columns_as_recorded(columns: Mapping[str, Array], terms: Iterable[Term]) -> dict[str, Array]:
+    """Return the readings of faulty sensors over a simulated cycle.
+
+    Parameters
+    ----------
+    columns : mapping of column name to Array, shape (N,)
+        A result in the columns of the file contract, two rows or more
+    terms : iterable of Term
+        Those of kind ``sensor`` count, with their parameters at their start
+
+    Returns
+    -------
+    dict of column name to Array, shape (N,)
+        ``T_oil_degC_as_recorded`` for every channel that a term distorts
+    """
+    time = columns["time_s"]
+    temperatures = {name[:-5]: T for name, T in columns.items() if name.startswith("T_") and name.endswith("_degC")}
+    nodes = {name[2:] for name in temperatures}
+    read: dict[str, Array] = {}
+    for term in terms:
+        true = {channel: _column(node_of_channel(channel, nodes)) for channel in term.target}
+        channels = [channel for channel in term.target if true[channel] in columns]
+        if term.kind != "sensor" or not channels:
+            continue
+        parameters = {p.name: p.start for p in term.parameters}
+        signals = {"time": time, **columns, **temperatures, **parameters}
+        names = sorted(symbol.name for symbol in term.expression.free_symbols)
+        function = compile_function(function_source("law", names, [term.expression], vector=True), "law")
+        law = np.broadcast_to(np.asarray(function(*(signals[name] for name in names))[0], dtype=float), time.shape)
+        readings = np.stack([read.get(name, columns[true[name]]) for name in channels], axis=-1)
+        if term.form == "shift":
+            readings = readings + law[:, None]
+        readings = passed_on(term, law, time, readings, range(len(channels)))
+        read |= dict(zip(channels, readings.T, strict=True))
+    return {f"{_column(channel)}{AS_RECORDED}": values for channel, values in read.items()}
+
+
+def _column(channel: str) -> str:
+    """Column of a channel: a node, one of its sensors, or the total loss."""
+    return column_of(channel if is_total_loss(channel) else f"T_{channel}")

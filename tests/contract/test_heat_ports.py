@@ -1,0 +1,72 @@
+"""Heat ports: what flows to the boundaries, and an energy balance that closes over the interface alone."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.contract.fmu_host import Host, hosted
+
+TERMS = ("heat_in", "heat_stored", "air.heat", "frame.heat")
+
+
+def ride(host: Host, step: float, steps: int) -> None:
+    """Steps with inputs that change from one to the next."""
+    for _ in range(steps):
+        share = host.time / 600.0
+        host.set(
+            speed=300.0 * np.sin(9.0 * share), torque=150.0 * np.cos(7.0 * share), T_ambient=293.15 + 25.0 * share,
+            air_speed=2.0 + 2.0 * np.sin(20.0 * share),
+        )  # fmt: skip
+        host.step(step)
+
+
+@pytest.mark.parametrize("step", [0.1, 1.0, 10.0, 60.0])
+def test_the_energy_balance_closes(path: Path, step: float) -> None:
+    with hosted(path) as host:
+        ride(host, step, min(60, round(600.0 / step)))
+        heat_in, stored, air, frame = host.get(*TERMS)
+    assert heat_in > 0.0
+    assert heat_in - stored - air - frame == pytest.approx(0.0, abs=1e-9 * heat_in)
+
+
+def test_flows_are_means_over_the_last_step(path: Path) -> None:
+    with hosted(path) as host:
+        (first,) = host.get("air.heat_flow")  # at the start the flow of the moment
+        assert host.get(*TERMS) == [0.0] * 4
+        host.step(1e-3)
+        assert host.get("air.heat_flow") == pytest.approx([first], abs=1e-3)
+        sum_of_steps = 1e-3 * host.get("air.heat_flow")[0]
+        for step in (0.5, 20.0, 3.0):
+            host.set(T_ambient=293.15 + step)
+            host.step(step)
+            sum_of_steps += step * host.get("air.heat_flow")[0]
+        assert host.get("air.heat") == pytest.approx([sum_of_steps], rel=1e-12)
+
+
+def test_heat_flows_from_a_warm_boundary_into_the_machine(path: Path) -> None:
+    with hosted(path, {"T_ambient": 353.15}) as host:
+        host.step(10.0)
+        flow, heat, stored = host.get("air.heat_flow", "air.heat", "heat_stored")
+    assert flow < 0.0
+    assert heat == pytest.approx(10.0 * flow)
+    assert stored > 0.0
+
+
+def test_saved_states_hold_the_heat(path: Path) -> None:
+    names = [*TERMS, "air.heat_flow", "frame.heat_flow"]
+    with hosted(path) as host:
+        ride(host, 5.0, 10)
+        saved, time = host.slave.getFMUstate(), host.time
+        kept = host.get(*names)
+        ride(host, 5.0, 10)
+        after = host.get(*names)
+        assert after != kept
+        host.slave.setFMUstate(saved)
+        host.time = time
+        assert host.get(*names) == kept
+        ride(host, 5.0, 10)
+        assert host.get(*names) == after
+        host.slave.freeFMUstate(saved)
