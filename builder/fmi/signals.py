@@ -333,7 +333,7 @@ class _Table:
         )  # fmt: skip
 
     def _linear(self, expression: sp.Expr) -> dict[str, str]:
-        """Return how an expression depends on inputs that it is linear in; nothing if it reads losses of the networks."""
+        """Return the kind of dependency on each input that an expression is linear in; nothing if it reads losses."""
         known = {f"T_{node}": temperature for node, temperature in self.boundaries.items()}
         expression = expression.subs({s: known[s.name] for s in expression.free_symbols if s.name in known})
         if any(s.name[2:] in self.network.components for s in expression.free_symbols):

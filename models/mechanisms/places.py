@@ -138,8 +138,8 @@ def _sources(network: ThermalNetwork, pattern: str) -> Iterator[Placement]:
 def _held(network: ThermalNetwork, holder: str, held: str) -> Iterator[Placement]:
     """One place per member of `holder`: the losses in those nodes of `held` that share a link with it, if several."""
     for member in _members(network, holder):
-        beside = {node for link in network.links if member in link.nodes for node in link.nodes}
-        nodes = tuple(node for node in _members(network, held) if node in beside)
+        neighbours = {node for link in network.links if member in link.nodes for node in link.nodes}
+        nodes = tuple(node for node in _members(network, held) if node in neighbours)
         target = tuple(source.name for source in network.sources if source.is_loss and source.node in nodes)
         if len(target) > 1:
             yield Placement(name=f"{held}_of_{member}", target=target, here=nodes)

@@ -1,4 +1,4 @@
-"""Two wind-turbine gearboxes of unknown geometry: what ten-minute means over weeks tell about them."""
+"""Two wind-turbine gearboxes of unknown geometry: what ten-minute means over weeks show of them."""
 
 from __future__ import annotations
 
