@@ -84,7 +84,7 @@ def model_sources(table: SignalTable, network: ThermalNetwork, losses: Surrogate
     network : ThermalNetwork
         Without numeric laws
     losses : SurrogateLosses or None
-        The trained networks of the loss components; None where the network has no components
+        The trained networks of the loss components; None if the network has no components
 
     Raises
     ------

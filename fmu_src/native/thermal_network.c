@@ -117,23 +117,17 @@ void network_outflow(Network *network, double *flow) {
     structure_outflow(now->conductance, now->at.T, now->T_boundary, flow);
 }
 
-/* Add the heat of an accepted step h, with the stages k_1 and k_2 and the weights of the temperatures: whatever leaves
-   the nodes arrives at the boundaries, to rounding. */
+/* Add the heat of an accepted step h: the stages k_1 and k_2 with the weights of the temperatures, 3/2 and 1/2, so that
+   what leaves the nodes arrives at the boundaries, to rounding. */
 static void add_heat(Heat *heat, const Balance *now, const Balance *then, const double *k_1, const double *k_2,
                      double h) {
-    const double none[AT_LEAST_ONE(N_BOUNDARIES)] = {0.0};
-    double out_1[AT_LEAST_ONE(N_BOUNDARIES)], out_2[AT_LEAST_ONE(N_BOUNDARIES)], slope[AT_LEAST_ONE(N_BOUNDARIES)];
-    double T[N_PARTS], change[N_PARTS];
-    for (int i = 0; i < N_PARTS; i++) {
-        T[i] = now->at.T[i] + GAMMA * h * k_1[i];
-        change[i] = GAMMA * h * k_2[i];
-    }
-    structure_outflow(now->conductance, T, now->T_boundary, out_1);
-    structure_outflow(then->conductance, then->at.T, then->T_boundary, out_2);
-    structure_outflow(now->conductance, change, none, slope);
-    for (int i = 0; i < N_BOUNDARIES; i++)
-        heat->out[i] += h * (1.5 * out_1[i] + 0.5 * (out_2[i] - 2.0 * out_1[i] + slope[i]));
-    for (int i = 0; i < N_SOURCES; i++) heat->in += 0.5 * h * (now->heat[i] + then->heat[i]);
+    double sum = 0.0, T[N_PARTS], first[AT_LEAST_ONE(N_BOUNDARIES)], second[AT_LEAST_ONE(N_BOUNDARIES)];
+    for (int i = 0; i < N_PARTS; i++) T[i] = now->at.T[i] + GAMMA * h * (k_1[i] + k_2[i]);
+    structure_outflow(now->conductance, T, now->T_boundary, first);
+    structure_outflow(then->conductance, then->at.T, then->T_boundary, second);
+    for (int i = 0; i < N_BOUNDARIES; i++) heat->out[i] += 0.5 * h * (first[i] + second[i]);
+    for (int i = 0; i < N_SOURCES; i++) sum += now->heat[i] + then->heat[i];
+    heat->in += 0.5 * h * sum;
 }
 
 /* Inputs at a share of the way from `begin` to `end`. */

@@ -211,14 +211,14 @@ def advance(system: System, state: State, time: float, duration: float, inputs: 
             continue
         elapsed = duration if h == remaining else elapsed + h
         later = state.states + h * (1.5 * k_1 + 0.5 * k_2)
-        out_1 = now.heat_out + GAMMA * h * _times(now.heat_out_slope, k_1)
-        out_2 = then.heat_out - 2.0 * out_1 + GAMMA * h * _times(now.heat_out_slope, k_2)
+        # The two stages with the weights of the temperatures, 3/2 and 1/2: what leaves the nodes arrives there.
+        flow = 0.5 * (now.heat_out + then.heat_out + GAMMA * h * _times(now.heat_out_slope, k_1 + k_2))
         state = State(
             states=system.updated(time + elapsed, inputs + slope * elapsed, later),
             # A short communication step says nothing about the step that the network would allow.
             step=max(next_step, state.step) if h < state.step else next_step,
             heat_in=state.heat_in + 0.5 * h * (now.heat_in + then.heat_in),
-            heat_out=state.heat_out + h * (1.5 * out_1 + 0.5 * out_2),
+            heat_out=state.heat_out + h * flow,
         )
     return state
 
