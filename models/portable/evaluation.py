@@ -181,11 +181,8 @@ class NetworkSystem:
     def balance(self, time: float, inputs: Array, states: Array, near: Balance | None = None) -> Balance:
         """Heat balance; see :class:`models.portable.solver.System`."""
         n, m, shape = self.n_parts, self.n_boundaries, states.shape[:-1]
-        point = (*self.operating(time, inputs, states), states[..., self._loss_nodes])
-        if near is not None and near.losses is not None and near.losses.still(*point):
-            power = near.losses.power
-        else:
-            power = self.losses.power(*point)
+        losses = self._losses_at(time, inputs, states, near)
+        power = np.zeros((*shape, 0)) if losses is None else losses.power
         common = self._common(time, inputs, states)
         signals = self._with_numeric(common, power)
         if self.vector:
@@ -212,8 +209,17 @@ class NetworkSystem:
             heat_in=heats.sum(axis=-1),
             heat_out=heat_out,
             heat_out_slope=to_boundary,
-            losses=LossesAt(*point, power),
+            losses=losses,
         )
+
+    def _losses_at(self, time: Any, inputs: Array, states: Array, near: Balance | None) -> LossesAt | None:
+        """Losses, those of `near` where they are still good; None without components."""
+        if not self.laws.components:
+            return None
+        point = (*self.operating(time, inputs, states), states[..., self._loss_nodes])
+        if near is not None and near.losses is not None and near.losses.still(*point):
+            return near.losses
+        return LossesAt(*point, self.losses.power(*point))
 
     def updated(self, time: float, inputs: Array, states: Array) -> Array:
         """States after the discrete updates of the extra states; see :class:`models.portable.solver.System`."""
