@@ -47,7 +47,7 @@ def test_agrees_with_the_simulation_in_python(
     assert done[-1] == (len(ramps) - 1, len(ramps) - 1)
     for name, values in expected.items():
         if name.startswith("T_") and name != "T_mesh_degC":
-            assert np.abs(driven[name] - values).max() < 0.005, name
+            assert np.abs(driven[name] - values).max() < 0.02, name
         elif name.startswith("P_"):
             np.testing.assert_allclose(driven[name], values, rtol=2e-4, atol=1e-3, err_msg=name)
         elif not name.startswith("T_"):
@@ -160,10 +160,11 @@ def test_more_rows_bring_the_old_ones_no_further_from_the_truth(
     truth = fzg.network().simulate(ramps, losses=fzg_training.losses, initial=20.0).columns()
     coarse, dense = (drive_fmu(path, c, initial=20.0) for c in (ramps, fine))
     names = [name for name in truth if name.startswith("T_")]
-    # 0.01 K: other steps of the solver, which holds 0.03 K in each, make chance differences.
+    # Other steps of the solver, which holds 0.03 K in each and 0.1 K for the mesh, make chance differences.
     for name in names:
+        chance = 0.1 if name == "T_mesh_degC" else 0.02
         before, after = np.abs(coarse[name] - truth[name]).max(), np.abs(dense[name][own] - truth[name]).max()
-        assert after < before + 0.01, name
+        assert after < before + chance, name
     before, after = (np.abs(d - truth["P_loss_W"]).max() for d in (coarse["P_loss_W"], dense["P_loss_W"][own]))
     assert after < before + 0.01
 
