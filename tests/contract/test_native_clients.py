@@ -23,7 +23,8 @@ from tests.contract.native_hosts import COMPILER, SOURCES, Unpacked, compiled, n
 
 AGREEMENT = 1e-9  # of every output, relative to its value or 1
 STEPS = 600
-WINE = shutil.which("wine64", path=f"{os.environ['PATH']}{os.pathsep}/usr/lib/wine") or shutil.which("wine")
+WINE_PATH = f"{os.environ['PATH']}{os.pathsep}/usr/lib/wine"  # of Debian's wine64
+WINE = shutil.which("wine64", path=WINE_PATH) or shutil.which("wine")
 
 
 @pytest.fixture(scope="module")
@@ -248,6 +249,6 @@ def test_the_windows_library_gives_the_same_under_wine(
     try:
         found = played([str(WINE), str(host)], fmu, library, inputs, tmp_path, env=environment)
     finally:  # wine leaves its server behind for a while
-        server = shutil.which("wineserver") or "wineserver"
+        server = shutil.which("wineserver", path=WINE_PATH) or "wineserver"
         subprocess.run([server, "-k"], env=environment, check=False, capture_output=True)
     assert_agree(found, expected, fmu.named("output"))
