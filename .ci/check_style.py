@@ -1,4 +1,4 @@
-"""House rules that no linter knows: plain technical English in docstrings and messages, and files of at most 500 lines.
+"""House rules that no linter knows: plain technical English in docstrings, messages and docs, and files of 500 lines.
 
 ``python .ci/check_style.py`` prints every breach and ends with status 1 if there is one.
 """
@@ -49,6 +49,8 @@ PHRASES = {
     r"\bin distress\b": "far outside its prior",
     r"\bof the house\b": "of this project",
 }
+# In docs/*.md these phrases and those for the start of a text are common English.
+NOT_IN_DOCS = (r"\b(?:says|said)\b", r"\bwhat (?:was|is|were|has|had) (?:found|told|said|shown|seen|left|meant)\b")
 
 
 def texts(tree: ast.Module) -> Iterator[tuple[int, str]]:
@@ -90,6 +92,15 @@ def phrase_faults(path: Path, name: str) -> Iterator[str]:
                 yield f"{name}:{at}: {found[0].strip()!r}: better: {better}"
 
 
+def docs_faults(path: Path) -> Iterator[str]:
+    """Phrases of the list in one page of docs."""
+    patterns = {p: better for p, better in PHRASES.items() if not p.startswith("^") and p not in NOT_IN_DOCS}
+    for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
+        for pattern, better in patterns.items():
+            if found := re.search(pattern, line):
+                yield f"docs/{path.name}:{number}: {found[0]!r}: better: {better}"
+
+
 def main() -> int:
     """Check all files; the exit status."""
     faults = []
@@ -103,6 +114,8 @@ def main() -> int:
                 faults.append(f"{name}: {lines} lines; split it, at most {MOST_LINES} are allowed")
             if folder in PACKAGES:
                 faults += phrase_faults(path, name)
+    for path in sorted((ROOT / "docs").glob("*.md")):
+        faults += docs_faults(path)
     print("\n".join(faults) or "style: no faults")
     return 1 if faults else 0
 

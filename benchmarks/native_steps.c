@@ -1,7 +1,8 @@
 /* Full steps of an FMU from C: set the inputs, step 1 s, get all outputs.
 
    native_steps LIBRARY GUID STEPS VARY INPUTS OUTPUTS   (value references separated by commas)
-   prints: seconds to instantiate and initialise, seconds for all steps (best of 7 lives) */
+   prints: seconds to instantiate and initialise (best of 7 lives), seconds for all steps (every hundred steps in the
+   life that was fastest in them: other programs that run meanwhile do not count) */
 #define _POSIX_C_SOURCE 199309L
 #include <dlfcn.h>
 #include <math.h>
@@ -12,7 +13,7 @@
 
 #include "fmi2Functions.h"
 
-enum { LIVES = 7, MOST = 256 };
+enum { LIVES = 7, MOST = 256, BLOCK = 100 };
 
 static double now(void) {
     struct timespec t;
@@ -49,7 +50,10 @@ int main(int argc, char **argv) {
     const int steps = atoi(argv[3]), vary = atoi(argv[4]);
     fmi2ValueReference inputs[MOST], outputs[MOST];
     const size_t n_in = references(argv[5], inputs), n_out = references(argv[6], outputs);
-    double start = 1e9, stepping = 1e9, y[MOST];
+    const int blocks = (steps + BLOCK - 1) / BLOCK;
+    double *const fastest = malloc((size_t)blocks * sizeof(double));
+    double start = 1e9, stepping = 0.0, y[MOST];
+    for (int block = 0; block < blocks; block++) fastest[block] = 1e9;
     for (int life = 0; life < LIVES; life++) {
         double u[4] = {300.0, 150.0, 293.15, 2.0};
         const double begin = now();
@@ -58,16 +62,23 @@ int main(int argc, char **argv) {
             fmi2SetReal_(c, inputs, n_in, u) || fmi2ExitInitializationMode_(c))
             return 3;
         const double ready = now();
+        double last = ready;
         for (int i = 0; i < steps; i++) {
             if (vary) u[0] = 300.0 + 100.0 * sin(0.01 * i), u[1] = 150.0 + 50.0 * cos(0.013 * i);
             if (fmi2SetReal_(c, inputs, n_in, u) || fmi2DoStep_(c, i, 1.0, fmi2True) ||
                 fmi2GetReal_(c, outputs, n_out, y))
                 return 4;
+            if ((i + 1) % BLOCK == 0 || i + 1 == steps) {
+                const double time = now();
+                fastest[i / BLOCK] = fmin(fastest[i / BLOCK], time - last);
+                last = time;
+            }
         }
-        stepping = fmin(stepping, now() - ready);
         start = fmin(start, ready - begin);
         fmi2FreeInstance_(c);
     }
+    for (int block = 0; block < blocks; block++) stepping += fastest[block];
+    free(fastest);
     printf("%.9f %.9f\n", start, stepping);
     return 0;
 }

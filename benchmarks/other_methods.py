@@ -40,7 +40,7 @@ from diagnosis.proof.scoring.rules import RULES, ScoredCase
 from diagnosis.proof.scoring.score import far_of, near_nodes
 from diagnosis.recordings.read import read_recordings
 from diagnosis.results.findings import node_of
-from diagnosis.setup.case import Case, first, prepare
+from diagnosis.setup.inference_setup import InferenceSetup, first, prepare
 from models.assembly.gearbox import load_gearbox
 from models.base.parallel import run_parallel
 from models.base.types import Array
@@ -67,13 +67,13 @@ class _ParametersHeld:
         return np.asarray(columns.T @ self.rest), np.einsum("mn,mn->n", columns, columns)
 
 
-def answers_to(case: Case, even: Case) -> dict[str, Any]:
+def answers_to(case: InferenceSetup, even: InferenceSetup) -> dict[str, Any]:
     """Answers of the methods to one case.
 
     Parameters
     ----------
-    case : Case
-    even : Case
+    case : InferenceSetup
+    even : InferenceSetup
         The case on intervals of one length, on which the network remembers its inputs
 
     Returns
@@ -94,7 +94,7 @@ def answers_to(case: Case, even: Case) -> dict[str, Any]:
     }
 
 
-def _naive(case: Case, base: Explanation, candidates: Sequence[Hypothesis]) -> dict[str, Any]:
+def _naive(case: InferenceSetup, base: Explanation, candidates: Sequence[Hypothesis]) -> dict[str, Any]:
     """Regress the calibrated residual on the response to each candidate; the best wins, at the tool's own threshold."""
     scored = scan(base.problem, base.fit, _ParametersHeld(base.fit), candidates)  # type: ignore[arg-type]
     logs = np.array([s.log_bayes for s in scored])
@@ -103,7 +103,7 @@ def _naive(case: Case, base: Explanation, candidates: Sequence[Hypothesis]) -> d
     return _answer(case, scored[0].hypothesis)
 
 
-def _sparse(case: Case, base: Explanation, candidates: Sequence[Hypothesis]) -> dict[str, Any]:
+def _sparse(case: InferenceSetup, base: Explanation, candidates: Sequence[Hypothesis]) -> dict[str, Any]:
     """Heat that is missing at the likeliest node, regressed sparsely on the catalogue's heats there."""
     marginal, pieces = Marginal.of(base.fit), base.problem.pieces
     knots = knots_of(pieces)
@@ -139,7 +139,7 @@ def _heat(base: Explanation, h: Hypothesis) -> Array:
     return np.asarray(np.nan_to_num(np.concatenate(heats)))
 
 
-def _answer(case: Case, h: Hypothesis | None) -> dict[str, Any]:
+def _answer(case: InferenceSetup, h: Hypothesis | None) -> dict[str, Any]:
     if h is None:
         return {"verdict": "consistent", "findings": [], "location": []}
     of_measurement = h.term is not None and h.term.of_measurement
@@ -157,7 +157,7 @@ def _answer(case: Case, h: Hypothesis | None) -> dict[str, Any]:
 # ---------------------------------------------------------------------- black box
 
 
-def _errors(even: Case, base: Explanation) -> dict[str, float | None]:
+def _errors(even: InferenceSetup, base: Explanation) -> dict[str, float | None]:
     """Held-out error of the calibrated model, alone and with a network on its residual.
 
     The network goes from inputs, their fading memories and the calibrated prediction to the residual.

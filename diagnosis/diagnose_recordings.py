@@ -14,7 +14,7 @@ from diagnosis.recordings.recording import Recording
 from diagnosis.recordings.shared_rows import check_shared_rows
 from diagnosis.results.assemble import assembled
 from diagnosis.results.result import Diagnosis
-from diagnosis.setup.case import prepare
+from diagnosis.setup.inference_setup import prepare
 from diagnosis.setup.plausibility import check_plausible
 from diagnosis.setup.shaft import shafts, with_shaft
 from models.assembly.gearbox import Gearbox, load_gearbox

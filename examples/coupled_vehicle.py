@@ -59,7 +59,7 @@ def build_gearbox(folder: Path) -> Path:
 
 
 def run_fmpy(ssp: Path, stop: float = STOP_S, step: float = STEP_S) -> Run:
-    """All outputs at the end of every step. FMPy writes the beginning of a step beside them."""
+    """All outputs at the end of every step. FMPy also writes the beginning of a step."""
     rows = simulate_ssp(str(ssp), stop_time=stop - 0.5 * step, step_size=step)
     return {"time": rows["time"] + step} | {name: rows[name] for name in OUTPUTS}
 

@@ -97,9 +97,9 @@ def fzg_fmu(build_fmu: FmuBuilder, tmp_path_factory: pytest.TempPathFactory) -> 
 
 @pytest.fixture(scope="session")
 def recordings_folder() -> Path:
-    """Recordings that are not part of this repository: the folder TWIN_RECORDINGS, by default beside the checkout."""
-    beside = Path(__file__).parents[2] / "shared" / "recordings"
-    folder = Path(os.environ.get("TWIN_RECORDINGS", beside))
+    """Recordings that are not part of this repository: the folder TWIN_RECORDINGS, by default next to the checkout."""
+    default = Path(__file__).parents[2] / "shared" / "recordings"
+    folder = Path(os.environ.get("TWIN_RECORDINGS", default))
     if not folder.is_dir():
         pytest.skip(f"no recordings at {folder}; name their folder in TWIN_RECORDINGS")
     return folder

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from models.base.types import Array
 from models.quantities.quantities import GEARBOX_INPUTS, Input
 
-# Okabe and Ito's palette: told apart by people with any colour vision, and in grey by order of lightness.
+# Okabe and Ito's palette: distinct for people with any colour vision, and in grey by order of lightness.
 PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#6B6B6B")
 LINES = ("-", "--", "-.", ":")
 TOTAL = "total"

@@ -135,7 +135,7 @@ def add_experiment(root: Element, identity: Identity) -> None:
 
 
 def add_co_simulation(root: Element, identity: Identity) -> Element:
-    """What the FMU can do."""
+    """Capabilities of the FMU."""
     element = SubElement(root, "CoSimulation", modelIdentifier=identity.model_identifier)
     for name, value in identity.flags.items():
         element.set(name, boolean(value) if isinstance(value, bool) else str(value))

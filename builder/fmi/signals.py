@@ -339,7 +339,7 @@ class _Table:
         )  # fmt: skip
 
     def _linear(self, expression: sp.Expr) -> dict[str, str]:
-        """How an expression depends on the inputs that it is linear in; empty if it has losses of the networks."""
+        """Kind of dependency on each input that an expression is linear in; empty with losses of the networks."""
         known = {f"T_{node}": temperature for node, temperature in self.boundaries.items()}
         expression = expression.subs({s: known[s.name] for s in expression.free_symbols if s.name in known})
         if any(s.name[2:] in self.network.components for s in expression.free_symbols):
@@ -393,7 +393,7 @@ class _Table:
                            description="Power out over power in; 0 without power")  # fmt: skip
 
     def _heats(self) -> Iterator[Signal]:
-        """Heat to the boundaries and the terms of the energy balance; none depends on the inputs at a moment."""
+        """Heat flows to the boundaries, and the terms of the energy balance; none depends on the inputs at a moment."""
         for node in self.boundaries:
             name, text = fmi_name(node), node.replace("_", " ")
             flow = self._output(

@@ -22,7 +22,8 @@ from models.simulation.thermal_network import ThermalNetwork
 
 Indices = NDArray[np.intp]
 LARGEST_EXPONENT = 700.0  # as in elementary.h
-LANES = 4  # hidden units are filled up to a multiple of this
+LANES = 4  # hidden units and tables are filled up to a multiple of this
+LARGEST_WIDTH = 16  # columns of weights that are multiplied together
 LAW_NAMES = ("boundary", "exchange", "heat", "fixed", "operating")
 SINGLE: tuple[Role, ...] = (
     "initial_uniform", "heat_in", "heat_stored", "total_loss", "torque_loss", "efficiency", "in_domain",
@@ -44,11 +45,11 @@ typedef struct {{
     double scale, offset;
 }} Place;
 
-/* One use of a part of a network that shares no hidden unit with others: where its numbers start, and how many there
-   are. Weights of the hidden layers are negative, in tiles of four columns; all rows end with zeros up to a multiple of
-   four. */
+/* One use of a part of a network that shares no hidden unit with others: where its features and nets start, and how
+   many numbers there are. Weights of the hidden layers are negative, in tiles of columns, each tile by rows; rows of
+   the other weights end with zeros up to a multiple of four. */
 typedef struct {{
-    int features, n_features, n_passed, first, n_first, second, n_second, nets, n_nets;
+    int features, n_features, n_passed, n_first, n_second, nets, n_nets;
     const double *w_1, *b_1, *w_2, *b_2, *w_3, *b_3, *passed;
 }} Block;
 
@@ -283,41 +284,44 @@ class _Pool:
             self.entries.append(entry)
         return self.entries.index(entry)
 
+    @property
+    def filled(self) -> list[tuple[Any, ...]]:
+        """The entries, the last one repeated until vectors are full."""
+        return [*self.entries, *self.entries[-1:] * (-len(self.entries) % LANES)]
+
     def column(self, index: int) -> list[Any]:
-        return [entry[index] for entry in self.entries]
+        return [entry[index] for entry in self.filled]
 
 
 class _Features:
-    """Inputs of the networks (rows), their logarithms and viscosities, each computed once for all uses."""
+    """Inputs of the networks (rows), the logarithm of each and viscosities, each computed once for all uses."""
 
     def __init__(self, losses: SurrogateLosses) -> None:
         self.columns = {name: i for i, name in enumerate(("speed", "torque", *losses.temperature_nodes))}
-        self.rows, self.logs, self.viscosities = _Pool(), _Pool(), _Pool()
+        self.rows, self.viscosities = _Pool(), _Pool()
         self.features: list[tuple[str, int]] = []
 
     def add(self, trained: Network, use: Use, kind: Feature, column: int) -> None:
+        shift = 0.0 if kind in ("value", "log") else KELVIN
         row = self.rows.place(self.columns[use.sources[column]], float(use.factors[column]), trained.lower[column],
-                              trained.upper[column])  # fmt: skip
+                              trained.upper[column], shift)  # fmt: skip
         if kind == "value":
             self.features.append(("rows", row))
             return
-        log = self.logs.place(row, 0.0 if kind == "log" else KELVIN)
         if kind in ("log", "log_kelvin"):
-            self.features.append(("logs", log))
+            self.features.append(("logs", row))
             return
         m, n = trained.viscosity
-        self.features.append(("viscosities", self.viscosities.place(log, LN10 * m, float(n))))
+        self.features.append(("viscosities", self.viscosities.place(row, LN10 * m, float(n))))
 
     def write(self, data: _Data) -> None:
-        rows, logs, viscosities = self.rows, self.logs, self.viscosities
-        starts = {"rows": 0, "logs": len(rows.entries), "viscosities": len(rows.entries) + len(logs.entries)}
-        for name, counted in (("N_ROWS", rows.entries), ("N_LOGS", logs.entries), ("N_FEATURES", self.features),
-                              ("N_VISCOSITIES", viscosities.entries)):  # fmt: skip
+        rows, viscosities = self.rows, self.viscosities
+        starts = {"rows": 0, "logs": len(rows.filled), "viscosities": 2 * len(rows.filled)}
+        for name, counted in (("N_ROWS", rows.filled), ("N_FEATURES", self.features),
+                              ("N_VISCOSITIES", viscosities.filled)):  # fmt: skip
             data.define(name, len(counted))
-        for index, name in enumerate(("ROW_FROM", "ROW_FACTOR", "ROW_LOWER", "ROW_UPPER")):
+        for index, name in enumerate(("ROW_FROM", "ROW_FACTOR", "ROW_LOWER", "ROW_UPPER", "ROW_SHIFT")):
             data.array("double" if index else "int", name, rows.column(index))
-        data.array("int", "LOG_FROM", logs.column(0))
-        data.array("double", "LOG_SHIFT", logs.column(1))
         data.array("int", "VISCOSITY_FROM", viscosities.column(0))
         data.array("double", "VISCOSITY_M", viscosities.column(1))
         data.array("double", "VISCOSITY_N", viscosities.column(2))
@@ -333,22 +337,21 @@ class _Blocks:
         self.n_first = self.n_second = self.n_nets = 0
         self.written: set[str] = set()
         self.net_of: dict[str, tuple[int, bool]] = {}
-        self.largest = 0.0
+        self.largest_sum = 0.0
 
     def add(self, trained: Network, use: Use) -> None:
         begin = len(self.features.features)
         for kind, column in trained.features:
             self.features.add(trained, use, kind, column)
-        self.largest = max(self.largest, _largest_sum(trained))
+        self.largest_sum = max(self.largest_sum, _largest_sum(trained))
         parts = _parts(trained)
-        n_passed = _pad_columns(trained.passed.T).shape[1]
+        n_features, n_passed = (len(trained.features) + -len(trained.features) % n for n in (2, LANES))
         for index, (first, second, outputs) in enumerate(parts):
             name = f"{trained.name}_{index}" if len(parts) > 1 else trained.name
             name = "".join(c if c.isalnum() else "_" for c in name).upper()
             sizes = self._weights(trained, name, first, second, outputs)
             arrays = ", ".join(f"{name}_{array}" for array in ("W1", "B1", "W2", "B2", "W3", "B3", "PASSED"))
-            places = (begin, len(trained.features), n_passed, self.n_first, sizes[0], self.n_second, sizes[1],
-                      self.n_nets, len(outputs))  # fmt: skip
+            places = (begin, n_features, n_passed, *sizes, self.n_nets, len(outputs))
             self.rows.append(f"{{{', '.join(map(str, places))},\n     {arrays}}}")
             for output in outputs:
                 self.net_of[use.components[output]] = (self.n_nets, trained.log_output)
@@ -359,7 +362,8 @@ class _Blocks:
     def _weights(
         self, trained: Network, name: str, first: Indices, second: Indices, outputs: Indices
     ) -> tuple[int, int]:
-        w_1, b_1 = _pad_columns(trained.weights[0][:, first]), _pad_columns(trained.biases[0][None, first])
+        w_1 = _pad_columns(np.pad(trained.weights[0][:, first], [(0, len(trained.features) % 2), (0, 0)]))
+        b_1 = _pad_columns(trained.biases[0][None, first])
         w_2 = _pad_columns(_pad_columns(trained.weights[1][np.ix_(first, second)].T).T)
         b_2 = _pad_columns(trained.biases[1][None, second])
         w_3 = _pad_columns(trained.weights[2][np.ix_(second, outputs)].T)
@@ -380,11 +384,10 @@ class _Blocks:
         return w_1.shape[1], w_2.shape[1]
 
     def write(self, data: _Data, components: Sequence[str], losses: SurrogateLosses) -> None:
-        # Only a network with absurd weights needs its sums held where exp can take them.
-        held = "(x)" if self.largest < LARGEST_EXPONENT else f"clamp(x, -{LARGEST_EXPONENT}, {LARGEST_EXPONENT})"
-        data.defines.append(f"#define HELD(x) {held}")
+        data.define("SUMS_ARE_LARGE", int(self.largest_sum > LARGEST_EXPONENT))
         for name, size in (("N_BLOCKS", len(self.rows)), ("N_FIRST", self.n_first), ("N_SECOND", self.n_second),
-                           ("N_NETS", self.n_nets)):  # fmt: skip
+                           ("N_NETS", self.n_nets + -self.n_nets % LANES),
+                           ("LARGEST_WIDTH", LARGEST_WIDTH)):  # fmt: skip
             data.define(name, size)
         data.array("Block", "BLOCKS", self.rows)
         data.array("int", "COMPONENT_FROM", (self.net_of[name][0] for name in components))
@@ -393,12 +396,17 @@ class _Blocks:
 
 
 def _largest_sum(trained: Network) -> float:
-    """A bound of what goes into the sigmoids."""
-    ends = [feature_values(kind, np.array([trained.lower[c], trained.upper[c]]), trained.viscosity)
-            for kind, c in trained.features]  # fmt: skip
-    first = np.max(np.abs(ends), axis=1) @ np.abs(trained.weights[0]) + np.abs(trained.biases[0])
-    second = np.abs(trained.weights[1]).sum(axis=0) + np.abs(trained.biases[1])
-    return float(max(first.max(), second.max()))
+    """A bound of what goes into the sigmoids: the features within their bounds, hidden units between 0 and 1."""
+    inputs = np.array([feature_values(kind, np.array([trained.lower[c], trained.upper[c]]), trained.viscosity)
+                       for kind, c in trained.features])  # fmt: skip
+    largest = 0.0
+    for ends, weights, bias in zip(
+        (inputs, np.array([[0.0, 1.0]])), trained.weights[:2], trained.biases[:2], strict=True
+    ):
+        products = weights[..., None] * ends[:, None, :]
+        sums = [bias + products.min(axis=-1).sum(axis=0), bias + products.max(axis=-1).sum(axis=0)]
+        largest = max(largest, float(np.abs(sums).max()))
+    return largest
 
 
 def _parts(trained: Network) -> list[tuple[Indices, Indices, Indices]]:
@@ -419,5 +427,6 @@ def _pad_columns(matrix: Array) -> Array:
 
 
 def _tiles(matrix: Array) -> Array:
-    """A matrix in tiles of columns, as the product reads it."""
-    return np.stack(np.split(matrix, matrix.shape[1] // LANES, axis=1))
+    """A matrix in tiles of columns, each by rows, as the product reads it."""
+    cuts = range(LARGEST_WIDTH, matrix.shape[1], LARGEST_WIDTH)
+    return np.concatenate([tile.ravel() for tile in np.split(matrix, cuts, axis=1)])

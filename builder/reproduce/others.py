@@ -30,6 +30,7 @@ from models.formulas.ehl import hertz_line, reduced_modulus
 from models.formulas.load_sharing import contact_points, load_sharing_loss_factor
 from models.losses.friction import friction_schlenk
 from models.portable.evaluation import RPM
+from models.quantities.definition_units import UNITS
 
 LEVELS = 4
 REACH = 2.0  # standard deviations to either side
@@ -39,23 +40,7 @@ SMALLEST = 0.005  # K
 WITHOUT_EFFECT = ("factors.C_", "housing.density", "housing.specific_heat", "oil.volume", "oil.schlenk")
 INPUTS = {"ambient.temperature_degC": "T_ambient", "ambient.air_speed_m_s": "air_speed"}
 FACTOR = "factors."
-UNITS = {
-    "W m2K": "W/(m² K)",
-    "W mK": "W/(m K)",
-    "W K": "W/K",
-    "J kgK": "J/(kg K)",
-    "kg m3": "kg/m³",
-    "Pa per K": "Pa/K",
-    "per K": "1/K",
-    "1 K": "1/K",
-    "m2": "m²",
-    "m s": "m/s",
-    "degC": "°C",
-    "um": "µm",
-    "mm": "mm",
-    "m": "m",
-    "kg": "kg",
-}
+SIGNS = {"m2": "m²", "m3": "m³", "deg": "°", "um": "µm"}  # as figures show units
 
 
 @item("Sensitivity", "What the final oil temperature hangs on", unchecked=Verdict.OURS)
@@ -174,11 +159,12 @@ def _label(study: Study, name: str) -> str:
     """Path of the definition in words and its unit; for a factor, its description."""
     if name.startswith(FACTOR):
         return next(p.description for p in study.network.parameters if p.name == name.removeprefix(FACTOR))
-    words = name.removeprefix("stage.").replace("_", " ").replace(".", ", ")
-    for ending, unit in UNITS.items():
-        if words.endswith(f" {ending}"):
-            return f"{words.removesuffix(ending)}in {unit}"
-    return words
+    ending = max((ending for ending in UNITS if name.endswith(ending)), key=len)
+    words = name.removeprefix("stage.").removesuffix(ending).replace("_", " ").replace(".", ", ")
+    unit = UNITS[ending].symbol
+    for plain, sign in SIGNS.items():
+        unit = unit.replace(plain, sign)
+    return f"{words} in {unit}" if unit else words
 
 
 @dataclass(frozen=True)

@@ -82,13 +82,12 @@ class LayerShapes:
         return parameters
 
 
-def predict_rows(shapes: LayerShapes, parameters: Array, rows: Array) -> Array:
-    """Outputs of the network, shape (rows, outputs), for `rows` of shape (rows, inputs)."""
-    *hidden, last = shapes.unpack(parameters)
-    activation = rows
+def predict_rows(layers: Sequence[Array], rows: Array) -> Array:
+    """Outputs of the network, shape (rows, outputs), for `rows` of shape (rows, inputs); layers as in `LayerShapes`."""
+    *hidden, last = layers
     for layer in hidden:
-        activation = _sigmoid(activation @ layer[:-1] + layer[-1])
-    return np.asarray(activation @ last[:-1] + last[-1])
+        rows = _sigmoid(rows @ layer[:-1] + layer[-1])
+    return np.asarray(rows @ last[:-1] + last[-1])
 
 
 def jacobian_transposed(shapes: LayerShapes, parameters: Array, rows: Array) -> tuple[Array, Array]:
@@ -173,7 +172,7 @@ def minimise(
     """
 
     def square(candidate: Array) -> float:
-        return float(np.mean((predict_rows(shapes, candidate, rows) - targets) ** 2))
+        return float(np.mean((predict_rows(shapes.unpack(candidate), rows) - targets) ** 2))
 
     damping, growth = DAMPING_START, 2.0
     loss = square(parameters)
@@ -273,7 +272,7 @@ class LevenbergMarquardtRegressor(RegressorMixin, BaseEstimator):  # type: ignor
         if self.validation_fraction > 0.0:
             split = train_test_split(X, targets, test_size=self.validation_fraction, random_state=self.random_state)
         shapes = LayerShapes((X.shape[1], *self.hidden_layer_sizes, targets.shape[1]))
-        # One thread of BLAS: the same sums in the same order whoever runs this, alone or beside other networks.
+        # One thread of BLAS: the same sums in the same order whoever runs this, alone or with other networks.
         with threadpool_limits(1), ThreadPoolExecutor(os.cpu_count()) as pool:
             runs = [_Run(shapes, self.random_state, start, split, pool) for start in range(max(self.starts, 1))]
             if len(runs) > 1:
@@ -291,14 +290,10 @@ class LevenbergMarquardtRegressor(RegressorMixin, BaseEstimator):  # type: ignor
     def predict(self, X: Any) -> Array:
         """Outputs, shape (N,) or (N, outputs) as the targets were, for `X` of shape (N, inputs)."""
         check_is_fitted(self, "coefs_")
-        activation = check_array(X, dtype=np.float64)
-        if activation.shape[1] != self.n_features_in_:
-            raise ValueError(
-                f"X has {activation.shape[1]} columns, but the network was fitted on {self.n_features_in_}"
-            )
-        for weights, bias in zip(self.coefs_[:-1], self.intercepts_[:-1], strict=True):
-            activation = _sigmoid(activation @ weights + bias)
-        outputs = np.asarray(activation @ self.coefs_[-1] + self.intercepts_[-1])
+        X = check_array(X, dtype=np.float64)
+        if X.shape[1] != self.n_features_in_:
+            raise ValueError(f"X has {X.shape[1]} columns, but the network was fitted on {self.n_features_in_}")
+        outputs = predict_rows([np.vstack(layer) for layer in zip(self.coefs_, self.intercepts_, strict=True)], X)
         return outputs[:, 0] if self.single_output_ else outputs
 
 
@@ -323,7 +318,7 @@ class _Run:
             step = next(self._steps, None)
             if step is None:
                 return
-            outputs = predict_rows(self._shapes, step.parameters, self._held_rows)
+            outputs = predict_rows(self._shapes.unpack(step.parameters), self._held_rows)
             error = float(np.mean((outputs - self._held_targets) ** 2))
             self.losses.append(step.loss)
             self.errors.append(error)

@@ -71,8 +71,9 @@ class Preset:
         Logarithms of speed, load and reduced losses, viscosity in place of temperature, and points denser at the low
         ends; without, min-max scaling and uniform points, as in the paper
     hidden : mapping of str to (int, int)
-        Units of the hidden layers by kind of network (mesh, no_load, bearing); where a kind is not named, by output
-        (mesh_sliding ...): every output then has separate hidden units, which fit it better for the same work
+        Units of the hidden layers by kind of network (mesh, no_load, bearing), `OTHER_HIDDEN` for others; where all
+        outputs (mesh_sliding ...) are named instead, each has separate hidden units, which fit it better for the same
+        work
     max_iter, starts, start_iterations, patience, tolerance
         See :class:`builder.surrogate.levenberg_marquardt.LevenbergMarquardtRegressor`
     domain : Domain, optional
@@ -92,6 +93,7 @@ class Preset:
     domain: Domain | None = None
 
 
+OTHER_HIDDEN = (10, 10)  # of a network that a preset does not name
 PRESETS: Mapping[str, Preset] = {
     "default": Preset(
         name="default",

@@ -12,7 +12,7 @@ from sklearn.model_selection import train_test_split
 
 from builder.surrogate.doe import latin_hypercube, mixed_hypercube, random_points, sample_losses
 from builder.surrogate.levenberg_marquardt import LevenbergMarquardtRegressor
-from builder.surrogate.networks import Domain, NetworkSpec, Preset, network_specs, preset_named
+from builder.surrogate.networks import OTHER_HIDDEN, Domain, NetworkSpec, Preset, network_specs, preset_named
 from builder.surrogate.pipeline import joined_network, plain_network, reduced_target, surrogate_pipeline
 from models.base.errors import InputError
 from models.base.parallel import run_parallel
@@ -252,14 +252,14 @@ def _train(
 ) -> TrainedNetwork:
     begin = time.perf_counter()
     x, x_test, y, y_test = train_test_split(points, losses, test_size=TEST_SHARE, random_state=seed)
-    together = spec.kind in preset.hidden
-    parts = [list(range(len(spec.outputs)))] if together else [[column] for column in range(len(spec.outputs))]
+    apart = all(output.removesuffix("_W") in preset.hidden for output in spec.outputs)
+    parts = [[column] for column in range(len(spec.outputs))] if apart else [list(range(len(spec.outputs)))]
     estimators, networks = [], []
     for columns in parts:
         outputs = [spec.outputs[column] for column in columns]
         powers = spec.powers[columns] if preset.transforms else None
         regressor = LevenbergMarquardtRegressor(
-            preset.hidden[spec.kind if together else outputs[0].removesuffix("_W")],
+            preset.hidden.get(outputs[0].removesuffix("_W") if apart else spec.kind, OTHER_HIDDEN),
             max_iter=preset.max_iter,
             starts=preset.starts,
             start_iterations=preset.start_iterations,

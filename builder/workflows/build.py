@@ -222,19 +222,15 @@ def build(
             full = network.simulate(cycle, losses=losses, initial=COLD_START, progress=progress).columns()
         cycles = {}
         for kind, path in fmus.items():
-            if kind == "native_fmi3":  # its numbers are those of the native FMU of FMI 2.0
-                continue
             if not runs_here(path):
-                notes.append(
-                    f"the {kind} FMU has no binary for this machine, so the reference cycle is not driven with it"
-                )
+                notes.append(f"the {LABEL[kind]} FMU has no binary for this machine: the reference cycle is not driven")
                 continue
-            label = f"{kind} FMU in FMPy"
+            label = f"{LABEL[kind]} FMU in FMPy"
             with _measure_time(f"reference cycle, {label}", seconds), console.progress_bar(label) as progress:
                 driven = drive_fmu(path, cycle, initial=COLD_START, progress=progress)
             cycles[path.name] = cycle_errors(driven, full)
             write_table(stage / f"drive_cycle{SUFFIX[kind]}.csv", driven)
-            title = f"{gearbox.name}\n600 s reference cycle, {kind} FMU and full model"
+            title = f"{gearbox.name}\n600 s reference cycle, {LABEL[kind]} FMU and full model"
             plot = stage / f"drive_cycle{SUFFIX[kind]}.png"
             plot_cycle(plot, driven, title=title, groups=network.groups, inputs=network.inputs, reference=full)
         report = BuildReport(
@@ -249,7 +245,7 @@ def build(
 
 
 def _planned(target: str, platforms: str, fmi: str) -> tuple[tuple[str, ...], tuple[str, ...], list[str]]:
-    """Kinds of FMU that can be built here, platforms of the native one, and notes on what is left out.
+    """Kinds of FMU that can be built here, platforms of the native one, and notes on omitted platforms.
 
     Called before the training, so that a missing compiler is known early.
 
@@ -281,7 +277,7 @@ def _purpose(names: Mapping[str, str], platforms: Sequence[str], networks: Seque
     native += "" if len(platforms) > 1 else " (--platforms all: for all)"
     needs = {
         "native": native,
-        "native_fmi3": f"is FMI 3.0, {native}",
+        "native_fmi3": f"(FMI 3.0) {native}",
         "python": "runs on Python with numpy" + (" and onnxruntime" if networks else ""),
     }
     return "; ".join(f"{names[kind]} {text}" for kind, text in needs.items() if kind in names)

@@ -14,7 +14,7 @@ from diagnosis.decision.holdout import Judge
 from diagnosis.decision.stage import LEAST_SHARE, Stage
 from diagnosis.forward.observation import reading_columns, readings
 from diagnosis.forward.term_on_grid import TermOnGrid
-from diagnosis.setup.case import Case
+from diagnosis.setup.inference_setup import InferenceSetup
 from models.quantities.quantities import is_total_loss
 
 # All set on development cases (seed 1 of `conceal`) and by the four open ones; the proof draws others.
@@ -155,7 +155,7 @@ def holds_out(judge: Judge, calibrated: Explanation, fit: Explanation) -> bool:
     return after <= max(slack * before, before + HOLDOUT_SLACK_K) and after <= FURTHER_SLACK * judge.rmse(judge.base)
 
 
-def _matters(case: Case, fit: Explanation, h: Hypothesis, times: float = 1.0) -> bool:
+def _matters(case: InferenceSetup, fit: Explanation, h: Hypothesis, times: float = 1.0) -> bool:
     """Whether something found is so many times what matters: by its heat, or by what it does to a reading."""
     if h.term is None:
         return True

@@ -12,12 +12,12 @@ from diagnosis.forward.trajectory import ROUNDS
 from diagnosis.inference.posterior import Linearised, Problem
 from diagnosis.inference.predict import overall_rmse, predict
 from diagnosis.inference.whitening import Whitening
-from diagnosis.setup.case import Case
+from diagnosis.setup.inference_setup import InferenceSetup
 from models.base.types import Array
 from models.quantities.quantities import is_total_loss
 
 
-def at_holdout(case: Case, explanation: Explanation) -> Problem:
+def at_holdout(case: InferenceSetup, explanation: Explanation) -> Problem:
     """The held-out recordings with everything that an explanation found; its terms, its model, its floor."""
     problem = explanation.problem
     return case.holdout.changed(
@@ -30,12 +30,12 @@ class Judge:
 
     Parameters
     ----------
-    case : Case
+    case : InferenceSetup
     base : Explanation
         With what the others are compared; its noise filters judge them all
     """
 
-    def __init__(self, case: Case, base: Explanation) -> None:
+    def __init__(self, case: InferenceSetup, base: Explanation) -> None:
         self.case, self.base = case, base
         self.rmse, self.gain = cache(self._rmse), cache(self._gain)
 

@@ -2,7 +2,7 @@
 
 Step by step: scan everything, fit the best few in earnest, keep the best if the data want it and the held-out
 recordings do not object; drop what is no longer needed beside it; look again at what remains. The structural floor
-follows the explanation, see :func:`diagnosis.setup.case.floored`.
+follows the explanation, see :func:`diagnosis.setup.inference_setup.floored`.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from diagnosis.decision.beside import Found, settled_beside
 from diagnosis.decision.holdout import Judge
 from diagnosis.decision.stage import OPEN_PENALTY, Stage, log_e_value, penalised
 from diagnosis.inference.evidence import Marginal
-from diagnosis.setup.case import Case, first, floored
+from diagnosis.setup.inference_setup import InferenceSetup, first, floored
 from models.base.parallel import run_parallel, starting_processes
 from models.mechanisms import OPEN_FORMS, Mechanism
 from models.quantities.quantities import TOTAL_LOSS
@@ -101,7 +101,7 @@ def threshold_at(false_alarm_rate: float) -> float:
     return THRESHOLD + float(np.log(0.05 / false_alarm_rate))
 
 
-def candidates_of(case: Case, catalogue: Mapping[str, Mechanism]) -> tuple[Hypothesis, ...]:
+def candidates_of(case: InferenceSetup, catalogue: Mapping[str, Mechanism]) -> tuple[Hypothesis, ...]:
     """Every mechanism and every open form at each of its places."""
     forms = [form for form in OPEN_FORMS if TOTAL_LOSS in case.channels or not form.is_loss]
     return tuple(
@@ -121,14 +121,14 @@ def hypotheses_of(candidates: Sequence[Hypothesis], explanation: Explanation) ->
 
 
 def search(
-    case: Case, catalogue: Mapping[str, Mechanism], *, false_alarm_rate: float = 0.05, jobs: int = 1,
+    case: InferenceSetup, catalogue: Mapping[str, Mechanism], *, false_alarm_rate: float = 0.05, jobs: int = 1,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Search:  # fmt: skip
     """Look for effects one after another.
 
     Parameters
     ----------
-    case : Case
+    case : InferenceSetup
     catalogue : mapping of str to Mechanism
     false_alarm_rate : float
     jobs : int

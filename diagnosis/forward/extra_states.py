@@ -28,9 +28,9 @@ SLOW_SUBSTEPS = 11  # of an interval of minutes, where there is no closed form; 
 MOVED = 1e-3  # of a state, for the slope of its rate
 
 
-def update_of(state: ExtraState, *, blurred: bool) -> sp.Expr:
+def update_of(state: ExtraState, *, averaged: bool) -> sp.Expr:
     """Value of a state after a step; the state itself if it does not switch."""
-    found = state.blurred if blurred and state.blurred is not None else state.update
+    found = state.averaged_update if averaged and state.averaged_update is not None else state.update
     return symbol(state.name) if found is None else found
 
 
@@ -65,10 +65,10 @@ class Memories:
         names = [*arguments, *(state.name for state in states)]
         rates = [state.rate.xreplace(boundary) for state in states]
         self._laws = {}
-        for blurred in (False, True):
-            updates = [update_of(state, blurred=blurred).xreplace(boundary) for state in states]
+        for averaged in (False, True):
+            updates = [update_of(state, averaged=averaged).xreplace(boundary) for state in states]
             source = function_source("memory", names, [*rates, *updates], vector=True)
-            self._laws[blurred] = compile_function(source, "memory")
+            self._laws[averaged] = compile_function(source, "memory")
         self._in_turn = all(_in_turn(state, states[index + 1 :]) for index, state in enumerate(states))
 
     def follow(
@@ -205,7 +205,7 @@ def _of_interval(row: Array | float, owner: NDArray[np.intp]) -> Array | float:
 
 def _in_turn(state: ExtraState, later: Sequence[ExtraState]) -> bool:
     """True if a state switches or is driven, does not depend on a later state, and is linear in itself."""
-    laws = [law for law in (state.rate, state.update, state.blurred) if law is not None]
+    laws = [law for law in (state.rate, state.update, state.averaged_update) if law is not None]
     others = {symbol(other.name) for other in later}
     if any(law.free_symbols & others for law in laws) or (state.update is not None and not state.rate.is_zero):
         return False

@@ -293,7 +293,7 @@ class NetworkOnGrid:
     @cached_property
     def switched_by(self) -> list[int]:
         """Which parts' temperatures decide on switches."""
-        laws = [update_of(self.network.states[index], blurred=False) for index in self.switches]
+        laws = [update_of(self.network.states[index], averaged=False) for index in self.switches]
         read = {s.name for law in laws for s in law.xreplace(self.boundary).free_symbols}
         return [index for index, part in enumerate(self.parts) if f"T_{part}" in read]
 
@@ -357,9 +357,9 @@ class NetworkOnGrid:
             result[..., index] = state
         return result
 
-    def switching(self, *, blurred: bool) -> Callable[[Sequence[Any]], tuple[float, ...]]:
+    def switching(self, *, averaged: bool) -> Callable[[Sequence[Any]], tuple[float, ...]]:
         """Values of switches after a step, from plain numbers: all signals in the order of the laws."""
-        return self._picked([update_of(self.network.states[index], blurred=blurred) for index in self.switches])
+        return self._picked([update_of(self.network.states[index], averaged=averaged) for index in self.switches])
 
     @cached_property
     def actuation(self) -> Callable[[Sequence[Any]], tuple[float, ...]]:

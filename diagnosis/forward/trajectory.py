@@ -262,7 +262,7 @@ def _stepped(
         kept[:, acting] = corner
         solved = _linearised(model, piece, values, middle, tangent, kept)
         solutions.append((solved.decay, solved.driven))
-    switching, actuation = model.switching(blurred=piece.guided and piece.slow), model.actuation
+    switching, actuation = model.switching(averaged=piece.guided and piece.slow), model.actuation
     power = tangent.at(middle[:, model.loss_nodes])
     given = np.broadcast_to(values, (len(kept), len(values)))
     table = np.concatenate([piece.middle[:, None], piece.inputs, middle, given, kept, power], axis=1).tolist()

@@ -14,7 +14,7 @@ from diagnosis.inference.predict import rmse
 from diagnosis.report.chart import Chart, Curve, averaged, drawn
 from diagnosis.report.wording import LOSS, name, time_scale
 from diagnosis.results.number_format import fixed
-from diagnosis.results.result import Course, Diagnosis, Finding, MissingHeat
+from diagnosis.results.result import Diagnosis, Finding, MissingHeat, PredictedRun
 from models.base.types import Array
 
 STAGES = (("as delivered", "before"), ("calibrated", "calibrated"), ("with what was found", "after"))
@@ -52,7 +52,7 @@ def _end(time: Array) -> float:
     return float(time[-1]) if len(time) else 0.0
 
 
-def _length(course: Course) -> str:
+def _length(course: PredictedRun) -> str:
     if not len(course.time):
         return ""
     span = float(course.time[-1] - course.time[0])
@@ -60,7 +60,7 @@ def _length(course: Course) -> str:
     return f"{span / seconds:.1f} {symbol}"
 
 
-def _panel(course: Course, title: str, noise: float, *, shows_after: bool) -> Panel:
+def _panel(course: PredictedRun, title: str, noise: float, *, shows_after: bool) -> Panel:
     seconds, symbol = time_scale(_end(course.time))
     time, label = course.time / seconds, f"Time in {symbol}"
     span = (float(time[0]), float(time[-1])) if len(time) else None

@@ -26,17 +26,17 @@ from diagnosis.results.identifiable import scale_notes
 from diagnosis.results.regime import active, regime, windows
 from diagnosis.results.result import (  # fmt: skip
     Calibrated,
-    Course,
     Diagnosis,
     Finding,
     Fits,
     Location,
     MissingHeat,
+    NotDetectable,
+    PredictedRun,
     Ranked,
-    Unseen,
     Verdict,
 )
-from diagnosis.setup.case import FLOORS, Case, heat_over_time
+from diagnosis.setup.inference_setup import FLOORS, InferenceSetup, heat_over_time
 from models.base.parallel import run_parallel
 from models.base.types import Array
 from models.base.version import project_version
@@ -50,14 +50,14 @@ UNEXPLAINED_SHARE = 0.25  # of the evidence that is left when the catalogue has 
 
 
 def assembled(
-    case: Case, found: Search, catalogue: Mapping[str, Mechanism], train: Sequence[Recording],
+    case: InferenceSetup, found: Search, catalogue: Mapping[str, Mechanism], train: Sequence[Recording],
     holdout: Sequence[Recording], *, false_alarm_rate: float, jobs: int = 1,
 ) -> Diagnosis:  # fmt: skip
     """The result of a search.
 
     Parameters
     ----------
-    case : Case
+    case : InferenceSetup
     found : Search
     catalogue : mapping of str to Mechanism
     train, holdout : sequence of Recording
@@ -115,7 +115,7 @@ def assembled(
     )
 
 
-def _floor(case: Case, found: Search) -> str:
+def _floor(case: InferenceSetup, found: Search) -> str:
     share, floor = HEAT_FRACTION, found.final.problem.floor
     text = f"in every part: {'assumed' if floor == FLOORS[0] else 'raised because the remainder asks for it'}"
     if case.gearbox.is_parametric:  # watts are known but for a common factor
@@ -128,7 +128,7 @@ def _floor(case: Case, found: Search) -> str:
 
 
 def _verdict(
-    found: Search, findings: Sequence[Finding], unseen: Sequence[Unseen], *, left: bool, detected: bool,
+    found: Search, findings: Sequence[Finding], unseen: Sequence[NotDetectable], *, left: bool, detected: bool,
     catalogue: Mapping[str, Mechanism],
 ) -> Verdict:  # fmt: skip
     if not detected:
@@ -157,7 +157,7 @@ def _much_is_left(misfit: float, first: Sequence[LatentHeat], remaining: Sequenc
 
 
 def _remaining(
-    found: Search, remaining: Sequence[LatentHeat], case: Case, *, left: bool, misfit: float, detected: bool
+    found: Search, remaining: Sequence[LatentHeat], case: InferenceSetup, *, left: bool, misfit: float, detected: bool
 ) -> tuple[float, str]:
     last = found.stages[-1]
     p_value = float(min(1.0, np.exp(-max(last.log_e_value, 0.0)))) if last.accepted is None else float("nan")
@@ -178,7 +178,7 @@ def _remaining(
 # ---------------------------------------------------------------------- where
 
 
-def _latents(case: Case, explanation: Explanation) -> tuple[LatentHeat, ...]:
+def _latents(case: InferenceSetup, explanation: Explanation) -> tuple[LatentHeat, ...]:
     """Unknown heat in every part, as mechanical loss (where the loss is measured) and not."""
     marginal, knots = Marginal.of(explanation.fit), knots_of(explanation.problem.pieces)
     kinds = (True, False) if TOTAL_LOSS in case.channels else (False,)
@@ -190,7 +190,7 @@ def _latents(case: Case, explanation: Explanation) -> tuple[LatentHeat, ...]:
 
 
 def _location(
-    case: Case, found: Search, findings: Sequence[Finding], first: Sequence[LatentHeat]
+    case: InferenceSetup, found: Search, findings: Sequence[Finding], first: Sequence[LatentHeat]
 ) -> tuple[Location, ...]:
     """Places by probability: of what was found, with its rivals' places; else by the unknown heat alone."""
     weights: dict[str, float] = {}
@@ -210,7 +210,7 @@ def _location(
     return tuple(_place(case, found, first, node, weight) for node, weight in chosen)
 
 
-def _place(case: Case, found: Search, first: Sequence[LatentHeat], node: str, weight: float) -> Location:
+def _place(case: InferenceSetup, found: Search, first: Sequence[LatentHeat], node: str, weight: float) -> Location:
     own = [h for h in found.final.found if node_of(case, h) == node]
     heats = _summed(found.final, own)
     if not heats:
@@ -247,7 +247,7 @@ def _summed(final: Explanation, found: Sequence[Hypothesis]) -> list[Array]:
     return [np.sum(values, axis=0) for values in zip(*laws, strict=True)]
 
 
-def p_index(case: Case, node: str) -> int:
+def p_index(case: InferenceSetup, node: str) -> int:
     """Index of a node among the parts; of the first part for one that is none (a boundary, an input)."""
     names = [part.name for part in case.nominal.parts]
     return names.index(node) if node in names else 0
@@ -259,7 +259,7 @@ def _shown(findings: Sequence[Finding], location: Sequence[Location]) -> list[st
 
 
 def _missing_heat(
-    case: Case, found: Search, latents: Sequence[LatentHeat], nodes: Sequence[str]
+    case: InferenceSetup, found: Search, latents: Sequence[LatentHeat], nodes: Sequence[str]
 ) -> tuple[MissingHeat, ...]:
     """What was found, and what an unknown heat would add to it; without findings that heat alone.
 
@@ -295,7 +295,7 @@ def _missing_heat(
 Predictions = dict[str, dict[str, list[Prediction]]]
 
 
-def _predictions(case: Case, found: Search, jobs: int) -> Predictions:
+def _predictions(case: InferenceSetup, found: Search, jobs: int) -> Predictions:
     """Free-running predictions: as delivered, calibrated and after, of the training and held-out pieces."""
     problems = {
         "train": (case.train, found.calibrated.problem, found.final.problem),
@@ -324,7 +324,7 @@ def _predicted(
     return before, tuned, predict(final, index, z_final, guess=tuned.trajectory.T if near is None else near)
 
 
-def _fits(case: Case, predictions: Predictions, which: str) -> Fits:
+def _fits(case: InferenceSetup, predictions: Predictions, which: str) -> Fits:
     per_state, overall = {}, {}
     temperatures = [i for i, name in enumerate(case.channels) if not is_total_loss(name)]
     for state, predicted in predictions[which].items():
@@ -339,13 +339,13 @@ def _fits(case: Case, predictions: Predictions, which: str) -> Fits:
     return Fits(before=overall["before"], calibrated=overall["calibrated"], after=overall["after"], sensors=sensors)
 
 
-def _courses(case: Case, predictions: Predictions) -> tuple[Course, ...]:
+def _courses(case: InferenceSetup, predictions: Predictions) -> tuple[PredictedRun, ...]:
     result = []
     for which, states in predictions.items():
         for before, calibrated, after in zip(states["before"], states["calibrated"], states["after"], strict=True):
             piece = before.piece
             at = np.clip(np.arange(len(piece.time)), 0, len(piece.steps) - 1)
-            result.append(Course(
+            result.append(PredictedRun(
                 recording=piece.recording, held_out=which == "holdout", time=piece.time, speed=piece.inputs[at, 0],
                 torque=piece.inputs[at, 1], measured=_by_channel(case, piece.measured),
                 before=_by_channel(case, before.read), calibrated=_by_channel(case, calibrated.read),
@@ -355,16 +355,16 @@ def _courses(case: Case, predictions: Predictions) -> tuple[Course, ...]:
     return tuple(result)
 
 
-def _by_channel(case: Case, values: Array) -> dict[str, Array]:
+def _by_channel(case: InferenceSetup, values: Array) -> dict[str, Array]:
     return {name: values[:, i] for i, name in enumerate(case.channels)}
 
 
-def _unmeasured(case: Case, prediction: Prediction) -> dict[str, Array]:
+def _unmeasured(case: InferenceSetup, prediction: Prediction) -> dict[str, Array]:
     names = [part.name for part in case.nominal.parts]
     return {name: prediction.trajectory.T[:, i] for i, name in enumerate(names)}
 
 
-def _calibration(case: Case, final: Explanation) -> tuple[Calibrated, ...]:
+def _calibration(case: InferenceSetup, final: Explanation) -> tuple[Calibrated, ...]:
     """Every parameter, how far it is from its prior as the definition has it: that of one found far off is wider."""
     stated = {(item.role, item.target): item for item in case.train.unknowns.items}
     sd = np.sqrt(np.diag(final.fit.covariance))
@@ -403,7 +403,7 @@ def _ranking(found: Search) -> tuple[Ranked, ...]:
     return tuple(sorted(rows, key=lambda r: (-r.probability, -r.log_bayes)))
 
 
-def _unseen(stage: Stage, catalogue: Mapping[str, Mechanism], threshold: float) -> tuple[Unseen, ...]:
+def _unseen(stage: Stage, catalogue: Mapping[str, Mechanism], threshold: float) -> tuple[NotDetectable, ...]:
     """Mechanisms that would not have been seen at their typical strength, at their best place."""
     best: dict[str, tuple[float, str]] = {}
     competing = [s for s in stage.scored if not s.hypothesis.is_open]
@@ -412,13 +412,13 @@ def _unseen(stage: Stage, catalogue: Mapping[str, Mechanism], threshold: float) 
         if name in catalogue and reached > best.get(name, (-np.inf, ""))[0]:
             best[name] = (reached, s.hypothesis.place)
     return tuple(
-        Unseen(mechanism=name, place=place, needed=catalogue[name].experiment)
+        NotDetectable(mechanism=name, place=place, needed=catalogue[name].experiment)
         for name, (reached, place) in sorted(best.items()) if reached < threshold
     )  # fmt: skip
 
 
 def _next_test(
-    verdict: Verdict, findings: Sequence[Finding], unseen: Sequence[Unseen], catalogue: Mapping[str, Mechanism],
+    verdict: Verdict, findings: Sequence[Finding], unseen: Sequence[NotDetectable], catalogue: Mapping[str, Mechanism],
     assumed: Collection[str],
 ) -> str:  # fmt: skip
     if verdict == "unexplained" and "T_ambient" in assumed:

@@ -13,13 +13,13 @@ from diagnosis.candidates.hypotheses import Hypothesis
 from diagnosis.decision.search import FORM_DOUBT
 from diagnosis.decision.stage import LEAST_RIVAL, Stage
 from diagnosis.results.result import Finding, ParameterValue, Rival
-from diagnosis.setup.case import Case, heat_over_time
+from diagnosis.setup.inference_setup import InferenceSetup, heat_over_time
 from models.mechanisms import Mechanism, Placed
 
 FORM_ERROR = 0.1  # of a strength and its heat: laws of the literature are hardly known better
 
 
-def node_of(case: Case, h: Hypothesis) -> str:
+def node_of(case: InferenceSetup, h: Hypothesis) -> str:
     """The part of the network (or the channel, or the boundary) that a hypothesis acts on."""
     network, term = case.nominal, h.term
     if term is None:
@@ -36,7 +36,7 @@ def node_of(case: Case, h: Hypothesis) -> str:
     return term.target[0]
 
 
-def _node_of_parameter(case: Case, name: str) -> str:
+def _node_of_parameter(case: InferenceSetup, name: str) -> str:
     network = case.nominal
     bare = name.removeprefix("shape_")
     for source in network.sources:
@@ -90,7 +90,7 @@ def _separation(own: Hypothesis, other: Hypothesis, catalogue: Mapping[str, Mech
 
 
 def finding_of(
-    case: Case, final: Explanation, h: Hypothesis, stage: Stage, catalogue: Mapping[str, Mechanism]
+    case: InferenceSetup, final: Explanation, h: Hypothesis, stage: Stage, catalogue: Mapping[str, Mechanism]
 ) -> Finding:
     """A finding with the values of the final explanation."""
     probabilities = dict(zip((f.found[-1].label for f in stage.fits), stage.probabilities(), strict=True))

@@ -161,7 +161,7 @@ class MissingHeat:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Course:
+class PredictedRun:
     """One recording as measured and as simulated, free-running.
 
     Attributes
@@ -233,7 +233,7 @@ class Ranked:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Unseen:
+class NotDetectable:
     """An effect of typical size that these data could not have shown, and the test that would show it."""
 
     mechanism: str
@@ -270,11 +270,11 @@ class Diagnosis:
         Of a further effect, if nothing more is missing; NaN where no further look was taken
     remaining_note : str
     ranking : tuple of Ranked
-    unseen : tuple of Unseen
+    unseen : tuple of NotDetectable
     next_test : str
         What to measure next
     missing_heat : tuple of MissingHeat
-    courses : tuple of Course
+    courses : tuple of PredictedRun
     network : ThermalNetwork
         The nominal one
     shapes : tuple of Term
@@ -302,10 +302,10 @@ class Diagnosis:
     remaining_p_value: float
     remaining_note: str
     ranking: tuple[Ranked, ...]
-    unseen: tuple[Unseen, ...]
+    unseen: tuple[NotDetectable, ...]
     next_test: str
     missing_heat: tuple[MissingHeat, ...]
-    courses: tuple[Course, ...]
+    courses: tuple[PredictedRun, ...]
     network: ThermalNetwork
     shapes: tuple[Term, ...]
     inputs: Mapping[str, Any]

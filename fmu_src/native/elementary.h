@@ -40,7 +40,8 @@ typedef struct {
 } Quotient;
 
 static inline Quotient exp_quotient(double x) {
-    const double shift = 6755399441055744.0; /* 1.5 * 2^52: adding it rounds to an integer, in the lowest bits */
+    /* 1.5 * 2^52 + 1023: adding it rounds to an integer, whose biased exponent is in the lowest bits */
+    const double shift = 6755399441056767.0;
     const double shifted = x * 1.4426950408889634 + shift, n = shifted - shift;
     const double r = (x - n * 6.93145751953125e-1) - n * 1.42860682030941723212e-6, r2 = r * r;
     const double p =
@@ -48,7 +49,7 @@ static inline Quotient exp_quotient(double x) {
     const double q =
         ((3.00198505138664455042e-6 * r2 + 2.52448340349684104192e-3) * r2 + 2.27265548208155028766e-1) * r2
         + 2.00000000000000000005;
-    const Quotient quotient = {q + p, q - p, from_bits((to_bits(shifted) + 1023) << 52)};
+    const Quotient quotient = {q + p, q - p, from_bits(to_bits(shifted) << 52)};
     return quotient;
 }
 

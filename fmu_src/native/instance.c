@@ -28,9 +28,9 @@ static void write_log(const Host *host, const char *name, Status status, const c
 }
 
 Status instance_report(Instance *self, Status status, const char *format, ...) {
-    char text[MESSAGE_SIZE + 128];
-    va_list arguments;
     if (self->logged & ONLY(status)) {
+        char text[MESSAGE_SIZE + 128];
+        va_list arguments;
         va_start(arguments, format);
         vsnprintf(text, sizeof text, format, arguments);
         va_end(arguments);
@@ -160,15 +160,15 @@ static void to_start(Instance *self) {
     instance_count_faults(self);
 }
 
-static size_t in_doubles(size_t bytes) { return (bytes + sizeof(double) - 1) / sizeof(double) * sizeof(double); }
+/* Number of doubles that take as much room. */
+static size_t in_doubles(size_t bytes) { return (bytes + sizeof(double) - 1) / sizeof(double); }
 
 Instance *instance_create(const Host *host, const char *name, const char *token, int logging) {
     const size_t head = in_doubles(sizeof(Instance));
-    const size_t values = model_variable_count * sizeof(double);
     const size_t state = in_doubles(model_state_size);
-    const size_t cleared = head + 2 * values + state + in_doubles(model_scratch_size);
+    const size_t cleared = head + 2 * model_variable_count + state + in_doubles(model_scratch_size);
     Instance *self;
-    char *memory;
+    double *memory;
     if (!name || !*name) {
         write_log(host, "", STATUS_ERROR, "an instance needs a name");
         return NULL;
@@ -178,20 +178,20 @@ Instance *instance_create(const Host *host, const char *name, const char *token,
                   "the GUID is not that of this binary; its modelDescription.xml belongs to another build");
         return NULL;
     }
-    memory = host->allocate(1, cleared + strlen(name) + 1);
+    memory = host->allocate(cleared + in_doubles(strlen(name) + 1), sizeof(double));
     if (!memory) {
         write_log(host, name, STATUS_ERROR, "there is no memory for an instance");
         return NULL;
     }
-    memset(memory, 0, cleared); /* not every host's function clears it */
+    memset(memory, 0, cleared * sizeof(double)); /* not every host's function clears it */
     self = (Instance *)memory;
     self->host = *host;
     self->logged = logging ? EVERY_STATUS : FAILURES;
-    self->values = (double *)(memory + head);
-    self->slopes = (double *)(memory + head + values);
-    self->model.state = memory + head + 2 * values;
-    self->model.scratch = memory + head + 2 * values + state;
-    self->name = strcpy(memory + cleared, name);
+    self->values = memory + head;
+    self->slopes = self->values + model_variable_count;
+    self->model.state = self->slopes + model_variable_count;
+    self->model.scratch = self->slopes + model_variable_count + state;
+    self->name = strcpy((char *)(memory + cleared), name);
     self->model.values = self->values;
     self->model.slopes = self->slopes;
     to_start(self);

@@ -47,12 +47,12 @@ static const char *foreign(const SavedState *saved) {
 
 /* Room for a state at *state, which may hold one already. */
 static SavedState *room_for_state(Instance *self, void **state, const char *function) {
-    SavedState *saved;
-    if (!state || (*state && foreign(*state))) {
+    SavedState *saved = state ? *state : NULL;
+    if (!state || (saved && foreign(saved))) {
         instance_report(self, STATUS_ERROR, "%s: the state must point to NULL or to a state of this FMU", function);
         return NULL;
     }
-    if (*state) return *state;
+    if (saved) return saved;
     saved = self->host.allocate(1, saved_size());
     if (!saved) instance_report(self, STATUS_ERROR, "%s: there is no memory for a state", function);
     return saved;

@@ -33,6 +33,7 @@ const char *network_set(Network *network, const double *parameters) {
         memcpy(balances[i]->at.parameters, parameters, N_PARAMETERS * sizeof(double));
     }
 #if N_COMPONENTS
+    memcpy(network->asked.parameters, parameters, N_PARAMETERS * sizeof(double));
     if (!network->loss_power) network->loss_power = loss_power_here();
 #endif
     return NULL;
@@ -57,10 +58,9 @@ static LossPoint loss_point(const Signals *at) {
     return point;
 }
 
-LossPoint network_loss_point(const Network *network, double time, const double *inputs, const ThermalState *state) {
-    Signals at = network->now.at;
-    set_moment(&at, time, inputs, state);
-    return loss_point(&at);
+LossPoint network_loss_point(Network *network, double time, const double *inputs, const ThermalState *state) {
+    set_moment(&network->asked, time, inputs, state);
+    return loss_point(&network->asked);
 }
 #endif
 

@@ -39,6 +39,7 @@ typedef struct {
 typedef struct {
 #if N_COMPONENTS
     LossPower *loss_power;
+    Signals asked; /* of network_loss_point */
 #endif
     double capacity[N_PARTS], weight[N_PARTS]; /* J/K; of the errors in the step control */
     Balance now, then;
@@ -57,7 +58,7 @@ INTERNAL const Balance *network_balance(Network *network, double time, const dou
 
 #if N_COMPONENTS
 /* What the losses depend on at a moment. */
-INTERNAL LossPoint network_loss_point(const Network *network, double time, const double *inputs,
+INTERNAL LossPoint network_loss_point(Network *network, double time, const double *inputs,
                                       const ThermalState *state);
 #endif
 

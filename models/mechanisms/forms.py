@@ -109,7 +109,7 @@ def two_point(name: str, *, reads: str = "T_oil", above: float = 1.0) -> Memory:
     return Memory(
         name=name,
         update=lambda s: hysteresis(**control(s)),
-        blurred=lambda s: soft_hysteresis(**control(s), width=SOFT_K),
+        averaged_update=lambda s: soft_hysteresis(**control(s), width=SOFT_K),
     )
 
 

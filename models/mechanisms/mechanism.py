@@ -14,7 +14,7 @@ from typing import Literal, TypeAlias
 import sympy as sp
 
 from models.base.errors import InputError
-from models.mechanisms.places import Spot, spots
+from models.mechanisms.places import Placement, placements
 from models.mechanisms.scale import Scale
 from models.network.laws import LawLike, NumericLaw, Parameter, symbol, trace
 from models.quantities.quantities import TOTAL_LOSS
@@ -42,7 +42,7 @@ class Memory:
         Time derivative, [1/s]
     update : law or None
         Its value after each step, e.g. of a thermostat's switch
-    blurred : law or None
+    averaged_update : law or None
         The same for temperatures that are means over minutes
     """
 
@@ -50,7 +50,7 @@ class Memory:
     start: Callable[[Scale], float] = field(default=lambda _: 0.0)
     rate: LawLike = 0.0
     update: LawLike | None = None
-    blurred: LawLike | None = None
+    averaged_update: LawLike | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -140,9 +140,9 @@ class Mechanism:
         """
         if channels is None:
             channels = (*(part.name for part in network.parts), TOTAL_LOSS)
-        found = [spot for pattern in self.places for spot in spots(network, self.kind, pattern, channels)]
+        found = [p for pattern in self.places for p in placements(network, self.kind, pattern, channels)]
         common, traced = _aliases(network, scale), cache(partial(trace, stand_in=self.name))
-        placed = [self._at(network, scale, spot, common, traced) for spot in found]
+        placed = [self._at(network, scale, placement, common, traced) for placement in found]
         if any(symbol(p.strength.name) not in p.expression.free_symbols for p in placed):
             raise InputError(f"mechanism {self.name!r}: its law must contain {STRENGTH!r}, the size of the effect")
         return tuple(
@@ -154,25 +154,25 @@ class Mechanism:
         return self.separate_by.get(other, self.experiment)
 
     def _at(
-        self, network: ThermalNetwork, scale: Scale, spot: Spot, common: Mapping[str, sp.Expr], traced: Traced
+        self, network: ThermalNetwork, scale: Scale, placement: Placement, common: Mapping[str, sp.Expr], traced: Traced
     ) -> Placed:  # fmt: skip
-        label = f"{self.name}_{spot.name}"
+        label = f"{self.name}_{placement.name}"
         own = self.parameters(scale)
         if not own or own[0].name != STRENGTH:
             raise InputError(f"mechanism {self.name!r}: its first parameter must be called {STRENGTH!r}")
         local = {p.name: symbol(f"{label}_{p.name}") for p in own}
         local |= {memory.name: symbol(f"{label}_{memory.name}") for memory in self.states}
-        aliases = {**common, **_ends(spot)}
+        aliases = {**common, **_ends(placement)}
         clash = sorted(set(local) & (set(aliases) | set(network.signals)))
         if clash:
             raise InputError(f"mechanism {self.name!r}: {clash[0]!r} is a signal; name the parameter differently")
 
-        other = spot.there[0] if self.kind == "link" and spot.there else self.other or "air"
+        other = placement.there[0] if self.kind == "link" and placement.there else self.other or "air"
         own_boundary = self.kind == "link" and other not in network.node_names
-        target = spot.target
+        target = placement.target
         if self.kind == "link":
             end = f"{label}_{other}" if own_boundary else other
-            target = (*(node for node in spot.target if node != end), end)
+            target = (*(node for node in placement.target if node != end), end)
         weights: tuple[float, ...] = ()
         if self.weights is not None:
             kept = [(name, weight) for name in target if (weight := self.weights(scale, name)) != 0.0]
@@ -197,7 +197,7 @@ class Mechanism:
         written = {key: expression.xreplace(absent) for key, expression in written.items()}
         return Placed(
             mechanism=self,
-            place=spot.name,
+            place=placement.name,
             written=written,
             scale=scale,
             label=label,
@@ -212,7 +212,9 @@ class Mechanism:
                     start=float(memory.start(scale)),
                     rate=full[f"rate {label}_{memory.name}"],
                     update=full.get(f"update {label}_{memory.name}"),
-                    blurred=None if memory.blurred is None else read(memory.blurred).xreplace(meant),
+                    averaged_update=None
+                    if memory.averaged_update is None
+                    else read(memory.averaged_update).xreplace(meant),
                 )
                 for memory in self.states
             ),
@@ -303,9 +305,9 @@ def _aliases(network: ThermalNetwork, scale: Scale) -> dict[str, sp.Expr]:
     return aliases
 
 
-def _ends(spot: Spot) -> dict[str, sp.Expr]:
+def _ends(placement: Placement) -> dict[str, sp.Expr]:
     """Temperatures of the place and of the other end."""
-    ends = {"T_here": spot.here, "T_there": spot.there}
+    ends = {"T_here": placement.here, "T_there": placement.there}
     return {name: _mean(nodes) for name, nodes in ends.items() if nodes}
 
 

@@ -30,7 +30,7 @@ EACH, FACTOR, ALL_LOSSES, ALL_PARTS = "each ", "factor ", "losses", "parts"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Spot:
+class Placement:
     """One place of a mechanism.
 
     Attributes
@@ -49,7 +49,7 @@ class Spot:
     there: tuple[str, ...] = ()
 
 
-def spots(network: ThermalNetwork, kind: Kind, pattern: str, channels: Sequence[str]) -> tuple[Spot, ...]:
+def placements(network: ThermalNetwork, kind: Kind, pattern: str, channels: Sequence[str]) -> tuple[Placement, ...]:
     """Return all places of a network that match a pattern.
 
     Parameters
@@ -65,9 +65,9 @@ def spots(network: ThermalNetwork, kind: Kind, pattern: str, channels: Sequence[
     --------
     >>> from models.assembly.gearbox import load_gearbox
     >>> network = load_gearbox("fzg").network()
-    >>> [spot.target for spot in spots(network, "link_factor", "each bearings-housing", ())][0]
+    >>> [one.target for one in placements(network, "link_factor", "each bearings-housing", ())][0]
     ('bearing_1-housing_lower', 'bearing_1-housing_upper')
-    >>> [spot.target for spot in spots(network, "loss_factor", "each shafts>bearings", ())]
+    >>> [one.target for one in placements(network, "loss_factor", "each shafts>bearings", ())]
     [('bearing_1', 'bearing_2'), ('bearing_3', 'bearing_4')]
     """
     if kind in ("source", "link"):
@@ -78,7 +78,7 @@ def spots(network: ThermalNetwork, kind: Kind, pattern: str, channels: Sequence[
         found = _links(network, pattern)
     elif kind == "signal":
         known = pattern in (*network.inputs, *network.derived)
-        found = iter([Spot(name=pattern, target=(pattern,))] if known else [])
+        found = iter([Placement(name=pattern, target=(pattern,))] if known else [])
     else:
         found = _channels(network, pattern, channels)
     return tuple(found)
@@ -94,7 +94,7 @@ def _members(network: ThermalNetwork, name: str) -> tuple[str, ...]:
     return network.groups.get(name, (name,) if name in network.node_names else ())
 
 
-def _nodes(network: ThermalNetwork, pattern: str) -> Iterator[Spot]:
+def _nodes(network: ThermalNetwork, pattern: str) -> Iterator[Placement]:
     each, name = _apart(pattern)
     name, dash, other = name.partition("-")
     there = tuple(_members(network, other)) if dash else ()
@@ -104,12 +104,12 @@ def _nodes(network: ThermalNetwork, pattern: str) -> Iterator[Spot]:
     members = tuple(node for node in _members(network, name) if node in parts and node not in there)
     ending = f"_{other}" if dash else ""
     if each:
-        yield from (Spot(name=node + ending, target=(node,), here=(node,), there=there) for node in members)
+        yield from (Placement(name=node + ending, target=(node,), here=(node,), there=there) for node in members)
     elif members:
-        yield Spot(name=name + ending, target=members, here=members, there=there)
+        yield Placement(name=name + ending, target=members, here=members, there=there)
 
 
-def _sources(network: ThermalNetwork, pattern: str) -> Iterator[Spot]:
+def _sources(network: ThermalNetwork, pattern: str) -> Iterator[Placement]:
     each, rest = _apart(pattern)
     holder, carries, held = rest.partition(">")
     if each and carries:
@@ -128,24 +128,24 @@ def _sources(network: ThermalNetwork, pattern: str) -> Iterator[Spot]:
         )
     ]
     if each:
-        yield from (Spot(name=source.name, target=(source.name,), here=(source.node,)) for source in chosen)
+        yield from (Placement(name=source.name, target=(source.name,), here=(source.node,)) for source in chosen)
     elif chosen:
         name = "_".join(name.removeprefix(FACTOR) for name in wanted)
         nodes = tuple(dict.fromkeys(source.node for source in chosen))
-        yield Spot(name=name, target=tuple(source.name for source in chosen), here=nodes)
+        yield Placement(name=name, target=tuple(source.name for source in chosen), here=nodes)
 
 
-def _held(network: ThermalNetwork, holder: str, held: str) -> Iterator[Spot]:
+def _held(network: ThermalNetwork, holder: str, held: str) -> Iterator[Placement]:
     """One place per member of `holder`: the losses in those nodes of `held` that share a link with it, if several."""
     for member in _members(network, holder):
-        beside = {node for link in network.links if member in link.nodes for node in link.nodes}
-        nodes = tuple(node for node in _members(network, held) if node in beside)
+        neighbours = {node for link in network.links if member in link.nodes for node in link.nodes}
+        nodes = tuple(node for node in _members(network, held) if node in neighbours)
         target = tuple(source.name for source in network.sources if source.is_loss and source.node in nodes)
         if len(target) > 1:
-            yield Spot(name=f"{held}_of_{member}", target=target, here=nodes)
+            yield Placement(name=f"{held}_of_{member}", target=target, here=nodes)
 
 
-def _links(network: ThermalNetwork, pattern: str) -> Iterator[Spot]:
+def _links(network: ThermalNetwork, pattern: str) -> Iterator[Placement]:
     each, rest = _apart(pattern)
     name = re.sub(r"\W", "_", rest)
     chosen: dict[str, tuple[str, str]] = {}
@@ -168,24 +168,24 @@ def _links(network: ThermalNetwork, pattern: str) -> Iterator[Spot]:
         yield _between(f"{member}_{b}" if side == 0 else f"{a}_{member}", own)
 
 
-def _between(name: str, chosen: dict[str, tuple[str, str]]) -> Spot:
+def _between(name: str, chosen: dict[str, tuple[str, str]]) -> Placement:
     here, there = (tuple(dict.fromkeys(nodes)) for nodes in zip(*chosen.values(), strict=True))
-    return Spot(name=name, target=tuple(chosen), here=here, there=there)
+    return Placement(name=name, target=tuple(chosen), here=here, there=there)
 
 
-def _channels(network: ThermalNetwork, pattern: str, channels: Sequence[str]) -> Iterator[Spot]:
+def _channels(network: ThermalNetwork, pattern: str, channels: Sequence[str]) -> Iterator[Placement]:
     nodes = [name for name in channels if node_of_channel(name, network.node_names) in network.node_names]
     at = {name: node_of_channel(name, network.node_names) for name in nodes}
     if pattern == "clock":
         # The loss comes from the rig's own torque meters, on one clock with speed and torque, more often than not.
         if nodes:
-            yield Spot(name="clock", target=tuple(nodes))
+            yield Placement(name="clock", target=tuple(nodes))
         if nodes and len(nodes) < len(channels):
-            yield Spot(name="clock_of_all", target=tuple(channels))
+            yield Placement(name="clock_of_all", target=tuple(channels))
     elif pattern == "pair":
         for pair in combinations(nodes, 2):
-            yield Spot(name="_".join(pair), target=pair, here=(at[pair[0]],), there=(at[pair[1]],))
+            yield Placement(name="_".join(pair), target=pair, here=(at[pair[0]],), there=(at[pair[1]],))
     else:
         chosen = nodes if pattern == "each thermometer" else channels
         for name in chosen:
-            yield Spot(name=name, target=(name,), here=(at[name],) if name in nodes else ())
+            yield Placement(name=name, target=(name,), here=(at[name],) if name in nodes else ())

@@ -91,7 +91,7 @@ class ExtraState:
         Time derivative, [1/s]; 0 for a state that only switches
     update : sympy.Expr or None
         Its value after each accepted step of the solver, e.g. a thermostat's hysteresis
-    blurred : sympy.Expr or None
+    averaged_update : sympy.Expr or None
         The same where temperatures are means over minutes, which hide the moment at which something switches
     """
 
@@ -99,7 +99,7 @@ class ExtraState:
     start: float
     rate: sp.Expr
     update: sp.Expr | None
-    blurred: sp.Expr | None = None
+    averaged_update: sp.Expr | None = None
 
 
 BASE_SIGNALS = ("time",)

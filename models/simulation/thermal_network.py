@@ -131,7 +131,7 @@ class ThermalNetwork(Network):
 
     def with_state(
         self, name: str, *, start: float, rate: LawLike = 0.0, update: LawLike | None = None,
-        blurred: sp.Expr | None = None,
+        averaged_update: sp.Expr | None = None,
     ) -> ThermalNetwork:  # fmt: skip
         """A network with a memory.
 
@@ -145,7 +145,7 @@ class ThermalNetwork(Network):
             Its time derivative, [1/s]
         update : law or None
             Its value after each accepted step of the solver
-        blurred : sympy.Expr or None
+        averaged_update : sympy.Expr or None
             The same where temperatures are means over minutes
         """
         self._new_name(name, self.signals, "signal")
@@ -157,7 +157,9 @@ class ThermalNetwork(Network):
             numeric = numeric or numeric_update
         if numeric is not None:
             raise InputError(f"the laws of state {name!r} must be expressions; write branches with sympy.Piecewise")
-        state = ExtraState(name=name, start=start, rate=rate_expression, update=update_expression, blurred=blurred)
+        state = ExtraState(
+            name=name, start=start, rate=rate_expression, update=update_expression, averaged_update=averaged_update
+        )
         return replace(self, states=(*self.states, state))
 
     def with_source(self, node: str, law: LawLike, *, name: str, is_loss: bool = False) -> ThermalNetwork:
@@ -352,7 +354,7 @@ class ThermalNetwork(Network):
             states=tuple(
                 replace(state, rate=state.rate.xreplace(seen),
                         update=None if state.update is None else state.update.xreplace(seen),
-                        blurred=None if state.blurred is None else state.blurred.xreplace(seen))
+                        averaged_update=None if state.averaged_update is None else state.averaged_update.xreplace(seen))
                 for state in self.states
             ),
             operating=operating,

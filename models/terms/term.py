@@ -125,7 +125,11 @@ class Term:
             network = network.with_parameter(parameter)
         for state in self.states:
             network = network.with_state(
-                state.name, start=state.start, rate=state.rate, update=state.update, blurred=state.blurred
+                state.name,
+                start=state.start,
+                rate=state.rate,
+                update=state.update,
+                averaged_update=state.averaged_update,
             )
         return self._placed_in(network)
 

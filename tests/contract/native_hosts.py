@@ -17,6 +17,8 @@ OPTIONS = ("-std=gnu99", "-O1", "-g", "-Wall", "-Wextra", "-Wno-unused-function"
 
 SANITIZED = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-fno-omit-frame-pointer")
 
+THREAD_SANITIZED = ("-fsanitize=thread", "-fno-omit-frame-pointer")
+
 needs_compiler = pytest.mark.skipif(COMPILER is None, reason="no C compiler (gcc or clang)")
 
 
@@ -54,10 +56,10 @@ def compiled(name: str, fmu: Unpacked, output: Path, *options: str | Path) -> Pa
     return output
 
 
-def sanitized(fmu: Unpacked, library: Path) -> Path:
-    """The library of an FMU, compiled from its own sources with the sanitizers."""
+def sanitized(fmu: Unpacked, library: Path, sanitizers: Sequence[str] = SANITIZED) -> Path:
+    """The library of an FMU, compiled from its own sources with sanitizers."""
     sources = sorted((fmu.folder / "sources").glob("*.c"))
-    options = ["-std=c99", "-O1", "-g", "-Wall", "-Wextra", "-Werror", *SANITIZED, "-shared", "-fPIC"]
+    options = ["-std=c99", "-O1", "-g", "-Wall", "-Wextra", "-Werror", *sanitizers, "-shared", "-fPIC"]
     run([str(COMPILER), *options, "-o", library, *sources, "-lm"])
     return library
 

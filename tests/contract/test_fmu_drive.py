@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from builder.drive.driver import drive_fmu, fmu_machine
+from builder.drive.driver import drive_fmu, fmu_machine, runs_here
 from builder.fmi.reference_cycle import reference_cycle
 from builder.surrogate.train import TrainingResult
 from models.assembly.gearbox import Gearbox
@@ -166,6 +166,18 @@ def test_more_rows_bring_the_old_ones_no_further_from_the_truth(
         assert after < before + 0.01, name
     before, after = (np.abs(d - truth["P_loss_W"]).max() for d in (coarse["P_loss_W"], dense["P_loss_W"][own]))
     assert after < before + 0.01
+
+
+def test_an_fmu_of_fmi_3_gives_the_same(fzg_native: Path, fzg_native3: Path, fzg: Gearbox) -> None:
+    assert runs_here(fzg_native3)
+    assert list(fmu_machine(fzg_native3).inputs) == list(fzg.network().inputs)
+    rows = cycle(time_s=[5.0, 65.0, 125.0])
+    two, three = (drive_fmu(path, rows, parameters={"churning": 1.5}) for path in (fzg_native, fzg_native3))
+    assert list(two) == list(three)
+    for name, values in two.items():
+        np.testing.assert_allclose(three[name], values, rtol=1e-12, err_msg=name)
+    with pytest.raises(InputError, match=r"factor\.churning is -1; 0\.05 to 20 is possible"):
+        drive_fmu(fzg_native3, cycle(), parameters={"churning": -1.0})
 
 
 # ---------------------------------------------------------------------- what is wrong is said

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import random
 import shutil
+import struct
 import subprocess
 import sys
 import threading
@@ -367,5 +368,34 @@ def test_all_platforms_are_built_and_the_bytes_are_reproducible(
     with zipfile.ZipFile(builds[0].path) as archive:
         for name, platform in PLATFORMS.items():
             assert archive.read(f"binaries/{name}/fzg{platform.suffix}").startswith(starts[platform.suffix])
+        universal = archive.read("binaries/darwin64/fzg.dylib")
     with hosted(builds[0].path) as host:
         host.step(1.0)
+    third = build_native_fmu(fzg, fzg_training, fzg_networks, tmp_path / "fzg.fmu", platforms="darwin64", fmi=3)
+    assert third.binaries == ("x86_64-darwin/fzg.dylib", "aarch64-darwin/fzg.dylib")
+    processors, names, oldest = zip(*map(mac_library, slices(universal)), strict=True)
+    assert processors == (0x01000007, 0x0100000C)  # x86_64 and arm64
+    assert names == ("@rpath/fzg.dylib",) * 2 and oldest == (11 << 16,) * 2
+
+
+def slices(universal: bytes) -> list[bytes]:
+    """Libraries in a universal binary (mach-o/fat.h)."""
+    magic, count = struct.unpack_from(">II", universal)
+    assert magic == 0xCAFEBABE
+    entries = [struct.unpack_from(">IIIII", universal, 8 + 20 * i) for i in range(count)]
+    assert all(offset % (1 << alignment) == 0 for _, _, offset, _, alignment in entries)
+    return [universal[offset : offset + size] for _, _, offset, size, _ in entries]
+
+
+def mac_library(content: bytes) -> tuple[int, str, int]:
+    """Processor, install name and oldest macOS of a Mach-O library (mach-o/loader.h)."""
+    place, name, oldest = 32, "", 0
+    for _ in range(struct.unpack_from("<I", content, 16)[0]):
+        command, size = struct.unpack_from("<II", content, place)
+        if command == 0x0D:
+            (start,) = struct.unpack_from("<I", content, place + 8)
+            name = content[place + start : place + size].rstrip(b"\0").decode()
+        elif command == 0x32:
+            oldest = struct.unpack_from("<I", content, place + 12)[0]
+        place += size
+    return struct.unpack_from("<I", content, 4)[0], name, oldest

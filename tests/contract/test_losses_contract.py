@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cache
-from typing import Any
+from typing import Any, Literal, get_args, get_origin
 
 import numpy as np
 import pytest
@@ -12,24 +12,32 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from models.assembly.gearbox import Gearbox, load_gearbox
+from models.definition.sections import Bearing, Churning, Friction, Rolling, Seal, Section, Stage
 
 FZG, CONVEYOR = load_gearbox("fzg"), load_gearbox("conveyor")
 EVERY_BEARING = range(len(FZG.bearing))
+PLACES: dict[type[Section], list[str]] = {
+    Stage: ["stage.0"],
+    Friction: ["stage.0.friction"],
+    Rolling: ["stage.0.rolling"],
+    Churning: ["stage.0.churning"],
+    Seal: [f"seal.{i}" for i in range(len(FZG.seal))],
+    Bearing: [f"bearing.{i}" for i in EVERY_BEARING],
+}
+PRINTED = "Churning.model niemann_printed"
+# Every choice that a definition offers and the rig's file does not make.
 OPTIONS: dict[str, Mapping[str, Any]] = {
     "default": {},
-    **{f"film {o}": {"stage.0.friction.film": o} for o in ("dowson_toyoda", "grubin")},
-    **{f"reduction {o}": {"stage.0.friction.thermal_reduction": o} for o in ("gupta_simple", "murch_wilson")},
-    **{f"asperities {o}": {"stage.0.friction.asperity_load_share": o} for o in ("erf", "diab", "matsumoto")},
-    **{f"roughness {o}": {"stage.0.friction.roughness": o} for o in ("composite", "composite_rms")},
-    "path_of_contact": {"stage.0.friction.average": "path_of_contact"},
-    "schlenk": {"stage.0.friction.model": "schlenk"},
-    **{f"churning {o}": {"stage.0.churning.model": o} for o in ("niemann_printed", "mauz", "changenet_velex")},
-    **{f"sharing {o}": {"stage.0.load_sharing": o} for o in ("sanchez_pedrero", "equal")},
-    "roelands": {"oil.pressure_viscosity": "roelands"},
-    "drag 2008": {f"bearing.{i}.drag": "2008" for i in EVERY_BEARING},
-    "skf_outlet": {f"bearing.{i}.temperature": "skf_outlet" for i in EVERY_BEARING},
-    "seal iso_simple": {"seal.0.model": "iso_simple", "seal.1.model": "iso_simple"},
     "conveyor": {},
+    "roelands": {"oil.pressure_viscosity": "roelands"},
+    **{
+        f"{section.__name__}.{key} {choice}": {f"{place}.{key}": choice for place in places}
+        for section, places in PLACES.items()
+        for key, field in section.model_fields.items()
+        if get_origin(field.annotation) is Literal
+        for choice in get_args(field.annotation)
+        if choice != FZG.leaves[f"{places[0]}.{key}"]
+    },
 }
 
 
@@ -65,7 +73,7 @@ class TestEveryOption:
         losses = losses_with(option)
         power = losses.power(n, torque, rng.uniform(20.0, 120.0, (500, 7)))
         for name, largest in zip(losses.components, power.max(axis=0), strict=True):
-            if option != "churning niemann_printed" or name != "churning":
+            if option != PRINTED or name != "churning":
                 assert 1.0 < largest < (4000.0 if name.startswith("mesh") else 1500.0)
 
     def test_symmetric_in_the_signs(self, option: str) -> None:
@@ -119,8 +127,8 @@ def test_any_point_of_any_option(n: float, torque: float, T: list[float], option
     power = losses.power(n, torque, np.array(T))
     assert np.all(np.isfinite(power))
     assert np.all(power >= 0.0)
-    beside = losses.power(n * (1 + 1e-7) + 1e-9, torque * (1 + 1e-7) + 1e-9, np.array(T))
-    assert beside == pytest.approx(power, rel=1e-3, abs=1e-3)
+    near = losses.power(n * (1 + 1e-7) + 1e-9, torque * (1 + 1e-7) + 1e-9, np.array(T))
+    assert near == pytest.approx(power, rel=1e-3, abs=1e-3)
 
 
 # ---------------------------------------------------------------------------------------------- every number is read
@@ -190,7 +198,7 @@ OPTIONAL: list[Mapping[str, Any]] = [
     {"oil.conductivity_W_mK": 0.14},
     {"oil.density_temperature_degC": 20.0},
     *({"housing.convection": name} for name in ("flat_plate", "iso_14179_free", "churchill_chu")),
-    *(dict(changes) for name, changes in OPTIONS.items() if changes and name != "churning niemann_printed"),
+    *(dict(changes) for name, changes in OPTIONS.items() if changes and name != PRINTED),
 ]
 
 

@@ -235,7 +235,7 @@ class TestInANetwork:
         for index, p in enumerate(term.parameters):
             assert np.max(np.abs(T[:, 2 * index + 2 : 2 * index + 4] - T[:, :1])) > 1e-3, p.name
         assert np.max(np.abs(T[:, 1] - T[:, 0])) > 0.01
-        # Variants beside it take part in the choice of the step.
+        # Other variants take part in the choice of the step.
         assert np.max(np.abs(T[: len(base.parts), 1] - nominal(gearbox))) < 0.1
 
     def test_only_a_loss_counts_as_loss(self, name: str) -> None:

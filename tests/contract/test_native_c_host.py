@@ -1,14 +1,25 @@
-"""A native FMU in a host written in C, without Python: as delivered, and under AddressSanitizer and UBSan."""
+"""A native FMU in a host written in C, without Python: as delivered, and under AddressSanitizer, UBSan and TSan."""
 
 from __future__ import annotations
 
 import os
+import sys
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 
-from tests.contract.native_hosts import SANITIZED, Unpacked, compiled, needs_compiler, run, sanitized, unpacked
+from tests.contract.native_hosts import (
+    SANITIZED,
+    THREAD_SANITIZED,
+    Unpacked,
+    compiled,
+    needs_compiler,
+    run,
+    sanitized,
+    unpacked,
+)
 
 pytestmark = needs_compiler
 
@@ -40,3 +51,14 @@ def test_the_whole_life_under_the_sanitizers(fmu: Unpacked, tmp_path: Path) -> N
     arguments = [str(library), *fmu.arguments[1:], *reference(fmu, tmp_path)]
     options = {"ASAN_OPTIONS": "detect_leaks=1:abort_on_error=0", "UBSAN_OPTIONS": "print_stacktrace=1"}
     assert run([host, *arguments], env=os.environ | options) == "done\n"
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="written for Linux")
+def test_threads_do_not_race(fmu: Unpacked, tmp_path: Path) -> None:
+    host = compiled("threads", fmu, tmp_path / "threads", *THREAD_SANITIZED)
+    library = sanitized(fmu, tmp_path / "sanitized.so", THREAD_SANITIZED)
+    inputs, outputs, _, _, table, _ = reference(fmu, tmp_path)
+    printed = run([host, library, *fmu.arguments[1:], inputs, outputs, table])
+    last = pd.read_csv(fmu.folder / "documentation/reference_out.csv")[fmu.named("output")].iloc[-1]
+    np.testing.assert_allclose([float(cell) for cell in printed.split(",")], last, rtol=1e-6, atol=1e-6)

@@ -23,7 +23,8 @@ from tests.contract.native_hosts import COMPILER, SOURCES, Unpacked, compiled, n
 
 AGREEMENT = 1e-9  # of every output, relative to its value or 1
 STEPS = 600
-WINE = shutil.which("wine64", path=f"{os.environ['PATH']}{os.pathsep}/usr/lib/wine") or shutil.which("wine")
+TOOLS = f"{os.environ['PATH']}{os.pathsep}/usr/lib/wine"  # of Debian
+WINE = shutil.which("wine64", path=TOOLS) or shutil.which("wine")
 
 
 @pytest.fixture(scope="module")
@@ -147,11 +148,14 @@ def test_libcosimpy_simulates(fzg_native: Path, fmu: Unpacked, inputs: pd.DataFr
 # ---------------------------------------------------------------------- ecos
 
 
-def test_ecos_simulates(fzg_native: Path, fmu: Unpacked, inputs: pd.DataFrame, expected: np.ndarray) -> None:
+@pytest.mark.parametrize("fixture", ["fzg_native", "fzg_native3"])
+def test_ecos_simulates(
+    fixture: str, fmu: Unpacked, inputs: pd.DataFrame, expected: np.ndarray, request: pytest.FixtureRequest
+) -> None:
     ecospy = ecos()
     names, rows = fmu.named("output"), []
     with ecospy.EcosSimulationStructure() as structure:
-        structure.add_model("gearbox", str(fzg_native))
+        structure.add_model("gearbox", str(request.getfixturevalue(fixture)))
         with ecospy.EcosSimulation(structure=structure, step_size=1.0) as simulation:
             simulation.init()
             for row in inputs.iloc[:-1, 1:].to_dict("records"):
@@ -183,7 +187,8 @@ def played(
     """What ``play.c`` prints."""
     file = folder / "in.csv"
     table.to_csv(file, index=False)
-    columns = [fmu.references(*table.columns[1:]), fmu.references(*fmu.named("output"))]
+    real = "Real" if fmu.description.fmiVersion == "2.0" else "Float64"
+    columns = [fmu.references(*table.columns[1:]), fmu.references(*fmu.named("output", real))]
     text = run([*host, library, *fmu.arguments[1:], *columns, file], **options)
     return np.array([[float(cell) for cell in line.split(",")] for line in text.splitlines()])
 
@@ -236,18 +241,22 @@ def test_two_fmus_are_linked_into_one_program(
 @pytest.mark.slow  # zig compiles its C library for the host first, which takes a minute and a half
 @pytest.mark.skipif(WINE is None, reason="no wine (Debian: wine64)")
 @pytest.mark.skipif(find_spec("ziglang") is None, reason="no ziglang, which cross-compiles")
+@pytest.mark.parametrize("fmi", [2, 3])
 def test_the_windows_library_gives_the_same_under_wine(
-    fmu: Unpacked, inputs: pd.DataFrame, expected: np.ndarray, tmp_path: Path
+    fmu: Unpacked, fzg_native3: Path, inputs: pd.DataFrame, expected: np.ndarray, tmp_path: Path, fmi: int
 ) -> None:
+    names = fmu.named("output")
+    fmu = fmu if fmi == 2 else unpacked(fzg_native3, tmp_path / "fmi3")
     sources = {path.name: path.read_bytes() for path in (fmu.folder / "sources").iterdir()}
     library, host = tmp_path / "fzg.dll", tmp_path / "play.exe"
     library.write_bytes(compile_libraries(sources, "win64").libraries["win64/library.dll"])
     zig = [sys.executable, "-m", "ziglang", "cc", "-target", "x86_64-windows-gnu", "-O1", "-w"]
-    run([*zig, f"-I{fmu.folder / 'sources'}", "-o", host, SOURCES / "play.c"])
+    run([*zig, f"-I{fmu.folder / 'sources'}", "-o", host, SOURCES / ("play.c" if fmi == 2 else "play3.c")])
     environment = os.environ | {"WINEPREFIX": str(tmp_path / "prefix"), "WINEDEBUG": "-all"}
     try:
         found = played([str(WINE), str(host)], fmu, library, inputs, tmp_path, env=environment)
     finally:  # wine leaves its server behind for a while
-        server = shutil.which("wineserver") or "wineserver"
-        subprocess.run([server, "-k"], env=environment, check=False, capture_output=True)
-    assert_agree(found, expected, fmu.named("output"))
+        server = shutil.which("wineserver", path=TOOLS)
+        if server is not None:
+            subprocess.run([server, "-k"], env=environment, check=False, capture_output=True)
+    assert_agree(found, expected, names)

@@ -1,6 +1,6 @@
 """Our own numbers, kept to see any change: losses of the full model, and one cycle of the rig.
 
-``python -m tests.golden.regenerate`` writes the file anew. Do that when the physics changes on purpose, and say so in
+``python -m tests.golden.regenerate`` writes the file again. Do that when the physics changes on purpose, and say so in
 the changelog; never to turn a red test green.
 """
 
@@ -37,7 +37,7 @@ def points() -> dict[str, list[Any]]:
 
 
 def golden() -> dict[str, Any]:
-    """Everything that the file holds, computed anew."""
+    """Everything that the file holds, computed again."""
     gearbox = load_gearbox("fzg")
     losses, at = gearbox.losses(), points()
     power = losses.power(at["speed_rpm"], at["torque_Nm"], at["temperatures_degC"])

@@ -118,6 +118,7 @@ WRONG = {
         "--gearbox box.toml": "box.toml: source is missing",
         "--platforms win46": "platform 'win46' is not known; did you mean 'win64'?",
         "--target python --platforms host": "--platforms is about native FMUs",
+        "--target python --fmi 3": "--fmi is about native FMUs, the Python FMU is FMI 2.0",
         "--couple fram": "'fram' is not a boundary of this network; did you mean 'frame'?",
         "--output file/out": "file/out: cannot be written",
         "--dask nonsense": "no dask scheduler answers at nonsense",

@@ -73,8 +73,8 @@ def test_what_is_assumed_is_told_and_names_are_as_given(
         assert run_cli("simulate", *driver, bare, "--initial", warm, "--output", out) == 0
         shown = capsys.readouterr()
         assert f"wrote {out}" in shown.out
-        told = [line for line in shown.err.splitlines() if line.startswith("note: ")]
-        assert told == [f"note: the cycle has no column {name}; {value} is assumed"
+        noted = [line for line in shown.err.splitlines() if line.startswith("note: ")]
+        assert noted == [f"note: the cycle has no column {name}; {value} is assumed"
                         for name, value in (("T_ambient_degC", 27), ("air_speed_m_s", 2))]  # fmt: skip
 
 
@@ -170,8 +170,8 @@ def test_a_recording_that_needs_a_mapping_is_driven_as_the_plain_one(
     )
     for recording, result in zip((plain, mapped, f"{mapped}@0..100"), results, strict=False):
         assert run_cli("simulate", "--gearbox", "fzg", recording, "--output", result, "--initial", "recorded") == 0
-        told = f"note: {recording}: air_speed_m_s was not recorded" in " ".join(capsys.readouterr().err.split())
-        assert told == (recording is not plain)
+        noted = f"note: {recording}: air_speed_m_s was not recorded" in " ".join(capsys.readouterr().err.split())
+        assert noted == (recording is not plain)
     for result in results[1:3]:
         assert pd.read_csv(result).equals(pd.read_csv(results[0]))
     farm.write_text("time_utc,Ds_avg,Cm_avg,Gost_avg,Git_avg\n" + "".join(

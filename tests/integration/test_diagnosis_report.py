@@ -95,7 +95,7 @@ def test_names_in_the_network_do_not_cover_each_other(browser: Any, folder: Path
 
 def test_pointing_at_a_chart_tells_its_values(browser: Any, folder: Path) -> None:
     opened(browser, folder, "missing_physics")
-    told = browser.execute_script(
+    shown = browser.execute_script(
         "const s = document.querySelector('.sensors svg[data-hover]'), b = s.getBoundingClientRect();"
         "s.dispatchEvent(new PointerEvent('pointermove',"
         " { clientX: b.left + 0.3 * b.width, clientY: b.top + 9, bubbles: true }));"
@@ -103,7 +103,7 @@ def test_pointing_at_a_chart_tells_its_values(browser: Any, folder: Path) -> Non
         "s.parentElement.dispatchEvent(new PointerEvent('pointerleave'));"
         "return [text, document.querySelectorAll('.tip').length];"
     )
-    text, left = told
+    text, left = shown
     assert left == 0
     assert text.startswith("Time in min: ")
     values = {line.rpartition(": ")[0]: float(line.rpartition(": ")[2]) for line in text.splitlines()}

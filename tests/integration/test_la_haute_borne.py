@@ -1,4 +1,4 @@
-"""Two wind-turbine gearboxes of unknown geometry: what ten-minute means over weeks tell about them."""
+"""Two wind-turbine gearboxes of unknown geometry: what ten-minute means over weeks show of them."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from diagnosis.candidates.explain import calibrated
 from diagnosis.recordings.read import read_recordings
 from diagnosis.recordings.recording import Recording
 from diagnosis.results.identifiable import scale_direction, scale_notes
-from diagnosis.results.result import Course, Diagnosis
-from diagnosis.setup.case import prepare
+from diagnosis.results.result import Diagnosis, PredictedRun
+from diagnosis.setup.inference_setup import prepare
 from models.assembly.gearbox import load_gearbox
 
 
@@ -57,7 +57,7 @@ def test_calibration_knows_that_it_has_no_scale(farm):
     assert sd["gears_no_load"] < 0.5
 
 
-def _oil_rmse(courses: Sequence[Course], run: str) -> float:
+def _oil_rmse(courses: Sequence[PredictedRun], run: str) -> float:
     squares = [
         (c.measured["oil"] - getattr(c, run)["oil"])[c.time >= c.counts_from_s] ** 2 for c in courses
     ]  # fmt: skip

@@ -74,7 +74,7 @@ def test_heat_balance_closes(speed: list[float], torque: list[float], gaps: list
 
 
 def test_heat_balance_from_the_output_columns() -> None:
-    """Losses and temperatures as printed, integrated anew by trapezoids over fine rows.
+    """Losses and temperatures as printed, integrated again by trapezoids over fine rows.
 
     Stored heat is capacity times temperature; given off is conductance of the boundary links times difference.
     """

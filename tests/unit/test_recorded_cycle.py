@@ -244,9 +244,9 @@ def test_a_recording_with_gaps_is_refused_and_its_pieces_can_be_named(
     (tmp_path / "mapping.toml").write_text('schema = 1\ncolumns.T_oil_degC = { quantity = "T_oil" }\n')
     with pytest.raises(InputError) as raised:
         read_cycle_or_recording(path, network)
-    told = str(raised.value)
-    assert f"{path}: gaps split it into 4 pieces" in told and "raise max_gap_s" in told
-    named = re.findall(r"run\.csv@\S+", told)
+    refusal = str(raised.value)
+    assert f"{path}: gaps split it into 4 pieces" in refusal and "raise max_gap_s" in refusal
+    named = re.findall(r"run\.csv@\S+", refusal)
     if not dated:
         assert named == ["run.csv@0..121", "run.csv@360..571", "run.csv@780..871"]
     pieces = [read_cycle_or_recording(tmp_path / name, network)[0] for name in named]

@@ -9,16 +9,16 @@ import numpy as np
 from diagnosis.inference.shapes import shape_terms
 from diagnosis.results.result import (
     Calibrated,
-    Course,
     Diagnosis,
     Finding,
     Fits,
     Location,
     MissingHeat,
+    NotDetectable,
     ParameterValue,
+    PredictedRun,
     Ranked,
     Rival,
-    Unseen,
 )
 from models.assembly.gearbox import load_gearbox
 from models.base.types import Array
@@ -150,7 +150,7 @@ def insufficient_data() -> Diagnosis:
         remaining_note="",
         ranking=(),
         unseen=tuple(
-            Unseen(mechanism=one.name, place=one.places[0], needed=one.experiment)
+            NotDetectable(mechanism=one.name, place=one.places[0], needed=one.experiment)
             for one in list(CATALOGUE.values())[:30]
         ),
         next_test="Drive the staircase of speeds at two torques, 18 h, and one cycle with changing load.",
@@ -215,8 +215,8 @@ def _diagnosis(**given: object) -> Diagnosis:
         "misfit": 0.62,
         "floor": "random heat of 0.5 % of the typical loss (140 W) in every part: assumed",
         "unseen": (
-            Unseen(mechanism="aeration", place="oil_gears", needed="hold 20 m/s for three hours"),
-            Unseen(mechanism="hot_neighbour", place="housing_lower", needed="let the rig stand for a night"),
+            NotDetectable(mechanism="aeration", place="oil_gears", needed="hold 20 m/s for three hours"),
+            NotDetectable(mechanism="hot_neighbour", place="housing_lower", needed="let the rig stand for a night"),
         ),
         "next_test": "",
         "missing_heat": (),
@@ -255,7 +255,7 @@ def _law(speed: Array) -> Array:
     return np.asarray(18.43 * (speed / TYPICAL) ** 2.87)
 
 
-def _course(name: str, *, lacking: float, duration: float | None = None, held_out: bool | None = None) -> Course:
+def _course(name: str, *, lacking: float, duration: float | None = None, held_out: bool | None = None) -> PredictedRun:
     usual_duration, usual_role = RECORDINGS.get(name, (600.0, False))
     duration = duration or usual_duration
     rng = np.random.default_rng(len(name))
@@ -271,7 +271,7 @@ def _course(name: str, *, lacking: float, duration: float | None = None, held_ou
         noise = rng.normal(0.0, NOISE, len(time))
         measured[channel] = np.where(rng.random(len(time)) < 0.01, np.nan, np.round(truth + noise, 1))
         before[channel], calibrated[channel], after[channel] = truth - lack, truth - 0.6 * lack + 0.8, truth + 0.1
-    return Course(
+    return PredictedRun(
         recording=name,
         held_out=usual_role if held_out is None else held_out,
         time=time,

@@ -8,9 +8,10 @@ import pytest
 from fmpy.validation import validate_fmu
 
 from builder.fmi.model_description import Identity, model_description
+from builder.fmi.model_description3 import model_description3
 from builder.fmi.signals import SignalTable, signal_table
 from builder.surrogate.train import TrainingResult
-from models.assembly.gearbox import Gearbox
+from models.assembly.gearbox import Gearbox, load_gearbox
 
 IDENTITY = Identity(
     model_name="a < b & c",
@@ -88,6 +89,32 @@ def test_indices_of_the_structure_are_one_based_places(root: ET.Element, table: 
     assert set(unknowns) == {signal.name for signal in table if signal.causality == "output"}
     depends = [names[int(i) - 1] for i in unknowns["oil.T"].get("dependencies", "").split()]
     assert depends == ["initial.uniform", "initial.T", "oil.T_start"]
+
+
+def test_kinds_of_dependencies_are_those_of_the_laws() -> None:
+    """Air follows the ambient temperature; a cell takes its share, a parameter, of the power."""
+    network = load_gearbox("heated_rod").network().with_source(
+        "cell_1", lambda s: s.heater_power * s.T_ambient, name="product"
+    )  # fmt: skip
+    found = {}
+    for version in (model_description, model_description3):
+        root = parsed(version(signal_table(network), IDENTITY))
+        names = [v.get("name") for v in root.find("ModelVariables") or ()]
+        unknowns = [*root.iterfind("ModelStructure/Outputs/Unknown"), *root.iterfind("ModelStructure/Output")]
+        kinds = {
+            names[int(u.get("index", 0)) - 1 if u.get("index") else int(u.get("valueReference", ""))]:
+            u.get("dependenciesKind") for u in unknowns
+        }  # fmt: skip
+        found[version] = {name: kinds[name] for name in ("air.T", "heat.heater_cell_1", "heat.product", "cell_1.T")}
+    assert [*found.values()] == [
+        {"air.T": "constant", "heat.heater_cell_1": "tunable", "heat.product": None, "cell_1.T": None}
+    ] * 2
+
+
+def test_experiment_has_tolerance_and_step(root: ET.Element) -> None:
+    experiment = root.find("DefaultExperiment")
+    assert experiment is not None
+    assert experiment.attrib == {"startTime": "0", "stopTime": "600", "tolerance": "0.0001", "stepSize": "1"}
 
 
 def test_only_what_must_have_a_start_value_has_one(root: ET.Element) -> None:

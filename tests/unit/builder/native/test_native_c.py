@@ -193,7 +193,7 @@ def model(generated: dict[str, str], library: Library) -> ctypes.CDLL:
         EXPORT void chosen(const double *p, double *y) { loss_power_here()(p[0], p[1], p + 2, y); }
         EXPORT void distance(const double *p, double *y) { y[0] = loss_domain_distance(p[0], p[1], p + 2); }
     """
-    beside = ("laws.c", "structure.c", "model_data.c", "loss_networks.c", "loss_networks_avx2.c")
+    beside = ("laws.c", "structure.c", "model_data.c", "loss_networks.c")
     return library(text, files, beside=beside)
 
 

@@ -36,13 +36,16 @@ def test_jacobian_is_the_derivative_of_the_outputs(inputs, hidden, outputs, seed
     parameters = random.normal(size=shapes.count)
     rows = random.uniform(-1.0, 1.0, (7, inputs))
     step = 1e-6
+
+    def outputs_at(point):
+        return predict_rows(shapes.unpack(point), rows)
+
     central = [
-        (predict_rows(shapes, parameters + step * e, rows) - predict_rows(shapes, parameters - step * e, rows)).T
-        / (2.0 * step)
+        (outputs_at(parameters + step * e) - outputs_at(parameters - step * e)).T / (2.0 * step)
         for e in np.eye(shapes.count)
     ]
     values, jacobian = jacobian_transposed(shapes, parameters, rows)
-    np.testing.assert_allclose(values, predict_rows(shapes, parameters, rows).T, rtol=1e-13, atol=1e-13)
+    np.testing.assert_allclose(values, outputs_at(parameters).T, rtol=1e-13, atol=1e-13)
     # central differences: truncation 1e-12, cancellation 1e-16 / 1e-6
     np.testing.assert_allclose(jacobian, central, rtol=0.0, atol=1e-8)
 
@@ -66,7 +69,7 @@ def test_every_step_lowers_the_loss_and_a_known_network_is_recovered():
     shapes = LayerShapes((2, 3, 2, 1))
     rows = random.uniform(-1.0, 1.0, (300, 2))
     teacher = random.normal(size=shapes.count) * 2.0
-    targets = predict_rows(shapes, teacher, rows)
+    targets = predict_rows(shapes.unpack(teacher), rows)
     near = teacher + 0.05 * random.normal(size=shapes.count)
     with ThreadPoolExecutor(1) as pool:
         steps = minimise(shapes, near, rows, targets, pool)

@@ -8,6 +8,7 @@ from zipfile import ZipFile
 
 import numpy as np
 import pytest
+from fmpy import read_model_description, simulate_fmu
 
 from builder.drive import driver as fmu_drive
 from builder.drive.driver import runs_here
@@ -16,7 +17,7 @@ from builder.native.compile import CACHE_VARIABLE, NoCompilerError, host_platfor
 from builder.surrogate.train import TrainingResult
 from builder.workflows import build as builder_build
 from builder.workflows.build import build, cycle_errors
-from models.assembly.gearbox import Gearbox
+from models.assembly.gearbox import Gearbox, load_gearbox
 
 
 def test_errors_over_a_cycle_are_those_of_the_fmu_against_the_model() -> None:
@@ -76,3 +77,18 @@ def test_without_a_compiler_the_python_fmu_is_built_and_one_line_says_how_to_get
     with pytest.raises(NoCompilerError, match="no cc, gcc or clang works here; install ziglang"):
         build(fzg, tmp_path / "native", name="fzg", target="native")
     assert not (tmp_path / "native").exists()
+
+
+@pytest.mark.skipif(native_compile._own_compiler() is None, reason="no C compiler")
+def test_both_versions_of_fmi_are_written_next_to_each_other(tmp_path: Path) -> None:
+    report = build(load_gearbox("heated_rod"), tmp_path, name="rod", target="native", fmi="both")
+    files = [path for path in report.files if path.suffix == ".fmu"]
+    assert [path.name for path in files] == ["rod_native.fmu", "rod_native_fmi3.fmu"]
+    assert [read_model_description(str(path)).fmiVersion for path in files] == ["2.0", "3.0"]
+    assert list(report.cycles) == ["rod_native.fmu"]
+    assert "rod_native_fmi3.fmu is FMI 3.0, needs no other software" in report.purpose
+    names = [f"cell_{i}.T" for i in range(1, 13)]
+    results = [simulate_fmu(str(path), stop_time=600.0, output_interval=60.0, start_values={"heater_power": 20.0},
+                            output=names) for path in files]  # fmt: skip
+    np.testing.assert_array_equal(*results)
+    assert results[0]["cell_1.T"][-1] > results[0]["cell_12.T"][-1] + 1.0

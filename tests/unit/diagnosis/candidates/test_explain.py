@@ -110,11 +110,11 @@ def test_the_error_of_a_mean_heat_is_that_of_the_strength_and_of_what_goes_with_
     assert mean == pytest.approx(np.average(np.abs(heats), weights=steps))
     assert h.term is not None
     value, own_error = found.values_of(h)[h.term.strength.name]
-    told = _with_form(h, found.values_of(h))
+    reported = _with_form(h, found.values_of(h))
     # What is said adds that the form of a law is hardly known to a tenth; its other numbers have none of it, nor has
     # the fault of an instrument, which has no law.
-    assert told[h.term.strength.name] == (value, pytest.approx(np.hypot(own_error, 0.1 * value)))
-    assert all(told[name] == pair for name, pair in found.values_of(h).items() if name != h.term.strength.name)
+    assert reported[h.term.strength.name] == (value, pytest.approx(np.hypot(own_error, 0.1 * value)))
+    assert all(reported[name] == pair for name, pair in found.values_of(h).items() if name != h.term.strength.name)
     fault: Any = SimpleNamespace(of_measurement=True)
     assert _with_form(replace(h, term=fault), found.values_of(h)) == found.values_of(h)
     # The same by many draws from the posterior of the term's parameters.

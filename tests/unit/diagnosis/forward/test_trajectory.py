@@ -49,9 +49,9 @@ def test_tangents_follow_the_losses_where_they_have_to(model: NetworkOnGrid, pie
         losses = model.loss_at(samples, T)
         error = np.abs(tangent.at(T[:, model.loss_nodes]) - losses).sum(axis=1)
         assert (error <= 5e-5 * losses.sum(axis=1) + 1e-9).all()
-        anew = model.loss_tangent(moved, T)
-        unlike = np.abs(tangent.slope - anew.slope).sum(axis=(1, 2))
-        assert (unlike <= 0.2 * np.abs(anew.slope).sum(axis=(1, 2)) + 1e-9).all()
+        renewed = model.loss_tangent(moved, T)
+        unlike = np.abs(tangent.slope - renewed.slope).sum(axis=(1, 2))
+        assert (unlike <= 0.2 * np.abs(renewed.slope).sum(axis=(1, 2)) + 1e-9).all()
 
 
 def test_tangents_of_slow_rows_are_anew_all_together_or_not_at_all(model: NetworkOnGrid, piece: Piece) -> None:
@@ -68,7 +68,7 @@ def test_tangents_of_slow_rows_are_anew_all_together_or_not_at_all(model: Networ
     near = model.loss_tangent(slow, moved(2.0), first)
     np.testing.assert_array_equal(near.power, model.loss_at(slow.samples, moved(2.0)))
     assert near.slope is first.slope
-    assert model.loss_tangent(slow, moved(2.0 + 0.9 * SLOW_NEAR_K), near) is near  # also of one that was anew before
+    assert model.loss_tangent(slow, moved(2.0 + 0.9 * SLOW_NEAR_K), near) is near  # also of one that was renewed before
     far = model.loss_tangent(slow, moved(1.1 * SLOW_REACH_K), first)
     np.testing.assert_array_equal(far.slope, model.loss_tangent(slow, moved(1.1 * SLOW_REACH_K)).slope)
     other = replace(slow, samples=1.001 * slow.samples)

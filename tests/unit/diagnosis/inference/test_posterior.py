@@ -19,7 +19,7 @@ from diagnosis.inference.noise import noise_of
 from diagnosis.inference.posterior import Problem, _gauss_newton
 from diagnosis.inference.unknowns import Unknowns, unknowns_of
 from diagnosis.inference.whitening import Whitening
-from diagnosis.setup.case import Case, floored
+from diagnosis.setup.inference_setup import InferenceSetup, floored
 from models.assembly.gearbox import Gearbox
 from models.base.types import Array
 from models.mechanisms import CATALOGUE, Scale
@@ -124,7 +124,7 @@ def test_a_fit_leaves_a_start_that_only_looks_good(monkeypatch: pytest.MonkeyPat
 def test_the_structural_floor_rises_and_falls_with_what_is_left(
     monkeypatch: pytest.MonkeyPatch, problem: Problem, piece: Piece
 ) -> None:
-    """It is told from the least there is, however often; and a held-out recording is judged by the same."""
+    """It is estimated from the smallest there is, however often; and a held-out recording is judged by the same."""
     clean = calibrated(problem)
     assert clean.problem.floor == 1.0 and floored(clean) is clean
     wander = 1.5 * np.sin(piece.time / 400.0)[:, None] * np.array([0.6, 1.0, 0.8, 0.0])
@@ -157,13 +157,13 @@ def test_an_input_that_follows_a_temperature_is_seen_alike_from_temperatures_alo
     once = shifted.linearise(0, z, None, rounds=8).trajectory
     for _ in range(4):
         once = shifted.linearise(0, z, once, rounds=8).trajectory
-    known, told = (shifted.linearise(0, z, guess, rounds=8) for guess in (once, once.T))
+    known, guided = (shifted.linearise(0, z, guess, rounds=8) for guess in (once, once.T))
     ambient = problem.model.laws.inputs.index("T_ambient")
     moved = [part.trajectory.piece.samples[..., ambient] - problem.pieces[0].samples[..., ambient]
-             for part in (known, told)]  # fmt: skip
+             for part in (known, guided)]  # fmt: skip
     assert np.abs(moved[0]).max() > 1.0
     np.testing.assert_allclose(moved[1], moved[0], atol=0.02)
-    np.testing.assert_allclose(told.residual, known.residual, atol=0.02)
+    np.testing.assert_allclose(guided.residual, known.residual, atol=0.02)
     filters = shifted.with_whitenings([known.whitening])
     assert filters.objective(z, [once.T]) == pytest.approx(filters.objective(z, [once]), rel=0.01)
 
@@ -177,7 +177,7 @@ def test_air_that_nobody_recorded_is_less_certain(problem: Problem) -> None:
 
 def test_judge_prefers_the_truth_and_survives_what_has_no_prediction(fzg: Gearbox, problem: Problem) -> None:
     right = calibrated(problem)
-    case = Case(
+    case = InferenceSetup(
         gearbox=fzg, nominal=fzg.network(), losses=fzg.losses(), scale=Scale.of(fzg), channels=CHANNELS, train=problem,
         holdout=problem, loss_W=250.0, noise_K=0.2,
     )  # fmt: skip

@@ -65,14 +65,14 @@ def test_prediction_does_not_see_what_was_measured_later(
         z[index[set_point]] = unknowns.items[index[set_point]].z(43.0)  # switches within this ride
     late = piece.time > piece.time[0] + START_S
     lied = replace(piece, measured=np.where(late[:, None], piece.measured - 4.0, piece.measured))
-    told, deceived = (
+    correct, deceived = (
         predict(problem.changed(model=model, unknowns=unknowns, pieces=[given]), 0, z) for given in (piece, lied)
     )
-    np.testing.assert_array_equal(told.read, deceived.read)
-    again = predict(problem.changed(model=model, unknowns=unknowns), 0, z, guess=told.trajectory.T + 5.0)
+    np.testing.assert_array_equal(correct.read, deceived.read)
+    again = predict(problem.changed(model=model, unknowns=unknowns), 0, z, guess=correct.trajectory.T + 5.0)
     temperatures = [i for i, channel in enumerate(piece.channels) if channel != "P_loss"]
-    np.testing.assert_allclose(again.read[:, temperatures], told.read[:, temperatures], atol=0.02)
-    np.testing.assert_allclose(again.read, told.read, rtol=1e-3)  # the loss, of which straight lines know 1e-4
+    np.testing.assert_allclose(again.read[:, temperatures], correct.read[:, temperatures], atol=0.02)
+    np.testing.assert_allclose(again.read, correct.read, rtol=1e-3)  # the loss, of which straight lines know 1e-4
     learnt = [
         problem.changed(model=model, unknowns=unknowns, pieces=[given]).linearise(0, z, None, rounds=6).trajectory.T
         for given in (piece, lied)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import re
 import subprocess
 import sys
@@ -13,7 +14,6 @@ import pandas as pd
 import pytest
 
 import diagnosis
-from diagnosis.recordings.cleaning import bridged, dropouts, outliers, resolution_of, stuck_rows
 from diagnosis.recordings.read import read_recordings
 from diagnosis.recordings.recording import Recording
 from diagnosis.recordings.shared_rows import check_shared_rows
@@ -144,6 +144,18 @@ def test_columns_that_nothing_asks_for_are_noted(tmp_path: Path, network: Therma
     many = table().assign(**{f"x{i}": 1.0 for i in range(15)})
     (note,) = (n for n in read(write(tmp_path / "many.csv", many), network).notes if "not used" in n)
     assert note.endswith("x11 and 3 more")
+
+
+def test_an_impossible_value_of_a_computed_quantity_is_missing(tmp_path: Path, network: ThermalNetwork) -> None:
+    """The table of quantities has the range of the output torque; another column has none."""
+    kept = "".join(f'[columns.{name}]\nquantity = "auxiliary"\n' for name in ("torque_out_Nm", "pump"))
+    wrong = np.array([-1e9, 1e9, *[50.0] * 198])
+    recording = read(write(tmp_path / "run.csv", table().assign(torque_out_Nm=wrong, pump=wrong)), network, kept)
+    np.testing.assert_array_equal(recording.auxiliary["torque_out_Nm"], [np.nan, np.nan, *wrong[2:]])
+    np.testing.assert_array_equal(recording.auxiliary["pump"], wrong)
+    assert any(
+        note.startswith("torque_out_Nm: 2 values (rows 1-2) outside -1e+08 ... 1e+08 N m") for note in recording.notes
+    )
 
 
 def test_parts_of_a_file(tmp_path: Path, network: ThermalNetwork) -> None:
@@ -298,46 +310,7 @@ def test_gaps_split_and_short_holes_are_bridged(tmp_path: Path, network: Thermal
     assert longer.segments == (slice(0, 180),)
 
 
-def test_a_slowly_sampled_input_is_no_row_of_holes() -> None:
-    time = np.arange(0.0, 1000.0, 10.0)
-    values = np.where(np.arange(100) % 20 == 0, time, np.nan)
-    filled, known = bridged(time, values, 60.0)
-    np.testing.assert_allclose(filled[:81], time[:81])
-    assert known.all()
-
-
-def test_outliers_go_and_steps_waves_and_noise_stay() -> None:
-    rng = np.random.default_rng(0)
-    values = 40.0 + rng.normal(0.0, 0.2, 500)
-    values[200:] += 30.0
-    values[300:360] += 12.0 * np.sin(np.linspace(0.0, np.pi, 60))
-    assert not outliers(values, least=8.0).any()
-    values[[100, 250, 251, 400]] += [60.0, -50.0, -50.0, 9.0]
-    assert np.flatnonzero(outliers(values, least=8.0)).tolist() == [100, 250, 251, 400]
-
-
-def test_the_top_of_a_sharp_wave_is_no_outlier() -> None:
-    """From a nacelle's temperature while a fan runs, ten minutes from row to row."""
-    values = np.concatenate([np.full(30, 28.0), [27.85, 15.94, 11.88, 13.78, 20.4], np.full(30, 26.0)])
-    values += 0.3 * np.sin(np.arange(len(values)))
-    assert not outliers(values, least=8.0).any()
-
-
-def test_dropouts_to_a_constant_go_and_a_hanging_sensor_stays() -> None:
-    values = 60.0 + 0.1 * (np.arange(400) % 7)
-    values[100:150] = 0.0
-    values[300:] = values[300]
-    values[200:220] = [80.0] * 10 + [100.0] * 10  # a start in steps, not away and back
-    values[220:] += 60.0
-    assert np.flatnonzero(dropouts(values)).tolist() == list(range(100, 150))
-    time = 60.0 * np.arange(400.0)
-    other = 40.0 + 0.05 * np.arange(400.0)
-    first, end, which, moved = stuck_rows(time, {"oil": values, "pinion": other})["oil"]
-    assert (first, end, which) == (300, 400, "pinion")
-    assert moved == pytest.approx(99 * 0.05)
-
-
-def test_cleaning_is_told_with_rows(tmp_path: Path, network: ThermalNetwork) -> None:
+def test_cleaning_is_reported_with_rows(tmp_path: Path, network: ThermalNetwork) -> None:
     source = table()
     source.loc[30, "T_oil_degC"] = -999.0
     source.loc[60, "T_pinion_degC"] = 180.0
@@ -347,12 +320,6 @@ def test_cleaning_is_told_with_rows(tmp_path: Path, network: ThermalNetwork) -> 
     notes = "\n".join(recording.notes)
     assert "T_oil_degC: 1 of 200 values (row 31) outside" in notes
     assert "T_pinion_degC: 1 outliers and dropouts in row 61" in notes
-
-
-@pytest.mark.parametrize("quantum", [0.1, 0.0625, 1.0, 0.25 * 5.0 / 9.0])
-def test_the_resolution_is_found(quantum: float) -> None:
-    values = quantum * np.round(np.random.default_rng(0).normal(300.0, 20.0, 500) / quantum)
-    assert resolution_of(values) == pytest.approx(quantum, rel=1e-5)
 
 
 def test_a_comment_between_rows_is_skipped_and_a_hash_in_a_cell_is_not(tmp_path: Path, network: ThermalNetwork) -> None:
@@ -441,6 +408,9 @@ def test_files_of_one_recording_are_joined_in_the_order_of_time(tmp_path: Path, 
     np.testing.assert_array_equal(joined.time, whole.time)
     np.testing.assert_array_equal(channel(joined, "oil"), channel(whole, "oil"))
     assert joined.segments == (slice(0, 200),)
+    digests = [hashlib.sha256(path.read_bytes()).hexdigest() for path in (first, second)]
+    assert read(first, network).sha256 == digests[0]
+    assert joined.sha256 == hashlib.sha256("".join(digests).encode()).hexdigest()
     part = read(f"{first}+{second}@1000..1500", network)
     assert (part.from_s, part.to_s, len(part.time)) == (1000.0, 1490.0, 50)
 
@@ -458,6 +428,18 @@ def test_files_that_overlap_are_refused(tmp_path: Path, network: ThermalNetwork)
     first, second = write(tmp_path / "a.csv", source[:120]), write(tmp_path / "b.csv", source[110:])
     with pytest.raises(InputError, match=r"b.csv: begins at 1100, before .*a.csv ends at 1190 .* follow each other"):
         read(f"{first}+{second}", network)
+
+
+def test_files_of_two_clocks_are_refused(tmp_path: Path, network: ThermalNetwork) -> None:
+    source = table()
+    dated = source[120:].assign(time=pd.to_datetime(source["time_s"], unit="s", utc=True).map(lambda t: t.isoformat()))
+    first = write(tmp_path / "a.csv", source[:120])
+    second = write(tmp_path / "b.csv", dated.drop(columns="time_s"))
+    with pytest.raises(InputError, match=r"b.csv: its time \(time\) and .*a.csv \(time_s\) are not of one kind"):
+        read(f"{first}+{second}", network)
+    without = write(tmp_path / "c.csv", source[120:].drop(columns="time_s"))
+    with pytest.raises(InputError, match=r"c.csv: .*time"):
+        read(f"{first}+{without}", network)
 
 
 def test_a_file_whose_name_has_a_plus_or_an_at_is_a_file(tmp_path: Path, network: ThermalNetwork) -> None:

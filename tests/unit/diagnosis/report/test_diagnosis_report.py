@@ -46,7 +46,7 @@ class Text(HTMLParser):
         self.open: list[str] = []
         self.faults: list[str] = []
         self.feed(source)
-        self.told = " ".join(" ".join(self.words).split())
+        self.plain = " ".join(" ".join(self.words).split())
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         if tag not in self.VOID:
@@ -84,7 +84,7 @@ def test_a_page_is_whole_and_needs_nothing_else(pages: dict[str, str], name: str
 
 @pytest.mark.parametrize("name", EXAMPLES)
 def test_the_verdict_stands_first_and_no_number_is_broken(pages: dict[str, str], name: str) -> None:
-    text, diagnosis = Text(pages[name]).told, EXAMPLES[name]()
+    text, diagnosis = Text(pages[name]).plain, EXAMPLES[name]()
     assert text.index(diagnosis.verdict_text) < 200
     assert not re.search(r"\b(nan|None|inf|Undefined)\b", text)
     assert "degC" not in text
@@ -94,22 +94,22 @@ def test_the_verdict_stands_first_and_no_number_is_broken(pages: dict[str, str],
 
 def test_errors_are_told_for_every_sensor_of_both_sets() -> None:
     diagnosis = missing_physics()
-    text = Text(page(diagnosis)).told
+    text = Text(page(diagnosis)).plain
     for fits in (diagnosis.train, diagnosis.holdout):
         for errors in fits.sensors.values():
             assert " ".join(fixed(value) for value in errors) in text
     assert "total loss W 40.00 22.00 6.00" in text
-    nothing_held_out = Text(page(insufficient_data())).told
+    nothing_held_out = Text(page(insufficient_data())).plain
     assert "No recording was held out" in nothing_held_out
 
 
 def test_without_a_finding_nothing_is_said_to_be_found(pages: dict[str, str]) -> None:
     for name in ("consistent", "insufficient_data"):
-        text = Text(pages[name][: pages[name].index('<section id="words">')]).told
+        text = Text(pages[name][: pages[name].index('<section id="words">')]).plain
         for never in ("What was found", "with what was found", "Missing heat", "pointed out"):
             assert never not in text, never
-    assert "Below the threshold" in Text(pages["consistent"]).told
-    assert "none: it is in the recording, not in the gearbox" in Text(pages["sensor_fault"]).told
+    assert "Below the threshold" in Text(pages["consistent"]).plain
+    assert "none: it is in the recording, not in the gearbox" in Text(pages["sensor_fault"]).plain
 
 
 def test_every_explained_word_is_among_the_words(pages: dict[str, str]) -> None:
@@ -137,7 +137,7 @@ def test_pieces_of_one_recording_are_told_apart_and_counted_once() -> None:
     base = consistent()
     diagnosis = replace(base, courses=(base.courses[0], base.courses[0], base.courses[2]))
     assert [panel.title for panel in courses(diagnosis)] == ["hold_1", "train_1, part 1", "train_1, part 2"]
-    assert "from 2 recordings" in Text(page(diagnosis)).told
+    assert "from 2 recordings" in Text(page(diagnosis)).plain
 
 
 def test_a_parameter_out_of_its_prior_is_told_as_one() -> None:
@@ -146,7 +146,7 @@ def test_a_parameter_out_of_its_prior_is_told_as_one() -> None:
         base.findings[0], mechanism="parameter", place="h_air", node="housing_lower", kind="parameter", term=None,
         equation="", says="The parameter h_air is 3.1, far from what the definition allows.",
     )  # fmt: skip
-    text = Text(page(replace(base, verdict="parameter_error", findings=(finding,)))).told
+    text = Text(page(replace(base, verdict="parameter_error", findings=(finding,)))).plain
     assert "parameter h air" in text
     assert "parameter at" not in text
 
@@ -155,7 +155,7 @@ def test_a_recording_without_values_does_not_break_the_page() -> None:
     base = consistent()
     course = base.courses[0]
     nothing = {channel: np.full(len(course.time), np.nan) for channel in CHANNELS}
-    text = Text(page(replace(base, courses=(replace(course, measured=nothing),)))).told
+    text = Text(page(replace(base, courses=(replace(course, measured=nothing),)))).plain
     assert f"RMSE {NONE} → {NONE} K" in text
     assert "Simulated less measured" in text
 

@@ -31,8 +31,8 @@ def test_the_ranking_holds_everything_that_was_scored() -> None:
     )  # fmt: skip
     search_found: Any = SimpleNamespace(stages=[stage])
     ranked = assemble._ranking(search_found)
-    told = [(r.mechanism, r.log_bayes) for r in ranked]
-    assert told == [("tank", 55.0), ("fan", 35.0), ("wear", 44.0), ("feed", -2.0)]
+    reported = [(r.mechanism, r.log_bayes) for r in ranked]
+    assert reported == [("tank", 55.0), ("fan", 35.0), ("wear", 44.0), ("feed", -2.0)]
     assert ranked[0].probability == pytest.approx(stage.probabilities()[0])
     assert ranked[2].probability == ranked[3].probability == 0.0
 
@@ -114,10 +114,10 @@ def test_a_parameter_found_far_off_is_told_by_the_prior_of_the_definition(fzg: G
     fit: Any = SimpleNamespace(z=z, unknowns=wide, covariance=np.eye(len(z)))
     case: Any = SimpleNamespace(train=problem)
     final = Explanation(problem=problem, fit=fit, log_evidence=0.0)
-    told = {c.parameter: c for c in assemble._calibration(case, final)}
-    assert told["h_air"].value == pytest.approx(float(np.exp(6.0 * item.parameter.sd)))
-    assert told["h_air"].shift_in_sd == pytest.approx(6.0)
-    assert told["mesh"].shift_in_sd == 0.0
+    reported = {c.parameter: c for c in assemble._calibration(case, final)}
+    assert reported["h_air"].value == pytest.approx(float(np.exp(6.0 * item.parameter.sd)))
+    assert reported["h_air"].shift_in_sd == pytest.approx(6.0)
+    assert reported["mesh"].shift_in_sd == 0.0
 
 
 @pytest.mark.parametrize(("verdict", "assumed", "said"), [

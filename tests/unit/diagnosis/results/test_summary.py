@@ -25,10 +25,10 @@ def test_a_rival_that_the_held_out_recordings_refused_is_not_told_as_one_among_o
     found = missing_physics()
     (finding,) = found.findings
     first, *rest = finding.confusable_with
-    told = replace(finding, probability=0.1, confusable_with=(replace(first, probability=0.21), *rest))
-    lines = [line.strip() for line in replace(found, findings=(told,)).summary()]
+    reported = replace(finding, probability=0.1, confusable_with=(replace(first, probability=0.21), *rest))
+    lines = [line.strip() for line in replace(found, findings=(reported,)).summary()]
     assert any(line.startswith(f"{AHEAD}: {first.mechanism} at {first.place} (0.21)") for line in lines)
-    near = replace(told, confusable_with=(replace(first, probability=0.19), *rest))
+    near = replace(reported, confusable_with=(replace(first, probability=0.19), *rest))
     assert AHEAD not in str(replace(found, findings=(near,)))
 
 
@@ -40,8 +40,8 @@ def test_what_is_nearest_to_something_without_a_name_is_told() -> None:
         )
     )  # fmt: skip
     nameless = replace(unexplained(), findings=(), ranking=ranking)
-    told = f"Most like: open_after_faster_loss at mesh (0.65), open_torque_loss at mesh (0.33); {NOT_ACCEPTED}"
-    assert told in nameless.summary()
+    reported = f"Most like: open_after_faster_loss at mesh (0.65), open_torque_loss at mesh (0.33); {NOT_ACCEPTED}"
+    assert reported in nameless.summary()
     shown = page(nameless)
     assert "<b>Most like:</b> open form (after faster, a loss) at mesh (0.65)" in shown
     assert NOT_ACCEPTED in shown

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from pathlib import Path
 
 import numpy as np
@@ -20,12 +21,19 @@ from models.base.errors import InputError
     (350.0, 16e6, "is P_loss in kW, or torque in N mm"),
     (350e3, 16_000.0, "P_loss in mW"),
     (0.0, 16_000.0, "P_loss is 0"),
+    (12_000.0, 16_000.0, ""),  # at the limits: all of the power, and 0.02 % of it
+    (20_000.0, 16_000.0, "P_loss in mW"),
+    (5.0, 16_000.0, ""),
+    (2.0, 16_000.0, "99.9875 % is not possible"),
     (120.0, 40.0, ""),  # drag of an idling gearbox: no row exceeds the nominal loss
     (900.0, 16.0, "torque in kN m"),
 ])  # fmt: skip
 def test_power_balance(loss: float, power: float, says: str) -> None:
     found = loss_problem(np.full(60, loss), np.full(60, power), np.full(60, 100.0))
     assert says in found and bool(found) == bool(says)
+
+
+PARTS = ("T_oil", "T_housing", "T_bearing", "T_pinion")
 
 
 def read_train(folder: Path) -> pd.DataFrame:
@@ -38,9 +46,16 @@ def read_train(folder: Path) -> pd.DataFrame:
     ("time_s", 1.0 / 3600.0, 0.0, True),
     ("T_", 1.8, 32.0, True),
     ("T_", 0.9, 0.0, False),  # a gearbox that stays cooler
+    (PARTS, 1.6, 0.0, False),  # or gets hotter: 32 K off, but 0.32 of the rise
 ])  # fmt: skip
 def test_units_that_the_model_shows(
-    tmp_path: Path, fzg: Gearbox, recordings_folder: Path, column: str, factor: float, offset: float, refused: bool
+    tmp_path: Path,
+    fzg: Gearbox,
+    recordings_folder: Path,
+    column: str | tuple[str, ...],
+    factor: float,
+    offset: float,
+    refused: bool,
 ) -> None:
     source = read_train(recordings_folder).drop(columns="P_loss_W")
     for name in source.columns:
@@ -55,16 +70,22 @@ def test_units_that_the_model_shows(
         check_plausible(recordings, fzg.network(), fzg.losses())
 
 
-@pytest.mark.parametrize("torque", [0.05, 0.3, 1.0])
-def test_a_recording_with_small_torque_is_accepted(tmp_path: Path, fzg: Gearbox, torque: float) -> None:
-    """A real drag test: as the nominal model behaves."""
-    time = np.arange(0.0, 7200.0, 10.0)
+@pytest.mark.parametrize(("torque", "unit", "says"), [
+    (0.05, 1.0, ""), (0.3, 1.0, ""), (1.0, 1.0, ""), (80.0, 1.0, ""),
+    (80.0, 1e-3, "run.csv: P_loss is .* is P_loss in kW"),
+])  # fmt: skip
+def test_a_measured_loss(tmp_path: Path, fzg: Gearbox, torque: float, unit: float, says: str) -> None:
+    """From a drag test to load, as the nominal model behaves; refused if it is in kW."""
+    time = np.arange(0.0, 7200.0, 60.0)
     cycle = {"time_s": time, "speed_rpm": np.full(len(time), 1500.0), "torque_Nm": np.full(len(time), torque)}
     result = fzg.network().simulate(cycle, losses=fzg.losses(), initial=20.0).columns()
     kept = ("time_s", "speed_rpm", "torque_Nm", "T_ambient_degC", "T_oil_degC", "T_pinion_degC", "P_loss_W")
-    pd.DataFrame({name: result[name] for name in kept}).to_csv(tmp_path / "run.csv", index=False)
+    run = pd.DataFrame({name: result[name] for name in kept})
+    run["P_loss_W"] *= unit
+    run.to_csv(tmp_path / "run.csv", index=False)
     recordings = read_recordings([tmp_path / "run.csv"], fzg.network())
-    check_plausible(recordings, fzg.network(), fzg.losses())
+    with pytest.raises(InputError, match=says) if says else nullcontext():
+        check_plausible(recordings, fzg.network(), fzg.losses())
 
 
 def test_recordings_of_a_foreign_plant_are_plausible(fzg: Gearbox, recordings_folder: Path) -> None:

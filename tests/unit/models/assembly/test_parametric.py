@@ -304,7 +304,7 @@ def test_a_switching_that_no_row_shows_does_not_send_learning_astray(monkeypatch
 @pytest.mark.parametrize(("above", "cold", "hot"), [(1.0, 0.0, 1.0), (0.0, 1.0, 0.0)])
 def test_coolers_and_heaters_switch_the_other_way_round_also_in_means(above, cold, hot):
     memory = two_point("valve", above=above)
-    for law in (memory.update, memory.blurred):
+    for law in (memory.update, memory.averaged_update):
         for T, was, then in ((40.0, 0.0, cold), (40.0, 1.0, cold), (70.0, 0.0, hot), (70.0, 1.0, hot),
                              (55.0, 0.0, 0.0), (55.0, 1.0, 1.0)):  # fmt: skip
             signals = SimpleNamespace(T_oil=sp.Float(T), valve=sp.Float(was), set_point=55.0, band=6.0)

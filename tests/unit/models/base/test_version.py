@@ -1,4 +1,4 @@
-"""The version and the licence are this program's, whatever lies beside it."""
+"""The version and the licence are this program's, whatever lies next to it."""
 
 from __future__ import annotations
 

@@ -69,6 +69,16 @@ FAULTS = [
     ("value = 7200.0", "value = 7.2", "housing.density_kg_m3: 7.2 kg/m3 900 to 12000 kg/m3 were g/cm3 meant?"),
     ("value = 0.45,", "value = 45,", "housing.part 'housing_lower'.area_fraction: 45 was percent meant?"),
     ("value = 0.024, sd", "value = 24.0, sd", "housing.wall_thickness_m: 24 m 0.3 m were millimetres meant?"),
+    # fractions and coefficients
+    ("poisson = 0.3", "poisson = 0.6", "stage.material.poisson: 0.6 is above 0.49 (plausible: 0 to 0.49)"),
+    ("value = 0.9, sd = 0.05", "value = 1.2, sd = 0.05", "housing.emissivity: 1.2 is above 1 (plausible: 0 to 1)"),
+    ("value = 0.55, source", "value = 1.55, source", "housing.part 'housing_upper'.area_fraction: 1.55 is above 1"),
+    ("load_share = { value = 0.5,", "load_share = { value = -0.5,", "bearing 'bearing_1'.load_share: -0.5 is below 0"),
+    ("value = 0.0863,", "value = 0.863,", "stage.friction.mu_solid: 0.863 is above 0.3"),
+    ("mu_EHL = { value = 0.02,", "mu_EHL = { value = 0.6,", "bearing 'bearing_1'.mu_EHL: 0.6 is above 0.5"),
+    ("value = 3.0e-8,", "value = 3.0e-2,", "bearing 'bearing_1'.K_rs: 0.03 is above 1e-06"),
+    ("R1 = { value = 1.0e-6", "R1 = { value = 1.0", "bearing 'bearing_1'.R1: 1 is above 0.0001"),
+    ("value = 1.6, sd = 0.3", "value = -1.6, sd = 0.3", "seal 'seal_1'.temperature_coefficient: -1.6 is below 0"),
     # annotations
     ("sd = 0.01,", "sd = -0.01,", "stage.friction.mu_solid: sd must be a number above 0 or a text such as '20 %'"),
     ("sd = 0.01,", 'sd = "10",', "stage.friction.mu_solid: sd must be a number above 0"),
@@ -80,6 +90,7 @@ FAULTS = [
     ('named = "FZG_mineral_32"', 'named = "FZG_mineral_46"', "oil.named: 'FZG_mineral_46'; 'FZG_mineral_32'?"),
     ('named = "FZG_mineral_32"', "named = 32", "oil.named: must be a text, not 32"),
     ('like = "bearing_1"', 'like = "bearing_l"', "bearing 'bearing_2'.like: 'bearing_l' ; did you mean 'bearing_1'?"),
+    ('name = "bearing_1"\n', "", "bearing 'bearing_2'.like: 'bearing_1' is no earlier bearing"),
     ('like = "bearing_1"', 'like = "bearing_2"', "bearing 'bearing_2'.like: 'bearing_2' is no earlier bearing"),
     # within a table
     ("[oil]", "[oil]\nviscosity_points = [[40.0, 5.45], [100.0, 32.63]]", "oil: 32.63 mm2/s at 100 degC hotter"),
@@ -97,14 +108,18 @@ FAULTS = [
     ("helix_angle_deg = 0.0", "helix_angle_deg = 15.0", "stage: helix_angle_deg = 15: not supported yet"),
     ("value = [0.182, 0.172]", "value = [-0.4, 0.754]", "stage: gear pair: profile shift -0.4 undercuts"),
     ("center_distance_mm = 91.5", "center_distance_mm = 80.0", "stage: gear pair: centre distance 80 mm"),
-    ("value = [30.0, 30.0]", "value = [63.0, 30.0]", "stage: bore_mm of 'pinion' is 63, root diameter 62.39 mm"),
+    ("value = [30.0, 30.0]", "value = [62.4, 30.0]", "stage: bore_mm of 'pinion' is 62.4, root diameter 62.39 mm"),
     ('driven = "shaft_2"', 'driven = "shaft_1"', "stage: driver and driven are both 'shaft_1'"),
     ("diameter_mm = 90.0", "diameter_mm = 30.0", "bearing 'bearing_1': outside_diameter_mm = 30 bore_mm = 30"),
     ("diameter_mm = 90.0", "diameter_mm = 900.0", "bearing 'bearing_1': outside_diameter_mm = 900 is 30 times 5"),
     ("value = 0.45,", "value = 0.4,", "housing: area_fraction sum to 0.95, not to 1"),
     ("value = [1.0, 6500.0]", "value = [6500.0, 1.0]", "training: speed_rpm: lower bound 6500 upper bound 1"),
     # between tables
-    ("value = 24.0, sd =", "value = 64.0, sd =", "shaft 'shaft_1'.diameter_mm: 64 mm root diameter 62.39 mm 'pinion'"),
+    (
+        "value = 24.0, sd =",
+        "value = 62.4, sd =",
+        "shaft 'shaft_1'.diameter_mm: 62.4 mm root diameter 62.39 mm 'pinion'",
+    ),
     ('driven = "shaft_2"', 'driven = "shaft2"', "stage.driven: no shaft 'shaft2'; did you mean 'shaft_2'?"),
     (
         'name = "bearing_1"\nshaft = "shaft_1"',

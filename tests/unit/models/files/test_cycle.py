@@ -77,8 +77,8 @@ def test_an_optional_column_under_another_name_is_not_lost(name: str, meant: str
     says = rf"run.csv: column {re.escape(name)} is not known; is {meant} meant\? rename it, or remove it"
     with pytest.raises(InputError, match=says):
         Cycle.from_columns({**GOOD, name: [1.0, 2.0]}, name="run.csv", extra=("valve_opening",))
-    beside = Cycle.from_columns({**GOOD, name: [1.0, 2.0], meant: [3.0, 4.0]}, extra=("valve_opening",))
-    assert [3.0, 4.0] in [values.tolist() for values in beside.inputs.values()]
+    both = Cycle.from_columns({**GOOD, name: [1.0, 2.0], meant: [3.0, 4.0]}, extra=("valve_opening",))
+    assert [3.0, 4.0] in [values.tolist() for values in both.inputs.values()]
 
 
 @pytest.mark.parametrize(("name", "meant"), [("Time_s", "time_s"), ("Speed", "speed_rpm"), ("torque_NM", "torque_Nm")])

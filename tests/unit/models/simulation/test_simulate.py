@@ -30,9 +30,9 @@ def test_starts_at_ambient_unless_told() -> None:
     assert {float(T[0]) for T in result.temperatures.values()} == {14.0}
     assert result.temperatures["air"].tolist() == [14.0, 15.0, 16.0]
     by_name = {part.name: 30.0 + i for i, part in enumerate(NETWORK.parts)}
-    told = NETWORK.simulate(CYCLE, losses=LOSSES, initial=by_name)
-    assert {name: float(told.temperatures[name][0]) for name in by_name} == by_name
-    assert float(told.temperatures["air"][0]) == 27.0  # the definition's ambient
+    started = NETWORK.simulate(CYCLE, losses=LOSSES, initial=by_name)
+    assert {name: float(started.temperatures[name][0]) for name in by_name} == by_name
+    assert float(started.temperatures["air"][0]) == 27.0  # the definition's ambient
 
 
 def test_columns_follow_the_file_contract() -> None:
@@ -167,9 +167,9 @@ def test_range_of_the_full_model_is_that_of_its_surrogate(fzg_training: Training
 
 def test_a_full_model_outside_the_named_range_says_so() -> None:
     cycle = {**CYCLE, "speed_rpm": [0.0, 500.0, 500.0], "torque_Nm": [0.0, 100.0, 9000.0]}
-    told = NETWORK.simulate(cycle, losses=LOSSES, initial=20.0, trained=GEARBOX.training)
-    assert told.columns()["in_domain"].tolist() == [True, True, False]
-    assert told.domain_distance[2] == pytest.approx((9000.0 - 350.0) / 349.0)
+    started = NETWORK.simulate(cycle, losses=LOSSES, initial=20.0, trained=GEARBOX.training)
+    assert started.columns()["in_domain"].tolist() == [True, True, False]
+    assert started.domain_distance[2] == pytest.approx((9000.0 - 350.0) / 349.0)
     cold = NETWORK.simulate(CYCLE, losses=LOSSES, initial=-30.0, trained=GEARBOX.training)
     assert not cold.columns()["in_domain"][0]
     assert NETWORK.simulate(cycle, losses=LOSSES, initial=20.0).columns()["in_domain"].all()

@@ -128,17 +128,27 @@ def test_numeric_factors_simulate_as_well() -> None:
     ("name", "shift"), [("torque", 20.0), ("speed", -500.0), ("T_ambient", 6.0), ("air_speed", -1.0)]
 )
 def test_a_shifted_input_is_seen_everywhere(name: str, shift: float) -> None:
-    """Losses, laws and boundaries, so that nothing differs from giving the shifted input."""
+    """Losses, laws, boundaries and memories, so that nothing differs from giving the shifted input."""
+    network = (
+        NETWORK.with_state("worn", start=0.0, rate=lambda s: 1e-9 * s.speed * s.torque)
+        .with_state("on", start=0.0, update=lambda s: sp.Piecewise((1.0, s.T_oil - s.T_ambient > 25.0), (s.on, True)))
+        .with_source("oil", lambda s: 100.0 * s.worn - 20.0 * s.on * s.air_speed, name="extra")
+    )
     point = {"speed": 2165.7, "torque": 94.1, "T_ambient": 27.0, "air_speed": 2.0}
-    shifted = NETWORK.with_signal_shift(name, lambda s: 0.75 * shift).with_signal_shift(name, lambda s: 0.25 * shift)
+    shifted = network.with_signal_shift(name, lambda s: 0.75 * shift).with_signal_shift(name, lambda s: 0.25 * shift)
     cycle = {f"{key}{unit}": [point[key]] * 3 for key, unit in UNITS.items()} | {"time_s": [0.0, 600.0, 1800.0]}
     truth = cycle | {f"{name}{UNITS[name]}": [point[name] + shift] * 3}
     given = shifted.simulate(cycle, losses=GEARBOX.losses(), initial=40.0)
-    meant = NETWORK.simulate(truth, losses=GEARBOX.losses(), initial=40.0)
+    meant = network.simulate(truth, losses=GEARBOX.losses(), initial=40.0)
     for node in NETWORK.node_names:
         np.testing.assert_allclose(given.temperatures[node], meant.temperatures[node], rtol=1e-9)
     np.testing.assert_allclose(given.loss, meant.loss, rtol=1e-9)
     np.testing.assert_allclose(given.domain_distance, meant.domain_distance)
+
+
+def test_a_shift_reaches_the_update_for_mean_temperatures() -> None:
+    network = NETWORK.with_state("on", start=0.0, update=0.0, averaged_update=symbol("T_ambient") + 1.0)
+    assert network.with_signal_shift("T_ambient", 6.0).states[0].averaged_update == symbol("T_ambient") + 7.0
 
 
 def test_the_domain_is_that_of_what_the_losses_see() -> None:

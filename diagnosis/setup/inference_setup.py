@@ -32,7 +32,7 @@ FLOOR_GAIN = 10.0  # log evidence that a higher floor has to bring
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Case:
+class InferenceSetup:
     """A gearbox and its recordings.
 
     Attributes
@@ -65,7 +65,7 @@ class Case:
 
 def prepare(
     gearbox: Gearbox, recordings: Sequence[Recording], holdout: Sequence[Recording], *, even: bool = False
-) -> Case:
+) -> InferenceSetup:
     """Set up the inference.
 
     Parameters
@@ -108,7 +108,7 @@ def prepare(
             [start_guess(model, p) for p in cut],
         ))  # fmt: skip
     noises = [white[name] for name in channels if not is_total_loss(name)]
-    return Case(
+    return InferenceSetup(
         gearbox=gearbox, nominal=nominal, losses=losses, scale=scale, channels=channels, train=problems[0],
         holdout=problems[1], loss_W=loss_W, noise_K=float(np.median(noises)) if noises else 0.0,
     )  # fmt: skip
@@ -223,7 +223,7 @@ def _evidence(explanation: Explanation, times: float) -> float:
     return -0.5 * (quadratic + float(np.linalg.slogdet(normal)[1]) + determinant)
 
 
-def first(case: Case) -> Explanation:
+def first(case: InferenceSetup) -> Explanation:
     """The calibrated model, judged by the floor that it asks for."""
     return floored(calibrated(case.train))
 

@@ -10,7 +10,7 @@ import pytest
 
 from diagnosis.candidates.explain import calibrated
 from diagnosis.recordings.recording import Channel, Recording
-from diagnosis.setup.case import HELD_OUT_SHARE, START_S, prepare, split
+from diagnosis.setup.inference_setup import HELD_OUT_SHARE, START_S, prepare, split
 from models.assembly.gearbox import Gearbox
 from models.files.cycle import Cycle
 
