@@ -20,7 +20,7 @@ import sympy as sp
 from models.base.errors import InputError, did_you_mean
 from models.network.laws import symbol
 from models.portable.surrogate import SurrogateLosses
-from models.quantities.quantities import GEARBOX_INPUTS, TYPES, column_of, quantity_of_signal
+from models.quantities.quantities import GEARBOX_INPUTS, TYPES, column_of_input, quantity_of_signal
 from models.quantities.units import UNITS, Unit, conversion, find_unit, fmi_symbol
 from models.simulation.thermal_network import ThermalNetwork
 
@@ -225,7 +225,7 @@ def result_column(name: str) -> str | None:
 
 def input_column(name: str) -> str:
     """Column of a cycle file for an input of an FMU: its usual one, else its own name."""
-    return column_of(name.strip("'"))
+    return column_of_input(name.strip("'"))
 
 
 def signal_table(network: ThermalNetwork, losses: SurrogateLosses | None = None) -> SignalTable:

@@ -112,6 +112,7 @@ def test_quoted_names_survive_the_way_to_a_column() -> None:
     assert result_column(f"{fmi_name('oil-2')}.T") == "T_oil-2_degC"
     assert input_column("speed") == "speed_rpm"
     assert input_column("flow") == "flow"
+    assert input_column("T_outdoor") == "T_outdoor"
 
 
 def test_nomenclature_has_one_line_per_signal(table: SignalTable) -> None:
