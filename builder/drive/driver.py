@@ -27,14 +27,14 @@ from fmpy.fmi1 import FMICallException
 from fmpy.fmi3 import FMU3Slave
 
 from builder.fmi.recorded import recorded_columns
-from builder.fmi.signals import input_column, result_column
+from builder.fmi.signals import input_name, result_column
 from builder.native.compile import host_platform
 from diagnosis.recordings.machine import DescribedMachine, Part
 from models.base.errors import InputError, did_you_mean
 from models.base.types import Array
 from models.correction.correction import Correction
 from models.files.cycle import Cycle
-from models.quantities.quantities import GEARBOX_INPUTS, INPUT_KINDS, Input, named_input
+from models.quantities.quantities import GEARBOX_INPUTS, INPUT_KINDS, Input, column_of, named_input
 from models.quantities.units import UNITS, conversion, find_unit
 from models.simulation.start_temperatures import start_temperatures
 
@@ -137,7 +137,7 @@ def refuse_other_correction(path: Path, correction: Correction, *, source: str) 
 
 def _input(variable: Any, required: Sequence[str]) -> Input:
     """An input of an FMU: of the table of quantities, else named, in the unit that tools show."""
-    name = variable.name.strip("'")
+    name = input_name(variable.name)
     if name in GEARBOX_INPUTS:
         known = GEARBOX_INPUTS[name]
         return replace(known, default=_to_column(variable, float(variable.start)))
@@ -178,7 +178,7 @@ class LoadedFmu:
         variables = self.description.modelVariables
         self.variables = {v.name: v for v in variables}
         self._inputs = [v for v in variables if v.causality == "input"]
-        self.inputs = [v.name.strip("'") for v in self._inputs]
+        self.inputs = [input_name(v.name) for v in self._inputs]
         self._outputs = [v for v in variables if v.causality == "output" and result_column(v.name) is not None]
         self._booleans = [v.valueReference for v in self._outputs if v.type == "Boolean"]
         self._reals = [v.valueReference for v in self._outputs if v.type != "Boolean"]
@@ -381,7 +381,7 @@ def _simulate_table(
             fmu.report_messages(f"at {end:g} s")
         if progress is not None and (row % PROGRESS_ROWS == PROGRESS_ROWS - 1 or row == n_rows - 2):
             progress(row + 1, n_rows - 1)
-    columns = {"time_s": time} | {input_column(name): table[:, i] for i, name in enumerate(fmu.inputs)}
+    columns = {"time_s": time} | {column_of(name): table[:, i] for i, name in enumerate(fmu.inputs)}
     return columns | fmu.columns(outputs)
 
 

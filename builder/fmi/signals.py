@@ -20,7 +20,7 @@ import sympy as sp
 from models.base.errors import InputError, did_you_mean
 from models.network.laws import symbol
 from models.portable.surrogate import SurrogateLosses
-from models.quantities.quantities import GEARBOX_INPUTS, TYPES, column_of, quantity_of_signal
+from models.quantities.quantities import GEARBOX_INPUTS, TYPES, quantity_of_signal
 from models.quantities.units import UNITS, Unit, conversion, find_unit, fmi_symbol
 from models.simulation.thermal_network import ThermalNetwork
 
@@ -223,9 +223,15 @@ def result_column(name: str) -> str | None:
     return None if quantity is None else quantity.column
 
 
-def input_column(name: str) -> str:
-    """Column of a cycle file for an input of an FMU: its usual one, else its own name."""
-    return column_of(name.strip("'"))
+def input_name(fmi: str) -> str:
+    """Name in the network and in files of an input of an FMU.
+
+    Examples
+    --------
+    >>> input_name("oil_flow"), input_name("frame.T_in")
+    ('oil_flow', 'frame_T_in')
+    """
+    return fmi.strip("'").replace(".", "_")
 
 
 def signal_table(network: ThermalNetwork, losses: SurrogateLosses | None = None) -> SignalTable:

@@ -71,6 +71,7 @@ def _panel(course: PredictedRun, title: str, noise: float, *, shows_after: bool)
         for title, unit, values in (
             ("Speed", "Input shaft, 1/min", course.speed), ("Torque", "Input shaft, N m", course.torque)
         )
+        if np.any(values)  # a machine without a shaft has zeros
     )  # fmt: skip
     stages = STAGES if shows_after else STAGES[:2]
     sensors = []
@@ -140,6 +141,8 @@ def _heat(node: str, heats: Sequence[MissingHeat]) -> HeatPanel:
     against = []
     for title, label, attribute in quantities:
         x = np.concatenate([getattr(heat, attribute) for heat in heats])
+        if not np.any(x):  # a machine without a shaft
+            continue
         curves = [Curve(label="missing heat", look="missing", x=x, y=np.concatenate([h.mean for h in heats]),
                         kind="points")]  # fmt: skip
         if any(heat.law is not None for heat in heats):

@@ -21,7 +21,7 @@ from diagnosis.setup.shaft import shafts, torque_gain, with_shaft
 from models.assembly.gearbox import Gearbox
 from models.base.types import Array
 from models.mechanisms import Scale
-from models.quantities.quantities import TOTAL_LOSS, is_total_loss
+from models.quantities.quantities import GEARBOX_INPUTS, TOTAL_LOSS, is_total_loss
 from models.simulation.thermal_network import Losses, ThermalNetwork
 
 STANDSTILL_RPM = 10.0
@@ -135,17 +135,19 @@ def scale_of(gearbox: Gearbox, recordings: Sequence[Recording]) -> Scale:
     torque = np.concatenate([np.abs(r.inputs["torque"]) for r in recordings])
     ambient = [np.median(r.inputs["T_ambient"]) for r in recordings if "T_ambient" in r.inputs]
     running = speed > STANDSTILL_RPM
+    duration = max(float(r.time[-1]) for r in recordings)
+    interval = float(np.median(np.concatenate([np.diff(r.time) for r in recordings])))
+    named = [name for name in recordings[0].inputs if name not in GEARBOX_INPUTS]
+    typical = {name: float(np.mean(np.concatenate([r.inputs[name] for r in recordings]))) for name in named}
     if not running.any():
-        return Scale.of(gearbox)
+        return Scale.of(gearbox, inputs=typical, duration=duration, interval=interval)
     # Without geometry the nominal steady state is a guess; how hot it gets was measured.
     oil = np.concatenate([c.values for r in recordings for c in r.channels if c.name == "oil"] or [np.zeros(0)])
     hot = float(np.nanpercentile(oil, 95)) if gearbox.is_parametric and np.isfinite(oil).any() else None
     return Scale.of(
         gearbox, temperature=hot, speed=float(np.percentile(speed[running], 90)),
         torque=max(float(np.percentile(torque[running], 75)), 1.0),
-        ambient=float(np.median(ambient)) if ambient else None,
-        duration=max(float(r.time[-1]) for r in recordings),
-        interval=float(np.median(np.concatenate([np.diff(r.time) for r in recordings]))),
+        ambient=float(np.median(ambient)) if ambient else None, inputs=typical, duration=duration, interval=interval,
     )  # fmt: skip
 
 

@@ -138,6 +138,8 @@ class Mechanism:
         >>> windage.target, windage.parameters[0].name
         (('oil',), 'windage_oil_strength')
         """
+        if self.kind == "source" and scale.loss == 0.0:  # its size is a share of the losses
+            return ()
         if channels is None:
             channels = (*(part.name for part in network.parts), TOTAL_LOSS)
         found = [p for pattern in self.places for p in placements(network, self.kind, pattern, channels)]

@@ -24,7 +24,7 @@ LEAST = 1e-12  # W, of a loss that is nothing here
 
 @dataclass(frozen=True, kw_only=True)
 class Scale:
-    """Typical sizes, all positive but the temperatures.
+    """Typical sizes, all positive but the temperatures and the loss of a machine without losses.
 
     Attributes
     ----------
@@ -33,7 +33,7 @@ class Scale:
     torque : float
         At the input shaft, [N m]
     loss : float
-        All losses there, [W]
+        All losses there, [W]; 0 for a machine without losses, to which the heats of the catalogue do not apply
     conductance : float
         From the gearbox to its surroundings, [W/K]
     capacity : float
@@ -81,6 +81,7 @@ class Scale:
         torque: float | None = None,
         ambient: float | None = None,
         temperature: float | None = None,
+        inputs: Mapping[str, float] | None = None,
         duration: float = TEN_HOURS,
         interval: float = 1.0,
     ) -> Scale:
@@ -96,6 +97,8 @@ class Scale:
             [degC]; by default the definition's
         temperature : float or None
             Of the hot oil, [degC]; by default where the nominal losses and conductances put it
+        inputs : mapping of str to float or None
+            Typical values of inputs that the definition names; by default their defaults
         duration : float
             Of a recording, [s]
         interval : float
@@ -118,6 +121,7 @@ class Scale:
         here = {symbol(f"T_{name}"): ambient for name in boundaries}
         here |= {symbol(f"T_{part.name}"): ambient + TYPICAL_RISE for part in network.parts}
         here |= {symbol(name): given.default for name, given in network.inputs.items()}
+        here |= {symbol(name): value for name, value in (inputs or {}).items()}
         here |= {symbol("speed"): speed, symbol("torque"): torque, symbol("time"): 0.0}
         outward = [link.conductance for link in network.links if boundaries & set(link.nodes)]
         conductance = float(sum(law.xreplace(start | here).evalf() for law in outward))

@@ -263,6 +263,17 @@ def quantity_of_column(column: str) -> Quantity | None:
     return next((quantity for quantity in QUANTITIES if quantity.column == column), None)
 
 
+def column_of_input(name: str) -> str:
+    """Return the column of an input; one that the table of quantities does not have keeps its name.
+
+    Examples
+    --------
+    >>> column_of_input("T_ambient"), column_of_input("T_outdoor")
+    ('T_ambient_degC', 'T_outdoor')
+    """
+    return GEARBOX_INPUTS[name].column if name in GEARBOX_INPUTS else name
+
+
 def column_of(name: str) -> str:
     """Return the column of a quantity; an input of a user has its own name."""
     quantity = quantity_of(name)

@@ -17,7 +17,7 @@ from models.network.structure import Losses, Network
 from models.portable import solver
 from models.portable.evaluation import NetworkSystem, efficiency, torque_loss
 from models.portable.surrogate import range_distance
-from models.quantities.quantities import TOTAL_LOSS, column_of
+from models.quantities.quantities import TOTAL_LOSS, column_of, column_of_input
 from models.simulation.start_temperatures import start_temperatures
 
 STEADY_TOLERANCE_K, STEADY_DISTANCE_K = 1e-9, 1e-6
@@ -160,7 +160,7 @@ class Result:
             Speed of the input shaft over speed of the output shaft, [-]; with it the output torque is a column too
         """
         table = {"time_s": self.time}
-        table |= {column_of(name): values for name, values in self.inputs.items()}
+        table |= {column_of_input(name): values for name, values in self.inputs.items()}
         computed = {f"T_{node}": T for node, T in self.temperatures.items()}
         if self.losses:
             computed |= {TOTAL_LOSS: self.loss} | {f"P_loss_{name}": P for name, P in self.losses.items()}

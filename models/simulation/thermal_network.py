@@ -55,8 +55,8 @@ class ThermalNetwork(Network):
     def with_coupled_boundary(self, name: str) -> ThermalNetwork:
         """A network that takes the temperature of a boundary from an input, for coupling with another model.
 
-        The input is ``T_<boundary>_in`` in laws, ``<boundary>.T_in`` at the FMI and in files [degC]; its default is
-        what the boundary's law gives at the defaults of the other inputs.
+        The input is ``<boundary>_T_in`` in laws and files [degC], ``<boundary>.T_in`` at the FMI; its default is what
+        the boundary's law gives at the defaults of the other inputs.
 
         Parameters
         ----------
@@ -72,8 +72,8 @@ class ThermalNetwork(Network):
         --------
         >>> from models.assembly.gearbox import load_gearbox
         >>> network = load_gearbox("fzg").network().with_coupled_boundary("frame")
-        >>> network.inputs["T_frame_in"].default, [n.temperature for n in network.nodes if n.name == "frame"]
-        (27.0, [T_frame_in])
+        >>> network.inputs["frame_T_in"].default, [n.temperature for n in network.nodes if n.name == "frame"]
+        (27.0, [frame_T_in])
         """
         laws = {node.name: node.temperature for node in self.nodes if node.temperature is not None}
         if name not in laws:
@@ -83,15 +83,15 @@ class ThermalNetwork(Network):
         law = laws[name].xreplace({symbol(key): expression for key, expression in self.derived.items()})
         default = law.xreplace({symbol(key): sp.Float(value) for key, value in values.items()})
         added = named_input(
-            f"T_{name}_in", "temperature", low=LOWEST_BOUNDARY, high=HIGHEST_BOUNDARY,
+            f"{name}_T_in", "temperature", low=LOWEST_BOUNDARY, high=HIGHEST_BOUNDARY,
             default=USUAL_BOUNDARY if default.free_symbols else float(default),
             description=f"Temperature of {name.replace('_', ' ')}, from the model that {name}.heat_flow goes to",
         )  # fmt: skip
-        port = f"{name}.T_in"
+        at_port = replace(added.quantity, fmi=f"{name}.T_in")
         self._new_name(added.name, self.signals, "signal")
         return replace(
             self,
-            inputs={**self.inputs, added.name: replace(added, quantity=replace(added.quantity, column=port, fmi=port))},
+            inputs={**self.inputs, added.name: replace(added, quantity=at_port)},
             nodes=tuple(replace(n, temperature=symbol(added.name)) if n.name == name else n for n in self.nodes),
         )
 

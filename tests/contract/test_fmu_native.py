@@ -284,7 +284,8 @@ def test_archive_is_complete(fzg_native: Path) -> None:
         "model.png", "documentation/index.html", "documentation/licenses/license.txt", "sources/fmi2Functions.h",
         "documentation/reference_in.csv", "documentation/reference_out.csv",
     } <= set(names)  # fmt: skip
-    assert not [name for name in names if name.startswith("resources/") or "pythonfmu" in name]
+    assert [name for name in names if name.startswith("resources/")] == ["resources/recording.json"]
+    assert not [name for name in names if "pythonfmu" in name]
     assert "Modelica Association" in licence
     for text in ("loss.mesh_sliding", "fmi2SetRealInputDerivatives", "fmpy compile FILE.fmu", "in_domain"):
         assert text in page

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import sys
 from pathlib import Path
 
@@ -22,6 +23,7 @@ from tests.contract.native_hosts import (
 )
 
 pytestmark = needs_compiler
+CPPCHECK = shutil.which("cppcheck")
 
 
 @pytest.fixture(scope="module")
@@ -62,3 +64,12 @@ def test_threads_do_not_race(fmu: Unpacked, tmp_path: Path) -> None:
     printed = run([host, library, *fmu.arguments[1:], inputs, outputs, table])
     last = pd.read_csv(fmu.folder / "documentation/reference_out.csv")[fmu.named("output")].iloc[-1]
     np.testing.assert_allclose([float(cell) for cell in printed.split(",")], last, rtol=1e-6, atol=1e-6)
+
+
+@pytest.mark.skipif(CPPCHECK is None, reason="no cppcheck")
+@pytest.mark.parametrize("fixture", ["fzg_native", "fzg_native3"])
+def test_cppcheck_finds_nothing_in_the_sources(fixture: str, request: pytest.FixtureRequest, tmp_path: Path) -> None:
+    """Hand-written and generated C, with all groups of checks but those of unused functions and missing headers."""
+    sources = unpacked(request.getfixturevalue(fixture), tmp_path).folder / "sources"
+    options = ["--quiet", "--std=c99", "--enable=warning,style,performance,portability", "--error-exitcode=1", "-I."]
+    assert run([CPPCHECK, *options, *sorted(file.name for file in sources.glob("*.c"))], cwd=sources) == ""

@@ -34,7 +34,7 @@ def test_every_option_exists() -> None:
 
 
 def test_every_file_exists() -> None:
-    paths = re.findall(r"(?:examples|models|docs|benchmarks)/[\w./-]+\.(?:py|toml|csv|png)", TEXT)
+    paths = re.findall(r"(?:examples|models|docs|benchmarks)/[\w./-]+\.(?:py|toml|csv(?:\.gz)?|png)", TEXT)
     assert paths
     assert [path for path in paths if not (ROOT / path).is_file()] == []
 

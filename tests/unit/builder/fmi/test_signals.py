@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from builder.fmi.signals import SignalTable, fmi_name, input_column, result_column, signal_table
+from builder.fmi.signals import SignalTable, fmi_name, result_column, signal_table
 from builder.surrogate.train import TrainingResult
 from models.assembly.gearbox import Gearbox
 from models.base.errors import InputError
@@ -110,8 +110,6 @@ def test_unknown_signal_names_the_nearest(table: SignalTable) -> None:
 def test_quoted_names_survive_the_way_to_a_column() -> None:
     assert result_column(f"loss.{fmi_name('a b')}") == "P_loss_a b_W"
     assert result_column(f"{fmi_name('oil-2')}.T") == "T_oil-2_degC"
-    assert input_column("speed") == "speed_rpm"
-    assert input_column("flow") == "flow"
 
 
 def test_nomenclature_has_one_line_per_signal(table: SignalTable) -> None:

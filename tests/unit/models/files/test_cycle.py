@@ -11,8 +11,14 @@ import pytest
 from models.assembly.gearbox import load_gearbox
 from models.base.errors import InputError
 from models.files.cycle import Cycle
+from models.quantities.quantities import GEARBOX_INPUTS, Input, named_input
 
 GOOD: dict[str, Any] = {"time_s": [0.0, 1.0], "speed_rpm": [0.0, 100.0], "torque_Nm": [1, 2]}
+
+
+def with_inputs(*names: str) -> dict[str, Input]:
+    """Inputs of a gearbox and further ones of a user."""
+    return {**GEARBOX_INPUTS, **{name: named_input(name, "ratio") for name in names}}
 
 
 def test_reads_what_it_knows() -> None:
@@ -23,7 +29,7 @@ def test_reads_what_it_knows() -> None:
 
 
 def test_extra_inputs_by_their_own_name() -> None:
-    cycle = Cycle.from_columns({**GOOD, "valve": [0, 1]}, extra=("valve", "absent"))
+    cycle = Cycle.from_columns({**GOOD, "valve": [0, 1]}, inputs=with_inputs("valve", "absent"))
     assert cycle.inputs["valve"].tolist() == [0.0, 1.0]
     assert "absent" not in cycle.inputs
 
@@ -76,8 +82,8 @@ def test_all_faults_at_once_with_the_name_of_the_file() -> None:
 def test_an_optional_column_under_another_name_is_not_lost(name: str, meant: str) -> None:
     says = rf"run.csv: column {re.escape(name)} is not known; is {meant} meant\? rename it, or remove it"
     with pytest.raises(InputError, match=says):
-        Cycle.from_columns({**GOOD, name: [1.0, 2.0]}, name="run.csv", extra=("valve_opening",))
-    both = Cycle.from_columns({**GOOD, name: [1.0, 2.0], meant: [3.0, 4.0]}, extra=("valve_opening",))
+        Cycle.from_columns({**GOOD, name: [1.0, 2.0]}, name="run.csv", inputs=with_inputs("valve_opening"))
+    both = Cycle.from_columns({**GOOD, name: [1.0, 2.0], meant: [3.0, 4.0]}, inputs=with_inputs("valve_opening"))
     assert [3.0, 4.0] in [values.tolist() for values in both.inputs.values()]
 
 
@@ -112,7 +118,7 @@ def test_refined_rows_are_the_own_ones_and_one_per_interval() -> None:
             "torque_Nm": [5.0, 5.0, 8.0],
             "heat": [1, 2, 3],
         },
-        extra=("heat",),
+        inputs=with_inputs("heat"),
     )
     fine = cycle.refined(1.0)
     assert fine.time.tolist() == [10.0, 11.0, 12.0, 12.5, 13.0, 14.0]

@@ -1,0 +1,43 @@
+"""Inputs that a definition names are inputs of the FMU: SI units inside, their own unit for people and in files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from fmpy import read_model_description
+from fmpy.validation import validate_fmu
+
+from builder.drive.driver import drive_fmu
+from builder.native.native_fmu import build_native_fmu
+from builder.python.python_fmu import build_python_fmu
+from models.files.cycle import Cycle
+from tests.unit.models.definition.test_named_inputs import rig
+
+
+@pytest.mark.parametrize("kind", ["native", "python"])
+def test_they_keep_their_unit_on_both_sides(kind: str, tmp_path: Path) -> None:
+    machine = rig()
+    network = machine.network()
+    path = tmp_path / "rig.fmu"
+    if kind == "native":
+        build_native_fmu(machine, None, (), path, network=network)
+    else:
+        build_python_fmu(machine, None, (), path, network=network)
+    assert validate_fmu(str(path)) == []
+    variables = {v.name: v for v in read_model_description(str(path)).modelVariables}
+    flow, heater = variables["oil_flow"], variables["heater"]
+    assert (flow.causality, flow.unit, flow.displayUnit) == ("input", "m3/s", "l/min")
+    assert float(flow.start) == pytest.approx(10.0 / 6e4) and float(flow.max) == pytest.approx(60.0 / 6e4)
+    assert (heater.unit, heater.displayUnit, float(heater.max)) == ("W", "kW", 5000.0)
+    assert not {"speed", "torque", "efficiency", "loss.total", "in_domain"} & variables.keys()
+    time = np.arange(0.0, 601.0, 5.0)
+    columns = {
+        "time_s": time, "heater": 1.0 + 0.0 * time, "oil_flow": 20.0 + 0.0 * time, "T_coolant": 35.0 + 0.0 * time,
+    }  # fmt: skip
+    cycle = Cycle.from_columns(columns, inputs=network.inputs)
+    expected = network.simulate(cycle, losses=machine.loss_laws(), initial=20.0).columns()
+    driven = drive_fmu(path, cycle, initial=20.0)
+    assert driven["oil_flow"] == pytest.approx(columns["oil_flow"])
+    np.testing.assert_allclose(driven["T_body_degC"], expected["T_body_degC"], rtol=0.0, atol=1e-9)
