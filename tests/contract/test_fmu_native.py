@@ -91,7 +91,8 @@ def test_inputs_go_along_their_rates_for_one_step(fzg_native: Path) -> None:
             )
             held.step(0.005)
         held.time = 20.0
-        assert ramped.get("oil.T", "pinion.T") == pytest.approx(held.get("oil.T", "pinion.T"), abs=0.005)
+        # half of what the solver tolerates in one of its steps
+        assert ramped.get("oil.T", "pinion.T") == pytest.approx(held.get("oil.T", "pinion.T"), abs=0.015)
         ramped.step(1.0)
         assert ramped.get("speed")[0] == LOADED["speed"] + 400.0  # held again
 
