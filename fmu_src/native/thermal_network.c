@@ -10,7 +10,7 @@
 
 #define GAMMA 0.29289321881345247 /* 1 - sqrt(1/2) */
 #define TOLERANCE_K 0.03
-#define FULL_WEIGHT_J_K 6.0
+#define FULL_WEIGHT_J_K 2.5
 #define MOST_STEPS 100000
 #define STILL_K 0.1
 #define SHORTEST_STEP_S 1e-6

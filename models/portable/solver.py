@@ -8,8 +8,8 @@ step. The step size follows the embedded first-order solution, so the communicat
 The stages take inputs and time at the shares gamma and 1 - gamma of the step. For inputs on a straight line that is the
 method's own term with the time derivative, without an evaluation for it: a stiff node follows a ramp without error.
 
-An error counts by the heat that the node can store: a node of less than 6 J/K has a tolerance of heat, 0.18 J, in place
-of one of temperature. It follows its neighbours within a second whatever happened before, and small steps for its sake
+An error counts by the heat that the node can store: a node of less than 2.5 J/K has a tolerance of heat, 0.075 J, in
+place of one of temperature. It follows its neighbours within a second whatever happened before, and small steps for its sake
 alone hardly change other nodes.
 
 Losses are the dear part. Where speed and torque are constant and no temperature that the losses depend on moves by more
@@ -32,7 +32,7 @@ Array = NDArray[np.float64]
 
 GAMMA = 1.0 - np.sqrt(0.5)
 TOLERANCE_K = 0.03  # of the embedded first-order solution, per step; the second-order one is far closer
-FULL_WEIGHT_J_K = 6.0  # heat capacity from which on a node's temperature error counts in full
+FULL_WEIGHT_J_K = 2.5  # heat capacity from which on a node's temperature error counts in full
 STILL_K = 0.1  # that temperatures may move in a stage before losses are evaluated again
 MOST_STEPS = 100_000  # tried in one communication step
 SHORTEST_STEP_S = 1e-6

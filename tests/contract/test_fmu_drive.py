@@ -35,7 +35,7 @@ def cycle(**columns: list[float]) -> Cycle:
     return Cycle.from_columns(given | columns)
 
 
-@pytest.mark.parametrize(("step_s", "limit_K"), [(1.0, 0.1), (10.0, 0.1), (60.0, 0.1)])
+@pytest.mark.parametrize(("step_s", "limit_K"), [(1.0, 0.06), (10.0, 0.08), (60.0, 0.08)])
 def test_agrees_with_the_simulation_in_python(
     fzg_fmu: Path, fzg: Gearbox, fzg_training: TrainingResult, step_s: float, limit_K: float
 ) -> None:
@@ -47,12 +47,12 @@ def test_agrees_with_the_simulation_in_python(
     assert done[-1] == (len(ramps) - 1, len(ramps) - 1)
     for name, values in expected.items():
         if name.startswith("T_") and name != "T_mesh_degC":
-            assert np.abs(driven[name] - values).max() < 0.02, name
+            assert np.abs(driven[name] - values).max() < 0.015, name  # half of what a step tolerates
         elif name.startswith("P_"):
             np.testing.assert_allclose(driven[name], values, rtol=2e-4, atol=1e-3, err_msg=name)
         elif not name.startswith("T_"):
             np.testing.assert_allclose(driven[name], values, rtol=2e-4, atol=1e-6, err_msg=name)
-    # The mesh has 0.1 s; it lags behind a ramp, which held inputs do not show, and it has a tolerance of 0.1 K.
+    # The mesh has 0.1 s; it lags behind a ramp, which held inputs do not show.
     assert np.abs(driven["T_mesh_degC"] - expected["T_mesh_degC"]).max() < limit_K
 
 
@@ -160,13 +160,12 @@ def test_more_rows_bring_the_old_ones_no_further_from_the_truth(
     truth = fzg.network().simulate(ramps, losses=fzg_training.losses, initial=20.0).columns()
     coarse, dense = (drive_fmu(path, c, initial=20.0) for c in (ramps, fine))
     names = [name for name in truth if name.startswith("T_")]
-    # Other steps of the solver, which holds 0.03 K in each and 0.1 K for the mesh, make chance differences.
+    # 0.01 K: other steps of the solver, which holds 0.03 K in each, make chance differences.
     for name in names:
-        chance = 0.1 if name == "T_mesh_degC" else 0.02
         before, after = np.abs(coarse[name] - truth[name]).max(), np.abs(dense[name][own] - truth[name]).max()
-        assert after < before + chance, name
+        assert after < before + 0.01, name
     before, after = (np.abs(d - truth["P_loss_W"]).max() for d in (coarse["P_loss_W"], dense["P_loss_W"][own]))
-    assert after < before + 0.05
+    assert after < before + 0.01
 
 
 def test_an_fmu_of_fmi_3_gives_the_same(fzg_native: Path, fzg_native3: Path, fzg: Gearbox) -> None:

@@ -87,7 +87,7 @@ def cycle(gearbox: str) -> Cycle:
 
 def simulate(gearbox: str, network: ThermalNetwork, parameters: Mapping[str, Array] | None = None) -> Result:
     start = SCALES[gearbox].ambient
-    # With rows of 120 s the solver is off by up to 0.15 K in the mesh when the gearbox starts, with these by 0.08 K.
+    # Where the gearbox stops, the solver is off by up to 0.1 K in the mesh.
     fine = cycle(gearbox).refined(30.0)
     return network.simulate(fine, losses=losses(gearbox), initial=start, parameters=parameters)
 
@@ -226,7 +226,7 @@ class TestInANetwork:
         assert network is not base
         variants = [usual(term), usual(term) | {term.strength.name: 0.0}]
         for p in term.parameters:
-            for step in (0.5 * p.sd, -0.5 * p.sd):
+            for step in (p.sd, -p.sd):  # a switch acts at the end of a step, so that small changes may do nothing
                 moved = variants[0][p.name] * np.exp(step) if p.log else variants[0][p.name] + step
                 variants.append(variants[0] | {p.name: min(max(moved, p.lower), p.upper)})
         columns = {p.name: np.array([variant[p.name] for variant in variants]) for p in term.parameters}
@@ -236,7 +236,7 @@ class TestInANetwork:
             assert np.max(np.abs(T[:, 2 * index + 2 : 2 * index + 4] - T[:, :1])) > 1e-3, p.name
         assert np.max(np.abs(T[:, 1] - T[:, 0])) > 0.01
         # Other variants take part in the choice of the step.
-        assert np.max(np.abs(T[: len(base.parts), 1] - nominal(gearbox))) < 0.1
+        assert np.max(np.abs(T[: len(base.parts), 1] - nominal(gearbox))) < 0.2
 
     def test_only_a_loss_counts_as_loss(self, name: str) -> None:
         term = placed(name)[0]

@@ -298,7 +298,8 @@ LAWS = st.recursive(
 @given(LAWS)
 def test_text_of_a_law_gives_the_same_law(law: sp.Expr) -> None:
     text = expression_text(law)
-    assert expression_text(parse_expression(text)) == text
+    read_once = expression_text(parse_expression(text))  # sympy multiplies 2*(a + b) out
+    assert expression_text(parse_expression(read_once)) == read_once
     at = {SPEED: sp.Float(2.5), TORQUE: sp.Float(0.7)}
     read, written = (complex(expression.xreplace(at).evalf()) for expression in (parse_expression(text), law))
     assert read == pytest.approx(written, rel=1e-12)
