@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import runpy
 import shutil
 from pathlib import Path
 
@@ -43,3 +44,10 @@ def test_the_mechanisms_of_the_examples_have_places_and_names_of_their_own(fzg: 
     check_placeable(found, fzg, "mechanisms.toml")
     assert [mechanism.name for mechanism in found] == ["belt_guard", "cold_floor"]
     assert not {mechanism.name for mechanism in found} & set(CATALOGUE)
+
+
+def test_the_rod_is_drawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """From the recording in the repository, with the correction that was written by hand."""
+    monkeypatch.setattr("sys.argv", ["heated_rod.py", str(tmp_path / "rod.png")])
+    runpy.run_path(str(EXAMPLES / "heated_rod.py"))
+    assert (tmp_path / "rod.png").read_bytes()[:4] == b"\x89PNG"
