@@ -9,8 +9,8 @@ The stages take inputs and time at the shares gamma and 1 - gamma of the step. F
 method's own term with the time derivative, without an evaluation for it: a stiff node follows a ramp without error.
 
 An error counts by the heat that the node can store: a node of less than 2.5 J/K has a tolerance of heat, 0.075 J, in
-place of one of temperature. It follows its neighbours within a second whatever happened before, and small steps for its sake
-alone hardly change other nodes.
+place of one of temperature. It follows its neighbours within a second whatever happened before, and small steps for
+its sake alone hardly change other nodes.
 
 Losses are the dear part. Where speed and torque are constant and no temperature that the losses depend on moves by more
 than 0.1 K from the first stage to the second, the second takes over the losses of the first: they would differ by about
