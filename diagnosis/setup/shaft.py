@@ -6,7 +6,7 @@ whose torque follows from a power, the torque is calculated, and the factor on t
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -40,11 +40,10 @@ def recording_with_shaft(recording: Recording, network: ThermalNetwork) -> Recor
     return replace(recording, inputs={"speed": speed, "torque": torque} | given)
 
 
-def _torque(network: ThermalNetwork, inputs: dict[str, Array] | object, zero: Array) -> Array:
+def _torque(network: ThermalNetwork, inputs: Mapping[str, Array], zero: Array) -> Array:
     law = network.derived["torque"].xreplace({symbol(p.name): sp.Float(p.start) for p in network.parameters})
     names = sorted(s.name for s in law.free_symbols)
-    values = [inputs[name] for name in names]  # type: ignore[index]
-    return np.asarray(sp.lambdify(names, law, "numpy")(*values), dtype=float) + zero
+    return np.asarray(zero + sp.lambdify(names, law, "numpy")(*(inputs[name] for name in names)))
 
 
 def torque_gain(network: ThermalNetwork) -> Parameter | None:
