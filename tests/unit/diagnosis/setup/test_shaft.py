@@ -25,8 +25,9 @@ def test_a_machine_without_shaft_is_set_up_with_zeros() -> None:
     assert "torque_gain" not in {item.role for item in case.train.unknowns.items}
     assert case.channels[5:7] == ("cell_6__NTC6", "cell_6__NTC7")
     assert case.scale.duration == pytest.approx(3600.0, abs=20.0)
-    placed = [p for mechanism in CATALOGUE.values() for p in mechanism.placed(case.nominal, case.scale, case.channels)]
-    # heats of the catalogue are sized by losses, and its heat paths by groups, of which a rod has none
+    catalogue = CATALOGUE.values()
+    placed = [p for mechanism in catalogue for p in mechanism.placed(case.nominal, case.scale, case.channels)]
+    # Heats of the catalogue are sized by losses, heat paths by groups: a rod has none.
     assert {p.kind for p in placed} == {"sensor", "signal"}
 
 
