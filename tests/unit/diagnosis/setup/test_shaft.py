@@ -35,7 +35,8 @@ def test_a_torque_from_a_power_is_an_input_whose_gain_is_the_efficiency() -> Non
     text = (ROOT / "models" / "gearboxes" / "la_haute_borne.toml").read_text(encoding="utf-8")
     table = (
         '[torque]\npower = "P"\nefficiency = { value = 0.9, sd = 0.018 }\n\n[[input]]\nname = "P"\nquantity = "power"\n'
-        'unit = "kW"\nrange = [-100.0, 2500.0]\n\n[recording.columns.P_avg]\nquantity = "P"\nunit = "kW"\n\n[[boundary]]'
+        'unit = "kW"\nrange = [-100.0, 2500.0]\n\n'
+        '[recording.columns.P_avg]\nquantity = "P"\nunit = "kW"\n\n[[boundary]]'
     )
     text = text.replace('quantity = "torque"', 'quantity = "auxiliary"', 1).replace("[[boundary]]", table, 1)
     machine = read_gearbox(text, file="power.toml")
