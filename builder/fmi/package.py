@@ -19,6 +19,7 @@ from models.base.atomic_write import atomic_file
 from models.base.errors import InputError
 from models.base.version import project_version
 from models.correction.correction import Correction, corrected_network
+from models.portable.evaluation import NoLosses
 from models.portable.surrogate import SurrogateLosses
 from models.simulation.thermal_network import ThermalNetwork
 
@@ -100,11 +101,12 @@ def gearbox_identity(
     """Description of an FMU of a gearbox."""
     version = project_version()
     model = "thermal network" if gearbox.is_parametric else "reduced-order twin of a detailed loss model"
+    subject = "Temperatures" if isinstance(gearbox.loss_laws(), NoLosses) else "Power loss and temperatures"
     model += "" if correction is None else f", {correction.words}"
     return Identity(
         model_name=gearbox.name,
         model_identifier=model_identifier(output.stem),
-        description=f"Power loss and temperatures of {gearbox.name}: {model}",
+        description=f"{subject} of {gearbox.name}: {model}",
         version=version,
         author=AUTHOR,
         license="MIT; see documentation/licenses",

@@ -10,6 +10,7 @@ from markupsafe import Markup
 
 from diagnosis.report.wording import headline, name, share
 from diagnosis.results.result import Diagnosis, Finding
+from models.quantities.quantities import node_of_channel
 from models.simulation.thermal_network import ThermalNetwork
 
 NO_CLAIM = ("consistent", "insufficient_data")
@@ -92,7 +93,7 @@ def drawn(network: ThermalNetwork, nominal: ThermalNetwork, measured: Iterable[s
     nominal : ThermalNetwork
         As delivered; what it lacks is drawn as new
     measured : iterable of str
-        Nodes with a thermometer
+        Channels: nodes with a thermometer, or with one of several
     marked : Marks
     """
     rows = _rows(network, nominal)
@@ -101,7 +102,10 @@ def drawn(network: ThermalNetwork, nominal: ThermalNetwork, measured: Iterable[s
         for line, row in enumerate(rows)
         for index, node in enumerate(row)
     }
-    known, has_thermometer = {link.name for link in nominal.links}, set(measured)
+    known, has_thermometer = (
+        {link.name for link in nominal.links},
+        {node_of_channel(name, network.node_names) for name in measured},
+    )
     ordered = sorted(network.links, key=lambda link: link.name in marked.links)
     lines = Markup("").join(
         Markup('<path class="{}" d="{}"><title>{}</title></path>').format(

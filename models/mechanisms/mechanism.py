@@ -138,7 +138,10 @@ class Mechanism:
         >>> windage.target, windage.parameters[0].name
         (('oil',), 'windage_oil_strength')
         """
-        if self.kind == "source" and scale.loss == 0.0:  # its size is a share of the losses
+        without_losses = (
+            scale.loss == 0.0
+        )  # they size the heats of the catalogue, and speed and torque act by them only
+        if without_losses and (self.kind == "source" or set(self.places) <= {"speed", "torque"}):
             return ()
         if channels is None:
             channels = (*(part.name for part in network.parts), TOTAL_LOSS)
