@@ -34,7 +34,7 @@ from models.base.errors import InputError, did_you_mean
 from models.base.types import Array
 from models.correction.correction import Correction
 from models.files.cycle import Cycle
-from models.quantities.quantities import GEARBOX_INPUTS, INPUT_KINDS, Input, column_of, named_input
+from models.quantities.quantities import GEARBOX_INPUTS, INPUT_KINDS, Input, column_of_input, named_input
 from models.quantities.units import UNITS, conversion, find_unit
 from models.simulation.start_temperatures import start_temperatures
 
@@ -381,7 +381,7 @@ def _simulate_table(
             fmu.report_messages(f"at {end:g} s")
         if progress is not None and (row % PROGRESS_ROWS == PROGRESS_ROWS - 1 or row == n_rows - 2):
             progress(row + 1, n_rows - 1)
-    columns = {"time_s": time} | {column_of(name): table[:, i] for i, name in enumerate(fmu.inputs)}
+    columns = {"time_s": time} | {column_of_input(name): table[:, i] for i, name in enumerate(fmu.inputs)}
     return columns | fmu.columns(outputs)
 
 

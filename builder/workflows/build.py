@@ -195,7 +195,7 @@ def build(
     network = corrected_network(gearbox, correction)
     for boundary in couple:
         network = network.with_coupled_boundary(boundary)
-    inside = gearbox.network_of_laws(network) if gearbox.is_parametric else network
+    inside = gearbox.network_of_laws(network)
     seconds: dict[str, float] = {}
     with atomic_folder(folder) as stage:
         training, networks = None, tuple[Path, ...]()

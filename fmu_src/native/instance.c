@@ -90,15 +90,6 @@ static int usable(const Variable *variable, double value) {
         || (isfinite(value) && value >= variable->minimum - slack && value <= variable->maximum + slack);
 }
 
-/* Add to a message; what does not fit is cut off. */
-static void append(char *message, const char *format, ...) {
-    const size_t length = strlen(message);
-    va_list arguments;
-    va_start(arguments, format);
-    vsnprintf(message + length, MESSAGE_SIZE - length, format, arguments);
-    va_end(arguments);
-}
-
 /* Add why a value cannot be used, and what was probably meant. */
 static void describe(const Variable *v, double value, char *message) {
     const char *unit = strcmp(v->unit, "1") ? v->unit : "";

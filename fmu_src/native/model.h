@@ -9,7 +9,10 @@
 
 #include "linker_names.h"
 
+#include <stdarg.h>
 #include <stddef.h>
+#include <stdio.h>
+#include <string.h>
 
 typedef enum { REAL, BOOLEAN } VariableType;
 typedef enum { CALCULATED, INPUT, FIXED, TUNABLE } VariableAccess; /* FIXED: until the simulation starts */
@@ -51,6 +54,15 @@ static inline double value_after(const Model *model, unsigned reference, double 
     const Variable *variable = &model_variables[reference];
     const double value = model->values[reference] + model->slopes[reference] * elapsed;
     return value < variable->minimum ? variable->minimum : value > variable->maximum ? variable->maximum : value;
+}
+
+/* Add to a message of MESSAGE_SIZE; what does not fit is cut off. */
+static inline void append(char *message, const char *format, ...) {
+    const size_t length = strlen(message);
+    va_list arguments;
+    va_start(arguments, format);
+    vsnprintf(message + length, MESSAGE_SIZE - length, format, arguments);
+    va_end(arguments);
 }
 
 /* Written with the model */

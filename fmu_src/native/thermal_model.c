@@ -6,7 +6,6 @@
 #include "thermal_network.h"
 
 #include <math.h>
-#include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -59,15 +58,6 @@ static ModelStatus prepare(Model *model) {
     }
     model->changed = 0;
     return MODEL_OK;
-}
-
-/* Add to a message; what does not fit is cut off. */
-static void append(char *message, const char *format, ...) {
-    const size_t length = strlen(message);
-    va_list arguments;
-    va_start(arguments, format);
-    vsnprintf(message + length, MESSAGE_SIZE - length, format, arguments);
-    va_end(arguments);
 }
 
 /* A warning about start temperatures that were given but are not used; else no message. */

@@ -266,10 +266,12 @@ class Gearbox:
         return ParametricLosses(self.definition) if self.definition.loss else NoLosses()
 
     def network_of_laws(self, network: ThermalNetwork) -> ThermalNetwork:
-        """Return a network of this machine (without geometry) whose losses are laws of its sources, as FMUs need it."""
-        if not isinstance(self.definition, ParametricDefinition):
-            raise TypeError("the losses of a gearbox with geometry are no laws")
-        return with_losses_as_laws(network, self.definition)
+        """Return a network of this machine as FMUs need it: without geometry its losses are laws of the sources."""
+        return (
+            with_losses_as_laws(network, self.definition)
+            if isinstance(self.definition, ParametricDefinition)
+            else network
+        )
 
     def network(self) -> ThermalNetwork:
         """Return the thermal network of this gearbox."""

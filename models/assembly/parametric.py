@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import sympy as sp
@@ -75,14 +76,20 @@ class ParametricLosses:
             nu = kinematic_viscosity_d341(T_here, *constants) / nu_ref
             # At standstill nothing is lost, whatever the exponent.
             turning = n > 0.0
-            no_load = loss.no_load_W * n**loss.speed_exponent * nu**loss.viscosity_exponent
-            found += [np.where(turning, no_load, 0.0), loss.load_W * n * m**loss.torque_exponent + 0.0 * T_here]
+            no_load, load = _parts_of(loss, n, m, nu)
+            found += [np.where(turning, no_load, 0.0), load + 0.0 * T_here]
         return np.stack(np.broadcast_arrays(*found), axis=-1)
 
     def domain_distance(self, speed: ArrayLike, torque: ArrayLike, temperatures: ArrayLike) -> Array:
         """Zero everywhere, shape (...): the laws hold as well, or as badly, at any operating point."""
         T = np.asarray(temperatures, dtype=float)[..., 0]
         return np.zeros(np.broadcast_shapes(np.shape(speed), np.shape(torque), T.shape))
+
+
+def _parts_of(loss: Loss, n: Any, m: Any, nu: Any) -> tuple[Any, Any]:
+    """No-load and load-dependent part [W] at ratios to the reference, numbers or symbols; see ParametricLosses."""
+    no_load = loss.no_load_W * n**loss.speed_exponent * nu**loss.viscosity_exponent
+    return no_load, loss.load_W * n * m**loss.torque_exponent
 
 
 def build_parametric_network(definition: ParametricDefinition, priors: Mapping[str, float]) -> ThermalNetwork:
@@ -126,7 +133,11 @@ def law_faults(definition: ParametricDefinition) -> list[tuple[str, str]]:
 def with_losses_as_laws(network: ThermalNetwork, definition: ParametricDefinition) -> ThermalNetwork:
     """Return a network of a definition, perhaps corrected, in which each loss is a law of its source.
 
-    The formula is that of :class:`ParametricLosses`.
+    Parameters
+    ----------
+    network : ThermalNetwork
+        With the signals ``P_<loss>`` of :class:`ParametricLosses`
+    definition : ParametricDefinition
     """
     operation, constants = definition.operation, definition.viscosity_constants
     n, m = sp.Abs(symbol("speed")) / operation.speed_rpm, sp.Abs(symbol("torque")) / operation.torque_Nm
@@ -135,9 +146,9 @@ def with_losses_as_laws(network: ThermalNetwork, definition: ParametricDefinitio
     for loss in definition.loss:
         T = sp.Min(sp.Max(symbol(f"T_{loss.part}"), T_LOWEST), T_HIGHEST)
         nu = kinematic_viscosity_d341(T, *constants, xp=sp) / nu_ref
-        no_load = loss.no_load_W * n**loss.speed_exponent * nu**loss.viscosity_exponent
+        no_load, load = _parts_of(loss, n, m, nu)
         laws[symbol(f"P_{loss.name}_no_load")] = sp.Piecewise((no_load, n > 0), (sp.Float(0.0), True))
-        laws[symbol(f"P_{loss.name}_load")] = loss.load_W * n * m**loss.torque_exponent
+        laws[symbol(f"P_{loss.name}_load")] = load
     # Losses see a shifted speed or torque (a fault of an instrument); as laws they contain the shift.
     seen = {symbol(name): law for name, law in network.operating.items()}
     laws = {name: law.xreplace(seen) for name, law in laws.items()}
@@ -213,6 +224,7 @@ class _Builder:
         return Link(name=f"{a}-{b}", nodes=(a, b), conductance=sp.sympify(G))
 
     def _torque(self, given: TorqueFromPower) -> sp.Expr:
+        """Torque [N m] as power over angular speed, times the efficiency between the two places of measurement."""
         efficiency = given.efficiency * self._factor(
             "efficiency",
             "torque.efficiency",

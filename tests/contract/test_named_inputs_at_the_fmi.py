@@ -45,6 +45,8 @@ def test_they_keep_their_unit_on_both_sides(kind: str, tmp_path: Path) -> None:
     cycle = Cycle.from_columns(columns, inputs=network.inputs)
     expected = network.simulate(cycle, losses=machine.loss_laws(), initial=20.0).columns()
     driven = drive_fmu(path, cycle, initial=20.0)
+    assert list(driven)[:5] == list(expected)[:5] == ["time_s", *(given.column for given in network.inputs.values())]
     assert driven["oil_flow"] == pytest.approx(columns["oil_flow"])
+    assert Cycle.from_columns(driven, inputs=network.inputs).inputs["T_coolant"] == pytest.approx(columns["T_coolant"])
     tolerance = {"native": 1e-9, "python": 0.01}[kind]  # the Python FMU holds its inputs
     np.testing.assert_allclose(driven["T_body_degC"], expected["T_body_degC"], rtol=0.0, atol=tolerance)
