@@ -1,0 +1,1 @@
+"""Plants that are built differently from the model: other nodes, other paths, other laws."""
