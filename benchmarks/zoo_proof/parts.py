@@ -213,15 +213,18 @@ class _Noted(dict[str, Array]):
 
 
 def moment_of(
-    plant: ZooPlant, inputs: Mapping[str, float], T: float | Mapping[str, float], read: set[str] | None = None
+    plant: ZooPlant,
+    inputs: Mapping[str, float | Array],
+    T: float | Array | Mapping[str, float],
+    read: set[str] | None = None,
 ) -> Moment:
-    """One moment with all bodies at a temperature, boundaries as they are; names of parameters read go to `read`."""
-    ones = np.ones(1)
+    """Moments with bodies at temperatures, boundaries as they are; names of parameters read go to `read`."""
+    ones = np.ones(np.shape(next(iter(inputs.values()))) or 1)
     p = _Noted({name: value * ones for name, value in plant.parameters.items()}, set() if read is None else read)
     given = {name: value * ones for name, value in inputs.items()}
     at = {b.name: ones * (T[b.name] if isinstance(T, Mapping) else T) for b in plant.bodies}
     bare = Moment(hours=0.0 * ones, since_start=0.0 * ones, inputs=given, T=at, p=p)
-    held = {b.name: np.broadcast_to(b.temperature(bare), (1,)) for b in plant.boundaries}
+    held = {b.name: np.broadcast_to(b.temperature(bare), ones.shape) for b in plant.boundaries}
     return Moment(hours=bare.hours, since_start=bare.since_start, inputs=given, T={**at, **held}, p=p)
 
 

@@ -127,7 +127,9 @@ class _Machine:
 
     def __init__(self, box: Box, rng: np.random.Generator) -> None:
         self.box = box
-        self.d = Draft("proof_b", box.gearbox, ("speed", "torque", "T_ambient", "air_speed"), set(box.nominal_links()), rng)
+        self.d = Draft(
+            "proof_b", box.gearbox, ("speed", "torque", "T_ambient", "air_speed"), set(box.nominal_links()), rng
+        )
         self.candidates: list[str] = []
 
     def plant(self) -> ZooPlant:

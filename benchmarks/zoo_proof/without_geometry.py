@@ -13,6 +13,7 @@ from models.base.errors import InputError
 from models.base.types import Array
 from models.definition.parametric_sections import Loss, ParametricDefinition, Path
 from models.formulas.oil import kinematic_viscosity_d341
+from models.quantities.units import find_unit
 
 from .parts import KELVIN, Draft, difference, draught, draw_door
 
@@ -262,7 +263,8 @@ class _Machine:
         if given is None:
             return m.inputs["torque"]
         omega = np.maximum(np.abs(m.inputs["speed"]), 1.0) * np.pi / 30.0
-        return given.efficiency * self.definition.inputs[given.power].quantity.to_inside(m.inputs[given.power]) / omega
+        watt = find_unit(self.definition.inputs[given.power].quantity.unit, "power").factor
+        return given.efficiency * watt * m.inputs[given.power] / omega
 
     # ------------------------------------------------------------------ extra links
 

@@ -145,7 +145,9 @@ def draw_open(gearbox: Gearbox, rng: np.random.Generator) -> ZooPlant:
 
 
 GEARBOX_FAMILIES = (
-    Family(name="walls", description="thick walls in layers, seats, warmer air above", machines=MACHINES, draw=draw_walls),
+    Family(
+        name="walls", description="thick walls in layers, seats, warmer air above", machines=MACHINES, draw=draw_walls
+    ),
     Family(name="rings", description="bearings and shafts in detail", machines=MACHINES, draw=draw_rings),
     Family(name="splash", description="oil as sump, mist and film; rims and hubs", machines=MACHINES, draw=draw_splash),
     Family(name="merged", description="coarser than the model, on a bed", machines=MACHINES, draw=draw_merged),

@@ -32,7 +32,9 @@ def load_proof_family(name: str) -> Family:
         raise InputError(f"there is no proof family '{name}'; known are {', '.join(PROOF_FAMILIES)}")
     start = FOLDER / "__init__.py"
     if not start.is_file():
-        raise InputError(f"the family '{name}' is in {FOLDER.parent.name}/{FOLDER.name} of the repository: use a checkout")
+        raise InputError(
+            f"the family '{name}' is in {FOLDER.parent.name}/{FOLDER.name} of the repository: use a checkout"
+        )
     if PACKAGE not in sys.modules:
         spec = importlib.util.spec_from_file_location(PACKAGE, start, submodule_search_locations=[str(FOLDER)])
         assert spec is not None
