@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -27,6 +28,11 @@ RUNNING = 0.4  # of the training maxima: where losses are typical
 def difference(a: Array, b: Array) -> Array:
     """Temperature difference for powers, [K]."""
     return np.maximum(np.abs(a - b), 0.1)
+
+
+def fixed(value: float) -> Law:
+    """Law of a constant."""
+    return lambda m: np.full_like(m.hours, value)
 
 
 def series(*conductances: Array | float) -> Array:
@@ -290,6 +296,11 @@ class Box:
         """Bearing."""
         return self.bearings[name].mass_kg * self.c_s
 
+    def C_seat(self, bearing: str) -> float:
+        """Ring of the wall around a bearing."""
+        D, _, B = self.D_d_B(bearing)
+        return self.rho_c_w * np.pi * ((0.5 * D + self.t) ** 2 - (0.5 * D) ** 2) * 1.5 * B
+
     def C_shaft(self, name: str) -> float:
         """Shaft."""
         shaft = self.shafts[name]
@@ -439,7 +450,7 @@ class Box:
             yield from (f"oil-{part.name}", f"{part.name}-air")
             if part.foundation:
                 yield f"{part.name}-frame"
-        yield from (f"{a}-{b}" for a, b in zip(names, names[1:], strict=False))
+        yield from (f"{a}-{b}" for a, b in pairwise(names))
         for gear, shaft in zip(self.gears, self.shaft_of, strict=True):
             yield from (f"{gear}-oil", f"{gear}-{shaft}")
         yield from (f"{name}-air" for name, shaft in self.shafts.items() if shaft.length_in_air)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -11,10 +12,10 @@ from diagnosis.proof.zoo.structure import Law, Moment, ZooPlant
 from models.assembly.gearbox import Gearbox
 from models.base.types import Array
 
-from .parts import GRAVITY, KELVIN, PRANDTL, RPM, Box, Contact, Draft, difference, radiation, series, shaft_in_air
+from .laws_a import across, bearing_torque, churning, disc, in_mesh, rising, seal_torque, windage
+from .parts import GRAVITY, RPM, Box, Draft, fixed, radiation, series, shaft_in_air
 
 STRENGTH = 1.0
-NU_FILM, K_FILM = 1.7e-5, 0.0272  # air at the housing
 
 
 def draw(gearbox: Gearbox, rng: np.random.Generator) -> ZooPlant:
@@ -23,63 +24,6 @@ def draw(gearbox: Gearbox, rng: np.random.Generator) -> ZooPlant:
 
 
 FAMILY = Family(name="proof_a", description="kept for proof", machines=("fzg", "conveyor"), draw=draw)
-
-
-# ---------------------------------------------------------------------- laws without a machine
-
-
-def across(u: Array, length: float) -> Array:
-    """Square prism across the wind after Jakob, [W/(m^2 K)]."""
-    return 0.102 * (u * length / NU_FILM) ** 0.675 * PRANDTL ** (1.0 / 3.0) * K_FILM / length
-
-
-def rising(T: Array, T_air: Array, length: float) -> Array:
-    """Free convection of a wall after Churchill and Chu, [W/(m^2 K)]."""
-    beta = 1.0 / (0.5 * (T + T_air) + KELVIN)
-    Ra = GRAVITY * beta * difference(T, T_air) * length**3 / NU_FILM**2 * PRANDTL
-    root = 0.825 + 0.387 * Ra ** (1.0 / 6.0) / (1.0 + (0.492 / PRANDTL) ** (9.0 / 16.0)) ** (8.0 / 27.0)
-    return root**2 * K_FILM / length
-
-
-def disc(omega: Array, nu: Array, k: Array, prandtl: Array) -> Array:
-    """Levich's disc, [W/(m^2 K)]; nu in mm^2/s."""
-    return 0.62 * k * prandtl ** (1.0 / 3.0) * np.sqrt(omega / (1e-6 * nu))
-
-
-def friction_benedict_kelley(load: Array, eta_mPas: Array, V_s: Array, v_r: Array, S: float) -> Array:
-    """Benedict and Kelley's friction; load in N/mm."""
-    argument = 29660.0 * load / (eta_mPas * np.maximum(V_s, 1e-3) * v_r**2)
-    mu = 0.0127 * 1.13 / (1.13 - min(S, 0.8)) * np.log10(np.maximum(argument, 1.0001))
-    return np.clip(mu, 0.01, 0.085)
-
-
-def in_mesh(_: Moment, c: Contact) -> Array:
-    """Friction at the contact points."""
-    return friction_benedict_kelley(1e-3 * c.F / c.b, c.eta_mPas, c.V_s, c.v_r, 0.5 * sum(c.Ra))
-
-
-def churning(nu: Array, n: Array, D: float, b: float, module: float, dipped: float) -> Array:
-    """Losses of one gear in oil after ISO/TR 14179-1, [W]; lengths in mm, without a factor."""
-    rough = (7.93 - 4.648 / module) / np.sqrt(np.tan(np.deg2rad(10.0)))
-    return 1e3 * dipped * n**3 / 0.2e26 * (7.37 * nu * D**4.7 * b * rough + 1.474 * nu * D**5.7)
-
-
-def bearing_torque(nu: Array, n: Array, F: Array, d_m: float) -> tuple[Array, Array]:
-    """Palmgren's torques of a cylindrical roller bearing without and with load, [N mm]; d_m in mm."""
-    return 3.0 * 1e-7 * d_m**3 * np.maximum(nu * n, 2000.0) ** (2.0 / 3.0), 0.0003 * F * d_m
-
-
-def seal_torque(d: float) -> float:
-    """Torque of a seal of fluoro rubber after ISO/TR 14179-1, [N m]; d in mm."""
-    return 3.737e-3 * d
-
-
-def windage(n: Array, R: float, b: float, eta_mPas: Array) -> Array:
-    """Anderson and Loewenthal in their air full of oil, [W]."""
-    return 2.82e-4 * (1.0 + 2.3 * b / R) * n**2.8 * R**4.6 * (0.028 * eta_mPas + 0.019) ** 0.2
-
-
-# ---------------------------------------------------------------------- machine
 
 
 class _Machine:
@@ -97,7 +41,8 @@ class _Machine:
         self._boundaries()
         self._housing()
         self._oil()
-        self._gears_and_shafts()
+        self._gears()
+        self._shafts()
         self._bearings()
         self._surroundings()
         self._sources()
@@ -127,7 +72,7 @@ class _Machine:
         }
         self.share_near = {part: x for part, (_, x) in split.items()}
         self.seats = d.chance(0.5)
-        seat = {name: self._seat_capacity(name) for name in box.bearings}
+        seat = {name: box.C_seat(name) for name in box.bearings}
         scale = min(1.0, 0.35 * box.C_housing / sum(seat.values()))
         left = 1.0 - self.seats * scale * sum(seat.values()) / box.C_housing
         for part, (cut, x) in split.items():
@@ -164,10 +109,6 @@ class _Machine:
         if self.bed:
             whole = box.C_housing
             d.body("bed", box.foot, lambda m: m.p["bed_C"] * whole)
-
-    def _seat_capacity(self, bearing: str) -> float:
-        D, _, B = self.box.D_d_B(bearing)
-        return self.box.rho_c_w * np.pi * ((0.5 * D + self.box.t) ** 2 - (0.5 * D) ** 2) * 1.5 * B
 
     # Bodies by the place they hold; an undivided thing serves for both of its ends.
 
@@ -231,7 +172,7 @@ class _Machine:
                 lateral = 2.0 * box.k_w * box.t * box.f(part) * round_the_box / s
                 d.path(ends[0][0], ends[1][0], part, _constant("k_lat", lateral))
         names = list(self.ends)
-        for a, b in zip(names, names[1:], strict=False):
+        for a, b in pairwise(names):
             for name_a, name_b, x in self._joined(a, b):
                 d.path(name_a, name_b, d.link(a, b), _constant("k_joint", box.housing.joint_conductance_W_K * x))
 
@@ -290,7 +231,7 @@ class _Machine:
 
     # ------------------------------------------------------------------ 1.3, 9 to 12
 
-    def _gears_and_shafts(self) -> None:
+    def _gears(self) -> None:
         box, d = self.box, self.d
         for i, gear in enumerate(box.gears):
             d.path(self._outer_gear(i), "sump", d.link(gear, "oil"), self._gear_oil(i))
@@ -299,22 +240,25 @@ class _Machine:
                 d.path(self._outer_gear(i), "cavity", d.link(gear, "oil"), self._gear_mist(i))
             for name, x in self.ends[box.top]:
                 d.path("cavity", name, d.link("oil", box.top), self._mist_top(box.A_in * box.f(box.top) * x))
-            d.path("cavity", "wall_oil", "oil", lambda m: np.full_like(m.hours, 10.0 * box.A_in))
+            d.path("cavity", "wall_oil", "oil", fixed(10.0 * box.A_in))
         for i, gear in enumerate(box.gears):
             cut, x = self.rim[i]
             outside, inside = box.ring(i, x)
             if cut:
-                d.path(f"{gear}_rim", f"{gear}_hub", gear, lambda m, g=outside: np.full_like(m.hours, g))
+                d.path(f"{gear}_rim", f"{gear}_hub", gear, fixed(outside))
             within = inside if cut else float(series(inside, outside))
             shaft = box.shaft_of[i]
             halves = [self._half(shaft, True), self._half(shaft, False)] if self.halves[shaft] else [shaft]
             for half in halves:
                 law = self._fit(i, within, 1.0 / len(halves))
                 d.path(f"{gear}_hub" if cut else gear, half, d.link(gear, shaft), law)
+
+    def _shafts(self) -> None:
+        box, d = self.box, self.d
         for shaft in box.shafts:
             if self.halves[shaft]:
                 along = 2.0 * box.along(shaft) / box.shafts[shaft].length
-                d.path(f"{shaft}_drive", f"{shaft}_free", shaft, lambda m, g=along: np.full_like(m.hours, g))
+                d.path(f"{shaft}_drive", f"{shaft}_free", shaft, fixed(along))
             for bearing in box.of_shaft(shaft):
                 half = self._half(shaft, box.is_drive_end(bearing))
                 d.path(half, self._ring(bearing, True), d.link(shaft, bearing), box.shaft_bearing(bearing))
@@ -408,12 +352,10 @@ class _Machine:
         for name, shaft in box.shafts.items():
             half, length, section = self._half(name, True), shaft.length, box.along(name)
             if self.stub[name]:
-                g = section / (0.15 * length + 0.02)
-                d.path(f"stub_{name}", half, name, lambda m, g=g: np.full_like(m.hours, g))
+                d.path(f"stub_{name}", half, name, fixed(section / (0.15 * length + 0.02)))
                 law = self._shaft_air(name, np.pi * shaft.diameter * 0.15 * length)
                 d.path(f"stub_{name}", "air_low", d.link(name, "air"), law)
-                g = s * section / 0.15
-                d.path(f"stub_{name}", "drive", "", lambda m, g=g: np.full_like(m.hours, g))
+                d.path(f"stub_{name}", "drive", "", fixed(s * section / 0.15))
             elif shaft.surface_to_air:
                 law = self._shaft_air(name, np.pi * shaft.diameter * shaft.length_in_air)
                 d.path(half, "air_low", d.link(name, "air"), law)
@@ -428,7 +370,7 @@ class _Machine:
             d.path(name, below, frame, lambda m, x=x: x * standing(m))
         if self.bed:
             d.path("bed", "floor", frame, lambda m: 2.0 * m.p["k_bed"] * np.maximum(standing(m), 1.0))
-            d.path("bed", "air_low", frame, lambda m: np.full_like(m.hours, 3.0 * box.A_out))
+            d.path("bed", "air_low", frame, fixed(3.0 * box.A_out))
 
     def _shaft_air(self, shaft: str, area: float) -> Law:
         box, d = self.box, self.box.shafts[shaft].diameter

@@ -308,9 +308,8 @@ class _Machine:
                 K = self.definition.inputs[signal].quantity.high / 15.0 / count
                 for part in heat.parts:
                     d.path(self.element[heat.name], part, part, lambda m, g=K: np.full_like(m.hours, g))
-            d.source(
-                heat.name, heat.name, lambda m, i=signal, g=gain, p=factor: m.inputs[i] * g * m.p[p], into, is_loss=False
-            )  # fmt: skip
+            law: Law = lambda m, i=signal, g=gain, p=factor: m.inputs[i] * g * m.p[p]  # noqa: E731
+            d.source(heat.name, heat.name, law, into, is_loss=False)
         for k, loss in enumerate(self.definition.loss):
             names = f"k_nl_{loss.name}", f"k_ld_{loss.name}", f"u_{loss.name}"
             for name, key, value in ((names[0], "no_load_W", loss.no_load_W), (names[1], "load_W", loss.load_W)):

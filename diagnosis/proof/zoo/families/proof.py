@@ -37,8 +37,8 @@ def load_proof_family(name: str) -> Family:
         )
     if PACKAGE not in sys.modules:
         spec = importlib.util.spec_from_file_location(PACKAGE, start, submodule_search_locations=[str(FOLDER)])
-        assert spec is not None
-        assert spec.loader is not None
+        if spec is None or spec.loader is None:
+            raise ImportError(start)
         sys.modules[PACKAGE] = importlib.util.module_from_spec(spec)
         spec.loader.exec_module(sys.modules[PACKAGE])
     family: Family = importlib.import_module(f"{PACKAGE}.{name}").FAMILY
