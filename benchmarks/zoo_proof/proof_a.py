@@ -65,12 +65,11 @@ class _Machine:
         self.cavity = d.chance(0.7)
         self._body(self.cavity, "cavity", "oil", 3600.0 * (box.A_in / 6.0) ** 1.5 + 0.01 * box.C_oil)
         split = {part: (d.chance(0.6), d.between(0.35, 0.65)) for part in box.parts}
-        # Ends of a part: name, share, and whose draught it is in.
+        # Ends of a part: body and share.
         self.ends: dict[str, list[tuple[str, float]]] = {
             part: [(f"{part}_near", x), (f"{part}_far", 1.0 - x)] if cut else [(part, 1.0)]
             for part, (cut, x) in split.items()
         }
-        self.share_near = {part: x for part, (_, x) in split.items()}
         self.seats = d.chance(0.5)
         seat = {name: box.C_seat(name) for name in box.bearings}
         scale = min(1.0, 0.35 * box.C_housing / sum(seat.values()))
@@ -321,9 +320,8 @@ class _Machine:
 
     def _rollers(self, bearing: str, still: float) -> Law:
         box, shaft = self.box, self.box.bearings[bearing].shaft
-        return lambda m: (
-            still * m.p["k_roll"] * (1.0 + 0.5 * np.sqrt(np.maximum(box.n_of(shaft, m), 1.0) / 1500.0))
-        )  # fmt: skip
+        n = lambda m: np.maximum(box.n_of(shaft, m), 1.0)  # noqa: E731
+        return lambda m: still * m.p["k_roll"] * (1.0 + 0.5 * np.sqrt(n(m) / 1500.0))
 
     def _gap(self, bearing: str, out: str, place: str, share: float) -> Law:
         box = self.box
