@@ -64,7 +64,7 @@ class Experiment:
         return np.array(lower), np.array(upper)
 
     def setting(self, index: int, z: Array) -> Setting:
-        """What a piece is simulated with."""
+        """Values with which a piece is simulated."""
         piece = self.pieces[index]
         setting = Setting.of(self.machine, piece)
         for unknown, value in zip(self.unknowns, z.tolist(), strict=True):
@@ -107,7 +107,9 @@ class Experiment:
             return Linear(point=point, filter=kept.filter, residual=residual, columns=kept.columns)
         columns = self.columns(point, z)
         if not np.isfinite(columns).all():
-            raise ArithmeticError(f"the laws of {self.pieces[index].recording} have no derivative with these parameters")
+            raise ArithmeticError(
+                f"the laws of {self.pieces[index].recording} have no derivative with these parameters"
+            )
         if self.filters is None:
             whiten = Whitening(self.machine.model, point.trajectory, point.sensors, self.noise[index])
         else:
@@ -115,7 +117,9 @@ class Experiment:
         white = whiten(np.concatenate([point.residual[:, :, None], columns], axis=2))
         return Linear(point=point, filter=whiten, residual=white[:, 0], columns=white[:, 1:])
 
-    def fit(self, z: Array | None = None, guesses: Sequence[Guess] | None = None, *, iterations: int = ITERATIONS) -> Fit:
+    def fit(
+        self, z: Array | None = None, guesses: Sequence[Guess] | None = None, *, iterations: int = ITERATIONS
+    ) -> Fit:
         """The most probable unknowns.
 
         Parameters
@@ -138,9 +142,9 @@ class Experiment:
         if parts is None:
             raise ArithmeticError("the simulation has no solution where the fit should start")
         if self.filters is None:  # those of the start serve on the way, those of the end afterwards
-            settled = self.with_filters(parts).fit(z, [part.point.trajectory for part in parts], iterations=iterations)
-            final = self._attempt(settled.z, [part.point.trajectory for part in settled.parts])
-            return Fit(experiment=self, z=settled.z, parts=settled.parts if final is None else tuple(final))
+            first = self.with_filters(parts).fit(z, [part.point.trajectory for part in parts], iterations=iterations)
+            final = self._attempt(first.z, [part.point.trajectory for part in first.parts])
+            return Fit(experiment=self, z=first.z, parts=first.parts if final is None else tuple(final))
         objective, damping, settled, fresh = _objective(parts, z), 0.0, False, True
         for _ in range(iterations * (SLOW_PATIENCE if self.slow else 1)):
             step = _step(parts, z, damping, lower, upper)
@@ -171,23 +175,8 @@ class Experiment:
             parts = self._attempt(z, [part.point.trajectory for part in parts]) or parts
         return Fit(experiment=self, z=z, parts=tuple(parts))
 
-    def objective(self, z: Array, guesses: Sequence[Guess]) -> float:
-        """Squared whitened residuals and priors, without derivatives; infinite without a solution.
-
-        Needs given filters.
-        """
-        assert self.filters is not None  # noqa: S101 - of an earlier fit
-        total = float(z @ z)
-        try:
-            for index, guess in enumerate(guesses):
-                residual = self.filters[index](self.point(index, z, guess, rounds=2).residual[:, :, None])
-                total += float(np.vdot(residual, residual))
-        except (InputError, ArithmeticError, np.linalg.LinAlgError):
-            return np.inf
-        return total
-
     def with_filters(self, parts: Sequence[Linear]) -> Experiment:
-        """The same, judged by the noise filters of a linearisation."""
+        """Experiment that is judged by the noise filters of a linearisation."""
         return replace(self, filters=tuple(part.filter for part in parts))
 
     def _attempt(
@@ -255,7 +244,10 @@ class Fit:
 
     @cached_property
     def _root(self) -> Array:
-        return np.linalg.cholesky(np.eye(len(self.z)) + sum(part.columns.T @ part.columns for part in self.parts))
+        normal = np.eye(len(self.z))
+        for part in self.parts:
+            normal += part.columns.T @ part.columns
+        return np.asarray(np.linalg.cholesky(normal))
 
 
 def calibrate(experiment: Experiment) -> Fit:

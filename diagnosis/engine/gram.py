@@ -50,7 +50,9 @@ class Gram:
     log_determinants: Mapping[str, float]
     rows: Mapping[str, int]
 
-    def given(self, unknowns: Index, amplitudes: Array | float = 1.0, recordings: Collection[str] | None = None) -> Given:
+    def given(
+        self, unknowns: Index, amplitudes: Array | float = 1.0, recordings: Collection[str] | None = None
+    ) -> Given:
         """Everything else, with some unknowns marginalised.
 
         Parameters
@@ -70,7 +72,7 @@ class Gram:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Strengths:
-    """What columns are worth as further unknowns.
+    """Evidence and size of columns as further unknowns.
 
     Attributes
     ----------
@@ -102,11 +104,11 @@ class Given:
 
     @property
     def log_evidence(self) -> float:
-        """Of the readings, up to ``-M/2 ln 2 pi``."""
+        """Log evidence of the readings, up to ``-M/2 ln 2 pi``."""
         return -0.5 * (float(self.matrix[0, 0]) + self.log_determinant)
 
     def given(self, unknowns: Index, amplitudes: Array | float = 1.0) -> Given:
-        """The same with further unknowns marginalised; see :meth:`Gram.given`."""
+        """Products with further unknowns marginalised; see :meth:`Gram.given`."""
         at = np.asarray(unknowns, dtype=int) + 1
         scale = np.broadcast_to(np.asarray(amplitudes, dtype=float), at.shape)
         at, scale = at[scale > 0.0], scale[scale > 0.0]

@@ -62,7 +62,7 @@ class Machine:
 
 @dataclass(kw_only=True, eq=False)
 class Setting:
-    """What one piece is simulated and read with; unknowns write their values into it."""
+    """Values with which one piece is simulated and read; unknowns write into it."""
 
     machine: Machine
     recording: str
@@ -103,7 +103,7 @@ class Setting:
         return replace(piece, late_s=late) if late else piece
 
     def read(self, trajectory: Trajectory) -> Array:
-        """What the sensors read, faults included, shape (K + 1, channels)."""
+        """Readings of the sensors, faults included, shape (K + 1, channels)."""
         read = readings(self.machine.model, trajectory, self.sensors)
         for fault in self.machine.distortions:
             read = fault.distorted(trajectory, self.sensors, read, self.of_terms[fault.term.label])
@@ -130,22 +130,26 @@ class Setting:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Column:
-    """What one unknown does per unit: heat in the network, a change of the readings, or both.
+    """Effect of one unknown per unit: heat in the network, a change of the readings, or both.
 
     Attributes
     ----------
     heat : Heat or None
     reading : Array, shape (K + 1, channels), or None
-        [K] or [W]
+        Change of the readings of sound sensors, [K] or [W]
+    shown : Array, shape (K + 1, channels), or None
+        Change of what is recorded, faults of sensors and clock included
     """
 
     heat: Heat | None = None
     reading: Array | None = None
+    shown: Array | None = None
 
     def __mul__(self, factor: float) -> Column:
         return Column(
             heat=None if self.heat is None else self.heat * factor,
             reading=None if self.reading is None else self.reading * factor,
+            shown=None if self.shown is None else self.shown * factor,
         )
 
 
@@ -227,13 +231,20 @@ class Point:
             read = readings(model, trajectory, self.sensors)
             there = term.distorted(trajectory, self.sensors, read, moved)
             here = term.distorted(trajectory, self.sensors, read, values)
-            return Column(reading=(there - here) / step)
+            return Column(shown=(there - here) / step)
         # The trajectory's piece is shifted already: only the difference is added.
         there = term.adjusted(trajectory.piece, moved, trajectory).samples
         here = term.adjusted(trajectory.piece, values, trajectory).samples
         piece = replace(trajectory.piece, samples=trajectory.piece.samples + there - here)
         into, loss = moved_heat(model, trajectory, piece)
         return Column(heat=Heat(into=self._whole(into / step), loss=loss / step))
+
+    def clock_column(self) -> Array:
+        """Change of the readings per second of delay, shape (K + 1, channels)."""
+        there, here = (
+            replace(self.setting, clock=self.setting.clock + way).read(self.trajectory) for way in (1.0, -1.0)
+        )
+        return np.asarray(0.5 * (there - here))
 
     def reading(self, channel: str, values: Array) -> Array:
         """A change of one channel, shape (K + 1, channels)."""
@@ -245,7 +256,7 @@ class Point:
         return np.pad(into, ((0, 0), (0, len(self.machine.model.coupled))))
 
     def responses(self, columns: Sequence[Column]) -> Array:
-        """What the sensors read per unit of many columns, in one pass, shape (K + 1, channels, columns)."""
+        """Change of the readings per unit of many columns, in one pass, shape (K + 1, channels, columns)."""
         model, trajectory = self.machine.model, self.trajectory
         result = np.zeros((*self.read.shape, len(columns)))
         heated = [i for i, column in enumerate(columns) if column.heat is not None]
@@ -254,9 +265,12 @@ class Point:
             heats = [heat for i in some if (heat := columns[i].heat) is not None]
             T = trajectory.response(np.stack([heat.into for heat in heats], axis=-1))
             loss = np.stack([heat.loss for heat in heats], axis=-1)
-            read = reading_columns(model, trajectory, self.sensors, T, loss)
-            result[:, :, some] = self.setting.passed_on(trajectory, read)
+            result[:, :, some] = reading_columns(model, trajectory, self.sensors, T, loss)
         for i, column in enumerate(columns):
             if column.reading is not None:
                 result[:, :, i] += column.reading
+        result = self.setting.passed_on(trajectory, result)
+        for i, column in enumerate(columns):
+            if column.shown is not None:
+                result[:, :, i] += column.shown
         return result

@@ -75,7 +75,11 @@ def prepare_experiment(
         gain_of_torque=torque_gain(gearbox.network()),
     )  # fmt: skip
     return setup, Experiment(
-        machine=Machine(model), pieces=tuple(old.pieces), unknowns=tuple(unknowns), noise=noise, starts=tuple(old.starts)
+        machine=Machine(model),
+        pieces=tuple(old.pieces),
+        unknowns=tuple(unknowns),
+        noise=noise,
+        starts=tuple(old.starts),
     )
 
 

@@ -1,4 +1,4 @@
-"""Exact derivatives of the heat balance with respect to anything that its laws name: parameters, inputs, states, losses.
+"""Exact derivatives of the heat balance by anything that its laws name: parameters, inputs, states, losses.
 
 The laws are symbolic expressions, so are their derivatives.
 """
@@ -91,7 +91,7 @@ class LawSlopes:
         model, T = self.model, trajectory.middle
         power = trajectory.tangent.at(T[:, model.loss_nodes])
         signals = model.signals(trajectory.piece, T, trajectory.values, trajectory.memory)
-        signals = [*signals, *power.T]
+        signals, stored = [*signals, *power.T], np.diff(trajectory.T, axis=0) / trajectory.piece.steps[:, None]
         n, nodes = model.n, [model.parts.index(source.node) for source in model.network.sources]
         into = {name: np.zeros((len(T), n + len(model.coupled))) for name in self._names}
         loss = {name: np.zeros(len(T)) for name in self._names}
@@ -112,7 +112,8 @@ class LawSlopes:
                         flow = slope * model.incidence[link, n + index] * here.conductances[:, link]
                         heat[:, :n] += flow[:, None] * model.to_parts[link]
                 elif kind == "capacity":
-                    heat[:, index] -= slope / trajectory.capacities[index] * here.heat[:, index]
+                    # What a part stores over an interval is its mean net heat, jumps of operation included.
+                    heat[:, index] -= slope * stored[:, index]
                 else:
                     heat[:, n + index] += slope
         return {name: Heat(into=into[name], loss=loss[name]) for name in self._names}

@@ -1,6 +1,6 @@
 """Unknowns of an explanation: small classes with a value and a column.
 
-Every unknown is a standard normal number ``z``. It says which `value` a ``z`` has, how it acts on what is simulated
+Every unknown is a standard normal number ``z``. It has a `value`, how it acts on what is simulated
 (`act`), and what the sensors read more per unit of ``z`` (`column`, the exact derivative). Calibration, faults of
 measurement and candidates all are unknowns.
 """
@@ -13,11 +13,13 @@ from typing import Protocol
 import numpy as np
 
 from diagnosis.engine.point import Column, Point, Setting
-from diagnosis.forward.observation import delay_column, lag_column, total_at_points
+from diagnosis.forward.observation import delay_column, total_at_points
+from diagnosis.forward.recurrence import lagged
 from models.network.laws import Parameter
 from models.quantities.quantities import TOTAL_LOSS
 
 Scope = frozenset[str] | None
+LAG_STEP = 0.01  # relative
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,7 +41,7 @@ CALIBRATION = Group(name="calibration")
 
 
 class Unknown(Protocol):
-    """What every unknown can do."""
+    """Common protocol of all unknowns."""
 
     @property
     def parameter(self) -> Parameter:
@@ -140,8 +142,10 @@ class SensorLag(_Prior):
     def column(self, point: Point, z: float) -> Column:
         """Difference of the lagged course with the lag."""
         at = point.sensors.channels.index(self.channel)
-        node = point.machine.model.part_index(self.channel)
-        slope = lag_column(point.trajectory, node, float(point.sensors.lag[at]))
+        T, steps = point.trajectory.T[:, point.machine.model.part_index(self.channel)], point.trajectory.piece.steps
+        lag = float(point.sensors.lag[at])
+        there, here = (lagged(T, steps, lag * (1.0 + way)) for way in (LAG_STEP, -LAG_STEP))
+        slope = (there - here) / (2.0 * LAG_STEP * lag)
         return Column(reading=point.reading(self.channel, slope * self.per_z(z)))
 
 
@@ -212,11 +216,8 @@ class ClockOffset(_Prior):
         setting.clock += self.value(z)
 
     def column(self, point: Point, z: float) -> Column:
-        """Minus the rate of every reading."""
-        time = point.trajectory.piece.time
-        slope = -np.gradient(point.read, time, axis=0)
-        slope[:, [name == TOTAL_LOSS for name in point.sensors.channels]] = 0.0
-        return Column(reading=slope * self.per_z(z))
+        """Difference of the delayed readings."""
+        return Column(shown=point.clock_column() * self.per_z(z))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -240,4 +241,3 @@ class TermParameter(_Prior):
 def in_scope(unknown: Unknown, recording: str) -> bool:
     """True if an unknown is there in a recording."""
     return unknown.scope is None or recording in unknown.scope
-

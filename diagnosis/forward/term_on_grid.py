@@ -54,8 +54,9 @@ class TermOnGrid:
         arguments = [*given, *own, *(s.name for s in term.states)]
         other = sp.Integer(0) if term.boundary_temperature is None else term.boundary_temperature
         laws = [law.xreplace(model.boundary) for law in (term.expression, other)]
-        self._law = _compiled(laws, arguments, {**{name: f"own_{i}" for i, name in enumerate(own)},
-                                                **{f"T_{node}": f"T_place_{i}" for i, node in enumerate(term.target)}})  # fmt: skip
+        names = {name: f"own_{i}" for i, name in enumerate(own)}
+        names |= {f"T_{node}": f"T_place_{i}" for i, node in enumerate(term.target)}
+        self._law = _compiled(laws, arguments, names)
         self._memories = Memories(term.states, [*given, *own], model.parts, model.boundary)
         heard = {f"T_{part.name}" for part in network.parts} | {f"P_{c}" for c in network.components}
         heard |= {s.name for s in network.states}
@@ -234,7 +235,9 @@ def _compiled(
     laws: Sequence[sp.Expr], arguments: Sequence[str], names: Mapping[str, str]
 ) -> Callable[..., tuple[Any, ...]]:  # fmt: skip
     """Laws as a function; with other `names`, so that those of a mechanism at another place are compiled already."""
-    given = {symbol(name): symbol(names[name]) for law in laws for name in {s.name for s in law.free_symbols} & set(names)}
+    given = {
+        symbol(name): symbol(names[name]) for law in laws for name in {s.name for s in law.free_symbols} & set(names)
+    }
     return compile_each([names.get(name, name) for name in arguments], [law.xreplace(given) for law in laws])
 
 
