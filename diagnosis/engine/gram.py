@@ -27,6 +27,7 @@ from scipy.special import log_ndtr, ndtr, owens_t
 from models.base.types import Array
 
 Index = Sequence[int] | NDArray[np.intp]
+Signs = NDArray[np.int_]
 LEAST = 1e-9  # of a column's square: less shows nothing
 
 
@@ -149,7 +150,7 @@ class Given:
         log_bayes = log_bayes + np.where(sign != 0, np.log(2.0) + log_ndtr(sign * value / own), 0.0)
         return Strengths(log_bayes=np.where(b > LEAST, log_bayes, 0.0), value=value, sd=own)
 
-    def pairs(self, first: Index, second: Index, sd: tuple[Array, Array], sign: tuple[Array, Array]) -> Array:
+    def pairs(self, first: Index, second: Index, sd: tuple[Array, Array], sign: tuple[Signs, Signs]) -> Array:
         """Log Bayes factors of pairs of candidates against nothing.
 
         Parameters

@@ -1,8 +1,7 @@
 """Unknowns of an explanation: small classes with a value and a column.
 
-Every unknown is a standard normal number ``z``. It has a `value`, how it acts on what is simulated
-(`act`), and what the sensors read more per unit of ``z`` (`column`, the exact derivative). Calibration, faults of
-measurement and candidates all are unknowns.
+Every unknown is a standard normal number ``z``. It has a `value`, it can `act` on a simulation, and its `column` is the
+exact derivative of the readings. Parameters of a calibration, faults of measurement and candidates all are unknowns.
 """
 
 from __future__ import annotations
