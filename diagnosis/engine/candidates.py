@@ -292,9 +292,26 @@ def refit(fit: Fit, candidate: Hypothesis, variant: int, strength: float, *, ite
     return experiment.fit(best.z, [part.point.trajectory for part in best.parts], iterations=iterations - ROUGH)
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Reached:
+    """End of a refit, small enough to travel between processes.
+
+    Attributes
+    ----------
+    log_evidence : float
+    z : Array, shape (unknowns + further unknowns,)
+    courses : tuple of Array, shape (K + 1, parts)
+        Temperatures of every piece, [degC]
+    """
+
+    log_evidence: float
+    z: Array
+    courses: tuple[Array, ...]
+
+
 def refit_all(
     fit: Fit, chosen: Sequence[tuple[Hypothesis, int, float]], *, jobs: int = 1, iterations: int = ITERATIONS
-) -> list[Fit | None]:
+) -> list[Reached | None]:
     """Several candidates, each fitted together with everything else; None if there is no solution.
 
     Parameters
@@ -306,11 +323,13 @@ def refit_all(
         Processes
     iterations : int
     """
-    return run_parallel(_refitted, [(fit, *one, iterations) for one in chosen], jobs=jobs)
+    return run_parallel(_refitted, [(fit, *one, iterations) for one in chosen], jobs=jobs, batches=jobs)
 
 
-def _refitted(fit: Fit, candidate: Hypothesis, variant: int, strength: float, iterations: int) -> Fit | None:
+def _refitted(fit: Fit, candidate: Hypothesis, variant: int, strength: float, iterations: int) -> Reached | None:
     try:
-        return refit(fit, candidate, variant, strength, iterations=iterations)
+        found = refit(fit, candidate, variant, strength, iterations=iterations)
     except (InputError, ArithmeticError, np.linalg.LinAlgError):
         return None
+    return Reached(log_evidence=found.log_evidence, z=found.z,
+                   courses=tuple(part.point.trajectory.T for part in found.parts))  # fmt: skip
