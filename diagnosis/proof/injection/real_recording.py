@@ -51,6 +51,8 @@ class RealRecording:
         Mapping file next to it
     factors : mapping of quantity to float
         Unit inside per unit of the column
+    nodes : tuple of str
+        Parts of the machine
     """
 
     path: Path
@@ -62,11 +64,12 @@ class RealRecording:
     recording: Recording
     mapping: Path | None
     factors: Mapping[str, float]
+    nodes: tuple[str, ...]
 
     @cached_property
     def time(self) -> Array:
         """Time since the first row, shape (rows,), [s]."""
-        return self.found.seconds - self.found.seconds[0]
+        return np.asarray(self.found.seconds - self.found.seconds[0])
 
     @property
     def offset_s(self) -> float:
@@ -173,4 +176,5 @@ def read_real_recording(text: str, gearbox: Gearbox) -> RealRecording:
         path=path, stem=stem_of(path), part=text.rpartition("@")[2] if parts else "", first_s=first_s,
         text=read_csv_text(path, file.mapping.text_form).with_rows(found.rows), found=found, recording=recording,
         mapping=mapping_file(path, stem_of(path)), factors=factors,
+        nodes=tuple(part.name for part in network.parts),
     )  # fmt: skip
