@@ -12,6 +12,7 @@ import sympy as sp
 from diagnosis.candidates.explain import Explanation, calibrated
 from diagnosis.forward.recurrence import lagged
 from diagnosis.inference.unknowns import shifted
+from diagnosis.proof.injection.control import Control, find_control
 from diagnosis.proof.injection.real_recording import RealRecording
 from diagnosis.setup.inference_setup import InferenceSetup, prepare
 from diagnosis.setup.shaft import shafts
@@ -25,6 +26,8 @@ from models.simulation.simulate import Result, simulate
 from models.simulation.thermal_network import Losses, ThermalNetwork
 
 AMPLITUDE, COURSE, SEEN = "injected_size", "injected_course", "injected_seen"
+HOLD, HELD = "injected_hold", "injected_held"
+HOLD_K = 1.0  # change of a held temperature at which its control removes as much heat as all sources make
 BLOCK_S = 30.0  # the model runs on means over so long, of recordings with faster rows
 # Multiples of the usual structural floor, the lowest that leaves every parameter inside its prior: with a floor that is
 # too low a wrong structure pushes parameters to values that no machine has.
@@ -80,6 +83,8 @@ class CalibratedModel:
         Root mean square of measured minus simulated, [K]
     left_out : tuple of str
         Sensors that the calibration did not use
+    control : Control or None
+        Two-point control of the machine
     """
 
     real: RealRecording
@@ -92,6 +97,7 @@ class CalibratedModel:
     lags: Mapping[str, float]
     misfit_K: Mapping[str, float]
     left_out: tuple[str, ...]
+    control: Control | None = None
 
     @cached_property
     def base(self) -> Result:
@@ -105,9 +111,16 @@ class CalibratedModel:
         return float(np.mean(np.sum(heats, axis=0)))
 
     def prepared(self) -> ThermalNetwork:
-        """Return the network with the size and the course of a change as signals that laws may use."""
+        """Return the network with the size and the course of a change as signals that laws may use.
+
+        A control of the machine holds its temperature as it was without the change, where it is at work.
+        """
         size = Parameter(name=AMPLITUDE, start=0.0, lower=-1e12, upper=1e12, log=False)
-        return self.network.with_parameter(size).with_input(COURSE, 0.0)
+        network = self.network.with_parameter(size).with_input(COURSE, 0.0)
+        if self.control is None:
+            return network
+        law = -symbol(HOLD) * (symbol(f"T_{self.control.node}") - symbol(HELD))
+        return network.with_input(HOLD, 0.0).with_input(HELD, 0.0).with_source(self.control.acts_at, law, name=HOLD)
 
     @property
     def size_and_course(self) -> sp.Expr:
@@ -139,6 +152,9 @@ class CalibratedModel:
         """
         first = max(int(np.argmax(course != 0.0)) - 1, 0)
         inputs = {**self.cycle.inputs, COURSE: course, **(extra or {})}
+        if self.control is not None:
+            active = np.interp(self.cycle.time, self.real.time, self.control.active)
+            inputs |= {HOLD: active * self.heat_W / HOLD_K, HELD: self.base.temperatures[self.control.node]}
         sizes = np.concatenate([[0.0], sizes])
         result = simulate(
             changed,
@@ -199,6 +215,7 @@ def calibrate(gearbox: Gearbox, real: RealRecording) -> CalibratedModel:
         start={part.name: float(T) for part, T in zip(network.parts, first.T[0], strict=True)},
         cycle=_cycle(setup, found, real),
         lags=dict(zip(sensors.channels, map(float, sensors.lag), strict=True)), misfit_K=misfit, left_out=left_out,
+        control=find_control(real),
     )  # fmt: skip
 
 

@@ -86,14 +86,16 @@ def swapped(real: RealRecording, channel: str, course: Course, rng: np.random.Ge
 
 
 def clock(real: RealRecording, _: str, course: Course, __: np.random.Generator) -> Trial:
-    """All temperatures come whole rows late against the inputs; `size` [s]."""
+    """All temperatures come whole rows late against the inputs; `size` [s].
+
+    It is chosen by the rms change of the median sensor: noise and spikes move as well, and would look like an effect.
+    """
     step = real.step_s
     most = int(min(max(LONGEST_CLOCK_S, LONGEST_CLOCK_ROWS * step), course.from_s) / step)
     rows = np.unique(np.round(np.geomspace(1, max(most, 1), SIZES)).astype(int))
     acts = course(real.time) > 0.0
     columns, K = {}, {}
     for name, values in real.channels.items():
-        # Noise and spikes move as well; without them it is seen how large the effect is.
         smooth = median_filter(
             np.interp(real.time, real.time[np.isfinite(values)], values[np.isfinite(values)]), SMOOTH
         )
@@ -107,6 +109,7 @@ def clock(real: RealRecording, _: str, course: Course, __: np.random.Generator) 
     return Trial(
         kind="clock", what="clock", of="temperatures", nodes=(), course=course, sizes=rows * step, unit="s",
         columns=columns, K=K,
+        size_K=np.median([np.sqrt(np.mean(moved[:, acts] ** 2, axis=1)) for moved in K.values()], axis=0),
     )  # fmt: skip
 
 
@@ -164,10 +167,8 @@ def _input(
     model: CalibratedModel, kind: str, name: str, law: sp.Expr, course: Course, sizes: Array, shift: Array
 ) -> Trial:  # fmt: skip
     inside = model.network.inputs.get(name)
-    if inside is None:
-        K = {channel: np.zeros(shift.shape) for channel in model.real.channels}
-    else:
-        K = input_shift(model, name, law, sizes, course)
+    nothing: Mapping[str, Array] = {channel: np.zeros(shift.shape) for channel in model.real.channels}
+    K = nothing if inside is None else input_shift(model, name, law, sizes, course)
     unit = "1" if kind == "input_gain" or inside is None else inside.quantity.unit
     return Trial(
         kind=kind, what="input", of=name, nodes=(), course=course, sizes=sizes, unit=unit, columns={name: shift}, K=K

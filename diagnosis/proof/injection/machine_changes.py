@@ -25,8 +25,12 @@ RUNNING_QUANTILE = 95.0  # of the speed at which a heat that goes with the speed
 
 APPROXIMATE = (
     "difference of two runs of the calibrated model, added to the readings: the laws of the model are evaluated at its "
-    "temperatures, not at the machine's, and a control of the machine that is not in the model did not react to the "
-    "change"
+    "temperatures, not at the machine's"
+)
+NO_CONTROL = "; a control of the machine that the recording does not show would have reacted to the change"
+CONTROLLED = (
+    "; the two-point control of {channel} ({low:.1f} to {high:.1f} degC) holds its temperature and cools {acts_at} "
+    "more or less where the recording shows it at work, without a limit of its power, and its cycles keep their times"
 )
 BY_VALVE = "; the injected valve follows the reading plus the change"
 
@@ -169,13 +173,24 @@ def _run(
 
 def _trial(model: CalibratedModel, d: Differences, **given: object) -> Trial:
     K = {quantity[2:]: values for quantity, values in d.readings.items() if quantity.startswith("T_")}
-    facts = {
+    facts: dict[str, object] = {
         "calibration": {
             "misfit_K": {name: round(size, 3) for name, size in model.misfit_K.items()},
             "sensors_left_out": list(model.left_out),
         }
     }
-    return Trial(columns=d.readings, K=K, approximate=APPROXIMATE, facts=facts, **given)  # type: ignore[arg-type]
+    reason, control = APPROXIMATE, model.control
+    if control is None:
+        reason += NO_CONTROL
+    else:
+        reason += CONTROLLED.format(**vars(control))
+        facts["control"] = {
+            "sensor": control.channel,
+            "acts_at": control.acts_at,
+            "levels_degC": [round(control.low, 2), round(control.high, 2)],
+            "active_share": round(float(control.active.mean()), 3),
+        }
+    return Trial(columns=d.readings, K=K, approximate=reason, facts=facts, **given)  # type: ignore[arg-type]
 
 
 def _share(model: CalibratedModel, d: Differences, course: Course) -> Array:

@@ -85,13 +85,15 @@ class Trial:
     columns : mapping of quantity to Array, shape (B, rows)
         Added to the columns, in the unit inside
     K : mapping of channel to Array, shape (B, rows)
-        By which the size is chosen: the change of a temperature, [K]
+        Change of a temperature, [K]
     heat : mapping of node to Array, shape (B, blocks)
         Heat that the change itself makes, [W]
     approximate : str
         Why the injection is not exact; empty if it is
     facts : mapping
         Further facts for the truth
+    size_K : Array, shape (B,), or None
+        By which the size is chosen, if that is not the largest of `K`, [K]
     """
 
     kind: str
@@ -106,10 +108,13 @@ class Trial:
     heat: Mapping[str, Array] = field(default_factory=dict)
     approximate: str = ""
     facts: Mapping[str, Any] = field(default_factory=dict)
+    size_K: Array | None = None
 
     @property
     def largest_K(self) -> Array:
-        """Largest change of a temperature, shape (B,), [K]."""
+        """Largest change of a temperature, by which the size is chosen, shape (B,), [K]."""
+        if self.size_K is not None:
+            return self.size_K
         largest = [np.nanmax(np.abs(values), axis=-1, initial=0.0) for values in self.K.values()]
         return np.asarray(np.max(largest, axis=0))
 
