@@ -119,8 +119,11 @@ class CalibratedModel:
         network = self.network.with_parameter(size).with_input(COURSE, 0.0)
         if self.control is None:
             return network
-        law = -symbol(HOLD) * (symbol(f"T_{self.control.node}") - symbol(HELD))
-        return network.with_input(HOLD, 0.0).with_input(HELD, 0.0).with_source(self.control.acts_at, law, name=HOLD)
+        network = network.with_input(HOLD, 0.0).with_input(HELD, 0.0)
+        # A path, not a source: the solver takes paths implicitly, and a stiff source costs a hundred times the steps.
+        return network.with_link(
+            self.control.node, f"{HELD}_temperature", symbol(HOLD), name=HOLD, temperature=symbol(HELD)
+        )
 
     @property
     def size_and_course(self) -> sp.Expr:

@@ -23,6 +23,8 @@ AT_LEVEL = 0.5  # share of the turns that meet their level
 LONGEST_PAUSE = 4.0  # times the usual time between turns, for which the control counts as at work
 AFTER_TURN = 2  # rows after a peak, in which the cooled place falls most
 
+SHARED = 0.1  # of the distance between the levels: how far another sensor falls with it, at least
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Control:
@@ -77,7 +79,9 @@ def find_control(real: RealRecording) -> Control | None:
         before = peaks[hits[0]]
         before = before[before < len(T) - AFTER_TURN]
         falls = {name: float(np.mean(values[before] - values[before + AFTER_TURN])) for name, values in whole.items()}
-        cooled = max(falls, key=lambda name: falls[name])
+        cooled, *others = sorted(falls, key=lambda name: -falls[name])
+        if others and falls[others[0]] < SHARED * (high - low):  # noise or a broken sensor, which no other one follows
+            continue
         node, acts_at = (node_of_channel(name, real.nodes) for name in (channel, cooled))
         return Control(channel=channel, node=node, acts_at=acts_at, low=low, high=high, active=active)
     return None
