@@ -30,7 +30,7 @@ APPROXIMATE = (
 NO_CONTROL = "; a control of the machine that the recording does not show would have reacted to the change"
 CONTROLLED = (
     "; the two-point control of {channel} ({low:.1f} to {high:.1f} degC) holds its temperature where the recording "
-    "shows it at work: the heat is taken from {node} itself, without a limit of its power, and its cycles keep their times"
+    "shows it at work: the heat is taken from {node}, without a limit of its power, and its cycles keep their times"
 )
 BY_VALVE = "; the injected valve follows the reading plus the change"
 
