@@ -53,11 +53,15 @@ class Control:
 
 
 def find_control(real: RealRecording) -> Control | None:
-    """Find the two-point control that a recording shows; None if no temperature turns at two fixed levels."""
+    """Find the two-point control that a recording shows; None if no temperature turns at two fixed levels.
+
+    Of several sensors that do, it is the one whose turns meet their levels most often.
+    """
     whole = {
         name: np.interp(real.time, real.time[np.isfinite(values)], values[np.isfinite(values)])
         for name, values in real.channels.items()
     }
+    best: tuple[float, Control] | None = None
     for channel, T in whole.items():
         spread = float(np.percentile(T, 90.0) - np.percentile(T, 10.0))
         prominence = max(PROMINENCE_K, PROMINENCE_SHARE * spread)
@@ -83,5 +87,7 @@ def find_control(real: RealRecording) -> Control | None:
         if others and falls[others[0]] < SHARED * (high - low):  # noise or a broken sensor, which no other one follows
             continue
         node, acts_at = (node_of_channel(name, real.nodes) for name in (channel, cooled))
-        return Control(channel=channel, node=node, acts_at=acts_at, low=low, high=high, active=active)
-    return None
+        met = min(float(hit.mean()) for hit in hits)
+        if best is None or met > best[0]:
+            best = met, Control(channel=channel, node=node, acts_at=acts_at, low=low, high=high, active=active)
+    return None if best is None else best[1]
