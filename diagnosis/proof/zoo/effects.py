@@ -16,7 +16,7 @@ import numpy as np
 
 from diagnosis.proof.zoo.faults import Fault, FaultMaker
 from diagnosis.proof.zoo.structure import Body, Boundary, Change, Law, Moment, Outcome, Path, Programme, ZooPlant
-from diagnosis.proof.zoo.time_course import Course
+from diagnosis.proof.zoo.time_course import ALWAYS, Course
 from models.base.types import Array
 
 What = Literal["loss", "link", "capacity", "heat", "sensor", "input", "clock"]
@@ -164,7 +164,7 @@ class ZooEffect:
     fault: Fault | None = None
     parameters: Mapping[str, float] = field(default_factory=dict)
     strength: float = 1.0
-    course: Course = Course()
+    course: Course = ALWAYS
 
     @cached_property
     def changes(self) -> tuple[Change, ...]:
@@ -205,6 +205,7 @@ def made(
         If the plant lacks what it needs.
     """
     draft = maker.draw(setting, rng)
+
     return ZooEffect(name=name, catalogue=catalogue, family=maker.family, kind=maker.kind, law=draft.law,
                      unit=draft.unit, cap=draft.cap, act=draft.act, parameters=draft.parameters, course=course)  # fmt: skip
 
@@ -216,7 +217,14 @@ def made_fault(name: str, maker: FaultMaker, fault: Fault, *, cap: float, law: s
 
 
 def _in_time(law: Law, strength: float, course: Course) -> Law:
+    if course.kind == "always":
+        return lambda m: strength * law(m)
     return lambda m: strength * course.share(m.hours) * law(m)
+
+
+def is_part(thing: str, of: str) -> bool:
+    """True if a ``part_of``, which may join several names by ``+``, holds a name."""
+    return of in thing.split("+")
 
 
 def soft(z: Array) -> Array:
@@ -280,15 +288,14 @@ class Setting:
         UnfitError
             If the plant has none.
         """
-        sizes = {b.name: float(b.capacity(self.typical)[0]) for b in self.plant.bodies if b.part_of == node}
+        sizes = {b.name: float(b.capacity(self.typical)[0]) for b in self.plant.bodies if is_part(b.part_of, node)}
         if not sizes:
             raise UnfitError(node)
         return {name: size / sum(sizes.values()) for name, size in sizes.items()}
 
     def group(self, name: str) -> tuple[str, ...]:
         """Nominal nodes of a group that the plant has bodies of."""
-        there = {body.part_of for body in self.plant.bodies}
-        nodes = tuple(node for node in self.groups.get(name, ()) if node in there)
+        nodes = tuple(node for node in self.groups.get(name, ()) if node in self.nodes)
         if not nodes:
             raise UnfitError(name)
         return nodes
@@ -296,12 +303,12 @@ class Setting:
     @cached_property
     def nodes(self) -> tuple[str, ...]:
         """Nominal nodes that the plant has bodies of."""
-        return tuple(dict.fromkeys(body.part_of for body in self.plant.bodies if body.part_of))
+        return tuple(dict.fromkeys(node for b in self.plant.bodies for node in b.part_of.split("+") if node))
 
     @cached_property
     def links(self) -> tuple[str, ...]:
         """Nominal links that the plant has paths of."""
-        return tuple(dict.fromkeys(path.part_of for path in self.plant.paths if "-" in path.part_of))
+        return tuple(dict.fromkeys(n for path in self.plant.paths for n in path.part_of.split("+") if "-" in n))
 
     def link_between(self, here: Sequence[str], there: Sequence[str]) -> tuple[str, ...]:
         """Nominal links that lead from one of some nodes to one of others.
@@ -328,11 +335,25 @@ class Setting:
         UnfitError
             If the plant has none.
         """
-        all_of = dict.fromkeys(source.part_of for source in self.plant.sources if source.is_loss)
-        found = tuple(one for one in all_of if any(one == name or one.startswith(f"{name}_") for name in names))
+        found = tuple(one for one in self.losses_all if any(one == name or one.startswith(f"{name}_") for name in names))
         if not found:
             raise UnfitError(str(names))
         return found
+
+    @cached_property
+    def losses_all(self) -> tuple[str, ...]:
+        """Nominal losses that the plant has sources of."""
+        return tuple(dict.fromkeys(n for s in self.plant.sources if s.is_loss for n in s.part_of.split("+") if n))
+
+    def date(self, rng: np.random.Generator, low: float, high: float) -> float:
+        """A time of the training recordings, between two shares of their rows, [h] since the first row."""
+        wanted = float(rng.uniform(low, high)) * self.hours
+        for programme in self.programmes:
+            length = (len(programme.inputs["T_ambient"]) - programme.unrecorded) * self.plant.row_s / 3600.0
+            if wanted < length:
+                return programme.begins_h + wanted
+            wanted -= length
+        raise AssertionError
 
     def speed(self) -> Law:
         """Speed over its highest value, >= 0, [-]."""
@@ -369,19 +390,35 @@ class Setting:
 
     def loss_factor(self, names: Sequence[str], law: Law, *, sign: int = 1) -> Act:
         """Nominal losses times ``1 + law``."""
-        sources = [source for source in self.plant.sources if source.part_of in names]
-        home = {body.name: body.part_of for body in self.plant.bodies}
-        nodes = {n: tuple(dict.fromkeys(home[b] for s in sources if s.part_of == n for b in s.spread)) for n in names}
+        sources = [s for s in self.plant.sources if any(is_part(s.part_of, name) for name in names)]
+        nodes = {name: self._heated(name) for name in names}
         return Act(
             changes=tuple(Change(kind="source", target=source.name, law=law) for source in sources),
             changed=tuple(Changed(what="loss", of=n, nodes=nodes[n], sign=sign, is_loss=True) for n in names),
+        )
+
+    def _heated(self, source: str) -> tuple[str, ...]:
+        """Nominal nodes that a nominal source heats in this plant."""
+        home = {body.name: body.part_of.split("+") for body in self.plant.bodies}
+        return tuple(
+            dict.fromkeys(
+                node
+                for one in self.plant.sources
+                if is_part(one.part_of, source)
+                for body in one.spread
+                for node in home[body]
+            )
         )
 
     def link_factor(self, names: Sequence[str], law: Law, *, sign: int = 1) -> Act:
         """Conductances of nominal links times ``1 + law``."""
         known = self.nodes
         return Act(
-            changes=tuple(Change(kind="path", target=p.name, law=law) for p in self.plant.paths if p.part_of in names),
+            changes=tuple(
+                Change(kind="path", target=p.name, law=law)
+                for p in self.plant.paths
+                if any(is_part(p.part_of, name) for name in names)
+            ),
             changed=tuple(
                 Changed(what="link", of=n, nodes=tuple(node for node in n.split("-") if node in known), sign=sign)
                 for n in names
@@ -424,7 +461,7 @@ class Setting:
             If the plant has none.
         """
         for boundary in self.plant.boundaries:
-            if boundary.part_of == "air":
+            if is_part(boundary.part_of, "air"):
                 return boundary.name
         raise UnfitError("air")
 

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from diagnosis.proof.plant.instruments import lagged
-from diagnosis.proof.zoo.time_course import Course
+from diagnosis.proof.zoo.time_course import ALWAYS, Course
 from models.base.types import Array
 
 FaultKind = Literal["bias", "gain", "drift", "lag", "stuck", "swapped", "clock", "offset", "input_gain", "heated"]
@@ -72,7 +72,7 @@ class Fault:
     near: str = ""
     strength: float
     sign: int = 1
-    course: Course = Course()
+    course: Course = ALWAYS
 
     @property
     def what(self) -> Literal["sensor", "input", "clock"]:

@@ -41,3 +41,6 @@ class Course:
         if self.kind == "ramp":
             return np.asarray(np.clip((hours - self.from_h) / (self.to_h - self.from_h), 0.0, 1.0))
         return np.asarray((hours >= self.from_h) & (hours < self.to_h), dtype=float)
+
+
+ALWAYS = Course()
