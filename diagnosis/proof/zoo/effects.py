@@ -240,7 +240,7 @@ class Setting:
     plant : ZooPlant
     programmes : sequence of Programme
     healthy : Outcome
-        Of the first programme without any effect, one run
+        Of one training recording without any effect, one run
     groups : mapping of str to tuple of str
         Nominal nodes by what they are: ``housing``, ``bearings``, ``shafts``, ``gears``, ``returns``
 
@@ -250,6 +250,8 @@ class Setting:
         Typical loss, [W]
     shed : float
         Heat that the machine sheds per kelvin that it is warmer than the air, [W/K]
+    hours, span : float
+        Length of the training recordings, and from the first row of the session to the last, pauses included, [h]
     """
 
     def __init__(
@@ -265,11 +267,12 @@ class Setting:
         values = {name: np.concatenate([p.inputs[name][p.unrecorded :] for p in train]) for name in plant.inputs}
         self.reference = {name: float(np.quantile(np.abs(v), 0.97)) or 1.0 for name, v in values.items()}
         self.healthy = {name: series[0] for name, series in healthy.T.items()}
-        air = values["T_ambient"][: len(next(iter(self.healthy.values())))]
-        self.air_mean = float(air.mean())
+        self.air_mean = float(values["T_ambient"].mean())
         names = [body.name for body in plant.bodies]
         self.rise = max(float(np.mean([self.healthy[n].mean() for n in names])) - self.air_mean, 1.0)
         self.loss, self.shed = plant.loss_W, plant.loss_W / self.rise
+        last = max(programmes, key=lambda p: p.begins_h)
+        self.span = last.begins_h + (len(last.inputs["T_ambient"]) - last.unrecorded) * plant.row_s / 3600.0
         self.hours = sum(len(p.inputs["T_ambient"]) - p.unrecorded for p in train) * plant.row_s / 3600.0
         self.typical = Moment(
             hours=np.ones(1), since_start=np.ones(1),
@@ -335,7 +338,9 @@ class Setting:
         UnfitError
             If the plant has none.
         """
-        found = tuple(one for one in self.losses_all if any(one == name or one.startswith(f"{name}_") for name in names))
+        found = tuple(
+            one for one in self.losses_all if any(one == name or one.startswith(f"{name}_") for name in names)
+        )
         if not found:
             raise UnfitError(str(names))
         return found
@@ -388,13 +393,14 @@ class Setting:
         )
         return Act(changes=changes, changed=(Changed(what="heat", of=node, nodes=(node,), sign=sign, is_loss=is_loss),))
 
-    def loss_factor(self, names: Sequence[str], law: Law, *, sign: int = 1) -> Act:
-        """Nominal losses times ``1 + law``."""
+    def loss_factor(self, names: Sequence[str], law: Law, *, sign: int = 1, is_loss: bool = True) -> Act:
+        """Nominal losses (or other heats) times ``1 + law``."""
+        what: What = "loss" if is_loss else "heat"
         sources = [s for s in self.plant.sources if any(is_part(s.part_of, name) for name in names)]
         nodes = {name: self._heated(name) for name in names}
         return Act(
             changes=tuple(Change(kind="source", target=source.name, law=law) for source in sources),
-            changed=tuple(Changed(what="loss", of=n, nodes=nodes[n], sign=sign, is_loss=True) for n in names),
+            changed=tuple(Changed(what=what, of=n, nodes=nodes[n], sign=sign, is_loss=is_loss) for n in names),
         )
 
     def _heated(self, source: str) -> tuple[str, ...]:

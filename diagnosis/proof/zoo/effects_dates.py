@@ -70,7 +70,7 @@ def _relative(s: Setting, rng: np.random.Generator, what: str, names: tuple[str,
     elif what == "capacity":
         act = s.capacity(name, law, sign=sign)
     else:
-        act = s.loss_factor((name,), law, sign=sign)
+        act = s.loss_factor((name,), law, sign=sign, is_loss=what == "loss")
     return Draft(act=act, law=f"{what} {name} (1 {_plus(sign)} a)", unit="1", cap=UP if sign > 0 else DOWN)
 
 

@@ -252,9 +252,11 @@ def ambient_swing(s: Setting, rng: np.random.Generator) -> Draft:
 
 def ambient_drift(s: Setting, rng: np.random.Generator) -> Draft:
     """The air at the machine warms to a new temperature, the probe's does not."""
-    tau = float(rng.uniform(2.0, 20.0))
+    tau = float(rng.uniform(0.02, 0.2)) * s.span
     act = s.input_shift("T_ambient", lambda m: -np.expm1(-m.hours / tau))
-    return Draft(act=act, law="air at the machine + a (1 - exp(-t / tau))", unit="K", cap=6.0, parameters={"tau_h": tau})
+    return Draft(
+        act=act, law="air at the machine + a (1 - exp(-t / tau))", unit="K", cap=6.0, parameters={"tau_h": tau}
+    )
 
 
 def _one(m: Moment) -> Array:

@@ -10,7 +10,6 @@ from diagnosis.proof.zoo.effects import Draft, Maker, Setting, UnfitError, soft
 from diagnosis.proof.zoo.structure import Law
 
 SLIDING, CHURNING = ("mesh_sliding", "gears_load"), ("churning", "gears_no_load")
-FORTY_HOURS = 40.0
 
 
 def windage(s: Setting, rng: np.random.Generator) -> Draft:
@@ -101,7 +100,7 @@ def pump_heat(s: Setting, rng: np.random.Generator) -> Draft:
 
 def run_in_flanks(s: Setting, rng: np.random.Generator) -> Draft:
     """Falls hyperbolically with the hours."""
-    life = float(rng.uniform(2.0, 15.0))
+    life = float(rng.uniform(0.03, 0.2)) * s.span
     act = s.loss_factor(s.losses(*SLIDING), lambda m: 1.0 / (1.0 + m.hours / life))
     return Draft(act=act, law="mesh sliding (1 + a / (1 + t / life))", unit="1", cap=1.0, parameters={"life_h": life})
 
@@ -111,21 +110,21 @@ def run_in_seals(s: Setting, rng: np.random.Generator) -> Draft:
     names = tuple(n for n in s.losses_all if "seal" in n)
     if not names:
         raise UnfitError("seals")
-    life = float(rng.uniform(3.0, 20.0))
+    life = float(rng.uniform(0.03, 0.2)) * s.span
     act = s.loss_factor(names, lambda m: np.exp(-np.sqrt(m.hours / life)))
     return Draft(act=act, law="seals (1 + a exp(-(t / life)^0.5))", unit="1", cap=1.5, parameters={"life_h": life})
 
 
 def oil_ageing(s: Setting, _: np.random.Generator) -> Draft:
     """Churning and bearings grow with the root of the hours."""
-    law: Law = lambda m: np.sqrt(m.hours / FORTY_HOURS)  # noqa: E731
+    law: Law = lambda m: np.sqrt(m.hours / s.span)  # noqa: E731
     act = s.loss_factor((*s.losses(*CHURNING), *s.losses(*s.group("bearings"))), law)
-    return Draft(act=act, law="churning and bearing losses (1 + a (t / 40 h)^0.5)", unit="1", cap=0.6)
+    return Draft(act=act, law="churning and bearing losses (1 + a (t / span)^0.5)", unit="1", cap=0.6)
 
 
 def oil_loss(s: Setting, rng: np.random.Generator) -> Draft:
     """The level sinks to a lower one: less churning, less to warm, drier gears."""
-    tau = float(rng.uniform(5.0, 30.0))
+    tau = float(rng.uniform(0.1, 0.4)) * s.span
     law: Law = lambda m: np.expm1(-m.hours / tau)  # noqa: E731
     act = s.loss_factor(s.losses(*CHURNING), law, sign=-1) + s.capacity("oil", law, sign=-1)
     act = act + s.link_factor(s.link_between(s.group("gears"), ("oil",)), law, sign=-1)
@@ -135,8 +134,8 @@ def oil_loss(s: Setting, rng: np.random.Generator) -> Draft:
 
 def gear_wear(s: Setting, _: np.random.Generator) -> Draft:
     """Grows with the square of the hours."""
-    act = s.loss_factor(s.losses(*SLIDING), lambda m: (m.hours / FORTY_HOURS) ** 2)
-    return Draft(act=act, law="mesh sliding (1 + a (t / 40 h)^2)", unit="1", cap=0.8)
+    act = s.loss_factor(s.losses(*SLIDING), lambda m: (m.hours / s.span) ** 2)
+    return Draft(act=act, law="mesh sliding (1 + a (t / span)^2)", unit="1", cap=0.8)
 
 
 def bearing_damage(s: Setting, rng: np.random.Generator) -> Draft:
@@ -151,8 +150,8 @@ def bearing_damage(s: Setting, rng: np.random.Generator) -> Draft:
 def torque_decay(s: Setting, rng: np.random.Generator) -> Draft:
     """The torque that is set is reached less and less, with the root of the hours."""
     s.load()
-    act = s.input_shift("torque", lambda m: -m.inputs["torque"] * np.sqrt(m.hours / FORTY_HOURS), sign=-1)
-    return Draft(act=act, law="true torque = recorded (1 - a (t / 40 h)^0.5)", unit="1", cap=0.3)
+    act = s.input_shift("torque", lambda m: -m.inputs["torque"] * np.sqrt(m.hours / s.span), sign=-1)
+    return Draft(act=act, law="true torque = recorded (1 - a (t / span)^0.5)", unit="1", cap=0.3)
 
 
 def _one(s: Setting, group: str, rng: np.random.Generator) -> str:

@@ -67,7 +67,7 @@ def water_evaporation(s: Setting, _: np.random.Generator) -> Draft:
 
 def growing_insulation(s: Setting, rng: np.random.Generator) -> Draft:
     """A layer that grows with the hours covers one way to the air."""
-    tau, names = float(rng.uniform(5.0, 30.0)), _way_to_air(s, rng)
+    tau, names = float(rng.uniform(0.05, 0.3)) * s.span, _way_to_air(s, rng)
     act = s.link_factor(names, lambda m: -(m.hours / tau) / (1.0 + m.hours / tau), sign=-1)
     return Draft(act=act, law="conductance to air (1 - a (t / tau) / (1 + t / tau))", unit="1", cap=0.9,
                  parameters={"tau_h": tau})  # fmt: skip
