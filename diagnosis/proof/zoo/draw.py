@@ -21,7 +21,7 @@ from diagnosis.proof.zoo.case import (
     run_case,
 )
 from diagnosis.proof.zoo.distance import Drawn, draw_plant
-from diagnosis.proof.zoo.effects import Maker, Setting, UnfitError, ZooEffect, either, made, made_fault
+from diagnosis.proof.zoo.effects import Maker, ZooEffect, made, made_fault
 from diagnosis.proof.zoo.effects_dates import DATED_MAKERS, draw_course
 from diagnosis.proof.zoo.effects_heat import HEAT_MAKERS
 from diagnosis.proof.zoo.effects_losses import LOSS_MAKERS
@@ -30,6 +30,7 @@ from diagnosis.proof.zoo.families import FAMILIES
 from diagnosis.proof.zoo.faults import AMBIENT, INPUT_FAULTS, SENSOR_FAULTS, Fault, FaultMaker, input_of
 from diagnosis.proof.zoo.oracle_columns import Measurement, design_of
 from diagnosis.proof.zoo.recorder import ZooInstruments, draw_instruments, with_slow_sensors
+from diagnosis.proof.zoo.setting import Setting, UnfitError, either
 from diagnosis.proof.zoo.simulate import simulate
 from diagnosis.proof.zoo.structure import Programme, Variant, ZooPlant
 from diagnosis.proof.zoo.time_course import ALWAYS, Course
