@@ -64,6 +64,11 @@ class Parts:
     paths: tuple[Path, ...] = ()
     like: Mapping[str, str] = field(default_factory=dict)
 
+    @property
+    def names(self) -> set[str]:
+        """Names of its bodies and boundaries."""
+        return {body.name for body in self.bodies} | {boundary.name for boundary in self.boundaries}
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Act:
