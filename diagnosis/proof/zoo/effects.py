@@ -74,8 +74,8 @@ class ZooEffect:
     fault : Fault or None
         Of measurement, at its strength
     parameters : mapping of str to float
-    cap : float
-        Greatest strength that is physical
+    least, cap : float
+        Range of strengths that are physical, and stand out of ordinary errors of instruments
     strength : float
     course : Course
     """
@@ -90,6 +90,7 @@ class ZooEffect:
     act: Act = field(default_factory=Act)
     fault: Fault | None = None
     parameters: Mapping[str, float] = field(default_factory=dict)
+    least: float = 0.0
     strength: float = 1.0
     course: Course = ALWAYS
 
