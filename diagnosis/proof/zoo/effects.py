@@ -142,7 +142,8 @@ def made(
 def made_fault(name: str, maker: FaultMaker, fault: Fault, *, least: float, cap: float, course: Course) -> ZooEffect:
     """A fault of measurement as an effect; its strength is still that of the fault."""
     return ZooEffect(name=name, catalogue=maker.catalogue, family="measurement", kind=maker.kind, law=maker.law,
-                     unit=maker.unit, least=least, cap=cap, fault=fault, strength=fault.strength, course=course)  # fmt: skip
+                     unit=maker.unit, least=least, cap=cap, fault=fault, strength=fault.strength,
+                     course=course)  # fmt: skip
 
 
 def _in_time(law: Law, strength: float, course: Course) -> Law:

@@ -135,8 +135,8 @@ SENSOR_FAULTS: Mapping[str, FaultMaker] = {
                                law="temperatures are stamped a seconds late"),
 }  # fmt: skip
 INPUT_FAULTS: Mapping[str, FaultMaker] = {
-    "torque_offset": FaultMaker(kind="signal", fault="offset", catalogue="torque_offset", unit="N m", cap=0.15, least=0.01,
-                                law="recorded torque = true + a"),
+    "torque_offset": FaultMaker(kind="signal", fault="offset", catalogue="torque_offset", unit="N m", cap=0.15,
+                                least=0.01, law="recorded torque = true + a"),
     "torque_gain": FaultMaker(kind="signal", fault="input_gain", catalogue="torque_gain", unit="1", cap=0.2, least=0.02,
                               law="recorded torque = true (1 + a)"),
     "speed_gain": FaultMaker(kind="signal", fault="input_gain", catalogue="speed_gain", unit="1", cap=0.15, least=0.004,

@@ -72,10 +72,10 @@ def case_of(
     drawn: Drawn, fzg: Gearbox, group: str, *effects: ZooEffect, seed: int = 4, kind: str | None = None
 ) -> ZooCase:
     """A case with given effects, or with drawn ones."""
-    name = {"name": "case_001", "kind": kind, "session_deviation": 0.03, "oracle": squares}
+    name = {"name": "case_001", "kind": None, "session_deviation": 0.03, "oracle": squares}
     if not effects:
-        return draw.draw_case_of(drawn, fzg, "fzg", seed, group, **name)
-    healthy = draw.draw_case_of(drawn, fzg, "fzg", seed, "control", **{**name, "kind": "clean"})
+        return draw.draw_case_of(drawn, fzg, "fzg", 4, group, **name)
+    healthy = draw.draw_case_of(drawn, fzg, "fzg", 4, "control", **{**name, "kind": "clean"})
     case = draw.with_effects(replace(healthy, group=group, kind="effects"), effects)
     case = replace(case, runs=run_case(case, "train", "hold", "baseline"))
     return replace(case, nats_of_effects=(OracleNats(plant=1.0, tool=1.0),) * len(effects))
