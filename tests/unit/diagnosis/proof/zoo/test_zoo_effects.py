@@ -212,9 +212,9 @@ def test_baselines_share_the_plant_up_to_the_deviation(drawn: Drawn, fzg: Gearbo
     [
         ("--plant zoo --group singl", "did you mean 'single'"),
         ("--plant zoo --families wals", "did you mean 'walls'"),
-        ("--plant zoo --effect windage", "--effect goes with --plant own"),
-        ("--effect windage --baselines 1", "use --plant zoo for --baselines"),
-        ("--effect windage --group single", "go with --plant zoo"),
+        ("--plant zoo --effect windage", "--effect: do not go with --plant zoo"),
+        ("--effect windage --baselines 1", "--baselines: go with --plant zoo only"),
+        ("--effect windage --group single", "--group: go with --plant zoo only"),
         ("--plant zoo --truth OUT/recordings/t", "must not lie among the recordings"),
     ],
 )
