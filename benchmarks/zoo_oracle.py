@@ -17,9 +17,9 @@ from typing import Any
 
 import matplotlib as mpl
 import numpy as np
+
 from diagnosis.proof.zoo.case import GROUPS
 from diagnosis.proof.zoo.draw import draw_case
-
 from diagnosis.proof.zoo.families import FAMILIES
 from models.base.errors import InputError
 

@@ -12,7 +12,17 @@ from diagnosis.proof.zoo.oracle import LOSS, Design
 from diagnosis.proof.zoo.oracle_columns import Measurement, design_of
 from diagnosis.proof.zoo.simulate import simulate
 from diagnosis.proof.zoo.structure import (
-    Body, Boundary, Change, Law, Moment, Path, Probe, Programme, Source, Variant, ZooPlant,
+    Body,
+    Boundary,
+    Change,
+    Law,
+    Moment,
+    Path,
+    Probe,
+    Programme,
+    Source,
+    Variant,
+    ZooPlant,
 )  # fmt: skip
 from models.base.types import Array
 
