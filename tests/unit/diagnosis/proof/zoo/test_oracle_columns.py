@@ -140,6 +140,6 @@ def test_start_temperatures_and_random_heat_are_no_evidence(design: Design) -> N
 
 
 def test_a_change_at_a_date_is_evidence_for_both(design: Design) -> None:
-    step = Change(kind="path", target="shed", law=lambda m: -0.5 * (m.hours > 0.5))
+    step = Change(kind="path", target="shed", law=lambda m: np.where(m.hours > 0.5, -0.5, 0.0))
     nats = design.nats_of(apart(Variant(changes=(step,))))
     assert nats.plant > nats.tool > 10.0

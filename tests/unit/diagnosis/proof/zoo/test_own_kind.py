@@ -50,6 +50,7 @@ def test_the_run_is_the_same(plant: Plant, run: Run, instruments: Instruments) -
         np.testing.assert_allclose(zoo.readings[channel][0], own, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_bias_counts_and_a_torque_within_its_tolerance_does_not(
     plant: Plant, run: Run, instruments: Instruments
 ) -> None:
