@@ -245,12 +245,12 @@ class _Linearised:
             scale = RELATIVE_STEP
         else:
             scale = RELATIVE_STEP if direction.kind == "input" else 1.0
-            moved = self._with_change(self.raw, self.values, self.base, direction, scale)
-            at_rows = self._with_change(self.raw_rows, self.values_rows, self.base_rows, direction, scale)
+            moved = self._with_change(self.raw, self.values, direction, scale)
+            at_rows = self._with_change(self.raw_rows, self.values_rows, direction, scale)
         direct = (self._outputs(at_rows) - self._outputs(self.base_rows)) / scale
         return self._both_stages(moved, scale), direct, still
 
-    def _with_change(self, raw: Moment, values: Array, base: Balance, change: Change, amplitude: float) -> Balance:
+    def _with_change(self, raw: Moment, values: Array, change: Change, amplitude: float) -> Balance:
         """Balance with one change more; linear in the amplitude but for inputs."""
         if change.kind == "input":
             felt = feel(raw, [(change, slice(None))])
