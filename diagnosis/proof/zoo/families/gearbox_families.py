@@ -96,7 +96,7 @@ def draw_splash(gearbox: Gearbox, rng: np.random.Generator) -> ZooPlant:
 def draw_merged(gearbox: Gearbox, rng: np.random.Generator) -> ZooPlant:
     """Coarser than the nominal model: gear and shaft are one rotor, bearings of a shaft one body, the box often too.
 
-    Friction of Michaelis with a least load, churning of Lauster and Boos, bearings of SKF, Linke's seals, McAdams'
+    Friction of O'Donoghue and Cameron, churning of Lauster and Boos, bearings of SKF, Linke's seals, McAdams'
     wall; the box stands on a bed that warms, or on a frame.
     """
     refuse_unsplit(gearbox)
@@ -108,7 +108,7 @@ def draw_merged(gearbox: Gearbox, rng: np.random.Generator) -> ZooPlant:
         bearings="shaft" if _coin(rng, 0.7) else "one",
         foundation="bed" if _coin(rng, 0.6) else "link",
         shaft_ends=_some_shafts(gearbox, rng, 0.3),
-        friction=losses.friction_michaelis,
+        friction=losses.friction_odonoghue_cameron,
         churning="lauster",
         bearing="skf",
         seal="linke",

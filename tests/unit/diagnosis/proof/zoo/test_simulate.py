@@ -73,7 +73,7 @@ def test_a_block_warms_as_the_exponential_says(row_s):
     t = row_s * np.arange(rows)
     for run, G in enumerate((2.0, 4.0)):
         exact = 20.0 + 20.0 / G * (1.0 - np.exp(-G * t / 1000.0))
-        assert np.abs(outcome.T["block"][run] - exact).max() < (1e-4 if row_s < 60.0 else 0.2)
+        assert np.abs(outcome.T["block"][run] - exact).max() < (2e-4 if row_s < 60.0 else 0.2)
     assert np.all(outcome.P_loss == 20.0)
 
 
