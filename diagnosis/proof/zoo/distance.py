@@ -30,7 +30,7 @@ from models.base.types import Array
 ACCEPTED_K, ACCEPTED_SLOW_K = (0.2, 1.0), (0.5, 3.0)  # gearboxes; machines without geometry in means of minutes
 WIDER = 2.0  # times the priors' standard deviations: a factor may go where the data want it
 PER_ROW_K = 5.0  # sd of one row: the fit follows the data, the priors hold what they do not show
-ITERATIONS = 8
+ITERATIONS = 12
 THINNED = 3  # of rows of 10 s the plant runs every third here: what it does takes minutes
 SETTLED = 0.02  # relative fall of the rms that ends the fit
 OIL_DEGC, HOTTEST_DEGC = (30.0, 120.0), 150.0  # the hottest oil of a plausible gearbox, and its hottest reading
@@ -158,7 +158,7 @@ def _problem(gearbox: Gearbox, recordings: Sequence[Recording]) -> Problem:
 def _fitted_rms(problem: Problem) -> float:
     """Root mean square of the residual at the least squares over all rows, [K]."""
     lower, upper = problem.unknowns.bounds
-    z, parts, best, damping = np.zeros(len(problem.unknowns)), None, np.inf, 1e-3
+    z, parts, best, damping = np.zeros(len(problem.unknowns)), None, np.inf, 1e-2
     guesses: Sequence[object] = [None] * len(problem.pieces)
     tried = z
     for _ in range(ITERATIONS):
