@@ -133,7 +133,7 @@ def as_recording(plant: ZooPlant, programme: Programme, readings: dict[str, Arra
         name=programme.name,
         path=Path(f"{programme.name}.csv"),
         sha256="",
-        time=plant.row_s * np.arange(rows),
+        time=plant.row_s * np.arange(rows, dtype=float),
         inputs={name: values[-rows:] for name, values in programme.inputs.items()},
         channels=tuple(Channel(name=name, values=values) for name, values in readings.items()),
         segments=(slice(0, rows),),

@@ -74,7 +74,7 @@ class Clock:
         self.steps_per_row = max(1, round(plant.row_s / LONGEST_STEP_S))
         self.dt = plant.row_s / self.steps_per_row
         self.steps = (self.rows - 1) * self.steps_per_row
-        at = np.arange(self.rows)
+        at = np.arange(self.rows, dtype=float)
         middle = (np.arange(self.steps) + 0.5) / self.steps_per_row
         self.at_rows = self._times(at)
         self.in_steps = self._times(middle)

@@ -184,7 +184,7 @@ class _Linearised:
         laws = self.laws
         force = (moved.q - base.q - (moved.C - base.C) * rate) / step
         dG = (moved.G - base.G) / step
-        for path in np.flatnonzero(np.any(dG != 0.0, axis=1)):
+        for path in map(int, np.flatnonzero(np.any(dG != 0.0, axis=1))):
             a, b = laws.ends[path]
             i, j = laws.body.get(a), laws.body.get(b)
             flow = dG[path] * ((T[i] if i is not None else base.T[a]) - (T[j] if j is not None else base.T[b]))
@@ -224,7 +224,7 @@ class _Linearised:
     ) -> Balance:
         field = dict(getattr(raw, kind))
         field[name] = field[name] + step
-        moved = replace(raw, **{kind: field})
+        moved = replace(raw, **{kind: field})  # type: ignore[arg-type]
         # A change may make the inputs follow a temperature, and then every law may.
         everything = kind == "T" and any(change.kind == "input" for change, _ in self.acting)
         return self._evaluate(moved, None if everything else values, None if everything else fresh)[0]

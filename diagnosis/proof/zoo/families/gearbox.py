@@ -13,7 +13,8 @@ import numpy as np
 from diagnosis.proof.zoo.families import films, losses
 from diagnosis.proof.zoo.families.builder import Builder, wander
 from diagnosis.proof.zoo.families.design import Design
-from diagnosis.proof.zoo.families.sizes import RPM, T_SERVICE, Sizes
+from diagnosis.proof.zoo.families.losses import RPM
+from diagnosis.proof.zoo.families.sizes import T_SERVICE, Sizes
 from diagnosis.proof.zoo.structure import Law, Moment, ZooPlant
 from models.assembly.gearbox import Gearbox
 from models.base.types import Array

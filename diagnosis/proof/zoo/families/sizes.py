@@ -13,7 +13,9 @@ from diagnosis.proof.zoo.families.losses import RPM, Dip, Roller
 from models.assembly.gearbox import Gearbox
 from models.base.errors import InputError
 from models.base.types import Array
+from models.definition.sections import Shaft
 from models.formulas.ehl import reduced_modulus
+from models.formulas.geometry import GearPair
 
 T_SERVICE = 60.0
 TOP_SPEED, REFERENCE_TORQUE = 0.8021, 94.0 / 350.0  # of the training range, as the programmes
@@ -46,7 +48,7 @@ class Sizes:
     gearbox: Gearbox
 
     @cached_property
-    def pair(self):
+    def pair(self) -> GearPair:
         """Geometry of the gear pair."""
         return self.gearbox.stage[0].pair()
 
@@ -87,7 +89,7 @@ class Sizes:
         """Speed [1/min] and torque [N m] where a machine is compared with the next: 0.415 of the top."""
         return 0.415 * self.top_speed, REFERENCE_TORQUE * self.gearbox.training.torque_Nm[1]
 
-    def shaft(self, name: str):
+    def shaft(self, name: str) -> Shaft:
         """Section of a shaft."""
         return next(shaft for shaft in self.gearbox.shaft if shaft.name == name)
 
@@ -206,9 +208,7 @@ class Sizes:
         yield from (f"{below}-{above}" for below, above in pairwise(parts))
         for gear, shaft in zip(self.gears, self.shafts, strict=True):
             yield from (f"{gear}-oil", f"{gear}-{shaft}", f"mesh-{gear}")
-        for shaft in self.gearbox.shaft:
-            if shaft.length_in_air:
-                yield f"{shaft.name}-air"
+        yield from (f"{shaft.name}-air" for shaft in self.gearbox.shaft if shaft.length_in_air)
         for bearing in self.gearbox.bearing:
             yield f"{bearing.shaft}-{bearing.name}"
             yield from (f"{bearing.name}-{part}" for part in parts)
