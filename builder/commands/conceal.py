@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from builder.base import console
+from builder.commands.conceal_into import conceal_into
 from models.assembly.gearbox import load_gearbox
 from models.base.atomic_write import atomic_folder
 from models.base.errors import InputError
@@ -16,9 +17,12 @@ def _list_effects(context: click.Context, _: click.Parameter, asked: bool) -> No
     """List the effects that can be concealed, and exit."""
     if asked:
         from diagnosis.proof.cases.conceal import EFFECTS
+        from diagnosis.proof.injection.inject import DESCRIPTIONS
 
         rows = [[name, "yes" if effect.catalogue else "no", effect.law] for name, effect in sorted(EFFECTS.items())]
         console.table("Effects that can be concealed", ["name", "in the catalogue", "law"], rows, text_columns=3)
+        injected = [list(item) for item in DESCRIPTIONS.items()]
+        console.table("Effects that can be injected (--into)", ["name", "what it is"], injected, text_columns=2)
         context.exit()
 
 
@@ -40,6 +44,10 @@ def _list_effects(context: click.Context, _: click.Parameter, asked: bool) -> No
 @click.option(
     "--gearbox", default="fzg", show_default=True, metavar="NAME|FILE", help="Name or definition file (TOML)."
 )
+@click.option("--into", default=None, metavar="FILE[@FROM..TO]", help="Recording of a real machine to inject into.")
+@click.option("--place", default=None, metavar="NAME", help="With --into: link, loss, node, sensor or input.")
+@click.option("--date", default=None, metavar="MOMENT", help="With --into: date or seconds at which it begins.")
+@click.option("--control", is_flag=True, help="With --into: inject nothing.")
 def conceal(
     effect: str | None,
     random: bool,
@@ -49,12 +57,24 @@ def conceal(
     truth: Path | None,
     cases: int | None,
     gearbox: str,
+    into: str | None,
+    place: str | None,
+    date: str | None,
+    control: bool,
 ) -> None:
     """Make recordings of a gearbox that hides an effect; the truth goes into another folder.
 
     The recordings come from a separate plant, not from the model: about 22 h to learn from (train_1 to train_3) and
-    6 h to hold out (hold_1, hold_2).
+    6 h to hold out (hold_1, hold_2). With --into an effect is put into a recording of a real machine instead.
     """
+    if into is not None:
+        if random or strength is not None:
+            raise InputError("--into draws effect and size; leave out --random and --strength")
+        conceal_into(into, gearbox, effect=effect, place=place, date=date, control=control, cases=cases, seed=seed,
+                     output=output, truth=truth)  # fmt: skip
+        return
+    if control or place is not None or date is not None:
+        raise InputError("--control, --place and --date go with --into")
     from diagnosis.proof.cases.case_files import keep_apart, keep_other_cases
     from diagnosis.proof.cases.conceal import conceal_set, random_plans  # imports scipy.signal
     from diagnosis.proof.cases.concealed_case import Plan
