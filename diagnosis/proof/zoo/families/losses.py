@@ -90,7 +90,7 @@ def friction_odonoghue_cameron(contact: Contact) -> Array:
     v_s, v_r = np.maximum(contact.v_s, 0.05) / inch, np.maximum(contact.v_r, 0.05) / inch
     rough = 0.6 * (max(contact.Ra_um / 0.0254, 10.0) + 22.0) / 35.0
     mu = rough / (contact.nu**0.125 * v_s ** (1.0 / 3.0) * v_r ** (1.0 / 6.0) * np.sqrt(contact.R / inch))
-    return np.asarray(np.clip(mu, 0.01, 0.11))
+    return np.asarray(np.clip(mu, 0.01, 0.08))  # dry asperities of ground steel end there
 
 
 def friction_drozdov(contact: Contact) -> Array:
