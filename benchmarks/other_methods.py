@@ -17,6 +17,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from diagnosis.proof.scoring.counts import Count, Median
+from diagnosis.proof.scoring.score import far_of, near_nodes
 from pysindy import STLSQ
 from rich.console import Console
 from rich.table import Table
@@ -35,9 +37,7 @@ from diagnosis.inference.latent import knots_of, latent_heat
 from diagnosis.inference.posterior import Fit, Problem
 from diagnosis.inference.predict import Prediction, predict
 from diagnosis.proof.scoring.answers import Answer
-from diagnosis.proof.scoring.counts import Count, Median
 from diagnosis.proof.scoring.rules import RULES, ScoredCase
-from diagnosis.proof.scoring.score import far_of, near_nodes
 from diagnosis.recordings.read import read_recordings
 from diagnosis.results.findings import node_of
 from diagnosis.setup.inference_setup import InferenceSetup, first, prepare
