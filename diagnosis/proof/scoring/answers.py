@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -116,10 +115,10 @@ def read_answer(result: Mapping[str, Any] | None, gearbox: Gearbox, *, otherwise
 
 def _claim(finding: Mapping[str, Any], gearbox: Gearbox) -> Claim:
     name = finding["mechanism"]
-    odds: Counter[tuple[str, str]] = Counter()
+    odds: dict[tuple[str, str], float] = {}
     for one in (finding, *(finding.get("confusable_with") or [])):
         key = (one["mechanism"], one.get("place") or "" if one["mechanism"] == PARAMETER else "")
-        odds[key] += _number(one.get("probability"), 0.0)
+        odds[key] = odds.get(key, 0.0) + _number(one.get("probability"), 0.0)
     rivals = [m for (m, _), p in sorted(odds.items(), key=lambda pair: -pair[1]) if m != name and p >= LEAST_TIED]
     parameters = finding.get("parameters") or []
     strength = _number(parameters[0].get("value"), 0.0) if parameters else 0.0
@@ -128,7 +127,7 @@ def _claim(finding: Mapping[str, Any], gearbox: Gearbox) -> Claim:
         mechanism=name,
         place=finding.get("place") or "",
         probability=_number(finding.get("probability"), 0.0),
-        odds=dict(odds),
+        odds=odds,
         tied=tuple(finding.get("tie_set") or (name, *dict.fromkeys(rivals)))[:MOST_TIED],
         open_form=finding.get("family") == OPEN_FORM,
         acts_like=bool(finding.get("acts_like")),

@@ -98,7 +98,7 @@ def tasks_of(settings: Settings, cases: Sequence[str], alone: Mapping[str, str])
     """
     tasks = [Task(case=case) for case in cases]
     if settings.removed:
-        first = {mechanism: case for case, mechanism in reversed(alone.items())}
+        first = {mechanism: case for case, mechanism in reversed(list(alone.items()))}
         tasks += [Task(case=case, removed=mechanism) for mechanism, case in first.items()]
     if settings.cells_every:
         cells = [(s, d) for s in SENSORS for d in DATA][1:]

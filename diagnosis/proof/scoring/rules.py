@@ -94,7 +94,7 @@ class Rule:
 
 
 def acts_like(claim: Claim, truth: Changed) -> bool:
-    """The same kind of thing at the same node or link, with the same sign.
+    """True if a finding reports the kind of thing that was changed, at the same node or link, with the same sign.
 
     Parts of a split node have the name of the nominal node. Both nodes of a link must be those of the claim; links to
     something outside the network have one. Sign 0 goes with both.

@@ -34,7 +34,7 @@ NO_LOSS = ("limit_cycle_pump", "phase_change", "drying", "melting wax in a hollo
 
 @dataclass(frozen=True, kw_only=True)
 class Changed:
-    """What an effect changed.
+    """A thing that an effect changed.
 
     Attributes
     ----------
@@ -215,7 +215,7 @@ def _effect(raw: Mapping[str, Any], case: Mapping[str, Any], oracle: Mapping[str
 
 
 def changed_of(effect: Mapping[str, Any]) -> tuple[Changed, ...]:
-    """What an effect changed: as its truth names it, else from kind, nodes, family and sign of its strength."""
+    """List what an effect changed: as its truth names it, else by kind, nodes, family and sign of its strength."""
     if "changed" in effect:
         # The truth of the zoo gives a fault of a recorded input the sign of the recorder's error.
         flip = -1 if effect.get("family") == "measurement" else 1
