@@ -80,10 +80,8 @@ def draw_reliability(result: Mapping[str, Any], file: Path) -> None:
     axes.plot([0, 1], [0, 1], color="0.6", linewidth=1, label="as stated")
     axes.errorbar(x, y, yerr=errors, fmt="o", capsize=3, label="right, with 95 % limits")
     for b, share in zip(bins, y, strict=True):
-        axes.annotate(
-            f"{b['hits']}/{b['of']}", (b["stated"], share), xytext=(6, -10), textcoords="offset points", size=8
-        )
-    axes.set(xlim=(0, 1.02), ylim=(0, 1.02), xlabel="stated probability", ylabel="share that is right")
+        axes.annotate(f"{b['hits']}/{b['of']}", (b["stated"], share), xytext=(6, 5), textcoords="offset points", size=8)
+    axes.set(xlim=(-0.04, 1.1), ylim=(-0.04, 1.1), xlabel="stated probability", ylabel="share that is right")
     axes.legend(loc="upper left", frameon=False)
     figure.savefig(file, dpi=120)
     plt.close(figure)

@@ -26,6 +26,7 @@ from models.base.parallel import iterate_parallel
 # Start of a diagnosis: an import of the plant, or of anything else of the proof, is an ImportError there.
 BLIND = "import sys; sys.modules['diagnosis.proof'] = None; from builder.__main__ import main; main()"
 HASHES = "answers.sha256"
+CASES = "cases.json"  # of which seed the recordings in an output folder are
 REFUSED = 2  # exit status of a diagnosis that does not accept its recordings
 INTERRUPTED = (130, -signal.SIGINT, -signal.SIGTERM)  # no answer: it is diagnosed when the proof is continued
 LONGEST_S = 3600.0
@@ -76,6 +77,7 @@ def prove(
             raise InputError(f"{file}: is about given recordings; name them with --recordings and --truth")
     else:
         recordings, truth = output / "recordings", output / "truth"
+        keep_to_one_set(settings, output / CASES)
     alone = make_cases(settings, recordings, truth, progress)
     cases = sorted(path.name for path in recordings.iterdir() if path.is_dir())
     tasks = lines.tasks_of(settings, cases, alone)
@@ -92,6 +94,22 @@ def prove(
     with atomic_file(output / HASHES) as partial:
         partial.write_text(lines.hash_list(records), encoding="utf-8")
     return outcome(read_truths(truth), records, load_gearbox(settings.gearbox), settings=settings, code=code)
+
+
+def keep_to_one_set(settings: Settings, file: Path) -> None:
+    """Write down which cases a folder holds.
+
+    Raises
+    ------
+    InputError
+        If they are others.
+    """
+    made = {key: getattr(settings, key) for key in ("plant", "seed", "cases", "gearbox")}
+    if not file.exists():
+        with atomic_file(file) as partial:
+            partial.write_text(json.dumps(made) + "\n", encoding="utf-8")
+    elif json.loads(file.read_text(encoding="utf-8")) != made:
+        raise InputError(f"{file.parent}: holds the cases of another proof; choose another output folder")
 
 
 def make_cases(settings: Settings, recordings: Path, truth: Path, progress: Progress) -> dict[str, str]:

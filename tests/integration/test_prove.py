@@ -86,6 +86,9 @@ def test_a_proof_of_the_own_plant(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     assert {row["group"] for row in result["lines"]} == {"control", "single", "double", "messy", "outside", "sensor"}
     seen.clear()
     assert prove(file, output) == result and not seen
+    lines.begin_lines(tmp_path / "78.jsonl", Settings(plant="own", seed=78, cases=6))
+    with pytest.raises(InputError, match="holds the cases of another proof"):
+        prove(tmp_path / "78.jsonl", output)
 
 
 def test_failures_count_and_other_code_or_recordings_are_refused(
