@@ -13,7 +13,7 @@ from models.base.errors import InputError
 from models.mechanisms import CATALOGUE
 
 What = Literal["loss", "link", "capacity", "heat", "sensor", "input", "clock"]
-CONTROL, MESSY, OUTSIDE, SENSOR = "control", "messy", "outside", "sensor"
+CONTROL, MESSY, OUTSIDE = "control", "messy", "outside"
 MEASUREMENT = ("sensor", "input", "clock")
 # Names that others gave to mechanisms of the catalogue.
 ALIASES = {
@@ -118,16 +118,14 @@ class Truth:
         kept = tuple(
             e for e in self.effects if not all(c.what == "sensor" and not {*c.nodes} & {*channels} for c in e.changed)
         )
-        return (
-            self
-            if kept == self.effects
-            else replace(self, effects=kept, group=CONTROL, verdicts=_verdicts(CONTROL, ""))
-        )
+        if kept == self.effects:
+            return self
+        return replace(self, effects=kept, group=self.group if kept else CONTROL, verdicts=_verdicts(kept, ""))
 
     def without_entry(self) -> Truth:
         """Truth where the entry of its mechanism is removed from the catalogue."""
         effects = tuple(replace(effect, name="") for effect in self.effects)
-        return replace(self, group=OUTSIDE, effects=effects, verdicts=_verdicts(OUTSIDE, ""))
+        return replace(self, group=OUTSIDE, effects=effects, verdicts=_verdicts(effects, ""))
 
 
 def read_truths(path: Path) -> dict[str, Truth]:
@@ -174,25 +172,29 @@ def truth_of(raw: Mapping[str, Any], oracle: Mapping[str, Any]) -> Truth:
     group = {"uncatalogued": OUTSIDE}.get(raw["group"], raw["group"])
     zoo = raw.get("plant") or raw.get("family")
     plant = f"zoo: {zoo}" if zoo else "own" if "friction_reading" in raw else "stranger"
-    effects = raw["effects"][:1] if group == MESSY else raw["effects"]
+    kept = raw["effects"][:1] if group == MESSY else raw["effects"]
+    effects = tuple(_effect(one, raw, oracle.get("effects", {})) for one in kept)
     far = raw.get("far_parameter") or ""
     return Truth(
         plant=plant,
         group=group,
-        effects=tuple(_effect(one, raw, oracle.get("effects", {})) for one in effects),
-        verdicts=tuple(raw.get("verdict_ok") or _verdicts(group, far)),
+        effects=effects,
+        verdicts=tuple(raw.get("verdict_ok") or _verdicts(effects, far)),
         far=far,
         channels=tuple(raw.get("K_all", {}).get("train", {})),
     )
 
 
-def _verdicts(group: str, far: str) -> tuple[str, ...]:
-    """Verdicts that are right; a parameter far outside its prior must be reported."""
+def _verdicts(effects: Sequence[TrueEffect], far: str) -> tuple[str, ...]:
+    """Verdicts that are right; a wrong input may be in the recorder or in the machine."""
     if far:
         return ("parameter_error",)
-    right = {CONTROL: ("consistent", "parameter_error"), SENSOR: ("sensor_fault",),
-             OUTSIDE: ("missing_physics", "unexplained")}  # fmt: skip
-    return right.get(group, ("missing_physics",))
+    if not effects:
+        return ("consistent", "parameter_error")
+    what = {one.what for effect in effects for one in effect.changed}
+    right = ["missing_physics"] if what - {"sensor", "clock"} else []
+    right += ["sensor_fault"] if what <= {*MEASUREMENT} else []
+    return (*right, *(["unexplained"] if not all(effect.name for effect in effects) else []))
 
 
 def _effect(raw: Mapping[str, Any], case: Mapping[str, Any], oracle: Mapping[str, Any]) -> TrueEffect:
