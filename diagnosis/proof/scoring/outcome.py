@@ -15,7 +15,7 @@ from diagnosis.proof.scoring.lines import Settings, Task, kept_columns
 from diagnosis.proof.scoring.rules import RULES, Item, is_right
 from diagnosis.proof.scoring.seeds import role_of
 from diagnosis.proof.scoring.truth import Truth
-from models.assembly.gearbox import Gearbox
+from models.assembly.gearbox import Gearbox, load_gearbox
 from models.base.errors import InputError
 
 SCHEMA = 3
@@ -39,7 +39,7 @@ def outcome(
     records : mapping of Task to mapping
         ``status``, ``seconds`` and ``answer`` of each diagnosis
     gearbox : Gearbox
-        Nominal definition
+        Nominal definition of cases whose truth names no other
     settings : Settings, optional
     code : str
         Hash of the code that decided
@@ -57,16 +57,18 @@ def outcome(
     unknown = [task.case for task in records if task.case not in truths]
     if unknown:
         raise InputError(f"case {unknown[0]!r} has an answer but no truth; the truth is of another set")
-    near = near_nodes(gearbox)
+    machines = {name: load_gearbox(name) for name in {truth.machine for truth in truths.values()} if name}
+    machines[""] = gearbox
+    near = {name: near_nodes(machine) for name, machine in machines.items()}
     groups: dict[str, list[Item]] = {}
     seconds: dict[str, list[float]] = {}
     for task, record in records.items():
         truth = _seen(truths[task.case], task)
-        answer = read_answer(record["answer"], gearbox, otherwise=record["status"])
+        answer = read_answer(record["answer"], machines[truth.machine], otherwise=record["status"])
         name = ", ".join(filter(None, (truth.plant, task.cell)))
         effects = truth.effects or (None,)
         groups.setdefault(name, []).extend(
-            Item(case=task.case, truth=truth, effect=effect, answer=answer, near=near, first=k == 0)
+            Item(case=task.case, truth=truth, effect=effect, answer=answer, near=near[truth.machine], first=k == 0)
             for k, effect in enumerate(effects)
         )
         if "seconds" in record:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from diagnosis.proof.scoring.answers import CERTAIN, PARAMETER, Answer, Claim
-from diagnosis.proof.scoring.truth import CONTROL, MEASUREMENT, OUTSIDE, Changed, TrueEffect, Truth
+from diagnosis.proof.scoring.truth import CONTROL, MEASUREMENT, Changed, TrueEffect, Truth
 
 SIZE_ERROR = 0.2
 VISIBLE, UNSEEN = 10.0, 3.0  # nats that the recordings hold: enough to name an effect, too few to see it
@@ -151,8 +151,8 @@ def visible(i: Item) -> bool:
 
 
 def outside(i: Item) -> bool:
-    """The effect is in no catalogue."""
-    return i.truth.group == OUTSIDE and has_effect(i)
+    """An effect that is in no catalogue is concealed."""
+    return i.effect is not None and not i.effect.name
 
 
 def in_machine(i: Item) -> bool:

@@ -102,6 +102,8 @@ class Truth:
         That are right
     far : str
         Parameter that is far outside its prior, or empty
+    machine : str
+        Name of the nominal definition, or empty if it is that of the set
     channels : tuple of str
         Measured temperatures
     """
@@ -111,6 +113,7 @@ class Truth:
     effects: tuple[TrueEffect, ...]
     verdicts: tuple[str, ...]
     far: str = ""
+    machine: str = ""
     channels: tuple[str, ...] = ()
 
     def seen_with(self, channels: Sequence[str]) -> Truth:
@@ -181,6 +184,7 @@ def truth_of(raw: Mapping[str, Any], oracle: Mapping[str, Any]) -> Truth:
         effects=effects,
         verdicts=tuple(raw.get("verdict_ok") or _verdicts(effects, far)),
         far=far,
+        machine=raw.get("machine", ""),
         channels=tuple(raw.get("K_all", {}).get("train", {})),
     )
 
