@@ -16,7 +16,6 @@ from builder.base import console
 from builder.base.workers import jobs_option
 from models.base.errors import InputError
 
-ZOO_CASES = 60
 LINES = 20  # of progress where there is no terminal
 MADE = ("plant", "cases", "seed", "removed")  # options of cases that are made
 ONLY_NEW = (*MADE, "gearbox", "cells_every", "answers")  # that an old file has
@@ -33,9 +32,8 @@ ONLY_NEW = (*MADE, "gearbox", "cells_every", "answers")  # that an old file has
               metavar="DIR", help="Recordings that exist, a folder per case, in place of --plant.")  # fmt: skip
 @click.option("--truth", type=click.Path(path_type=Path, exists=True), default=None, metavar="FILE|DIR",
               help="Truth of --recordings: one file, or <case>.json in a folder.")  # fmt: skip
-@click.option(
-    "--gearbox", default="fzg", show_default=True, metavar="NAME|FILE", help="Name or definition file (TOML)."
-)
+@click.option("--gearbox", default=None, metavar="NAME|FILE",
+              help="Name or definition file (TOML).  [default: fzg; zoo: drawn by family]")  # fmt: skip
 @click.option("--cells-every", type=click.IntRange(min=0), default=0, show_default=True, metavar="N",
               help="Every N-th case is also diagnosed with fewer sensors and shorter recordings; 0: none.")  # fmt: skip
 @click.option("--removed", is_flag=True,
@@ -50,16 +48,17 @@ ONLY_NEW = (*MADE, "gearbox", "cells_every", "answers")  # that an old file has
 @click.pass_context
 def prove(
     context: click.Context, plant: Literal["own", "zoo"], cases: int | None, seed: int | None, recordings: Path | None,
-    truth: Path | None, gearbox: str, cells_every: int, removed: bool, answers: Path | None, continued: Path | None,
-    jobs: int, output: Path,
+    truth: Path | None, gearbox: str | None, cells_every: int, removed: bool, answers: Path | None,
+    continued: Path | None, jobs: int, output: Path,
 ) -> None:  # fmt: skip
     """Test the diagnosis on sealed cases: hide effects, diagnose blindly, hash the answers, open the truth, score.
 
     Every diagnosis is a process that gets the recordings of one case and nothing else. Its answer is added to a file,
     with which an interrupted proof is continued.
     """
+    from builder.workflows.prove import ZOO_MIX
     from builder.workflows.prove import prove as run
-    from diagnosis.proof.cases.conceal import WHOLE, mix_of
+    from diagnosis.proof.cases.conceal import PROOF_MIX, mix_of
     from diagnosis.proof.scoring.lines import Settings, begin_lines
     from diagnosis.proof.scoring.seeds import OWN_PROOF, ZOO_PROOF
 
@@ -75,16 +74,15 @@ def prove(
         if wrong:
             raise InputError(f"--{_dashed(wrong[0])} is for cases that are made; --recordings names cases that exist")
         file = answers or output / "given.jsonl"
-        begin_lines(file, Settings(plant="given", gearbox=gearbox, cells_every=cells_every))
+        begin_lines(file, Settings(plant="given", gearbox=gearbox or "fzg", cells_every=cells_every))
     else:
-        if plant == "own":
-            mix_of(cases or WHOLE)  # refuses too few
-        elif removed:
+        if plant == "zoo" and removed:
             raise InputError("--removed is for --plant own; the zoo has effects outside the catalogue")
-        number, chosen = (WHOLE, OWN_PROOF) if plant == "own" else (ZOO_CASES, ZOO_PROOF[0])
+        mix, chosen, machine = (PROOF_MIX, OWN_PROOF, "fzg") if plant == "own" else (ZOO_MIX, ZOO_PROOF[0], "")
+        number = sum(mix_of(cases or sum(mix.values()), mix).values())  # refuses too few
         chosen = chosen if seed is None else seed
         file = answers or output / f"{chosen}.jsonl"
-        begin_lines(file, Settings(plant=plant, seed=chosen, cases=cases or number, gearbox=gearbox,
+        begin_lines(file, Settings(plant=plant, seed=chosen, cases=number, gearbox=gearbox or machine,
                                    cells_every=cells_every, removed=removed))  # fmt: skip
     with _progress() as progress:
         result = run(file, output, recordings=recordings, truth=truth, jobs=jobs, progress=progress)

@@ -54,8 +54,8 @@ DATA_SHEET = {"noise": 0.2, "resolution": 0.1, "lag_s": 15.0, "lag_sd_s": 5.0}
 NOISY_K, SLOW_LAG_S = (0.4, 0.7), (30.0, 55.0)
 
 
-def mix_of(cases: int) -> dict[str, int]:
-    """Number of cases of each group, in the proportions of :data:`PROOF_MIX`, at least one of each.
+def mix_of(cases: int, mix: Mapping[str, int] = PROOF_MIX) -> dict[str, int]:
+    """Number of cases of each group, in the proportions of a mix, at least one of each.
 
     Raises
     ------
@@ -69,9 +69,9 @@ def mix_of(cases: int) -> dict[str, int]:
     >>> mix_of(WHOLE) == PROOF_MIX
     True
     """
-    if cases < len(PROOF_MIX):
-        raise InputError(f"{cases} cases are too few: {len(PROOF_MIX)} groups ({', '.join(PROOF_MIX)}) need one each")
-    shares = {group: cases * number / WHOLE for group, number in PROOF_MIX.items()}
+    if cases < len(mix):
+        raise InputError(f"{cases} cases are too few: {len(mix)} groups ({', '.join(mix)}) need one each")
+    shares = {group: cases * number / sum(mix.values()) for group, number in mix.items()}
     counts = {group: max(1, int(share)) for group, share in shares.items()}
     while sum(counts.values()) > cases:
         counts[max((g for g in counts if counts[g] > 1), key=lambda group: counts[group] - shares[group])] -= 1

@@ -173,8 +173,7 @@ def truth_of(raw: Mapping[str, Any], oracle: Mapping[str, Any]) -> Truth:
         Evidence by effect, of sets that keep it in a file apart
     """
     group = {"uncatalogued": OUTSIDE}.get(raw["group"], raw["group"])
-    zoo = raw.get("plant") or raw.get("family")
-    plant = f"zoo: {zoo}" if zoo else "own" if "friction_reading" in raw else "stranger"
+    plant = f"zoo: {raw['family']}" if "family" in raw else "own" if "friction_reading" in raw else "stranger"
     kept = raw["effects"][:1] if group == MESSY else raw["effects"]
     effects = tuple(_effect(one, raw, oracle.get("effects", {})) for one in kept)
     far = raw.get("far_parameter") or ""
@@ -226,7 +225,8 @@ def changed_of(effect: Mapping[str, Any]) -> tuple[Changed, ...]:
         # The truth of the zoo gives a fault of a recorded input the sign of the recorder's error.
         flip = -1 if effect.get("family") == "measurement" else 1
         return tuple(
-            Changed(what=one["what"], of=one["of"], nodes=tuple(one["nodes"]),
+            Changed(what="loss" if one["what"] == "heat" and one.get("is_loss") else one["what"], of=one["of"],
+                    nodes=tuple(part for node in one["nodes"] for part in node.split("+")),
                     sign=one["sign"] * (flip if one["what"] == "input" else 1))
             for one in effect["changed"]
         )  # fmt: skip
