@@ -23,7 +23,7 @@ from diagnosis.proof.plant.effects_losses import LOSS_EFFECTS
 from diagnosis.proof.plant.effects_outside import OUTSIDE_EFFECTS
 from diagnosis.proof.plant.instruments import SENSOR_EFFECTS, Instruments, default_channels, record
 from diagnosis.proof.plant.plant import READINGS, Plant
-from diagnosis.proof.plant.plant_run import Individual, Outcome, Run, run_plant
+from diagnosis.proof.plant.plant_run import EXPONENTS, ORDINARY_SPREAD, Individual, Outcome, Run, factor_sd, run_plant
 from models.assembly.gearbox import Gearbox
 from models.base.errors import InputError, did_you_mean
 from models.base.types import Array
@@ -45,7 +45,6 @@ DOMINANT = ("churning_swirl", "splash_starvation", "run_in_flanks", "gear_wear",
 MINOR_STRENGTH = (0.15, 0.4)
 STRENGTH = (0.25, 2.0)  # drawn evenly in its logarithm
 LEAST_STRENGTH = {"double": 0.5, "messy": 0.8}  # of effects that must be found next to others
-ORDINARY_SPREAD = 0.5  # of the definition's standard deviations, by which every gearbox is off
 FAR = 5.0  # standard deviations
 # Parameters that may be far off, and to which side: the other one of the first two would overheat the box.
 FAR_FACTORS = (("mesh", -1.0), ("h_air", 1.0), ("seal", 1.0), ("seal", -1.0), ("bearing", 1.0), ("C_oil", 1.0))
@@ -274,22 +273,15 @@ def _individual(plant: Plant, plan: Plan, rng: np.random.Generator) -> Individua
         z = float(np.clip(rng.standard_normal(), -2.0, 2.0)) * ORDINARY_SPREAD
         if plan.kind == "parameters_off":
             z = float(rng.uniform(1.0, 2.0)) * (1.0 if rng.random() < 0.5 else -1.0)
-        factors[name] = start * float(np.exp(z * _sd(gearbox, name)))
+        factors[name] = start * float(np.exp(z * factor_sd(gearbox, name)))
     if plan.kind == "parameter_far":
         name, side = FAR_FACTORS[int(rng.integers(len(FAR_FACTORS)))]
-        factors[name] = gearbox.factors[name] * float(np.exp(side * FAR * _sd(gearbox, name)))
+        factors[name] = gearbox.factors[name] * float(np.exp(side * FAR * factor_sd(gearbox, name)))
     return Individual(
         factors=factors,
         reading=int(rng.integers(len(READINGS))),
-        forced_exponent=float(rng.normal(0.6, 0.02)),
-        oil_exponent=float(rng.normal(0.0, 0.03)),
-        exchange_exponent=float(rng.normal(0.5, 0.05)),
+        **{name: float(rng.normal(*mean_and_sd)) for name, mean_and_sd in EXPONENTS.items()},
     )
-
-
-def _sd(gearbox: Gearbox, factor: str) -> float:
-    # A churning formula may be wrong by a factor of e; a plant that uses it twice over in two sd would drown in oil.
-    return min(gearbox.priors.get(f"factors.{factor}", 0.2), 0.6)
 
 
 def _run(plant: Plant, individual: Individual, programme: Programme, rng: np.random.Generator) -> Run:

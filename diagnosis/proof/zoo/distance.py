@@ -1,0 +1,208 @@
+"""How far a healthy plant is from the nominal model of its definition: what calibration of lumped factors leaves.
+
+Plants that are too near or too far are not drawn. This module judges: the nominal model serves here, the plant never
+sees it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from diagnosis.forward.grid import pieces, slow_rows
+from diagnosis.forward.network_on_grid import NetworkOnGrid
+from diagnosis.inference.noise import noise_of, start_guess
+from diagnosis.inference.posterior import Linearised, Problem
+from diagnosis.inference.unknowns import unknowns_of
+from diagnosis.proof.zoo.families.family import Family
+from diagnosis.proof.zoo.programmes import programmes
+from diagnosis.proof.zoo.simulate import simulate
+from diagnosis.proof.zoo.structure import Programme, Variant, ZooPlant
+from diagnosis.recordings.recording import Channel, Recording
+from diagnosis.setup.shaft import shafts, torque_gain, with_shaft
+from models.assembly.gearbox import Gearbox, load_gearbox
+from models.base.errors import InputError
+from models.base.types import Array
+
+ACCEPTED_K, ACCEPTED_SLOW_K = (0.2, 1.0), (0.5, 3.0)  # gearboxes; machines without geometry in means of minutes
+WIDER = 2.0  # times the priors' standard deviations: a factor may go where the data want it
+PER_ROW_K = 5.0  # sd of one row: the fit follows the data, the priors hold what they do not show
+ITERATIONS = 8
+THINNED = 3  # rows of a gearbox that are passed over for one: laws change over minutes
+SETTLED = 0.02  # relative fall of the rms that ends the fit
+HOT_DEGC, COLD_DEGC = 125.0, 25.0  # the hottest reading of a plausible plant lies between
+MOST_DRAWS = 60
+
+
+@dataclass(frozen=True, kw_only=True)
+class Drawn:
+    """A plant that is neither too near nor too far.
+
+    Attributes
+    ----------
+    plant : ZooPlant
+    programmes : tuple of Programme
+    distance_K : float
+    rejected : int
+        Plants drawn before it
+    """
+
+    plant: ZooPlant
+    programmes: tuple[Programme, ...]
+    distance_K: float
+    rejected: int
+
+
+def draw_plant(family: Family, machine: str, seed: int, *, baselines: int = 0) -> Drawn:
+    """Draw plants of a family until one is at an accepted distance from the nominal model.
+
+    Parameters
+    ----------
+    family : Family
+    machine : str
+        Name or file of the nominal definition
+    seed : int
+    baselines : int
+        Healthy recordings before the session
+
+    Returns
+    -------
+    Drawn
+
+    Raises
+    ------
+    InputError
+        If the definition cannot be split, or no plant of many is accepted.
+    """
+    gearbox = load_gearbox(machine)
+    low, high = ACCEPTED_SLOW_K if gearbox.is_parametric else ACCEPTED_K
+    for rejected in range(MOST_DRAWS):
+        rng = np.random.default_rng([seed, rejected, *family.name.encode()])
+        plant = family.draw(gearbox, rng)
+        session = programmes(plant, rng, baselines=baselines)
+        distance = distance_K(plant, session)
+        if low <= distance <= high:
+            return Drawn(plant=plant, programmes=session, distance_K=distance, rejected=rejected)
+    raise InputError(
+        f"{gearbox.file}: none of {MOST_DRAWS} plants of the family '{family.name}' leaves {low:g} to {high:g} K after "
+        "calibration; draw another family for this machine"
+    )
+
+
+def distance_K(plant: ZooPlant, session: Sequence[Programme]) -> float:
+    """Rms [K] that calibration of the nominal model leaves on noise-free readings of a healthy plant.
+
+    The definition's factors, sensor biases and lags, gain of the torque and offset of the ambient temperature are
+    fitted to the training recordings without random heats; infinite if the nominal model cannot follow at all or the
+    plant is too cold or too hot.
+    """
+    gearbox = load_gearbox(plant.gearbox)
+    every = 1 if gearbox.is_parametric else THINNED
+    plant = replace(plant, row_s=every * plant.row_s)
+    learnt = [_thinned(p, every) for p in session if p.name.startswith("train")]
+    outcomes = [simulate(plant, programme, [Variant(quiet=True)]) for programme in learnt]
+    hottest = max(float(values.max()) for outcome in outcomes for values in outcome.readings.values())
+    if not gearbox.is_parametric and not COLD_DEGC <= hottest <= HOT_DEGC:
+        return np.inf
+    recordings = [
+        as_recording(plant, programme, {name: values[0] for name, values in outcome.readings.items()})
+        for programme, outcome in zip(learnt, outcomes, strict=True)
+    ]
+    try:
+        return _fitted_rms(_problem(gearbox, recordings))
+    except (ArithmeticError, np.linalg.LinAlgError, InputError):
+        return np.inf
+
+
+def _thinned(programme: Programme, every: int) -> Programme:
+    """Every so many rows, those before the recording included."""
+    return replace(
+        programme, inputs={name: values[::every] for name, values in programme.inputs.items()}, random_heat={},
+        unrecorded=0,
+    )  # fmt: skip
+
+
+def as_recording(plant: ZooPlant, programme: Programme, readings: dict[str, Array]) -> Recording:
+    """A recording of readings, without a file."""
+    rows = len(next(iter(readings.values())))
+    return Recording(
+        name=programme.name,
+        path=Path(f"{programme.name}.csv"),
+        sha256="",
+        time=plant.row_s * np.arange(rows),
+        inputs={name: values[-rows:] for name, values in programme.inputs.items()},
+        channels=tuple(Channel(name=name, values=values) for name, values in readings.items()),
+        segments=(slice(0, rows),),
+    )
+
+
+def _problem(gearbox: Gearbox, recordings: Sequence[Recording]) -> Problem:
+    """The nominal model and its usual unknowns, without shapes of laws."""
+    network = gearbox.network()
+    recordings = shafts(recordings, network)
+    gain = torque_gain(network)
+    network = with_shaft(network)
+    model = NetworkOnGrid(network, gearbox.loss_laws())
+    channels = sorted((c.name for c in recordings[0].channels), key=lambda name: (model.part_index(name), name))
+    unknowns = unknowns_of(network, channels, slow=slow_rows(recordings), torque_gain=gain)
+    cut = pieces(recordings, model.laws.inputs, channels)
+    white = dict.fromkeys(channels, 0.1)
+    noise = [noise_of(model, piece, white, 1.0, parametric=gearbox.is_parametric) for piece in cut]
+    return Problem(model, cut, unknowns, noise, [start_guess(model, piece) for piece in cut])
+
+
+def _fitted_rms(problem: Problem) -> float:
+    """Root mean square of the residual at the least squares over all rows, [K]."""
+    lower, upper = problem.unknowns.bounds
+    z, parts, best, damping = np.zeros(len(problem.unknowns)), None, np.inf, 1e-3
+    guesses: Sequence[object] = [None] * len(problem.pieces)
+    tried = z
+    for _ in range(ITERATIONS):
+        trial = [
+            problem.linearise(i, tried, guess, rounds=3)  # type: ignore[arg-type]
+            for i, guess in enumerate(guesses)
+        ]
+        rms = _rms(trial)
+        if parts is None or rms < best:
+            settled = rms > (1.0 - SETTLED) * best
+            z, parts, best, damping = tried, trial, rms, 0.3 * damping
+            guesses = [part.trajectory for part in parts]
+            if settled:
+                break
+        else:
+            damping *= 30.0
+        step = _step(parts, z, damping)
+        tried = np.clip(z + np.clip(step, -3.0, 3.0), lower, upper)
+    return best
+
+
+def _step(parts: Sequence[Linearised], z: Array, damping: float) -> Array:
+    normal, right = np.eye(len(z)) / WIDER**2, -z / WIDER**2
+    for part in parts:
+        residual, columns = _weighted(part)
+        normal = normal + columns.T @ columns / PER_ROW_K**2
+        right = right + columns.T @ residual / PER_ROW_K**2
+    return np.asarray(np.linalg.solve(normal + damping * np.diag(np.diag(normal)), right))
+
+
+def _weighted(part: Linearised) -> tuple[Array, Array]:
+    """Residual and columns of all readings, weighted by the rows that a point of the grid stands for."""
+    time = part.trajectory.piece.time
+    width = np.sqrt(np.gradient(time) / np.median(np.diff(time)))
+    seen = np.isfinite(part.residual)
+    weight = np.broadcast_to(width[:, None], seen.shape)[seen]
+    return part.residual[seen] * weight, part.columns[seen] * weight[:, None]
+
+
+def _rms(parts: Sequence[Linearised]) -> float:
+    squares, weights = 0.0, 0.0
+    for part in parts:
+        time = part.trajectory.piece.time
+        width = np.broadcast_to(np.gradient(time)[:, None], part.residual.shape)
+        seen = np.isfinite(part.residual)
+        squares += float(np.sum(width[seen] * part.residual[seen] ** 2))
+        weights += float(width[seen].sum())
+    return float(np.sqrt(squares / weights))

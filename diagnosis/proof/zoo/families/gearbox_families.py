@@ -1,0 +1,163 @@
+"""Development families of one-stage gearboxes: each has its own graph and its own published laws.
+
+Inside a family every machine draws which of the optional splits, merges and paths it has.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from diagnosis.proof.zoo.families import losses
+from diagnosis.proof.zoo.families.family import Family
+from diagnosis.proof.zoo.families.gearbox import Design, build_gearbox
+from diagnosis.proof.zoo.families.sizes import refuse_unsplit
+from diagnosis.proof.zoo.structure import ZooPlant
+from models.assembly.gearbox import Gearbox
+
+MACHINES = ("fzg", "conveyor")
+
+
+def draw_walls(gearbox: Gearbox, rng: np.random.Generator) -> ZooPlant:
+    """Thick walls: two or three bodies through every wall, a seat for every bearing, warmer air over the upper half.
+
+    Friction of Schlenk without its least load, churning of Changenet and Velex 2007, bearings of Palmgren, seals of
+    ISO/TR 14179-2, Gnielinski's plate.
+    """
+    refuse_unsplit(gearbox)
+    design = Design(
+        layers=int(rng.integers(2, 4)),
+        seats=_coin(rng, 0.7),
+        oil="mist" if _coin(rng, 0.4) else "sump",
+        shafts="halves" if _coin(rng, 0.5) else "one",
+        foundation="link" if _coin(rng, 0.5) else "none",
+        stratified=float(rng.uniform(0.02, 0.08)) if _coin(rng, 0.6) else 0.0,
+        shaft_ends=_some_shafts(gearbox, rng, 0.3),
+        friction=losses.friction_schlenk,
+        churning="changenet_2007",
+        bearing="palmgren",
+        seal="iso_2",
+        convection="gnielinski_plate",
+    )
+    return build_gearbox("walls", gearbox, design, rng)
+
+
+def draw_rings(gearbox: Gearbox, rng: np.random.Generator) -> ZooPlant:
+    """Bearings in detail: rings inner and outer, seats, shafts with ends, seals that heat shaft and wall.
+
+    Friction of Benedict and Kelley, churning of Changenet et al. 2011, bearings of SKF without drag, Linke's seals, a box
+    across a stream after Hilpert.
+    """
+    refuse_unsplit(gearbox)
+    design = Design(
+        layers=2 if _coin(rng, 0.4) else 1,
+        seats=_coin(rng, 0.5),
+        oil="sump" if _coin(rng, 0.5) else "mist",
+        gears="rim" if _coin(rng, 0.3) else "one",
+        shafts="ends" if _coin(rng, 0.7) else "halves",
+        bearings="rings",
+        foundation="link" if _coin(rng, 0.3) else "none",
+        shaft_ends=_some_shafts(gearbox, rng, 0.4),
+        friction=losses.friction_benedict_kelley,
+        churning="changenet_2011",
+        bearing="skf",
+        seal="linke",
+        seal_into="shaft",
+        convection="hilpert_box",
+    )
+    return build_gearbox("rings", gearbox, design, rng)
+
+
+def draw_splash(gearbox: Gearbox, rng: np.random.Generator) -> ZooPlant:
+    """Oil in three places, rim and hub: what the gears throw has its own temperature, and a film on the walls.
+
+    Friction of Xu and Kahraman, churning of Boness, bearings of Palmgren, seals of ISO/TR 14179-1, gears as cylinders in
+    oil after Becker, ISO/TR 14179-2 outside.
+    """
+    refuse_unsplit(gearbox)
+    design = Design(
+        layers=2 if _coin(rng, 0.5) else 1,
+        oil="film" if _coin(rng, 0.6) else "mist",
+        gears="rim",
+        shafts="halves" if _coin(rng, 0.4) else "one",
+        bearings="shaft" if _coin(rng, 0.3) else "one",
+        stratified=float(rng.uniform(0.03, 0.1)) if _coin(rng, 0.3) else 0.0,
+        draught=float(rng.uniform(0.02, 0.06)) if _coin(rng, 0.4) else 0.0,
+        friction=losses.friction_xu_kahraman,
+        churning="boness",
+        bearing="palmgren",
+        seal="iso_1",
+        convection="iso_14179",
+        gear_film="cylinder",
+    )
+    return build_gearbox("splash", gearbox, design, rng)
+
+
+def draw_merged(gearbox: Gearbox, rng: np.random.Generator) -> ZooPlant:
+    """Coarser than the nominal model: gear and shaft are one rotor, bearings of a shaft one body, the box often too.
+
+    Friction of O'Donoghue and Cameron (it knows no load), churning of Mauz, bearings of SKF, Linke's seals, McAdams'
+    wall; the box stands on a bed that warms, or on a frame.
+    """
+    refuse_unsplit(gearbox)
+    design = Design(
+        one_box=_coin(rng, 0.6),
+        layers=1 if _coin(rng, 0.5) else 2,
+        oil="mist" if _coin(rng, 0.3) else "sump",
+        gears="rotor",
+        bearings="shaft" if _coin(rng, 0.7) else "one",
+        foundation="bed" if _coin(rng, 0.6) else "link",
+        shaft_ends=_some_shafts(gearbox, rng, 0.3),
+        friction=losses.friction_odonoghue_cameron,
+        churning="mauz",
+        bearing="skf",
+        seal="linke",
+        convection="mcadams",
+    )
+    return build_gearbox("merged", gearbox, design, rng)
+
+
+def draw_open(gearbox: Gearbox, rng: np.random.Generator) -> ZooPlant:
+    """Open to its surroundings: couplings, shaft ends in air, a bed, draughts, warmer air above.
+
+    Friction of Doleschel (solid and film mixed), churning of Changenet et al. 2011, bearings of Palmgren, seals of
+    ISO/TR 14179-2, Churchill and Chu with a laminar plate.
+    """
+    refuse_unsplit(gearbox)
+    flanges = _some_shafts(gearbox, rng, 0.6)
+    design = Design(
+        layers=2 if _coin(rng, 0.4) else 1,
+        gears="rim" if _coin(rng, 0.4) else "one",
+        shafts="halves" if _coin(rng, 0.6) else "one",
+        bearings="rings" if _coin(rng, 0.3) else "one",
+        foundation="bed" if _coin(rng, 0.5) else "link",
+        shaft_ends=tuple(shaft.name for shaft in gearbox.shaft),
+        flanges=flanges,
+        stratified=float(rng.uniform(0.03, 0.1)) if _coin(rng, 0.5) else 0.0,
+        draught=float(rng.uniform(0.02, 0.08)),
+        friction=losses.friction_doleschel,
+        churning="changenet_2011",
+        bearing="palmgren",
+        seal="iso_2",
+        seal_into="shaft" if _coin(rng, 0.5) else "oil",
+        convection="churchill_chu",
+    )
+    return build_gearbox("open", gearbox, design, rng)
+
+
+GEARBOX_FAMILIES = (
+    Family(
+        name="walls", description="thick walls in layers, seats, warmer air above", machines=MACHINES, draw=draw_walls
+    ),
+    Family(name="rings", description="bearings and shafts in detail", machines=MACHINES, draw=draw_rings),
+    Family(name="splash", description="oil as sump, mist and film; rims and hubs", machines=MACHINES, draw=draw_splash),
+    Family(name="merged", description="coarser than the model, on a bed", machines=MACHINES, draw=draw_merged),
+    Family(name="open", description="couplings, shaft ends, bed and draughts", machines=MACHINES, draw=draw_open),
+)
+
+
+def _coin(rng: np.random.Generator, probability: float) -> bool:
+    return bool(rng.random() < probability)
+
+
+def _some_shafts(gearbox: Gearbox, rng: np.random.Generator, probability: float) -> tuple[str, ...]:
+    return tuple(shaft.name for shaft in gearbox.shaft if rng.random() < probability)

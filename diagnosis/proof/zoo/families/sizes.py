@@ -1,0 +1,212 @@
+"""Numbers of a one-stage gearbox that its definition gives: areas, masses, radii, depths; no law of losses among them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from diagnosis.proof.zoo.families.losses import RPM, Dip, Roller
+from models.assembly.gearbox import Gearbox
+from models.base.errors import InputError
+from models.formulas.ehl import reduced_modulus
+
+T_SERVICE = 60.0
+TOP_SPEED, REFERENCE_TORQUE = 0.8021, 94.0 / 350.0  # of the training range, as the programmes
+
+
+def refuse_unsplit(gearbox: Gearbox) -> None:
+    """Raise InputError for a definition that no family splits."""
+    if not gearbox.is_parametric and len(gearbox.stage) != 1:
+        raise InputError(
+            f"{gearbox.file}: has {len(gearbox.stage)} stages; the zoo splits gearboxes of one stage and definitions "
+            "without geometry: give one of these"
+        )
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """Sizes of one gearbox.
+
+    Parameters
+    ----------
+    gearbox : Gearbox
+        With geometry, of one stage
+    """
+
+    gearbox: Gearbox
+
+    @cached_property
+    def pair(self):
+        """Geometry of the gear pair."""
+        return self.gearbox.stage[0].pair()
+
+    @cached_property
+    def steel_per_volume(self) -> float:
+        """Heat capacity of steel, [J/(m^3 K)]."""
+        steel = self.gearbox.stage[0].material
+        return steel.density_kg_m3 * steel.specific_heat_J_kgK
+
+    @property
+    def k_steel(self) -> float:
+        """Conductivity of steel, [W/(m K)]."""
+        return self.gearbox.stage[0].material.conductivity_W_mK
+
+    @cached_property
+    def E_red(self) -> float:
+        """Reduced modulus of the flanks, [Pa]."""
+        steel = self.gearbox.stage[0].material
+        return reduced_modulus(steel.youngs_modulus, steel.poisson, steel.youngs_modulus, steel.poisson)
+
+    @property
+    def gears(self) -> tuple[str, str]:
+        """Names of the gears."""
+        return self.gearbox.stage[0].names
+
+    @property
+    def shafts(self) -> tuple[str, str]:
+        """Names of the driving and the driven shaft."""
+        return self.gearbox.stage[0].driver, self.gearbox.stage[0].driven
+
+    @cached_property
+    def top_speed(self) -> float:
+        """Highest speed of the programmes, [1/min]."""
+        return TOP_SPEED * self.gearbox.training.speed_rpm[1]
+
+    @cached_property
+    def reference(self) -> tuple[float, float]:
+        """Speed [1/min] and torque [N m] where a machine is compared with the next: 0.415 of the top."""
+        return 0.415 * self.top_speed, REFERENCE_TORQUE * self.gearbox.training.torque_Nm[1]
+
+    def shaft(self, name: str):
+        """Section of a shaft."""
+        return next(shaft for shaft in self.gearbox.shaft if shaft.name == name)
+
+    def bearings(self, shaft: str) -> list[str]:
+        """Bearings of a shaft."""
+        return [bearing.name for bearing in self.gearbox.bearing if bearing.shaft == shaft]
+
+    # ------------------------------------------------------------------ capacities, [J/K]
+
+    @cached_property
+    def C_housing(self) -> float:
+        """Of all walls."""
+        housing = self.gearbox.housing
+        area = 0.5 * (housing.inside_area_m2 + housing.outside_area_m2)
+        return area * housing.wall_thickness_m * housing.density_kg_m3 * housing.specific_heat_J_kgK
+
+    @cached_property
+    def C_oil(self) -> float:
+        """Of the filling."""
+        oil = self.gearbox.lubricant()
+        return self.gearbox.oil.volume * float(oil.density(T_SERVICE) * oil.specific_heat(T_SERVICE))
+
+    def C_gear(self, i: int) -> float:
+        """Of a gear as a ring up to the pitch circle."""
+        bore = 0.5 * self.shaft(self.shafts[i]).diameter
+        return float(np.pi * (self.pair.r[i] ** 2 - bore**2) * self.pair.b * self.steel_per_volume)
+
+    def C_shaft(self, name: str) -> float:
+        """Of a shaft as a cylinder."""
+        shaft = self.shaft(name)
+        cylinder = self.steel_per_volume * np.pi / 4.0 * shaft.diameter**2 * shaft.length
+        return float(shaft.heat_capacity_J_K or cylinder)
+
+    def C_bearing(self, name: str) -> float:
+        """Of a bearing."""
+        bearing = next(b for b in self.gearbox.bearing if b.name == name)
+        return float(bearing.mass_kg * self.gearbox.stage[0].material.specific_heat_J_kgK)
+
+    # ------------------------------------------------------------------ resistances, [K/W]
+
+    @cached_property
+    def R_wall(self) -> float:
+        """Of the whole wall, from face to face."""
+        housing = self.gearbox.housing
+        area = 0.5 * (housing.inside_area_m2 + housing.outside_area_m2)
+        return housing.wall_thickness_m / (housing.conductivity_W_mK * area)
+
+    def R_gear(self, i: int) -> float:
+        """Of a gear between shaft and pitch circle."""
+        bore = 0.5 * self.shaft(self.shafts[i]).diameter
+        return float(np.log(self.pair.r[i] / bore) / (2.0 * np.pi * self.k_steel * self.pair.b))
+
+    def R_shaft(self, name: str) -> float:
+        """Of a whole shaft along its length."""
+        shaft = self.shaft(name)
+        return float(shaft.length / (shaft.conductivity_W_mK * np.pi / 4.0 * shaft.diameter**2))
+
+    def R_bearing(self, name: str) -> float:
+        """Of a bearing as a solid ring."""
+        bearing = next(b for b in self.gearbox.bearing if b.name == name)
+        ratio = bearing.outside_diameter_mm / bearing.bore_mm
+        return float(np.log(ratio) / (2.0 * np.pi * self.k_steel * bearing.width_mm * 1e-3))
+
+    # ------------------------------------------------------------------ for loss formulas
+
+    def dip(self, i: int) -> Dip:
+        """A gear in the oil."""
+        pair, oil = self.pair, self.gearbox.oil
+        return Dip(
+            h=pair.r_w[i] - oil.level_below_axis,
+            r=pair.r_w[i],
+            b=pair.b,
+            m=pair.m_n,
+            z=pair.z[i],
+            tooth_height=pair.r_a[i] - pair.r_f[i],
+            alpha=pair.alpha_wt,
+            volume=oil.volume,
+        )
+
+    @cached_property
+    def tips_under_oil(self) -> tuple[float, float]:
+        """Depths of the tips of both gears, [m]."""
+        level = self.gearbox.oil.level_below_axis
+        return self.pair.r_a[0] - level, self.pair.r_a[1] - level
+
+    def roller(self, name: str) -> Roller:
+        """A bearing."""
+        b = next(b for b in self.gearbox.bearing if b.name == name)
+        return Roller(
+            d_m=0.5 * (b.bore_mm + b.outside_diameter_mm),
+            bore=b.bore_mm,
+            outside=b.outside_diameter_mm,
+            width=b.width_mm,
+        )
+
+    def load_share(self, name: str) -> float:
+        """Share of a bearing in the normal force of the mesh."""
+        return next(b.load_share for b in self.gearbox.bearing if b.name == name)
+
+    def ratio(self, shaft: str) -> float:
+        """Speed of a shaft over that of the input."""
+        return self.gearbox.speed_ratio[shaft]
+
+    def through_flow(self, name: str) -> float:
+        """Most heat that oil takes through a bearing, ``27 D B / 12500``, [W/K] (ISO/TR 14179-2, read in the paper)."""
+        b = next(b for b in self.gearbox.bearing if b.name == name)
+        return 27.0 * b.outside_diameter_mm * b.width_mm / 12500.0
+
+    def nominal_links(self) -> Iterator[str]:
+        """Names of the links in the nominal network of the definition."""
+        parts = [part.name for part in self.gearbox.housing.part]
+        for part in self.gearbox.housing.part:
+            yield from (f"oil-{part.name}", f"{part.name}-air")
+            if part.foundation:
+                yield f"{part.name}-frame"
+        yield from (f"{below}-{above}" for below, above in zip(parts, parts[1:], strict=False))
+        for gear, shaft in zip(self.gears, self.shafts, strict=True):
+            yield from (f"{gear}-oil", f"{gear}-{shaft}", f"mesh-{gear}")
+        for shaft in self.gearbox.shaft:
+            if shaft.length_in_air:
+                yield f"{shaft.name}-air"
+        for bearing in self.gearbox.bearing:
+            yield f"{bearing.shaft}-{bearing.name}"
+            yield from (f"{bearing.name}-{part}" for part in parts)
+            yield f"{bearing.name}-oil"
+
+    def omega(self, n: np.ndarray, i: int) -> np.ndarray:
+        """Speed of a gear, [rad/s], from that of the input, [1/min]."""
+        return n * RPM / (1.0 if i == 0 else self.pair.u)
