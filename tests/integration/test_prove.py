@@ -22,6 +22,7 @@ from diagnosis.proof.cases.conceal import WHOLE
 from diagnosis.proof.plant import cycles
 from diagnosis.proof.scoring import lines, seeds, truth
 from diagnosis.proof.scoring.lines import Settings, Task
+from models.assembly.gearbox import known_gearboxes
 from models.base.errors import InputError
 
 SETTINGS = Settings(plant="own", seed=77, cases=6)
@@ -89,6 +90,38 @@ def test_a_proof_of_the_own_plant(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     lines.begin_lines(tmp_path / "78.jsonl", Settings(plant="own", seed=78, cases=6))
     with pytest.raises(InputError, match="holds the cases of another proof"):
         prove(tmp_path / "78.jsonl", output)
+
+
+def test_a_proof_of_the_zoo_is_continued_while_its_cases_are_made(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Machines are drawn with the plants, so every case brings its definition; two rounds of making."""
+    output, made = tmp_path / "out", []
+
+    def make(name: str, plan: Any, recordings: Path, truths: Path) -> None:
+        if len(made) == 4:
+            made.append("interrupted")
+            raise KeyboardInterrupt
+        made.append(name)
+        for folder in (recordings / name, truths):
+            folder.mkdir(parents=True, exist_ok=True)
+        (recordings / name / "train_1.csv").write_text(name)
+        (recordings / name / "gearbox.toml").write_text(plan.machine)
+        one = {"group": plan.group, "effects": [], "family": plan.family, "machine": plan.machine}
+        (truths / f"{name}.json").write_text(json.dumps(one))
+
+    def look(task: Task, files: Any, *work: Any) -> tuple[Task, dict[str, Any]]:
+        assert files["gearbox.toml"].decode() in known_gearboxes() and len(made) == 4 + 1 + 3
+        return silent(task, files, *work)
+
+    monkeypatch.setattr(driver, "make_zoo_case", make)
+    monkeypatch.setattr(driver, "diagnose", look)
+    lines.begin_lines(tmp_path / "35.jsonl", Settings(plant="zoo", seed=35, cases=7, gearbox=""))
+    with pytest.raises(KeyboardInterrupt):
+        prove(tmp_path / "35.jsonl", output)
+    result = prove(tmp_path / "35.jsonl", output)
+    assert result["cases"]["all"] == 7 and {row["group"] for row in result["lines"]} == set(driver.ZOO_MIX)
+    assert all(name.startswith("zoo: ") for name in result["cases"] if name != "all")
 
 
 def test_failures_count_and_other_code_or_recordings_are_refused(
