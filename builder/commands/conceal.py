@@ -15,14 +15,21 @@ from models.base.errors import InputError
 def _list_effects(context: click.Context, _: click.Parameter, asked: bool) -> None:
     """List the effects that can be concealed, and exit."""
     if asked:
-        from diagnosis.proof.cases.conceal import EFFECTS
+        if context.params.get("plant") == "zoo":
+            from diagnosis.proof.zoo.draw import list_effects
 
-        rows = [[name, "yes" if effect.catalogue else "no", effect.law] for name, effect in sorted(EFFECTS.items())]
+            rows = list_effects()
+        else:
+            from diagnosis.proof.cases.conceal import EFFECTS
+
+            rows = [[name, "yes" if effect.catalogue else "no", effect.law] for name, effect in sorted(EFFECTS.items())]
         console.table("Effects that can be concealed", ["name", "in the catalogue", "law"], rows, text_columns=3)
         context.exit()
 
 
 @click.command("conceal")
+@click.option("--plant", type=click.Choice(["own", "zoo"]), default="own", show_default=True, is_eager=True,
+              help="own: built like the model, of any gearbox; zoo: of random structure.")  # fmt: skip
 @click.option("--effect", default=None, metavar="NAME", help="Effect to conceal; --list shows the names.")
 @click.option(
     "--list", is_flag=True, is_eager=True, expose_value=False, callback=_list_effects, help="Show the effects."
@@ -37,10 +44,22 @@ def _list_effects(context: click.Context, _: click.Parameter, asked: bool) -> No
 @click.option("--truth", type=click.Path(path_type=Path, file_okay=False), default=None, metavar="DIR",
               help="Folder for the truth.  [default: 'truth' in --output]")  # fmt: skip
 @click.option("--cases", type=click.IntRange(min=1, max=10_000), default=None, metavar="N", help="How many cases.")
+@click.option("--gearbox", default="fzg", show_default=True, metavar="NAME|FILE",
+              help="Name or definition file (TOML), of the own plant.")  # fmt: skip
+@click.option("--machine", default=None, metavar="NAME|FILE",
+              help="Zoo: name or definition file (TOML).  [default: drawn]")  # fmt: skip
 @click.option(
-    "--gearbox", default="fzg", show_default=True, metavar="NAME|FILE", help="Name or definition file (TOML)."
+    "--families", default=None, metavar="NAME,...", help="Zoo: families of plants to draw from.  [default: all]"
 )
+@click.option("--group", default=None, metavar="NAME",
+              help="Zoo: control, single, date, sensor, pair, outside or messy.  [default: drawn]")  # fmt: skip
+@click.option("--baselines", type=click.IntRange(min=0, max=20), default=0, show_default=True, metavar="N",
+              help="Zoo: healthy recordings of the same plant as well.")  # fmt: skip
+@click.option("--session-deviation", type=click.FloatRange(min=0.0, max=0.2), default=None, metavar="X",
+              help="Zoo: relative deviation of the plant's parameters between sessions.  [default: 0, 0.01 or 0.03]"
+              )  # fmt: skip
 def conceal(
+    plant: str,
     effect: str | None,
     random: bool,
     strength: float | None,
@@ -49,12 +68,31 @@ def conceal(
     truth: Path | None,
     cases: int | None,
     gearbox: str,
+    machine: str | None,
+    families: str | None,
+    group: str | None,
+    baselines: int,
+    session_deviation: float | None,
 ) -> None:
     """Make recordings of a gearbox that hides an effect; the truth goes into another folder.
 
     The recordings come from a separate plant, not from the model: about 22 h to learn from (train_1 to train_3) and
-    6 h to hold out (hold_1, hold_2).
+    6 h to hold out (hold_1, hold_2). Plants of the zoo are built of other nodes, paths and laws than the model; strengths
+    are drawn by the evidence that the recordings hold.
     """
+    if plant == "zoo":
+        for option, given in (("--effect", effect), ("--random", random), ("--strength", strength)):
+            if given:
+                raise InputError(f"{option} goes with --plant own; in the zoo effects are drawn, see --group")
+        _conceal_in_zoo(seed, output, truth, cases, machine, families, group, baselines, session_deviation)
+        return
+    if machine is not None or families is not None or group is not None:
+        raise InputError("--machine, --families and --group go with --plant zoo; the own plant takes --gearbox")
+    if baselines or session_deviation is not None:
+        raise InputError(
+            "the own plant records no baselines; use --plant zoo for --baselines and --session-deviation, or conceal "
+            "a second case of weakest effect: --effect NAME --strength 0.01"
+        )
     from diagnosis.proof.cases.case_files import keep_apart, keep_other_cases
     from diagnosis.proof.cases.conceal import conceal_set, random_plans  # imports scipy.signal
     from diagnosis.proof.cases.concealed_case import Plan
@@ -82,4 +120,39 @@ def conceal(
         keep_other_cases(stage, recordings)
         keep_other_cases(truth_stage, truth)
     for name in names:
+        console.out.print(f"wrote {recordings / ('' if cases is None else name)}, {truth / name}.json")
+
+
+def _conceal_in_zoo(
+    seed: int,
+    output: Path,
+    truth: Path | None,
+    cases: int | None,
+    machine: str | None,
+    families: str | None,
+    group: str | None,
+    baselines: int,
+    session_deviation: float | None,
+) -> None:
+    from diagnosis.proof.cases.case_files import keep_apart, keep_other_cases
+    from diagnosis.proof.zoo.conceal_zoo import conceal_zoo, random_zoo_plans, zoo_plans
+
+    names = None if families is None else [name.strip() for name in families.split(",")]
+    number = 1 if cases is None else cases
+    if group is None:
+        plans = random_zoo_plans(seed, number, families=names, machine=machine)
+    else:
+        plans = zoo_plans(seed, {group: number}, families=names, machine=machine)
+    recordings, truth = output / "recordings", truth or output / "truth"
+    keep_apart(recordings, truth)
+    with (
+        atomic_folder(recordings) as stage,
+        atomic_folder(truth) as truth_stage,
+        console.progress_bar("concealing") as progress,
+    ):
+        made = conceal_zoo(plans, recordings=stage, truth=truth_stage, flat=cases is None, baselines=baselines,
+                           session_deviation=session_deviation, progress=progress)  # fmt: skip
+        keep_other_cases(stage, recordings)
+        keep_other_cases(truth_stage, truth)
+    for name in made:
         console.out.print(f"wrote {recordings / ('' if cases is None else name)}, {truth / name}.json")

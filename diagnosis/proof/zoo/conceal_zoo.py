@@ -76,7 +76,7 @@ def zoo_plans(
         fit = tuple(name for name in chosen if machine in FAMILIES[name].machines)
         chosen = fit or chosen  # a definition of the user: the families themselves say what they cannot split
     order = [str(name) for name in rng.permutation(chosen)]
-    plans = []
+    plans: list[ZooPlan] = []
     for group, number in counts.items():
         for i in range(number):
             family = order[len(plans) % len(order)]

@@ -21,7 +21,7 @@ from diagnosis.proof.zoo.case import (
     run_case,
 )
 from diagnosis.proof.zoo.distance import Drawn, draw_plant
-from diagnosis.proof.zoo.effects import Maker, Setting, UnfitError, ZooEffect, either, made, made_fault
+from diagnosis.proof.zoo.effects import Maker, ZooEffect, made, made_fault
 from diagnosis.proof.zoo.effects_dates import DATED_MAKERS, draw_course
 from diagnosis.proof.zoo.effects_heat import HEAT_MAKERS
 from diagnosis.proof.zoo.effects_losses import LOSS_MAKERS
@@ -30,6 +30,7 @@ from diagnosis.proof.zoo.families import FAMILIES
 from diagnosis.proof.zoo.faults import AMBIENT, INPUT_FAULTS, SENSOR_FAULTS, Fault, FaultMaker, input_of
 from diagnosis.proof.zoo.oracle_columns import Measurement, design_of
 from diagnosis.proof.zoo.recorder import ZooInstruments, draw_instruments, with_slow_sensors
+from diagnosis.proof.zoo.setting import Setting, UnfitError, either
 from diagnosis.proof.zoo.simulate import simulate
 from diagnosis.proof.zoo.structure import Programme, Variant, ZooPlant
 from diagnosis.proof.zoo.time_course import ALWAYS, Course
@@ -152,10 +153,11 @@ def draw_case_of(
 
 def with_effects(case: ZooCase, effects: Sequence[ZooEffect]) -> ZooCase:
     """The case with effects, and its plant with what they bring along that it does not have yet."""
-    plant, like = case.plant, {}
+    plant = case.plant
+    like: dict[str, str] = {}
     known = {body.name for body in plant.bodies} | {boundary.name for boundary in plant.boundaries}
     for parts in (effect.act.parts for effect in effects):
-        if any(one.name in known for one in (*parts.bodies, *parts.boundaries)):
+        if parts.names & known:
             continue
         plant = replace(
             plant,
@@ -176,6 +178,7 @@ def with_effects(case: ZooCase, effects: Sequence[ZooEffect]) -> ZooCase:
 
 def draw_effects(group: str, setting: Setting, rng: np.random.Generator) -> tuple[ZooEffect, ...]:
     """Effects of a group, still without strength."""
+    kinds: tuple[str, ...]
     if group == "pair":
         kinds = ("single", str(rng.choice(("single", "date", "outside", "sensor"), p=(0.4, 0.2, 0.15, 0.25))))
     elif group == "messy":
@@ -202,8 +205,7 @@ def draw_effects(group: str, setting: Setting, rng: np.random.Generator) -> tupl
 
 def _clash(one: ZooEffect, other: ZooEffect) -> bool:
     """True if two effects are of one name or bring parts of one name along."""
-    parts = [{p.name for p in (*e.act.parts.bodies, *e.act.parts.boundaries)} for e in (one, other)]
-    return one.name == other.name or bool(parts[0] & parts[1])
+    return one.name == other.name or bool(one.act.parts.names & other.act.parts.names)
 
 
 def _draw_one(kind: str, setting: Setting, rng: np.random.Generator) -> ZooEffect:
@@ -234,7 +236,8 @@ def draw_fault(name: str, setting: Setting, rng: np.random.Generator, course: Co
     """
     maker, plant = FAULT_MAKERS[name], setting.plant
     channels = [probe.channel for probe in plant.probes]
-    cap, chosen, near = maker.cap, (channels[int(rng.integers(len(channels)))],), ""
+    cap, near = maker.cap, ""
+    chosen: tuple[str, ...] = (channels[int(rng.integers(len(channels)))],)
     if name in INPUT_FAULTS:
         chosen = (input_of(name),)
         if chosen[0] not in plant.inputs:
@@ -257,6 +260,16 @@ def draw_fault(name: str, setting: Setting, rng: np.random.Generator, course: Co
     nodes = tuple(channel for channel in chosen if channel in setting.nodes)
     fault = Fault(kind=maker.fault, channels=chosen, nodes=nodes, near=near, strength=cap, sign=sign, course=course)
     return made_fault(name, maker, fault, cap=cap, law=maker.law, course=course)
+
+
+def list_effects() -> list[list[str]]:
+    """Name of every effect, whether it is a form of one of the catalogue, and what it is."""
+    rows = [
+        [name, "yes" if name in CATALOGUE_MAKERS else "no", str(maker.draw.__doc__)]
+        for name, maker in {**CATALOGUE_MAKERS, **OUTSIDE_MAKERS, **DATED_MAKERS}.items()
+    ]
+    faults = [[name, "yes" if maker.catalogue else "no", maker.law] for name, maker in FAULT_MAKERS.items()]
+    return sorted(rows + faults)
 
 
 # ---------------------------------------------------------------------- strengths

@@ -6,7 +6,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from diagnosis.proof.zoo.effects import Draft, Maker, Setting, UnfitError, either
+from diagnosis.proof.zoo.effects import Draft, Maker
+from diagnosis.proof.zoo.setting import Setting, UnfitError, either
 from diagnosis.proof.zoo.structure import Law
 from diagnosis.proof.zoo.time_course import Course
 

@@ -6,7 +6,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from diagnosis.proof.zoo.effects import Act, Draft, Maker, Parts, Setting, soft
+from diagnosis.proof.zoo.effects import Draft, Maker
+from diagnosis.proof.zoo.setting import Act, Parts, Setting, soft
 from diagnosis.proof.zoo.structure import Law, Moment
 from models.base.types import Array
 from models.formulas.heat_transfer import KELVIN
@@ -48,7 +49,7 @@ def bearing_seat_contact(s: Setting, rng: np.random.Generator) -> Draft:
     return Draft(act=act, law="conductance bearing-housing (1 - a exp(-dT+ / 20 K))", unit="1", cap=0.9)
 
 
-def radiation_error(s: Setting, rng: np.random.Generator) -> Draft:
+def radiation_error(s: Setting, _: np.random.Generator) -> Draft:
     """Walls radiate less: the part of their conductance that grows with the cube of the absolute temperature."""
     wall = s.temperature(s.group("housing")[0])
     names = s.link_between(s.group("housing"), (AIR,))

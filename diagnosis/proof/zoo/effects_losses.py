@@ -6,7 +6,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from diagnosis.proof.zoo.effects import Draft, Maker, Setting, UnfitError, soft
+from diagnosis.proof.zoo.effects import Draft, Maker
+from diagnosis.proof.zoo.setting import Setting, UnfitError, soft
 from diagnosis.proof.zoo.structure import Law
 
 SLIDING, CHURNING = ("mesh_sliding", "gears_load"), ("churning", "gears_no_load")
@@ -147,7 +148,7 @@ def bearing_damage(s: Setting, rng: np.random.Generator) -> Draft:
                  parameters={"at_h": at_h})  # fmt: skip
 
 
-def torque_decay(s: Setting, rng: np.random.Generator) -> Draft:
+def torque_decay(s: Setting, _: np.random.Generator) -> Draft:
     """The torque that is set is reached less and less, with the root of the hours."""
     s.load()
     act = s.input_shift("torque", lambda m: -m.inputs["torque"] * np.sqrt(m.hours / s.span), sign=-1)

@@ -6,7 +6,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from diagnosis.proof.zoo.effects import Draft, Maker, Setting, soft
+from diagnosis.proof.zoo.effects import Draft, Maker
+from diagnosis.proof.zoo.setting import Setting, soft
 from diagnosis.proof.zoo.structure import Law, Moment
 from models.base.types import Array
 

@@ -9,10 +9,11 @@ import numpy as np
 
 from diagnosis.proof.cases.truth import ACTIVE_SHARE, SCHEMA, practical_of, size_of, spans_of
 from diagnosis.proof.zoo.case import HOLD, TRAIN, ZooCase, with_reading_faults
-from diagnosis.proof.zoo.effects import Changed, ZooEffect
+from diagnosis.proof.zoo.effects import ZooEffect
 from diagnosis.proof.zoo.faults import recorded_minus_true
 from diagnosis.proof.zoo.oracle import OracleNats
 from diagnosis.proof.zoo.recorder import measure
+from diagnosis.proof.zoo.setting import Changed
 from diagnosis.proof.zoo.structure import Change, Outcome, Programme, ZooPlant
 from models.base.types import Array
 
@@ -180,7 +181,7 @@ def _heat(case: ZooCase, run: int) -> dict[str, Any]:
     """Heat that an effect made by nominal node, its mean magnitude, and when it acted."""
     plant, none = case.plant, _none(case)
     by_recording = {
-        p.name: _heat_of(plant, case, _runs(case, p), run, none, _acting(case, run)) for p in case.recordings(*SETS)
+        p.name: _heat_of(plant, _runs(case, p), run, none, _acting(case, run)) for p in case.recordings(*SETS)
     }
     nodes = sorted({node for heat in by_recording.values() for node in heat})
     found: dict[str, Any] = {}
@@ -206,37 +207,27 @@ def _acting(case: ZooCase, run: int) -> list[Change]:
     return [change for k in case.runs.sets[run] for change in case.effects[k].changes]
 
 
-def _heat_of(
-    plant: ZooPlant, case: ZooCase, outcome: Outcome, run: int, none: int, changes: Sequence[Change]
-) -> dict[str, Array]:
+def _heat_of(plant: ZooPlant, outcome: Outcome, run: int, none: int, changes: Sequence[Change]) -> dict[str, Array]:
     """Heat by nominal node, [W]; of a changed input what the losses differ by, at the node ``losses``."""
-    home = {body.name: body.part_of for body in plant.bodies}
+    home = {body.name: body.part_of.split("+")[0] for body in plant.bodies}
     ends = {path.name: path.ends for path in plant.paths}
     spread = {source.name: source.spread for source in plant.sources}
     found: dict[str, Array] = {}
-
-    def add(body: str, watts: Array) -> None:
-        for node in home.get(body, "").split("+")[:1]:
-            if node:
-                found[node] = found.get(node, 0.0) + watts
-
     for i, change in enumerate(changes):
-        watts = outcome.heat[run].get(i)
         if change.kind == "input":
             found["losses"] = outcome.P_loss[run] - outcome.P_loss[none]
-        elif watts is None:
             continue
+        if change.kind == "source":
+            shares = dict(spread[change.target])
         elif change.kind in ("path", "bridge"):
             first, second = ends[change.target] if change.kind == "path" else (change.target, change.other)
-            add(first, -watts)
-            add(second, watts)
-        elif change.kind == "source":
-            for body, share in spread[change.target].items():
-                add(body, share * watts)
+            shares = {first: -1.0, second: 1.0}
         else:
-            add(change.target, watts)
-            if change.other:
-                add(change.other, -watts)
+            shares = {change.target: 1.0, change.other: -1.0}
+        for body, share in shares.items():
+            node = home.get(body, "")
+            if node:
+                found[node] = found.get(node, 0.0) + share * outcome.heat[run][i]
     return found
 
 
