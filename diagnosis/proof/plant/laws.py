@@ -61,6 +61,10 @@ class Laws:
 
     def losses(self, moment: Moment) -> Array:
         """Loss of every component, shape (B, c), [W]; thinner oil is read as hotter oil, except by the seals."""
+        return np.asarray(self.losses_at_one(moment) * self.loss_factor)
+
+    def losses_at_one(self, moment: Moment) -> Array:
+        """Losses with all factors at 1, shape (B, c), [W]."""
         index, anatomy = self.plant.anatomy.index, self.plant.anatomy
         oil = moment.T[:, index[SUMP]]
         thin = moment.thinning
@@ -78,7 +82,7 @@ class Laws:
                 columns.append(term.power(moment.speed, load, at))
             elif term.name != MESH:
                 columns.append(term.power(moment.speed, moment.torque, {OIL: oil}))
-        return np.asarray(np.concatenate(columns, axis=1) * self.loss_factor)
+        return np.asarray(np.concatenate(columns, axis=1))
 
     def conductances(self, moment: Moment) -> Array:
         """Conductance of every path, shape (B, p), [W/K]."""
