@@ -56,7 +56,7 @@ def prove(
     Every diagnosis is a process that gets the recordings of one case and nothing else. Its answer is added to a file,
     with which an interrupted proof is continued.
     """
-    from builder.workflows.prove import ZOO_MIX
+    from builder.workflows.proof_cases import ZOO_MIX
     from builder.workflows.prove import prove as run
     from diagnosis.proof.cases.conceal import PROOF_MIX, mix_of
     from diagnosis.proof.scoring.lines import Settings, begin_lines

@@ -10,35 +10,27 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from importlib import resources
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from diagnosis.proof.cases.conceal import conceal_set, mix_of, mixed_plans
+from builder.workflows.proof_cases import Progress, add_evidence, keep_to_one_set, make_cases
 from diagnosis.proof.scoring import lines
-from diagnosis.proof.scoring.lines import DEFINITION, Settings, Task
-from models.assembly.gearbox import FOLDER, load_gearbox, names_a_file
-from models.base.atomic_write import atomic_file, atomic_folder
+from diagnosis.proof.scoring.lines import DEFINITION, Task
+from models.assembly.gearbox import load_gearbox, names_a_file
+from models.base.atomic_write import atomic_file
 from models.base.errors import InputError
 from models.base.parallel import iterate_parallel
-from models.files.toml_file import packaged, read_text
-
-if TYPE_CHECKING:
-    from diagnosis.proof.zoo.conceal_zoo import ZooPlan
 
 # Start of a diagnosis: an import of the plant, or of anything else of the proof, is an ImportError there.
 BLIND = "import sys; sys.modules['diagnosis.proof'] = None; from builder.__main__ import main; main()"
 HASHES = "answers.sha256"
 CASES = "cases.json"  # of which seed the recordings in an output folder are
-# Of a proof on plants of the zoo.
-ZOO_MIX = {"control": 20, "single": 13, "date": 9, "sensor": 6, "pair": 5, "outside": 5, "messy": 2}
 REFUSED = 2  # exit status of a diagnosis that does not accept its recordings
 INTERRUPTED = (130, -signal.SIGINT, -signal.SIGTERM)  # no answer: it is diagnosed when the proof is continued
 LONGEST_S = 3600.0
 MESSAGE_LENGTH = 2000  # characters that are kept
-
-Progress = Callable[[str, int, int], None]
 
 
 def prove(
@@ -99,68 +91,9 @@ def prove(
         progress("diagnosing", len(records), len(tasks))
     with atomic_file(output / HASHES) as partial:
         partial.write_text(lines.hash_list(records), encoding="utf-8")
+    if settings.plant == "own":
+        add_evidence(settings, truth, jobs, progress)
     return outcome(read_truths(truth), records, load_gearbox(settings.gearbox or "fzg"), settings=settings, code=code)
-
-
-def keep_to_one_set(settings: Settings, file: Path) -> None:
-    """Write down which cases a folder holds.
-
-    Raises
-    ------
-    InputError
-        If they are others.
-    """
-    made = {key: getattr(settings, key) for key in ("plant", "seed", "cases", "gearbox")}
-    if not file.exists():
-        with atomic_file(file) as partial:
-            partial.write_text(json.dumps(made) + "\n", encoding="utf-8")
-    elif json.loads(file.read_text(encoding="utf-8")) != made:
-        raise InputError(f"{file.parent}: holds the cases of another proof; choose another output folder")
-
-
-def make_cases(settings: Settings, recordings: Path, truth: Path, jobs: int, progress: Progress) -> dict[str, str]:
-    """Make the recordings and truths of a seed, unless they are there.
-
-    Returns
-    -------
-    dict of case to str
-        The only mechanism of a case, of those that have one and could be left out of the catalogue
-    """
-    if settings.plant == "given":
-        return {}
-    names = [f"case_{i:0{max(3, len(str(settings.cases)))}d}" for i in range(1, settings.cases + 1)]
-    # The truth of a case is written after its recordings.
-    missing = [name for name in names if not (truth / f"{name}.json").exists()]
-    if settings.plant == "zoo":
-        from diagnosis.proof.zoo.conceal_zoo import zoo_plans
-
-        plans = dict(zip(names, zoo_plans(settings.seed, mix_of(settings.cases, ZOO_MIX),
-                                          machine=settings.gearbox or None), strict=True))  # fmt: skip
-        work = [(name, plans[name], recordings, truth) for name in missing]
-        for done, _ in enumerate(iterate_parallel(make_zoo_case, work, jobs=jobs), start=1):
-            progress("making recordings", len(names) - len(missing) + done, len(names))
-        return {}
-    own = mixed_plans(settings.seed, mix_of(settings.cases))
-    if missing:
-        with atomic_folder(recordings) as stage, atomic_folder(truth) as truth_stage:
-            conceal_set(
-                load_gearbox(settings.gearbox), own, seed=settings.seed, recordings=stage, truth=truth_stage,
-                progress=lambda done, of: progress("making recordings", done, of),
-            )  # fmt: skip
-    return {name: plan.effects[0] for name, plan in zip(names, own, strict=True) if plan.group == "single"}
-
-
-def make_zoo_case(name: str, plan: ZooPlan, recordings: Path, truth: Path) -> None:
-    """Write recordings and definition of a case of the zoo into a folder, and its truth into a file."""
-    from diagnosis.proof.zoo.conceal_zoo import write_zoo_case
-    from diagnosis.proof.zoo.draw import draw_case
-
-    case = draw_case(plan.family, plan.machine, plan.seed, plan.group, name=name, kind=plan.kind)
-    folder = recordings / name
-    folder.mkdir(parents=True, exist_ok=True)
-    source = Path(plan.machine) if names_a_file(plan.machine) else packaged(FOLDER, plan.machine)
-    (folder / DEFINITION).write_text(read_text(source), encoding="utf-8", newline="\n")
-    write_zoo_case(case, folder, truth / f"{name}.json")
 
 
 def diagnose(

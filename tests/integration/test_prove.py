@@ -16,6 +16,7 @@ import pytest
 from click.testing import CliRunner
 
 from builder.commands.prove import prove as verb
+from builder.workflows import proof_cases
 from builder.workflows import prove as driver
 from builder.workflows.prove import BLIND, HASHES, diagnose, environment, prove
 from diagnosis.proof.cases.conceal import WHOLE
@@ -65,6 +66,12 @@ def test_a_proof_of_the_own_plant(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
         assert not (output / HASHES).exists()
         return diagnose(task, *work) if task.case == "case_001" else silent(task, *work)
 
+    def weighed(file: Path, *_: Any) -> None:
+        assert (output / HASHES).exists()
+        facts = json.loads(file.read_text())
+        facts["effects"][0]["oracle"] = {"D_plant_nats": 20.0, "D_tool_nats": 10.0}
+        file.write_text(json.dumps(facts))
+
     def opened(path: Path) -> dict[str, truth.Truth]:
         assert len((output / HASHES).read_text().splitlines()) == 6
         return read(path)
@@ -72,6 +79,7 @@ def test_a_proof_of_the_own_plant(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     read = truth.read_truths
     monkeypatch.setattr(driver, "diagnose", some)
     monkeypatch.setattr(truth, "read_truths", opened)
+    monkeypatch.setattr(proof_cases, "add_evidence_of_case", weighed)
     lines.begin_lines(file, SETTINGS)
     with pytest.raises(KeyboardInterrupt):
         prove(file, output)
@@ -85,6 +93,9 @@ def test_a_proof_of_the_own_plant(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     assert first["answer"]["verdict"] != "failed" and len(first["sha256"]) == 64
     assert (output / HASHES).read_text().startswith(f"{first['sha256']}  case_001\n")
     assert {row["group"] for row in result["lines"]} == {"control", "single", "double", "messy", "outside", "sensor"}
+    assert {row["group"]: row["D_tool_nats"] for row in result["lines"]} | {"double": 0} == {
+        "control": None, "single": 10.0, "double": 0, "messy": 10.0, "outside": 10.0, "sensor": 10.0,
+    }  # fmt: skip
     seen.clear()
     assert prove(file, output) == result and not seen
     lines.begin_lines(tmp_path / "78.jsonl", Settings(plant="own", seed=78, cases=6))
@@ -114,13 +125,13 @@ def test_a_proof_of_the_zoo_is_continued_while_its_cases_are_made(
         assert files["gearbox.toml"].decode() in known_gearboxes() and len(made) == 4 + 1 + 3
         return silent(task, files, *work)
 
-    monkeypatch.setattr(driver, "make_zoo_case", make)
+    monkeypatch.setattr(proof_cases, "make_zoo_case", make)
     monkeypatch.setattr(driver, "diagnose", look)
     lines.begin_lines(tmp_path / "35.jsonl", Settings(plant="zoo", seed=35, cases=7, gearbox=""))
     with pytest.raises(KeyboardInterrupt):
         prove(tmp_path / "35.jsonl", output)
     result = prove(tmp_path / "35.jsonl", output)
-    assert result["cases"]["all"] == 7 and {row["group"] for row in result["lines"]} == set(driver.ZOO_MIX)
+    assert result["cases"]["all"] == 7 and {row["group"] for row in result["lines"]} == set(proof_cases.ZOO_MIX)
     assert all(name.startswith("zoo: ") for name in result["cases"] if name != "all")
 
 
