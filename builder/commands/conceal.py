@@ -77,8 +77,8 @@ def conceal(
     """Make recordings of a gearbox that hides an effect; the truth goes into another folder.
 
     The recordings come from a separate plant, not from the model: about 22 h to learn from (train_1 to train_3) and
-    6 h to hold out (hold_1, hold_2). Plants of the zoo are built of other nodes, paths and laws than the model; strengths
-    are drawn by the evidence that the recordings hold.
+    6 h to hold out (hold_1, hold_2). Plants of the zoo are built of other nodes, paths and laws than the model;
+    strengths are drawn by the evidence that the recordings hold.
     """
     if plant == "zoo":
         for option, given in (("--effect", effect), ("--random", random), ("--strength", strength)):

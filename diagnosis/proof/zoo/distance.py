@@ -18,7 +18,7 @@ from diagnosis.inference.noise import noise_of, start_guess
 from diagnosis.inference.posterior import Linearised, Problem
 from diagnosis.inference.unknowns import unknowns_of
 from diagnosis.proof.zoo.families.family import Family
-from diagnosis.proof.zoo.programmes import programmes
+from diagnosis.proof.zoo.programmes import MINUTES_S, programmes
 from diagnosis.proof.zoo.simulate import simulate
 from diagnosis.proof.zoo.structure import Programme, Variant, ZooPlant
 from diagnosis.recordings.recording import Channel, Recording
@@ -78,17 +78,17 @@ def draw_plant(family: Family, machine: str, seed: int, *, baselines: int = 0) -
         If the definition cannot be split, or no plant of many is accepted.
     """
     gearbox = load_gearbox(machine)
-    low, high = ACCEPTED_SLOW_K if gearbox.is_parametric else ACCEPTED_K
     for rejected in range(MOST_DRAWS):
         rng = np.random.default_rng([seed, rejected, *family.name.encode()])
         plant = family.draw(gearbox, rng)
+        low, high = ACCEPTED_SLOW_K if plant.row_s > MINUTES_S else ACCEPTED_K
         session = programmes(plant, rng, baselines=baselines)
         distance = distance_K(plant, session)
         if low <= distance <= high:
             return Drawn(plant=plant, programmes=session, distance_K=distance, rejected=rejected)
     raise InputError(
-        f"{gearbox.file}: none of {MOST_DRAWS} plants of the family '{family.name}' leaves {low:g} to {high:g} K after "
-        "calibration; draw another family for this machine"
+        f"{gearbox.file}: none of {MOST_DRAWS} plants of the family '{family.name}' is as far from the nominal "
+        "model as a healthy one may be; draw another family for this machine"
     )
 
 

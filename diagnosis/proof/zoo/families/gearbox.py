@@ -442,6 +442,7 @@ class _Gearbox:
         b, sizes, pair, oil, design = self.b, self.sizes, self.sizes.pair, self.oil, self.design
         sump, rho = self.at["oil"]["sump"], float(oil.density(T_SERVICE))
         dips, tips = [sizes.dip(0), sizes.dip(1)], sizes.tips_under_oil
+        C_Sp = b.uniform(0.3, 0.8)
         law = {
             "changenet_2007": losses.churning_changenet_2007,
             "changenet_2011": losses.churning_changenet_2011,
@@ -451,7 +452,7 @@ class _Gearbox:
         def churning(m: Moment) -> Array:
             n = _speed(m)
             if law is None:
-                return losses.churning_mauz(tips, pair.b, n * RPM * pair.r_w[0], sizes.omega(n, 1))
+                return losses.churning_mauz(tips, pair.b, n * RPM * pair.r_w[0], sizes.omega(n, 1), C_Sp)
             nu = np.minimum(oil.kinematic_viscosity(m.T[sump]), 500.0)
             return np.asarray(sum(law(dip, sizes.omega(n, i), nu, rho) for i, dip in enumerate(dips)))
 

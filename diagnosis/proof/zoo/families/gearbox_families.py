@@ -70,7 +70,7 @@ def draw_rings(gearbox: Gearbox, rng: np.random.Generator) -> ZooPlant:
 def draw_splash(gearbox: Gearbox, rng: np.random.Generator) -> ZooPlant:
     """Oil in three places, rim and hub: what the gears throw has its own temperature, and a film on the walls.
 
-    Friction of Xu and Kahraman, churning of Boness, bearings of Palmgren, seals of ISO/TR 14179-1, gears as cylinders in
+    Friction of Drozdov and Gavrikov, churning of Boness, bearings of Palmgren, seals of ISO/TR 14179-1, gears as cylinders in
     oil after Becker, ISO/TR 14179-2 outside.
     """
     refuse_unsplit(gearbox)
@@ -82,7 +82,7 @@ def draw_splash(gearbox: Gearbox, rng: np.random.Generator) -> ZooPlant:
         bearings="shaft" if _coin(rng, 0.3) else "one",
         stratified=float(rng.uniform(0.03, 0.1)) if _coin(rng, 0.3) else 0.0,
         draught=float(rng.uniform(0.02, 0.06)) if _coin(rng, 0.4) else 0.0,
-        friction=losses.friction_xu_kahraman,
+        friction=losses.friction_drozdov,
         churning="boness",
         bearing="palmgren",
         seal="iso_1",
@@ -95,7 +95,7 @@ def draw_splash(gearbox: Gearbox, rng: np.random.Generator) -> ZooPlant:
 def draw_merged(gearbox: Gearbox, rng: np.random.Generator) -> ZooPlant:
     """Coarser than the nominal model: gear and shaft are one rotor, bearings of a shaft one body, the box often too.
 
-    Friction of O'Donoghue and Cameron (it knows no load), churning of Mauz, bearings of SKF, Linke's seals, McAdams'
+    Friction of Michaelis with a least load, churning of Mauz, bearings of SKF, Linke's seals, McAdams'
     wall; the box stands on a bed that warms, or on a frame.
     """
     refuse_unsplit(gearbox)
@@ -107,7 +107,7 @@ def draw_merged(gearbox: Gearbox, rng: np.random.Generator) -> ZooPlant:
         bearings="shaft" if _coin(rng, 0.7) else "one",
         foundation="bed" if _coin(rng, 0.6) else "link",
         shaft_ends=_some_shafts(gearbox, rng, 0.3),
-        friction=losses.friction_odonoghue_cameron,
+        friction=losses.friction_michaelis,
         churning="mauz",
         bearing="skf",
         seal="linke",
