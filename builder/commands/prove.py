@@ -17,7 +17,7 @@ from builder.base.workers import jobs_option
 from models.base.errors import InputError
 
 LINES = 20  # of progress where there is no terminal
-MADE = ("plant", "cases", "seed", "removed")  # options of cases that are made
+MADE = ("plant", "cases", "seed", "families", "removed")  # options of cases that are made
 ONLY_NEW = (*MADE, "gearbox", "cells_every", "answers")  # that an old file has
 
 
@@ -34,6 +34,8 @@ ONLY_NEW = (*MADE, "gearbox", "cells_every", "answers")  # that an old file has
               help="Truth of --recordings: one file, or <case>.json in a folder.")  # fmt: skip
 @click.option("--gearbox", default=None, metavar="NAME|FILE",
               help="Name or definition file (TOML).  [default: fzg; zoo: drawn by family]")  # fmt: skip
+@click.option("--families", default="", metavar="NAME,...",
+              help="Zoo: families of plants to draw from.  [default: all]")  # fmt: skip
 @click.option("--cells-every", type=click.IntRange(min=0), default=0, show_default=True, metavar="N",
               help="Every N-th case is also diagnosed with fewer sensors and shorter recordings; 0: none.")  # fmt: skip
 @click.option("--removed", is_flag=True,
@@ -48,8 +50,8 @@ ONLY_NEW = (*MADE, "gearbox", "cells_every", "answers")  # that an old file has
 @click.pass_context
 def prove(
     context: click.Context, plant: Literal["own", "zoo"], cases: int | None, seed: int | None, recordings: Path | None,
-    truth: Path | None, gearbox: str | None, cells_every: int, removed: bool, answers: Path | None,
-    continued: Path | None, jobs: int, output: Path,
+    truth: Path | None, gearbox: str | None, families: str, cells_every: int, removed: bool,
+    answers: Path | None, continued: Path | None, jobs: int, output: Path,
 ) -> None:  # fmt: skip
     """Test the diagnosis on sealed cases: hide effects, diagnose blindly, hash the answers, open the truth, score.
 
@@ -76,6 +78,8 @@ def prove(
         file = answers or output / "given.jsonl"
         begin_lines(file, Settings(plant="given", gearbox=gearbox or "fzg", cells_every=cells_every))
     else:
+        if plant == "own" and families:
+            raise InputError("--families is for --plant zoo")
         if plant == "zoo" and removed:
             raise InputError("--removed is for --plant own; the zoo has effects outside the catalogue")
         mix, chosen, machine = (PROOF_MIX, OWN_PROOF, "fzg") if plant == "own" else (ZOO_MIX, ZOO_PROOF[0], "")
@@ -83,7 +87,7 @@ def prove(
         chosen = chosen if seed is None else seed
         file = answers or output / f"{chosen}.jsonl"
         begin_lines(file, Settings(plant=plant, seed=chosen, cases=number, gearbox=gearbox or machine,
-                                   cells_every=cells_every, removed=removed))  # fmt: skip
+                                   families=families, cells_every=cells_every, removed=removed))  # fmt: skip
     with _progress() as progress:
         result = run(file, output, recordings=recordings, truth=truth, jobs=jobs, progress=progress)
     _show(result, output)

@@ -33,7 +33,7 @@ def keep_to_one_set(settings: Settings, file: Path) -> None:
     InputError
         If they are others.
     """
-    made = {key: getattr(settings, key) for key in ("plant", "seed", "cases", "gearbox")}
+    made = {key: getattr(settings, key) for key in ("plant", "seed", "cases", "gearbox", "families")}
     if not file.exists():
         with atomic_file(file) as partial:
             partial.write_text(json.dumps(made) + "\n", encoding="utf-8")
@@ -57,8 +57,10 @@ def make_cases(settings: Settings, recordings: Path, truth: Path, jobs: int, pro
     if settings.plant == "zoo":
         from diagnosis.proof.zoo.conceal_zoo import zoo_plans
 
-        plans = dict(zip(names, zoo_plans(settings.seed, mix_of(settings.cases, ZOO_MIX),
-                                          machine=settings.gearbox or None), strict=True))  # fmt: skip
+        families = settings.families.split(",") if settings.families else None
+        drawn = zoo_plans(settings.seed, mix_of(settings.cases, ZOO_MIX), families=families,
+                          machine=settings.gearbox or None)  # fmt: skip
+        plans = dict(zip(names, drawn, strict=True))
         work = [(name, plans[name], recordings, truth) for name in missing]
         for done, _ in enumerate(iterate_parallel(make_zoo_case, work, jobs=jobs), start=1):
             progress("making recordings", len(names) - len(missing) + done, len(names))

@@ -231,6 +231,8 @@ def test_verb_refuses(given: dict[str, Path], tmp_path: Path) -> None:
         (["--cases", "3"], "3 cases are too few"),
         (["--recordings", recordings], "--recordings and --truth go together"),
         (["--recordings", recordings, "--truth", truths, "--seed", "1"], "--seed is for cases that are made"),
+        (["--plant", "zoo", "--removed"], "--removed is for --plant own"),
+        (["--families", "walls"], "--families is for --plant zoo"),
         (["--continue", str(old), "--cells-every", "2"], "--cells-every does not go with --continue"),
         (["--continue", str(old)], "is not a file of answers that prove wrote"),
     ):

@@ -42,9 +42,11 @@ class Settings:
         ``own`` or ``zoo``: cases are made from `seed`; ``given``: recordings that exist
     seed, cases : int
     gearbox : str
-        Name or file of the nominal definition
+        Name or file of the nominal definition; empty: drawn with each plant of the zoo
     cells_every : int
         Every n-th case is also diagnosed with fewer sensors and shorter recordings; 0: none
+    families : str
+        Families of the zoo, separated by commas; empty: all
     removed : bool
         True to diagnose every mechanism that is alone in a case once more with its entry removed from the catalogue
     """
@@ -53,6 +55,7 @@ class Settings:
     seed: int = 0
     cases: int = 0
     gearbox: str = "fzg"
+    families: str = ""
     cells_every: int = 0
     removed: bool = False
 
@@ -196,9 +199,9 @@ def begin_lines(file: Path, settings: Settings) -> None:
     Raises
     ------
     InputError
-        If the file exists.
+        If the file holds answers.
     """
-    if file.exists():
+    if file.exists() and read_lines(file)[2]:
         raise InputError(f"{file}: holds answers already; continue it with --continue, or name another file")
     file.parent.mkdir(parents=True, exist_ok=True)
     first = {"proof": SCHEMA, "settings": asdict(settings), "code": code_hash(), "version": project_version()}
