@@ -8,12 +8,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from diagnosis.proof.cases.conceal import conceal_set, draw_case, mix_of, mixed_plans
-from diagnosis.proof.scoring.lines import DEFINITION, Settings
-from models.assembly.gearbox import FOLDER, Gearbox, load_gearbox, names_a_file
+from diagnosis.proof.scoring.lines import Settings
+from models.assembly.gearbox import Gearbox, load_gearbox
 from models.base.atomic_write import atomic_file, atomic_folder
 from models.base.errors import InputError
 from models.base.parallel import iterate_parallel
-from models.files.toml_file import packaged, read_text
 
 if TYPE_CHECKING:
     from diagnosis.proof.cases.concealed_case import Plan
@@ -76,16 +75,12 @@ def make_cases(settings: Settings, recordings: Path, truth: Path, jobs: int, pro
 
 
 def make_zoo_case(name: str, plan: ZooPlan, recordings: Path, truth: Path) -> None:
-    """Write recordings and definition of a case of the zoo into a folder, and its truth into a file."""
+    """Draw a case of the zoo and write its recordings and definition into a folder, its truth into a file."""
     from diagnosis.proof.zoo.conceal_zoo import write_zoo_case
     from diagnosis.proof.zoo.draw import draw_case
 
     case = draw_case(plan.family, plan.machine, plan.seed, plan.group, name=name, kind=plan.kind)
-    folder = recordings / name
-    folder.mkdir(parents=True, exist_ok=True)
-    source = Path(plan.machine) if names_a_file(plan.machine) else packaged(FOLDER, plan.machine)
-    (folder / DEFINITION).write_text(read_text(source), encoding="utf-8", newline="\n")
-    write_zoo_case(case, folder, truth / f"{name}.json")
+    write_zoo_case(case, recordings / name, truth / f"{name}.json")
 
 
 def add_evidence(settings: Settings, truth: Path, jobs: int, progress: Progress) -> None:

@@ -16,8 +16,9 @@ from pathlib import Path
 from typing import Any
 
 from builder.workflows.proof_cases import Progress, add_evidence, keep_to_one_set, make_cases
+from diagnosis.proof.cases.case_files import DEFINITION
 from diagnosis.proof.scoring import lines
-from diagnosis.proof.scoring.lines import DEFINITION, Task
+from diagnosis.proof.scoring.lines import Task
 from models.assembly.gearbox import load_gearbox, names_a_file
 from models.base.atomic_write import atomic_file
 from models.base.errors import InputError

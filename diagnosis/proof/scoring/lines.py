@@ -15,13 +15,12 @@ from importlib import resources
 from pathlib import Path
 from typing import Any, Literal
 
-from diagnosis.proof.cases.case_files import MAPPING
+from diagnosis.proof.cases.case_files import DEFINITION, MAPPING
 from models.base.errors import InputError
 from models.base.version import project_version
 
 SCHEMA = 1
 ENDINGS = (".csv.gz", ".csv", ".parquet")
-DEFINITION = "gearbox.toml"  # of a case whose machine is not that of the whole set
 DIGITS = 6
 
 Plant = Literal["own", "zoo", "given"]
