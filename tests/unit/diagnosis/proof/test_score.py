@@ -159,6 +159,18 @@ def test_what_was_changed_by_truths_that_do_not_name_it(
     assert {c.sign for c in changed_of(raw | {"parameters": {"a": -0.5}})} == {-sign}
 
 
+def test_what_was_changed_by_truths_of_the_zoo() -> None:
+    heat = {"what": "heat", "of": "oil+mist", "nodes": ["oil+mist", "pinion"], "sign": 1, "is_loss": True}
+    (loss,) = changed_of({"changed": [heat], "family": "no-load loss"})
+    assert (loss.what, loss.nodes, loss.sign) == ("loss", ("oil", "mist", "pinion"), 1)
+    (sun,) = changed_of({"changed": [heat | {"is_loss": False}], "family": "surroundings"})
+    assert sun.what == "heat"
+    # A recorder that shows too much torque: the machine gets less than recorded.
+    torque = {"what": "input", "of": "torque", "nodes": [], "sign": 1, "is_loss": False}
+    assert changed_of({"changed": [torque], "family": "measurement"})[0].sign == -1
+    assert changed_of({"changed": [torque], "family": "change at a date"})[0].sign == 1
+
+
 def test_exact_limits() -> None:
     assert count([True] * 5 + [False]) == {"hits": 5, "of": 6, "low": 0.3588, "high": 0.9958}
     assert count([]) == {"hits": 0, "of": 0, "low": 0.0, "high": 1.0}
