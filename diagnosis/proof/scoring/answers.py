@@ -37,6 +37,7 @@ class Claim:
     nodes : frozenset of str
         Nodes, channels or input of it, both ends of a link
     sign : int
+        1: more, -1: less, 0: not given
     heat_W : float
     """
 
@@ -122,6 +123,8 @@ def _claim(finding: Mapping[str, Any], gearbox: Gearbox) -> Claim:
     rivals = [m for (m, _), p in sorted(odds.items(), key=lambda pair: -pair[1]) if m != name and p >= LEAST_TIED]
     parameters = finding.get("parameters") or []
     strength = _number(parameters[0].get("value"), 0.0) if parameters else 0.0
+    if finding.get("kind") == PARAMETER:
+        strength -= next((p.start for p in gearbox.network().parameters if p.name == finding.get("place")), strength)
     what = _what(finding, gearbox)
     return Claim(
         mechanism=name,
@@ -133,7 +136,7 @@ def _claim(finding: Mapping[str, Any], gearbox: Gearbox) -> Claim:
         acts_like=bool(finding.get("acts_like")),
         what=what,
         nodes=_nodes(finding, gearbox),
-        sign=0 if what in ("capacity",) or strength == 0.0 else int(math.copysign(1, strength)),
+        sign=(strength > 0.0) - (strength < 0.0),
         heat_W=_number((finding.get("heat_W") or {}).get("mean")),
     )
 
@@ -160,8 +163,18 @@ def _what(finding: Mapping[str, Any], gearbox: Gearbox) -> What:
 
 
 def _nodes(finding: Mapping[str, Any], gearbox: Gearbox) -> frozenset[str]:
-    """Nodes, channels and inputs that a finding names: its node, and every node, group and loss in its place."""
+    """Nodes, channels and inputs that a finding names: its node, and every node, group and loss in its place.
+
+    A parameter names all nodes whose losses or links depend on it.
+    """
     network = gearbox.network()
+    if finding.get("kind") == PARAMETER:
+        laws: list[tuple[Any, tuple[str, ...]]] = [(link.conductance, link.nodes) for link in network.links]
+        laws += [(source.heat, (source.node,)) for source in network.sources]
+        named = {
+            node for law, nodes in laws if finding.get("place") in {s.name for s in law.free_symbols} for node in nodes
+        }
+        return frozenset(named | ({finding.get("node") or ""} - {""}))
     known = {name: {name} for name in (*network.node_names, *network.inputs)}
     known |= {name: set(members) for name, members in network.groups.items()}
     known |= {source.name: {source.node} for source in network.sources if source.name not in known}

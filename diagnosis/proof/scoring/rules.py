@@ -97,9 +97,9 @@ def acts_like(claim: Claim, truth: Changed) -> bool:
     """True if a finding reports the kind of thing that was changed, at the same node or link, with the same sign.
 
     Parts of a split node have the name of the nominal node. Both nodes of a link must be those of the claim; links to
-    something outside the network have one. Sign 0 goes with both.
+    something outside the network have one. An effect that neither adds nor takes away goes with both signs.
     """
-    if claim.what != truth.what or claim.sign * truth.sign < 0:
+    if claim.what != truth.what or truth.sign not in (0, claim.sign):
         return False
     if truth.what == "clock":
         return True

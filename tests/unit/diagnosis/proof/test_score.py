@@ -56,6 +56,7 @@ INSIDE = truth("single", effect("oil_housing_speed", "link", ["oil", "housing_up
 TORQUE = truth("sensor", effect("torque_gain", "input", ["torque"]) | {"family": "measurement"})
 BIAS = truth("sensor", effect("sensor_bias", "sensor", ["pinion"]))
 ALIEN = truth("outside", effect("hum", "loss", ["bearing_1"]) | {"catalogue": "none"})
+WORN = truth("date", effect("loss_changes", "loss", ["mesh"]))
 SILENT, FAILED = says("consistent"), None
 NAMED, OTHER = says("missing_physics", finding("windage")), says("missing_physics", finding("pump_heat", node="oil"))
 TIED = says("missing_physics", finding("churning_swirl", windage=0.3))
@@ -89,6 +90,7 @@ PARAMETER = finding("parameter", "parameter", "mesh", place="mesh")
         ("named or tied", ONE, TIED, True), ("named or tied", ONE, OTHER, False), ("named or tied", ONE, FOURTH, False),
         ("named or tied", ONE, says("missing_physics", finding("churning_swirl", windage=0.04)), False),
         ("acts like", ONE, OTHER, True), ("acts like", ONE, says("x", finding("pump_heat", value=-1.0)), False),
+        ("acts like", ONE, says("x", finding("pump_heat") | {"parameters": []}), False),
         ("acts like", ONE, says("x", finding("oil_tank")), False), ("acts like", ONE, FAILED, False),
         ("acts like", ONE, says("x", finding("windage", node="wheel", place="gears")), True),
         ("acts like", ONE, says("x", finding("churning_swirl", node="wheel")), False),
@@ -101,6 +103,10 @@ PARAMETER = finding("parameter", "parameter", "mesh", place="mesh")
         ("acts like", BIAS, says("x", finding("sensor_drift", "sensor", "oil")), False),
         ("acts like", TORQUE, says("x", finding("torque_offset", "sensor", "torque", -1.0)), True),
         ("acts like", TORQUE, says("x", finding("torque_offset", "sensor", "torque", 1.0)), False),
+        ("acts like", WORN, says("x", PARAMETER | {"parameters": [{"value": 1.3}]}), True),
+        ("acts like", WORN, says("x", PARAMETER | {"parameters": [{"value": 0.7}]}), False),
+        ("acts like", LINK, says("x", finding("parameter", "parameter", "frame", 0.7, place="h_air")), True),
+        ("acts like", LINK, says("x", finding("parameter", "parameter", "frame", 0.7, place="seal")), False),
         ("acts like", ALIEN, says("x", OPEN), True), ("acts like", CLEAN, SILENT, None),
         ("place right", ONE, says("unexplained", node="housing_lower"), True),
         ("place right", ONE, says("unexplained", node="bearing_1"), True),
