@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import click
 
 from builder.base import console
+from builder.commands.conceal_in_zoo import conceal_in_zoo
+from builder.commands.conceal_into import conceal_into
 from models.assembly.gearbox import load_gearbox
 from models.base.atomic_write import atomic_folder
 from models.base.errors import InputError
@@ -18,12 +21,17 @@ def _list_effects(context: click.Context, _: click.Parameter, asked: bool) -> No
         if context.params.get("plant") == "zoo":
             from diagnosis.proof.zoo.draw import list_effects
 
-            rows = list_effects()
-        else:
-            from diagnosis.proof.cases.conceal import EFFECTS
+            console.table(
+                "Effects of the zoo", ["name", "in the catalogue", "what it is"], list_effects(), text_columns=3
+            )
+            context.exit()
+        from diagnosis.proof.cases.conceal import EFFECTS
+        from diagnosis.proof.injection.inject import DESCRIPTIONS
 
-            rows = [[name, "yes" if effect.catalogue else "no", effect.law] for name, effect in sorted(EFFECTS.items())]
+        rows = [[name, "yes" if effect.catalogue else "no", effect.law] for name, effect in sorted(EFFECTS.items())]
         console.table("Effects that can be concealed", ["name", "in the catalogue", "law"], rows, text_columns=3)
+        injected = [list(item) for item in DESCRIPTIONS.items()]
+        console.table("Effects that can be injected (--into)", ["name", "what it is"], injected, text_columns=2)
         context.exit()
 
 
@@ -58,6 +66,10 @@ def _list_effects(context: click.Context, _: click.Parameter, asked: bool) -> No
 @click.option("--session-deviation", type=click.FloatRange(min=0.0, max=0.2), default=None, metavar="X",
               help="Zoo: relative deviation of the plant's parameters between sessions.  [default: 0, 0.01 or 0.03]"
               )  # fmt: skip
+@click.option("--into", default=None, metavar="FILE[@FROM..TO]", help="Recording of a real machine to inject into.")
+@click.option("--place", default=None, metavar="NAME", help="With --into: link, loss, node, sensor or input.")
+@click.option("--date", default=None, metavar="MOMENT", help="With --into: date or seconds at which it begins.")
+@click.option("--control", is_flag=True, help="With --into: inject nothing.")
 def conceal(
     plant: str,
     effect: str | None,
@@ -73,26 +85,36 @@ def conceal(
     group: str | None,
     baselines: int,
     session_deviation: float | None,
+    into: str | None,
+    place: str | None,
+    date: str | None,
+    control: bool,
 ) -> None:
     """Make recordings of a gearbox that hides an effect; the truth goes into another folder.
 
     The recordings come from a separate plant, not from the model: about 22 h to learn from (train_1 to train_3) and
     6 h to hold out (hold_1, hold_2). Plants of the zoo are built of other nodes, paths and laws than the model;
-    strengths are drawn by the evidence that the recordings hold.
+    strengths are drawn by the evidence that the recordings hold. With --into an effect is put into a recording of a
+    real machine instead.
     """
+    of_zoo = {"--machine": machine, "--families": families, "--group": group, "--baselines": baselines or None,
+              "--session-deviation": session_deviation}  # fmt: skip
+    of_injection = {"--into": into, "--place": place, "--date": date, "--control": control or None}
     if plant == "zoo":
-        for option, given in (("--effect", effect), ("--random", random), ("--strength", strength)):
-            if given:
-                raise InputError(f"{option} goes with --plant own; in the zoo effects are drawn, see --group")
-        _conceal_in_zoo(seed, output, truth, cases, machine, families, group, baselines, session_deviation)
+        own = {"--effect": effect, "--random": random or None, "--strength": strength}
+        _refuse({**own, **of_injection}, "do not go with --plant zoo, where effects are drawn; see --group")
+        conceal_in_zoo(seed=seed, output=output, truth=truth, cases=cases, machine=machine, families=families,
+                       group=group, baselines=baselines, session_deviation=session_deviation)  # fmt: skip
         return
-    if machine is not None or families is not None or group is not None:
-        raise InputError("--machine, --families and --group go with --plant zoo; the own plant takes --gearbox")
-    if baselines or session_deviation is not None:
-        raise InputError(
-            "the own plant records no baselines; use --plant zoo for --baselines and --session-deviation, or conceal "
-            "a second case of weakest effect: --effect NAME --strength 0.01"
-        )
+    _refuse(of_zoo, "go with --plant zoo only; the own plant takes --gearbox and records no baselines")
+    if into is not None:
+        if random or strength is not None:
+            raise InputError("--into draws effect and size; leave out --random and --strength")
+        conceal_into(into, gearbox, effect=effect, place=place, date=date, control=control, cases=cases, seed=seed,
+                     output=output, truth=truth)  # fmt: skip
+        return
+    if control or place is not None or date is not None:
+        raise InputError("--control, --place and --date go with --into")
     from diagnosis.proof.cases.case_files import keep_apart, keep_other_cases
     from diagnosis.proof.cases.conceal import conceal_set, random_plans  # imports scipy.signal
     from diagnosis.proof.cases.concealed_case import Plan
@@ -123,36 +145,7 @@ def conceal(
         console.out.print(f"wrote {recordings / ('' if cases is None else name)}, {truth / name}.json")
 
 
-def _conceal_in_zoo(
-    seed: int,
-    output: Path,
-    truth: Path | None,
-    cases: int | None,
-    machine: str | None,
-    families: str | None,
-    group: str | None,
-    baselines: int,
-    session_deviation: float | None,
-) -> None:
-    from diagnosis.proof.cases.case_files import keep_apart, keep_other_cases
-    from diagnosis.proof.zoo.conceal_zoo import conceal_zoo, random_zoo_plans, zoo_plans
-
-    names = None if families is None else [name.strip() for name in families.split(",")]
-    number = 1 if cases is None else cases
-    if group is None:
-        plans = random_zoo_plans(seed, number, families=names, machine=machine)
-    else:
-        plans = zoo_plans(seed, {group: number}, families=names, machine=machine)
-    recordings, truth = output / "recordings", truth or output / "truth"
-    keep_apart(recordings, truth)
-    with (
-        atomic_folder(recordings) as stage,
-        atomic_folder(truth) as truth_stage,
-        console.progress_bar("concealing") as progress,
-    ):
-        made = conceal_zoo(plans, recordings=stage, truth=truth_stage, flat=cases is None, baselines=baselines,
-                           session_deviation=session_deviation, progress=progress)  # fmt: skip
-        keep_other_cases(stage, recordings)
-        keep_other_cases(truth_stage, truth)
-    for name in made:
-        console.out.print(f"wrote {recordings / ('' if cases is None else name)}, {truth / name}.json")
+def _refuse(options: Mapping[str, object], why: str) -> None:
+    given = [option for option, value in options.items() if value is not None]
+    if given:
+        raise InputError(f"{' and '.join(given)}: {why}")

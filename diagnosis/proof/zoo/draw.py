@@ -236,14 +236,14 @@ def draw_fault(name: str, setting: Setting, rng: np.random.Generator, course: Co
     """
     maker, plant = FAULT_MAKERS[name], setting.plant
     channels = [probe.channel for probe in plant.probes]
-    cap, near = maker.cap, ""
+    cap, near, scale = maker.cap, "", 1.0
     chosen: tuple[str, ...] = (channels[int(rng.integers(len(channels)))],)
     if name in INPUT_FAULTS:
         chosen = (input_of(name),)
         if chosen[0] not in plant.inputs:
             raise UnfitError(name)
         near = channels[int(rng.integers(len(channels)))]
-        cap *= setting.reference["torque"] if name == "torque_offset" else 1.0
+        scale = setting.reference["torque"] if name == "torque_offset" else 1.0
     elif maker.fault == "swapped":
         if len(channels) < 2:
             raise UnfitError(name)
@@ -258,8 +258,10 @@ def draw_fault(name: str, setting: Setting, rng: np.random.Generator, course: Co
         course = Course(kind="step", from_h=setting.date(rng, 0.1, 0.7))
     sign = either(rng) if maker.signed else 1
     nodes = tuple(channel for channel in chosen if channel in setting.nodes)
-    fault = Fault(kind=maker.fault, channels=chosen, nodes=nodes, near=near, strength=cap, sign=sign, course=course)
-    return made_fault(name, maker, fault, cap=cap, law=maker.law, course=course)
+    fault = Fault(
+        kind=maker.fault, channels=chosen, nodes=nodes, near=near, strength=scale * cap, sign=sign, course=course
+    )
+    return made_fault(name, maker, fault, least=scale * maker.least, cap=fault.strength, course=course)
 
 
 def list_effects() -> list[list[str]]:
@@ -287,7 +289,8 @@ def draw_strengths(case: ZooCase, nats_of: NatsOf, rng: np.random.Generator) -> 
     for k, (effect, nats) in enumerate(zip(trial.effects, found, strict=True)):
         low, high = NATS if case.group != "messy" else DOMINANT_NATS if k == 0 else MINOR_NATS
         wanted = float(np.exp(rng.uniform(np.log(low), np.log(high))))
-        strength = min(effect.strength * np.sqrt(wanted / max(nats.tool, 1e-9)), effect.cap)
+        linear = effect.strength * np.sqrt(wanted / max(nats.tool, 1e-9))
+        strength = np.clip(linear, effect.least, effect.cap)
         whole = effect.fault is not None and effect.fault.kind == "swapped"
         chosen.append(effect.with_strength(effect.cap if whole else float(strength)))
     return chosen

@@ -74,8 +74,8 @@ class ZooEffect:
     fault : Fault or None
         Of measurement, at its strength
     parameters : mapping of str to float
-    cap : float
-        Greatest strength that is physical
+    least, cap : float
+        Range of strengths that are physical, and stand out of ordinary errors of instruments
     strength : float
     course : Course
     """
@@ -90,6 +90,7 @@ class ZooEffect:
     act: Act = field(default_factory=Act)
     fault: Fault | None = None
     parameters: Mapping[str, float] = field(default_factory=dict)
+    least: float = 0.0
     strength: float = 1.0
     course: Course = ALWAYS
 
@@ -138,10 +139,11 @@ def made(
                      course=course)  # fmt: skip
 
 
-def made_fault(name: str, maker: FaultMaker, fault: Fault, *, cap: float, law: str, course: Course) -> ZooEffect:
+def made_fault(name: str, maker: FaultMaker, fault: Fault, *, least: float, cap: float, course: Course) -> ZooEffect:
     """A fault of measurement as an effect; its strength is still that of the fault."""
-    return ZooEffect(name=name, catalogue=maker.catalogue, family="measurement", kind=maker.kind, law=law,
-                     unit=maker.unit, cap=cap, fault=fault, strength=fault.strength, course=course)  # fmt: skip
+    return ZooEffect(name=name, catalogue=maker.catalogue, family="measurement", kind=maker.kind, law=maker.law,
+                     unit=maker.unit, least=least, cap=cap, fault=fault, strength=fault.strength,
+                     course=course)  # fmt: skip
 
 
 def _in_time(law: Law, strength: float, course: Course) -> Law:

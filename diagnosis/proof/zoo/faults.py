@@ -100,8 +100,9 @@ class FaultMaker:
     catalogue : str or None
         Mechanism of the catalogue
     unit : str
-    cap : float
-        Greatest strength that happens; of an offset in units of the input's highest value
+    cap, least : float
+        Greatest strength that happens, and the least that stands out of ordinary errors of instruments; of a torque's
+        offset in units of the highest torque
     law : str
     signed : bool
         True if it may go either way
@@ -114,10 +115,11 @@ class FaultMaker:
     cap: float
     law: str
     signed: bool = True
+    least: float = 0.0
 
 
 SENSOR_FAULTS: Mapping[str, FaultMaker] = {
-    "sensor_bias": FaultMaker(kind="sensor", fault="bias", catalogue="sensor_bias", unit="K", cap=8.0,
+    "sensor_bias": FaultMaker(kind="sensor", fault="bias", catalogue="sensor_bias", unit="K", cap=8.0, least=0.3,
                               law="reading + a"),
     "sensor_gain": FaultMaker(kind="sensor", fault="gain", catalogue="sensor_gain", unit="1", cap=0.15,
                               law="reading + a (reading - 20 degC)"),
@@ -129,20 +131,20 @@ SENSOR_FAULTS: Mapping[str, FaultMaker] = {
                                law="the reading stands still for a hours", signed=False),
     "swapped_channels": FaultMaker(kind="sensor", fault="swapped", catalogue="swapped_channels", unit="1", cap=1.0,
                                    law="two channels exchanged", signed=False),
-    "clock_offset": FaultMaker(kind="sensor", fault="clock", catalogue="clock_offset", unit="s", cap=600.0,
+    "clock_offset": FaultMaker(kind="sensor", fault="clock", catalogue="clock_offset", unit="s", cap=600.0, least=6.0,
                                law="temperatures are stamped a seconds late"),
 }  # fmt: skip
 INPUT_FAULTS: Mapping[str, FaultMaker] = {
     "torque_offset": FaultMaker(kind="signal", fault="offset", catalogue="torque_offset", unit="N m", cap=0.15,
-                                law="recorded torque = true + a"),
-    "torque_gain": FaultMaker(kind="signal", fault="input_gain", catalogue="torque_gain", unit="1", cap=0.2,
+                                least=0.01, law="recorded torque = true + a"),
+    "torque_gain": FaultMaker(kind="signal", fault="input_gain", catalogue="torque_gain", unit="1", cap=0.2, least=0.02,
                               law="recorded torque = true (1 + a)"),
-    "speed_gain": FaultMaker(kind="signal", fault="input_gain", catalogue="speed_gain", unit="1", cap=0.15,
+    "speed_gain": FaultMaker(kind="signal", fault="input_gain", catalogue="speed_gain", unit="1", cap=0.15, least=0.004,
                              law="recorded speed = true (1 + a)"),
-    "heater_power_gain": FaultMaker(kind="signal", fault="input_gain", catalogue=None, unit="1", cap=0.2,
+    "heater_power_gain": FaultMaker(kind="signal", fault="input_gain", catalogue=None, unit="1", cap=0.2, least=0.02,
                                     law="recorded power = true (1 + a)"),
     "ambient_probe_offset": FaultMaker(kind="signal", fault="offset", catalogue="ambient_probe_offset", unit="K",
-                                       cap=8.0, law="recorded ambient = true + a"),
+                                       cap=8.0, least=0.5, law="recorded ambient = true + a"),
     "ambient_probe_heated": FaultMaker(kind="signal", fault="heated", catalogue="ambient_probe_heated", unit="1",
                                        cap=0.3, law="recorded ambient = true + a (neighbour - true), 300 s late",
                                        signed=False),

@@ -33,7 +33,7 @@ FARTHEST = 3.0  # standard deviations, where coordinates are held
 
 @dataclass(frozen=True, kw_only=True)
 class Measurement:
-    """What is recorded of a plant, and how well.
+    """Recorded channels of a plant and their noise.
 
     Attributes
     ----------

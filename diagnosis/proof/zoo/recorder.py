@@ -70,7 +70,7 @@ def draw_instruments(plant: ZooPlant, kind: str, *, has_loss: bool, rng: np.rand
         noise_K=noise * float(rng.uniform(2.0, 3.5)) if kind == "noise_misstated" else noise,
         input_gain={name: float(rng.normal(0.0, sd)) for name, sd in gains.items() if name in plant.inputs},
         input_offset={name: float(rng.normal(0.0, 0.2)) for name in temperatures},
-        clock_s=float(rng.uniform(-3.0, 3.0)),
+        clock_s=float(rng.uniform(-2.0, 2.0)),
         loss_noise=(0.02, max(2.0, 0.005 * plant.loss_W)) if has_loss else None,
         loss_gain=float(rng.normal(0.0, 0.015)),
         loss_offset_W=float(rng.normal(0.0, 1.5)),

@@ -133,7 +133,7 @@ def _of_all(variant: Variant) -> Acting:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Push:
-    """What one direction does.
+    """Forces and direct responses of one direction.
 
     Attributes
     ----------
