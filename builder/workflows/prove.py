@@ -115,8 +115,8 @@ def diagnose(
     -------
     Task
     dict
-        ``status`` (``answered``, ``refused``, ``failed``), ``seconds``, ``sha256`` of ``diagnosis.json``,
-        ``recordings`` (SHA-256 of the files), ``answer`` (see
+        ``status`` (``answered``, ``refused``, ``failed``), ``seconds``, ``processor_s``, ``sha256`` of
+        ``diagnosis.json``, ``recordings`` (SHA-256 of the files), ``answer`` (see
         :func:`diagnosis.proof.scoring.lines.compact`, or None), ``message``
     """
     content = dict(files)
@@ -126,7 +126,7 @@ def diagnose(
     command = [sys.executable, "-c", BLIND, "diagnose", *arguments, "--gearbox", definition, "--jobs", "1",
                "--output", "out"]  # fmt: skip
     with tempfile.TemporaryDirectory(prefix="case-") as folder:
-        room, begin = Path(folder), time.perf_counter()
+        room, begin, used = Path(folder), time.perf_counter(), os.times()
         for name, data in content.items():
             (room / name).write_bytes(data)
         try:
@@ -143,6 +143,7 @@ def diagnose(
     return task, {
         "status": "answered" if status == 0 else "refused" if status == REFUSED else "failed",
         "seconds": round(time.perf_counter() - begin, 1),
+        "processor_s": round(sum(os.times()[2:4]) - sum(used[2:4]), 1),
         "sha256": hashlib.sha256(written).hexdigest() if status == 0 else "",
         "recordings": hash_of(files),
         "answer": lines.compact(json.loads(written)) if status == 0 else None,

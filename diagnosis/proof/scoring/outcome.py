@@ -72,7 +72,8 @@ def outcome(
             for k, effect in enumerate(effects)
         )
         if "seconds" in record:
-            seconds.setdefault(name, []).append(record["seconds"])
+            # On a machine with other work processor time is what a diagnosis costs; older lines lack it.
+            seconds.setdefault(name, []).append(record.get("processor_s") or record["seconds"])
     whole = [item for name, items in groups.items() if "," not in name for item in items]
     tables = {ALL: whole, **groups} if len(groups) > 1 else groups
     return {
