@@ -278,7 +278,7 @@ def list_effects() -> list[list[str]]:
 
 
 def draw_strengths(case: ZooCase, nats_of: NatsOf, rng: np.random.Generator) -> list[ZooEffect]:
-    """Effects at strengths whose evidence is log-uniform, as far as their physical ranges allow.
+    """Effects at strengths whose evidence is log-uniform, up to the ends of their physical ranges.
 
     The evidence grows with the square of the strength while the response is linear: it is computed at a small strength
     and scaled.

@@ -1,4 +1,4 @@
-"""What is concealed in a plant of the zoo: changes of given form and strength, always or at a date.
+"""Effects that are concealed in a plant of the zoo: changes of given form and strength, always or at a date.
 
 The law of an effect is linear in its strength, which has a unit and a greatest value that a real machine could show.
 """
@@ -103,7 +103,7 @@ class ZooEffect:
 
     @property
     def changed(self) -> tuple[Changed, ...]:
-        """What it changed, by the names of the nominal model."""
+        """Things that it changed, by the names of the nominal model."""
         if self.fault is None:
             return self.act.changed
         return tuple(
@@ -117,7 +117,7 @@ class ZooEffect:
         return tuple(dict.fromkeys(node for one in self.changed for node in one.nodes))
 
     def with_strength(self, strength: float) -> ZooEffect:
-        """The same effect at another strength."""
+        """This effect at another strength."""
         fault = None if self.fault is None else replace(self.fault, strength=strength)
         return replace(self, strength=strength, fault=fault)
 

@@ -87,7 +87,7 @@ def with_slow_sensors(plant: ZooPlant, rng: np.random.Generator) -> ZooPlant:
 
 
 def measure(plant: ZooPlant, programme: Programme, outcome: Outcome, run: int, *, has_loss: bool) -> Measured:
-    """What perfect instruments would record of one run of a batch."""
+    """Recording of one run of a batch by perfect instruments."""
     first = programme.unrecorded
     rows = outcome.P_loss.shape[1]
     return Measured(
@@ -151,7 +151,7 @@ def record(
 
 
 def _with_errors(measured: Measured, instruments: ZooInstruments) -> Measured:
-    """What these instruments would record without noise and faults."""
+    """Recording by these instruments without noise and faults."""
     inputs = {
         name: values * (1.0 + instruments.input_gain.get(name, 0.0)) + instruments.input_offset.get(name, 0.0)
         for name, values in measured.inputs.items()

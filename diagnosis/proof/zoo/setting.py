@@ -26,7 +26,7 @@ class UnfitError(Exception):
 
 @dataclass(frozen=True, kw_only=True)
 class Changed:
-    """What an effect changed, by the names of the nominal model.
+    """One thing that an effect changed, by the names of the nominal model.
 
     Attributes
     ----------
@@ -256,7 +256,7 @@ class Setting:
     # ------------------------------------------------------------------ acts at a strength of 1
 
     def heat(self, node: str, law: Law, *, sign: int = 1, is_loss: bool = False) -> Act:
-        """Heat `law` [W] into a node; `sign` says what it mostly does."""
+        """Heat `law` [W] into a node; `sign` is what it mostly does."""
         changes = tuple(
             Change(kind="heat", target=body, law=_times(share, law), is_loss=is_loss)
             for body, share in self.bodies(node).items()

@@ -217,7 +217,7 @@ class Linearised:
         laws = self.laws
         force = (moved.q - base.q - (moved.C - base.C) * rate) / step
         dG = (moved.G - base.G) / step
-        for path in np.flatnonzero(np.any(dG != 0.0, axis=1)):
+        for path in map(int, np.flatnonzero(np.any(dG != 0.0, axis=1))):
             a, b = laws.ends[path]
             i, j = laws.body.get(a), laws.body.get(b)
             flow = dG[path] * ((T[i] if i is not None else base.T[a]) - (T[j] if j is not None else base.T[b]))
@@ -258,7 +258,7 @@ class Linearised:
     ) -> Balance:
         field = dict(getattr(raw, kind))
         field[name] = field[name] + step
-        moved = replace(raw, **{kind: field})
+        moved = replace(raw, **{kind: field})  # type: ignore[arg-type]
         # A change may make the inputs follow a temperature, and then every law may.
         everything = kind == "T" and any(change.kind == "input" for change, _ in self.acting)
         return self._evaluate(moved, None if everything else values, None if everything else fresh)[0]
@@ -279,8 +279,8 @@ class Linearised:
             scale = RELATIVE_STEP
         else:
             scale = RELATIVE_STEP if direction.kind == "input" else 1.0
-            moved = self._with_change(self.raw, self.values, self.base, direction, scale)
-            at_rows = self._with_change(self.raw_rows, self.values_rows, self.base_rows, direction, scale)
+            moved = self._with_change(self.raw, self.values, direction, scale)
+            at_rows = self._with_change(self.raw_rows, self.values_rows, direction, scale)
         early, late = self._both_stages(moved, scale)
         direct = (self._outputs(at_rows) - self._outputs(self.base_rows)) / scale
         pushed = np.flatnonzero(np.any((early != 0.0) | (late != 0.0), axis=1))
@@ -318,7 +318,7 @@ class Linearised:
             outputs = {0: change.is_loss * at_rows}
         return _Push(into=into, outputs=outputs, start=still)
 
-    def _with_change(self, raw: Moment, values: Array, base: Balance, change: Change, amplitude: float) -> Balance:
+    def _with_change(self, raw: Moment, values: Array, change: Change, amplitude: float) -> Balance:
         """Balance with one change more; linear in the amplitude but for inputs."""
         if change.kind == "input":
             felt = feel(raw, [(change, slice(None))])

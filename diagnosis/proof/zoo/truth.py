@@ -1,4 +1,4 @@
-"""The truth of a zoo case: what is concealed, its heat, the kelvin that it causes, and what the oracle says of it."""
+"""The truth of a zoo case: what is concealed, its heat, the kelvin that it causes, and the evidence for it by the oracle."""
 
 from __future__ import annotations
 
