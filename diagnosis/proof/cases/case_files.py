@@ -14,6 +14,7 @@ from models.base.errors import InputError
 from models.base.types import Array
 
 MAPPING = "mapping.toml"
+DEFINITION = "gearbox.toml"  # of a case whose machine is not that of the whole set
 OF_AIR = ("T_ambient", "T_outdoor")  # temperatures that are inputs
 DECIMALS = {"time_s": 0, "speed_rpm": 1, "torque_Nm": 2}
 

@@ -32,6 +32,9 @@ EFFECTS: Mapping[str, Effect] = {e.name: e for e in (*LOSS_EFFECTS, *HEAT_EFFECT
 PHYSICS = tuple(e.name for e in (*LOSS_EFFECTS, *HEAT_EFFECTS))
 OUTSIDE = tuple(e.name for e in OUTSIDE_EFFECTS)
 MIX = {"control": 0.24, "single": 0.44, "double": 0.10, "sensor": 0.08, "outside": 0.10, "messy": 0.04}
+# The whole proof: every mechanism of the catalogue twice as a single.
+PROOF_MIX = {"control": 60, "single": 2 * len(PHYSICS), "double": 30, "messy": 30, "outside": 30, "sensor": 15}
+WHOLE = sum(PROOF_MIX.values())
 MINOR = ("windage", "shaft_ends_to_air", "oil_level_thermal", "pump_heat", "radiation_error", "hot_neighbour",
          "bearing_additive", "oil_mist", "misalignment", "ambient_swing", "run_in_seals", "motor_flange")  # fmt: skip
 # At usual strength these cause a kelvin or more, so that they stand out among minor ones.
@@ -48,6 +51,32 @@ FAR_FACTORS = (("mesh", -1.0), ("h_air", 1.0), ("seal", 1.0), ("seal", -1.0), ("
 TOGETHER = 40  # cases that are simulated at once, a gigabyte at most
 DATA_SHEET = {"noise": 0.2, "resolution": 0.1, "lag_s": 15.0, "lag_sd_s": 5.0}
 NOISY_K, SLOW_LAG_S = (0.4, 0.7), (30.0, 55.0)
+
+
+def mix_of(cases: int, mix: Mapping[str, int] = PROOF_MIX) -> dict[str, int]:
+    """Number of cases of each group, in the proportions of a mix, at least one of each.
+
+    Raises
+    ------
+    InputError
+        If there are fewer cases than groups.
+
+    Examples
+    --------
+    >>> mix_of(60)
+    {'control': 15, 'single': 20, 'double': 7, 'messy': 7, 'outside': 7, 'sensor': 4}
+    >>> mix_of(WHOLE) == PROOF_MIX
+    True
+    """
+    if cases < len(mix):
+        raise InputError(f"{cases} cases are too few: {len(mix)} groups ({', '.join(mix)}) need one each")
+    shares = {group: cases * number / sum(mix.values()) for group, number in mix.items()}
+    counts = {group: max(1, int(share)) for group, share in shares.items()}
+    while sum(counts.values()) > cases:
+        counts[max((g for g in counts if counts[g] > 1), key=lambda group: counts[group] - shares[group])] -= 1
+    while sum(counts.values()) < cases:
+        counts[max(shares, key=lambda group: shares[group] - counts[group])] += 1
+    return counts
 
 
 def mixed_plans(seed: int, counts: Mapping[str, int]) -> list[Plan]:

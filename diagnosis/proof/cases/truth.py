@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -18,6 +19,7 @@ from models.base.types import Array
 
 SCHEMA = 1
 PRACTICAL_K = 0.3
+FAR_CONTROL = "parameter_far"
 # Errors of a recorded input that no gearbox's owner would care for, by column.
 COLUMN_SIZE = {"T_ambient_degC": PRACTICAL_K, "torque_Nm": 1.0, "speed_rpm": 20.0}
 ACTIVE_SHARE = 0.1  # an effect acts where its heat is above this share of its highest
@@ -61,6 +63,7 @@ def truth_of(plant: Plant, case: ConcealedCase, by_twin: Sequence[Sequence[Outco
         "control": case.plan.kind if case.plan.group == "control" else None,
         "effects": facts,
         "practical": practical_of(facts),
+        "far_parameter": _farthest(plant, case) if case.plan.kind == FAR_CONTROL else None,
         "K_all": _kelvin(plant, case, everything, without_any),
         "base_parameters": {name: round(value, 5) for name, value in case.individual.factors.items()},
         "friction_reading": case.individual.reading,
@@ -85,6 +88,16 @@ def truth_of(plant: Plant, case: ConcealedCase, by_twin: Sequence[Sequence[Outco
             for run, o in zip(case.runs, everything, strict=True)
         },
     }
+
+
+def _farthest(plant: Plant, case: ConcealedCase) -> str:
+    """The parameter that is farthest from its nominal value, in standard deviations of its prior."""
+
+    def distance(name: str) -> float:
+        sd = min(plant.gearbox.priors.get(f"factors.{name}", 0.2), 0.6)
+        return abs(math.log(case.individual.factors[name] / plant.gearbox.factors[name])) / sd
+
+    return max(case.individual.factors, key=distance)
 
 
 def practical_of(facts: Sequence[Mapping[str, Any]]) -> list[bool | None]:

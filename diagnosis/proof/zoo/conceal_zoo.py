@@ -8,15 +8,16 @@ from pathlib import Path
 
 import numpy as np
 
-from diagnosis.proof.cases.case_files import keep_apart, write_case
+from diagnosis.proof.cases.case_files import DEFINITION, keep_apart, write_case
 from diagnosis.proof.zoo.case import BASELINE, CONTROLS, GROUPS, Oracle, ZooCase
 from diagnosis.proof.zoo.draw import draw_case, oracle_of
 from diagnosis.proof.zoo.families import FAMILIES
 from diagnosis.proof.zoo.recorder import measure, record
 from diagnosis.proof.zoo.truth import truth_of
-from models.assembly.gearbox import load_gearbox
+from models.assembly.gearbox import FOLDER, load_gearbox, names_a_file
 from models.base.errors import InputError, did_you_mean
 from models.base.types import Array
+from models.files.toml_file import packaged, read_text
 
 # Shares of a set in which nothing else is asked for.
 ZOO_MIX = {"control": 0.3, "single": 0.2, "date": 0.15, "sensor": 0.1, "pair": 0.1, "outside": 0.1, "messy": 0.05}
@@ -163,7 +164,7 @@ def conceal_zoo(
 
 
 def write_zoo_case(case: ZooCase, folder: Path, truth_file: Path | None) -> None:
-    """Write the recordings of a case into a folder and its truth into a file outside it.
+    """Write recordings and nominal definition of a case into a folder, and its truth into a file outside it.
 
     Raises
     ------
@@ -171,6 +172,9 @@ def write_zoo_case(case: ZooCase, folder: Path, truth_file: Path | None) -> None
         If something cannot be written.
     """
     gearbox = load_gearbox(case.machine)
+    source = Path(case.machine) if names_a_file(case.machine) else packaged(FOLDER, case.machine)
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / DEFINITION).write_text(read_text(source), encoding="utf-8", newline="\n")
     columns = {name: one.quantity.column for name, one in gearbox.network().inputs.items()}
     truth = {} if truth_file is None else truth_of(case, gearbox.hash, columns)
     write_case(folder, truth_file, record_case(case, columns), truth, case.instruments.stated)
