@@ -117,7 +117,7 @@ class ZooEffect:
         return tuple(dict.fromkeys(node for one in self.changed for node in one.nodes))
 
     def with_strength(self, strength: float) -> ZooEffect:
-        """This effect at another strength."""
+        """Effect with another strength."""
         fault = None if self.fault is None else replace(self.fault, strength=strength)
         return replace(self, strength=strength, fault=fault)
 

@@ -1,4 +1,4 @@
-"""The truth of a zoo case: what is concealed, its heat, the kelvin that it causes, and the evidence for it by the oracle."""
+"""The truth of a zoo case: concealed effects, their heat, the kelvin they cause, and the evidence for them."""
 
 from __future__ import annotations
 
