@@ -61,10 +61,11 @@ class Cost:
     stages: dict[str, float]
 
 
-def make_recordings(folder: Path, lengths_h: Sequence[float], step_s: float) -> list[Path]:
+def make_recordings(folder: Path, lengths_h: Sequence[float], step_s: float, effect: str | None = EFFECT) -> list[Path]:
     """One recording per length, of one gearbox with a concealed effect; the plant's rows, or straight lines between."""
     plant = Plant(load_gearbox("fzg"))
-    case = draw_case(plant, Plan(group="single", effects=(EFFECT,), strength=1.0), seed=(SEED, 0), name="benchmark")
+    plan = Plan(group="single", effects=(effect,), strength=1.0) if effect else Plan(group="control", kind="clean")
+    case = draw_case(plant, plan, seed=(SEED, 0), name="benchmark")
     rng = np.random.default_rng(SEED)
     runs = []
     for hours in lengths_h:

@@ -34,10 +34,9 @@ from diagnosis.inference.evidence import Marginal
 from diagnosis.inference.latent import knots_of, latent_heat
 from diagnosis.inference.posterior import Fit, Problem
 from diagnosis.inference.predict import Prediction, predict
-from diagnosis.proof.scoring.answers import Answer
-from diagnosis.proof.scoring.counts import Count, Median
-from diagnosis.proof.scoring.rules import RULES, ScoredCase
-from diagnosis.proof.scoring.score import far_of, near_nodes
+from diagnosis.proof.scoring.lines import Task
+from diagnosis.proof.scoring.outcome import outcome
+from diagnosis.proof.scoring.truth import CONTROL, read_truths
 from diagnosis.recordings.read import read_recordings
 from diagnosis.results.findings import node_of
 from diagnosis.setup.inference_setup import InferenceSetup, first, prepare
@@ -49,7 +48,7 @@ from models.quantities.quantities import TOTAL_LOSS, is_total_loss
 
 METHODS: Mapping[str, str] = {"naive": "naive residual regression", "sparse": "sparse regression (pysindy)"}
 ERRORS: Mapping[str, str] = {"calibrated_K": "calibration only", "black_box_K": "black-box residual network"}
-NOT_THEIRS = ("far", "strength", "strength_as_stated", "single_evident", "sensor_evident", "heldout")  # rules
+NOT_THEIRS = ("far parameter named", "heat within 20 %", "held-out error improves")  # rules
 SPARSE_THRESHOLD, SPARSE_RIDGE = 0.1, 0.05  # of pysindy's STLSQ on columns of unit norm: its defaults
 HIDDEN, SEED = (32, 32), 0
 MEMORIES_S = (600.0, 3600.0)  # over which the black box remembers its inputs
@@ -148,7 +147,7 @@ def _answer(case: InferenceSetup, h: Hypothesis | None) -> dict[str, Any]:
         "verdict": "sensor_fault" if of_measurement else "missing_physics",
         "findings": [
             {"mechanism": h.name, "place": h.place, "node": node, "family": h.family, "probability": 1.0,
-             "confusable_with": [], "parameters": []}
+             "kind": "parameter" if h.term is None else h.term.kind, "confusable_with": [], "parameters": []}
         ],
         "location": [{"node": node}],
     }  # fmt: skip
@@ -230,31 +229,36 @@ def main(arguments: Sequence[str] | None = None) -> None:
     answers = {folder.name: answer for folder, answer in zip(folders, found, strict=True)}
     if given.output:
         given.output.write_text(json.dumps(answers, indent=1, allow_nan=False) + "\n", encoding="utf-8")
-    gearbox = load_gearbox(given.gearbox)
-    near = near_nodes(gearbox)
-    scored: dict[str, list[ScoredCase]] = {method: [] for method in METHODS}
-    for case, answer in answers.items():
-        truth = json.loads((given.truth / f"{case}.json").read_text(encoding="utf-8"))
-        for method, cases in scored.items():
-            cases.append(ScoredCase(case=case, truth=truth, answer=Answer.of(answer[method]), near=near,
-                                    far=far_of(truth, gearbox)))  # fmt: skip
-    show(scored, answers)
+    truths, gearbox = read_truths(given.truth), load_gearbox(given.gearbox)
+    scores = [
+        outcome(
+            truths, {Task(case=c): {"status": "answered", "answer": a[method]} for c, a in answers.items()}, gearbox
+        )
+        for method in METHODS
+    ]
+    to_find = [answers[case] for case, truth in truths.items() if truth.group != CONTROL and case in answers]
+    show(scores, to_find)
 
 
-def show(scored: Mapping[str, Sequence[ScoredCase]], answers: Mapping[str, Mapping[str, Any]]) -> None:
-    """Print the two tables."""
+def show(scores: Sequence[Mapping[str, Any]], to_find: Sequence[Mapping[str, Any]]) -> None:
+    """Print the two tables.
+
+    Parameters
+    ----------
+    scores : sequence of mapping
+        See :func:`diagnosis.proof.scoring.outcome.outcome`, of every method
+    to_find : sequence of mapping
+        Answers to the cases in which something is concealed
+    """
     rules = Table("rule", *METHODS.values(), title="Other methods, by the rules of a proof")
-    for rule in RULES:
-        if rule.key not in NOT_THEIRS:
-            counts = [Count.over([rule.apply(case) for case in scored[method]]) for method in METHODS]
-            rules.add_row(rule.text, *(f"{count.hits}/{count.of}" for count in counts))
-    errors = Table(
-        "held-out error, median", "K", "95 % limits", "cases", title="Cases with an effect of practical size"
-    )
-    to_find = [c.case for c in next(iter(scored.values())) if c.group != "control" and c.practical()]
+    for of_methods in zip(*(score["rules"] for score in scores), strict=True):
+        if of_methods[0]["name"] not in NOT_THEIRS:
+            counts = [next(iter(rule["counts"].values())) for rule in of_methods]  # all cases, or the only kind
+            rules.add_row(of_methods[0]["name"], *(f"{count['hits']}/{count['of']}" for count in counts))
+    errors = Table("held-out error, median", "K", "cases", title="Cases with an effect")
     for key, text in ERRORS.items():
-        median = Median.over([math.nan if answers[case][key] is None else answers[case][key] for case in to_find])
-        errors.add_row(text, f"{median.value:.2f}", f"{median.low:.2f} to {median.high:.2f}", str(median.of))
+        values = [answer[key] for answer in to_find if answer[key] is not None]
+        errors.add_row(text, f"{np.median(values):.2f}" if values else "-", str(len(values)))
     for table in (rules, errors):
         Console().print(table)
 

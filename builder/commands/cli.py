@@ -11,7 +11,7 @@ import click
 from builder.base.workers import worker_options
 from builder.commands.conceal import conceal
 from builder.commands.diagnose import diagnose
-from builder.commands.prove import prove
+from builder.commands.prove import prove, score
 from builder.commands.simulate import simulate
 from builder.reproduce.command import reproduce
 from models.assembly.gearbox import known_gearboxes, load_gearbox
@@ -104,3 +104,4 @@ commands.add_command(diagnose)
 commands.add_command(reproduce)
 commands.add_command(conceal)
 commands.add_command(prove)
+commands.add_command(score)

@@ -1,77 +1,148 @@
-"""The verb ``prove``."""
+"""The verbs ``prove`` and ``score``."""
 
 from __future__ import annotations
 
+import json
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import click
+from click.core import ParameterSource
 
 from builder.base import console
-from builder.base.workers import worker_options
+from builder.base.workers import jobs_option
+from models.base.errors import InputError
 
 LINES = 20  # of progress where there is no terminal
+MADE = ("plant", "cases", "seed", "families", "removed")  # options of cases that are made
+ONLY_NEW = (*MADE, "gearbox", "cells_every", "answers")  # that an old file has
 
 
 @click.command("prove")
+@click.option("--plant", type=click.Choice(["own", "zoo"]), default="own", show_default=True,
+              help="Kind of plant that makes the cases.")  # fmt: skip
 @click.option("--cases", type=click.IntRange(min=1, max=10_000), default=None, metavar="N",
-              help="Number of cases, in the proportions of the whole mix.  [default: the whole mix, 247]")  # fmt: skip
+              help="Number of cases.  [default: 247 (own), 60 (zoo)]")  # fmt: skip
 @click.option("--seed", type=click.IntRange(min=0, max=2**32 - 1), default=None, metavar="N",
-              help="Seed of the cases.  [default: 2042, which nobody has opened]")  # fmt: skip
+              help="Seed of the cases.  [default: 2042 (own), 3000 (zoo), which nobody has opened]")  # fmt: skip
+@click.option("--recordings", type=click.Path(path_type=Path, file_okay=False, exists=True), default=None,
+              metavar="DIR", help="Recordings that exist, a folder per case, in place of --plant.")  # fmt: skip
+@click.option("--truth", type=click.Path(path_type=Path, exists=True), default=None, metavar="FILE|DIR",
+              help="Truth of --recordings: one file, or <case>.json in a folder.")  # fmt: skip
+@click.option("--gearbox", default=None, metavar="NAME|FILE",
+              help="Name or definition file (TOML).  [default: fzg; zoo: drawn by family]")  # fmt: skip
+@click.option("--families", default="", metavar="NAME,...",
+              help="Zoo: families of plants to draw from.  [default: all]")  # fmt: skip
+@click.option("--cells-every", type=click.IntRange(min=0), default=0, show_default=True, metavar="N",
+              help="Every N-th case is also diagnosed with fewer sensors and shorter recordings; 0: none.")  # fmt: skip
+@click.option("--removed", is_flag=True,
+              help="Own plant: mechanisms that are alone in a case once more with their entry removed.")  # fmt: skip
+@click.option("--answers", type=click.Path(path_type=Path, dir_okay=False), default=None, metavar="FILE",
+              help="File that gets a line per case.  [default: <seed>.jsonl in --output]")  # fmt: skip
+@click.option("--continue", "continued", type=click.Path(path_type=Path, dir_okay=False, exists=True), default=None,
+              metavar="FILE", help="Continue the proof of this file of answers, with its options.")  # fmt: skip
+@jobs_option()
+@click.option("--output", type=click.Path(path_type=Path, file_okay=False), default=Path("out/proof"),
+              show_default=True, metavar="DIR", help="Folder for recordings, truth and scores.")  # fmt: skip
+@click.pass_context
+def prove(
+    context: click.Context, plant: Literal["own", "zoo"], cases: int | None, seed: int | None, recordings: Path | None,
+    truth: Path | None, gearbox: str | None, families: str, cells_every: int, removed: bool,
+    answers: Path | None, continued: Path | None, jobs: int, output: Path,
+) -> None:  # fmt: skip
+    """Test the diagnosis on sealed cases: hide effects, diagnose blindly, hash the answers, open the truth, score.
+
+    Every diagnosis is a process that gets the recordings of one case and nothing else. Its answer is added to a file,
+    with which an interrupted proof is continued.
+    """
+    from builder.workflows.proof_cases import ZOO_MIX
+    from builder.workflows.prove import prove as run
+    from diagnosis.proof.cases.conceal import PROOF_MIX, mix_of
+    from diagnosis.proof.scoring.lines import Settings, begin_lines
+    from diagnosis.proof.scoring.seeds import OWN_PROOF, ZOO_PROOF
+
+    typed = [n for n in ONLY_NEW if context.get_parameter_source(n) == ParameterSource.COMMANDLINE]
+    if (recordings is None) != (truth is None):
+        raise InputError("--recordings and --truth go together: a folder per case, and what is concealed in them")
+    if continued is not None:
+        if typed:
+            raise InputError(f"--{_dashed(typed[0])} does not go with --continue: {continued} has its options")
+        file = continued
+    elif recordings is not None:
+        wrong = [n for n in typed if n in MADE]
+        if wrong:
+            raise InputError(f"--{_dashed(wrong[0])} is for cases that are made; --recordings names cases that exist")
+        file = answers or output / "given.jsonl"
+        begin_lines(file, Settings(plant="given", gearbox=gearbox or "fzg", cells_every=cells_every))
+    else:
+        if plant == "own" and families:
+            raise InputError("--families is for --plant zoo")
+        if plant == "zoo" and removed:
+            raise InputError("--removed is for --plant own; the zoo has effects outside the catalogue")
+        mix, chosen, machine = (PROOF_MIX, OWN_PROOF, "fzg") if plant == "own" else (ZOO_MIX, ZOO_PROOF[0], "")
+        number = sum(mix_of(cases or sum(mix.values()), mix).values())  # refuses too few
+        chosen = chosen if seed is None else seed
+        file = answers or output / f"{chosen}.jsonl"
+        begin_lines(file, Settings(plant=plant, seed=chosen, cases=number, gearbox=gearbox or machine,
+                                   families=families, cells_every=cells_every, removed=removed))  # fmt: skip
+    with _progress() as progress:
+        result = run(file, output, recordings=recordings, truth=truth, jobs=jobs, progress=progress)
+    _show(result, output)
+    console.out.print(f"wrote {file}")
+
+
+@click.command("score")
+@click.argument("results", type=click.Path(path_type=Path, file_okay=False, exists=True), metavar="RESULTS")
+@click.option("--truth", type=click.Path(path_type=Path, exists=True), required=True, metavar="FILE|DIR",
+              help="Truth: one file, or <case>.json in a folder.")  # fmt: skip
 @click.option(
     "--gearbox", default="fzg", show_default=True, metavar="NAME|FILE", help="Name or definition file (TOML)."
 )
-@click.option("--cells-every", type=click.IntRange(min=0), default=3, show_default=True, metavar="N",
-              help="Every N-th case is also diagnosed with fewer sensors and shorter recordings; 0: none.")  # fmt: skip
-@worker_options()
-@click.option("--output", type=click.Path(path_type=Path, file_okay=False), default=Path("out/proof"),
-              show_default=True, metavar="DIR",
-              help="Folder of the proof; an interrupted one is continued.")  # fmt: skip
-def prove(
-    cases: int | None,
-    seed: int | None,
-    gearbox: str,
-    cells_every: int,
-    jobs: int,
-    dask: str | None,
-    output: Path,
-) -> None:
-    """Test the diagnosis on sealed cases: hide effects, diagnose blindly, hash the answers, open the truth, score.
+@click.option("--output", type=click.Path(path_type=Path, file_okay=False), default=Path("out/score"),
+              show_default=True, metavar="DIR", help="Folder for the scores.")  # fmt: skip
+def score(results: Path, truth: Path, gearbox: str, output: Path) -> None:
+    """Score the diagnoses of any method: RESULTS holds <case>/diagnosis.json for every case of the truth.
 
-    The truth is on no disk while anything is diagnosed. The same command in the same folder continues a proof.
+    A case without a readable file counts as failed.
     """
-    from builder.workflows.prove import NUMBERS, PAGE
-    from builder.workflows.prove import prove as run
-    from diagnosis.proof.scoring.protocol import UNOPENED_SEED, WHOLE, Settings
+    from diagnosis.proof.scoring.lines import Task
+    from diagnosis.proof.scoring.outcome import outcome
+    from diagnosis.proof.scoring.truth import read_truths
+    from models.assembly.gearbox import load_gearbox
 
-    settings = Settings(seed=UNOPENED_SEED if seed is None else seed, cases=WHOLE if cases is None else cases,
-                        gearbox=gearbox, cells_every=cells_every)  # fmt: skip
-    with _progress() as progress:
-        result = run(settings, output, jobs=jobs, dask=dask, progress=progress)
-    show(result)
-    for name in (PAGE, NUMBERS):
-        console.out.print(f"wrote {output / name}")
+    truths = read_truths(truth)
+    if not any((results / case / "diagnosis.json").exists() for case in truths):
+        raise InputError(f"{results}: holds no <case>/diagnosis.json of the cases in {truth}")
+    records: dict[Task, dict[str, Any]] = {}
+    for case in truths:
+        try:
+            answer = json.loads((results / case / "diagnosis.json").read_text(encoding="utf-8"))
+            records[Task(case=case)] = {"status": "answered", "answer": answer | {"verdict": answer["verdict"]}}
+        except (OSError, ValueError, KeyError, TypeError):
+            records[Task(case=case)] = {"status": "failed", "answer": None}
+    _show(outcome(truths, records, load_gearbox(gearbox)), output)
 
 
-def show(result: Mapping[str, Any]) -> None:
-    """Print the rules with their counts."""
-    rows = []
-    for rule in result["rules"]:
-        count = rule["count"]
-        asked = "" if rule["needed"] is None else f"{'<=' if rule['at_most'] else '>='} {100 * rule['needed']:.0f} %"
-        met = {True: "yes", False: "NO", None: ""}[rule["met"]]
-        share = f"{100 * count['hits'] / count['of']:.0f} %" if count["of"] else "-"
-        limits = f"{100 * count['low']:.0f} to {100 * count['high']:.0f} %" if count["of"] else ""
-        rows.append([rule["text"], f"{count['hits']}/{count['of']}", share, limits, asked, met])
-    console.table("Proof", ["rule", "cases", "share", "95 % limits", "asked", "met"], rows)
-    protocol = result["protocol"]
-    if protocol["on_development_seed"]:
-        console.out.print(f"Seed {protocol['seed']} was opened while the diagnosis was developed: this is no proof.")
-    if protocol["failed"]:
-        console.out.print(f"{protocol['failed']} processes failed; the files of their answers contain the message.")
+def _dashed(name: str) -> str:
+    return name.replace("_", "-")
+
+
+def _show(result: Mapping[str, Any], output: Path) -> None:
+    """Print the tables and write the files of scores."""
+    from builder.workflows.proof_files import write_scores
+    from diagnosis.proof.scoring.outcome import tables_of
+
+    for title, header, rows in tables_of(result):
+        console.table(title, header, rows, text_columns=1 if len(header) < 6 else 3)
+    if result["role_of_seed"] not in (None, "proof"):
+        console.out.print(f"These cases are open ({result['role_of_seed']}): their scores are no proof.")
+    if result["failed"]:
+        console.out.print(f"{result['failed']} diagnoses ended without an answer; they count as wrong.")
+    for path in write_scores(result, output):
+        console.out.print(f"wrote {path}")
 
 
 @contextmanager

@@ -1,4 +1,4 @@
-"""A proof from beginning to end: cases, diagnoses in separate processes, hashes, truth, score, page."""
+"""A proof from beginning to end: cases, diagnoses in separate processes, hashes, truth, scores."""
 
 from __future__ import annotations
 
@@ -10,45 +10,49 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from diagnosis.proof.scoring import protocol
-from diagnosis.proof.scoring.protocol import BLIND, Settings, Task
+from builder.workflows.proof_cases import Progress, add_evidence, keep_to_one_set, make_cases
+from diagnosis.proof.cases.case_files import DEFINITION
+from diagnosis.proof.scoring import lines
+from diagnosis.proof.scoring.lines import Task
 from models.assembly.gearbox import load_gearbox, names_a_file
-from models.base.atomic_write import atomic_folder
+from models.base.atomic_write import atomic_file
+from models.base.errors import InputError
 from models.base.parallel import iterate_parallel
 
-PAGE, NUMBERS = "proof.html", "proof.json"
+# Start of a diagnosis: an import of the plant, or of anything else of the proof, is an ImportError there.
+BLIND = "import sys; sys.modules['diagnosis.proof'] = None; from builder.__main__ import main; main()"
+HASHES = "answers.sha256"
+CASES = "cases.json"  # of which seed the recordings in an output folder are
 REFUSED = 2  # exit status of a diagnosis that does not accept its recordings
 INTERRUPTED = (130, -signal.SIGINT, -signal.SIGTERM)  # no answer: it is diagnosed when the proof is continued
-LONGEST_S = 3600.0
+LONGEST_S = 4 * 3600.0  # wall time, of machines that have other work as well
 MESSAGE_LENGTH = 2000  # characters that are kept
-
-Progress = Callable[[str, int, int], None]
 
 
 def prove(
-    settings: Settings,
-    output: Path,
-    *,
-    jobs: int = 1,
-    dask: str | None = None,
+    file: Path, output: Path, *, recordings: Path | None = None, truth: Path | None = None, jobs: int = 1,
     progress: Progress = lambda *_: None,
-) -> dict[str, Any]:
-    """Run a proof, or the rest of one that was interrupted.
+) -> dict[str, Any]:  # fmt: skip
+    """Run the proof of a file of answers, or what is missing of it.
+
+    The truth lies in its folder while the tool runs, in processes that get the recordings of one case only. It is read
+    after the list of hashes of all answers is written.
 
     Parameters
     ----------
-    settings : Settings
+    file : Path
+        Begun by :func:`diagnosis.proof.scoring.lines.begin_lines`
     output : Path
-        Gets recordings, answers, their hashes, the truth, ``proof.json`` and ``proof.html``
+        Gets recordings and truth of cases that are made from a seed, and the list of hashes
+    recordings, truth : Path, optional
+        Folder with a folder per case and truth (folder of ``<case>.json``, or one file), of recordings that are given
     jobs : int
-        Processes on this machine
-    dask : str, optional
-        Address of a Dask scheduler that does the work instead
+        Processes
     progress : callable
         Called with the step, the amount of work done and the amount in all
 
@@ -60,65 +64,71 @@ def prove(
     Raises
     ------
     InputError
-        If the folder cannot be used, or answers or code are changed on the way.
+        If the file was begun with other code or other recordings, or something cannot be read.
     """
     from diagnosis.proof.scoring.outcome import outcome
-    from diagnosis.proof.scoring.proof_report import page
+    from diagnosis.proof.scoring.truth import read_truths
 
-    gearbox = load_gearbox(settings.gearbox)
-    protocol.begin(settings, gearbox, output, lambda done, of: progress("making recordings", done, of))
-    tasks = protocol.tasks_of(settings, protocol.plans_of(settings))
-    missing = protocol.open_tasks(output, tasks)
-    done = len(tasks) - len(missing)
-    progress("diagnosing", done, len(tasks))
-    work = ((task, *work_of(output / protocol.RECORDINGS, task, settings.gearbox)) for task in missing)
-    for task, record in iterate_parallel(run_task, work, jobs=jobs, dask=dask):
-        protocol.write_text(protocol.answer_file(output, task), json.dumps(record, indent=1) + "\n")
-        done += 1
-        progress("diagnosing", done, len(tasks))
-    protocol.fix_answers(output, tasks)
-    truths = protocol.open_truth(settings, gearbox, output, lambda done, of: progress("opening the truth", done, of))
-    records = {t: json.loads(protocol.answer_file(output, t).read_text(encoding="utf-8")) for t in tasks}
-    hashes = hashlib.sha256((output / protocol.HASHES).read_bytes()).hexdigest()
-    result = outcome(settings, gearbox, truths, records, code=protocol.code_hash(), hashes=hashes)
-    with atomic_folder(output) as stage:
-        (stage / NUMBERS).write_text(json.dumps(result, indent=1, allow_nan=False) + "\n", encoding="utf-8")
-        (stage / PAGE).write_text(page(result), encoding="utf-8", newline="\n")
-    return result
+    settings, code, records = lines.read_lines(file)
+    lines.refuse_other_code(file, code)
+    if settings.plant == "given":
+        if recordings is None or truth is None:
+            raise InputError(f"{file}: is about given recordings; name them with --recordings and --truth")
+    else:
+        recordings, truth = output / "recordings", output / "truth"
+        keep_to_one_set(settings, output / CASES)
+    alone = make_cases(settings, recordings, truth, jobs, progress)
+    cases = sorted(path.name for path in recordings.iterdir() if path.is_dir())
+    tasks = lines.tasks_of(settings, cases, alone)
+    for task, record in records.items():
+        if task not in tasks or record["recordings"] != hash_of(lines.files_of(recordings, task)[0]):
+            raise InputError(f"{file}: {task.case} was answered from other recordings than those in {recordings}")
+    missing = [task for task in tasks if task not in records]
+    work = ((task, *lines.files_of(recordings, task), settings.gearbox) for task in missing)
+    for task, record in iterate_parallel(diagnose, work, jobs=jobs):
+        lines.refuse_other_code(file, code)
+        lines.append_line(file, task, record)
+        records[task] = record
+        progress("diagnosing", len(records), len(tasks))
+    with atomic_file(output / HASHES) as partial:
+        partial.write_text(lines.hash_list(records), encoding="utf-8")
+    if settings.plant == "own":
+        add_evidence(settings, truth, jobs, progress)
+    return outcome(read_truths(truth), records, load_gearbox(settings.gearbox or "fzg"), settings=settings, code=code)
 
 
-def work_of(recordings: Path, task: Task, gearbox: str) -> tuple[dict[str, bytes], list[str]]:
-    """Files of a task and arguments of its diagnosis; a definition file is one of the files.
+def diagnose(
+    task: Task, files: Mapping[str, bytes], arguments: Sequence[str], gearbox: str
+) -> tuple[Task, dict[str, Any]]:
+    """Diagnose in a separate process, in a temporary folder that holds only the files of the task.
 
     Parameters
     ----------
-    recordings : Path
     task : Task
+    files : mapping of name to bytes
+    arguments : sequence of str
+        Of the verb ``diagnose``
     gearbox : str
-        Name or file of the definition
-    """
-    files, arguments = protocol.files_of(recordings, task)
-    if names_a_file(gearbox):
-        files["gearbox.toml"] = Path(gearbox).read_bytes()
-        gearbox = "gearbox.toml"
-    return files, [*arguments, "--gearbox", gearbox]
-
-
-def run_task(task: Task, files: Mapping[str, bytes], arguments: Sequence[str]) -> tuple[Task, dict[str, Any]]:
-    """Diagnose in a separate process, in a temporary folder that holds only the files of the task.
+        Name or file of the definition, unless one is among the files
 
     Returns
     -------
     Task
     dict
-        ``status`` (``answered``, ``refused``, ``failed``), ``seconds``, ``answer`` (content of ``diagnosis.json``, or
-        None), ``message``
+        ``status`` (``answered``, ``refused``, ``failed``), ``seconds``, ``processor_s``, ``sha256`` of
+        ``diagnosis.json``, ``recordings`` (SHA-256 of the files), ``answer`` (see
+        :func:`diagnosis.proof.scoring.lines.compact`, or None), ``message``
     """
-    command = [sys.executable, "-c", BLIND, "diagnose", *arguments, "--jobs", "1", "--output", "out"]
+    content = dict(files)
+    if DEFINITION not in content and names_a_file(gearbox):
+        content[DEFINITION] = Path(gearbox).read_bytes()
+    definition = DEFINITION if DEFINITION in content else gearbox
+    command = [sys.executable, "-c", BLIND, "diagnose", *arguments, "--gearbox", definition, "--jobs", "1",
+               "--output", "out"]  # fmt: skip
     with tempfile.TemporaryDirectory(prefix="case-") as folder:
-        room, begin = Path(folder), time.perf_counter()
-        for name, content in files.items():
-            (room / name).write_bytes(content)
+        room, begin, used = Path(folder), time.perf_counter(), os.times()
+        for name, data in content.items():
+            (room / name).write_bytes(data)
         try:
             process = subprocess.run(  # noqa: S603 - our own program
                 command, cwd=room, env=environment(), text=True, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
@@ -129,14 +139,24 @@ def run_task(task: Task, files: Mapping[str, bytes], arguments: Sequence[str]) -
             status, message = None, f"no answer within {LONGEST_S:.0f} s"
         if status in INTERRUPTED:
             raise KeyboardInterrupt
-        file = room / "out" / "diagnosis.json"
-        answer = json.loads(file.read_text(encoding="utf-8")) if status == 0 else None
+        written = (room / "out" / "diagnosis.json").read_bytes() if status == 0 else b""
     return task, {
         "status": "answered" if status == 0 else "refused" if status == REFUSED else "failed",
         "seconds": round(time.perf_counter() - begin, 1),
-        "answer": answer,
+        "processor_s": round(sum(os.times()[2:4]) - sum(used[2:4]), 1),
+        "sha256": hashlib.sha256(written).hexdigest() if status == 0 else "",
+        "recordings": hash_of(files),
+        "answer": lines.compact(json.loads(written)) if status == 0 else None,
         "message": "" if status == 0 else message[-MESSAGE_LENGTH:],
     }
+
+
+def hash_of(files: Mapping[str, bytes]) -> str:
+    """SHA-256 over names and contents."""
+    digest = hashlib.sha256()
+    for name, content in sorted(files.items()):
+        digest.update(name.encode() + b"\0" + hashlib.sha256(content).digest())
+    return digest.hexdigest()
 
 
 def environment() -> dict[str, str]:

@@ -65,7 +65,7 @@ class Memories:
         names = [*arguments, *(state.name for state in states)]
         rates = [state.rate.xreplace(boundary) for state in states]
         self._laws = {}
-        for averaged in (False, True):
+        for averaged in (False, True) if states else ():
             updates = [update_of(state, averaged=averaged).xreplace(boundary) for state in states]
             source = function_source("memory", names, [*rates, *updates], vector=True)
             self._laws[averaged] = compile_function(source, "memory")
@@ -86,6 +86,8 @@ class Memories:
         given : mapping of int to Array, shape (K,), optional
             States that are known, by their place
         """
+        if not self._states:
+            return []
         known = {index: state[None, :] for index, state in (given or {}).items()}
         with np.errstate(over="ignore", invalid="ignore"):
             if not self._in_turn:

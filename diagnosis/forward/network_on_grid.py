@@ -13,8 +13,8 @@ import sympy as sp
 from diagnosis.forward.extra_states import Memories, update_of
 from diagnosis.forward.grid import Piece
 from models.base.types import Array
-from models.network.compiled import compile_laws, structure
-from models.network.laws import compile_function, function_source, symbol
+from models.network.compiled import FUNCTIONS, law_expressions, laws_of, structure
+from models.network.laws import compile_each, compile_function, function_source, symbol
 from models.quantities.quantities import node_of_channel
 from models.simulation.thermal_network import BASE_SIGNALS, Losses, ThermalNetwork
 
@@ -93,17 +93,18 @@ class NetworkOnGrid:
 
     def __init__(self, network: ThermalNetwork, losses: Losses) -> None:
         self.network, self.losses = network, losses
-        self.laws = compile_laws(network, vector=True)
+        functions = law_expressions(network)
+        self.laws = laws_of(network, {name: compile_each(*functions[name]) for name in FUNCTIONS})
         self.parts = self.laws.parts
         self.n = len(self.parts)
         _, to_boundary, self.injection = structure(network)
         n_all = self.n + to_boundary.shape[-1]
-        self._incidence = np.zeros((len(network.links), n_all))
+        self.incidence = np.zeros((len(network.links), n_all))
         names = [*self.parts, *self.laws.boundaries]
         for index, link in enumerate(network.links):
-            self._incidence[index, names.index(link.nodes[0])] = 1.0
-            self._incidence[index, names.index(link.nodes[1])] = -1.0
-        self.to_parts = -self._incidence[:, : self.n]
+            self.incidence[index, names.index(link.nodes[0])] = 1.0
+            self.incidence[index, names.index(link.nodes[1])] = -1.0
+        self.to_parts = -self.incidence[:, : self.n]
         varying = np.array(self.laws.varying, dtype=int)
         self._varying = varying
         self._constant = np.array([i for i in range(len(network.links)) if i not in set(self.laws.varying)], dtype=int)
@@ -135,7 +136,7 @@ class NetworkOnGrid:
 
     def conductances(self, signals: Sequence[Array | float], values: Array, shape: tuple[int, ...]) -> Array:
         """Conductances of all links [W/K], shape (K, links) or (V, K, links)."""
-        result = np.empty((*shape, len(self._incidence)))
+        result = np.empty((*shape, len(self.incidence)))
         for index, value in zip(self._constant, self.laws.fixed(*_one_each(values)), strict=False):
             result[..., index] = value
         for index, value in zip(self._varying, self.laws.exchange(*signals), strict=True):
@@ -144,11 +145,11 @@ class NetworkOnGrid:
 
     def differences(self, signals: Sequence[Array | float], T: Array, shape: tuple[int, ...]) -> Array:
         """Temperature differences over the links [K], shape (K, links) or (V, K, links)."""
-        everywhere = np.empty((*shape, self._incidence.shape[1]))
+        everywhere = np.empty((*shape, self.incidence.shape[1]))
         everywhere[..., : self.n] = T
         for index, value in enumerate(self.laws.boundary(*signals), start=self.n):
             everywhere[..., index] = value
-        return np.asarray(everywhere @ self._incidence.T)
+        return np.asarray(everywhere @ self.incidence.T)
 
     def source_heats(self, signals: Sequence[Array | float], power: Array, shape: tuple[int, ...]) -> Array:
         """Heats of all sources [W], shape (K, sources) or (V, K, sources)."""

@@ -4,8 +4,9 @@ it shifts, or the reading it distorts.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import sympy as sp
@@ -17,7 +18,7 @@ from diagnosis.forward.observation import Sensors
 from diagnosis.forward.sensor_fault import passed_on
 from diagnosis.forward.trajectory import Trajectory
 from models.base.types import Array
-from models.network.laws import compile_function, function_source, symbol
+from models.network.laws import compile_each, symbol
 from models.simulation.thermal_network import BASE_SIGNALS
 from models.terms.term import FACTORS, Term
 
@@ -53,7 +54,9 @@ class TermOnGrid:
         arguments = [*given, *own, *(s.name for s in term.states)]
         other = sp.Integer(0) if term.boundary_temperature is None else term.boundary_temperature
         laws = [law.xreplace(model.boundary) for law in (term.expression, other)]
-        self._law = compile_function(function_source("law", arguments, laws, vector=True), "law")
+        names = {name: f"own_{i}" for i, name in enumerate(own)}
+        names |= {f"T_{node}": f"T_place_{i}" for i, node in enumerate(term.target)}
+        self._law = _compiled(laws, arguments, names)
         self._memories = Memories(term.states, [*given, *own], model.parts, model.boundary)
         heard = {f"T_{part.name}" for part in network.parts} | {f"P_{c}" for c in network.components}
         heard |= {s.name for s in network.states}
@@ -226,6 +229,16 @@ class TermOnGrid:
         law = self.law(trajectory, values[None, :], at_points=True)[0][0]
         channels = [sensors.channels.index(name) for name in self.term.target]
         return passed_on(self.term, law, trajectory.piece.time, changes, channels)
+
+
+def _compiled(
+    laws: Sequence[sp.Expr], arguments: Sequence[str], names: Mapping[str, str]
+) -> Callable[..., tuple[Any, ...]]:  # fmt: skip
+    """Laws as a function; with other `names`, so that those of a mechanism at another place are compiled already."""
+    given = {
+        symbol(name): symbol(names[name]) for law in laws for name in {s.name for s in law.free_symbols} & set(names)
+    }
+    return compile_each([names.get(name, name) for name in arguments], [law.xreplace(given) for law in laws])
 
 
 def input_slope(model: NetworkOnGrid, trajectory: Trajectory, name: str) -> tuple[Array, Array]:

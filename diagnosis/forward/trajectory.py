@@ -101,18 +101,20 @@ class Trajectory:
             [K]
         """
         n, size = len(self.capacities), self.decay.shape[-1]
-        driven = self.gain[:, :, :n] @ (heat[:, :n] / self.capacities[:, None])
-        if heat.shape[1] > n:
-            driven += self.gain[:, :, n:] @ heat[:, n:]
-        result = np.zeros((len(heat) + 1, size, heat.shape[2]))
+        given, count = heat.shape[1:]
+        result = np.empty((len(heat) + 1, n, count))
+        # One matrix per interval takes (state, heat) to the next state.
+        step = np.concatenate([self.decay, self.gain[:, :, :given]], axis=2)
+        step[:, :, size : size + n] /= self.capacities
+        now = np.zeros((size + given, count))
         if initial is not None:
-            result[0, : len(initial)] = initial
-        now = result[0]
-        for k, decay in enumerate(self.decay):
-            now = decay @ now
-            now += driven[k]
-            result[k + 1] = now
-        return result[:, :n]
+            now[: len(initial)] = initial
+        result[0] = now[:n]
+        for k, matrix in enumerate(step):
+            now[size:] = heat[k]
+            now[:size] = matrix @ now
+            result[k + 1] = now[:n]
+        return result
 
 
 def simulate(

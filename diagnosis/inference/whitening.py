@@ -25,6 +25,7 @@ from models.base.types import Array
 from models.quantities.quantities import is_total_loss
 
 MISSING_VARIANCE = 1e12
+AT_ONCE = 128  # columns, so that a step stays in the processor's cache
 JUMP_SHARE = 0.3  # of a change within one interval: whether it came early or late in it is not known
 
 
@@ -94,7 +95,6 @@ class Whitening:
         self._seen = np.isfinite(piece.measured)
         variance = reading_variance(model, trajectory, sensors, noise)
         variance = np.where(self._seen, variance, MISSING_VARIANCE)
-        self._observe = observe
         points, m = variance.shape
         self._root = np.empty((points, m, m))
         self._gain = np.empty((points, size, m))
@@ -119,9 +119,13 @@ class Whitening:
                 half = self._transition[k]
                 covariance = half @ covariance @ half.T
                 covariance[range(n, size), range(n, size)] += renewed[k]
-        # One matrix per step takes (state, readings) to the next state.
-        self._forget = self._transition - self._transition @ self._gain[:-1] @ observe[:-1]
-        self._learn = self._transition @ self._gain[:-1]
+        # One matrix per step takes (state, reading) to (next state, innovation).
+        self._step = np.zeros((points, size + m, size + m))
+        self._step[:-1, :size, :size] = self._transition - self._transition @ self._gain[:-1] @ observe[:-1]
+        self._step[:-1, :size, size:] = self._transition @ self._gain[:-1]
+        self._step[:, size:, :size] = -self._root @ observe
+        self._step[:, size:, size:] = self._root
+        del self._transition, self._gain, self._root
 
     def __call__(self, columns: Array) -> Array:
         """Innovations of signals.
@@ -136,18 +140,19 @@ class Whitening:
         Array, shape ((K + 1) channels, columns)
             Standardised innovations; 0 where nothing was measured
         """
-        given = np.where(self._seen[:, :, None], columns, 0.0)
-        points, m, count = given.shape
-        driven = self._learn @ given[:-1]
-        state = np.zeros((points, self._forget.shape[1], count))
-        now = state[0]
-        for k in range(points - 1):
-            now = self._forget[k] @ now
-            now += driven[k]
-            state[k + 1] = now
-        innovations = self._root @ (given - self._observe @ state)
-        innovations[~self._seen] = 0.0
-        return innovations.reshape(points * m, count)
+        points, m, count = columns.shape
+        size = self._step.shape[1] - m
+        result = np.empty((points, m, count))
+        for first in range(0, count, AT_ONCE):
+            some = slice(first, first + AT_ONCE)
+            now = np.zeros((size + m, min(AT_ONCE, count - first)))
+            for k, step in enumerate(self._step):
+                now[size:] = columns[k, :, some]
+                now[size:][~self._seen[k]] = 0.0
+                now = step @ now
+                result[k, :, some] = now[size:]
+        result[~self._seen] = 0.0
+        return result.reshape(points * m, count)
 
 
 def reading_variance(model: NetworkOnGrid, trajectory: Trajectory, sensors: Sensors, noise: Noise) -> Array:

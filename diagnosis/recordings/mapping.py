@@ -204,7 +204,13 @@ def _with_tuples(node: Any) -> Any:
 
 
 def mapping_beside(recording: Path, stem: str) -> RecordingMapping | None:
-    """Read the mapping file next to a recording: ``<stem>.toml``, else ``mapping.toml``; None without one.
+    """Read the mapping file next to a recording; None without one. See :func:`mapping_file`."""
+    found = mapping_file(recording, stem)
+    return None if found is None else read_mapping(found)
+
+
+def mapping_file(recording: Path, stem: str) -> Path | None:
+    """Return the mapping file next to a recording: ``<stem>.toml``, else ``mapping.toml``; None without one.
 
     A gearbox definition that has the stem of the recording is not a mapping file.
     """
@@ -212,8 +218,8 @@ def mapping_beside(recording: Path, stem: str) -> RecordingMapping | None:
     if own.is_file():
         values = toml_file.parse(toml_file.read_text(own), file=str(own))
         if not any(key in values for key in DEFINITION_KEYS):
-            return read_mapping(own)
-    return read_mapping(shared) if shared.is_file() else None
+            return own
+    return shared if shared.is_file() else None
 
 
 def mapping_of_definition(values: Mapping[str, Any]) -> RecordingMapping:

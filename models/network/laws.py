@@ -264,6 +264,27 @@ def compile_function(source: str, name: str) -> Callable[..., tuple[Any, ...]]:
     return function
 
 
+def compile_each(arguments: Sequence[str], expressions: Sequence[sp.Expr]) -> Callable[..., tuple[Any, ...]]:
+    """A function of arrays that evaluates expressions, each compiled apart and kept.
+
+    A network that differs from another one by a term shares most of its laws: only the new ones are compiled.
+
+    Parameters
+    ----------
+    arguments : sequence of str
+        Positional arguments of the function, in order
+    expressions : sequence of sympy.Expr
+        What it returns, as a tuple
+    """
+    place = {name: index for index, name in enumerate(arguments)}
+    laws = []
+    for expression in expressions:
+        used = sorted((s.name for s in expression.free_symbols), key=place.__getitem__)
+        law = compile_function(function_source("law", used, [expression], vector=True), "law")
+        laws.append((law, [place[name] for name in used]))
+    return lambda *signals: tuple(law(*(signals[i] for i in at))[0] for law, at in laws)
+
+
 class _CPrinter(C99CodePrinter):  # type: ignore[misc]
     """C99 on doubles alone: no integer that could be divided as one, no macro that a compiler may lack."""
 

@@ -14,6 +14,8 @@ from models.base.errors import InputError
 from models.base.types import Array
 
 MAPPING = "mapping.toml"
+DEFINITION = "gearbox.toml"  # of a case whose machine is not that of the whole set
+OF_AIR = ("T_ambient", "T_outdoor")  # temperatures that are inputs
 DECIMALS = {"time_s": 0, "speed_rpm": 1, "torque_Nm": 2}
 
 
@@ -91,7 +93,7 @@ def write_case(
 
 def _mapping(recordings: Mapping[str, Mapping[str, Array]], stated: Mapping[str, float]) -> str:
     columns = next(iter(recordings.values()))
-    sensors = [name for name in columns if name.startswith("T_") and name != "T_ambient_degC"]
+    sensors = [name for name in columns if name.startswith("T_") and name.removesuffix("_degC") not in OF_AIR]
     lines = ["# from the data sheet of the temperature sensors", "schema = 1"]
     for name in sensors:
         lines += ["", f"[columns.{name}]", f'quantity = "{name.removesuffix("_degC")}"', 'unit = "degC"']

@@ -23,7 +23,7 @@ from diagnosis.proof.plant.effects_losses import LOSS_EFFECTS
 from diagnosis.proof.plant.effects_outside import OUTSIDE_EFFECTS
 from diagnosis.proof.plant.instruments import SENSOR_EFFECTS, Instruments, default_channels, record
 from diagnosis.proof.plant.plant import READINGS, Plant
-from diagnosis.proof.plant.plant_run import Individual, Outcome, Run, run_plant
+from diagnosis.proof.plant.plant_run import EXPONENTS, ORDINARY_SPREAD, Individual, Outcome, Run, factor_sd, run_plant
 from models.assembly.gearbox import Gearbox
 from models.base.errors import InputError, did_you_mean
 from models.base.types import Array
@@ -32,6 +32,9 @@ EFFECTS: Mapping[str, Effect] = {e.name: e for e in (*LOSS_EFFECTS, *HEAT_EFFECT
 PHYSICS = tuple(e.name for e in (*LOSS_EFFECTS, *HEAT_EFFECTS))
 OUTSIDE = tuple(e.name for e in OUTSIDE_EFFECTS)
 MIX = {"control": 0.24, "single": 0.44, "double": 0.10, "sensor": 0.08, "outside": 0.10, "messy": 0.04}
+# The whole proof: every mechanism of the catalogue twice as a single.
+PROOF_MIX = {"control": 60, "single": 2 * len(PHYSICS), "double": 30, "messy": 30, "outside": 30, "sensor": 15}
+WHOLE = sum(PROOF_MIX.values())
 MINOR = ("windage", "shaft_ends_to_air", "oil_level_thermal", "pump_heat", "radiation_error", "hot_neighbour",
          "bearing_additive", "oil_mist", "misalignment", "ambient_swing", "run_in_seals", "motor_flange")  # fmt: skip
 # At usual strength these cause a kelvin or more, so that they stand out among minor ones.
@@ -42,13 +45,38 @@ DOMINANT = ("churning_swirl", "splash_starvation", "run_in_flanks", "gear_wear",
 MINOR_STRENGTH = (0.15, 0.4)
 STRENGTH = (0.25, 2.0)  # drawn evenly in its logarithm
 LEAST_STRENGTH = {"double": 0.5, "messy": 0.8}  # of effects that must be found next to others
-ORDINARY_SPREAD = 0.5  # of the definition's standard deviations, by which every gearbox is off
 FAR = 5.0  # standard deviations
 # Parameters that may be far off, and to which side: the other one of the first two would overheat the box.
 FAR_FACTORS = (("mesh", -1.0), ("h_air", 1.0), ("seal", 1.0), ("seal", -1.0), ("bearing", 1.0), ("C_oil", 1.0))
 TOGETHER = 40  # cases that are simulated at once, a gigabyte at most
 DATA_SHEET = {"noise": 0.2, "resolution": 0.1, "lag_s": 15.0, "lag_sd_s": 5.0}
 NOISY_K, SLOW_LAG_S = (0.4, 0.7), (30.0, 55.0)
+
+
+def mix_of(cases: int, mix: Mapping[str, int] = PROOF_MIX) -> dict[str, int]:
+    """Number of cases of each group, in the proportions of a mix, at least one of each.
+
+    Raises
+    ------
+    InputError
+        If there are fewer cases than groups.
+
+    Examples
+    --------
+    >>> mix_of(60)
+    {'control': 15, 'single': 20, 'double': 7, 'messy': 7, 'outside': 7, 'sensor': 4}
+    >>> mix_of(WHOLE) == PROOF_MIX
+    True
+    """
+    if cases < len(mix):
+        raise InputError(f"{cases} cases are too few: {len(mix)} groups ({', '.join(mix)}) need one each")
+    shares = {group: cases * number / sum(mix.values()) for group, number in mix.items()}
+    counts = {group: max(1, int(share)) for group, share in shares.items()}
+    while sum(counts.values()) > cases:
+        counts[max((g for g in counts if counts[g] > 1), key=lambda group: counts[group] - shares[group])] -= 1
+    while sum(counts.values()) < cases:
+        counts[max(shares, key=lambda group: shares[group] - counts[group])] += 1
+    return counts
 
 
 def mixed_plans(seed: int, counts: Mapping[str, int]) -> list[Plan]:
@@ -245,22 +273,15 @@ def _individual(plant: Plant, plan: Plan, rng: np.random.Generator) -> Individua
         z = float(np.clip(rng.standard_normal(), -2.0, 2.0)) * ORDINARY_SPREAD
         if plan.kind == "parameters_off":
             z = float(rng.uniform(1.0, 2.0)) * (1.0 if rng.random() < 0.5 else -1.0)
-        factors[name] = start * float(np.exp(z * _sd(gearbox, name)))
+        factors[name] = start * float(np.exp(z * factor_sd(gearbox, name)))
     if plan.kind == "parameter_far":
         name, side = FAR_FACTORS[int(rng.integers(len(FAR_FACTORS)))]
-        factors[name] = gearbox.factors[name] * float(np.exp(side * FAR * _sd(gearbox, name)))
+        factors[name] = gearbox.factors[name] * float(np.exp(side * FAR * factor_sd(gearbox, name)))
     return Individual(
         factors=factors,
         reading=int(rng.integers(len(READINGS))),
-        forced_exponent=float(rng.normal(0.6, 0.02)),
-        oil_exponent=float(rng.normal(0.0, 0.03)),
-        exchange_exponent=float(rng.normal(0.5, 0.05)),
+        **{name: float(rng.normal(*mean_and_sd)) for name, mean_and_sd in EXPONENTS.items()},
     )
-
-
-def _sd(gearbox: Gearbox, factor: str) -> float:
-    # A churning formula may be wrong by a factor of e; a plant that uses it twice over in two sd would drown in oil.
-    return min(gearbox.priors.get(f"factors.{factor}", 0.2), 0.6)
 
 
 def _run(plant: Plant, individual: Individual, programme: Programme, rng: np.random.Generator) -> Run:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -18,6 +19,7 @@ from models.base.types import Array
 
 SCHEMA = 1
 PRACTICAL_K = 0.3
+FAR_CONTROL = "parameter_far"
 # Errors of a recorded input that no gearbox's owner would care for, by column.
 COLUMN_SIZE = {"T_ambient_degC": PRACTICAL_K, "torque_Nm": 1.0, "speed_rpm": 20.0}
 ACTIVE_SHARE = 0.1  # an effect acts where its heat is above this share of its highest
@@ -60,7 +62,8 @@ def truth_of(plant: Plant, case: ConcealedCase, by_twin: Sequence[Sequence[Outco
         "group": case.plan.group,
         "control": case.plan.kind if case.plan.group == "control" else None,
         "effects": facts,
-        "practical": _practical(facts),
+        "practical": practical_of(facts),
+        "far_parameter": _farthest(plant, case) if case.plan.kind == FAR_CONTROL else None,
         "K_all": _kelvin(plant, case, everything, without_any),
         "base_parameters": {name: round(value, 5) for name, value in case.individual.factors.items()},
         "friction_reading": case.individual.reading,
@@ -87,7 +90,17 @@ def truth_of(plant: Plant, case: ConcealedCase, by_twin: Sequence[Sequence[Outco
     }
 
 
-def _practical(facts: Sequence[Mapping[str, Any]]) -> list[bool | None]:
+def _farthest(plant: Plant, case: ConcealedCase) -> str:
+    """The parameter that is farthest from its nominal value, in standard deviations of its prior."""
+
+    def distance(name: str) -> float:
+        sd = min(plant.gearbox.priors.get(f"factors.{name}", 0.2), 0.6)
+        return abs(math.log(case.individual.factors[name] / plant.gearbox.factors[name])) / sd
+
+    return max(case.individual.factors, key=distance)
+
+
+def practical_of(facts: Sequence[Mapping[str, Any]]) -> list[bool | None]:
     """True per effect if it moves a measured temperature by more than is of practical interest; None: not known."""
     largest = [None if f["K"] is None else max(size["rms"] for size in f["K"]["train"].values()) for f in facts]
     inputs = [any(c in COLUMN_SIZE and s["rms"] > COLUMN_SIZE[c] for c, s in _columns(f).items()) for f in facts]
@@ -122,7 +135,8 @@ def _sets(case: ConcealedCase) -> dict[str, list[int]]:
     return {kind: [i for i, name in enumerate(names) if name.startswith(kind)] for kind in ("train", "hold")}
 
 
-def _size(values: Array) -> dict[str, float]:
+def size_of(values: Array) -> dict[str, float]:
+    """Root mean square and greatest magnitude, rounded for the truth."""
     return {
         "rms": round(float(np.sqrt(np.mean(values**2))), 3),
         "max": round(float(np.abs(values).max(initial=0.0)), 3),
@@ -134,7 +148,7 @@ def _kelvin(
 ) -> dict[str, Any]:
     return {
         kind: {
-            place: _size(
+            place: size_of(
                 np.concatenate([_at(plant, with_it[i], place) - _at(plant, without[i], place) for i in members])
             )
             for place in case.instruments.channels
@@ -169,7 +183,8 @@ def _heat(case: ConcealedCase, heat: Sequence[Mapping[str, Array]]) -> dict[str,
     total = [np.sum([np.abs(part[place]) for place in places], axis=0, initial=0.0) for part in heat]
     top = max((float(values.max(initial=0.0)) for values in total), default=0.0)
     acting = {
-        run.programme.name: _spans(values > ACTIVE_SHARE * top) for run, values in zip(case.runs, total, strict=True)
+        run.programme.name: spans_of(values > ACTIVE_SHARE * top, ROW_S)
+        for run, values in zip(case.runs, total, strict=True)
     }
     magnitude = {
         kind: round(float(np.concatenate([total[i] for i in members]).mean()), 3)
@@ -178,9 +193,10 @@ def _heat(case: ConcealedCase, heat: Sequence[Mapping[str, Array]]) -> dict[str,
     return {"heat_W": found, "heat_magnitude_W": magnitude, "acting_s": acting}
 
 
-def _spans(active: NDArray[np.bool_]) -> list[list[float]]:
+def spans_of(active: NDArray[np.bool_], row_s: float) -> list[list[float]]:
+    """Begin and end [s] of all stretches of rows in which something acts."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], active, [False]]).astype(int)))
-    return [[ROW_S * float(a), ROW_S * float(b)] for a, b in edges.reshape(-1, 2)]
+    return [[row_s * float(a), row_s * float(b)] for a, b in edges.reshape(-1, 2)]
 
 
 def _felt(with_it: Sequence[Outcome], without: Sequence[Outcome], effect: Concealed) -> dict[str, Any]:
@@ -191,7 +207,7 @@ def _felt(with_it: Sequence[Outcome], without: Sequence[Outcome], effect: Concea
         name: np.concatenate([getattr(a, name) - getattr(b, name) for a, b in zip(with_it, without, strict=True)])
         for name in ("air", "torque")
     }
-    return {"input_shift": {name: _size(values) for name, values in shift.items() if np.any(values != 0.0)}}
+    return {"input_shift": {name: size_of(values) for name, values in shift.items() if np.any(values != 0.0)}}
 
 
 def _measured(plant: Plant, case: ConcealedCase, outcomes: Sequence[Outcome], effect: Concealed) -> dict[str, Any]:
@@ -203,7 +219,7 @@ def _measured(plant: Plant, case: ConcealedCase, outcomes: Sequence[Outcome], ef
         for column in faulty[0]:
             change = np.concatenate([f[column] - s[column] for f, s in zip(faulty, sound, strict=True)])
             if np.any(change != 0.0):
-                shifts[kind][column] = _size(change)
+                shifts[kind][column] = size_of(change)
     K = {
         kind: {place: found.get(f"T_{place}_degC", {"rms": 0.0, "max": 0.0}) for place in case.instruments.channels}
         for kind, found in shifts.items()

@@ -112,23 +112,25 @@ def record(
         for name, values in columns.items():
             decimals = DECIMALS.get(name)
             columns[name] = values if decimals is None else np.asarray(np.round(values, decimals))
-        _drop(columns, instruments.dropouts, rng)
+        temperatures = {f"T_{place}_degC": columns[f"T_{place}_degC"] for place in readings}
+        drop_readings(temperatures, instruments.dropouts, rng)
     return columns
 
 
-def lagged(values: Array, tau_s: float) -> Array:
-    """Reading of a sensor of first order, settled at the start, shape (rows,)."""
-    keep = np.exp(-ROW_S / tau_s)
+def lagged(values: Array, tau_s: float, row_s: float = ROW_S) -> Array:
+    """Reading of a sensor of first order in rows of `row_s`, settled at the start, shape (rows,)."""
+    keep = np.exp(-row_s / tau_s)
     start = lfiltic([1.0 - keep], [1.0, -keep], y=[values[0]])
     return np.asarray(lfilter([1.0 - keep], [1.0, -keep], values, zi=start)[0])
 
 
-def _drop(columns: dict[str, Array], bursts: int, rng: np.random.Generator) -> None:
-    temperatures = [name for name in columns if name.startswith("T_") and name != "T_ambient_degC"]
+def drop_readings(readings: Mapping[str, Array], bursts: int, rng: np.random.Generator) -> None:
+    """Lose bursts of readings of sensors drawn at random, in place."""
+    names = list(readings)
     for _ in range(bursts):
-        name = temperatures[int(rng.integers(len(temperatures)))]
-        start = int(rng.integers(len(columns[name])))
-        columns[name][start : start + int(rng.integers(1, 30))] = np.nan
+        name = names[int(rng.integers(len(names)))]
+        start = int(rng.integers(len(readings[name])))
+        readings[name][start : start + int(rng.integers(1, 30))] = np.nan
 
 
 # ---------------------------------------------------------------------- faults

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from diagnosis.proof.plant.anatomy import MESH, OIL, SPLASH, Anatomy
+from diagnosis.proof.plant.anatomy import MESH, OIL, SPLASH, SUMP, Anatomy
 from diagnosis.proof.plant.cycles import reference_torque, top_speed
 from models.assembly.gearbox import Gearbox
 from models.base.types import Array
@@ -100,3 +100,11 @@ class Plant:
         if component in self.anatomy.bearings:
             return component
         return MESH if component.startswith(MESH) else OIL
+
+    def spread_of(self, component: str) -> dict[str, float]:
+        """Nodes that take the heat of a loss, and the share of each: the mesh's parts between the rims and the oil."""
+        if component.startswith(MESH):
+            return dict(self.mesh_spread)
+        if component in self.anatomy.bearings:
+            return {component: 1.0}
+        return {SUMP: 0.7, SPLASH: 0.3} if component == "churning" else {SUMP: 1.0}

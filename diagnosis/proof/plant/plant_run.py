@@ -10,16 +10,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from diagnosis.proof.plant.anatomy import MESH, OIL, SPLASH, SUMP, T_SERVICE
 from diagnosis.proof.plant.cycles import ROW_S, Programme
 from diagnosis.proof.plant.effect import Concealed, Grip, Hook
 from diagnosis.proof.plant.integrator import sdirk_step
+from diagnosis.proof.plant.laws import Laws
 from diagnosis.proof.plant.plant import Moment, Plant
+from models.assembly.gearbox import Gearbox
 from models.base.types import Array
-from models.formulas.heat_transfer import KELVIN, STEFAN_BOLTZMANN
-from models.losses.loss_term import RPM
 
-FILM_REFERENCE_K = 316.65  # film temperature at which the reference of the convection is taken
+ORDINARY_SPREAD = 0.5  # of the definition's standard deviations, by which every gearbox is off
+EXPONENTS = {"forced_exponent": (0.6, 0.02), "oil_exponent": (0.0, 0.03), "exchange_exponent": (0.5, 0.05)}  # mean, sd
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,6 +42,12 @@ class Individual:
     forced_exponent: float = 0.6
     oil_exponent: float = 0.0
     exchange_exponent: float = 0.5
+
+
+def factor_sd(gearbox: Gearbox, factor: str) -> float:
+    """Standard deviation of the logarithm of a tunable factor, as the definition states it."""
+    # A churning formula may be wrong by a factor of e; a plant that uses it twice over in two sd would drown in oil.
+    return min(gearbox.priors.get(f"factors.{factor}", 0.2), 0.6)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -143,29 +149,18 @@ class _Batch:
         self.plant, self.runs = plant, runs
         anatomy, B = plant.anatomy, len(runs)
         self.n = len(anatomy.nodes)
-        factor = [run.individual.factors for run in runs]
-
-        def of(name: str | None) -> Array:
-            return np.array([1.0 if name is None else f.get(name, 1.0) for f in factor])
-
-        self.base = np.stack([path.conductance * of(path.factor) for path in anatomy.paths], axis=1)
-        self.capacity = np.stack([value * of(name) for value, name in anatomy.capacities.values()], axis=1)
-        names = [self._factor_of(component) for component in plant.components]
-        self.loss_factor = np.stack([of(name) for name in names], axis=1)
-        self.h_air, self.radiation = of("h_air"), of("radiation")
-        pick = [run.individual for run in runs]
-        self.reading = np.array([p.reading for p in pick])
-        self.forced = np.array([p.forced_exponent for p in pick])
-        self.oil_exponent = np.array([p.oil_exponent for p in pick])
-        self.exchange = np.array([p.exchange_exponent for p in pick])
-        self.loss_factor[:, 0] *= plant.reading_scale[self.reading]
+        who = [run.individual for run in runs]
+        names = sorted({name for individual in who for name in individual.factors})
+        self.laws = Laws(
+            plant,
+            {name: np.array([individual.factors.get(name, 1.0) for individual in who]) for name in names},
+            reading=np.array([individual.reading for individual in who]),
+            forced_exponent=np.array([individual.forced_exponent for individual in who]),
+            oil_exponent=np.array([individual.oil_exponent for individual in who]),
+            exchange_exponent=np.array([individual.exchange_exponent for individual in who]),
+        )
         self.random_heat = self._random_heat(B)
         self.grips = self._grips()
-
-    @staticmethod
-    def _factor_of(component: str) -> str:
-        own = {"mesh_sliding": "mesh", "mesh_rolling": "rolling", "churning": "churning"}
-        return own.get(component, component.partition("_")[0])
 
     def _random_heat(self, B: int) -> Array:
         """Heat of the unknown by row, run and node, shape (rows, B, nodes), [W]."""
@@ -261,8 +256,6 @@ class _Batch:
         tally.shed += ROW_S * (moment.ground * mean - moment.ground_heat).sum(axis=1)
         return np.asarray(new)
 
-    # ------------------------------------------------------------------ laws
-
     def _moment(self, hours: Array, inputs: Mapping[str, Array], T: Array, random_heat: Array) -> Moment:
         B, anatomy = len(self.runs), self.plant.anatomy
         bearings = len(anatomy.bearings)
@@ -271,11 +264,11 @@ class _Batch:
             air_speed=inputs["air_speed"].copy(), T=T, thinning=np.zeros(B), bearing_load=np.ones((B, bearings)),
             loss=np.zeros((B, len(self.plant.components))), lost=np.zeros(B), heat=random_heat.copy(),
             G=np.empty(0), ground=np.zeros((B, self.n)), ground_heat=np.zeros((B, self.n)),
-            capacity=self.capacity.copy(),
+            capacity=self.laws.capacity.copy(),
         )  # fmt: skip
         self._act("before", moment)
-        moment.loss = self._losses(moment)
-        moment.G = self._conductances(moment)
+        moment.loss = self.laws.losses(moment)
+        moment.G = self.laws.conductances(moment)
         self._act("after", moment)
         self._place_losses(moment)
         return moment
@@ -289,117 +282,9 @@ class _Batch:
             if when == "after":
                 grip.next_row()
 
-    def _losses(self, moment: Moment) -> Array:
-        """Loss of every component, shape (B, c), [W]; thinner oil is read as hotter oil, except by the seals."""
-        index, anatomy = self.plant.anatomy.index, self.plant.anatomy
-        oil = moment.T[:, index[SUMP]]
-        thin = moment.thinning
-        gears = {gear: moment.T[:, index[f"{gear}.rim"]] + thin for gear in anatomy.gears}
-        mesh = np.empty((len(oil), 2))
-        for reading in np.unique(self.reading):
-            of = self.reading == reading
-            at = {gear: T[of] for gear, T in gears.items()}
-            mesh[of] = self.plant.losses[reading].term("mesh").power(moment.speed[of], moment.torque[of], at)
-        columns = [mesh]
-        for term in self.plant.losses[0].terms:
-            if term.name in anatomy.bearings:
-                load = moment.torque * moment.bearing_load[:, anatomy.bearings.index(term.name)]
-                at = {OIL: oil + thin, term.name: moment.T[:, index[term.name]] + thin}
-                columns.append(term.power(moment.speed, load, at))
-            elif term.name != MESH:
-                columns.append(term.power(moment.speed, moment.torque, {OIL: oil}))
-        return np.asarray(np.concatenate(columns, axis=1) * self.loss_factor)
-
-    def _conductances(self, moment: Moment) -> Array:
-        G = self.base.copy()
-        for column, path in enumerate(self.plant.anatomy.paths):
-            if path.law != "fixed":
-                G[:, column] = self._law(path.law, column, moment)
-        return G
-
-    def _law(self, law: str, column: int, moment: Moment) -> Array:
-        plant, anatomy = self.plant, self.plant.anatomy
-        base, index = self.base[:, column], anatomy.index
-        path = anatomy.paths[column]
-        relative = moment.speed / plant.speed_ref
-        if law == "oil":
-            wall = anatomy.half_wall / anatomy.share[path.ends[1].removesuffix(".inner")]
-            return np.asarray(1.0 / (1.0 / base + wall))
-        if law == "exchange":
-            return np.asarray(base * (0.3 + 0.7 * relative**self.exchange))
-        if law == "air":
-            return self._to_air(path.ends[0], base, moment)
-        if law == MESH:
-            # Half of a contact's conductance to one gear: heat crosses from rim to rim through both in series.
-            return np.asarray(0.5 * base * self._striction(moment))
-        kind, _, gear = law.partition("_")
-        to_oil = self._gear_to_oil(kind, int(gear), moment.T[:, index[SUMP]], moment.speed)
-        return np.asarray(base * to_oil * np.maximum(relative, 0.02) ** self.oil_exponent)
-
-    def _to_air(self, node: str, area: Array, moment: Moment) -> Array:
-        """Wall to air with radiation, behind the quarter of the wall; mixed convection by the cubic rule."""
-        anatomy = self.plant.anatomy
-        T, T_a = moment.T[:, anatomy.index[node]], moment.air
-        forced_ref, free_ref = anatomy.convection
-        v_ref = max(self.plant.gearbox.ambient.air_speed_m_s, 0.1)
-        forced = forced_ref * (np.maximum(moment.air_speed, 0.0) / v_ref) ** self.forced
-        free = free_ref * (np.abs(T - T_a) / 33.0) ** 0.25
-        theta, theta_a = T + KELVIN, T_a + KELVIN
-        forced = forced * (0.5 * (theta + theta_a) / FILM_REFERENCE_K) ** -0.8  # hot air is thin
-        emissivity = self.plant.gearbox.housing.emissivity
-        h = self.h_air * np.cbrt(forced**3 + free**3)
-        h = h + self.radiation * emissivity * STEFAN_BOLTZMANN * (theta**2 + theta_a**2) * (theta + theta_a)
-        wall = anatomy.half_wall / anatomy.share[node.removesuffix(".outer")]
-        return np.asarray(1.0 / (1.0 / np.maximum(h * area, 1e-9) + wall))
-
-    def _striction(self, moment: Moment) -> Array:
-        """Conductance from the contact into one gear, [W/K]: flash temperature at the pitch point, exponents rounded.
-
-        ``b_H ~ T^(1/2)`` and ``G ~ (b_H u)^(1/2)``: Blok's law, with 0.48 and 0.26 in place of 1/2 and 1/4.
-        """
-        pair, steel = self.plant.anatomy.pair, self.plant.anatomy.stage.material
-        k = steel.conductivity_W_mK
-        chi = k / (steel.density_kg_m3 * steel.specific_heat_J_kgK)
-        E_red = steel.youngs_modulus / (1.0 - steel.poisson**2)
-        M, n = self.plant.torque_ref, self.plant.speed_ref
-        b_H = np.sqrt(8.0 * M / (pair.r_b[0] * pair.b) * 0.24 * pair.T1T2 / (np.pi * E_red))
-        reference = 2.0 * b_H * pair.b * k / 1.06 * np.sqrt(n * RPM * pair.T1C / (chi * b_H))
-        speed = np.maximum(moment.speed, 1.0) / n
-        torque = np.maximum(np.abs(moment.torque), 1.0) / M
-        return np.asarray(reference * speed**0.48 * torque**0.26)
-
-    def _gear_to_oil(self, kind: str, gear: int, T_oil: Array, speed: Array) -> Array:
-        """Faces: a disk with laminar and turbulent part by a power sum; teeth: a film flung off every turn. [W/K].
-
-        Smooth where the usual forms change regime; constants as in Dorfman 1963 and de Winter, Blok 1974, from memory.
-        """
-        oil, pair = self.plant.oil, self.plant.anatomy.pair
-        omega = np.maximum(speed, 0.0) * RPM / (1.0 if gear == 0 else pair.u)
-        nu = oil.kinematic_viscosity(T_oil) * 1e-6
-        rho, c, k = oil.density(T_SERVICE), oil.specific_heat(T_SERVICE), oil.conductivity(T_SERVICE)
-        prandtl = nu * rho * c / k
-        r, height = pair.r[gear], pair.r_a[gear] - pair.r_f[gear]
-        if kind == "teeth":
-            film = 1.14 * np.sqrt(omega * k * rho * c) / (2.0 * np.pi) * (prandtl * height / r) ** 0.25
-            return np.asarray(film * pair.z[gear] * height * pair.b)
-        level = self.plant.gearbox.oil.level_below_axis / pair.r_a[gear]
-        theta = np.arccos(np.clip(level, -1.0, 1.0))
-        immersed = (2.0 * theta - np.sin(2.0 * theta)) / (2.0 * np.pi)
-        Re = omega * r**2 / nu
-        nusselt = ((0.6 * np.sqrt(Re)) ** 6 + (0.019 * Re**0.8) ** 6) ** (1.0 / 6.0) * np.cbrt(prandtl)
-        return np.asarray(nusselt * k / r * 2.0 * np.pi * r**2 * immersed)
-
     def _place_losses(self, moment: Moment) -> None:
-        """Losses into the nodes: the mesh's parts between the rims and the oil, churning and seals into the oil."""
-        index, components = self.plant.anatomy.index, self.plant.components
+        """Losses into the nodes."""
         moment.lost += moment.loss.sum(axis=1)
-        mesh = moment.loss[:, 0] + moment.loss[:, 1]
-        for node, weight in self.plant.mesh_spread.items():
-            moment.heat[:, index[node]] += weight * mesh
-        for k, component in enumerate(components[2:], start=2):
-            if component in self.plant.anatomy.bearings:
-                moment.heat[:, index[component]] += moment.loss[:, k]
-            else:
-                splash = 0.3 if component == "churning" else 0.0
-                moment.heat[:, index[SUMP]] += (1.0 - splash) * moment.loss[:, k]
-                moment.heat[:, index[SPLASH]] += splash * moment.loss[:, k]
+        for k, component in enumerate(self.plant.components):
+            for node, weight in self.plant.spread_of(component).items():
+                moment.heat[:, self.plant.anatomy.index[node]] += weight * moment.loss[:, k]

@@ -1,146 +1,191 @@
-"""Answers of a diagnosis as the scoring reads them from ``diagnosis.json``."""
+"""Answers of a diagnosis as scoring reads them from ``diagnosis.json``."""
 
 from __future__ import annotations
 
 import math
-from collections import Counter
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from models.mechanisms import OPEN_FORM
+from diagnosis.proof.scoring.truth import What
+from models.assembly.gearbox import Gearbox
+from models.mechanisms import CATALOGUE, OPEN_FORM, OPEN_FORMS
 
-TIE_PROBABILITY = 0.05  # from which a rival belongs to the tie set
-SILENT = ("consistent", "insufficient_data", "refused", "failed")
-CANNOT_TELL = ("insufficient_data", "refused")
-NO_ANSWER = ("refused", "failed")
+ALARMS = ("missing_physics", "sensor_fault", "unexplained")
+MOST_TIED, LEAST_TIED = 3, 0.05  # names that a tie may hold; probability from which a rival belongs to it
+CERTAIN = 0.9  # a claim
 PARAMETER = "parameter"  # a parameter of the definition outside its prior
 
 
 @dataclass(frozen=True, kw_only=True)
 class Claim:
-    """One finding of a diagnosis, with its rivals.
+    """One finding, with its rivals.
 
     Attributes
     ----------
-    mechanism, place, node, family : str
-    odds : mapping of mechanism to float
+    mechanism, place : str
+    probability : float
+    odds : mapping of (mechanism, parameter or empty) to float
         Probability of the finding and of its rivals, summed over the places of each mechanism
-    parameters : mapping of str to float
-        Probability of each parameter outside its prior
-    heat_W, heat_sd_W : float
-        Mean magnitude of the heat, and its stated standard error
-    strength, strength_sd : float
-        First parameter of the law, and its stated standard error
+    tied : tuple of str
+        Tie set: at most three names, the most probable first
+    open_form, acts_like : bool
+        True if it gives no name: a form found by regression; the catalogue's nearest name
+    what : str
+        Kind of thing that it reports as changed, see :class:`diagnosis.proof.scoring.truth.Changed`
+    nodes : frozenset of str
+        Nodes, channels or input of it, both ends of a link
+    sign : int
+        1: more, -1: less, 0: not given
+    heat_W : float
     """
 
     mechanism: str
     place: str
-    node: str
-    family: str
-    odds: Mapping[str, float]
-    parameters: Mapping[str, float] = field(default_factory=dict)
+    probability: float
+    odds: Mapping[tuple[str, str], float]
+    tied: tuple[str, ...]
+    open_form: bool
+    acts_like: bool
+    what: What
+    nodes: frozenset[str]
+    sign: int
     heat_W: float
-    heat_sd_W: float = math.nan
-    strength: float
-    strength_sd: float = math.nan
 
     @property
-    def tied(self) -> frozenset[str]:
-        """Tie set: the finding and every rival of at least 5 %."""
-        return frozenset({self.mechanism, *(m for m, p in self.odds.items() if p >= TIE_PROBABILITY)})
+    def name(self) -> str:
+        """Name of the catalogue that it gives, or empty."""
+        return "" if self.open_form or self.acts_like else self.mechanism
 
 
 @dataclass(frozen=True, kw_only=True)
 class Answer:
-    """Answer of a diagnosis to one case.
+    """Answer to one case.
 
     Attributes
     ----------
     verdict : str
-        Verdict; ``refused`` if the recordings were not accepted, ``failed`` if the process gave no answer
+        ``refused`` if the recordings were not accepted, ``failed`` if there is no answer
     claims : tuple of Claim
     node : str
-        Most probable place, or ``""``
-    holdout_K : (float, float, float)
-        Held-out error as delivered, calibrated and with the findings; NaN if unknown
-    unseen : frozenset of str
-        Mechanisms reported as not detectable in these data
-    evidence : mapping of mechanism to float
-        Best log Bayes factor over its places in the first scan, [nat]; only mechanisms of the ranking
+        Most probable place, or empty
+    holdout_K : (float, float)
+        Held-out error calibrated and with the findings; NaN if unknown
     """
 
     verdict: str
     claims: tuple[Claim, ...] = ()
     node: str = ""
-    holdout_K: tuple[float, float, float] = (math.nan, math.nan, math.nan)
-    unseen: frozenset[str] = frozenset()
-    evidence: Mapping[str, float] = field(default_factory=dict)
-
-    @classmethod
-    def of(cls, result: Mapping[str, Any] | None, *, otherwise: str = "failed") -> Answer:
-        """Read the content of ``diagnosis.json``; None becomes the verdict `otherwise`."""
-        if result is None:
-            return cls(verdict=otherwise)
-        errors = result.get("fit", {}).get("holdout", {})
-        values = [errors.get(f"rmse_{stage}_K") for stage in ("before", "calibrated", "after")]
-        before, calibrated, after = (math.nan if v is None else float(v) for v in values)
-        location = result.get("location", [])
-        evidence: dict[str, float] = {}
-        for row in result.get("ranking", []):
-            evidence[row["mechanism"]] = max(row["log_bayes"], evidence.get(row["mechanism"], -math.inf))
-        return cls(
-            verdict=result["verdict"],
-            claims=tuple(_claim(finding) for finding in result.get("findings", [])),
-            node=location[0]["node"] if location else "",
-            holdout_K=(before, calibrated, after),
-            unseen=frozenset(one["mechanism"] for one in result.get("not_visible", [])),
-            evidence=evidence,
-        )
+    holdout_K: tuple[float, float] = field(default=(math.nan, math.nan))
 
     @property
-    def silent(self) -> bool:
-        """True if no fault is claimed."""
-        return self.verdict in SILENT
+    def alarm(self) -> bool:
+        """True if a fault is reported that no parameter explains."""
+        return self.verdict in ALARMS
 
     @property
-    def unnamed(self) -> bool:
-        """True if a fault is claimed without a name of the catalogue or a parameter."""
-        return not self.silent and not self.known
-
-    @property
-    def partly(self) -> bool:
-        """True if a name is given and reported not to explain everything."""
-        return bool(self.known) and self.verdict == "unexplained"
-
-    @property
-    def known(self) -> frozenset[str]:
-        """Mechanisms of all claims except open forms."""
-        return frozenset(claim.mechanism for claim in self.claims if claim.family != OPEN_FORM)
-
-    @property
-    def named(self) -> frozenset[str]:
-        """Mechanisms of all claims."""
-        return frozenset(claim.mechanism for claim in self.claims)
-
-    @property
-    def tied(self) -> frozenset[str]:
-        """Union of the tie sets of all claims."""
-        return frozenset().union(*(claim.tied for claim in self.claims))
+    def answered(self) -> bool:
+        """True if there is a verdict."""
+        return self.verdict not in ("failed", "refused")
 
 
-def _claim(finding: Mapping[str, Any]) -> Claim:
-    odds: Counter[str] = Counter()
-    off: Counter[str] = Counter()
-    for one in (finding, *finding.get("confusable_with", [])):
-        odds[one["mechanism"]] += one["probability"]
-        if one["mechanism"] == PARAMETER:
-            off[one["place"]] += one["probability"]
-    parameters, heat = finding.get("parameters", []), finding.get("heat_W", {})
-    first = parameters[0] if parameters else {}
+def read_answer(result: Mapping[str, Any] | None, gearbox: Gearbox, *, otherwise: str = "failed") -> Answer:
+    """Read the content of ``diagnosis.json``, whole or compact.
+
+    Parameters
+    ----------
+    result : mapping or None
+    gearbox : Gearbox
+        Definition that the diagnosis was given
+    otherwise : str
+        Verdict where there is no result
+    """
+    if result is None:
+        return Answer(verdict=otherwise)
+    errors = result.get("fit", {}).get("holdout") or {}
+    after = [errors.get(f"rmse_{stage}_K") for stage in ("calibrated", "after")]
+    location = max(result.get("location") or [{}], key=lambda place: place.get("probability") or 0.0)
+    return Answer(
+        verdict=result["verdict"],
+        claims=tuple(_claim(finding, gearbox) for finding in result.get("findings") or []),
+        node=location.get("node", ""),
+        holdout_K=(_number(after[0]), _number(after[1])),
+    )
+
+
+def _claim(finding: Mapping[str, Any], gearbox: Gearbox) -> Claim:
+    name = finding["mechanism"]
+    odds: dict[tuple[str, str], float] = {}
+    for one in (finding, *(finding.get("confusable_with") or [])):
+        key = (one["mechanism"], one.get("place") or "" if one["mechanism"] == PARAMETER else "")
+        odds[key] = odds.get(key, 0.0) + _number(one.get("probability"), 0.0)
+    rivals = [m for (m, _), p in sorted(odds.items(), key=lambda pair: -pair[1]) if m != name and p >= LEAST_TIED]
+    parameters = finding.get("parameters") or []
+    strength = _number(parameters[0].get("value"), 0.0) if parameters else 0.0
+    if finding.get("kind") == PARAMETER:
+        strength -= next((p.start for p in gearbox.network().parameters if p.name == finding.get("place")), strength)
+    what = _what(finding, gearbox)
     return Claim(
-        mechanism=finding["mechanism"], place=finding["place"], node=finding["node"], family=finding["family"],
-        odds=dict(odds), parameters=dict(off),
-        heat_W=heat.get("mean", math.nan), heat_sd_W=heat.get("stderr", math.nan),
-        strength=first.get("value", math.nan), strength_sd=first.get("stderr", math.nan),
-    )  # fmt: skip
+        mechanism=name,
+        place=finding.get("place") or "",
+        probability=_number(finding.get("probability"), 0.0),
+        odds=odds,
+        tied=tuple(finding.get("tie_set") or (name, *dict.fromkeys(rivals)))[:MOST_TIED],
+        open_form=finding.get("family") == OPEN_FORM,
+        acts_like=bool(finding.get("acts_like")),
+        what=what,
+        nodes=_nodes(finding, gearbox),
+        sign=(strength > 0.0) - (strength < 0.0),
+        heat_W=_number((finding.get("heat_W") or {}).get("mean")),
+    )
+
+
+def _what(finding: Mapping[str, Any], gearbox: Gearbox) -> What:
+    kind, name = finding.get("kind") or "", finding["mechanism"]
+    known = CATALOGUE.get(name) or next((form for form in OPEN_FORMS if form.name == name), None)
+    if name == "clock_offset" or (known and known.form == "clock"):
+        return "clock"
+    if kind == "sensor":
+        return "input" if known and known.kind == "signal" else "sensor"
+    if kind in ("signal", "input"):
+        return "input"
+    if kind.startswith("link"):
+        return "link"
+    if kind == "loss_factor":
+        return "loss"
+    if kind == PARAMETER:
+        network, place = gearbox.network(), finding.get("place") or ""
+        if any(place in {s.name for s in link.conductance.free_symbols} for link in network.links):
+            return "link"
+        return "capacity" if place.startswith("C_") else "loss"
+    return "loss" if known and known.is_loss else "heat"
+
+
+def _nodes(finding: Mapping[str, Any], gearbox: Gearbox) -> frozenset[str]:
+    """Nodes, channels and inputs that a finding names: its node, and every node, group and loss in its place.
+
+    A parameter names all nodes whose losses or links depend on it.
+    """
+    network = gearbox.network()
+    if finding.get("kind") == PARAMETER:
+        laws: list[tuple[Any, tuple[str, ...]]] = [(link.conductance, link.nodes) for link in network.links]
+        laws += [(source.heat, (source.node,)) for source in network.sources]
+        named = {
+            node for law, nodes in laws if finding.get("place") in {s.name for s in law.free_symbols} for node in nodes
+        }
+        return frozenset(named | ({finding.get("node") or ""} - {""}))
+    known = {name: {name} for name in (*network.node_names, *network.inputs)}
+    known |= {name: set(members) for name, members in network.groups.items()}
+    known |= {source.name: {source.node} for source in network.sources if source.name not in known}
+    found = {finding.get("node") or ""} - {""}
+    left = f"_{re.sub('[^A-Za-z0-9]', '_', finding.get('place') or '')}_"
+    for name in sorted(known, key=len, reverse=True):  # housing_upper before housing
+        if f"_{name}_" in left:
+            found |= known[name]
+            left = left.replace(f"_{name}_", "__")
+    return frozenset(found)
+
+
+def _number(value: Any, otherwise: float = math.nan) -> float:
+    return float(value) if isinstance(value, int | float) else otherwise

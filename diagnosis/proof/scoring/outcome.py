@@ -1,176 +1,212 @@
-"""Numbers of a proof from answers and truths: ``proof.json``, and everything that its page shows."""
+"""Scores of a set of answers: counts with exact limits by kind of plant, claims, misses and time, ready for JSON."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from typing import Any
 
-from diagnosis.proof.scoring import score
-from diagnosis.proof.scoring.answers import CANNOT_TELL, Answer
-from diagnosis.proof.scoring.counts import Count
-from diagnosis.proof.scoring.protocol import (
-    DATA,
-    DEVELOPMENT_SEEDS,
-    FIRST,
-    SENSORS,
-    Settings,
-    Task,
-    kept_columns,
-    mix_of,
-)
-from diagnosis.proof.scoring.rules import BY_KEY, FAR, REMOVED_RULES, RULES, Rule, ScoredCase
-from models.assembly.gearbox import Gearbox
-from models.base.version import project_version
+import numpy as np
+from scipy.stats import binomtest
 
-SCHEMA = 2
-STATED_FALSE_ALARMS = 0.05  # default of diagnose
-CERTAIN = 0.9  # a claim of at least this probability
+from diagnosis.proof.scoring.answers import CERTAIN, read_answer
+from diagnosis.proof.scoring.lines import Settings, Task, kept_columns
+from diagnosis.proof.scoring.rules import RULES, Item, is_right
+from diagnosis.proof.scoring.seeds import role_of
+from diagnosis.proof.scoring.truth import Truth
+from models.assembly.gearbox import Gearbox, load_gearbox
+from models.base.errors import InputError
+
+SCHEMA = 3
+BINS = (0.0, 0.1, 0.3, 0.5, 0.7, 0.9, 1.0)
+ALL = "all"
 
 
 def outcome(
-    settings: Settings,
-    gearbox: Gearbox,
-    truths: Mapping[str, Mapping[str, Any]],
+    truths: Mapping[str, Truth],
     records: Mapping[Task, Mapping[str, Any]],
+    gearbox: Gearbox,
     *,
-    code: str,
-    hashes: str,
+    settings: Settings | None = None,
+    code: str = "",
 ) -> dict[str, Any]:
-    """Score all answers of a proof.
+    """Score all answers.
 
     Parameters
     ----------
-    settings : Settings
+    truths : mapping of case to Truth
+    records : mapping of Task to mapping
+        ``status``, ``seconds`` and ``answer`` of each diagnosis
     gearbox : Gearbox
-    truths : mapping of case to truth
-    records : mapping of Task to the record of its process, see :func:`builder.workflows.prove.run_task`
+        Nominal definition of cases whose truth names no other
+    settings : Settings, optional
     code : str
-        SHA-256 of the code
-    hashes : str
-        SHA-256 of the list of hashes of the answers
+        Hash of the code that decided
 
     Returns
     -------
     dict
-        Ready for JSON; every share as hits, number of cases and 95 % limits
+        Ready for JSON
+
+    Raises
+    ------
+    InputError
+        If a case has no truth.
     """
-    near = score.near_nodes(gearbox)
-    far = {case: score.far_of(truth, gearbox) for case, truth in truths.items()}
-    measured = [f"T_{name}_degC" for name in next(iter(truths.values()))["K_all"]["train"]]
-    channels = {s: [c[2:-5] for c in kept_columns(measured, s)] for s in SENSORS}
-
-    def scored(task: Task, answer: Answer, kin: frozenset[str] = frozenset()) -> ScoredCase:
-        truth = score.seen_by(truths[task.case], channels[task.sensors])
-        return ScoredCase(case=task.case, truth=truth, answer=answer, near=near, far=far[task.case], kin=kin)
-
-    answers = {task: Answer.of(record["answer"], otherwise=record["status"]) for task, record in records.items()}
-    whole = {task: answer for task, answer in answers.items() if task.removed is None}
-    main = {task.case: scored(task, answer) for task, answer in whole.items() if _cell(task) == FIRST}
-    removed = [
-        scored(task, answer, main[task.case].answer.tied) for task, answer in answers.items() if task not in whole
-    ]
-    tool = list(main.values())
-    stated = score.stated_probabilities(tool)
-    false_alarm = BY_KEY["false_alarm"]
-    certain = [true for p, true in stated if p >= CERTAIN]
+    unknown = [task.case for task in records if task.case not in truths]
+    if unknown:
+        raise InputError(f"case {unknown[0]!r} has an answer but no truth; the truth is of another set")
+    machines = {name: load_gearbox(name) for name in {truth.machine for truth in truths.values()} if name}
+    machines[""] = gearbox
+    near = {name: near_nodes(machine) for name, machine in machines.items()}
+    groups: dict[str, list[Item]] = {}
+    seconds: dict[str, list[float]] = {}
+    for task, record in records.items():
+        truth = _seen(truths[task.case], task)
+        answer = read_answer(record["answer"], machines[truth.machine], otherwise=record["status"])
+        name = ", ".join(filter(None, (truth.plant, task.cell)))
+        effects = truth.effects or (None,)
+        groups.setdefault(name, []).extend(
+            Item(case=task.case, truth=truth, effect=effect, answer=answer, near=near[truth.machine], first=k == 0)
+            for k, effect in enumerate(effects)
+        )
+        if "seconds" in record:
+            # On a machine with other work processor time is what a diagnosis costs; older lines lack it.
+            seconds.setdefault(name, []).append(record.get("processor_s") or record["seconds"])
+    whole = [item for name, items in groups.items() if "," not in name for item in items]
+    tables = {ALL: whole, **groups} if len(groups) > 1 else groups
     return {
         "schema": SCHEMA,
         "gearbox": gearbox.name,
-        "protocol": {
-            "seed": settings.seed,
-            "development_seeds": list(DEVELOPMENT_SEEDS),
-            "on_development_seed": settings.seed in DEVELOPMENT_SEEDS,
-            "cases": mix_of(settings.cases),
-            "diagnoses": len(answers),
-            "cells_every": settings.cells_every,
-            "code_sha256": code,
-            "gearbox_sha256": gearbox.hash,
-            "answers_sha256": hashes,
-            "version": project_version(),
-            "failed": sum(record["status"] == "failed" for record in records.values()),
-            "refused": sum(record["status"] == "refused" for record in records.values()),
-            "processor_s": round(sum(record["seconds"] for record in records.values()), 1),
-        },
+        "settings": None if settings is None else vars(settings),
+        "role_of_seed": None if settings is None else role_of(settings.plant, settings.seed),
+        "code": code,
+        "cases": {name: len({item.case for item in items}) for name, items in tables.items()},
+        "failed": sum(record["status"] != "answered" for record in records.values()),
         "rules": [
-            *(_row(rule, tool) for rule in RULES),
-            *(_row(rule, removed) for rule in REMOVED_RULES),
+            {"name": rule.name, "meaning": rule.meaning, "bad": rule.bad,
+             "counts": {n: count([rule.right(i) for i in items if rule.when(i)]) for n, items in tables.items()}}
+            for rule in RULES
         ],
-        "cells": [
-            _cell_row(sensors, data, [scored(t, a) for t, a in whole.items() if _cell(t) == (sensors, data)])
-            for data in DATA for sensors in SENSORS
-        ],
-        "confusion": score.confusion(tool),
-        "removed": [_case_row(c) for c in removed],
-        "reliability": {
-            "bins": score.reliability(stated),
-            "certain": Count.over(certain).as_dict(),
-            "certain_from": CERTAIN,
-        },
-        "false_alarms": {
-            "stated": STATED_FALSE_ALARMS,
-            "found": Count.over([false_alarm.apply(c) for c in tool]).as_dict(),
-            "by_kind": _alarms_by_kind(tool),
-        },
-        "held_out_K": score.errors_by_group(tool),
-        "held_out_pairs": [
-            {"case": c.case, "group": c.group, "calibrated": c.answer.holdout_K[1], "after": c.answer.holdout_K[2]}
-            for c in tool if math.isfinite(c.answer.holdout_K[1])
-        ],
-        "cases": [{**_case_row(c), "outcome": score.outcome_of(c)} for c in tool],
+        "claims": {n: count([right for p, right in stated(items) if p >= CERTAIN]) for n, items in tables.items()},
+        "reliability": reliability(stated(whole)),
+        "seconds": {n: {"median": float(np.median(s)), "max": max(s)} for n, s in seconds.items()},
+        "misses": [_row(item) for item in sorted(whole, key=lambda i: i.case) if _missed(item)],
+        "lines": [_row(item) for items in groups.values() for item in items],
     }  # fmt: skip
 
 
-def _cell(task: Task) -> tuple[str, str]:
-    return task.sensors, task.data
+def near_nodes(gearbox: Gearbox) -> dict[str, frozenset[str]]:
+    """Each part of the network with the parts that share a heat path with it."""
+    network = gearbox.network()
+    parts = [part.name for part in network.parts]
+    ends = [link.nodes for link in network.links]
+    return {p: frozenset({p, *(n for nodes in ends if p in nodes for n in nodes if n in parts)}) for p in parts}
 
 
-def _row(rule: Rule, cases: Sequence[ScoredCase]) -> dict[str, Any]:
-    count = Count.over([rule.apply(c) for c in cases])
+def count(verdicts: Sequence[bool]) -> dict[str, Any]:
+    """Hits among cases with the exact (Clopper and Pearson) 95 % limits of their share.
+
+    Examples
+    --------
+    >>> count([True] * 5 + [False])
+    {'hits': 5, 'of': 6, 'low': 0.3588, 'high': 0.9958}
+    """
+    hits, of = sum(map(bool, verdicts)), len(verdicts)
+    limits = binomtest(hits, of).proportion_ci(0.95, method="exact") if of else (0.0, 1.0)
+    return {"hits": hits, "of": of, "low": round(float(limits[0]), 4), "high": round(float(limits[1]), 4)}
+
+
+def stated(items: Sequence[Item]) -> list[tuple[float, bool]]:
+    """Every stated probability of a name, and True if the name is right."""
+    return [
+        (min(p, 1.0), is_right(key, claim, item.truth))
+        for item in items if item.first for claim in item.answer.claims for key, p in claim.odds.items()
+    ]  # fmt: skip
+
+
+def reliability(probabilities: Sequence[tuple[float, bool]]) -> list[dict[str, Any]]:
+    """Stated probabilities in bins, each with the count of right ones."""
+    rows = []
+    for low, high in pairwise(BINS):
+        inside = [(p, right) for p, right in probabilities if low <= p < high or p == high == BINS[-1]]
+        mean = float(np.mean([p for p, _ in inside])) if inside else None
+        rows.append({"from": low, "to": high, "stated": mean, **count([right for _, right in inside])})
+    return rows
+
+
+def _seen(truth: Truth, task: Task) -> Truth:
+    if task.removed:
+        return truth.without_entry()
+    columns = kept_columns([f"T_{name}_degC" for name in truth.channels], task.sensors)
+    return truth.seen_with([c[2:-5] for c in columns]) if task.cell else truth
+
+
+def _missed(item: Item) -> bool:
+    if item.effect is None:
+        return item.answer.verdict not in item.truth.verdicts
+    return not item.found
+
+
+def _row(item: Item) -> dict[str, Any]:
+    effect, answer = item.effect, item.answer
+    nats = effect.nats if effect else (math.nan, math.nan)
     return {
-        "key": rule.key,
-        "text": rule.text,
-        "rule": rule.meaning,
-        "needed": rule.needed,
-        "at_most": rule.at_most,
-        "count": count.as_dict(),
-        "met": rule.met(count),
+        "case": item.case,
+        "plant": item.truth.plant,
+        "group": item.truth.group,
+        "truth": _label(item),
+        "D_plant_nats": nats[0] if math.isfinite(nats[0]) else None,
+        "D_tool_nats": nats[1] if math.isfinite(nats[1]) else None,
+        "verdict": answer.verdict,
+        "answer": [f"{c.mechanism} at {c.place} ({c.probability:.2f})" for c in answer.claims],
+        "found": not _missed(item),
     }
 
 
-def _cell_row(sensors: str, data: str, cases: Sequence[ScoredCase]) -> dict[str, Any]:
-    return {
-        "sensors": sensors,
-        "data": data,
-        "cases": len(cases),
-        "outcomes": {name: count.as_dict() for name, count in score.cell_counts(cases).items()},
-        "consistent": Count.over([BY_KEY["consistent"].apply(c) for c in cases]).as_dict(),
-        "single": Count.over([BY_KEY["single_tied"].apply(c) for c in cases]).as_dict(),
-        "cannot_tell": Count.over([c.answer.verdict in CANNOT_TELL for c in cases]).as_dict(),
-    }
+def _label(item: Item) -> str:
+    if item.effect is None:
+        return f"nothing, {item.truth.far} far off" if item.truth.far else "nothing"
+    places = ", ".join(dict.fromkeys(one.of for one in item.effect.changed))
+    return f"{item.effect.label} at {places}" + (f", {item.effect.course}" if item.effect.course else "")
 
 
-def _alarms_by_kind(cases: Sequence[ScoredCase]) -> dict[str, dict[str, Any]]:
-    kinds = {c.truth["control"] for c in cases if c.group == "control"} - {FAR}
-    return {
-        kind: Count.over([BY_KEY["false_alarm"].apply(c) for c in cases if c.truth["control"] == kind]).as_dict()
-        for kind in sorted(kinds)
-    }
+def tables_of(result: Mapping[str, Any]) -> list[tuple[str, list[str], list[list[str]]]]:
+    """Title, header and rows of the tables that are printed and published."""
+    kinds = list(result["cases"])
+    rules = [
+        [rule["name"], *(_share(rule["counts"][kind]) for kind in kinds)]
+        for rule in result["rules"] if any(rule["counts"][kind]["of"] for kind in kinds)
+    ]  # fmt: skip
+    rules.append([f"claims of {CERTAIN} and more that are right", *(_share(result["claims"][kind]) for kind in kinds)])
+    time = result["seconds"]
+    if time:
+        times = [f"{time[k]['median']:.0f} s ({time[k]['max']:.0f} s)" if k in time else "" for k in kinds]
+        rules.append(["time per case, median (longest)", *times])
+    bins = [
+        [f"{b['from']:.1f} to {b['to']:.1f}", "" if b["stated"] is None else f"{b['stated']:.2f}", _share(b)]
+        for b in result["reliability"]
+    ]
+    misses = [
+        [m["case"], m["group"], m["truth"], _nats(m["D_plant_nats"]), _nats(m["D_tool_nats"]),
+         m["verdict"].replace("_", " "), "; ".join(m["answer"]) or "-"]
+        for m in result["misses"]
+    ]  # fmt: skip
+    header = ["rule", *(f"{k} ({result['cases'][k]} cases)" for k in kinds)]
+    return [
+        ("Right, of all, with exact 95 % limits", header, rules),
+        ("Stated probabilities", ["stated", "mean", "right"], bins),
+        ("Misses, with the nats (D / 2) that the recordings hold",
+         ["case", "group", "truth", "plant", "tool", "verdict", "answer"], misses),
+    ]  # fmt: skip
 
 
-def _case_row(c: ScoredCase) -> dict[str, Any]:
-    """One line of the page for one case."""
-    control = str(c.truth["control"]).replace("_", " ") + (f": {c.far}" if c.truth["control"] == FAR else "")
-    return {
-        "case": c.case,
-        "group": c.group,
-        "truth": [f"{e['name']} at {e['nodes'][0]}, {e['strength']:.2f} x" for e in c.truth["effects"]] or [control],
-        "evidence": [round(c.answer.evidence[name], 1) if name in c.answer.evidence else None for name in c.names],
-        "practical": bool(c.truth["effects"]) and c.practical(),
-        "verdict": c.answer.verdict,
-        "named": [
-            f"{claim.mechanism} at {claim.place} ({claim.odds[claim.mechanism]:.2f})" for claim in c.answer.claims
-        ],
-        "tied": sorted(c.answer.tied - c.answer.named),
-        "kin": sorted(c.kin),
-    }
+def _share(c: Mapping[str, Any]) -> str:
+    if not c["of"]:
+        return "-"
+    return f"{c['hits']}/{c['of']} ({100 * c['low']:.0f} to {100 * c['high']:.0f} %)"
+
+
+def _nats(value: float | None) -> str:
+    return "-" if value is None else f"{value:.3g}"

@@ -1,108 +1,74 @@
-"""The rules of a proof as a table: which cases a rule counts, and which answers it counts as right.
-
-An effect is *of practical size* if it moves a measured temperature by more than 0.3 K rms (an input by more than its
-ordinary error). For smaller effects silence is right, so rules that ask for a name leave them out.
-"""
+"""The rules of scoring as one table: what a rule counts, and which answers it counts as right."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
 
-from diagnosis.proof.scoring.answers import NO_ANSWER, PARAMETER, Answer
-from diagnosis.proof.scoring.counts import Count
-from models.mechanisms import OPEN_FORM
+from diagnosis.proof.scoring.answers import CERTAIN, PARAMETER, Answer, Claim
+from diagnosis.proof.scoring.truth import CONTROL, MEASUREMENT, Changed, TrueEffect, Truth
 
-STRENGTH_ERROR = 0.15
-EVIDENT = 10.0  # nats of the first scan for an effect at its best place: with less it is lost among the catalogue
-FAR = "parameter_far"
-# Strengths that mean the same in plant and catalogue, but for their sign; heats are compared as heats.
-SAME_STRENGTH = ("sensor_bias", "sensor_gain", "sensor_lag", "clock_offset", "torque_offset", "torque_gain",
-                 "speed_gain", "ambient_probe_offset")  # fmt: skip
+SIZE_ERROR = 0.2
+VISIBLE, UNSEEN = 10.0, 3.0  # nats that the recordings hold: enough to name an effect, too few to see it
 
 
 @dataclass(frozen=True, kw_only=True)
-class ScoredCase:
-    """Answer and truth of one case.
+class Item:
+    """One concealed effect with the answer to its case, or a case with nothing concealed.
 
     Attributes
     ----------
     case : str
-    truth : mapping
-        See :func:`diagnosis.proof.cases.truth.truth_of`
+    truth : Truth
+    effect : TrueEffect or None
     answer : Answer
-    near : mapping of node to set of str
+    near : mapping of node to frozenset of str
         The node and those that share a heat path with it
-    far : str
-        Parameter that is farthest from its nominal value, in standard deviations
-    kin : frozenset of str
-        Tie set on the same recordings with the whole catalogue, if a mechanism was removed
+    first : bool
+        True of one item per case
     """
 
     case: str
-    truth: Mapping[str, Any]
+    truth: Truth
+    effect: TrueEffect | None
     answer: Answer
     near: Mapping[str, frozenset[str]]
-    far: str
-    kin: frozenset[str] = frozenset()
+    first: bool = True
 
     @property
-    def group(self) -> str:
-        """Group of the case."""
-        return str(self.truth["group"])
+    def concealed(self) -> TrueEffect:
+        """The effect of an item that has one."""
+        assert self.effect is not None  # noqa: S101 - rules ask only items with an effect
+        return self.effect
 
     @property
-    def answered(self) -> bool:
-        """True if there is an answer."""
-        return self.answer.verdict not in NO_ANSWER
+    def named(self) -> bool:
+        """True if a finding gives the name of the effect."""
+        return any(claim.name == self.concealed.name != "" for claim in self.answer.claims)
 
     @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the effects, the dominant one first."""
-        return tuple(effect["name"] for effect in self.truth["effects"])
+    def tied(self) -> bool:
+        """True if a finding or one of its at most two rivals has the name of the effect."""
+        return self.named or any(
+            self.concealed.name in claim.tied and self.concealed.name for claim in self.answer.claims
+        )
 
     @property
-    def first_tied(self) -> bool:
-        """True if the dominant effect is named or tied."""
-        return self.names[0] in self.answer.tied
+    def alike(self) -> bool:
+        """True if it is named, or the same kind of thing at the same node or link is reported with the same sign."""
+        return self.named or any(acts_like(c, one) for c in self.answer.claims for one in self.concealed.changed)
 
     @property
-    def nodes(self) -> list[str]:
-        """Nodes of the dominant effect; empty for effects on an input (torque, ambient)."""
-        return [node for node in self.truth["effects"][0]["nodes"] if node in self.near]
-
-    def practical(self, k: int = 0) -> bool:
-        """True if an effect is of practical size, or if the truth does not know."""
-        return self.truth["practical"][k] is not False
+    def found(self) -> bool:
+        """True if the effect is named, tied or, from outside the catalogue, reported by what it acts like."""
+        return self.tied or (not self.concealed.name and self.alike)
 
     @property
-    def evident(self) -> bool:
-        """True if the first scan gives the dominant effect at least 10 nats, or there is no scan."""
-        return self.answer.evidence.get(self.names[0], math.inf) >= EVIDENT
-
-    @property
-    def right(self) -> bool | None:
-        """True if the main effect is found (or nothing, in a control); None if there is nothing to find."""
-        if self.group == "control":
-            return apply("far", self) if self.truth["control"] == FAR else apply("consistent", self)
-        if not self.practical():
-            return None
-        return self.answer.unnamed if self.group == "outside" else self.first_tied
-
-    def strengths(self) -> tuple[float, float, float] | None:
-        """Claimed strength, its stated error and the true strength of one effect; None unless it is named exactly."""
-        if self.group not in ("single", "sensor") or not self.practical() or not self.answer.claims:
-            return None
-        claim, effect = self.answer.claims[0], self.truth["effects"][0]
-        if claim.mechanism != effect["name"]:
-            return None
-        if effect["name"] in SAME_STRENGTH:
-            return abs(claim.strength), claim.strength_sd, abs(float(effect["parameters"]["a"]))
-        if effect["kind"] == "signal" or self.group == "sensor":
-            return None
-        return claim.heat_W, claim.heat_sd_W, float(effect["heat_magnitude_W"]["train"])
+    def located(self) -> bool:
+        """True if the most probable place or that of a finding is a node of the effect, or next to one."""
+        near = {n for node in self.concealed.nodes for n in self.near.get(node, {node})}
+        return self.answer.node in near or any(near & claim.nodes for claim in self.answer.claims)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -111,250 +77,138 @@ class Rule:
 
     Attributes
     ----------
-    key, text : str
-    meaning : str
-        Definition that the page shows
+    name, meaning : str
     when : callable
-        True if the rule counts the case
+        True if the rule counts the item
     right : callable
-        True if the answer is right, of the cases that it counts
-    needed : float or None
-        Required share; None if nothing is required
-    at_most : bool
-        True if the share must not exceed `needed`
+        True if the answer is right, or wrong where the rule counts errors
+    bad : bool
+        True if the rule counts errors
     """
 
-    key: str
-    text: str
+    name: str
     meaning: str
-    when: Callable[[ScoredCase], bool]
-    right: Callable[[ScoredCase], bool]
-    needed: float | None = None
-    at_most: bool = False
-
-    def apply(self, case: ScoredCase) -> bool | None:
-        """Score one case; None if the rule does not count it."""
-        return self.right(case) if self.when(case) else None
-
-    def met(self, count: Count) -> bool | None:
-        """True if the share is as required; None if nothing is required or counted."""
-        if self.needed is None or not count.of:
-            return None
-        return count.share <= self.needed if self.at_most else count.share >= self.needed
+    when: Callable[[Item], bool]
+    right: Callable[[Item], bool]
+    bad: bool = False
 
 
-# ---------------------------------------------------------------------- cases that rules count
+def acts_like(claim: Claim, truth: Changed) -> bool:
+    """True if a finding reports the kind of thing that was changed, at the same node or link, with the same sign.
+
+    Parts of a split node have the name of the nominal node. Both nodes of a link must be those of the claim; links to
+    something outside the network have one. An effect that neither adds nor takes away goes with both signs.
+    """
+    if claim.what != truth.what or truth.sign not in (0, claim.sign):
+        return False
+    if truth.what == "clock":
+        return True
+    if truth.what == "link":
+        return bool(truth.nodes) and set(truth.nodes) <= claim.nodes
+    return bool({truth.of, *truth.nodes} & claim.nodes)
 
 
-def healthy(c: ScoredCase) -> bool:
-    """Nothing concealed, every parameter inside its prior."""
-    return c.group == "control" and c.truth["control"] != FAR
+def is_right(claim: tuple[str, str], odds_of: Claim, truth: Truth) -> bool:
+    """True if a stated name is among the effects of a case.
+
+    A parameter is right if it is the one that is far off; an open form or a finding that only acts like something, if
+    it acts like an effect.
+
+    Parameters
+    ----------
+    claim : (str, str)
+        Mechanism, and the parameter if it is one
+    odds_of : Claim
+        The finding that states it
+    truth : Truth
+    """
+    mechanism, parameter = claim
+    if mechanism == PARAMETER:
+        return bool(truth.far) and parameter in (truth.far, f"factor_{truth.far}")
+    if mechanism == odds_of.mechanism and not odds_of.name:
+        return any(acts_like(odds_of, one) for effect in truth.effects for one in effect.changed)
+    return mechanism in {effect.name for effect in truth.effects}
 
 
-def far_off(c: ScoredCase) -> bool:
-    """Nothing concealed, one parameter five standard deviations off."""
-    return c.group == "control" and c.truth["control"] == FAR
+def has_effect(i: Item) -> bool:
+    """An effect is concealed."""
+    return i.effect is not None
 
 
-def of_group(group: str) -> Callable[[ScoredCase], bool]:
-    """Cases of a group whose dominant effect is of practical size."""
-    return lambda c: c.group == group and c.practical()
+def in_catalogue(i: Item) -> bool:
+    """An effect of the catalogue is concealed."""
+    return i.effect is not None and bool(i.effect.name)
 
 
-single, messy, sensor, outside = map(of_group, ("single", "messy", "sensor", "outside"))
+def nothing(i: Item) -> bool:
+    """Nothing is concealed and no parameter is far off."""
+    return i.truth.group == CONTROL and not i.truth.far
 
 
-def located(c: ScoredCase) -> bool:
-    """One effect with a node, and a fault claimed."""
-    return single(c) and not c.answer.silent and bool(c.nodes)
+def visible(i: Item) -> bool:
+    """The oracle gives the effect enough evidence."""
+    return i.effect is not None and i.effect.nats[1] >= VISIBLE
 
 
-def double(c: ScoredCase) -> bool:
-    """Two effects of practical size."""
-    return c.group == "double" and c.practical(0) and c.practical(1)
+def outside(i: Item) -> bool:
+    """An effect that is in no catalogue is concealed."""
+    return i.effect is not None and not i.effect.name
 
 
-def outside_forced(c: ScoredCase) -> bool:
-    """An effect outside the catalogue, and a name given."""
-    return c.group == "outside" and c.answered and bool(c.answer.known)
+def in_machine(i: Item) -> bool:
+    """The effect has a place in the machine."""
+    return i.effect is not None and bool(i.effect.nodes) and all(c.what not in MEASUREMENT for c in i.effect.changed)
 
 
-def removed_forced(c: ScoredCase) -> bool:
-    """An effect whose entry is removed, and a name given that is no kin."""
-    return c.answered and not c.answer.known <= c.kin
+def sized(i: Item) -> bool:
+    """The effect is named and its heat is known."""
+    return in_catalogue(i) and i.named and math.isfinite(i.concealed.heat_W) and i.concealed.heat_W > 0.0
 
 
-# ---------------------------------------------------------------------- answers that are right
-
-
-def named_parameter(c: ScoredCase) -> bool:
-    """The parameter that is off is among the claims."""
-    places = {claim.place for claim in c.answer.claims if claim.mechanism == PARAMETER}
-    return c.answer.verdict == "parameter_error" and c.far in places
-
-
-def within(c: ScoredCase, share: float | None) -> bool:
-    """The claimed strength is within a share of the truth, or within twice the stated error if that is None."""
-    claimed, sd, true = c.strengths() or (math.nan,) * 3
-    return abs(claimed - true) <= (2.0 * sd if share is None else share * true)
-
-
-def dominant_first(c: ScoredCase) -> bool:
-    """The first claim names or ties the dominant effect."""
-    return bool(c.answer.claims) and c.names[0] in c.answer.claims[0].tied
-
-
-def no_other(c: ScoredCase) -> bool:
-    """No claim of the catalogue leaves the effect out."""
-    return all(c.names[0] in claim.tied for claim in c.answer.claims if claim.family != OPEN_FORM)
+def heat_right(i: Item) -> bool:
+    """The heat of the finding is that of the effect."""
+    heat = next(claim.heat_W for claim in i.answer.claims if claim.name == i.concealed.name)
+    return abs(heat / i.concealed.heat_W - 1.0) <= SIZE_ERROR
 
 
 RULES = (
-    Rule(
-        key="consistent", text="consistent recordings called consistent", needed=0.95,
-        meaning="Nothing concealed, every parameter inside its prior (or noise or lag misstated): the verdict is "
-                "consistent.",
-        when=healthy, right=lambda c: c.answer.verdict == "consistent",
-    ),
-    Rule(
-        key="false_alarm", text="false alarms", needed=0.05, at_most=True,
-        meaning="Of the same cases: any fault is claimed.",
-        when=lambda c: healthy(c) and c.answered, right=lambda c: not c.answer.silent,
-    ),
-    Rule(
-        key="far", text="parameter far off: called so, and which",
-        meaning="A parameter five standard deviations off, nothing else: a parameter error, that parameter among those "
-                "named.",
-        when=far_off, right=named_parameter,
-    ),
-    Rule(
-        key="single_tied", text="single effect named or in the tie set", needed=0.95,
-        meaning="One effect of practical size: named, or in the tie set (a rival of at least 5 %).",
-        when=single, right=lambda c: c.first_tied,
-    ),
-    Rule(
-        key="single_exact", text="single effect named exactly", needed=0.85,
-        meaning="One effect of practical size: the first name given.",
-        when=single, right=lambda c: bool(c.answer.claims) and c.answer.claims[0].mechanism == c.names[0],
-    ),
-    Rule(
-        key="single_answered", text="single effect named, tied, or reported as not detectable in these data",
-        meaning="One effect of practical size: named or tied, or nothing is claimed and it is reported as not "
-                "detectable.",
-        when=single, right=lambda c: c.first_tied or (c.answer.silent and c.names[0] in c.answer.unseen),
-    ),
-    Rule(
-        key="single_evident", text="single effect that the first scan scores with 10 nats: named or in the tie set",
-        meaning="One effect of practical size that the first scan scores with 10 nats or more: named, or in the tie "
-                "set.",
-        when=lambda c: single(c) and c.evident, right=lambda c: c.first_tied,
-    ),
-    Rule(
-        key="single_small", text="single effect too small to matter: no other named",
-        meaning="One effect too small to matter: no claim of the catalogue leaves it out.",
-        when=lambda c: c.group == "single" and not c.practical() and c.answered, right=no_other,
-    ),
-    Rule(
-        key="place", text="place right, or next to it", needed=0.95,
-        meaning="One effect of practical size, a fault claimed: the most probable place is its node or one linked to "
-                "it. Effects on an input (torque, ambient) have no node and are left out.",
-        when=located, right=lambda c: any(c.answer.node in c.near[node] for node in c.nodes),
-    ),
-    Rule(
-        key="place_exact", text="place right exactly",
-        meaning="The same cases: the most probable place is a node of the effect.",
-        when=located, right=lambda c: c.answer.node in c.truth["effects"][0]["nodes"],
-    ),
-    Rule(
-        key="strength", text="strength within 15 %", needed=0.90,
-        meaning="One effect, exactly named: its mean heat (the size, of a fault of measurement) within 15 % of the "
-                "truth.",
-        when=lambda c: c.strengths() is not None, right=lambda c: within(c, STRENGTH_ERROR),
-    ),
-    Rule(
-        key="strength_as_stated", text="strength within twice the stated error",
-        meaning="The same cases: within twice the standard error that the diagnosis states.",
-        when=lambda c: math.isfinite((c.strengths() or (math.nan,) * 3)[1]), right=lambda c: within(c, None),
-    ),
-    Rule(
-        key="both", text="two effects: both", needed=0.75,
-        meaning="Two effects, both of practical size: both named or tied.",
-        when=double, right=lambda c: set(c.names) <= c.answer.tied,
-    ),
-    Rule(
-        key="one", text="two effects: at least one", needed=0.95,
-        meaning="Two effects, both of practical size: at least one named or tied.",
-        when=double, right=lambda c: bool(set(c.names) & c.answer.tied),
-    ),
-    Rule(
-        key="messy", text="one dominant, six minor: the dominant one first",
-        meaning="One dominant effect among six minor ones: the first claim names it or ties it.",
-        when=messy, right=dominant_first,
-    ),
-    Rule(
-        key="sensor", text="fault of measurement named or in the tie set", needed=0.90,
-        meaning="A fault of measurement of practical size: named or tied.",
-        when=sensor, right=lambda c: c.first_tied,
-    ),
-    Rule(
-        key="sensor_evident",
-        text="fault of measurement that the first scan scores with 10 nats: named or in the tie set",
-        meaning="A fault of measurement that the first scan scores with 10 nats or more: named or tied.",
-        when=lambda c: sensor(c) and c.evident, right=lambda c: c.first_tied,
-    ),
-    Rule(
-        key="outside", text="outside the catalogue: reported as such",
-        meaning="Practical size, in no catalogue: called unexplained or an open form, and no name of the catalogue "
-                "given.",
-        when=outside, right=lambda c: c.answer.unnamed,
-    ),
-    Rule(
-        key="outside_forced", text="outside the catalogue: forced into a name", needed=0.0, at_most=True,
-        meaning="In no catalogue, of any size: a name of the catalogue is given, or a parameter.",
-        when=lambda c: c.group == "outside" and c.answered, right=outside_forced,
-    ),
-    Rule(
-        key="outside_partly", text="of those: reported as well that more is missing",
-        meaning="Of these: reported as well that the name does not explain everything.",
-        when=outside_forced, right=lambda c: c.answer.partly,
-    ),
-    Rule(
-        key="heldout", text="held-out error improves on calibration",
-        meaning="An effect of practical size is there and a claim is made: the held-out error is below that of "
-                "calibration alone.",
-        when=lambda c: c.group != "control" and c.practical() and bool(c.answer.claims)
-        and math.isfinite(c.answer.holdout_K[2]),
-        right=lambda c: c.answer.holdout_K[2] < c.answer.holdout_K[1],
-    ),
+    Rule(name="false alarm", bad=True, when=nothing, right=lambda i: i.answer.alarm,
+         meaning="Nothing concealed, no parameter far outside its prior: the verdict is missing_physics, sensor_fault "
+                 "or unexplained."),
+    Rule(name="control answered right", when=nothing, right=lambda i: i.answer.verdict in i.truth.verdicts,
+         meaning="The same cases: the verdict is consistent or parameter_error."),
+    Rule(name="far parameter named", when=lambda i: bool(i.truth.far),
+         right=lambda i: i.answer.verdict == "parameter_error"
+         and any(is_right(key, c, i.truth) for c in i.answer.claims for key in c.odds if key[0] == PARAMETER),
+         meaning="A parameter five standard deviations off: a parameter error, that parameter among those named."),
+    Rule(name="verdict right", when=lambda i: i.first, right=lambda i: i.answer.verdict in i.truth.verdicts,
+         meaning="All cases: the verdict is one of those that the truth allows."),
+    Rule(name="named", when=in_catalogue, right=lambda i: i.named,
+         meaning="Effects of the catalogue: a finding has the name."),
+    Rule(name="named or tied", when=in_catalogue, right=lambda i: i.tied,
+         meaning="Effects of the catalogue: at most three names of a finding (it and its rivals of at least 5 %) hold "
+                 "the true one."),
+    Rule(name="acts like", when=has_effect, right=lambda i: i.alike,
+         meaning="All effects: named, or the same kind of thing (loss, link, capacity, heat, sensor, input, clock) at "
+                 "the same node or link is reported with the same sign."),
+    Rule(name="place right", when=in_machine, right=lambda i: i.located,
+         meaning="Effects in the machine: the most probable place or that of a finding is a node of the effect or "
+                 "linked to it."),
+    Rule(name="named or tied, visible", when=lambda i: in_catalogue(i) and visible(i), right=lambda i: i.tied,
+         meaning=f"Effects of the catalogue for which D_tool / 2 is {VISIBLE:.0f} nats or more: named or tied."),
+    Rule(name="acts like, visible", when=visible, right=lambda i: i.alike,
+         meaning=f"All effects for which D_tool / 2 is {VISIBLE:.0f} nats or more: acts like."),
+    Rule(name="silent where nothing can be seen", when=lambda i: has_effect(i) and i.concealed.nats[1] < UNSEEN,
+         right=lambda i: i.answer.answered and not i.answer.alarm,
+         meaning=f"Effects for which D_tool / 2 is below {UNSEEN:.0f} nats: no fault is reported."),
+    Rule(name="outside: no wrong name", when=outside,
+         right=lambda i: i.answer.alarm and not any(c.name and c.probability >= CERTAIN for c in i.answer.claims),
+         meaning=f"Effects in no catalogue: a fault is reported, and no name of the catalogue with "
+                 f"{CERTAIN:.0%} or more."),
+    Rule(name="heat within 20 %", when=sized, right=heat_right,
+         meaning="Effects that are named and make heat: the mean heat of the finding is within 20 % of the truth."),
+    Rule(name="held-out error improves", when=lambda i: i.first and has_effect(i) and bool(i.answer.claims)
+         and math.isfinite(i.answer.holdout_K[1]),
+         right=lambda i: i.answer.holdout_K[1] < i.answer.holdout_K[0],
+         meaning="Something is concealed and found: the held-out error is below that of calibration alone."),
 )  # fmt: skip
-# For single effects whose entry was removed from the catalogue.
-REMOVED_RULES = (
-    Rule(
-        key="removed", text="entry removed: reported as outside the catalogue",
-        meaning="Practical size, its entry removed: called unexplained or an open form, and no name of the catalogue "
-                "given.",
-        when=lambda c: c.practical(), right=lambda c: c.answer.unnamed,
-    ),
-    Rule(
-        key="removed_kin", text="entry removed: only a kin named that was tied before",
-        meaning="Practical size, its entry removed: only names that the whole catalogue does not rule out on these "
-                "recordings either.",
-        when=lambda c: c.practical(), right=lambda c: bool(c.answer.known) and c.answer.known <= c.kin,
-    ),
-    Rule(
-        key="removed_forced", text="entry removed: forced into another name", needed=0.0, at_most=True,
-        meaning="Its entry removed, of any size: another name of the catalogue is given, and it is no kin.",
-        when=lambda c: c.answered, right=removed_forced,
-    ),
-    Rule(
-        key="removed_partly", text="entry removed, of those: reported as well that more is missing",
-        meaning="Of these: reported as well that the name does not explain everything.",
-        when=removed_forced, right=lambda c: c.answer.partly,
-    ),
-)  # fmt: skip
-BY_KEY: Mapping[str, Rule] = {rule.key: rule for rule in (*RULES, *REMOVED_RULES)}
-
-
-def apply(key: str, case: ScoredCase) -> bool | None:
-    """Score one case by the rule of a key; None if the rule does not count it."""
-    return BY_KEY[key].apply(case)

@@ -30,10 +30,10 @@ from models.base.types import Array
 ACCEPTED_K, ACCEPTED_SLOW_K = (0.2, 1.0), (0.5, 3.0)  # gearboxes; machines without geometry in means of minutes
 WIDER = 2.0  # times the priors' standard deviations: a factor may go where the data want it
 PER_ROW_K = 5.0  # sd of one row: the fit follows the data, the priors hold what they do not show
-ITERATIONS = 8
-THINNED = 3  # rows of a gearbox that are passed over for one: laws change over minutes
+ITERATIONS = 12
+THINNED = 3  # of rows of 10 s the plant runs every third here: what it does takes minutes
 SETTLED = 0.02  # relative fall of the rms that ends the fit
-HOT_DEGC, COLD_DEGC = 125.0, 25.0  # the hottest reading of a plausible plant lies between
+OIL_DEGC, HOTTEST_DEGC = (30.0, 120.0), 150.0  # the hottest oil of a plausible gearbox, and its hottest reading
 MOST_DRAWS = 60
 
 
@@ -100,12 +100,13 @@ def distance_K(plant: ZooPlant, session: Sequence[Programme]) -> float:
     plant is too cold or too hot.
     """
     gearbox = load_gearbox(plant.gearbox)
-    every = 1 if gearbox.is_parametric else THINNED
+    every = 1 if plant.row_s > MINUTES_S else THINNED
     plant = replace(plant, row_s=every * plant.row_s)
     learnt = [_thinned(p, every) for p in session if p.name.startswith("train")]
     outcomes = [simulate(plant, programme, [Variant(quiet=True)]) for programme in learnt]
-    hottest = max(float(values.max()) for outcome in outcomes for values in outcome.readings.values())
-    if not gearbox.is_parametric and not COLD_DEGC <= hottest <= HOT_DEGC:
+    hottest = {name: max(float(o.readings[name].max()) for o in outcomes) for name in outcomes[0].readings}
+    plausible = max(hottest.values()) <= HOTTEST_DEGC and OIL_DEGC[0] <= hottest.get("oil", OIL_DEGC[0]) <= OIL_DEGC[1]
+    if not gearbox.is_parametric and not plausible:
         return np.inf
     recordings = [
         as_recording(plant, programme, {name: values[0] for name, values in outcome.readings.items()})
@@ -132,7 +133,7 @@ def as_recording(plant: ZooPlant, programme: Programme, readings: dict[str, Arra
         name=programme.name,
         path=Path(f"{programme.name}.csv"),
         sha256="",
-        time=plant.row_s * np.arange(rows),
+        time=plant.row_s * np.arange(rows, dtype=float),
         inputs={name: values[-rows:] for name, values in programme.inputs.items()},
         channels=tuple(Channel(name=name, values=values) for name, values in readings.items()),
         segments=(slice(0, rows),),
@@ -157,7 +158,7 @@ def _problem(gearbox: Gearbox, recordings: Sequence[Recording]) -> Problem:
 def _fitted_rms(problem: Problem) -> float:
     """Root mean square of the residual at the least squares over all rows, [K]."""
     lower, upper = problem.unknowns.bounds
-    z, parts, best, damping = np.zeros(len(problem.unknowns)), None, np.inf, 1e-3
+    z, parts, best, damping = np.zeros(len(problem.unknowns)), None, np.inf, 1e-2
     guesses: Sequence[object] = [None] * len(problem.pieces)
     tried = z
     for _ in range(ITERATIONS):
@@ -189,7 +190,7 @@ def _step(parts: Sequence[Linearised], z: Array, damping: float) -> Array:
 
 
 def _weighted(part: Linearised) -> tuple[Array, Array]:
-    """Residual and columns of all readings, weighted by the rows that a point of the grid stands for."""
+    """Residual and columns of all readings, weighted by the width of the intervals."""
     time = part.trajectory.piece.time
     width = np.sqrt(np.gradient(time) / np.median(np.diff(time)))
     seen = np.isfinite(part.residual)

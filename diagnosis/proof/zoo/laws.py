@@ -83,7 +83,10 @@ class Laws:
 
     def _lay_paths(self) -> None:
         """Linear maps from conductances to the matrix of the balance and to the heat from boundaries."""
-        n, rows, columns, signs = len(self.bodies), [], [], []
+        n = len(self.bodies)
+        rows: list[int] = []
+        columns: list[int] = []
+        signs: list[float] = []
         self.from_boundary: list[tuple[int, int, str]] = []  # path, body, boundary
         for k, ends in enumerate(self.ends):
             i, j = self.body.get(ends[0]), self.body.get(ends[1])

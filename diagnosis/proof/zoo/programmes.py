@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 
 from diagnosis.proof.plant import cycles
@@ -15,7 +13,7 @@ from models.definition.parametric_sections import ParametricDefinition
 PAUSE_H = (4.0, 60.0)  # between recordings of one session
 RANDOM_HEAT = (0.002, 0.006)  # of the typical loss, sd of a heat that no law describes
 HOURS = {"train_1": 12.0, "train_2": 5.0, "train_3": 5.0, "hold_1": 2.5, "hold_2": 3.5}
-DAYS = {"train_1": 21.0, "train_2": 7.0, "train_3": 7.0, "hold_1": 7.0, "hold_2": 7.0}
+DAYS = {"train_1": 14.0, "train_2": 5.0, "train_3": 5.0, "hold_1": 5.0, "hold_2": 5.0}
 MINUTES_S = 60.0  # rows further apart belong to machines that are recorded for weeks
 
 
@@ -27,7 +25,7 @@ def programmes(plant: ZooPlant, rng: np.random.Generator, *, baselines: int = 0)
     plant : ZooPlant
     rng : numpy.random.Generator
     baselines : int
-        How many baselines; each is a session before this one with a clock of its own
+        How many baselines; each is a session before this one, with its clock at 0
 
     Returns
     -------

@@ -16,7 +16,7 @@ from diagnosis.proof.zoo.laws import Acting, Balance, Laws, feel
 from diagnosis.proof.zoo.structure import Change, Moment, Programme, Variant, ZooPlant
 from models.base.types import Array
 
-LONGEST_STEP_S = 60.0
+LONGEST_STEP_S = 200.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,7 +74,7 @@ class Clock:
         self.steps_per_row = max(1, round(plant.row_s / LONGEST_STEP_S))
         self.dt = plant.row_s / self.steps_per_row
         self.steps = (self.rows - 1) * self.steps_per_row
-        at = np.arange(self.rows)
+        at = np.arange(self.rows, dtype=float)
         middle = (np.arange(self.steps) + 0.5) / self.steps_per_row
         self.at_rows = self._times(at)
         self.in_steps = self._times(middle)
@@ -90,7 +90,7 @@ class Clock:
 def integrate(
     plant: ZooPlant, programme: Programme, variants: Sequence[Variant], further: Sequence[Change] = ()
 ) -> tuple[Run, Clock, Laws, list[Change]]:
-    """Integrate a batch: the run, its clock, its laws and the different changes; bridges of `further` have no effect."""
+    """Integrate a batch: the run, its clock, its laws, the different changes; bridges of `further` do nothing yet."""
     clock, B = Clock(plant, programme), len(variants)
     unique = list({id(change): change for variant in variants for change in variant.changes}.values())
     laws = Laws(plant, [change for change in (*unique, *further) if change.kind == "bridge"])
@@ -175,7 +175,7 @@ def rows_of_run(laws: Laws, clock: Clock, variant: Variant, T: Array) -> tuple[M
 
 
 def read_probes(plant: ZooPlant, T: Mapping[str, Array], first: int) -> dict[str, Array]:
-    """What probes show of temperatures of the shape (B, rows), from row `first` on."""
+    """Readings of probes for temperatures of the shape (B, rows), from row `first` on."""
     readings = {}
     for probe in plant.probes:
         seat = sum(weight * T[name] for name, weight in probe.mix.items())

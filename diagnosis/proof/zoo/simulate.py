@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from diagnosis.proof.plant.integrator import GAMMA
-from diagnosis.proof.zoo.laws import Acting, Balance, Laws, feel
-from diagnosis.proof.zoo.run import Clock, HeatBalance, integrate, read_probes, rows_of_run
+from diagnosis.proof.zoo.laws import Acting, Balance, feel
+from diagnosis.proof.zoo.run import HeatBalance, integrate, read_probes, rows_of_run
 from diagnosis.proof.zoo.structure import Change, Moment, Outcome, Programme, Variant, ZooPlant
 from models.base.types import Array
 
@@ -121,9 +122,8 @@ def tangents(
     Outcome
         Derivatives in place of values, one row per direction; ``heat`` is empty
     """
-    run, clock, laws, _ = integrate(plant, programme, [at], further=[c for c in changes if isinstance(c, Change)])
-    linear = _Linearised(laws, clock, at, run.T[:, :, 0], run.T_steps[:, :, 0])
-    return linear.respond(changes, bodies)
+    further = [change for change in changes if isinstance(change, Change)]
+    return Linearised(plant, programme, at=at, further=further).respond(changes, bodies)
 
 
 def _of_all(variant: Variant) -> Acting:
@@ -131,10 +131,41 @@ def _of_all(variant: Variant) -> Acting:
     return [(change, slice(None)) for change in variant.changes]
 
 
-class _Linearised:
-    """A run's time steps, linearised."""
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Push:
+    """Forces and direct responses of one direction.
 
-    def __init__(self, laws: Laws, clock: Clock, at: Variant, T_rows: Array, T_steps: Array) -> None:
+    Attributes
+    ----------
+    into : mapping of int to (Array, Array), shape (steps,)
+        Force on a body in both stages of every step, [W]
+    outputs : mapping of int to Array, shape (rows,)
+        Direct derivative of an output
+    start : Array, shape (bodies,)
+        [K]
+    """
+
+    into: Mapping[int, tuple[Array, Array]]
+    outputs: Mapping[int, Array]
+    start: Array
+
+
+class Linearised:
+    """A run and its linear time steps, for any number of directions.
+
+    Parameters
+    ----------
+    plant : ZooPlant
+    programme : Programme
+    at : Variant
+        The run about which is linearised
+    further : sequence of Change
+        Directions to come; needed of those that are bridges
+    """
+
+    def __init__(self, plant: ZooPlant, programme: Programme, *, at: Variant, further: Sequence[Change] = ()) -> None:
+        run, clock, laws, _ = integrate(plant, programme, [at], further=further)
+        T_rows, T_steps = run.T[:, :, 0], run.T_steps[:, :, 0]
         self.laws, self.clock, self.at, self.T_rows = laws, clock, at, T_rows
         self.acting = _of_all(at)
         start, self.end = T_steps[:-1].T, T_steps[1:].T  # (bodies, steps)
@@ -143,6 +174,8 @@ class _Linearised:
         self.raw_rows = self._moment(clock.at_rows, clock.inputs_at_rows, T_rows.T)
         self.base, self.values = self._evaluate(self.raw)
         self.base_rows, self.values_rows = self._evaluate(self.raw_rows)
+        self.whole = replace(self.raw, T=self.base.T)
+        self.whole_rows = replace(self.raw_rows, T=self.base_rows.T)
         self._stages(start)
 
     def _moment(self, times: tuple[Array, Array], inputs: Mapping[str, Array], T: Array) -> Moment:
@@ -184,7 +217,7 @@ class _Linearised:
         laws = self.laws
         force = (moved.q - base.q - (moved.C - base.C) * rate) / step
         dG = (moved.G - base.G) / step
-        for path in np.flatnonzero(np.any(dG != 0.0, axis=1)):
+        for path in map(int, np.flatnonzero(np.any(dG != 0.0, axis=1))):
             a, b = laws.ends[path]
             i, j = laws.body.get(a), laws.body.get(b)
             flow = dG[path] * ((T[i] if i is not None else base.T[a]) - (T[j] if j is not None else base.T[b]))
@@ -199,6 +232,7 @@ class _Linearised:
     def _both_stages(self, moved: Balance, step: float) -> tuple[Array, Array]:
         return tuple(self._forces(self.base, moved, T, rate, step) for T, rate in self.stages)  # type: ignore[return-value]
 
+    @cached_property
     def _jacobians(self) -> tuple[Array, Array, Array]:
         """Derivatives to temperatures: of both stages at mid-step (steps, n, n), of the outputs (rows, outputs, n)."""
         laws, n = self.laws, len(self.laws.bodies)
@@ -224,33 +258,67 @@ class _Linearised:
     ) -> Balance:
         field = dict(getattr(raw, kind))
         field[name] = field[name] + step
-        moved = replace(raw, **{kind: field})
+        moved = replace(raw, **{kind: field})  # type: ignore[arg-type]
         # A change may make the inputs follow a temperature, and then every law may.
         everything = kind == "T" and any(change.kind == "input" for change, _ in self.acting)
         return self._evaluate(moved, None if everything else values, None if everything else fresh)[0]
 
-    def _along(self, direction: Direction) -> tuple[tuple[Array, Array], Array, Array]:
-        """Forces on both stages (bodies, steps), direct derivative of the outputs (outputs, rows), start (bodies,)."""
-        laws, still = self.laws, np.zeros(len(self.laws.bodies))
+    def _along(self, direction: Direction) -> _Push:
+        still = np.zeros(len(self.laws.bodies))
         if isinstance(direction, StartDirection):
             for name, kelvin in direction.start.items():
-                still[laws.body[name]] = kelvin
-            nothing = np.zeros((len(still), self.clock.steps))
-            return (nothing, nothing), np.zeros((1 + len(laws.boundaries), self.clock.rows)), still
+                still[self.laws.body[name]] = kelvin
+            return _Push(into={}, outputs={}, start=still)
+        if isinstance(direction, Change) and direction.kind != "input" and not self.acting:
+            return self._push_of_change(direction, still)
         if isinstance(direction, ParameterDirection):
             step = RELATIVE_STEP * direction.step
-            fresh = laws.reached_by(("p", direction.name))
+            fresh = self.laws.reached_by(("p", direction.name))
             moved = self._moved(self.raw, self.values, "p", direction.name, step, fresh)
             at_rows = self._moved(self.raw_rows, self.values_rows, "p", direction.name, step, fresh)
             scale = RELATIVE_STEP
         else:
             scale = RELATIVE_STEP if direction.kind == "input" else 1.0
-            moved = self._with_change(self.raw, self.values, self.base, direction, scale)
-            at_rows = self._with_change(self.raw_rows, self.values_rows, self.base_rows, direction, scale)
+            moved = self._with_change(self.raw, self.values, direction, scale)
+            at_rows = self._with_change(self.raw_rows, self.values_rows, direction, scale)
+        early, late = self._both_stages(moved, scale)
         direct = (self._outputs(at_rows) - self._outputs(self.base_rows)) / scale
-        return self._both_stages(moved, scale), direct, still
+        pushed = np.flatnonzero(np.any((early != 0.0) | (late != 0.0), axis=1))
+        return _Push(into={int(k): (early[k], late[k]) for k in pushed}, outputs=dict(enumerate(direct)), start=still)
 
-    def _with_change(self, raw: Moment, values: Array, base: Balance, change: Change, amplitude: float) -> Balance:
+    def _push_of_change(self, change: Change, still: Array) -> _Push:
+        """Forces of a change on a run without changes, without a balance of all bodies."""
+        laws = self.laws
+        amount = np.broadcast_to(change.law(self.whole), self.clock.steps)
+        at_rows = np.broadcast_to(change.law(self.whole_rows), self.clock.rows)
+        into: dict[int, tuple[Array, Array]] = {}
+        outputs = {}
+        if change.kind in ("path", "bridge"):
+            k = laws.path[change.target] if change.kind == "path" else laws.bridge[id(change)]
+            G = amount * self.base.G[k] if change.kind == "path" else amount
+            for own, other in (laws.ends[k], laws.ends[k][::-1]):
+                if own in laws.body:
+                    ends = [
+                        [T[laws.body[name]] if name in laws.body else self.base.T[name] for name in (own, other)]
+                        for T, _ in self.stages
+                    ]
+                    into[laws.body[own]] = (G * (ends[0][1] - ends[0][0]), G * (ends[1][1] - ends[1][0]))
+        elif change.kind == "source":
+            k = laws.source[change.target]
+            watts = amount * self.values[laws.cut[1] + k]
+            into = {int(b): (laws.spread[b, k] * watts,) * 2 for b in np.flatnonzero(laws.spread[:, k])}
+            outputs = {0: laws.is_loss[k] * at_rows * self.values_rows[laws.cut[1] + k]}
+        elif change.kind == "capacity":
+            b = laws.body[change.target]
+            into[b] = (-amount * self.base.C[b] * self.stages[0][1][b], -amount * self.base.C[b] * self.stages[1][1][b])
+        else:
+            into[laws.body[change.target]] = (amount, amount)
+            if change.other in laws.body:
+                into[laws.body[change.other]] = (-amount, -amount)
+            outputs = {0: change.is_loss * at_rows}
+        return _Push(into=into, outputs=outputs, start=still)
+
+    def _with_change(self, raw: Moment, values: Array, change: Change, amplitude: float) -> Balance:
         """Balance with one change more; linear in the amplitude but for inputs."""
         if change.kind == "input":
             felt = feel(raw, [(change, slice(None))])
@@ -266,16 +334,19 @@ class _Linearised:
     def respond(self, directions: Sequence[Direction], kept: Sequence[str]) -> Outcome:
         """Run all directions through the linear time steps."""
         laws, clock = self.laws, self.clock
-        J_1, J_2, J_out = self._jacobians()
+        J_1, J_2, J_out = self._jacobians
         along = [self._along(direction) for direction in directions]
-        dT = np.stack([start for _, _, start in along], axis=1)
+        dT = np.stack([push.start for push in along], axis=1)
         before = dT
         seats = [name for probe in laws.plant.probes for name in probe.mix]
         wanted = [name for name in laws.bodies if name in seats or name in kept]
         of_wanted = np.array([laws.body[name] for name in wanted])
         T = np.empty((len(wanted), len(directions), clock.rows))
-        outputs = np.stack([direct for _, direct, _ in along], axis=1)  # (outputs, directions, rows)
-        for step, (transit, of_middle, forced) in enumerate(self._chunks(J_1, J_2, [forces for forces, _, _ in along])):
+        outputs = np.zeros((1 + len(laws.boundaries), len(directions), clock.rows))
+        for column, push in enumerate(along):
+            for output, direct in push.outputs.items():
+                outputs[output, column] = direct
+        for step, (transit, of_middle, forced) in enumerate(self._chunks(J_1, J_2, along)):
             row, part = divmod(step, clock.steps_per_row)
             if part == 0:
                 T[:, :, row] = dT[of_wanted]
@@ -287,16 +358,17 @@ class _Linearised:
         seat = dict(zip(wanted, T, strict=True)) | dict(zip(laws.boundaries, outputs[1:], strict=True))
         return self._outcome(directions, seat, outputs[0], kept)
 
-    def _chunks(
-        self, J_1: Array, J_2: Array, forces: Sequence[tuple[Array, Array]]
-    ) -> Iterator[tuple[Array, Array, Array]]:
+    def _chunks(self, J_1: Array, J_2: Array, along: Sequence[_Push]) -> Iterator[tuple[Array, Array, Array]]:
         """Per step: matrices of the temperatures at its start and at its middle, and what the directions add."""
         dt, n = self.clock.dt, len(self.laws.bodies)
         eye = np.eye(n)
         for first in range(0, self.clock.steps, ROWS_AT_ONCE):
             part = slice(first, min(first + ROWS_AT_ONCE, self.clock.steps))
             inverse, K = self.inverse[part], self.K[part]
-            F_1, F_2 = (np.stack([pair[k][:, part] for pair in forces], axis=2).transpose(1, 0, 2) for k in (0, 1))
+            F_1, F_2 = np.zeros((2, len(K), n, len(along)))
+            for column, push in enumerate(along):
+                for body, (force_1, force_2) in push.into.items():
+                    F_1[:, body, column], F_2[:, body, column] = force_1[part], force_2[part]
             # rate_1 = inverse (F_1 - K dT), second = dT + (1 - g) dt rate_1, rate_2 = inverse (F_2 - K second)
             decay = inverse @ K
             second = eye - (1.0 - GAMMA) * dt * decay

@@ -1,7 +1,7 @@
 """A plant as an abstract graph: bodies that store heat, paths between them, sources of heat, and probes.
 
 Laws are functions of a :class:`Moment`, many runs at once. What a plant is made of refers to the nominal model by names
-only: ``part_of`` says which node, link or source of the nominal network a thing is a piece of.
+only: ``part_of`` states which node, link or source of the nominal network a thing is a piece of.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ class Body:
     capacity : Law
         [J/K]
     part_of : str
-        Node of the nominal network, e.g. ``housing_lower``
+        Node of the nominal network, e.g. ``housing_lower``; several joined by ``+`` if it is made of several
     """
 
     name: str
@@ -90,8 +90,8 @@ class Path:
     conductance : Law
         [W/K]
     part_of : str
-        Link of the nominal network by its name there, e.g. ``oil-housing_lower``; of a path inside one nominal node
-        the name of this node; empty if the nominal network has no such link
+        Link of the nominal network by its name there, e.g. ``oil-housing_lower``, several joined by ``+``; of a path
+        inside one nominal node the name of this node; empty if the nominal network has no such link
     """
 
     name: str
@@ -114,7 +114,8 @@ class Source:
     is_loss : bool
         True if it is mechanical power that a measured total loss shows
     part_of : str
-        Component or source of the nominal model, e.g. ``churning``, ``mesh_sliding``, ``bearing_1``, ``seal_input``
+        Component or source of the nominal model, e.g. ``churning``, ``mesh_sliding``, ``bearing_1``, ``seal_input``;
+        several joined by ``+``
     """
 
     name: str

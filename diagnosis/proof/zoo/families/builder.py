@@ -107,7 +107,7 @@ class Builder:
         self, name: str, part_of: str, power: Law, into: Mapping[str, float], spread: float = 0.15,
         *, is_loss: bool = True
     ) -> str:  # fmt: skip
-        """Add heat of about so many W that parts among bodies as `into` says; its name."""
+        """Add heat of about so many W that parts among bodies by the shares of `into`; its name."""
         parameter = self.draw(f"P {name}", 1.0, spread)
         total = sum(into.values())
         self.sources.append(

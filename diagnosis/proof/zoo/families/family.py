@@ -1,4 +1,4 @@
-"""What a family of plants is."""
+"""A family of plants."""
 
 from __future__ import annotations
 

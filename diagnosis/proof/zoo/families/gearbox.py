@@ -5,15 +5,16 @@ Bodies are named after the nominal node that they are a piece of: ``housing_lowe
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from typing import Literal
+from collections.abc import Mapping
+from itertools import pairwise
 
 import numpy as np
 
 from diagnosis.proof.zoo.families import films, losses
 from diagnosis.proof.zoo.families.builder import Builder, wander
-from diagnosis.proof.zoo.families.sizes import RPM, T_SERVICE, Sizes
+from diagnosis.proof.zoo.families.design import Design
+from diagnosis.proof.zoo.families.losses import RPM
+from diagnosis.proof.zoo.families.sizes import T_SERVICE, Sizes
 from diagnosis.proof.zoo.structure import Law, Moment, ZooPlant
 from models.assembly.gearbox import Gearbox
 from models.base.types import Array
@@ -21,69 +22,6 @@ from models.base.types import Array
 AIR, FRAME = "air", "frame"
 OIL_TO_WALL = 0.4  # share of the oil's heat transfer that is left at rest
 SPAN_H = 80.0  # of a wandering draught before it repeats
-
-
-@dataclass(frozen=True, kw_only=True)
-class Design:
-    """Structure and laws of one gearbox.
-
-    Attributes
-    ----------
-    layers : int
-        Bodies through every wall, 1 to 3
-    one_box : bool
-        True if all housing parts are one body
-    seats : bool
-        True if every bearing has a seat between its outer ring and the walls
-    oil : str
-        ``sump`` alone, with ``mist``, or with mist and a ``film`` on the upper walls
-    gears : str
-        ``one`` body, ``rim`` and hub, or a ``rotor`` with the shaft
-    shafts : str
-        ``one`` body, two ``halves``, or a middle with ``ends``; read where gears are no rotor
-    bearings : str
-        ``one`` body each, ``rings`` inner and outer, or all of a ``shaft`` in one
-    foundation : str
-        ``none``, a ``link`` to the frame, or a ``bed`` that warms
-    shaft_ends : tuple of str
-        Shafts whose end gives heat to air
-    flanges : tuple of str
-        Shafts that carry a coupling
-    stratified : float
-        Share of the oil's rise that the air over the upper half has
-    draught : float
-        Sd of the logarithm of the convection, wandering
-    friction : Callable
-        Of :mod:`diagnosis.proof.zoo.families.losses`
-    churning : {"changenet_2007", "changenet_2011", "boness", "mauz"}
-    bearing : {"palmgren", "skf"}
-    seal : {"iso_1", "iso_2", "linke"}
-    seal_into : {"oil", "shaft"}
-        Where the heat of a lip goes
-    convection : str
-        Of :data:`diagnosis.proof.zoo.families.films.CONVECTION`
-    gear_film : {"fling_off", "cylinder"}
-    """
-
-    layers: int = 1
-    one_box: bool = False
-    seats: bool = False
-    oil: Literal["sump", "mist", "film"] = "sump"
-    gears: Literal["one", "rim", "rotor"] = "one"
-    shafts: Literal["one", "halves", "ends"] = "one"
-    bearings: Literal["one", "rings", "shaft"] = "one"
-    foundation: Literal["none", "link", "bed"] = "none"
-    shaft_ends: tuple[str, ...] = ()
-    flanges: tuple[str, ...] = ()
-    stratified: float = 0.0
-    draught: float = 0.0
-    friction: Callable[[losses.Contact], Array]
-    churning: str
-    bearing: str
-    seal: str
-    seal_into: str = "oil"
-    convection: str
-    gear_film: str = "fling_off"
 
 
 def build_gearbox(family: str, gearbox: Gearbox, design: Design, rng: np.random.Generator) -> ZooPlant:
@@ -153,7 +91,7 @@ class _Gearbox:
             short = members[0] if len(members) == 1 else "box"
             layers = [b.body(f"{short}.{name}", node, sizes.C_housing * share / design.layers) for name in names]
             slab = sizes.R_wall / share / design.layers
-            for a, c in zip(layers, layers[1:], strict=False):
+            for a, c in pairwise(layers):
                 b.path(a, c, 1.0 / slab, common="wall")
             for part in members:
                 self.at[part] = {"inner": layers[0], "outer": layers[-1], "middle": layers[len(layers) // 2]}
@@ -161,7 +99,7 @@ class _Gearbox:
             air = self.upper_air if (g > 0 or len(groups) == 1) else AIR
             self._to_air(layers[-1], air, share, 0.5 * slab)
         distinct = list(dict.fromkeys(self.at[part]["middle"] for part in self.parts))
-        for below, above in zip(distinct, distinct[1:], strict=False):
+        for below, above in pairwise(distinct):
             b.path(below, above, housing.joint_conductance_W_K, 0.3)
         if design.foundation != "none":
             self._foundation()
@@ -260,7 +198,7 @@ class _Gearbox:
                     b.path(body, self.at[shaft]["middle"], 1.0 / R, 0.2)
                     self.at[gear] = {"rim": body, "hub": body}
             self._gear_to_oil(i, gear)
-            self._shaft_to_air(i, shaft)
+            self._shaft_to_air(shaft)
 
     def _shaft(self, shaft: str, C: float) -> None:
         b, sizes = self.b, self.sizes
@@ -312,7 +250,7 @@ class _Gearbox:
 
             b.path(self.at[gear]["hub"], sump, from_faces, 0.15, name=f"{gear}.faces-oil")
 
-    def _shaft_to_air(self, i: int, shaft: str) -> None:
+    def _shaft_to_air(self, shaft: str) -> None:
         b, section = self.b, self.sizes.shaft(shaft)
         d = section.diameter
         seats = self.sizes.bearings(shaft)
@@ -442,11 +380,11 @@ class _Gearbox:
         b, sizes, pair, oil, design = self.b, self.sizes, self.sizes.pair, self.oil, self.design
         sump, rho = self.at["oil"]["sump"], float(oil.density(T_SERVICE))
         dips, tips = [sizes.dip(0), sizes.dip(1)], sizes.tips_under_oil
-        C_Sp = b.uniform(0.3, 0.8)
+        C_Sp = b.uniform(0.2, 0.45)
         law = {
             "changenet_2007": losses.churning_changenet_2007,
             "changenet_2011": losses.churning_changenet_2011,
-            "boness": losses.churning_boness,
+            "lauster": losses.churning_lauster,
         }.get(design.churning)
 
         def churning(m: Moment) -> Array:
@@ -460,13 +398,12 @@ class _Gearbox:
         b.source("churning", "churning", churning, into, 0.2)
 
     def _bearing_losses(self) -> None:
-        b, sizes, oil, pair = self.b, self.sizes, self.oil, self.sizes.pair
+        b, sizes = self.b, self.sizes
         f_0, f_1 = b.uniform(2.2, 4.0), b.uniform(2e-4, 4e-4)
         R_1, mu_bl = b.uniform(0.9, 1.3) * 1e-6, b.uniform(0.05, 0.13)
         for bearing in self.gearbox.bearing:
             name, ratio, share = bearing.name, sizes.ratio(bearing.shaft), bearing.load_share
             self._bearing_loss(name, ratio, share, (f_0, f_1, R_1, mu_bl))
-        del b, oil, pair
 
     def _bearing_loss(self, name: str, ratio: float, share: float, numbers: tuple[float, float, float, float]) -> None:
         oil, r_b, roller = self.oil, self.sizes.pair.r_b[0], self.sizes.roller(name)

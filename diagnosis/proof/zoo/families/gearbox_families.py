@@ -8,8 +8,9 @@ from __future__ import annotations
 import numpy as np
 
 from diagnosis.proof.zoo.families import losses
+from diagnosis.proof.zoo.families.design import Design
 from diagnosis.proof.zoo.families.family import Family
-from diagnosis.proof.zoo.families.gearbox import Design, build_gearbox
+from diagnosis.proof.zoo.families.gearbox import build_gearbox
 from diagnosis.proof.zoo.families.sizes import refuse_unsplit
 from diagnosis.proof.zoo.structure import ZooPlant
 from models.assembly.gearbox import Gearbox
@@ -44,8 +45,8 @@ def draw_walls(gearbox: Gearbox, rng: np.random.Generator) -> ZooPlant:
 def draw_rings(gearbox: Gearbox, rng: np.random.Generator) -> ZooPlant:
     """Bearings in detail: rings inner and outer, seats, shafts with ends, seals that heat shaft and wall.
 
-    Friction of Benedict and Kelley, churning of Changenet et al. 2011, bearings of SKF without drag, Linke's seals, a box
-    across a stream after Hilpert.
+    Friction of Benedict and Kelley, churning of Changenet et al. 2011, bearings of SKF without drag, Linke's seals, a
+    box across a stream after Hilpert.
     """
     refuse_unsplit(gearbox)
     design = Design(
@@ -70,8 +71,8 @@ def draw_rings(gearbox: Gearbox, rng: np.random.Generator) -> ZooPlant:
 def draw_splash(gearbox: Gearbox, rng: np.random.Generator) -> ZooPlant:
     """Oil in three places, rim and hub: what the gears throw has its own temperature, and a film on the walls.
 
-    Friction of Drozdov and Gavrikov, churning of Boness, bearings of Palmgren, seals of ISO/TR 14179-1, gears as cylinders in
-    oil after Becker, ISO/TR 14179-2 outside.
+    Friction of Drozdov and Gavrikov, churning of Mauz, bearings of Palmgren, seals of ISO/TR 14179-1, gears as
+    cylinders in oil after Becker, ISO/TR 14179-2 outside.
     """
     refuse_unsplit(gearbox)
     design = Design(
@@ -83,7 +84,7 @@ def draw_splash(gearbox: Gearbox, rng: np.random.Generator) -> ZooPlant:
         stratified=float(rng.uniform(0.03, 0.1)) if _coin(rng, 0.3) else 0.0,
         draught=float(rng.uniform(0.02, 0.06)) if _coin(rng, 0.4) else 0.0,
         friction=losses.friction_drozdov,
-        churning="boness",
+        churning="mauz",
         bearing="palmgren",
         seal="iso_1",
         convection="iso_14179",
@@ -95,7 +96,7 @@ def draw_splash(gearbox: Gearbox, rng: np.random.Generator) -> ZooPlant:
 def draw_merged(gearbox: Gearbox, rng: np.random.Generator) -> ZooPlant:
     """Coarser than the nominal model: gear and shaft are one rotor, bearings of a shaft one body, the box often too.
 
-    Friction of Michaelis with a least load, churning of Mauz, bearings of SKF, Linke's seals, McAdams'
+    Friction of O'Donoghue and Cameron, churning of Lauster and Boos, bearings of SKF, Linke's seals, McAdams'
     wall; the box stands on a bed that warms, or on a frame.
     """
     refuse_unsplit(gearbox)
@@ -107,8 +108,8 @@ def draw_merged(gearbox: Gearbox, rng: np.random.Generator) -> ZooPlant:
         bearings="shaft" if _coin(rng, 0.7) else "one",
         foundation="bed" if _coin(rng, 0.6) else "link",
         shaft_ends=_some_shafts(gearbox, rng, 0.3),
-        friction=losses.friction_michaelis,
-        churning="mauz",
+        friction=losses.friction_odonoghue_cameron,
+        churning="lauster",
         bearing="skf",
         seal="linke",
         convection="mcadams",

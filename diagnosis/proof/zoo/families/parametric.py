@@ -78,10 +78,10 @@ def draw_blocks(gearbox: Gearbox, rng: np.random.Generator) -> ZooPlant:
         merge=0.0,
         free=float(rng.uniform(0.15, 0.33)),
         radiant=float(rng.uniform(0.2, 0.5)),
-        contact=float(rng.uniform(0.0, 0.006)),
+        contact=float(rng.uniform(0.0, 0.015)),
         leaks=int(rng.integers(1, 4)),
         near_air=False,
-        draught=0.0,
+        draught=float(rng.uniform(0.03, 0.12)),
         smooth_standstill=True,
         loss="drag",
     )
@@ -330,7 +330,8 @@ class _Machine:
             into: dict[str, float] = {}
             for part, weight in zip(heat.parts, weights, strict=True):
                 into[self.skin[part]] = into.get(self.skin[part], 0.0) + float(weight)
-            self.b.source(heat.name, heat.name, _times(heat.gain, law), into, 0.02, is_loss=False)
+            own = heat.name if len(heat.parts) == 1 else "+".join(f"{heat.name}_{part}" for part in heat.parts)
+            self.b.source(heat.name, own, _times(heat.gain, law), into, 0.02, is_loss=False)
 
     def _factor(self, text: str | None) -> Law:
         """A law that a definition gives as text, of inputs, parameters at their start and temperatures of parts."""

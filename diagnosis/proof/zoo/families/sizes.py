@@ -1,25 +1,34 @@
-"""Numbers of a one-stage gearbox that its definition gives: areas, masses, radii, depths; no law of losses among them."""
+"""Numbers of a one-stage gearbox that its definition gives: areas, masses, radii, depths, but no law of losses."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 
 from diagnosis.proof.zoo.families.losses import RPM, Dip, Roller
 from models.assembly.gearbox import Gearbox
 from models.base.errors import InputError
+from models.base.types import Array
+from models.definition.sections import Shaft
 from models.formulas.ehl import reduced_modulus
+from models.formulas.geometry import GearPair
 
 T_SERVICE = 60.0
 TOP_SPEED, REFERENCE_TORQUE = 0.8021, 94.0 / 350.0  # of the training range, as the programmes
 
 
 def refuse_unsplit(gearbox: Gearbox) -> None:
-    """Raise InputError for a definition that no family splits."""
-    if not gearbox.is_parametric and len(gearbox.stage) != 1:
+    """Raise InputError for a definition that no family of gearboxes splits."""
+    if gearbox.is_parametric:
+        raise InputError(
+            f"{gearbox.file}: has no geometry; this family splits gearboxes with teeth, shafts and bearings: name a "
+            "family for definitions without geometry"
+        )
+    if len(gearbox.stage) != 1:
         raise InputError(
             f"{gearbox.file}: has {len(gearbox.stage)} stages; the zoo splits gearboxes of one stage and definitions "
             "without geometry: give one of these"
@@ -39,7 +48,7 @@ class Sizes:
     gearbox: Gearbox
 
     @cached_property
-    def pair(self):
+    def pair(self) -> GearPair:
         """Geometry of the gear pair."""
         return self.gearbox.stage[0].pair()
 
@@ -80,7 +89,7 @@ class Sizes:
         """Speed [1/min] and torque [N m] where a machine is compared with the next: 0.415 of the top."""
         return 0.415 * self.top_speed, REFERENCE_TORQUE * self.gearbox.training.torque_Nm[1]
 
-    def shaft(self, name: str):
+    def shaft(self, name: str) -> Shaft:
         """Section of a shaft."""
         return next(shaft for shaft in self.gearbox.shaft if shaft.name == name)
 
@@ -92,30 +101,30 @@ class Sizes:
 
     @cached_property
     def C_housing(self) -> float:
-        """Of all walls."""
+        """Heat capacity of all walls."""
         housing = self.gearbox.housing
         area = 0.5 * (housing.inside_area_m2 + housing.outside_area_m2)
         return area * housing.wall_thickness_m * housing.density_kg_m3 * housing.specific_heat_J_kgK
 
     @cached_property
     def C_oil(self) -> float:
-        """Of the filling."""
+        """Heat capacity of the filling."""
         oil = self.gearbox.lubricant()
         return self.gearbox.oil.volume * float(oil.density(T_SERVICE) * oil.specific_heat(T_SERVICE))
 
     def C_gear(self, i: int) -> float:
-        """Of a gear as a ring up to the pitch circle."""
+        """Heat capacity of a gear, a ring up to the pitch circle."""
         bore = 0.5 * self.shaft(self.shafts[i]).diameter
         return float(np.pi * (self.pair.r[i] ** 2 - bore**2) * self.pair.b * self.steel_per_volume)
 
     def C_shaft(self, name: str) -> float:
-        """Of a shaft as a cylinder."""
+        """Heat capacity of a shaft, a cylinder."""
         shaft = self.shaft(name)
         cylinder = self.steel_per_volume * np.pi / 4.0 * shaft.diameter**2 * shaft.length
         return float(shaft.heat_capacity_J_K or cylinder)
 
     def C_bearing(self, name: str) -> float:
-        """Of a bearing."""
+        """Heat capacity of a bearing."""
         bearing = next(b for b in self.gearbox.bearing if b.name == name)
         return float(bearing.mass_kg * self.gearbox.stage[0].material.specific_heat_J_kgK)
 
@@ -123,23 +132,23 @@ class Sizes:
 
     @cached_property
     def R_wall(self) -> float:
-        """Of the whole wall, from face to face."""
+        """Resistance of the whole wall, from face to face."""
         housing = self.gearbox.housing
         area = 0.5 * (housing.inside_area_m2 + housing.outside_area_m2)
         return housing.wall_thickness_m / (housing.conductivity_W_mK * area)
 
     def R_gear(self, i: int) -> float:
-        """Of a gear between shaft and pitch circle."""
+        """Resistance of a gear between shaft and pitch circle."""
         bore = 0.5 * self.shaft(self.shafts[i]).diameter
         return float(np.log(self.pair.r[i] / bore) / (2.0 * np.pi * self.k_steel * self.pair.b))
 
     def R_shaft(self, name: str) -> float:
-        """Of a whole shaft along its length."""
+        """Resistance of a whole shaft along its length."""
         shaft = self.shaft(name)
         return float(shaft.length / (shaft.conductivity_W_mK * np.pi / 4.0 * shaft.diameter**2))
 
     def R_bearing(self, name: str) -> float:
-        """Of a bearing as a solid ring."""
+        """Resistance of a bearing, a solid ring."""
         bearing = next(b for b in self.gearbox.bearing if b.name == name)
         ratio = bearing.outside_diameter_mm / bearing.bore_mm
         return float(np.log(ratio) / (2.0 * np.pi * self.k_steel * bearing.width_mm * 1e-3))
@@ -196,17 +205,15 @@ class Sizes:
             yield from (f"oil-{part.name}", f"{part.name}-air")
             if part.foundation:
                 yield f"{part.name}-frame"
-        yield from (f"{below}-{above}" for below, above in zip(parts, parts[1:], strict=False))
+        yield from (f"{below}-{above}" for below, above in pairwise(parts))
         for gear, shaft in zip(self.gears, self.shafts, strict=True):
             yield from (f"{gear}-oil", f"{gear}-{shaft}", f"mesh-{gear}")
-        for shaft in self.gearbox.shaft:
-            if shaft.length_in_air:
-                yield f"{shaft.name}-air"
+        yield from (f"{shaft.name}-air" for shaft in self.gearbox.shaft if shaft.length_in_air)
         for bearing in self.gearbox.bearing:
             yield f"{bearing.shaft}-{bearing.name}"
             yield from (f"{bearing.name}-{part}" for part in parts)
             yield f"{bearing.name}-oil"
 
-    def omega(self, n: np.ndarray, i: int) -> np.ndarray:
+    def omega(self, n: Array, i: int) -> Array:
         """Speed of a gear, [rad/s], from that of the input, [1/min]."""
-        return n * RPM / (1.0 if i == 0 else self.pair.u)
+        return np.asarray(n * RPM / (1.0 if i == 0 else self.pair.u))

@@ -1,0 +1,164 @@
+"""What the inference engine costs, next to the old one in the same run.
+
+python -m benchmarks.engine [contract] [control] [week] [turbine RECORDING] [--jobs 2]
+
+Contract: 26 h of the FZG rig at 10 s with 7 channels; preparation, calibration, Gram matrix of all candidates of the
+catalogue with 300 further columns, and five refits. ``control`` is the same with nothing concealed. The old engine does
+the same steps without the further columns, as it cannot have them.
+"""
+
+from __future__ import annotations
+
+import argparse
+import multiprocessing
+import resource
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.diagnose import make_recordings
+from diagnosis.candidates.explain import best_fits, calibrated
+from diagnosis.candidates.hypotheses import parameter_hypotheses
+from diagnosis.candidates.hypotheses import scan as old_scan
+from diagnosis.decision.search import candidates_of
+from diagnosis.engine.candidates import refit_all, scan
+from diagnosis.engine.fit import calibrate
+from diagnosis.engine.point import Column
+from diagnosis.engine.prepare import prepare_experiment
+from diagnosis.engine.slopes import Heat
+from diagnosis.inference.evidence import Marginal
+from diagnosis.recordings.read import read_recordings
+from diagnosis.setup.inference_setup import prepare
+from models.assembly.gearbox import load_gearbox
+from models.mechanisms import CATALOGUE
+
+FURTHER, REFITS = 300, 5
+LONGEST_KNOT = 60  # intervals over which a further column keeps its value
+
+
+@dataclass
+class Clock:
+    """Wall time of stages, [s]."""
+
+    stages: dict[str, float] = field(default_factory=dict)
+    _since: float = field(default_factory=time.perf_counter)
+
+    def mark(self, name: str) -> None:
+        """End a stage."""
+        now = time.perf_counter()
+        self.stages[name] = now - self._since
+        self._since = now
+
+
+def new(gearbox: str, recordings: Sequence[str], jobs: int) -> dict[str, float]:
+    """All stages of the new engine."""
+    machine = load_gearbox(gearbox)
+    read, clock = read_recordings(recordings, machine.network()), Clock()
+    setup, experiment = prepare_experiment(machine, read)
+    clock.mark("preparation")
+    fit = calibrate(experiment)
+    clock.mark("calibration")
+    candidates = candidates_of(setup, CATALOGUE)
+    clock.mark("candidates placed")
+    rng, parts = np.random.default_rng(0), experiment.machine.model.n
+    further = []
+    for piece in experiment.pieces:
+        count = len(piece.steps)
+        columns = []
+        for _ in range(FURTHER):
+            knots = rng.standard_normal((count // LONGEST_KNOT + 1, parts))
+            into = np.repeat(knots, LONGEST_KNOT, axis=0)[:count] * setup.loss_W * 0.01
+            into = np.pad(into, ((0, 0), (0, len(experiment.machine.model.coupled))))
+            columns.append(Column(heat=Heat(into=into, loss=np.zeros(count))))
+        further.append(columns)
+    clock.mark("-")
+    found = scan(fit, candidates, further)
+    clock.mark("columns and Gram matrix")
+    given = found.gram.given(found.unknowns).given(found.further)
+    singles = found.singles(given)
+    found.pairs(given)
+    clock.mark("all singles and pairs")
+    order = np.argsort(-singles.log_bayes)[:REFITS]
+    chosen = [(found.candidates[k], found.best[k], float(singles.value[k])) for k in order]
+    refit_all(fit, chosen, jobs=jobs)
+    clock.mark("five refits")
+    del clock.stages["-"]
+    return clock.stages
+
+
+def old(gearbox: str, recordings: Sequence[str], jobs: int) -> dict[str, float]:
+    """The same steps of the old engine, without pairs and further columns."""
+    machine = load_gearbox(gearbox)
+    read, clock = read_recordings(recordings, machine.network()), Clock()
+    setup = prepare(machine, read, ())
+    clock.mark("preparation")
+    base = calibrated(setup.train)
+    clock.mark("calibration")
+    candidates = [*candidates_of(setup, CATALOGUE), *parameter_hypotheses(base.problem)]
+    clock.mark("candidates placed")
+    scored = old_scan(base.problem, base.fit, Marginal.of(base.fit), candidates, jobs=jobs)
+    clock.mark("columns and Gram matrix")
+    best_fits(base, [(base, s) for s in scored[:REFITS]], jobs=jobs)
+    clock.mark("five refits")
+    return clock.stages
+
+
+def _apart(queue: Any, run: Callable[..., dict[str, float]], arguments: tuple[Any, ...]) -> None:
+    stages = run(*arguments)
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    queue.put((stages, peak / (1e9 if sys.platform == "darwin" else 1e6)))
+
+
+def measured(run: Callable[..., dict[str, float]], *arguments: Any) -> tuple[dict[str, float], float]:
+    """Stages [s] and peak memory [GB] in a fresh process (of that process alone)."""
+    context = multiprocessing.get_context("spawn")
+    queue = context.Queue()
+    process = context.Process(target=_apart, args=(queue, run, arguments))
+    process.start()
+    result = queue.get()
+    process.join()
+    return result
+
+
+def compare(name: str, gearbox: str, recordings: Sequence[str], jobs: int) -> None:
+    """Print one table."""
+    (ours, ours_GB), (theirs, theirs_GB) = (measured(run, gearbox, recordings, jobs) for run in (new, old))
+    print(f"\n{name}: wall time on {jobs} processes [s]\n{'':28}{'new':>8}{'share':>8}{'old':>8}{'ratio':>8}")
+    whole = sum(ours.values())
+    for stage, seconds in ours.items():
+        before = theirs.get(stage)
+        tail = "" if before is None else f"{before:8.2f}{seconds / before:8.2f}"
+        print(f"{stage:28}{seconds:8.2f}{seconds / whole:8.0%}{tail}")
+    total = sum(theirs.values())
+    print(f"{'sum':28}{whole:8.2f}{'':8}{total:8.2f}{whole / total:8.2f}")
+    print(f"{'peak memory of one process':28}{ours_GB:8.2f}{'':8}{theirs_GB:8.2f}   GB", flush=True)
+
+
+def main() -> None:
+    """Run the sizes that are asked for."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("sizes", nargs="*", default=["contract"], help="contract, control, week, turbine RECORDING")
+    parser.add_argument("--jobs", type=int, default=2)
+    given = parser.parse_args()
+    sizes = list(given.sizes)
+    with tempfile.TemporaryDirectory() as folder:
+        while sizes:
+            size = sizes.pop(0)
+            if size == "turbine":
+                compare("turbine", "la_haute_borne", [sizes.pop(0)], given.jobs)
+                continue
+            room = Path(folder) / size
+            room.mkdir()
+            hours = (168.0,) if size == "week" else (20.0, 6.0)
+            made = make_recordings(room, hours, 10.0, effect=None if size == "control" else "windage")
+            compare(size, "fzg", [str(path) for path in made], given.jobs)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,51 @@
+"""Cases of the zoo for the verb ``conceal``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from builder.base import console
+from models.base.atomic_write import atomic_folder
+
+
+def conceal_in_zoo(
+    *,
+    seed: int,
+    output: Path,
+    truth: Path | None,
+    cases: int | None,
+    machine: str | None,
+    families: str | None,
+    group: str | None,
+    baselines: int,
+    session_deviation: float | None,
+) -> None:
+    """Draw and write cases of the zoo; arguments are the options of the verb.
+
+    Raises
+    ------
+    InputError
+        If a group or family is not known, a definition cannot be split, or a folder cannot be written to.
+    """
+    from diagnosis.proof.cases.case_files import keep_apart, keep_other_cases
+    from diagnosis.proof.zoo.conceal_zoo import conceal_zoo, random_zoo_plans, zoo_plans
+
+    names = None if families is None else [name.strip() for name in families.split(",")]
+    number = 1 if cases is None else cases
+    if group is None:
+        plans = random_zoo_plans(seed, number, families=names, machine=machine)
+    else:
+        plans = zoo_plans(seed, {group: number}, families=names, machine=machine)
+    recordings, truth = output / "recordings", truth or output / "truth"
+    keep_apart(recordings, truth)
+    with (
+        atomic_folder(recordings) as stage,
+        atomic_folder(truth) as truth_stage,
+        console.progress_bar("concealing") as progress,
+    ):
+        made = conceal_zoo(plans, recordings=stage, truth=truth_stage, flat=cases is None, baselines=baselines,
+                           session_deviation=session_deviation, progress=progress)  # fmt: skip
+        keep_other_cases(stage, recordings)
+        keep_other_cases(truth_stage, truth)
+    for name in made:
+        console.out.print(f"wrote {recordings / ('' if cases is None else name)}, {truth / name}.json")

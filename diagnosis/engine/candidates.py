@@ -1,0 +1,335 @@
+"""Candidates as columns: every mechanism at its places in its best shape, faults of measurement, parameters out of
+their priors, all whitened and put into one Gram matrix with the unknowns.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
+
+from diagnosis.candidates.hypotheses import Hypothesis
+from diagnosis.engine.fit import Experiment, Fit, Linear
+from diagnosis.engine.gram import Given, Gram, Strengths
+from diagnosis.engine.point import AT_ONCE, Column, Machine, Point
+from diagnosis.engine.slopes import Heat
+from diagnosis.engine.unknown import Group, NetworkParameter, TermParameter, Unknown
+from diagnosis.forward.network_on_grid import NetworkOnGrid
+from diagnosis.forward.observation import readings
+from diagnosis.forward.term_on_grid import TermOnGrid
+from models.base.errors import InputError
+from models.base.parallel import run_parallel
+from models.base.types import Array
+from models.terms.term import Term
+
+START_SHARES = (1.0, 0.3, 0.03)  # of the strength that the scan promises
+ROUGH, ITERATIONS = 3, 10
+CANDIDATE = Group(name="candidate")
+VALUES_AT_ONCE = 800_000  # of heats that are held together, per part: bounds the memory of long recordings
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Scan:
+    """All candidates in their best shapes, and one Gram matrix.
+
+    Attributes
+    ----------
+    candidates : tuple of Hypothesis
+    best : tuple of int
+        Best variant of each
+    log_bayes : Array, shape (candidates,)
+        Mean over the variants, against nothing
+    gram : Gram
+        Of residual, unknowns, further columns, candidates: in this order
+    unknowns, further, of_candidates : range
+        Their places among the labels of the Gram matrix
+    sd, sign : Array, shape (candidates,)
+        Prior of the strengths
+    """
+
+    candidates: tuple[Hypothesis, ...]
+    best: tuple[int, ...]
+    log_bayes: Array
+    gram: Gram
+    unknowns: range
+    further: range
+    of_candidates: range
+    sd: Array
+    sign: NDArray[np.int_]
+
+    def singles(self, given: Given) -> Strengths:
+        """Every candidate alone, in its best shape; the sign of a clock fault is that of its variant."""
+        return given.singles(self.of_candidates, self.sd, self.sign)
+
+    def pairs(
+        self, given: Given, which: Sequence[int] | None = None
+    ) -> tuple[NDArray[np.intp], NDArray[np.intp], Array]:
+        """Log Bayes factors of all pairs of some candidates; their places among the candidates, and the factors."""
+        some = np.asarray(range(len(self.candidates)) if which is None else which, dtype=np.intp)
+        a, b = np.triu_indices(len(some), 1)
+        i, j, first = some[a], some[b], self.of_candidates.start
+        log_bayes = given.pairs(first + i, first + j, (self.sd[i], self.sd[j]), (self.sign[i], self.sign[j]))
+        return i, j, log_bayes
+
+
+def scan(fit: Fit, candidates: Sequence[Hypothesis], further: Sequence[Sequence[Column]] = ()) -> Scan:
+    """Linearise everything at a fit.
+
+    Parameters
+    ----------
+    fit : Fit
+    candidates : sequence of Hypothesis
+        Terms; parameters out of their priors follow from the unknowns themselves
+    further : sequence, one per piece, of sequences of Column
+        Further unknowns such as model error, per unit
+
+    Returns
+    -------
+    Scan
+    """
+    candidates = [c for c in candidates if c.term is not None]
+    count, model = len(fit.z), fit.experiment.machine.model
+    on_grid = [_on_grid(model, c.term) for c in candidates if c.term is not None]
+    base = _whitened_base(fit, further)
+    known = range(count)
+    chosen = [np.empty((len(W), len(candidates)), order="F") for W in base]
+    best, mean, signs = [], [], []
+    weigh = _Marginal(fit, base)
+    intervals = max(len(part.point.trajectory.T) for part in fit.parts)
+    for some in _chunks(candidates, max(16, min(AT_ONCE, VALUES_AT_ONCE // intervals))):
+        blocks = [part.filter(_columns(part, [(candidates[i], on_grid[i]) for i in some])) for part in fit.parts]
+        products, first = weigh.products(blocks), 0
+        for i in some:
+            c, n = candidates[i], len(candidates[i].variants)
+            way = np.sign(c.variants[:, 0]).astype(int)
+            sign = way if len(set(way.tolist())) > 1 else np.full(n, c.sign)
+            assert c.term is not None  # noqa: S101 - only terms are here
+            found = products.singles(np.arange(first, first + n), c.term.strength.sd, sign)
+            at = int(np.argmax(found.log_bayes))
+            best.append(at)
+            mean.append(float(np.logaddexp.reduce(found.log_bayes) - np.log(n)))
+            signs.append(int(sign[at]))
+            for kept, block in zip(chosen, blocks, strict=True):
+                kept[:, i] = block[:, first + at]
+            first += n
+    extra = base[0].shape[1] - 1 - count
+    return Scan(
+        candidates=tuple(candidates), best=tuple(best), log_bayes=np.array(mean),
+        gram=_gram_of(fit, base, chosen, [c.label for c in candidates]), unknowns=known,
+        further=range(count, count + extra), of_candidates=range(count + extra, count + extra + len(candidates)),
+        sd=np.array([c.term.strength.sd for c in candidates if c.term is not None]), sign=np.array(signs, dtype=int),
+    )  # fmt: skip
+
+
+class _Marginal:
+    """Products of columns with the residual, and of themselves, with the unknowns of a fit marginalised."""
+
+    def __init__(self, fit: Fit, base: Sequence[Array]) -> None:
+        self._J = [part.columns for part in fit.parts]
+        count = len(fit.z)
+        self._root = np.linalg.cholesky(np.eye(count) + np.sum([J.T @ J for J in self._J], axis=0))
+        along = np.sum([J.T @ W[:, 0] for J, W in zip(self._J, base, strict=True)], axis=0)
+        at = solve_triangular(self._root.T, solve_triangular(self._root, along, lower=True))
+        self._rest = [W[:, 0] - J @ at for J, W in zip(self._J, base, strict=True)]
+
+    def products(self, blocks: Sequence[Array]) -> Given:
+        """Of whitened columns of every piece, shape (M, n) each; only row and column 0 and the diagonal are filled."""
+        along = np.sum([J.T @ X for J, X in zip(self._J, blocks, strict=True)], axis=0)
+        along = solve_triangular(self._root, along, lower=True)
+        a = np.sum([X.T @ rest for X, rest in zip(blocks, self._rest, strict=True)], axis=0)
+        b = np.sum([np.einsum("mn,mn->n", X, X) for X in blocks], axis=0) - np.einsum("un,un->n", along, along)
+        matrix = np.zeros((1 + len(a), 1 + len(a)))
+        matrix[0, 1:], matrix[range(1, 1 + len(a)), range(1, 1 + len(a))] = a, b
+        return Given(matrix=matrix, log_determinant=0.0)
+
+
+def _whitened_base(fit: Fit, further: Sequence[Sequence[Column]]) -> list[Array]:
+    """Residual at the priors' middles, unknowns and further columns of every piece, whitened, shape (M, n)."""
+    result = []
+    for index, part in enumerate(fit.parts):
+        more, count = further[index] if further else [], len(fit.z)
+        W = np.empty((len(part.residual), 1 + count + len(more)))
+        W[:, 0], W[:, 1 : 1 + count] = part.residual + part.columns @ fit.z, part.columns
+        for first in range(0, len(more), AT_ONCE):
+            some = more[first : first + AT_ONCE]
+            W[:, 1 + count + first : 1 + count + first + len(some)] = part.filter(part.point.responses(some))
+        result.append(W)
+    return result
+
+
+def _gram_of(fit: Fit, base: Sequence[Array], chosen: Sequence[Array], names: Sequence[str]) -> Gram:
+    """Gram matrices by recording."""
+    of_recording: dict[str, Array] = {}
+    determinants: dict[str, float] = {}
+    rows: dict[str, int] = {}
+    for part, W, X in zip(fit.parts, base, chosen, strict=True):
+        name = part.point.trajectory.piece.recording
+        across = W.T @ X
+        of_recording[name] = of_recording.get(name, 0.0) + np.block([[W.T @ W, across], [across.T, X.T @ X]])
+        determinants[name] = determinants.get(name, 0.0) + part.filter.log_determinant
+        rows[name] = rows.get(name, 0) + int(np.isfinite(part.point.residual).sum())
+    known = [unknown.parameter.name for unknown in fit.experiment.unknowns]
+    extra = base[0].shape[1] - 1 - len(known)
+    labels = (*known, *(f"further_{i}" for i in range(extra)), *names)
+    return Gram(labels=labels, of_recording=of_recording, log_determinants=determinants, rows=rows)
+
+
+def _columns(part: Linear, some: Sequence[tuple[Hypothesis, TermOnGrid]]) -> Array:
+    """Readings per unit of strength for all variants of some candidates, shape (K + 1, channels, n)."""
+    columns = [column for candidate, on_grid in some for column in candidate_columns(part.point, candidate, on_grid)]
+    return part.point.responses(columns)
+
+
+def candidate_columns(point: Point, candidate: Hypothesis, on_grid: TermOnGrid) -> Iterator[Column]:
+    """Columns per unit of strength of all variants of a candidate."""
+    term = on_grid.term
+    if term.kind != "sensor":
+        into, loss = on_grid.heat(point.trajectory, candidate.variants)
+        into, loss = np.nan_to_num(into), np.nan_to_num(loss)
+        coupled = len(point.machine.model.coupled)
+        for v in range(into.shape[2]):
+            yield Column(heat=Heat(into=np.pad(into[:, :, v], ((0, 0), (0, coupled))), loss=loss[:, v]))
+        return
+    read = readings(point.machine.model, point.trajectory, point.sensors)
+    for variant in candidate.variants:
+        values = np.array(variant)
+        values[0] *= term.strength.sd  # by a difference of the size that the fault typically has
+        yield Column(shown=(on_grid.distorted(point.trajectory, point.sensors, read, values) - read) / values[0])
+
+
+def _chunks(candidates: Sequence[Hypothesis], most: int) -> Iterator[list[int]]:
+    chunk: list[int] = []
+    columns = 0
+    for index, candidate in enumerate(candidates):
+        if chunk and columns + len(candidate.variants) > most:
+            yield chunk
+            chunk, columns = [], 0
+        chunk.append(index)
+        columns += len(candidate.variants)
+    if chunk:
+        yield chunk
+
+
+@lru_cache(maxsize=2048)
+def _on_grid(model: NetworkOnGrid, term: Term) -> TermOnGrid:
+    return TermOnGrid(model, term)
+
+
+def with_candidate(fit: Fit, candidate: Hypothesis, variant: int) -> tuple[Experiment, Array]:
+    """The experiment with one candidate as further unknowns, and their ``z`` in one of its shapes.
+
+    Parameters
+    ----------
+    fit : Fit
+    candidate : Hypothesis
+        Of a term
+    variant : int
+        Shape, with strength 1
+
+    Returns
+    -------
+    experiment : Experiment
+    z : Array, shape (further unknowns,)
+    """
+    experiment, term = fit.experiment, candidate.term
+    assert term is not None  # noqa: S101 - parameters out of their priors have no term
+    machine = experiment.machine
+    names = tuple(p.name for p in term.parameters)
+    added: list[Unknown]
+    if term.kind in ("sensor", "signal"):
+        machine = Machine(machine.model, (*machine.terms, term))
+        added = [TermParameter(parameter=p, group=CANDIDATE, label=term.label, names=names) for p in term.parameters]
+    else:
+        network = term.apply(machine.model.network)
+        machine = Machine(NetworkOnGrid(network, machine.model.losses), machine.terms)
+        added = [NetworkParameter(parameter=p, group=CANDIDATE) for p in term.parameters]
+    z = [unknown.z_of(value) for unknown, value in zip(added, candidate.variants[variant].tolist(), strict=True)]
+    return replace(experiment, machine=machine, unknowns=(*experiment.unknowns, *added)), np.array(z)
+
+
+def refit(fit: Fit, candidate: Hypothesis, variant: int, strength: float, *, iterations: int = ITERATIONS) -> Fit:
+    """A candidate fitted together with everything else, judged by the noise filters of a fit without it.
+
+    The other unknowns start where the straight line puts them with the candidate there. What it does may be far from
+    a straight line; so smaller shares of the promised strength are tried until a rough fit agrees better with the
+    readings than without the candidate.
+
+    Raises
+    ------
+    ArithmeticError
+        If there is no solution at any of the starts.
+    """
+    one = replace(candidate, variants=candidate.variants[[variant]])
+    assert candidate.term is not None  # noqa: S101 - parameters out of their priors have no term
+    on_grid = _on_grid(fit.experiment.machine.model, candidate.term)
+    normal, right = np.eye(len(fit.z)), np.zeros(len(fit.z))
+    for part in fit.parts:
+        x = part.filter(_columns(part, [(one, on_grid)]))[:, 0]
+        normal += part.columns.T @ part.columns
+        right += part.columns.T @ x
+    aside = -np.linalg.solve(normal, right)  # of the other unknowns, per unit of strength
+    guesses = [part.point.trajectory for part in fit.parts]
+    experiment, own = with_candidate(fit, candidate, variant)
+    lower, upper = experiment.bounds
+    added = experiment.unknowns[len(fit.z)]
+    rough: list[Fit] = []
+    for share in START_SHARES:
+        own[0] = added.z_of(share * strength)
+        z = np.clip(np.concatenate([fit.z + share * strength * aside, own]), lower, upper)
+        try:
+            rough.append(experiment.fit(z, guesses, iterations=ROUGH))
+        except ArithmeticError:
+            continue
+        if rough[-1].objective < fit.objective:
+            break
+    if not rough:
+        raise ArithmeticError(f"no simulation has a solution with {candidate.label}")
+    best = min(rough, key=lambda one: one.objective)
+    return experiment.fit(best.z, [part.point.trajectory for part in best.parts], iterations=iterations - ROUGH)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Reached:
+    """End of a refit, small enough to travel between processes.
+
+    Attributes
+    ----------
+    log_evidence : float
+    z : Array, shape (unknowns + further unknowns,)
+    courses : tuple of Array, shape (K + 1, parts)
+        Temperatures of every piece, [degC]
+    """
+
+    log_evidence: float
+    z: Array
+    courses: tuple[Array, ...]
+
+
+def refit_all(
+    fit: Fit, chosen: Sequence[tuple[Hypothesis, int, float]], *, jobs: int = 1, iterations: int = ITERATIONS
+) -> list[Reached | None]:
+    """Several candidates, each fitted together with everything else; None if there is no solution.
+
+    Parameters
+    ----------
+    fit : Fit
+    chosen : sequence of (Hypothesis, int, float)
+        Candidate, variant and strength, see :func:`refit`
+    jobs : int
+        Processes
+    iterations : int
+    """
+    return run_parallel(_refitted, [(fit, *one, iterations) for one in chosen], jobs=jobs, batches=jobs)
+
+
+def _refitted(fit: Fit, candidate: Hypothesis, variant: int, strength: float, iterations: int) -> Reached | None:
+    try:
+        found = refit(fit, candidate, variant, strength, iterations=iterations)
+    except (InputError, ArithmeticError, np.linalg.LinAlgError):
+        return None
+    return Reached(log_evidence=found.log_evidence, z=found.z,
+                   courses=tuple(part.point.trajectory.T for part in found.parts))  # fmt: skip

@@ -1,0 +1,274 @@
+"""The most probable values of the unknowns: Gauss-Newton in whitened residuals, over all pieces of all recordings."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from scipy.linalg import solve_triangular
+
+from diagnosis.engine.point import Column, Machine, Point, Setting
+from diagnosis.engine.unknown import Unknown, in_scope
+from diagnosis.forward.grid import Piece
+from diagnosis.forward.trajectory import ROUNDS, Trajectory, simulate
+from diagnosis.inference.whitening import Noise, Whitening
+from models.base.errors import InputError
+from models.base.types import Array
+
+FIRST_ITERATIONS, ITERATIONS = 4, 8
+SETTLED = 0.05  # of a prior standard deviation
+LEAST_GAIN = 0.02  # of the objective
+NEAR = 0.5  # of a prior sd: every other time, after so short a step, the columns are kept
+FARTHEST_STEP = 3.0  # of the z in one iteration
+SLOW_PATIENCE = 3  # times as many iterations where switches follow slow measurements: steps are small there
+PASSES = 3  # simulations of a piece whose inputs follow its own temperatures, before there is a trajectory
+Guess = Trajectory | Array | None
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Experiment:
+    """Recordings to be explained by a machine.
+
+    Attributes
+    ----------
+    machine : Machine
+    pieces : tuple of Piece
+    unknowns : tuple of Unknown
+    noise : tuple of Noise
+        One per piece
+    starts : tuple of Array, shape (parts,)
+        Best guess of the start temperatures of every piece, [degC]
+    filters : tuple of Whitening or None
+        Noise filters of an earlier fit of the same pieces; None: those of the point itself. Evidences count their
+        determinants, so those of different filters can be compared
+    """
+
+    machine: Machine
+    pieces: tuple[Piece, ...]
+    unknowns: tuple[Unknown, ...]
+    noise: tuple[Noise, ...]
+    starts: tuple[Array, ...]
+    filters: tuple[Whitening, ...] | None = None
+
+    @property
+    def slow(self) -> bool:
+        """True if the rows of any piece lie minutes apart."""
+        return any(piece.slow for piece in self.pieces)
+
+    @cached_property
+    def bounds(self) -> tuple[Array, Array]:
+        """Lowest and highest ``z``, each of shape (unknowns,)."""
+        lower, upper = zip(*(unknown.bounds() for unknown in self.unknowns), strict=True)
+        return np.array(lower), np.array(upper)
+
+    def setting(self, index: int, z: Array) -> Setting:
+        """Values with which a piece is simulated."""
+        piece = self.pieces[index]
+        setting = Setting.of(self.machine, piece)
+        for unknown, value in zip(self.unknowns, z.tolist(), strict=True):
+            if in_scope(unknown, piece.recording):
+                unknown.act(setting, value)
+        return setting
+
+    def point(self, index: int, z: Array, guess: Guess = None, *, rounds: int = ROUNDS) -> Point:
+        """Simulate a piece.
+
+        Raises
+        ------
+        ArithmeticError
+            If the temperatures leave all bounds.
+        """
+        setting, model = self.setting(index, z), self.machine.model
+        known = guess if isinstance(guess, Trajectory) else None
+        follows = any(shift.follows for shift in self.machine.shifts)
+        for _ in range(PASSES if follows and known is None else 1):
+            piece = setting.piece(self.pieces[index], known)
+            known = simulate(model, piece, setting.values, self.starts[index], guess=guess, rounds=rounds,
+                             settled_K=0.01)  # fmt: skip
+            guess = known
+        assert known is not None  # noqa: S101 - one pass at least
+        return Point(setting=setting, trajectory=known, read=setting.read(known))
+
+    def columns(self, point: Point, z: Array) -> Array:
+        """Derivatives of the readings of a piece, shape (K + 1, channels, unknowns); 0 outside an unknown's scope."""
+        recording = point.trajectory.piece.recording
+        return point.responses([
+            unknown.column(point, value) if in_scope(unknown, recording) else Column()
+            for unknown, value in zip(self.unknowns, z.tolist(), strict=True)
+        ])  # fmt: skip
+
+    def linearised(self, index: int, z: Array, guess: Guess, *, rounds: int = 1, kept: Linear | None = None) -> Linear:
+        """Simulate a piece and whiten its residual and columns; `kept`: with the columns of that linearisation."""
+        point = self.point(index, z, guess, rounds=rounds)
+        if kept is not None:
+            residual = kept.filter(point.residual[:, :, None])[:, 0]
+            return Linear(point=point, filter=kept.filter, residual=residual, columns=kept.columns)
+        columns = self.columns(point, z)
+        if not np.isfinite(columns).all():
+            raise ArithmeticError(
+                f"the laws of {self.pieces[index].recording} have no derivative with these parameters"
+            )
+        if self.filters is None:
+            whiten = Whitening(self.machine.model, point.trajectory, point.sensors, self.noise[index])
+        else:
+            whiten = self.filters[index]
+        white = whiten(np.concatenate([point.residual[:, :, None], columns], axis=2))
+        return Linear(point=point, filter=whiten, residual=white[:, 0], columns=white[:, 1:])
+
+    def fit(
+        self, z: Array | None = None, guesses: Sequence[Guess] | None = None, *, iterations: int = ITERATIONS
+    ) -> Fit:
+        """The most probable unknowns.
+
+        Parameters
+        ----------
+        z : Array, shape (unknowns,), optional
+            Where to start; by default the middles of the priors
+        guesses : sequence, one per piece, optional
+            Where to linearise first, see :func:`diagnosis.forward.trajectory.simulate`
+        iterations : int
+            At most
+
+        Raises
+        ------
+        ArithmeticError
+            If there is no solution where it should start.
+        """
+        lower, upper = self.bounds
+        z = np.zeros(len(self.unknowns)) if z is None else np.clip(z, lower, upper)
+        parts = self._attempt(z, guesses)
+        if parts is None:
+            raise ArithmeticError("the simulation has no solution where the fit should start")
+        if self.filters is None:  # those of the start serve on the way, those of the end afterwards
+            first = self.with_filters(parts).fit(z, [part.point.trajectory for part in parts], iterations=iterations)
+            final = self._attempt(first.z, [part.point.trajectory for part in first.parts])
+            return Fit(experiment=self, z=first.z, parts=first.parts if final is None else tuple(final))
+        objective, damping, settled, fresh = _objective(parts, z), 0.0, False, True
+        for _ in range(iterations * (SLOW_PATIENCE if self.slow else 1)):
+            step = _step(parts, z, damping, lower, upper)
+            longest = float(np.max(np.abs(step), initial=0.0))
+            step *= min(1.0, FARTHEST_STEP / max(longest, 1e-12))
+            tried = np.clip(z + step, lower, upper)
+            keep = fresh and longest < NEAR
+            trial = self._attempt(tried, [part.point.trajectory for part in parts], parts if keep else None)
+            reached = np.inf if trial is None else _objective(trial, tried)
+            if trial is not None and reached <= objective + 1e-6:
+                gained, z, parts, objective = objective - reached, tried, trial, reached
+                damping, settled, fresh = 0.2 * damping, False, not keep
+                if float(np.max(np.abs(step), initial=0.0)) < SETTLED or gained < LEAST_GAIN:
+                    break
+            elif not fresh:
+                parts, fresh = self._attempt(z, [part.point.trajectory for part in parts]) or parts, True
+                objective = _objective(parts, z)
+            else:
+                # The trajectory may not have settled at these values yet, and look better than it is. Where switches
+                # follow means over minutes it never settles to the last.
+                again = None if settled or self.slow else self._attempt(z, [part.point.trajectory for part in parts])
+                if again is not None:
+                    parts, objective = again, _objective(again, z)
+                settled, damping = True, max(4.0 * damping, 1.0)
+                if damping > 1e3:
+                    break
+        if not fresh:
+            parts = self._attempt(z, [part.point.trajectory for part in parts]) or parts
+        return Fit(experiment=self, z=z, parts=tuple(parts))
+
+    def with_filters(self, parts: Sequence[Linear]) -> Experiment:
+        """Experiment that is judged by the noise filters of a linearisation."""
+        return replace(self, filters=tuple(part.filter for part in parts))
+
+    def _attempt(
+        self, z: Array, guesses: Sequence[Guess] | None, kept: Sequence[Linear] | None = None
+    ) -> list[Linear] | None:
+        try:
+            if guesses is None:
+                return [self.linearised(i, z, None, rounds=ROUNDS) for i in range(len(self.pieces))]
+            # Trajectory and unknowns settle together: one round per iteration.
+            return [self.linearised(i, z, guess, kept=None if kept is None else kept[i])
+                    for i, guess in enumerate(guesses)]  # fmt: skip
+        except (InputError, ArithmeticError, np.linalg.LinAlgError):
+            return None
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Linear:
+    """A piece linearised and whitened.
+
+    Attributes
+    ----------
+    point : Point
+    filter : Whitening
+    residual : Array, shape (M,)
+    columns : Array, shape (M, unknowns)
+    """
+
+    point: Point
+    filter: Whitening
+    residual: Array
+    columns: Array
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Fit:
+    """The most probable values of the unknowns of an experiment.
+
+    Attributes
+    ----------
+    experiment : Experiment
+    z : Array, shape (unknowns,)
+    parts : tuple of Linear
+    """
+
+    experiment: Experiment
+    z: Array
+    parts: tuple[Linear, ...]
+
+    @property
+    def objective(self) -> float:
+        """Squared whitened residuals and priors."""
+        return _objective(self.parts, self.z)
+
+    @cached_property
+    def covariance(self) -> Array:
+        """Of ``z``, from the curvature, shape (unknowns, unknowns)."""
+        root = solve_triangular(self._root, np.eye(len(self.z)), lower=True)
+        return np.asarray(root.T @ root)
+
+    @cached_property
+    def log_evidence(self) -> float:
+        """Laplace approximation, determinants of the noise filters included, up to ``-M/2 ln 2 pi``."""
+        filters = sum(part.filter.log_determinant for part in self.parts)
+        return -0.5 * (self.objective + filters) - float(np.log(np.diag(self._root)).sum())
+
+    @cached_property
+    def _root(self) -> Array:
+        normal = np.eye(len(self.z))
+        for part in self.parts:
+            normal += part.columns.T @ part.columns
+        return np.asarray(np.linalg.cholesky(normal))
+
+
+def calibrate(experiment: Experiment) -> Fit:
+    """The unknowns of the nominal machine: a first fit chooses the noise filters, a second one is judged by them."""
+    first = experiment.fit(iterations=FIRST_ITERATIONS)
+    return experiment.with_filters(first.parts).fit(first.z, [part.point.trajectory for part in first.parts])
+
+
+def _objective(parts: Sequence[Linear], z: Array) -> float:
+    """Squared whitened residuals and priors."""
+    return float(sum(part.residual @ part.residual for part in parts) + z @ z)
+
+
+def _step(parts: Sequence[Linear], z: Array, damping: float, lower: Array, upper: Array) -> Array:
+    """The step to the minimum of the linearised objective; what it pushes out of its bounds stays where it is."""
+    normal, right = np.eye(len(z)), -np.array(z)
+    for part in parts:
+        normal += part.columns.T @ part.columns
+        right += part.columns.T @ part.residual
+    normal += damping * np.diag(np.diag(normal))
+    free = ~((z <= lower) & (right < 0.0)) & ~((z >= upper) & (right > 0.0))
+    step = np.zeros(len(z))
+    step[free] = np.linalg.solve(normal[np.ix_(free, free)], right[free])
+    return step

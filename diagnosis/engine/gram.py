@@ -1,0 +1,189 @@
+r"""One Gram matrix of everything that may be in the readings, and the evidences that follow from it.
+
+Per recording :math:`G = W^T W` with the whitened :math:`W = [r, J, N, X]`: residual, unknowns, model error, candidates.
+With unknowns :math:`z \sim N(0, A^2)` (A the amplitudes, 0 for what is absent) the evidence of the readings is
+
+.. math:: \ln p = -\tfrac12 \left(r^T M^{-1} r + \ln |M| + \ln |S|\right), \quad M = 1 + W_b A^2 W_b^T
+
+(S: the noise), and every further question is a Schur complement of G.
+
+References
+----------
+MacKay, Information Theory, Inference, and Learning Algorithms (2003), chapter 28, for the evidence; Petersen, Pedersen,
+The Matrix Cookbook (2012), sections 3.2 and 9.1, for inverse and determinant by Schur complements; Owen, Communications
+in Statistics B 9 (1980), for the bivariate normal distribution by the T function.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cholesky, solve_triangular
+from scipy.special import log_ndtr, ndtr, owens_t
+
+from models.base.types import Array
+
+Index = Sequence[int] | NDArray[np.intp]
+Signs = NDArray[np.int_]
+LEAST = 1e-9  # of a column's square: less shows nothing
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Gram:
+    """Inner products of whitened columns.
+
+    Attributes
+    ----------
+    labels : tuple of str
+        Names of the columns after the first, which is the residual at the priors' middles
+    of_recording : mapping of str to Array, shape (columns, columns)
+    log_determinants : mapping of str to float
+        Of the noise of every recording
+    rows : mapping of str to int
+        Readings of every recording
+    """
+
+    labels: tuple[str, ...]
+    of_recording: Mapping[str, Array]
+    log_determinants: Mapping[str, float]
+    rows: Mapping[str, int]
+
+    def given(
+        self, unknowns: Index, amplitudes: Array | float = 1.0, recordings: Collection[str] | None = None
+    ) -> Given:
+        """Everything else, with some unknowns marginalised.
+
+        Parameters
+        ----------
+        unknowns : sequence of int
+            Places of the unknowns among :attr:`labels`
+        amplitudes : Array, shape (unknowns,), or float
+            Prior standard deviations
+        recordings : collection of str, optional
+            Which recordings count; all by default
+        """
+        names = list(self.of_recording) if recordings is None else [n for n in self.of_recording if n in recordings]
+        whole = np.sum([self.of_recording[name] for name in names], axis=0)
+        nothing = Given(matrix=whole, log_determinant=sum(self.log_determinants[name] for name in names))
+        return nothing.given(unknowns, amplitudes)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Strengths:
+    """Evidence and size of columns as further unknowns.
+
+    Attributes
+    ----------
+    log_bayes : Array, shape (n,)
+        Log Bayes factor against nothing
+    value, sd : Array, shape (n,)
+        Most probable strength and its standard deviation
+    """
+
+    log_bayes: Array
+    value: Array
+    sd: Array
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Given:
+    """Inner products with some unknowns marginalised; columns keep their places.
+
+    Attributes
+    ----------
+    matrix : Array, shape (columns, columns)
+        Inner products in the metric of noise and unknowns
+    log_determinant : float
+        Of noise and unknowns
+    """
+
+    matrix: Array
+    log_determinant: float
+
+    @property
+    def log_evidence(self) -> float:
+        """Log evidence of the readings, up to ``-M/2 ln 2 pi``."""
+        return -0.5 * (float(self.matrix[0, 0]) + self.log_determinant)
+
+    def given(self, unknowns: Index, amplitudes: Array | float = 1.0) -> Given:
+        """Products with further unknowns marginalised; see :meth:`Gram.given`."""
+        at = np.asarray(unknowns, dtype=int) + 1
+        scale = np.broadcast_to(np.asarray(amplitudes, dtype=float), at.shape)
+        at, scale = at[scale > 0.0], scale[scale > 0.0]
+        if not len(at):
+            return self
+        inner = scale[:, None] * self.matrix[np.ix_(at, at)] * scale
+        inner[np.diag_indices(len(at))] += 1.0
+        root = cholesky(inner, lower=True)
+        across = solve_triangular(root, scale[:, None] * self.matrix[at], lower=True)
+        return Given(matrix=self.matrix - across.T @ across,
+                     log_determinant=self.log_determinant + 2.0 * float(np.log(np.diag(root)).sum()))  # fmt: skip
+
+    def most_probable(self, unknowns: Index, amplitudes: Array | float = 1.0) -> Array:
+        """Most probable values of unknowns that are not marginalised yet, shape (unknowns,)."""
+        at = np.asarray(unknowns, dtype=int) + 1
+        scale = np.broadcast_to(np.asarray(amplitudes, dtype=float), at.shape)
+        inner = scale[:, None] * self.matrix[np.ix_(at, at)] * scale + np.eye(len(at))
+        return np.asarray(scale * np.linalg.solve(inner, scale * self.matrix[at, 0]))
+
+    def singles(self, candidates: Index, sd: Array | float, sign: NDArray[np.int_] | int = 0) -> Strengths:
+        """Every candidate alone.
+
+        Parameters
+        ----------
+        candidates : sequence of int
+            Places among the labels
+        sd : Array, shape (n,), or float
+            Prior of the strengths
+        sign : Array of int, shape (n,), or int
+            Which strengths are possible: -1, 1, or 0 for both
+        """
+        at = np.asarray(candidates, dtype=int) + 1
+        a, b = self.matrix[0, at], np.maximum(self.matrix[at, at], 0.0)
+        sd, sign = np.broadcast_to(np.asarray(sd, float), at.shape), np.broadcast_to(np.asarray(sign), at.shape)
+        precision = b + 1.0 / np.square(sd)
+        value, own = a / precision, 1.0 / np.sqrt(precision)
+        log_bayes = 0.5 * a * value - 0.5 * np.log1p(b * np.square(sd))
+        log_bayes = log_bayes + np.where(sign != 0, np.log(2.0) + log_ndtr(sign * value / own), 0.0)
+        return Strengths(log_bayes=np.where(b > LEAST, log_bayes, 0.0), value=value, sd=own)
+
+    def pairs(self, first: Index, second: Index, sd: tuple[Array, Array], sign: tuple[Signs, Signs]) -> Array:
+        """Log Bayes factors of pairs of candidates against nothing.
+
+        Parameters
+        ----------
+        first, second : sequence of int
+            Places of the members of n pairs among the labels
+        sd, sign : tuple of two Array, shape (n,)
+            Of either member, see :meth:`singles`
+
+        Returns
+        -------
+        Array, shape (n,)
+        """
+        i, j = np.asarray(first, dtype=int) + 1, np.asarray(second, dtype=int) + 1
+        M, (s, t) = self.matrix, (np.asarray(each, dtype=float) for each in sd)
+        a, b = s * M[0, i], t * M[0, j]
+        A, B, C = 1.0 + s * s * M[i, i], 1.0 + t * t * M[j, j], s * t * M[i, j]
+        determinant = A * B - C * C
+        x, y = (B * a - C * b) / determinant, (A * b - C * a) / determinant
+        log_bayes = 0.5 * (a * x + b * y) - 0.5 * np.log(determinant)
+        sx, sy, rho = np.sqrt(B / determinant), np.sqrt(A / determinant), -C / np.sqrt(A * B)
+        u, v = sign
+        left, right = u * x / sx, v * y / sy
+        inside = np.where(u == 0, log_ndtr(right) + np.log(2.0), log_ndtr(left) + np.log(2.0))
+        both = np.log(np.maximum(_both_below(left, right, u * v * rho), 1e-300)) + np.log(4.0)
+        return np.asarray(log_bayes + np.where((u == 0) & (v == 0), 0.0, np.where((u != 0) & (v != 0), both, inside)))
+
+
+def _both_below(h: Array, k: Array, rho: Array) -> Array:
+    """Bivariate normal distribution function, by Owen's T."""
+    h, k = (np.where(np.abs(x) < 1e-12, 1e-12, x) for x in (h, k))
+    root = np.sqrt(np.maximum(1.0 - rho * rho, 1e-15))
+    apart = np.where(h * k < 0.0, 0.5, 0.0)
+    return np.asarray(
+        0.5 * (ndtr(h) + ndtr(k)) - owens_t(h, (k / h - rho) / root) - owens_t(k, (h / k - rho) / root) - apart
+    )

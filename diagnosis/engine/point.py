@@ -1,0 +1,276 @@
+"""One piece of a recording, simulated at some values of the unknowns, and what is linear about it there."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+
+from diagnosis.engine.slopes import Heat, LawSlopes
+from diagnosis.forward.grid import Piece
+from diagnosis.forward.network_on_grid import Balance, NetworkOnGrid
+from diagnosis.forward.observation import Sensors, reading_columns, readings
+from diagnosis.forward.term_on_grid import TermOnGrid, input_slope, moved_heat
+from diagnosis.forward.trajectory import Trajectory, parameter_heats, settled_balance
+from models.base.types import Array
+from models.quantities.quantities import is_total_loss
+from models.terms.term import Term
+
+AT_ONCE = 256  # columns that go through the network and the filter together
+MEMORY_STEP = 0.02  # of a prior sd, for parameters that decide on switches and memories
+
+
+class Machine:
+    """A network on the grid with the terms outside it, and all derivatives of its laws.
+
+    Parameters
+    ----------
+    model : NetworkOnGrid
+    terms : sequence of Term
+        What shifts an input or distorts a reading
+    """
+
+    def __init__(self, model: NetworkOnGrid, terms: Sequence[Term] = ()) -> None:
+        self.model, self.terms = model, tuple(terms)
+        self.inputs = model.laws.inputs
+        self.parameter_index = {p.name: i for i, p in enumerate(model.network.parameters)}
+        self.on_grid = {term.label: TermOnGrid(model, term) for term in terms}
+
+    @cached_property
+    def slopes(self) -> LawSlopes:
+        """Derivatives of the laws by parameters that vary, inputs and losses."""
+        network = self.model.network
+        varying = [p.name for p in network.parameters if p.sd > 0.0 and not self.by_difference(p.name)]
+        return LawSlopes(self.model, [*varying, *self.inputs, *(f"P_{c}" for c in network.components)])
+
+    def by_difference(self, parameter: str) -> bool:
+        """True if a parameter decides on memories, or laws have no symbolic form: finite differences serve then."""
+        return parameter in self.model.remembered or bool(self.model.network.numeric_laws)
+
+    @property
+    def shifts(self) -> list[TermOnGrid]:
+        """Terms that shift an input."""
+        return [on_grid for on_grid in self.on_grid.values() if on_grid.term.kind == "signal"]
+
+    @property
+    def distortions(self) -> list[TermOnGrid]:
+        """Terms that distort a reading."""
+        return [on_grid for on_grid in self.on_grid.values() if on_grid.term.kind == "sensor"]
+
+
+@dataclass(kw_only=True, eq=False)
+class Setting:
+    """Values with which one piece is simulated and read; unknowns write into it."""
+
+    machine: Machine
+    recording: str
+    channels: tuple[str, ...]
+    inputs: tuple[str, ...]
+    values: Array
+    samples: Array
+    lag: Array
+    bias: Array
+    loss_gain: float = 1.0
+    loss_delay: float = 0.0
+    clock: float = 0.0
+    of_terms: Mapping[str, Array] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, machine: Machine, piece: Piece) -> Setting:
+        """As delivered: parameters at their start, ideal sensors, inputs as recorded."""
+        nothing = np.zeros(len(piece.channels))
+        return cls(
+            machine=machine, recording=piece.recording, channels=piece.channels, inputs=machine.inputs,
+            values=machine.model.start.copy(), samples=np.array(piece.samples), lag=nothing.copy(), bias=nothing.copy(),
+            of_terms={term.label: np.array([p.start for p in term.parameters]) for term in machine.terms},
+        )  # fmt: skip
+
+    @property
+    def sensors(self) -> Sensors:
+        """The sensors."""
+        return Sensors(channels=self.channels, lag=self.lag, bias=self.bias, loss_gain=self.loss_gain,
+                       loss_delay=self.loss_delay)  # fmt: skip
+
+    def piece(self, piece: Piece, known: Trajectory | None) -> Piece:
+        """The piece with its inputs as they probably were."""
+        piece = replace(piece, samples=self.samples, lags=self.lag)
+        for shift in self.machine.shifts:
+            piece = shift.adjusted(piece, self.of_terms[shift.term.label], known)
+        clocks = [d.constant(self.of_terms[d.term.label]) for d in self.machine.distortions if d.term.form == "clock"]
+        late = self.clock + sum(clocks)
+        return replace(piece, late_s=late) if late else piece
+
+    def read(self, trajectory: Trajectory) -> Array:
+        """Readings of the sensors, faults included, shape (K + 1, channels)."""
+        read = readings(self.machine.model, trajectory, self.sensors)
+        for fault in self.machine.distortions:
+            read = fault.distorted(trajectory, self.sensors, read, self.of_terms[fault.term.label])
+        return self._by_clock(trajectory, read)
+
+    def passed_on(self, trajectory: Trajectory, changes: Array) -> Array:
+        """Changes of readings as faulty sensors and clock show them, shape (K + 1, channels, ...)."""
+        for fault in self.machine.distortions:
+            changes = fault.passed_on(trajectory, self.sensors, changes, self.of_terms[fault.term.label])
+        return self._by_clock(trajectory, changes)
+
+    def _by_clock(self, trajectory: Trajectory, read: Array) -> Array:
+        if not self.clock:
+            return read
+        time = trajectory.piece.time
+        at = np.interp(time - self.clock, time, np.arange(len(time)))
+        low = np.minimum(at.astype(int), len(time) - 2)
+        share = (at - low).reshape(-1, *[1] * (read.ndim - 1))
+        late = (1.0 - share) * read[low] + share * read[low + 1]
+        losses = [is_total_loss(name) for name in self.channels]
+        late[:, losses] = read[:, losses]
+        return np.asarray(late)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Column:
+    """Effect of one unknown per unit: heat in the network, a change of the readings, or both.
+
+    Attributes
+    ----------
+    heat : Heat or None
+    reading : Array, shape (K + 1, channels), or None
+        Change of the readings of sound sensors, [K] or [W]
+    shown : Array, shape (K + 1, channels), or None
+        Change of what is recorded, faults of sensors and clock included
+    """
+
+    heat: Heat | None = None
+    reading: Array | None = None
+    shown: Array | None = None
+
+    def __mul__(self, factor: float) -> Column:
+        return Column(
+            heat=None if self.heat is None else self.heat * factor,
+            reading=None if self.reading is None else self.reading * factor,
+            shown=None if self.shown is None else self.shown * factor,
+        )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Point:
+    """One piece at some values of the unknowns.
+
+    Attributes
+    ----------
+    setting : Setting
+    trajectory : Trajectory
+    read : Array, shape (K + 1, channels)
+        What the sensors read, [degC] or [W]
+    """
+
+    setting: Setting
+    trajectory: Trajectory
+    read: Array
+
+    @property
+    def machine(self) -> Machine:
+        """The network."""
+        return self.setting.machine
+
+    @cached_property
+    def sensors(self) -> Sensors:
+        """The sensors."""
+        return self.setting.sensors
+
+    @property
+    def residual(self) -> Array:
+        """Measured minus read, shape (K + 1, channels), NaN where nothing was measured."""
+        return np.asarray(self.trajectory.piece.measured - self.read)
+
+    @cached_property
+    def balance(self) -> Balance:
+        """The heat balance along the trajectory."""
+        return settled_balance(self.machine.model, self.trajectory)
+
+    @cached_property
+    def _heats(self) -> dict[str, Heat]:
+        return self.machine.slopes.along(self.trajectory, self.balance)
+
+    def heat_per(self, name: str) -> Heat:
+        """Net heat per unit of a parameter or of an input that no loss depends on."""
+        model, index = self.machine.model, self.machine.parameter_index
+        if name in index and self.machine.by_difference(name):
+            p = model.network.parameters[index[name]]
+            value = float(self.trajectory.values[index[name]])
+            step = np.array([MEMORY_STEP * p.sd * (value if p.log else 1.0)])
+            into, loss = parameter_heats(model, self.trajectory, self.balance, [index[name]], step)
+            return Heat(into=into[:, :, 0], loss=loss[:, 0])
+        if model.network.numeric_laws:
+            into, loss = input_slope(model, self.trajectory, name)
+            return Heat(into=self._whole(into), loss=loss)
+        return self._heats[name]
+
+    def heat_per_relative(self, name: str) -> Heat:
+        """Net heat per relative change of an input, through the losses too."""
+        model, trajectory = self.machine.model, self.trajectory
+        at = self.machine.inputs.index(name)
+        if name == "torque" and not model.network.numeric_laws:
+            heat = self.heat_per(name) * trajectory.piece.inputs[:, at]
+            for component, slope in zip(model.network.components, trajectory.tangent.torque_slope.T, strict=True):
+                heat = heat + self._heats[f"P_{component}"] * slope
+            return heat
+        samples, step = np.array(trajectory.piece.samples), 0.01
+        samples[..., at] *= 1.0 + step
+        into, loss = moved_heat(model, trajectory, replace(trajectory.piece, samples=samples))
+        return Heat(into=self._whole(into / step), loss=loss / step)
+
+    def term_column(self, label: str, index: int, step: float) -> Column:
+        """Column per unit of a parameter of a term outside the network."""
+        term, trajectory, model = self.machine.on_grid[label], self.trajectory, self.machine.model
+        values = self.setting.of_terms[label]
+        moved = np.array(values)
+        moved[index] += step
+        if term.term.kind == "sensor":
+            read = readings(model, trajectory, self.sensors)
+            there = term.distorted(trajectory, self.sensors, read, moved)
+            here = term.distorted(trajectory, self.sensors, read, values)
+            return Column(shown=(there - here) / step)
+        # The trajectory's piece is shifted already: only the difference is added.
+        there = term.adjusted(trajectory.piece, moved, trajectory).samples
+        here = term.adjusted(trajectory.piece, values, trajectory).samples
+        piece = replace(trajectory.piece, samples=trajectory.piece.samples + there - here)
+        into, loss = moved_heat(model, trajectory, piece)
+        return Column(heat=Heat(into=self._whole(into / step), loss=loss / step))
+
+    def clock_column(self) -> Array:
+        """Change of the readings per second of delay, shape (K + 1, channels)."""
+        there, here = (
+            replace(self.setting, clock=self.setting.clock + way).read(self.trajectory) for way in (1.0, -1.0)
+        )
+        return np.asarray(0.5 * (there - here))
+
+    def reading(self, channel: str, values: Array) -> Array:
+        """A change of one channel, shape (K + 1, channels)."""
+        result = np.zeros(self.read.shape)
+        result[:, self.sensors.channels.index(channel)] = values
+        return result
+
+    def _whole(self, into: Array) -> Array:
+        return np.pad(into, ((0, 0), (0, len(self.machine.model.coupled))))
+
+    def responses(self, columns: Sequence[Column]) -> Array:
+        """Change of the readings per unit of many columns, in one pass, shape (K + 1, channels, columns)."""
+        model, trajectory = self.machine.model, self.trajectory
+        result = np.zeros((*self.read.shape, len(columns)))
+        heated = [i for i, column in enumerate(columns) if column.heat is not None]
+        for first in range(0, len(heated), AT_ONCE):
+            some = heated[first : first + AT_ONCE]
+            heats = [heat for i in some if (heat := columns[i].heat) is not None]
+            T = trajectory.response(np.stack([heat.into for heat in heats], axis=-1))
+            loss = np.stack([heat.loss for heat in heats], axis=-1)
+            result[:, :, some] = reading_columns(model, trajectory, self.sensors, T, loss)
+        for i, column in enumerate(columns):
+            if column.reading is not None:
+                result[:, :, i] += column.reading
+        result = self.setting.passed_on(trajectory, result)
+        for i, column in enumerate(columns):
+            if column.shown is not None:
+                result[:, :, i] += column.shown
+        return result

@@ -1,0 +1,142 @@
+"""From recordings to an experiment: the usual unknowns of a network, its sensors and its inputs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from diagnosis.engine.fit import Experiment
+from diagnosis.engine.point import Machine
+from diagnosis.engine.unknown import (
+    CALIBRATION,
+    Group,
+    InputGain,
+    InputOffset,
+    LossDelay,
+    LossGain,
+    NetworkParameter,
+    SensorBias,
+    SensorLag,
+    Unknown,
+)
+from diagnosis.forward.grid import slow_rows
+from diagnosis.inference.unknowns import (
+    AMBIENT_ASSUMED_SD_K,
+    AMBIENT_SD_K,
+    BIAS_SD_K,
+    LAG_S,
+    LAG_SD,
+    LOSS_DELAY_ROWS,
+    LOSS_GAIN_SD,
+    LOSS_OFFSET_SD_W,
+    SHORTEST_LAG_S,
+    TORQUE_GAIN_SD,
+)
+from diagnosis.recordings.recording import Recording
+from diagnosis.setup.inference_setup import CAPACITY_SD, InferenceSetup, prepare
+from diagnosis.setup.shaft import torque_gain
+from models.assembly.gearbox import Gearbox
+from models.network.laws import Parameter
+from models.quantities.quantities import TOTAL_LOSS, is_total_loss
+from models.simulation.thermal_network import ThermalNetwork
+
+WIDEST = 1e6
+
+
+def prepare_experiment(
+    gearbox: Gearbox, recordings: Sequence[Recording], holdout: Sequence[Recording] = (), *, even: bool = False
+) -> tuple[InferenceSetup, Experiment]:
+    """Set up an experiment with the recordings to learn from.
+
+    Parameters
+    ----------
+    gearbox : Gearbox
+    recordings, holdout : sequence of Recording
+        Without any held out, the last quarter of every recording is
+    even : bool
+        True for intervals of one length, see :func:`diagnosis.forward.grid.pieces`
+
+    Returns
+    -------
+    setup : InferenceSetup
+        Scale, channels and held-out pieces
+    experiment : Experiment
+    """
+    setup = prepare(gearbox, recordings, holdout, even=even)
+    model, old = setup.train.model, setup.train
+    stated = {c.name: c for r in recordings for c in r.channels}
+    steps = np.array([(stated[name].resolution or 0.0) if name in stated else 0.0 for name in setup.channels])
+    # A display that rounds is off by up to half a step, however many rows are averaged while it stands still.
+    noise = tuple(replace(n, floor_sd=np.maximum(n.floor_sd, steps / np.sqrt(12.0))) for n in old.noise)
+    unknowns = usual_unknowns(
+        model.network, recordings, setup.channels, interval=setup.scale.interval,
+        gain_of_torque=torque_gain(gearbox.network()),
+    )  # fmt: skip
+    return setup, Experiment(
+        machine=Machine(model),
+        pieces=tuple(old.pieces),
+        unknowns=tuple(unknowns),
+        noise=noise,
+        starts=tuple(old.starts),
+    )
+
+
+def usual_unknowns(
+    network: ThermalNetwork, recordings: Sequence[Recording], channels: Sequence[str], *, interval: float,
+    gain_of_torque: Parameter | None = None, group: Group = CALIBRATION,
+) -> list[Unknown]:  # fmt: skip
+    """Parameters of the network that may vary, sensors and inputs.
+
+    Parameters
+    ----------
+    network : ThermalNetwork
+    recordings : sequence of Recording
+        What their mappings state of sensors is their prior: lag, its standard deviation and tolerance of the bias
+    channels : sequence of str
+    interval : float
+        Between rows, [s]
+    gain_of_torque : Parameter or None
+        Prior of the gain of a torque that follows from a power
+    group : Group
+    """
+    stated, slow = {c.name: c for r in recordings for c in r.channels}, slow_rows(recordings)
+    found: list[Unknown] = []
+    for p in network.parameters:
+        if p.sd > 0.0:
+            wider = replace(p, sd=max(p.sd, CAPACITY_SD)) if p.name.startswith("C_") else p
+            found.append(NetworkParameter(parameter=wider, group=group))
+    for name in channels:
+        if is_total_loss(name):
+            gain = Parameter(name="loss_gain", start=1.0, sd=LOSS_GAIN_SD, lower=0.5, upper=2.0, log=False)
+            zero = _normal("bias_P_loss", "W", LOSS_OFFSET_SD_W)
+            found += [LossGain(parameter=gain, group=group),
+                      SensorBias(parameter=zero, group=group, channel=TOTAL_LOSS)]  # fmt: skip
+            if not slow:
+                delay = _normal("delay_P_loss", "s", LOSS_DELAY_ROWS * interval)
+                found.append(LossDelay(parameter=delay, group=group))
+            continue
+        sensor = stated.get(name)
+        tolerance = (sensor.bias_sd if sensor else None) or 0.0
+        bias = _normal(f"bias_{name}", "K", max(tolerance, BIAS_SD_K))
+        found.append(SensorBias(parameter=bias, group=group, channel=name))
+        if not slow:
+            start = max((sensor.lag_s if sensor else None) or LAG_S, SHORTEST_LAG_S)
+            sd = sensor.lag_sd_s / start if sensor is not None and sensor.lag_sd_s is not None else LAG_SD
+            lag = Parameter(name=f"lag_{name}", unit="s", start=start, sd=sd, lower=0.01, upper=1e4, log=True,
+                            description=f"time constant of the sensor at {name}")  # fmt: skip
+            found.append(SensorLag(parameter=lag, group=group, channel=name))
+    if network.components:
+        torque = Parameter(name="torque_gain", start=1.0, sd=TORQUE_GAIN_SD, lower=0.5, upper=2.0, log=False,
+                           description="true over recorded torque")  # fmt: skip
+        found.append(InputGain(parameter=gain_of_torque or torque, group=group, input="torque"))
+    if "T_ambient" in network.inputs:
+        assumed = any("T_ambient" in r.assumed for r in recordings)
+        offset = _normal("ambient_offset", "K", AMBIENT_ASSUMED_SD_K if assumed else AMBIENT_SD_K)
+        found.append(InputOffset(parameter=offset, group=group, input="T_ambient"))
+    return found
+
+
+def _normal(name: str, unit: str, sd: float) -> Parameter:
+    return Parameter(name=name, unit=unit, start=0.0, sd=sd, lower=-WIDEST, upper=WIDEST, log=False)

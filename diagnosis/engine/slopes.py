@@ -1,0 +1,126 @@
+"""Exact derivatives of the heat balance by anything that its laws name: parameters, inputs, states, losses.
+
+The laws are symbolic expressions, so are their derivatives.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+import sympy as sp
+
+from diagnosis.forward.network_on_grid import Balance, NetworkOnGrid
+from diagnosis.forward.trajectory import Trajectory
+from models.base.types import Array
+from models.network.laws import compile_function, function_source, symbol
+from models.simulation.thermal_network import BASE_SIGNALS
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Heat:
+    """Further heat in a network on all intervals, per unit of something.
+
+    Attributes
+    ----------
+    into : Array, shape (K, parts + coupled)
+        Net heat into every part [W], then the rates of the states that are solved with the temperatures
+    loss : Array, shape (K,)
+        What of it is mechanical loss at fixed temperatures, [W]
+    """
+
+    into: Array
+    loss: Array
+
+    def __add__(self, other: Heat) -> Heat:
+        return Heat(into=self.into + other.into, loss=self.loss + other.loss)
+
+    def __mul__(self, factor: Array | float) -> Heat:
+        factor = np.asarray(factor, dtype=float)
+        return Heat(into=self.into * (factor[:, None] if factor.ndim else factor), loss=self.loss * factor)
+
+
+class LawSlopes:
+    """The derivatives of all laws of a network.
+
+    Parameters
+    ----------
+    model : NetworkOnGrid
+        Of a network without numeric laws
+    names : sequence of str
+        Parameters, inputs, states and losses (``P_<component>``) to differentiate by
+    """
+
+    def __init__(self, model: NetworkOnGrid, names: Sequence[str]) -> None:
+        self.model, network = model, model.network
+        derived = {symbol(name): law for name, law in network.derived.items()}
+        known = derived | {s: law.xreplace(derived) for s, law in model.boundary.items()}
+        laws = [
+            *(("link", i, link.conductance.xreplace(known)) for i, link in enumerate(network.links)),
+            *(("source", i, source.heat.xreplace(known)) for i, source in enumerate(network.sources)),
+            *(("boundary", i, known[symbol(f"T_{name}")]) for i, name in enumerate(model.laws.boundaries)),
+            *(("capacity", i, part.capacity) for i, part in enumerate(network.parts)),
+            *(("rate", i, network.states[s].rate.xreplace(known)) for i, s in enumerate(model.coupled)),
+        ]
+        self._arguments = [
+            *BASE_SIGNALS, *network.inputs, *(f"T_{part}" for part in model.parts),
+            *(p.name for p in network.parameters), *(s.name for s in network.states),
+            *(f"P_{c}" for c in network.components),
+        ]  # fmt: skip
+        self._laws: list[tuple[str, int, list[str], Callable[..., tuple[Any, ...]], list[int]]] = []
+        for kind, index, law in laws:
+            free = {s.name for s in law.free_symbols}
+            if by := [name for name in names if name in free]:
+                used = [i for i, name in enumerate(self._arguments) if name in free]
+                function = _slopes(law, tuple(self._arguments[i] for i in used), tuple(by))
+                self._laws.append((kind, index, by, function, used))
+        self._names = tuple(names)
+
+    def along(self, trajectory: Trajectory, here: Balance) -> dict[str, Heat]:
+        """Net heat per unit of every name along a trajectory.
+
+        Parameters
+        ----------
+        trajectory : Trajectory
+        here : Balance
+            Its heat balance, see :func:`diagnosis.forward.trajectory.settled_balance`
+        """
+        model, T = self.model, trajectory.middle
+        power = trajectory.tangent.at(T[:, model.loss_nodes])
+        signals = model.signals(trajectory.piece, T, trajectory.values, trajectory.memory)
+        signals, stored = [*signals, *power.T], np.diff(trajectory.T, axis=0) / trajectory.piece.steps[:, None]
+        n, nodes = model.n, [model.parts.index(source.node) for source in model.network.sources]
+        into = {name: np.zeros((len(T), n + len(model.coupled))) for name in self._names}
+        loss = {name: np.zeros(len(T)) for name in self._names}
+        for kind, index, names, function, used in self._laws:
+            with np.errstate(all="ignore"):
+                slopes = function(*(signals[i] for i in used))
+            for name, found in zip(names, slopes, strict=True):
+                slope, heat = np.asarray(found, dtype=float), into[name]
+                if not np.isfinite(slope.sum()):
+                    slope = np.nan_to_num(slope)  # x^p ln(x) at x = 0 has no value but the limit 0
+                if kind == "link":
+                    heat[:, :n] += (slope * here.differences[:, index])[:, None] * model.to_parts[index]
+                elif kind == "source":
+                    heat[:, nodes[index]] += slope
+                    loss[name] += slope if model.is_loss[index] else 0.0
+                elif kind == "boundary":
+                    for link in np.flatnonzero(model.incidence[:, n + index]):
+                        flow = slope * model.incidence[link, n + index] * here.conductances[:, link]
+                        heat[:, :n] += flow[:, None] * model.to_parts[link]
+                elif kind == "capacity":
+                    # What a part stores over an interval is its mean net heat, jumps of operation included.
+                    heat[:, index] -= slope * stored[:, index]
+                else:
+                    heat[:, n + index] += slope
+        return {name: Heat(into=into[name], loss=loss[name]) for name in self._names}
+
+
+@lru_cache(maxsize=4096)
+def _slopes(law: sp.Expr, arguments: tuple[str, ...], names: tuple[str, ...]) -> Callable[..., tuple[Any, ...]]:
+    """Derivatives of one law as a function; kept, since most laws stay as they are when a term is added."""
+    slopes = [sp.diff(law, symbol(name)) for name in names]
+    return compile_function(function_source("slopes", arguments, slopes, vector=True), "slopes")

@@ -1,0 +1,242 @@
+"""Unknowns of an explanation: small classes with a value and a column.
+
+Every unknown is a standard normal number ``z``. It has a `value`, it can `act` on a simulation, and its `column` is the
+exact derivative of the readings. Parameters of a calibration, faults of measurement and candidates all are unknowns.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+
+from diagnosis.engine.point import Column, Point, Setting
+from diagnosis.forward.observation import delay_column, total_at_points
+from diagnosis.forward.recurrence import lagged
+from models.network.laws import Parameter
+from models.quantities.quantities import TOTAL_LOSS
+
+Scope = frozenset[str] | None
+LAG_STEP = 0.01  # relative
+
+
+@dataclass(frozen=True, kw_only=True)
+class Group:
+    """Unknowns that share a prior amplitude.
+
+    Attributes
+    ----------
+    name : str
+    amplitude : float
+        Prior standard deviation of every unknown's ``z``; 0 where the group is absent
+    """
+
+    name: str
+    amplitude: float = 1.0
+
+
+CALIBRATION = Group(name="calibration")
+
+
+class Unknown(Protocol):
+    """Common protocol of all unknowns."""
+
+    @property
+    def parameter(self) -> Parameter:
+        """Start, prior and bounds."""
+
+    @property
+    def group(self) -> Group:
+        """Unknowns that it shares its amplitude with."""
+
+    @property
+    def scope(self) -> Scope:
+        """Recordings in which it is there; None for all."""
+
+    def value(self, z: float) -> float:
+        """Value at `z`, in its unit."""
+
+    def z_of(self, value: float) -> float:
+        """The ``z`` of the nearest possible value."""
+
+    def bounds(self) -> tuple[float, float]:
+        """Lowest and highest ``z``."""
+
+    def act(self, setting: Setting, z: float) -> None:
+        """Put the value into what is simulated and read."""
+
+    def column(self, point: Point, z: float) -> Column:
+        """Derivative of the readings with respect to `z`."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Prior:
+    """Prior of one number: normal, or log-normal."""
+
+    parameter: Parameter
+    group: Group = CALIBRATION
+    scope: Scope = None
+
+    def value(self, z: float) -> float:
+        """Value at `z`, held at the bounds."""
+        p = self.parameter
+        value = p.start * np.exp(p.sd * z) if p.log else p.start + p.sd * z
+        return float(min(max(value, p.lower), p.upper))
+
+    def z_of(self, value: float) -> float:
+        """The ``z`` of the nearest possible value."""
+        p = self.parameter
+        value = min(max(value, p.lower), p.upper)
+        return float(np.log(value / p.start) / p.sd if p.log else (value - p.start) / p.sd)
+
+    def per_z(self, z: float) -> float:
+        """Change of the value with `z`, at a bound that to the inside."""
+        return self.value(z) * self.parameter.sd if self.parameter.log else self.parameter.sd
+
+    def bounds(self) -> tuple[float, float]:
+        """Lowest and highest ``z``."""
+        p = self.parameter
+        return -np.inf if p.log and p.lower <= 0.0 else self.z_of(p.lower), self.z_of(p.upper)
+
+
+@dataclass(frozen=True, kw_only=True)
+class NetworkParameter(_Prior):
+    """A parameter of the network's laws."""
+
+    def act(self, setting: Setting, z: float) -> None:
+        """Set the parameter."""
+        setting.values[setting.machine.parameter_index[self.parameter.name]] = self.value(z)
+
+    def column(self, point: Point, z: float) -> Column:
+        """Heat by the exact derivative of the laws."""
+        return Column(heat=point.heat_per(self.parameter.name) * self.per_z(z))
+
+
+@dataclass(frozen=True, kw_only=True)
+class SensorBias(_Prior):
+    """A constant error of a channel, [K] or [W]."""
+
+    channel: str
+
+    def act(self, setting: Setting, z: float) -> None:
+        """Shift the readings."""
+        setting.bias[setting.channels.index(self.channel)] += self.value(z)
+
+    def column(self, point: Point, z: float) -> Column:
+        """A constant."""
+        return Column(reading=point.reading(self.channel, np.full(len(point.trajectory.T), self.per_z(z))))
+
+
+@dataclass(frozen=True, kw_only=True)
+class SensorLag(_Prior):
+    """Time constant of a temperature sensor, [s]."""
+
+    channel: str
+
+    def act(self, setting: Setting, z: float) -> None:
+        """Slow the sensor."""
+        setting.lag[setting.channels.index(self.channel)] = self.value(z)
+
+    def column(self, point: Point, z: float) -> Column:
+        """Difference of the lagged course with the lag."""
+        at = point.sensors.channels.index(self.channel)
+        T, steps = point.trajectory.T[:, point.machine.model.part_index(self.channel)], point.trajectory.piece.steps
+        lag = float(point.sensors.lag[at])
+        there, here = (lagged(T, steps, lag * (1.0 + way)) for way in (LAG_STEP, -LAG_STEP))
+        slope = (there - here) / (2.0 * LAG_STEP * lag)
+        return Column(reading=point.reading(self.channel, slope * self.per_z(z)))
+
+
+@dataclass(frozen=True, kw_only=True)
+class LossGain(_Prior):
+    """Gain of the measured total loss, [-]."""
+
+    def act(self, setting: Setting, z: float) -> None:
+        """Scale the reading of the loss."""
+        setting.loss_gain *= self.value(z)
+
+    def column(self, point: Point, z: float) -> Column:
+        """The loss itself."""
+        loss = total_at_points(point.trajectory.loss)
+        return Column(reading=point.reading(TOTAL_LOSS, loss * self.per_z(z)))
+
+
+@dataclass(frozen=True, kw_only=True)
+class LossDelay(_Prior):
+    """Delay of the measured total loss behind the inputs, [s]."""
+
+    def act(self, setting: Setting, z: float) -> None:
+        """Delay the reading of the loss."""
+        setting.loss_delay += self.value(z)
+
+    def column(self, point: Point, z: float) -> Column:
+        """Minus the rate of the loss."""
+        slope = delay_column(point.trajectory, point.sensors.loss_delay) * point.sensors.loss_gain
+        return Column(reading=point.reading(TOTAL_LOSS, slope * self.per_z(z)))
+
+
+@dataclass(frozen=True, kw_only=True)
+class InputGain(_Prior):
+    """True over recorded value of an input, [-]."""
+
+    input: str
+
+    def act(self, setting: Setting, z: float) -> None:
+        """Scale the input."""
+        setting.samples[..., setting.inputs.index(self.input)] *= self.value(z)
+
+    def column(self, point: Point, z: float) -> Column:
+        """Heat per relative change of the input, as it was taken in this simulation."""
+        return Column(heat=point.heat_per_relative(self.input) * (self.per_z(z) / self.value(z)))
+
+
+@dataclass(frozen=True, kw_only=True)
+class InputOffset(_Prior):
+    """True less recorded value of an input that no loss depends on, in its unit."""
+
+    input: str
+
+    def act(self, setting: Setting, z: float) -> None:
+        """Shift the input."""
+        setting.samples[..., setting.inputs.index(self.input)] += self.value(z)
+
+    def column(self, point: Point, z: float) -> Column:
+        """Heat by the exact derivative of the laws."""
+        return Column(heat=point.heat_per(self.input) * self.per_z(z))
+
+
+@dataclass(frozen=True, kw_only=True)
+class ClockOffset(_Prior):
+    """Time by which the readings of temperatures come after the inputs, [s]."""
+
+    def act(self, setting: Setting, z: float) -> None:
+        """Delay the readings."""
+        setting.clock += self.value(z)
+
+    def column(self, point: Point, z: float) -> Column:
+        """Difference of the delayed readings."""
+        return Column(shown=point.clock_column() * self.per_z(z))
+
+
+@dataclass(frozen=True, kw_only=True)
+class TermParameter(_Prior):
+    """A parameter of a term outside the network: an input shifted, or a reading distorted."""
+
+    label: str
+    names: tuple[str, ...] = field(default=())
+
+    def act(self, setting: Setting, z: float) -> None:
+        """Set the term's parameter."""
+        setting.of_terms[self.label][self.names.index(self.parameter.name)] = self.value(z)
+
+    def column(self, point: Point, z: float) -> Column:
+        """Difference of the shifted heat or of the distorted reading."""
+        p = self.parameter
+        step = 0.05 * p.sd * (self.value(z) if p.log else 1.0)
+        return point.term_column(self.label, self.names.index(p.name), step) * self.per_z(z)
+
+
+def in_scope(unknown: Unknown, recording: str) -> bool:
+    """True if an unknown is there in a recording."""
+    return unknown.scope is None or recording in unknown.scope

@@ -1,0 +1,1 @@
+"""Blind injections: known effects put into recordings of real machines."""

@@ -1,0 +1,333 @@
+"""Injections into a recording of a real machine: drawn from a seed, written with the truth apart from them."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from diagnosis.proof.injection.calibrated_model import CalibratedModel, calibrate
+from diagnosis.proof.injection.instrument_faults import (
+    INPUT_FAULTS,
+    INSTRUMENT_FAULTS,
+    LONGEST_STUCK_S,
+    instrument_places,
+)
+from diagnosis.proof.injection.machine_changes import MACHINE_CHANGES, places
+from diagnosis.proof.injection.real_recording import RealRecording, read_real_recording
+from diagnosis.proof.injection.trial import FORMS, Form, Trial, choose_size, draw_course
+from diagnosis.recordings.time_axis import moment_text
+from models.assembly.gearbox import Gearbox
+from models.base.errors import InputError, did_you_mean
+from models.base.types import Array
+
+SCHEMA = 1
+# Largest change of a measured temperature, [K]: of fast recordings, and of those whose rows are means over minutes.
+BOUNDS_K, SLOW_BOUNDS_K, SLOW_S = (0.3, 6.0), (1.0, 15.0), 60.0
+TRIES = 6  # draws of kind, place and date, until one reaches the lower bound
+KINDS = (*MACHINE_CHANGES, *INSTRUMENT_FAULTS, *INPUT_FAULTS)
+SHARES = {"machine": 0.55, "instrument": 0.3, "input": 0.15}
+ONLY_FORMS: dict[str, tuple[Form, ...]] = {
+    "drift": ("ramp",), "bias": ("step", "from_to"), "stuck": ("from_to",), "lag": ("step", "from_to"),
+    "swapped": ("step", "from_to"), "clock": ("step",), "capacity": ("step",),
+}  # fmt: skip
+DESCRIPTIONS = {
+    "loss_factor": "a loss or heat source becomes larger or smaller, -60 % to +150 %",
+    "link_factor": "a heat path conducts more or less, -60 % to +150 %",
+    "new_link": "a further heat path between two nodes, or to the surroundings",
+    "thermostat": "a cooler with a thermostat valve",
+    "heat": "heat into a node or out of it, steady or with the speed",
+    "capacity": "a heat capacity changes, -50 % to +100 %",
+    "bias": "a sensor shows too much or too little",
+    "gain": "a sensor's scale is wrong",
+    "drift": "a sensor's bias grows",
+    "lag": "a sensor follows slowly",
+    "stuck": "a sensor hangs for hours",
+    "swapped": "two sensors are recorded in each other's columns",
+    "clock": "temperatures come late against the inputs",
+    "input_offset": "a recorded input is off by a constant",
+    "input_gain": "a recorded input is off by a factor",
+}
+
+NOUNS = {
+    "loss_factor": "loss or heat source", "link_factor": "link", "new_link": "pair of nodes without a link",
+    "thermostat": "pair of node and boundary", "heat": "node", "capacity": "node",
+}  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class Wish:
+    """Requests for an injection; the rest is drawn.
+
+    Attributes
+    ----------
+    kind : str or None
+        One of :data:`KINDS`
+    place : str or None
+    date : str or None
+        When it begins: a date, or seconds as in the name of a part
+    control : bool
+        True to inject nothing
+    """
+
+    kind: str | None = None
+    place: str | None = None
+    date: str | None = None
+    control: bool = False
+
+
+class Injector:
+    """A recording and its machine; the model is calibrated once, when it is needed.
+
+    Parameters
+    ----------
+    gearbox : Gearbox
+    recording : str
+        ``FILE`` or ``FILE@start..end``
+
+    Raises
+    ------
+    InputError
+        With all problems of the recording.
+    """
+
+    def __init__(self, gearbox: Gearbox, recording: str) -> None:
+        self.gearbox = gearbox
+        self.real: RealRecording = read_real_recording(recording, gearbox)
+        self.bounds_K = BOUNDS_K if self.real.step_s <= SLOW_S else SLOW_BOUNDS_K
+
+    @property
+    def written(self) -> frozenset[str]:
+        """Names of the files of a case."""
+        mapping = self.real.mapping
+        return frozenset({f"{self.real.stem}.csv.gz", *([] if mapping is None else [mapping.name])})
+
+    @cached_property
+    def model(self) -> CalibratedModel:
+        """The calibrated model.
+
+        Raises
+        ------
+        InputError
+            If it cannot be calibrated to the recording.
+        """
+        return calibrate(self.gearbox, self.real)
+
+    def places(self, kind: str) -> list[str]:
+        """Return where a kind of change can be."""
+        if kind in MACHINE_CHANGES:
+            return places(kind, self.gearbox.network())
+        return instrument_places(kind, self.real, self.gearbox)
+
+    def check(self, wish: Wish) -> None:
+        """Refuse a wish that this machine and recording cannot fulfil.
+
+        Raises
+        ------
+        InputError
+        """
+        if wish.date is not None:
+            self.real.moment(wish.date)
+        if wish.kind is None:
+            if wish.place is not None:
+                raise InputError("--place goes with --effect; without, the place is drawn")
+            return
+        if wish.kind not in KINDS:
+            raise InputError(f"--effect {wish.kind}: is nothing to inject{did_you_mean(wish.kind, KINDS)}")
+        known = self.places(wish.kind)
+        if not known:
+            raise InputError(f"{self.real.path}: has no column that {wish.kind} could act on; choose another --effect")
+        if wish.place is not None and wish.place not in known:
+            where = self.gearbox.file if wish.kind in MACHINE_CHANGES else str(self.real.path)
+            noun = NOUNS.get(wish.kind, "sensor" if wish.kind in INSTRUMENT_FAULTS else "input")
+            raise InputError(f"{where}: has no {noun} {wish.place!r} for {wish.kind}{did_you_mean(wish.place, known)}")
+
+    def draw(self, wish: Wish, rng: np.random.Generator) -> tuple[Trial, int]:
+        """Draw an injection, and which of its sizes; again while the largest possible one is below the bound.
+
+        Raises
+        ------
+        InputError
+            If the model cannot be calibrated or simulated.
+        """
+        best: tuple[float, Trial, int] | None = None
+        for _ in range(TRIES):
+            trial = self._trial(wish, rng)
+            chosen = choose_size(trial.largest_K, self.bounds_K, rng)
+            reached = float(trial.largest_K[chosen])
+            if best is None or reached > best[0]:
+                best = reached, trial, chosen
+            if reached >= self.bounds_K[0]:
+                break
+        assert best is not None  # noqa: S101 - there is one try at least
+        return best[1], best[2]
+
+    def _trial(self, wish: Wish, rng: np.random.Generator) -> Trial:
+        kind = wish.kind or self._kind(rng)
+        known = self.places(kind)
+        place = wish.place or known[int(rng.integers(len(known)))]
+        course = draw_course(
+            float(self.real.time[-1]), rng, forms=ONLY_FORMS.get(kind, FORMS),
+            date_s=None if wish.date is None else self.real.moment(wish.date),
+            longest_s=LONGEST_STUCK_S if kind == "stuck" else np.inf,
+        )  # fmt: skip
+        if kind in MACHINE_CHANGES:
+            return MACHINE_CHANGES[kind](self.model, place, course, rng)
+        if kind in INSTRUMENT_FAULTS:
+            return INSTRUMENT_FAULTS[kind](self.real, place, course, rng)
+        return INPUT_FAULTS[kind](self.model, place, course, rng)
+
+    def _kind(self, rng: np.random.Generator) -> str:
+        """Draw a kind that this machine and recording can have."""
+        groups = {"machine": MACHINE_CHANGES, "instrument": INSTRUMENT_FAULTS, "input": INPUT_FAULTS}
+        possible = {name: [kind for kind in kinds if self.places(kind)] for name, kinds in groups.items()}
+        weights = np.array([SHARES[name] if kinds else 0.0 for name, kinds in possible.items()])
+        group = list(possible)[int(rng.choice(len(weights), p=weights / weights.sum()))]
+        return possible[group][int(rng.integers(len(possible[group])))]
+
+
+def inject_set(
+    injector: Injector,
+    wish: Wish,
+    number: int,
+    *,
+    seed: int,
+    recordings: Path,
+    truth: Path,
+    flat: bool,
+    progress: Callable[[int, int], None] | None = None,
+) -> list[str]:
+    """Write recordings with an injection each, and the truth.
+
+    Parameters
+    ----------
+    injector : Injector
+    wish : Wish
+        Of every case
+    number : int
+        Cases
+    seed : int
+    recordings, truth : Path
+        Folders; with `flat` the recording lies in the first itself, else in a folder per case
+    flat : bool
+    progress : callable or None
+        Called with (cases done, cases in all)
+
+    Returns
+    -------
+    list of str
+        Names of the cases
+
+    Raises
+    ------
+    InputError
+        If the wish cannot be fulfilled, or something cannot be written.
+    """
+    injector.check(wish)
+    names = []
+    for k in range(number):
+        name = f"case_{k + 1:03d}"
+        folder = recordings if flat else recordings / name
+        rng = np.random.default_rng([seed, k])
+        found = None if wish.control else injector.draw(wish, rng)
+        columns = {} if found is None else {q: values[found[1]] for q, values in found[0].columns.items()}
+        facts = truth_of(injector, found) | {"case": name, "seed": [seed, k]}
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            (folder / f"{injector.real.stem}.csv.gz").write_bytes(injector.real.with_shifts(columns).compressed)
+            if injector.real.mapping is not None:
+                shutil.copyfile(injector.real.mapping, folder / injector.real.mapping.name)
+            truth.mkdir(parents=True, exist_ok=True)
+            (truth / f"{name}.json").write_text(json.dumps(facts, indent=1, sort_keys=True, allow_nan=False) + "\n")
+        except OSError as error:
+            raise InputError(
+                f"{error.filename}: cannot be written ({error.strerror}); choose another output"
+            ) from error
+        names.append(name)
+        if progress is not None:
+            progress(k + 1, number)
+    return names
+
+
+def truth_of(injector: Injector, found: tuple[Trial, int] | None) -> dict[str, Any]:
+    """Return the truth of a case, ready for JSON; without an injection that of a control."""
+    real = injector.real
+    return {
+        "schema": SCHEMA,
+        "gearbox": injector.gearbox.hash,
+        "group": "control" if found is None else "injection",
+        "control": "real" if found is None else None,
+        "source": {"file": real.path.name, "part": real.part, "sha256": real.recording.sha256},
+        "bounds_K": list(injector.bounds_K),
+        "changed": [] if found is None else [_changed(real, found[0], float(found[0].sizes[found[1]]))],
+        "effects": [] if found is None else [_effect(injector, *found)],
+        "K_all": {name: {"rms": 0.0, "max": 0.0} for name in real.channels}
+        if found is None or found[0].what == "input"
+        else _sizes(found[0].K, found[1]),
+        "approximate": bool(found and found[0].approximate),
+        "approximate_because": found[0].approximate if found else "",
+    }
+
+
+def _changed(real: RealRecording, trial: Trial, size: float) -> dict[str, Any]:
+    course, clock, first = trial.course, real.found.clock, float(real.found.seconds[0])
+    unsigned = trial.kind in ("stuck", "swapped")
+    return {
+        "what": trial.what,
+        "of": trial.of,
+        "nodes": list(trial.nodes),
+        "sign": 0 if unsigned else int(np.sign(size)),
+        "course": course.form,
+        "from_s": round(course.from_s, 1),
+        "to_s": round(course.to_s, 1),
+        "from": moment_text(first + course.from_s, clock),
+        "to": moment_text(first + course.to_s, clock),
+        "recording": real.stem,
+    }
+
+
+def _effect(injector: Injector, trial: Trial, chosen: int) -> dict[str, Any]:
+    largest = float(trial.largest_K[chosen])
+    is_input = trial.what == "input"
+    units = {quantity: float(np.nanmax(np.abs(values[chosen]))) for quantity, values in trial.columns.items()}
+    return {
+        "name": trial.kind,
+        "law": DESCRIPTIONS[trial.kind],
+        "of": trial.of,
+        "nodes": list(trial.nodes),
+        "size": float(f"{trial.sizes[chosen]:.6g}"),
+        "unit": trial.unit,
+        "below_bounds": largest < injector.bounds_K[0],
+        # A fault of an input changes no reading: its size is chosen by the change of the calibrated model's.
+        "K": {name: {"rms": 0.0, "max": 0.0} for name in trial.K} if is_input else _sizes(trial.K, chosen),
+        "K_of_model": _sizes(trial.K, chosen) if is_input else None,
+        "column_shift": {injector.real.found.names[q]: round(value, 4) for q, value in units.items()},
+        "heat_W": {node: _watts(values[chosen]) for node, values in trial.heat.items()},
+        **trial.facts,
+    }
+
+
+def _sizes(K: Any, chosen: int) -> dict[str, dict[str, float]]:
+    return {
+        name: {
+            "rms": round(float(np.sqrt(np.nanmean(values[chosen] ** 2))), 3),
+            "max": round(float(np.nanmax(np.abs(values[chosen]))), 3),
+        }
+        for name, values in K.items()
+    }
+
+
+def _watts(heat: Array) -> dict[str, float]:
+    """Return mean and greatest heat, and the mean while it acts, [W]."""
+    acting = np.abs(heat) > 0.1 * np.abs(heat).max(initial=0.0)
+    return {
+        "mean": round(float(heat.mean()), 3),
+        "mean_active": round(float(heat[acting].mean()) if acting.any() else 0.0, 3),
+        "max": round(float(heat[np.abs(heat).argmax()]), 3),
+    }

@@ -1,0 +1,179 @@
+"""Faults of instruments: exact changes of the recorded columns."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+
+import numpy as np
+import sympy as sp
+from scipy.ndimage import median_filter
+
+from diagnosis.forward.recurrence import lagged
+from diagnosis.proof.injection.calibrated_model import CalibratedModel
+from diagnosis.proof.injection.machine_changes import input_shift
+from diagnosis.proof.injection.real_recording import RealRecording
+from diagnosis.proof.injection.trial import SIZES, SMALLEST, Course, Trial, ladder
+from models.assembly.gearbox import Gearbox
+from models.base.types import Array
+from models.network.laws import symbol
+from models.quantities.quantities import node_of_channel
+
+BIAS_K, GAIN = 15.0, 0.15  # at most
+LONGEST_LAG_S, LONGEST_LAG_ROWS = 3600.0, 6  # the longer of both
+LONGEST_CLOCK_S, LONGEST_CLOCK_ROWS = 3600.0, 12
+LONGEST_STUCK_S = 24 * 3600.0
+INPUT_OFFSET_K, INPUT_OFFSET, INPUT_GAIN = 6.0, 0.1, 0.2  # the second of the input's usual size
+USUAL_PERCENTILE = 95.0
+SMOOTH = 7  # rows of a running median
+
+Maker = Callable[[RealRecording, str, Course, np.random.Generator], Trial]
+
+
+def bias(real: RealRecording, channel: str, course: Course, rng: np.random.Generator) -> Trial:
+    """Reading plus `size` [K]."""
+    sizes = ladder(-BIAS_K, BIAS_K, rng)
+    shift = sizes[:, None] * np.where(np.isnan(real.channels[channel]), np.nan, course(real.time))
+    return _sensor(real, "bias", channel, course, sizes, "K", shift)
+
+
+def drift(real: RealRecording, channel: str, course: Course, rng: np.random.Generator) -> Trial:
+    """Reading plus a bias that grows to `size` [K]: a bias with a ramp as its course."""
+    return replace(bias(real, channel, course, rng), kind="drift")
+
+
+def gain(real: RealRecording, channel: str, course: Course, rng: np.random.Generator) -> Trial:
+    """Reading in degC times ``1 + size``."""
+    sizes = ladder(-GAIN, GAIN, rng)
+    return _sensor(
+        real, "gain", channel, course, sizes, "1", sizes[:, None] * real.channels[channel] * course(real.time)
+    )
+
+
+def lag(real: RealRecording, channel: str, course: Course, _: np.random.Generator) -> Trial:
+    """A slower sensor: the reading follows the old one with a time constant of `size` [s]."""
+    sizes = max(LONGEST_LAG_S, LONGEST_LAG_ROWS * real.step_s) * np.geomspace(SMALLEST, 1.0, SIZES)
+    sizes = sizes[sizes >= 0.1 * real.step_s]
+    values, acts = real.channels[channel], course(real.time)
+    first = int(np.argmax(acts > 0.0))
+    known = np.isfinite(values)
+    whole = np.interp(real.time, real.time[known], values[known])
+    slow = np.stack([lagged(whole[first:], np.diff(real.time[first:]), float(size)) for size in sizes])
+    shift = np.zeros((len(sizes), len(values)))
+    shift[:, first:] = (slow - whole[first:]) * acts[first:]
+    return _sensor(real, "lag", channel, course, sizes, "s", np.where(known, shift, np.nan))
+
+
+def stuck(real: RealRecording, channel: str, course: Course, _: np.random.Generator) -> Trial:
+    """The reading stays as it was."""
+    values, acts = real.channels[channel], course(real.time)
+    before = np.flatnonzero(np.isfinite(values) & (real.time < course.from_s))
+    held = float(values[before[-1]]) if len(before) else float("nan")
+    return _sensor(real, "stuck", channel, course, np.ones(1), "1", ((held - values) * acts)[None])
+
+
+def swapped(real: RealRecording, channel: str, course: Course, rng: np.random.Generator) -> Trial:
+    """Two sensors in each other's columns."""
+    others = [name for name in real.channels if name != channel]
+    other = others[int(rng.integers(len(others)))]
+    difference = (real.channels[other] - real.channels[channel]) * course(real.time)
+    trial = _sensor(real, "swapped", channel, course, np.ones(1), "1", difference[None])
+    shifts = {channel: difference[None], other: -difference[None]}
+    return replace(
+        trial, of=f"{channel},{other}", nodes=(*trial.nodes, node_of_channel(other, real.nodes)), K=shifts,
+        columns={f"T_{name}": shift for name, shift in shifts.items()},
+    )  # fmt: skip
+
+
+def clock(real: RealRecording, _: str, course: Course, __: np.random.Generator) -> Trial:
+    """All temperatures come whole rows late against the inputs; `size` [s].
+
+    It is chosen by the rms change of the median sensor: noise and spikes move as well, and would look like an effect.
+    """
+    step = real.step_s
+    most = int(min(max(LONGEST_CLOCK_S, LONGEST_CLOCK_ROWS * step), course.from_s) / step)
+    rows = np.unique(np.round(np.geomspace(1, max(most, 1), SIZES)).astype(int))
+    acts = course(real.time) > 0.0
+    columns, K = {}, {}
+    for name, values in real.channels.items():
+        smooth = median_filter(
+            np.interp(real.time, real.time[np.isfinite(values)], values[np.isfinite(values)]), SMOOTH
+        )
+        shifts, moved = np.zeros((len(rows), len(values))), np.zeros((len(rows), len(values)))
+        for k, late in enumerate(rows):
+            at = np.searchsorted(real.time, real.time - late * step - 0.5 * step)
+            before = acts & (np.abs(real.time[at] - (real.time - late * step)) <= step)
+            shifts[k, acts] = np.where(before, values[at], np.nan)[acts] - values[acts]
+            moved[k, before] = smooth[at][before] - smooth[before]
+        columns[f"T_{name}"], K[name] = shifts, moved
+    return Trial(
+        kind="clock", what="clock", of="temperatures", nodes=(), course=course, sizes=rows * step, unit="s",
+        columns=columns, K=K,
+        size_K=np.median([np.sqrt(np.mean(moved[:, acts] ** 2, axis=1)) for moved in K.values()], axis=0),
+    )  # fmt: skip
+
+
+INSTRUMENT_FAULTS: Mapping[str, Maker] = {
+    "bias": bias, "gain": gain, "drift": drift, "lag": lag, "stuck": stuck, "swapped": swapped, "clock": clock
+}  # fmt: skip
+
+
+def input_offset(model: CalibratedModel, name: str, course: Course, rng: np.random.Generator) -> Trial:
+    """Recorded input plus `size`, in the unit inside."""
+    real, network = model.real, model.network
+    is_temperature = name in network.inputs and network.inputs[name].quantity.is_temperature
+    cap = INPUT_OFFSET_K if is_temperature else INPUT_OFFSET * _usual(real.inputs[name])
+    sizes = ladder(-cap, cap, rng)
+    shift = sizes[:, None] * np.where(np.isnan(real.inputs[name]), np.nan, course(real.time))
+    return _input(model, "input_offset", name, sp.Integer(1), course, sizes, shift)
+
+
+def input_gain(model: CalibratedModel, name: str, course: Course, rng: np.random.Generator) -> Trial:
+    """Recorded input times ``1 + size``."""
+    sizes = ladder(-INPUT_GAIN, INPUT_GAIN, rng)
+    shift = sizes[:, None] * model.real.inputs[name] * course(model.real.time)
+    return _input(model, "input_gain", name, symbol(name), course, sizes, shift)
+
+
+INPUT_FAULTS: Mapping[str, Callable[[CalibratedModel, str, Course, np.random.Generator], Trial]] = {
+    "input_offset": input_offset, "input_gain": input_gain
+}  # fmt: skip
+
+
+def instrument_places(kind: str, real: RealRecording, gearbox: Gearbox) -> list[str]:
+    """Return the channels or inputs that can have a fault."""
+    moving = [name for name, values in real.channels.items() if np.nanmax(values) > np.nanmin(values)]
+    if kind == "clock":
+        return ["temperatures"] if moving else []
+    if kind == "swapped":
+        return moving if len(moving) > 1 else []
+    if kind in INSTRUMENT_FAULTS:
+        return moving
+    known = gearbox.network().inputs
+    return [name for name in real.inputs if kind == "input_offset" or not known[name].quantity.is_temperature]
+
+
+def _sensor(
+    real: RealRecording, kind: str, channel: str, course: Course, sizes: Array, unit: str, shift: Array
+) -> Trial:  # fmt: skip
+    node = node_of_channel(channel, real.nodes)
+    return Trial(
+        kind=kind, what="sensor", of=channel, nodes=(node,), course=course, sizes=sizes, unit=unit,
+        columns={f"T_{channel}": shift}, K={channel: shift},
+    )  # fmt: skip
+
+
+def _input(
+    model: CalibratedModel, kind: str, name: str, law: sp.Expr, course: Course, sizes: Array, shift: Array
+) -> Trial:  # fmt: skip
+    inside = model.network.inputs.get(name)
+    nothing: Mapping[str, Array] = {channel: np.zeros(shift.shape) for channel in model.real.channels}
+    K = nothing if inside is None else input_shift(model, name, law, sizes, course)
+    unit = "1" if kind == "input_gain" or inside is None else inside.quantity.unit
+    return Trial(
+        kind=kind, what="input", of=name, nodes=(), course=course, sizes=sizes, unit=unit, columns={name: shift}, K=K
+    )  # fmt: skip
+
+
+def _usual(values: Array) -> float:
+    return float(np.nanpercentile(np.abs(values), USUAL_PERCENTILE))

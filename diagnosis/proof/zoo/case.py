@@ -1,0 +1,216 @@
+"""A case of the zoo: the hidden plant, what is concealed in it, how it is measured, and what its runs gave."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from diagnosis.proof.zoo.effects import ZooEffect
+from diagnosis.proof.zoo.faults import Fault, Measured, hold_reading, spoiled
+from diagnosis.proof.zoo.oracle import LOSS, OracleNats
+from diagnosis.proof.zoo.recorder import ZooInstruments, measure
+from diagnosis.proof.zoo.simulate import simulate
+from diagnosis.proof.zoo.structure import Change, Law, Outcome, Programme, Variant, ZooPlant
+from models.base.types import Array
+
+GROUPS = ("control", "single", "date", "sensor", "pair", "outside", "messy")
+CONTROLS = ("clean", "clean", "parameters_off", "noise_misstated", "lag_wrong")
+TRAIN, HOLD, BASELINE = "train", "hold", "baseline"
+SEEN_NATS = 3.0
+
+NatsOf = Callable[[Sequence[Mapping[str, Array]]], OracleNats]
+Oracle = Callable[[ZooPlant, Sequence[Programme], ZooInstruments], NatsOf]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ZooCase:
+    """One case.
+
+    Attributes
+    ----------
+    name : str
+    seed : int
+    group, kind : str
+        One of :data:`GROUPS`; of a control one of :data:`CONTROLS`, else ``effects``
+    family, machine : str
+    plant : ZooPlant
+        With the parts that effects bring along
+    programmes : tuple of Programme
+        Training, held-out and baseline recordings
+    effects : tuple of ZooEffect
+        At their strengths, the dominant one first
+    instruments : ZooInstruments
+    session_deviation : float
+        Standard deviation of the logarithm of every parameter between sessions
+    sessions : mapping of str to mapping of str to float
+        Parameters in the session of every baseline
+    distance_K : float
+        From the nominal model, after calibration
+    rejected : int
+        Plants that were drawn before it and were too near to or too far from the nominal model
+    runs : CaseRuns or None
+        What its recordings gave
+    nats : OracleNats or None
+        Evidence for all effects together; None of a control
+    nats_of_effects : tuple of OracleNats
+        Evidence for every effect alone
+    """
+
+    name: str
+    seed: int
+    group: str
+    kind: str
+    family: str
+    machine: str
+    plant: ZooPlant
+    programmes: tuple[Programme, ...]
+    effects: tuple[ZooEffect, ...]
+    instruments: ZooInstruments
+    session_deviation: float = 0.0
+    sessions: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    distance_K: float
+    rejected: int = 0
+    runs: CaseRuns | None = None
+    nats: OracleNats | None = None
+    nats_of_effects: tuple[OracleNats, ...] = ()
+
+    @property
+    def has_loss(self) -> bool:
+        """True if the total loss is measured."""
+        return self.instruments.loss_noise is not None
+
+    @property
+    def visible(self) -> bool | None:
+        """True if the recordings hold at least 3 nats for the dominant effect; None of a control."""
+        return self.nats_of_effects[0].tool >= SEEN_NATS if self.effects else None
+
+    def recordings(self, *kinds: str) -> list[Programme]:
+        """Programmes whose names begin with one of some words."""
+        return [p for p in self.programmes if p.name.startswith(kinds)]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class CaseRuns:
+    """Runs of a case.
+
+    Attributes
+    ----------
+    sets : tuple of tuples of int
+        Which effects act in each run of a batch: all, none, and every one alone
+    outcomes : mapping of str to Outcome
+        By recording; a baseline has one run
+    as_recorded : mapping of str to Outcome
+        Of the training recordings, with errors of recorded inputs turned into errors of the true ones
+    """
+
+    sets: tuple[tuple[int, ...], ...]
+    outcomes: Mapping[str, Outcome]
+    as_recorded: Mapping[str, Outcome]
+
+
+def run_case(case: ZooCase, *kinds: str) -> CaseRuns:
+    """Simulate recordings of a case with all effects, without any, and with every one alone.
+
+    Parameters
+    ----------
+    case : ZooCase
+    kinds : str
+        ``train``, ``hold``, ``baseline``
+    """
+    number = len(case.effects)
+    alone = tuple((k,) for k in range(number)) if number > 1 else ()
+    sets = (tuple(range(number)), (), *alone) if number else ((),)
+    plain = {p.name: simulate(case.plant, p, [_variant(case, s) for s in sets]) for p in case.recordings(TRAIN, HOLD)
+             if p.name.startswith(kinds)}  # fmt: skip
+    felt = {}
+    if any(effect.fault is not None and effect.fault.what == "input" for effect in case.effects):
+        variants = [_variant(case, s, felt=True) for s in sets]
+        felt = {p.name: simulate(case.plant, p, variants) for p in case.recordings(TRAIN)}
+    healthy = {
+        p.name: simulate(case.plant, p, [Variant(parameters=case.sessions[p.name])])
+        for p in case.recordings(BASELINE)
+        if p.name.startswith(kinds)
+    }
+    return CaseRuns(sets=sets, outcomes={**plain, **healthy}, as_recorded=felt)
+
+
+def nats_of_case(case: ZooCase, runs: CaseRuns, nats_of: NatsOf) -> tuple[OracleNats, tuple[OracleNats, ...]]:
+    """Evidence of the training recordings for all effects together, and for each alone."""
+    found = [nats_of(differences(case, runs, b)) for b, acting in enumerate(runs.sets) if acting]
+    return found[0], tuple(found[1:]) or (found[0],)
+
+
+def differences(case: ZooCase, runs: CaseRuns, run: int) -> list[dict[str, Array]]:
+    """Noise-free readings with the effects of a run minus those without any, by training recording.
+
+    An error of a recorded input is seen as one of the true input in the other direction: that is what it means to a
+    method which believes the recorder.
+
+    Returns
+    -------
+    list of dict of channel to Array, shape (rows,)
+        [K], and [W] of :data:`~diagnosis.proof.zoo.oracle.LOSS`
+    """
+    none = runs.sets.index(())
+    faults = [fault for fault in (case.effects[k].fault for k in runs.sets[run]) if fault is not None]
+    found = []
+    for programme in case.recordings(TRAIN):
+        sound = measure(case.plant, programme, runs.outcomes[programme.name], none, has_loss=case.has_loss)
+        outcome = runs.as_recorded.get(programme.name, runs.outcomes[programme.name])
+        measured = measure(case.plant, programme, outcome, run, has_loss=case.has_loss)
+        measured = with_reading_faults(measured, faults)
+        x = {name: measured.readings[name] - sound.readings[name] for name in case.instruments.channels}
+        if measured.P_loss is not None and sound.P_loss is not None:
+            x[LOSS] = measured.P_loss - sound.P_loss
+        found.append(x)
+    return found
+
+
+def with_reading_faults(measured: Measured, faults: Sequence[Fault]) -> Measured:
+    """Noise-free readings with faults of sensors and the clock."""
+    for fault in faults:
+        if fault.kind == "stuck":
+            (name,) = fault.channels
+            held = hold_reading(measured.readings[name], measured, fault)
+            measured = replace(measured, readings={**measured.readings, name: held})
+        elif fault.what != "input":
+            measured = spoiled(measured, fault)
+    return measured
+
+
+def _variant(case: ZooCase, acting: Sequence[int], *, felt: bool = False) -> Variant:
+    changes: list[Change] = []
+    for k in acting:
+        effect = case.effects[k]
+        changes += effect.changes
+        if felt and effect.fault is not None and effect.fault.what == "input":
+            changes.append(_as_felt(effect.fault, case.plant))
+    return Variant(changes=tuple(changes))
+
+
+def _as_felt(fault: Fault, plant: ZooPlant) -> Change:
+    """The error of a recorded input as one of the true input in the other direction; lags are left out."""
+    (name,) = fault.channels
+    a, course = -fault.sign * fault.strength, fault.course
+    law: Law
+    if fault.kind == "offset":
+        law = lambda m: a * course.share(m.hours)  # noqa: E731
+    elif fault.kind == "input_gain":
+        law = lambda m: a * course.share(m.hours) * m.inputs[name]  # noqa: E731
+    else:
+        mix = next(probe.mix for probe in plant.probes if probe.channel == fault.near)
+
+        def law(m):  # type: ignore[no-untyped-def]
+            near = sum(weight * m.T[body] for body, weight in mix.items())
+            return a * course.share(m.hours) * (near - m.inputs[name])
+
+    return Change(kind="input", target=name, law=law)
+
+
+def deviating(
+    parameters: Mapping[str, float], names: Sequence[str], sd: float, rng: np.random.Generator
+) -> dict[str, float]:
+    """Parameters of another session: every positive one is off by a lognormal factor."""
+    return {name: parameters[name] * float(np.exp(sd * rng.standard_normal())) for name in names}

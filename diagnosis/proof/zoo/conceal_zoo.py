@@ -1,0 +1,193 @@
+"""Sets of zoo cases: their plans, recordings and truth."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from diagnosis.proof.cases.case_files import DEFINITION, keep_apart, write_case
+from diagnosis.proof.zoo.case import BASELINE, CONTROLS, GROUPS, Oracle, ZooCase
+from diagnosis.proof.zoo.draw import draw_case, oracle_of
+from diagnosis.proof.zoo.families import FAMILIES
+from diagnosis.proof.zoo.recorder import measure, record
+from diagnosis.proof.zoo.truth import truth_of
+from models.assembly.gearbox import FOLDER, load_gearbox, names_a_file
+from models.base.errors import InputError, did_you_mean
+from models.base.types import Array
+from models.files.toml_file import packaged, read_text
+
+# Shares of a set in which nothing else is asked for.
+ZOO_MIX = {"control": 0.3, "single": 0.2, "date": 0.15, "sensor": 0.1, "pair": 0.1, "outside": 0.1, "messy": 0.05}
+
+
+@dataclass(frozen=True, kw_only=True)
+class ZooPlan:
+    """A case before it is drawn.
+
+    Attributes
+    ----------
+    group : str
+        One of :data:`~diagnosis.proof.zoo.case.GROUPS`
+    kind : str or None
+        Of a control, one of :data:`~diagnosis.proof.zoo.case.CONTROLS`
+    family, machine : str
+    seed : int
+        Of this case
+    """
+
+    group: str
+    kind: str | None
+    family: str
+    machine: str
+    seed: int
+
+
+def zoo_plans(
+    seed: int, counts: Mapping[str, int], *, families: Sequence[str] | None = None, machine: str | None = None
+) -> list[ZooPlan]:
+    """Plans of a set, in random order; families take turns, machines of a family are drawn.
+
+    Parameters
+    ----------
+    seed : int
+    counts : mapping of group to int
+        How many of each group
+    families : sequence of str or None
+        Which families; all if None
+    machine : str or None
+        Name or file of a nominal definition; drawn among those of the family if None
+
+    Raises
+    ------
+    InputError
+        If a group or family is not known, or no family can be drawn for the machine.
+    """
+    for group in counts:
+        if group not in GROUPS:
+            raise InputError(f"{group!r} is not a group of cases of the zoo{did_you_mean(group, GROUPS)}")
+    for family in families or ():
+        if family not in FAMILIES:
+            raise InputError(f"{family!r} is not a family of the zoo{did_you_mean(family, FAMILIES)}")
+    chosen = tuple(families or FAMILIES)
+    rng = np.random.default_rng([seed, 1])
+    if machine is not None and families is None:
+        fit = tuple(name for name in chosen if machine in FAMILIES[name].machines)
+        chosen = fit or chosen  # a definition of the user: the families themselves say what they cannot split
+    order = [str(name) for name in rng.permutation(chosen)]
+    plans: list[ZooPlan] = []
+    for group, number in counts.items():
+        for i in range(number):
+            family = order[len(plans) % len(order)]
+            machines = FAMILIES[family].machines
+            plans.append(
+                ZooPlan(
+                    group=group,
+                    kind=CONTROLS[i % len(CONTROLS)] if group == "control" else None,
+                    family=family,
+                    machine=machine or machines[int(rng.integers(len(machines)))],
+                    seed=int(rng.integers(2**32)),
+                )
+            )
+    return [plans[i] for i in rng.permutation(len(plans))]
+
+
+def random_zoo_plans(
+    seed: int, number: int, *, families: Sequence[str] | None = None, machine: str | None = None
+) -> list[ZooPlan]:
+    """Plans drawn in the proportions of :data:`ZOO_MIX`."""
+    drawn = np.random.default_rng([seed, 0]).choice(list(ZOO_MIX), number, p=list(ZOO_MIX.values()))
+    counts = {group: int(np.sum(drawn == group)) for group in ZOO_MIX}
+    return zoo_plans(seed, counts, families=families, machine=machine)
+
+
+def conceal_zoo(
+    plans: Sequence[ZooPlan],
+    *,
+    recordings: Path,
+    truth: Path | None,
+    flat: bool = False,
+    baselines: int = 0,
+    session_deviation: float | None = None,
+    oracle: Oracle = oracle_of,
+    progress: Callable[[int, int], None] | None = None,
+) -> list[str]:
+    """Draw, simulate and record cases of the zoo.
+
+    Parameters
+    ----------
+    plans : sequence of ZooPlan
+    recordings : Path
+        Folder that gets one folder per case
+    truth : Path or None
+        Folder that gets ``<case>.json``; must be another one. None: it is not written
+    flat : bool
+        True to write the recordings of a single case straight into `recordings`
+    baselines : int
+        Healthy recordings of every plant, ``baseline_1.csv.gz`` ...
+    session_deviation : float or None
+        Standard deviation of the logarithm of every parameter between sessions; drawn if None
+    oracle : callable
+    progress : callable or None
+        Called with the cases done and in all
+
+    Returns
+    -------
+    list of str
+        Names of the cases, in order
+
+    Raises
+    ------
+    InputError
+        If the truth is to lie among the recordings, several cases are to share a folder, a definition cannot be split,
+        or a folder cannot be written to.
+    """
+    if flat and len(plans) != 1:
+        raise InputError(f"{len(plans)} cases cannot share one folder; only a single case is written flat")
+    if truth is not None:
+        keep_apart(recordings, truth)
+    digits, names = max(3, len(str(len(plans)))), []
+    for i, plan in enumerate(plans):
+        case = draw_case(
+            plan.family, plan.machine, plan.seed, plan.group, name=f"case_{i + 1:0{digits}d}", kind=plan.kind,
+            baselines=baselines, session_deviation=session_deviation, oracle=oracle,
+        )  # fmt: skip
+        write_zoo_case(
+            case, recordings if flat else recordings / case.name, None if truth is None else truth / f"{case.name}.json"
+        )
+        names.append(case.name)
+        if progress is not None:
+            progress(i + 1, len(plans))
+    return names
+
+
+def write_zoo_case(case: ZooCase, folder: Path, truth_file: Path | None) -> None:
+    """Write recordings and nominal definition of a case into a folder, and its truth into a file outside it.
+
+    Raises
+    ------
+    InputError
+        If something cannot be written.
+    """
+    gearbox = load_gearbox(case.machine)
+    source = Path(case.machine) if names_a_file(case.machine) else packaged(FOLDER, case.machine)
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / DEFINITION).write_text(read_text(source), encoding="utf-8", newline="\n")
+    columns = {name: one.quantity.column for name, one in gearbox.network().inputs.items()}
+    truth = {} if truth_file is None else truth_of(case, gearbox.hash, columns)
+    write_case(folder, truth_file, record_case(case, columns), truth, case.instruments.stated)
+
+
+def record_case(case: ZooCase, columns: Mapping[str, str]) -> dict[str, dict[str, Array]]:
+    """Columns by recording, with noise and faults; faults do not reach back to baselines."""
+    assert case.runs is not None  # noqa: S101
+    faults = [effect.fault for effect in case.effects if effect.fault is not None]
+    made = {}
+    for k, programme in enumerate(case.programmes):
+        rng = np.random.default_rng([case.seed, 8, k])
+        measured = measure(case.plant, programme, case.runs.outcomes[programme.name], 0, has_loss=case.has_loss)
+        acting = [] if programme.name.startswith(BASELINE) else faults
+        made[programme.name] = record(measured, case.instruments, acting, columns, rng)
+    return made

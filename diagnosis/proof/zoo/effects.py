@@ -1,0 +1,152 @@
+"""Effects that are concealed in a plant of the zoo: changes of given form and strength, always or at a date.
+
+The law of an effect is linear in its strength, which has a unit and a greatest value that a real machine could show.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+
+from diagnosis.proof.zoo.faults import Fault, FaultMaker
+from diagnosis.proof.zoo.setting import Act, Changed, Setting
+from diagnosis.proof.zoo.structure import Change, Law
+from diagnosis.proof.zoo.time_course import ALWAYS, Course
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Draft:
+    """An effect as its maker draws it.
+
+    Attributes
+    ----------
+    act : Act
+        At a strength of 1
+    law : str
+        In words and symbols; ``a`` is the strength
+    unit : str
+        Of the strength
+    cap : float
+        Greatest strength that is physical
+    parameters : mapping of str to float
+        What was drawn for this specimen
+    """
+
+    act: Act
+    law: str
+    unit: str
+    cap: float
+    parameters: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Maker:
+    """Kind of effect.
+
+    Attributes
+    ----------
+    family, kind : str
+        As in the catalogue: kind is ``source``, ``link``, ``loss_factor``, ``link_factor``, ``signal`` ...
+    draw : callable
+        Of the setting and a random generator: the draft. Raises UnfitError if the plant lacks what it needs.
+    """
+
+    family: str
+    kind: str
+    draw: Callable[[Setting, np.random.Generator], Draft]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ZooEffect:
+    """One concealed effect of one plant.
+
+    Attributes
+    ----------
+    name : str
+    catalogue : str or None
+        Mechanism of the catalogue that it is a form of
+    family, kind, law, unit : str
+    act : Act
+        At a strength of 1, without its course in time
+    fault : Fault or None
+        Of measurement, at its strength
+    parameters : mapping of str to float
+    least, cap : float
+        Range of strengths that are physical, and stand out of ordinary errors of instruments
+    strength : float
+    course : Course
+    """
+
+    name: str
+    catalogue: str | None
+    family: str
+    kind: str
+    law: str
+    unit: str
+    cap: float
+    act: Act = field(default_factory=Act)
+    fault: Fault | None = None
+    parameters: Mapping[str, float] = field(default_factory=dict)
+    least: float = 0.0
+    strength: float = 1.0
+    course: Course = ALWAYS
+
+    @cached_property
+    def changes(self) -> tuple[Change, ...]:
+        """Changes of the plant at this strength and in the course of time."""
+        return tuple(
+            replace(change, law=_in_time(change.law, self.strength, self.course)) for change in self.act.changes
+        )
+
+    @property
+    def changed(self) -> tuple[Changed, ...]:
+        """Things that it changed, by the names of the nominal model."""
+        if self.fault is None:
+            return self.act.changed
+        return tuple(
+            Changed(what=self.fault.what, of=name, nodes=self.fault.nodes, sign=self.fault.direction)
+            for name in self.fault.channels
+        )
+
+    @property
+    def nodes(self) -> tuple[str, ...]:
+        """Nominal nodes that it concerns, each once."""
+        return tuple(dict.fromkeys(node for one in self.changed for node in one.nodes))
+
+    def with_strength(self, strength: float) -> ZooEffect:
+        """Effect with another strength."""
+        fault = None if self.fault is None else replace(self.fault, strength=strength)
+        return replace(self, strength=strength, fault=fault)
+
+
+def made(
+    name: str, maker: Maker, setting: Setting, rng: np.random.Generator, *, catalogue: str | None, course: Course
+) -> ZooEffect:
+    """Draw an effect for a plant; its strength is still 1.
+
+    Raises
+    ------
+    UnfitError
+        If the plant lacks what it needs.
+    """
+    draft = maker.draw(setting, rng)
+
+    return ZooEffect(name=name, catalogue=catalogue, family=maker.family, kind=maker.kind, law=draft.law,
+                     unit=draft.unit, cap=draft.cap, act=draft.act, parameters=draft.parameters,
+                     course=course)  # fmt: skip
+
+
+def made_fault(name: str, maker: FaultMaker, fault: Fault, *, least: float, cap: float, course: Course) -> ZooEffect:
+    """A fault of measurement as an effect; its strength is still that of the fault."""
+    return ZooEffect(name=name, catalogue=maker.catalogue, family="measurement", kind=maker.kind, law=maker.law,
+                     unit=maker.unit, least=least, cap=cap, fault=fault, strength=fault.strength,
+                     course=course)  # fmt: skip
+
+
+def _in_time(law: Law, strength: float, course: Course) -> Law:
+    if course.kind == "always":
+        return lambda m: strength * law(m)
+    return lambda m: strength * course.share(m.hours) * law(m)

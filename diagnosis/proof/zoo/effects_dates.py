@@ -1,0 +1,100 @@
+"""Changes at a date of anything that a plant is made of: losses, other heats, links, capacities, inputs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from diagnosis.proof.zoo.effects import Draft, Maker
+from diagnosis.proof.zoo.setting import Setting, UnfitError, either
+from diagnosis.proof.zoo.structure import Law
+from diagnosis.proof.zoo.time_course import Course
+
+DATED_FAMILY = "change at a date"
+DOWN, UP = 0.9, 2.0  # greatest relative changes
+
+
+def loss_changes(s: Setting, rng: np.random.Generator) -> Draft:
+    """One loss grows or falls."""
+    if not s.losses_all:
+        raise UnfitError("losses")
+    return _relative(s, rng, "loss", s.losses_all)
+
+
+def heat_changes(s: Setting, rng: np.random.Generator) -> Draft:
+    """A heat that is no loss grows or falls."""
+    names = [n for one in s.plant.sources if not one.is_loss for n in one.part_of.split("+") if n]
+    if not names:
+        raise UnfitError("heats")
+    return _relative(s, rng, "heat", tuple(dict.fromkeys(names)))
+
+
+def link_changes(s: Setting, rng: np.random.Generator) -> Draft:
+    """One link conducts more or less."""
+    return _relative(s, rng, "link", s.links)
+
+
+def capacity_changes(s: Setting, rng: np.random.Generator) -> Draft:
+    """One node stores more or less."""
+    return _relative(s, rng, "capacity", s.nodes)
+
+
+def heat_appears(s: Setting, rng: np.random.Generator) -> Draft:
+    """A constant heat into one node."""
+    node = s.nodes[int(rng.integers(len(s.nodes)))]
+    return Draft(act=s.heat(node, lambda m: np.ones_like(m.hours)), law=f"a into {node}", unit="W", cap=0.3 * s.loss)
+
+
+def link_appears(s: Setting, rng: np.random.Generator) -> Draft:
+    """A further way from one node to the air."""
+    node = s.nodes[int(rng.integers(len(s.nodes)))]
+    act = s.bridge(node, s.air(), lambda m: np.ones_like(m.hours), called="air")
+    return Draft(act=act, law=f"a between {node} and air", unit="W/K", cap=0.4 * s.shed)
+
+
+def set_point_changes(s: Setting, rng: np.random.Generator) -> Draft:
+    """A control that misses: the true input is larger or smaller than the recorded one."""
+    names = [name for name in ("torque", "speed", "heater_power") if name in s.plant.inputs]
+    if not names:
+        raise UnfitError("inputs")
+    name, sign = names[int(rng.integers(len(names)))], either(rng)
+    act = s.input_shift(name, lambda m: sign * m.inputs[name], sign=sign)
+    return Draft(act=act, law=f"true {name} = recorded (1 {_plus(sign)} a)", unit="1", cap=0.2)
+
+
+def _relative(s: Setting, rng: np.random.Generator, what: str, names: tuple[str, ...]) -> Draft:
+    name, sign = names[int(rng.integers(len(names)))], either(rng)
+    law: Law = lambda m: np.full_like(m.hours, sign)  # noqa: E731
+    if what == "link":
+        act = s.link_factor((name,), law, sign=sign)
+    elif what == "capacity":
+        act = s.capacity(name, law, sign=sign)
+    else:
+        act = s.loss_factor((name,), law, sign=sign, is_loss=what == "loss")
+    return Draft(act=act, law=f"{what} {name} (1 {_plus(sign)} a)", unit="1", cap=UP if sign > 0 else DOWN)
+
+
+def _plus(sign: int) -> str:
+    return "+" if sign > 0 else "-"
+
+
+def draw_course(s: Setting, rng: np.random.Generator) -> Course:
+    """A step, ramp or passing change that begins in the training recordings and lasts through later ones."""
+    from_h = s.date(rng, 0.1, 0.75)
+    kind = ("step", "ramp", "from_to")[int(rng.choice(3, p=(0.5, 0.3, 0.2)))]
+    if kind == "step":
+        return Course(kind="step", from_h=from_h)
+    lasts = float(rng.uniform(0.1, 0.6)) * s.hours
+    return Course(kind="ramp" if kind == "ramp" else "from_to", from_h=from_h, to_h=from_h + lasts)
+
+
+DATED_MAKERS: Mapping[str, Maker] = {
+    "loss_changes": Maker(family=DATED_FAMILY, kind="loss_factor", draw=loss_changes),
+    "heat_changes": Maker(family=DATED_FAMILY, kind="source", draw=heat_changes),
+    "link_changes": Maker(family=DATED_FAMILY, kind="link_factor", draw=link_changes),
+    "capacity_changes": Maker(family=DATED_FAMILY, kind="capacity", draw=capacity_changes),
+    "heat_appears": Maker(family=DATED_FAMILY, kind="source", draw=heat_appears),
+    "link_appears": Maker(family=DATED_FAMILY, kind="link", draw=link_appears),
+    "set_point_changes": Maker(family=DATED_FAMILY, kind="signal", draw=set_point_changes),
+}

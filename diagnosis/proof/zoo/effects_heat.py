@@ -1,0 +1,317 @@
+"""Heat paths, oil circuit and surroundings of the catalogue in forms that are not the catalogue's."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from diagnosis.proof.zoo.effects import Draft, Maker
+from diagnosis.proof.zoo.setting import Act, Parts, Setting, soft
+from diagnosis.proof.zoo.structure import Law, Moment
+from models.base.types import Array
+from models.formulas.heat_transfer import KELVIN
+
+AIR = "air"
+WATER, COOLANT = "water", "coolant"
+
+
+def aeration(s: Setting, rng: np.random.Generator) -> Draft:
+    """Foam lowers what gears give to the oil, by a logistic function of speed."""
+    x, x0 = s.speed(), float(rng.uniform(0.3, 0.6))
+    act = s.link_factor(s.link_between(s.group("gears"), ("oil",)), lambda m: -soft((x(m) - x0) / 0.1), sign=-1)
+    return Draft(act=act, law="conductance gear-oil (1 - a s((x - x0) / 0.1))", unit="1", cap=0.9,
+                 parameters={"x0": x0})  # fmt: skip
+
+
+def oil_housing_speed(s: Setting, _: np.random.Generator) -> Draft:
+    """The film on the walls grows with the logarithm of speed."""
+    x = s.speed()
+    act = s.link_factor(s.link_between(s.group("housing"), ("oil",)), lambda m: np.log1p(8.0 * x(m)) / np.log(9.0))
+    return Draft(act=act, law="conductance oil-housing (1 + a log(1 + 8 x) / log(9))", unit="1", cap=3.0)
+
+
+def oil_mist(s: Setting, _: np.random.Generator) -> Draft:
+    """Mist wets the uppermost housing part, saturating with speed."""
+    x = s.speed()
+    names = s.link_between(s.group("housing")[-1:], ("oil",))
+    act = s.link_factor(names, lambda m: -np.expm1(-3.0 * x(m)))
+    return Draft(act=act, law="conductance oil-upper housing (1 + a (1 - exp(-3 x)))", unit="1", cap=3.0)
+
+
+def bearing_seat_contact(s: Setting, rng: np.random.Generator) -> Draft:
+    """A loose seat, tighter while the bearing is warmer than the wall."""
+    bearings = s.group("bearings")
+    bearing = bearings[int(rng.integers(len(bearings)))]
+    T, wall = s.temperature(bearing), s.temperature(s.group("housing")[0])
+    names = s.link_between((bearing,), s.group("housing"))
+    act = s.link_factor(names, lambda m: -np.exp(-np.maximum(T(m) - wall(m), 0.0) / 20.0), sign=-1)
+    return Draft(act=act, law="conductance bearing-housing (1 - a exp(-dT+ / 20 K))", unit="1", cap=0.9)
+
+
+def radiation_error(s: Setting, _: np.random.Generator) -> Draft:
+    """Walls radiate less: the part of their conductance that grows with the cube of the absolute temperature."""
+    wall = s.temperature(s.group("housing")[0])
+    names = s.link_between(s.group("housing"), (AIR,))
+    act = s.link_factor(names, lambda m: -(((wall(m) + KELVIN) / 330.0) ** 3), sign=-1)
+    return Draft(act=act, law="conductance housing-air (1 - a (T / 330 K)^3)", unit="1", cap=0.35)
+
+
+def air_cooling_change(s: Setting, rng: np.random.Generator) -> Draft:
+    """A fan cools one wall less than it did."""
+    walls = s.group("housing")
+    wall = walls[int(rng.integers(len(walls)))]
+    names = s.link_between((wall,), (AIR,))
+    act = s.link_factor(names, lambda m: -np.ones_like(m.hours), sign=-1)
+    return Draft(act=act, law="conductance of one wall to air (1 - a)", unit="1", cap=0.8)
+
+
+def fan_thermostat(s: Setting, rng: np.random.Generator) -> Draft:
+    """A fan cools one wall, faster the warmer its feeler is."""
+    walls = s.group("housing")
+    wall = walls[int(rng.integers(len(walls)))]
+    T_on, tau = s.quantile(wall, float(rng.uniform(0.4, 0.8))), s.lag(rng, 60.0, 300.0)
+    act = s.link_factor(s.link_between((wall,), (AIR,)), lambda m: soft((m.T["fan feeler"] - T_on) / 1.0))
+    act = act + _with(s.follower("fan feeler", wall, tau))
+    return Draft(act=act, law="conductance of one wall to air (1 + a s((T_feeler - T_on) / 1 K))", unit="1", cap=4.0,
+                 parameters={"T_on": T_on, "tau_s": tau})  # fmt: skip
+
+
+def foundation_conduction(s: Setting, rng: np.random.Generator) -> Draft:
+    """The lowest part stands on a plinth that stores heat."""
+    part = s.group("housing")[0]
+    mass = float(rng.uniform(3.0, 15.0)) * _capacity(s, part)
+    act = s.bridge(part, "plinth", _one, called="frame", parts=s.reservoir("plinth", mass, 2.0 * s.shed))
+    return Draft(act=act, law="a to a plinth that stores heat", unit="W/K", cap=0.8 * s.shed,
+                 parameters={"capacity_J_K": mass})  # fmt: skip
+
+
+def hot_neighbour(s: Setting, rng: np.random.Generator) -> Draft:
+    """A warm machine at one shaft or housing part, which itself follows the air."""
+    node = s.group("shafts" if s.groups.get("shafts") else "housing")[-1]
+    rise = float(rng.uniform(0.5, 1.3)) * s.rise
+    around = s.boundary("neighbour", lambda m: m.inputs["T_ambient"] + rise)
+    act = s.bridge(node, "neighbour", _one, parts=around)
+    return Draft(act=act, law="a to a neighbour warmer than the air by dT", unit="W/K", cap=0.4 * s.shed,
+                 parameters={"dT": rise})  # fmt: skip
+
+
+def motor_flange(s: Setting, rng: np.random.Generator) -> Draft:
+    """A motor at the input whose warmth follows the root of its power."""
+    node = s.group("shafts" if s.groups.get("shafts") else "housing")[0]
+    x, y, rise = s.speed(), s.load(), float(rng.uniform(0.6, 1.2)) * s.rise
+    warm: Law = lambda m: m.inputs["T_ambient"] + 0.3 * rise + rise * np.sqrt(x(m) * y(m))  # noqa: E731
+    act = s.bridge(node, "motor", _one, parts=s.boundary("motor", warm))
+    return Draft(act=act, law="a to a motor warmer than the air by dT (0.3 + (x y)^0.5)", unit="W/K", cap=0.4 * s.shed,
+                 parameters={"dT": rise})  # fmt: skip
+
+
+def shaft_ends_to_air(s: Setting, _: np.random.Generator) -> Draft:
+    """Shaft ends in the air, with the root of speed."""
+    x, air = s.speed(), s.air()
+    law: Law = lambda m: 0.1 + np.sqrt(x(m))  # noqa: E731
+    shafts = s.group("shafts")
+    act = s.bridge(shafts[0], air, law, called=AIR)
+    for shaft in shafts[1:]:
+        act = act + s.bridge(shaft, air, law, called=AIR)
+    return Draft(act=act, law="a (0.1 + x^0.5) from every shaft to air", unit="W/K", cap=0.2 * s.shed)
+
+
+def water_jacket(s: Setting, rng: np.random.Generator) -> Draft:
+    """Water whose flow falls off as it warms the valve."""
+    part, cold = s.group("housing")[0], _below_air(s, rng)
+    T, T0 = s.temperature(part), s.quantile(part, 0.5)
+    act = s.bridge(part, WATER, lambda m: 0.5 + soft((T(m) - T0) / 5.0), parts=s.boundary(WATER, _fixed(cold)))
+    return Draft(act=act, law="a (0.5 + s((T - T0) / 5 K)) to water", unit="W/K", cap=0.6 * s.shed,
+                 parameters={"T_water": cold, "T0": T0})  # fmt: skip
+
+
+# ---------------------------------------------------------------------- oil circuit
+
+
+def cooler_thermostat(s: Setting, rng: np.random.Generator) -> Draft:
+    """A water cooler that a slow thermostat opens within a kelvin."""
+    return _cooler(s, rng, width=0.4, power=1.0, water=True)
+
+
+def cooler_proportional(s: Setting, rng: np.random.Generator) -> Draft:
+    """A water cooler with a proportional valve behind a lag."""
+    return _cooler(s, rng, width=5.0, power=0.7, water=True)
+
+
+def cooler_air_thermostat(s: Setting, rng: np.random.Generator) -> Draft:
+    """An air cooler that a slow thermostat opens within a kelvin."""
+    return _cooler(s, rng, width=0.4, power=1.0, water=False)
+
+
+def cooler_air_proportional(s: Setting, rng: np.random.Generator) -> Draft:
+    """An air cooler with a proportional valve behind a lag."""
+    return _cooler(s, rng, width=5.0, power=0.7, water=False)
+
+
+def _cooler(s: Setting, rng: np.random.Generator, *, width: float, power: float, water: bool) -> Draft:
+    T_on, tau = s.quantile("oil", float(rng.uniform(0.4, 0.8))), s.lag(rng, 60.0, 400.0)
+    parts = s.follower("valve feeler", "oil", tau)
+    cold = _below_air(s, rng)
+
+    def opening(m: Moment) -> Array:
+        return np.asarray(soft((m.T["valve feeler"] - T_on) / width) ** power)
+
+    if water:
+        act = s.bridge("oil", COOLANT, opening, parts=s.boundary(COOLANT, _fixed(cold))) + _with(parts)
+    else:
+        act = s.bridge("oil", s.air(), opening, called=AIR, parts=parts)
+    return Draft(act=act, law=f"a s((T_feeler - T_on) / {width:g} K)^{power:g} to the coolant", unit="W/K",
+                 cap=1.5 * s.shed, parameters={"T_on": T_on, "tau_s": tau, "T_water": cold})  # fmt: skip
+
+
+def cooler_constant(s: Setting, rng: np.random.Generator) -> Draft:
+    """A water cooler that always runs, a little better with thin oil."""
+    T, T0, cold = s.temperature("oil"), s.quantile("oil", 0.5), _below_air(s, rng)
+    law: Law = lambda m: np.exp((T(m) - T0) / 80.0)  # noqa: E731
+    act = s.bridge("oil", COOLANT, law, parts=s.boundary(COOLANT, _fixed(cold)))
+    return Draft(act=act, law="a exp((T_oil - T0) / 80 K) to water", unit="W/K", cap=0.6 * s.shed,
+                 parameters={"T0": T0, "T_water": cold})  # fmt: skip
+
+
+def cooler_shaft_driven(s: Setting, rng: np.random.Generator) -> Draft:
+    """An air cooler whose fan sits on the shaft and stalls."""
+    x, x0 = s.speed(), float(rng.uniform(0.2, 0.6))
+    act = s.bridge("oil", s.air(), lambda m: x(m) / (x(m) + x0), called=AIR)
+    return Draft(act=act, law="a x / (x + x0) to air", unit="W/K", cap=1.0 * s.shed, parameters={"x0": x0})
+
+
+def oil_jet(s: Setting, rng: np.random.Generator) -> Draft:
+    """Oil of fixed temperature is injected as long as the shaft turns."""
+    x, T = s.speed(), s.air_mean + float(rng.uniform(0.2, 0.6)) * s.rise
+    act = s.bridge("oil", "jet", lambda m: np.tanh(x(m) / 0.05), parts=s.boundary("jet", _fixed(T)))
+    return Draft(act=act, law="a tanh(x / 0.05) to oil of T_jet", unit="W/K", cap=1.0 * s.shed, parameters={"T_jet": T})
+
+
+def oil_tank(s: Setting, rng: np.random.Generator) -> Draft:
+    """A tank outside with a pump whose flow follows the root of speed."""
+    x, size = s.speed(), float(rng.uniform(1.0, 4.0)) * _capacity(s, "oil")
+    to_air = 0.3 * s.shed
+    act = s.bridge("oil", "tank", lambda m: np.sqrt(x(m)), parts=s.reservoir("tank", size, to_air))
+    return Draft(act=act, law="a x^0.5 to a tank that sheds heat to air", unit="W/K", cap=2.0 * s.shed,
+                 parameters={"capacity_J_K": size, "to_air_W_K": to_air})  # fmt: skip
+
+
+def heater_thermostat(s: Setting, rng: np.random.Generator) -> Draft:
+    """A heater at rest whose power falls smoothly as the oil warms."""
+    x, T = s.speed(), s.temperature("oil")
+    T_off = s.quantile("oil", float(rng.uniform(0.3, 0.7)))
+    act = s.heat("oil", lambda m: soft((T_off - T(m)) / 2.0) * np.exp(-((x(m) / 0.02) ** 2)))
+    return Draft(act=act, law="a s((T_off - T_oil) / 2 K) at standstill into the oil", unit="W", cap=1.0 * s.loss,
+                 parameters={"T_off": T_off})  # fmt: skip
+
+
+def pump_fast_stage(s: Setting, rng: np.random.Generator) -> Draft:
+    """The circulation runs smoothly faster when the oil is warm."""
+    T, T_on = s.temperature("oil"), s.quantile("oil", float(rng.uniform(0.4, 0.8)))
+    names = s.link_between(("oil",), s.group("returns"))
+    act = s.link_factor(names, lambda m: soft((T(m) - T_on) / 2.0))
+    return Draft(act=act, law="conductance oil-return (1 + a s((T_oil - T_on) / 2 K))", unit="1", cap=3.0,
+                 parameters={"T_on": T_on})  # fmt: skip
+
+
+# ---------------------------------------------------------------------- surroundings
+
+
+def solar_soak(s: Setting, rng: np.random.Generator) -> Draft:
+    """Sun on the uppermost part: a bell over the hours of the day."""
+    start, width = float(rng.uniform(0.0, 24.0)), float(rng.uniform(2.0, 3.5))
+
+    def law(m: Moment) -> Array:
+        hour = np.mod(start + m.hours, 24.0)
+        return np.asarray(np.exp(-0.5 * ((hour - 13.0) / width) ** 2))
+
+    act = s.heat(s.group("housing")[-1], law)
+    return Draft(act=act, law="a exp(-((hour - 13) / width)^2 / 2) into the upper part", unit="W", cap=0.5 * s.loss,
+                 parameters={"start_hour": start, "width_h": width})  # fmt: skip
+
+
+def rain_on_housing(s: Setting, rng: np.random.Generator) -> Draft:
+    """Showers of an hour that rise and fall smoothly, on one part."""
+    every, first = float(rng.uniform(3.0, 7.0)), float(rng.uniform(0.5, 2.5))
+    act = s.bridge(
+        s.group("housing")[-1], "rain",
+        lambda m: np.exp(-(((np.mod(m.hours - first + 0.5 * every, every) - 0.5 * every) / 0.4) ** 2)),
+        parts=s.boundary("rain", lambda m: m.inputs["T_ambient"] - 5.0),
+    )  # fmt: skip
+    return Draft(act=act, law="a exp(-(t' / 0.4 h)^2) to air - 5 K around every shower", unit="W/K", cap=2.0 * s.shed,
+                 parameters={"every_h": every, "first_h": first})  # fmt: skip
+
+
+def ambient_swing(s: Setting, rng: np.random.Generator) -> Draft:
+    """The air at the machine swings like a triangle, the probe's does not."""
+    period = float(rng.uniform(3.0, 10.0))
+    act = s.input_shift("T_ambient", lambda m: 2.0 * np.abs(2.0 * np.mod(m.hours / period, 1.0) - 1.0) - 1.0, sign=0)
+    return Draft(act=act, law="air at the machine + a triangle(t / period)", unit="K", cap=6.0,
+                 parameters={"period_h": period})  # fmt: skip
+
+
+def ambient_drift(s: Setting, rng: np.random.Generator) -> Draft:
+    """The air at the machine warms to a new temperature, the probe's does not."""
+    tau = float(rng.uniform(0.02, 0.2)) * s.span
+    act = s.input_shift("T_ambient", lambda m: -np.expm1(-m.hours / tau))
+    return Draft(
+        act=act, law="air at the machine + a (1 - exp(-t / tau))", unit="K", cap=6.0, parameters={"tau_h": tau}
+    )
+
+
+def _one(m: Moment) -> Array:
+    return np.ones_like(m.hours)
+
+
+def _fixed(value: float) -> Law:
+    return lambda m: np.full_like(m.hours, value)
+
+
+def _with(parts: Parts) -> Act:
+    return Act(parts=parts)
+
+
+def _below_air(s: Setting, rng: np.random.Generator) -> float:
+    """Temperature of cooling water, [degC]."""
+    return s.air_mean - float(rng.uniform(3.0, 12.0))
+
+
+def _capacity(s: Setting, node: str) -> float:
+    sizes = s.bodies(node)
+    return sum(float(b.capacity(s.typical)[0]) for b in s.plant.bodies if b.name in sizes)
+
+
+def _maker(family: str, kind: str, draw: object) -> Maker:
+    return Maker(family=family, kind=kind, draw=draw)  # type: ignore[arg-type]
+
+
+INSIDE, OUT, CIRCUIT, AROUND = "heat inside the gearbox", "heat to the surroundings", "oil circuit", "surroundings"
+HEAT_MAKERS: Mapping[str, Maker] = {
+    "aeration": _maker(INSIDE, "link_factor", aeration),
+    "oil_housing_speed": _maker(INSIDE, "link_factor", oil_housing_speed),
+    "oil_mist": _maker(INSIDE, "link_factor", oil_mist),
+    "bearing_seat_contact": _maker(INSIDE, "link_factor", bearing_seat_contact),
+    "radiation_error": _maker(OUT, "link_factor", radiation_error),
+    "air_cooling_change": _maker(OUT, "link_factor", air_cooling_change),
+    "fan_thermostat": _maker(AROUND, "link_factor", fan_thermostat),
+    "foundation_conduction": _maker(OUT, "link", foundation_conduction),
+    "hot_neighbour": _maker(OUT, "link", hot_neighbour),
+    "motor_flange": _maker(OUT, "link", motor_flange),
+    "shaft_ends_to_air": _maker(OUT, "link", shaft_ends_to_air),
+    "water_jacket": _maker(CIRCUIT, "link", water_jacket),
+    "cooler_thermostat": _maker(CIRCUIT, "link", cooler_thermostat),
+    "cooler_proportional": _maker(CIRCUIT, "link", cooler_proportional),
+    "cooler_air_thermostat": _maker(CIRCUIT, "link", cooler_air_thermostat),
+    "cooler_air_proportional": _maker(CIRCUIT, "link", cooler_air_proportional),
+    "cooler_constant": _maker(CIRCUIT, "link", cooler_constant),
+    "cooler_shaft_driven": _maker(CIRCUIT, "link", cooler_shaft_driven),
+    "oil_jet": _maker(CIRCUIT, "link", oil_jet),
+    "oil_tank": _maker(CIRCUIT, "link", oil_tank),
+    "heater_thermostat": _maker(CIRCUIT, "source", heater_thermostat),
+    "pump_fast_stage": _maker(CIRCUIT, "link_factor", pump_fast_stage),
+    "solar_soak": _maker(AROUND, "source", solar_soak),
+    "rain_on_housing": _maker(AROUND, "link", rain_on_housing),
+    "ambient_swing": _maker(AROUND, "signal", ambient_swing),
+    "ambient_drift": _maker(AROUND, "signal", ambient_drift),
+}

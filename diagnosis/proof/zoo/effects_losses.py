@@ -1,0 +1,182 @@
+"""Losses of the catalogue in forms that are not the catalogue's; ``x``, ``y``: speed and torque over their highest."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from diagnosis.proof.zoo.effects import Draft, Maker
+from diagnosis.proof.zoo.setting import Setting, UnfitError, soft
+from diagnosis.proof.zoo.structure import Law
+
+SLIDING, CHURNING = ("mesh_sliding", "gears_load"), ("churning", "gears_no_load")
+
+
+def windage(s: Setting, rng: np.random.Generator) -> Draft:
+    """Between the square and the cube of speed, half of it into the oil."""
+    x, p = s.speed(), float(rng.uniform(1.8, 2.3))
+    law: Law = lambda m: 0.5 * x(m) ** p * (1.0 + x(m))  # noqa: E731
+    act = s.heat("oil", law, is_loss=True)
+    return Draft(act=act, law="a x^p (1 + x) / 2 into the oil", unit="W", cap=0.3 * s.loss, parameters={"p": p})
+
+
+def pocketing(s: Setting, rng: np.random.Generator) -> Draft:
+    """Exponential in speed."""
+    x, k = s.speed(), float(rng.uniform(2.0, 3.5))
+    act = s.heat("oil", lambda m: np.expm1(k * x(m)) / np.expm1(k), is_loss=True)
+    return Draft(act=act, law="a (exp(k x) - 1) / (exp(k) - 1) into the oil", unit="W", cap=0.4 * s.loss,
+                 parameters={"k": k})  # fmt: skip
+
+
+def churning_swirl(s: Setting, rng: np.random.Generator) -> Draft:
+    """Above a soft threshold with the power 1.4 of speed."""
+    x, x0 = s.speed(), float(rng.uniform(0.35, 0.7))
+    act = s.heat("oil", lambda m: x(m) ** 1.4 * soft((x(m) - x0) / 0.05), is_loss=True)
+    return Draft(act=act, law="a x^1.4 s((x - x0) / 0.05) into the oil", unit="W", cap=0.8 * s.loss,
+                 parameters={"x0": x0})  # fmt: skip
+
+
+def churning_load(s: Setting, rng: np.random.Generator) -> Draft:
+    """Grows with the root of torque."""
+    x, y, p = s.speed(), s.load(), float(rng.uniform(0.8, 1.2))
+    act = s.heat("oil", lambda m: np.sqrt(y(m)) * x(m) ** p, is_loss=True)
+    return Draft(act=act, law="a y^0.5 x^p into the oil", unit="W", cap=0.5 * s.loss, parameters={"p": p})
+
+
+def oil_level_thermal(s: Setting, rng: np.random.Generator) -> Draft:
+    """Saturating function of the oil's temperature."""
+    T, T0 = s.temperature("oil"), s.quantile("oil", 0.1)
+    width = max(0.5 * (s.quantile("oil", 0.95) - T0), 3.0) * float(rng.uniform(0.8, 1.4))
+    act = s.loss_factor(s.losses(*CHURNING), lambda m: np.maximum(np.tanh((T(m) - T0) / width), 0.0))
+    return Draft(act=act, law="churning (1 + a tanh((T_oil - T0) / width)+)", unit="1", cap=0.9,
+                 parameters={"T0": T0, "width": width})  # fmt: skip
+
+
+def splash_starvation(s: Setting, rng: np.random.Generator) -> Draft:
+    """A soft step of sliding friction at a speed."""
+    x, x0 = s.speed(), float(rng.uniform(0.4, 0.7))
+    act = s.loss_factor(s.losses(*SLIDING), lambda m: soft((x(m) - x0) / 0.08))
+    return Draft(act=act, law="mesh sliding (1 + a s((x - x0) / 0.08))", unit="1", cap=2.0, parameters={"x0": x0})
+
+
+def misalignment(s: Setting, _: np.random.Generator) -> Draft:
+    """Teeth wind straight under load: less at high torque; a bearing of the input shaft feels half of it."""
+    y = s.load()
+    act = s.loss_factor(s.losses(*SLIDING), lambda m: 1.0 / (0.5 + y(m)))
+    act = act + s.loss_factor(s.losses(s.group("bearings")[0]), lambda m: np.full_like(m.hours, 0.5))
+    return Draft(act=act, law="mesh sliding (1 + a / (0.5 + y)), first bearing (1 + a / 2)", unit="1", cap=0.5)
+
+
+def bearing_preload(s: Setting, rng: np.random.Generator) -> Draft:
+    """A bearing warmer than its housing closes its clearance softly."""
+    bearing = _one(s, "bearings", rng)
+    T, wall = s.temperature(bearing), s.temperature(s.group("housing")[0])
+    dT = float(rng.uniform(1.0, 4.0))
+    act = s.loss_factor(s.losses(bearing), lambda m: 0.2 * np.logaddexp(0.0, (T(m) - wall(m) - dT) / 0.8))
+    return Draft(act=act, law="bearing loss (1 + a log(1 + exp((T - T_housing - dT) / 0.8 K)) / 5)", unit="1", cap=4.0,
+                 parameters={"dT": dT})  # fmt: skip
+
+
+def bearing_additive(s: Setting, rng: np.random.Generator) -> Draft:
+    """Less friction of all bearings at low speed."""
+    x, x0 = s.speed(), float(rng.uniform(0.2, 0.5))
+    act = s.loss_factor(s.losses(*s.group("bearings")), lambda m: -1.0 / (1.0 + (x(m) / x0) ** 2), sign=-1)
+    return Draft(act=act, law="bearing losses (1 - a / (1 + (x / x0)^2))", unit="1", cap=0.8, parameters={"x0": x0})
+
+
+def brake_drag(s: Setting, _: np.random.Generator) -> Draft:
+    """Heat in the output shaft that falls off from proportional to speed."""
+    x = s.speed()
+    act = s.heat(s.group("shafts")[-1], lambda m: x(m) * (1.4 - 0.4 * x(m)), is_loss=True)
+    return Draft(act=act, law="a x (1.4 - 0.4 x) into the output shaft", unit="W", cap=0.5 * s.loss)
+
+
+def pump_heat(s: Setting, rng: np.random.Generator) -> Draft:
+    """A pump whose relief valve opens: constant above a speed."""
+    x, x0 = s.speed(), float(rng.uniform(0.2, 0.5))
+    act = s.heat("oil", lambda m: np.tanh(x(m) / x0), is_loss=True)
+    return Draft(act=act, law="a tanh(x / x0) into the oil", unit="W", cap=0.3 * s.loss, parameters={"x0": x0})
+
+
+def run_in_flanks(s: Setting, rng: np.random.Generator) -> Draft:
+    """Falls hyperbolically with the hours."""
+    life = float(rng.uniform(0.03, 0.2)) * s.span
+    act = s.loss_factor(s.losses(*SLIDING), lambda m: 1.0 / (1.0 + m.hours / life))
+    return Draft(act=act, law="mesh sliding (1 + a / (1 + t / life))", unit="1", cap=1.0, parameters={"life_h": life})
+
+
+def run_in_seals(s: Setting, rng: np.random.Generator) -> Draft:
+    """Falls with the square root of the hours."""
+    names = tuple(n for n in s.losses_all if "seal" in n)
+    if not names:
+        raise UnfitError("seals")
+    life = float(rng.uniform(0.03, 0.2)) * s.span
+    act = s.loss_factor(names, lambda m: np.exp(-np.sqrt(m.hours / life)))
+    return Draft(act=act, law="seals (1 + a exp(-(t / life)^0.5))", unit="1", cap=1.5, parameters={"life_h": life})
+
+
+def oil_ageing(s: Setting, _: np.random.Generator) -> Draft:
+    """Churning and bearings grow with the root of the hours."""
+    law: Law = lambda m: np.sqrt(m.hours / s.span)  # noqa: E731
+    act = s.loss_factor((*s.losses(*CHURNING), *s.losses(*s.group("bearings"))), law)
+    return Draft(act=act, law="churning and bearing losses (1 + a (t / span)^0.5)", unit="1", cap=0.6)
+
+
+def oil_loss(s: Setting, rng: np.random.Generator) -> Draft:
+    """The level sinks to a lower one: less churning, less to warm, drier gears."""
+    tau = float(rng.uniform(0.1, 0.4)) * s.span
+    law: Law = lambda m: np.expm1(-m.hours / tau)  # noqa: E731
+    act = s.loss_factor(s.losses(*CHURNING), law, sign=-1) + s.capacity("oil", law, sign=-1)
+    act = act + s.link_factor(s.link_between(s.group("gears"), ("oil",)), law, sign=-1)
+    return Draft(act=act, law="churning, oil's capacity and gear-oil (1 - a (1 - exp(-t / tau)))", unit="1", cap=0.7,
+                 parameters={"tau_h": tau})  # fmt: skip
+
+
+def gear_wear(s: Setting, _: np.random.Generator) -> Draft:
+    """Grows with the square of the hours."""
+    act = s.loss_factor(s.losses(*SLIDING), lambda m: (m.hours / s.span) ** 2)
+    return Draft(act=act, law="mesh sliding (1 + a (t / span)^2)", unit="1", cap=0.8)
+
+
+def bearing_damage(s: Setting, rng: np.random.Generator) -> Draft:
+    """One bearing grinds from a moment on, in proportion to speed."""
+    bearing, x = _one(s, "bearings", rng), s.speed()
+    at_h = s.date(rng, 0.05, 0.7)
+    act = s.heat(bearing, lambda m: x(m) * soft((m.hours - at_h) / 0.05), is_loss=True)
+    return Draft(act=act, law="a x s((t - at) / 0.05 h) into the bearing", unit="W", cap=0.4 * s.loss,
+                 parameters={"at_h": at_h})  # fmt: skip
+
+
+def torque_decay(s: Setting, _: np.random.Generator) -> Draft:
+    """The torque that is set is reached less and less, with the root of the hours."""
+    s.load()
+    act = s.input_shift("torque", lambda m: -m.inputs["torque"] * np.sqrt(m.hours / s.span), sign=-1)
+    return Draft(act=act, law="true torque = recorded (1 - a (t / span)^0.5)", unit="1", cap=0.3)
+
+
+def _one(s: Setting, group: str, rng: np.random.Generator) -> str:
+    names = s.group(group)
+    return names[int(rng.integers(len(names)))]
+
+
+LOSS_MAKERS: Mapping[str, Maker] = {
+    "windage": Maker(family="no-load loss", kind="source", draw=windage),
+    "pocketing": Maker(family="no-load loss", kind="source", draw=pocketing),
+    "churning_swirl": Maker(family="no-load loss", kind="source", draw=churning_swirl),
+    "churning_load": Maker(family="load-dependent loss", kind="source", draw=churning_load),
+    "oil_level_thermal": Maker(family="no-load loss", kind="loss_factor", draw=oil_level_thermal),
+    "splash_starvation": Maker(family="load-dependent loss", kind="loss_factor", draw=splash_starvation),
+    "misalignment": Maker(family="load-dependent loss", kind="loss_factor", draw=misalignment),
+    "bearing_preload": Maker(family="load-dependent loss", kind="loss_factor", draw=bearing_preload),
+    "bearing_additive": Maker(family="load-dependent loss", kind="loss_factor", draw=bearing_additive),
+    "brake_drag": Maker(family="no-load loss", kind="source", draw=brake_drag),
+    "pump_heat": Maker(family="oil circuit", kind="source", draw=pump_heat),
+    "run_in_flanks": Maker(family="ageing and running-in", kind="loss_factor", draw=run_in_flanks),
+    "run_in_seals": Maker(family="ageing and running-in", kind="loss_factor", draw=run_in_seals),
+    "oil_ageing": Maker(family="ageing and running-in", kind="loss_factor", draw=oil_ageing),
+    "oil_loss": Maker(family="ageing and running-in", kind="loss_factor", draw=oil_loss),
+    "gear_wear": Maker(family="ageing and running-in", kind="loss_factor", draw=gear_wear),
+    "bearing_damage": Maker(family="ageing and running-in", kind="source", draw=bearing_damage),
+    "torque_decay": Maker(family="ageing and running-in", kind="signal", draw=torque_decay),
+}

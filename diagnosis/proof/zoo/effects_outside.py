@@ -1,0 +1,194 @@
+"""Effects that no catalogue has; ``x``, ``y``: speed and torque over their highest."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from diagnosis.proof.zoo.effects import Draft, Maker
+from diagnosis.proof.zoo.setting import Setting, soft
+from diagnosis.proof.zoo.structure import Law, Moment
+from models.base.types import Array
+
+OUTSIDE_FAMILY = "outside the catalogue"
+
+
+def bearing_torque_square(s: Setting, rng: np.random.Generator) -> Draft:
+    """A bearing that bends loses power with the square of torque."""
+    x, y, node = s.speed(), s.load(), _any(s.group("bearings"), rng)
+    act = s.heat(node, lambda m: y(m) ** 2 * x(m), is_loss=True)
+    return Draft(act=act, law="a y^2 x into the bearing", unit="W", cap=0.4 * s.loss)
+
+
+def resonance(s: Setting, rng: np.random.Generator) -> Draft:
+    """A narrow band of speed shakes one node."""
+    x, x0, node = s.speed(), float(rng.uniform(0.2, 0.8)), _any(s.group("bearings"), rng)
+    act = s.heat(node, lambda m: 1.0 / (1.0 + ((x(m) - x0) / (0.06 * x0)) ** 2), is_loss=True)
+    return Draft(act=act, law="a / (1 + ((x - x0) / (0.06 x0))^2)", unit="W", cap=0.5 * s.loss, parameters={"x0": x0})
+
+
+def stick_slip(s: Setting, rng: np.random.Generator) -> Draft:
+    """A support creaks below a speed and slides above it."""
+    x, x0, node = s.speed(), float(rng.uniform(0.1, 0.3)), _any(s.group("bearings"), rng)
+    act = s.heat(node, lambda m: soft((x0 - x(m)) / 0.01) * np.tanh(x(m) / 0.01), is_loss=True)
+    return Draft(act=act, law="a while 0 < x < x0", unit="W", cap=0.5 * s.loss, parameters={"x0": x0})
+
+
+def eddy_brake(s: Setting, rng: np.random.Generator) -> Draft:
+    """A stray field brakes a turning part: rises, then saturates."""
+    x, x0 = s.speed(), float(rng.uniform(0.2, 0.5))
+    node = s.group("gears" if s.groups.get("gears") else "bearings")[-1]
+    act = s.heat(node, lambda m: x(m) ** 2 / (x(m) ** 2 + x0**2), is_loss=True)
+    return Draft(act=act, law="a x^2 / (x^2 + x0^2)", unit="W", cap=0.4 * s.loss, parameters={"x0": x0})
+
+
+def stiff_grease(s: Setting, rng: np.random.Generator) -> Draft:
+    """Grease that stiffens at rest is sheared soft in every recording."""
+    x, tau, node = s.speed(), float(rng.uniform(0.4, 2.0)), _any(s.group("bearings"), rng)
+    act = s.heat(node, lambda m: np.sqrt(x(m)) * np.exp(-m.since_start / tau), is_loss=True)
+    return Draft(act=act, law="a x^0.5 exp(-t / tau), t since the recording began", unit="W", cap=0.6 * s.loss,
+                 parameters={"tau_h": tau})  # fmt: skip
+
+
+def sludge(s: Setting, rng: np.random.Generator) -> Draft:
+    """Sludge brakes below a temperature of the oil."""
+    x, T, T0 = s.speed(), s.temperature("oil"), s.quantile("oil", float(rng.uniform(0.2, 0.6)))
+    act = s.heat("oil", lambda m: np.sqrt(x(m)) * soft((T0 - T(m)) / 0.5), is_loss=True)
+    return Draft(act=act, law="a x^0.5 below T0 into the oil", unit="W", cap=0.4 * s.loss, parameters={"T0": T0})
+
+
+def water_evaporation(s: Setting, _: np.random.Generator) -> Draft:
+    """Water boils out of the oil, steeply with its temperature."""
+    T = s.temperature("oil")
+    T0 = s.quantile("oil", 0.95)
+    act = s.heat("oil", lambda m: -np.exp(np.minimum((T(m) - T0) / 14.0, 1.5)), sign=-1)
+    return Draft(act=act, law="-a exp((T_oil - T0) / 14 K)", unit="W", cap=0.4 * s.loss, parameters={"T0": T0})
+
+
+def growing_insulation(s: Setting, rng: np.random.Generator) -> Draft:
+    """A layer that grows with the hours covers one way to the air."""
+    tau, names = float(rng.uniform(0.05, 0.3)) * s.span, _way_to_air(s, rng)
+    act = s.link_factor(names, lambda m: -(m.hours / tau) / (1.0 + m.hours / tau), sign=-1)
+    return Draft(act=act, law="conductance to air (1 - a (t / tau) / (1 + t / tau))", unit="1", cap=0.9,
+                 parameters={"tau_h": tau})  # fmt: skip
+
+
+def opening_gap(s: Setting, rng: np.random.Generator) -> Draft:
+    """A gap opens in one link inside as it warms."""
+    inside = [n for n in s.links if all(node in s.nodes for node in n.split("-"))]
+    name = _any(inside, rng)
+    node = name.split("-")[0]
+    T, T0 = s.temperature(node), s.quantile(node, float(rng.uniform(0.3, 0.7)))
+    act = s.link_factor((name,), lambda m: -soft((T(m) - T0) / 2.0), sign=-1)
+    return Draft(act=act, law=f"conductance of {name} (1 - a s((T - T0) / 2 K))", unit="1", cap=0.95,
+                 parameters={"T0": T0})  # fmt: skip
+
+
+def timed_neighbour(s: Setting, rng: np.random.Generator) -> Draft:
+    """A machine next to it runs by a timer."""
+    node, on = _outer(s, rng), _timer(rng)
+    rise = 1.5 * s.rise
+    warm: Law = lambda m: m.inputs["T_ambient"] + rise * on(m)  # noqa: E731
+    act = s.bridge(node, "timed neighbour", lambda m: np.ones_like(m.hours), parts=s.boundary("timed neighbour", warm))
+    return Draft(act=act, law="a to a neighbour that runs by a timer", unit="W/K", cap=0.4 * s.shed,
+                 parameters={"rise_K": rise, **on.parameters})  # fmt: skip
+
+
+def timed_heat(s: Setting, rng: np.random.Generator) -> Draft:
+    """An auxiliary gives its heat to one part for a share of every period."""
+    node, on = _outer(s, rng), _timer(rng)
+    act = s.heat(node, on)
+    return Draft(act=act, law="a for 40 % of every period", unit="W", cap=0.4 * s.loss, parameters=on.parameters)
+
+
+def door_draught(s: Setting, rng: np.random.Generator) -> Draft:
+    """A door opens by the clock: one way to the air conducts more."""
+    names, on = _way_to_air(s, rng), _timer(rng)
+    act = s.link_factor(names, on)
+    return Draft(act=act, law="conductance to air (1 + a) for 40 % of every period", unit="1", cap=2.0,
+                 parameters=on.parameters)  # fmt: skip
+
+
+def melting_wax(s: Setting, rng: np.random.Generator) -> Draft:
+    """A filling melts: capacity around its melting point."""
+    node = _outer(s, rng)
+    T, T0, width = s.temperature(node), s.quantile(node, float(rng.uniform(0.3, 0.7))), float(rng.uniform(1.0, 2.5))
+    act = s.capacity(node, lambda m: np.exp(-0.5 * ((T(m) - T0) / width) ** 2))
+    return Draft(act=act, law="capacity (1 + a exp(-((T - T0) / width)^2 / 2))", unit="1", cap=15.0,
+                 parameters={"T0": T0, "width_K": width})  # fmt: skip
+
+
+def heat_pipe(s: Setting, rng: np.random.Generator) -> Draft:
+    """A wet crack leads heat between two nodes that touch nowhere, once one is warm."""
+    pairs = [
+        (a, b)
+        for i, a in enumerate(s.nodes)
+        for b in s.nodes[i + 1 :]
+        if f"{a}-{b}" not in s.links and f"{b}-{a}" not in s.links
+    ]
+    here, there = pairs[int(rng.integers(len(pairs)))]
+    T, T0 = s.temperature(here), s.quantile(here, float(rng.uniform(0.2, 0.6)))
+    body = max(s.bodies(there).items(), key=lambda item: item[1])[0]
+    act = s.bridge(here, body, lambda m: soft((T(m) - T0) / 3.0), called=there)
+    return Draft(act=act, law=f"a s((T - T0) / 3 K) between {here} and {there}", unit="W/K", cap=0.5 * s.shed,
+                 parameters={"T0": T0})  # fmt: skip
+
+
+def wet_floor(s: Setting, rng: np.random.Generator) -> Draft:
+    """The lowest part stands on a floor that swings between day and night."""
+    node, phase, T0 = s.nodes[0], float(rng.uniform(0.0, 1.0)), s.air_mean - float(rng.uniform(2.0, 8.0))
+    floor: Law = lambda m: T0 + 5.0 * np.sin(2.0 * np.pi * (m.hours / 24.0 + phase))  # noqa: E731
+    act = s.bridge(node, "floor", lambda m: np.ones_like(m.hours), parts=s.boundary("floor", floor))
+    return Draft(act=act, law="a to T0 + 5 sin(2 pi (t / 24 h + phase))", unit="W/K", cap=0.4 * s.shed,
+                 parameters={"T0": T0, "phase": phase})  # fmt: skip
+
+
+class _Timer:
+    """1 for 40 % of every period, 0 else."""
+
+    def __init__(self, period_h: float, phase: float) -> None:
+        self.parameters = {"period_h": period_h, "phase": phase}
+
+    def __call__(self, m: Moment) -> Array:
+        p = self.parameters
+        return np.asarray(np.mod(m.hours / p["period_h"] + p["phase"], 1.0) < 0.4, dtype=float)
+
+
+def _timer(rng: np.random.Generator) -> _Timer:
+    return _Timer(float(rng.uniform(0.7, 3.0)), float(rng.uniform(0.0, 1.0)))
+
+
+def _any(names: tuple[str, ...] | list[str], rng: np.random.Generator) -> str:
+    return names[int(rng.integers(len(names)))]
+
+
+def _outer(s: Setting, rng: np.random.Generator) -> str:
+    """A node that touches the air, a housing part if there is one."""
+    return _any(s.group("housing"), rng) if s.groups.get("housing") else _any(s.nodes, rng)
+
+
+def _way_to_air(s: Setting, rng: np.random.Generator) -> tuple[str, ...]:
+    return (_any(s.link_between(s.nodes, ("air",)), rng),)
+
+
+OUTSIDE_MAKERS: Mapping[str, Maker] = {
+    name: Maker(family=OUTSIDE_FAMILY, kind=kind, draw=draw)
+    for name, kind, draw in (
+        ("bearing_torque_square", "source", bearing_torque_square),
+        ("resonance", "source", resonance),
+        ("stick_slip", "source", stick_slip),
+        ("eddy_brake", "source", eddy_brake),
+        ("stiff_grease", "source", stiff_grease),
+        ("sludge", "source", sludge),
+        ("water_evaporation", "source", water_evaporation),
+        ("growing_insulation", "link_factor", growing_insulation),
+        ("opening_gap", "link_factor", opening_gap),
+        ("timed_neighbour", "link", timed_neighbour),
+        ("timed_heat", "source", timed_heat),
+        ("door_draught", "link_factor", door_draught),
+        ("melting_wax", "capacity", melting_wax),
+        ("heat_pipe", "link", heat_pipe),
+        ("wet_floor", "link", wet_floor),
+    )
+}

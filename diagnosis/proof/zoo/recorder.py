@@ -1,0 +1,164 @@
+"""From what a zoo plant did to what was recorded: errors of instruments, noise, display steps, dropouts, faults."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from diagnosis.proof.plant.instruments import drop_readings
+from diagnosis.proof.zoo.faults import AMBIENT, Fault, Measured, hold_reading, spoiled
+from diagnosis.proof.zoo.structure import Outcome, Programme, ZooPlant
+from models.base.types import Array
+
+DATA_SHEET = {"noise": 0.2, "resolution": 0.1, "lag_s": 15.0, "lag_sd_s": 5.0}
+SLOW_ROW_S = 60.0  # rows longer than this are means: less noise, lags do not show
+NOISE_K, SLOW_NOISE_K, NOISY_K, SLOW_LAG_S = 0.2, 0.1, (0.4, 0.7), (30.0, 55.0)
+STEP = {"speed": 0.1, "torque": 0.01}  # of recorded inputs; 0.1 of others
+INPUT_NOISE = {AMBIENT: 0.1}
+
+
+@dataclass(frozen=True, kw_only=True)
+class ZooInstruments:
+    """How one case is measured.
+
+    Attributes
+    ----------
+    channels : tuple of str
+        Recorded temperatures
+    noise_K, quantum_K : float
+        White noise and step of temperature readings
+    input_gain, input_offset : mapping of str to float
+        Errors of the recorded inputs: relative [-], and in the unit of the input
+    clock_s : float
+        Temperatures are stamped late by so much, [s]
+    loss_noise : (float, float) or None
+        White noise of the measured loss, relative [-] and absolute [W]; None: it is not measured
+    loss_gain : float
+    loss_offset_W : float
+        While there is a loss
+    dropouts : int
+        Bursts of missing readings per recording
+    stated : mapping of str to float, or None
+        Data sheet of the temperature sensors, by the keys of a mapping file; it may be wrong
+    """
+
+    channels: tuple[str, ...]
+    noise_K: float = NOISE_K
+    quantum_K: float = 0.1
+    input_gain: Mapping[str, float]
+    input_offset: Mapping[str, float]
+    clock_s: float
+    loss_noise: tuple[float, float] | None = (0.02, 2.0)
+    loss_gain: float = 0.0
+    loss_offset_W: float = 0.0
+    dropouts: int = 0
+    stated: Mapping[str, float] | None = None
+
+
+def draw_instruments(plant: ZooPlant, kind: str, *, has_loss: bool, rng: np.random.Generator) -> ZooInstruments:
+    """Draw the instruments of a case; `kind` is that of a control, see :data:`diagnosis.proof.zoo.case.CONTROLS`."""
+    slow = plant.row_s > SLOW_ROW_S
+    noise = SLOW_NOISE_K if slow else NOISE_K
+    sheet = {"noise": noise, "resolution": 0.1} if slow else DATA_SHEET
+    stated = kind in ("noise_misstated", "lag_wrong") or rng.random() < 0.5
+    gains = {"torque": 0.008, "speed": 0.001, "heater_power": 0.01}
+    temperatures = [name for name in plant.inputs if name.startswith("T_")]
+    return ZooInstruments(
+        channels=tuple(probe.channel for probe in plant.probes),
+        noise_K=noise * float(rng.uniform(2.0, 3.5)) if kind == "noise_misstated" else noise,
+        input_gain={name: float(rng.normal(0.0, sd)) for name, sd in gains.items() if name in plant.inputs},
+        input_offset={name: float(rng.normal(0.0, 0.2)) for name in temperatures},
+        clock_s=float(rng.uniform(-2.0, 2.0)),
+        loss_noise=(0.02, max(2.0, 0.005 * plant.loss_W)) if has_loss else None,
+        loss_gain=float(rng.normal(0.0, 0.015)),
+        loss_offset_W=float(rng.normal(0.0, 1.5)),
+        dropouts=int(rng.integers(1, 6)) if rng.random() < 0.3 else 0,
+        stated=sheet if stated else None,
+    )
+
+
+def with_slow_sensors(plant: ZooPlant, rng: np.random.Generator) -> ZooPlant:
+    """The plant with sensors whose lag is not that of the data sheet."""
+    factor = max(1.0, plant.row_s / 60.0)
+    probes = tuple(replace(probe, lag_s=factor * float(rng.uniform(*SLOW_LAG_S))) for probe in plant.probes)
+    return replace(plant, probes=probes)
+
+
+def measure(plant: ZooPlant, programme: Programme, outcome: Outcome, run: int, *, has_loss: bool) -> Measured:
+    """Recording of one run of a batch by perfect instruments."""
+    first = programme.unrecorded
+    rows = outcome.P_loss.shape[1]
+    return Measured(
+        hours=np.asarray(programme.begins_h + np.arange(rows) * plant.row_s / 3600.0),
+        row_s=plant.row_s,
+        inputs={name: programme.inputs[name][first:] for name in plant.inputs},
+        readings={name: values[run] for name, values in outcome.readings.items()},
+        P_loss=outcome.P_loss[run] if has_loss else None,
+    )
+
+
+def record(
+    measured: Measured,
+    instruments: ZooInstruments,
+    faults: Sequence[Fault],
+    columns: Mapping[str, str],
+    rng: np.random.Generator,
+) -> dict[str, Array]:
+    """Columns of a recording.
+
+    Parameters
+    ----------
+    measured : Measured
+        What perfect instruments would record
+    instruments : ZooInstruments
+    faults : sequence of Fault
+    columns : mapping of str to str
+        Column of every input
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    dict of column name to Array, shape (rows,)
+    """
+    sound = _with_errors(measured, instruments)
+    for fault in faults:
+        sound = spoiled(sound, fault)
+    rows = len(measured.hours)
+    inputs = {}
+    for name, values in sound.inputs.items():
+        step = STEP.get(name, 0.1)
+        noisy = values + INPUT_NOISE.get(name, 0.0) * rng.standard_normal(rows)
+        inputs[columns[name]] = np.round(noisy / step) * step
+    quantum = instruments.quantum_K
+    readings = {
+        name: np.round((sound.readings[name] + instruments.noise_K * rng.standard_normal(rows)) / quantum) * quantum
+        for name in instruments.channels
+    }
+    for fault in faults:
+        if fault.kind == "stuck":
+            (name,) = fault.channels
+            readings[name] = hold_reading(readings[name], measured, fault)
+    drop_readings(readings, instruments.dropouts, rng)
+    made = {"time_s": np.asarray(np.arange(rows) * measured.row_s), **inputs}
+    made |= {f"T_{name}_degC": values for name, values in readings.items()}
+    if sound.P_loss is not None and instruments.loss_noise is not None:
+        relative, absolute = instruments.loss_noise
+        noise = np.hypot(relative * sound.P_loss, absolute) * rng.standard_normal(rows)
+        made["P_loss_W"] = np.round(sound.P_loss + noise, 1)
+    return made
+
+
+def _with_errors(measured: Measured, instruments: ZooInstruments) -> Measured:
+    """Recording by these instruments without noise and faults."""
+    inputs = {
+        name: values * (1.0 + instruments.input_gain.get(name, 0.0)) + instruments.input_offset.get(name, 0.0)
+        for name, values in measured.inputs.items()
+    }
+    time = measured.hours * 3600.0
+    readings = {n: np.interp(time - instruments.clock_s, time, values) for n, values in measured.readings.items()}
+    loss = measured.P_loss
+    if loss is not None:
+        loss = loss * (1.0 + instruments.loss_gain) + instruments.loss_offset_W * (loss > 0.0)
+    return replace(measured, inputs=inputs, readings=readings, P_loss=loss)

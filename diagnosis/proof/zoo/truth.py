@@ -1,0 +1,270 @@
+"""The truth of a zoo case: concealed effects, their heat, the kelvin they cause, and the evidence for them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from diagnosis.proof.cases.truth import ACTIVE_SHARE, SCHEMA, practical_of, size_of, spans_of
+from diagnosis.proof.zoo.case import HOLD, TRAIN, ZooCase, with_reading_faults
+from diagnosis.proof.zoo.effects import ZooEffect
+from diagnosis.proof.zoo.faults import recorded_minus_true
+from diagnosis.proof.zoo.oracle import OracleNats
+from diagnosis.proof.zoo.recorder import measure
+from diagnosis.proof.zoo.setting import Changed
+from diagnosis.proof.zoo.structure import Change, Outcome, Programme, ZooPlant
+from models.base.types import Array
+
+SETS = (TRAIN, HOLD)
+
+
+def truth_of(case: ZooCase, gearbox_hash: str, columns: Mapping[str, str]) -> dict[str, Any]:
+    """The truth of a case, ready for JSON.
+
+    Parameters
+    ----------
+    case : ZooCase
+        With its runs
+    gearbox_hash : str
+        Of the nominal definition
+    columns : mapping of str to str
+        Column of every input
+
+    Returns
+    -------
+    dict
+        Keys as in the truth of a plant of the own kind. ``K`` of an effect compares the run with this effect alone
+        (the noise-free readings, for faults of measurement) with the run without any. ``heat_W`` is by nominal node.
+        ``changed`` lists everything that was changed, for the scorer; ``from_s`` and ``to_s`` count from the first row
+        of ``recording`` and may lie beyond its end
+    """
+    facts = [_effect(case, k, columns) for k in range(len(case.effects))]
+    instruments = case.instruments
+    return {
+        "schema": SCHEMA,
+        "case": case.name,
+        "seed": [case.seed],
+        "plant": "zoo",
+        "family": case.family,
+        "machine": case.machine,
+        "gearbox": gearbox_hash,
+        "group": case.group,
+        "control": case.kind if case.group == "control" else None,
+        "sensors": list(instruments.channels),
+        "effects": facts,
+        "changed": [one for fact in facts for one in fact["changed"]],
+        "visible": case.visible,
+        "practical": practical_of(facts),
+        "oracle": {**_nats(case.nats), "distance_K": round(case.distance_K, 4)},
+        "rejected_plants": case.rejected,
+        "K_all": _kelvin(case, 0),
+        "base_parameters": {name: float(f"{value:.6g}") for name, value in case.plant.parameters.items()},
+        "sessions": {
+            "deviation": case.session_deviation,
+            "parameters": {
+                recording: {name: float(f"{value:.6g}") for name, value in values.items()}
+                for recording, values in case.sessions.items()
+            },
+        },
+        "noise": {
+            "white_K": round(instruments.noise_K, 3),
+            "quantum_K": instruments.quantum_K,
+            "sensor_lag_s": {probe.channel: round(probe.lag_s, 2) for probe in case.plant.probes},
+            "sensor_mix": {
+                probe.channel: {name: round(weight, 4) for name, weight in probe.mix.items()}
+                for probe in case.plant.probes
+            },
+            "input_gain": {name: round(value, 5) for name, value in instruments.input_gain.items()},
+            "input_offset": {name: round(value, 3) for name, value in instruments.input_offset.items()},
+            "clock_s": round(instruments.clock_s, 2),
+            "loss_gain": round(instruments.loss_gain, 5),
+            "loss_offset_W": round(instruments.loss_offset_W, 3),
+            "stated": None if instruments.stated is None else dict(instruments.stated),
+            "dropouts": instruments.dropouts,
+            "random_heat": {
+                p.name: {body: round(float(np.std(w)), 2) for body, w in p.random_heat.items()} for p in case.programmes
+            },
+        },
+        "begins_h": {p.name: round(p.begins_h, 3) for p in case.programmes},
+        "start_degC": {
+            p.name: {name: round(float(values[0, 0]), 1) for name, values in _runs(case, p).readings.items()}
+            for p in case.programmes
+        },
+    }
+
+
+def _runs(case: ZooCase, programme: Programme) -> Outcome:
+    assert case.runs is not None  # noqa: S101
+    return case.runs.outcomes[programme.name]
+
+
+def _nats(nats: OracleNats | None) -> dict[str, float | None]:
+    """Evidence by the keys of the truth; null where nothing is concealed."""
+    if nats is None:
+        return {"D_plant_nats": None, "D_tool_nats": None}
+    return {"D_plant_nats": round(nats.plant, 2), "D_tool_nats": round(nats.tool, 2)}
+
+
+def _effect(case: ZooCase, k: int, columns: Mapping[str, str]) -> dict[str, Any]:
+    effect = case.effects[k]
+    facts: dict[str, Any] = {
+        "name": effect.name,
+        "catalogue": effect.catalogue,
+        "family": effect.family,
+        "kind": effect.kind,
+        "nodes": list(effect.nodes),
+        "dominant": k == 0,
+        "law": effect.law,
+        "unit": effect.unit,
+        "strength": round(effect.strength, 6),
+        "cap": round(effect.cap, 6),
+        "parameters": {"a": round(effect.strength, 6)} | {n: round(v, 6) for n, v in effect.parameters.items()},
+        "oracle": _nats(case.nats_of_effects[k]),
+        "changed": [_changed(case, effect, one) for one in effect.changed],
+    }
+    if effect.fault is not None:
+        sign = effect.fault.sign
+        facts["parameters"]["a"] = round(sign * effect.strength, 6)
+        return facts | _measured(case, effect, columns)
+    run = 0 if len(case.effects) == 1 else 2 + k
+    return facts | {"K": _kelvin(case, run)} | _heat(case, run)
+
+
+def _changed(case: ZooCase, effect: ZooEffect, changed: Changed) -> dict[str, Any]:
+    """One thing that was changed, with its course in seconds of the recording in which it begins."""
+    course = effect.course if effect.fault is None else effect.fault.course
+    facts: dict[str, Any] = {
+        "what": changed.what,
+        "of": changed.of,
+        "nodes": list(changed.nodes),
+        "sign": changed.sign,
+        "is_loss": changed.is_loss,
+        "course": course.kind,
+        "from_s": None,
+        "to_s": None,
+        "recording": None,
+    }
+    to_h = course.to_h
+    if effect.fault is not None and effect.fault.kind == "stuck":
+        facts["course"], to_h = "from_to", course.from_h + effect.fault.strength
+    if course.kind == "always":
+        return facts
+    began = [p for p in case.recordings(TRAIN, HOLD) if p.begins_h <= course.from_h]
+    recording = max(began, key=lambda p: p.begins_h)
+    facts |= {"recording": recording.name, "from_s": round(3600.0 * (course.from_h - recording.begins_h), 1)}
+    if np.isfinite(to_h):
+        facts["to_s"] = round(3600.0 * (to_h - recording.begins_h), 1)
+    return facts
+
+
+def _kelvin(case: ZooCase, run: int) -> dict[str, Any]:
+    """Difference of the readings, without faults of measurement, of a run and that without effects."""
+    found: dict[str, Any] = {}
+    for kind in SETS:
+        outcomes = [_runs(case, p) for p in case.recordings(kind)]
+        none = _none(case)
+        found[kind] = {
+            name: size_of(np.concatenate([o.readings[name][run] - o.readings[name][none] for o in outcomes]))
+            for name in case.instruments.channels
+        }
+    return found
+
+
+def _none(case: ZooCase) -> int:
+    assert case.runs is not None  # noqa: S101
+    return case.runs.sets.index(())
+
+
+def _heat(case: ZooCase, run: int) -> dict[str, Any]:
+    """Heat that an effect made by nominal node, its mean magnitude, and when it acted."""
+    plant, none = case.plant, _none(case)
+    by_recording = {
+        p.name: _heat_of(plant, _runs(case, p), run, none, _acting(case, run)) for p in case.recordings(*SETS)
+    }
+    nodes = sorted({node for heat in by_recording.values() for node in heat})
+    found: dict[str, Any] = {}
+    total: dict[str, Array] = {}
+    for name, heat in by_recording.items():
+        rows = _runs(case, next(p for p in case.programmes if p.name == name)).P_loss.shape[1]
+        total[name] = np.sum([np.abs(heat[node]) for node in heat], axis=0) if heat else np.zeros(rows)
+    for kind in SETS:
+        names = [p.name for p in case.recordings(kind)]
+        found[kind] = {
+            n: _of_heat(np.concatenate([by_recording[r].get(n, 0.0 * total[r]) for r in names])) for n in nodes
+        }
+    top = max(float(values.max(initial=0.0)) for values in total.values())
+    magnitude = {
+        kind: round(float(np.concatenate([total[p.name] for p in case.recordings(kind)]).mean()), 3) for kind in SETS
+    }
+    acting = {name: spans_of(values > ACTIVE_SHARE * top, plant.row_s) for name, values in total.items()}
+    return {"heat_W": found, "heat_magnitude_W": magnitude, "acting_s": acting}
+
+
+def _acting(case: ZooCase, run: int) -> list[Change]:
+    assert case.runs is not None  # noqa: S101
+    return [change for k in case.runs.sets[run] for change in case.effects[k].changes]
+
+
+def _heat_of(plant: ZooPlant, outcome: Outcome, run: int, none: int, changes: Sequence[Change]) -> dict[str, Array]:
+    """Heat by nominal node, [W]; of a changed input what the losses differ by, at the node ``losses``."""
+    home = {body.name: body.part_of.split("+")[0] for body in plant.bodies}
+    ends = {path.name: path.ends for path in plant.paths}
+    spread = {source.name: source.spread for source in plant.sources}
+    found: dict[str, Array] = {}
+    for i, change in enumerate(changes):
+        if change.kind == "input":
+            found["losses"] = outcome.P_loss[run] - outcome.P_loss[none]
+            continue
+        if change.kind == "source":
+            shares = dict(spread[change.target])
+        elif change.kind in ("path", "bridge"):
+            first, second = ends[change.target] if change.kind == "path" else (change.target, change.other)
+            shares = {first: -1.0, second: 1.0}
+        else:
+            shares = {change.target: 1.0, change.other: -1.0}
+        for body, share in shares.items():
+            node = home.get(body, "")
+            if node:
+                found[node] = found.get(node, 0.0) + share * outcome.heat[run][i]
+    return found
+
+
+def _of_heat(watts: Array) -> dict[str, float]:
+    largest = float(np.abs(watts).max(initial=0.0))
+    active = np.abs(watts) > ACTIVE_SHARE * largest
+    return {
+        "mean": round(float(watts.mean()), 3),
+        "mean_active": round(float(watts[active].mean()) if active.any() else 0.0, 3),
+        "active_share": round(float(active.mean()), 4),
+        "max": round(float(watts[np.abs(watts).argmax()]), 3),
+    }
+
+
+def _measured(case: ZooCase, effect: ZooEffect, columns: Mapping[str, str]) -> dict[str, Any]:
+    """Changes of the columns by a fault of measurement, without noise."""
+    fault = effect.fault
+    assert fault is not None  # noqa: S101
+    shifts: dict[str, dict[str, Any]] = {kind: {} for kind in SETS}
+    for kind in SETS:
+        changes: dict[str, list[Array]] = {}
+        for p in case.recordings(kind):
+            sound = measure(case.plant, p, _runs(case, p), _none(case), has_loss=case.has_loss)
+            if fault.what == "input":
+                changes.setdefault(columns[fault.channels[0]], []).append(recorded_minus_true(sound, fault))
+                continue
+            faulty = with_reading_faults(sound, [fault])
+            for name in case.instruments.channels:
+                column = f"T_{name}_degC"
+                changes.setdefault(column, []).append(faulty.readings[name] - sound.readings[name])
+        for column, parts in changes.items():
+            values = np.concatenate(parts)
+            if np.any(values != 0.0):
+                shifts[kind][column] = size_of(values)
+    nothing = {"rms": 0.0, "max": 0.0}
+    K = {
+        kind: {name: found.get(f"T_{name}_degC", nothing) for name in case.instruments.channels}
+        for kind, found in shifts.items()
+    }
+    return {"K": K, "column_shift": shifts, "heat_W": {}, "acting_s": {}}

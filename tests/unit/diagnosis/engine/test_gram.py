@@ -1,0 +1,97 @@
+"""The Gram matrix: every evidence against the normal density of the readings themselves, and against the old engine."""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+import numpy as np
+import pytest
+from scipy.integrate import dblquad
+from scipy.stats import multivariate_normal, norm
+
+from diagnosis.engine.gram import Gram
+from diagnosis.inference.evidence import Marginal, strength
+from models.base.types import Array
+
+ROWS, UNKNOWNS, FURTHER, CANDIDATES = {"a": 30, "b": 12}, 4, 3, 5
+
+
+@pytest.fixture
+def columns() -> dict[str, Array]:
+    """Residual, unknowns, further unknowns and candidates of two recordings."""
+    rng = np.random.default_rng(1)
+    return {name: rng.standard_normal((rows, 1 + UNKNOWNS + FURTHER + CANDIDATES)) * [2.0, *(0.7,) * 12]
+            for name, rows in ROWS.items()}  # fmt: skip
+
+
+@pytest.fixture
+def gram(columns: dict[str, Array]) -> Gram:
+    return Gram(labels=tuple(f"x{i}" for i in range(12)), of_recording={n: W.T @ W for n, W in columns.items()},
+                log_determinants={"a": 3.0, "b": -1.0}, rows=ROWS)  # fmt: skip
+
+
+def log_density(W: Array, which: list[int], sd: Array | float = 1.0) -> float:
+    """Of the residual, up to what all have in common."""
+    X = W[:, 1 + np.array(which, dtype=int)] * sd
+    covariance = np.eye(len(W)) + X @ X.T
+    return float(multivariate_normal(cov=covariance).logpdf(W[:, 0])) + 0.5 * len(W) * np.log(2.0 * np.pi)
+
+
+def test_evidence_is_the_normal_density(gram: Gram, columns: dict[str, Array]) -> None:
+    both, sd = np.concatenate(list(columns.values())), np.array([0.5, 2.0, 1.0, 0.3])
+    given = gram.given(range(4), sd)
+    assert given.log_evidence == pytest.approx(log_density(both, [0, 1, 2, 3], sd) - 0.5 * (3.0 - 1.0), abs=1e-9)
+    # In steps as at once; what has no amplitude is absent; some recordings alone.
+    stepwise = gram.given([0, 2], sd[[0, 2]]).given([3, 1, 5], [0.3, 2.0, 0.0])
+    assert stepwise.log_evidence == pytest.approx(given.log_evidence, abs=1e-9)
+    alone = gram.given(range(4), sd, recordings=["b"])
+    assert alone.log_evidence == pytest.approx(log_density(columns["b"], [0, 1, 2, 3], sd) + 0.5, abs=1e-9)
+
+
+def test_singles_and_pairs_are_ratios_of_densities(gram: Gram, columns: dict[str, Array]) -> None:
+    both, base, sd = np.concatenate(list(columns.values())), [0, 1, 2, 3], np.array([0.4, 3.0, 1.0, 0.2, 0.9])
+    given, nothing = gram.given(base), log_density(both, base)
+    at = 7 + np.arange(5)
+    for k, found in enumerate(given.singles(at, sd).log_bayes):
+        own = np.array([1.0] * 4 + [sd[k]])
+        assert found == pytest.approx(log_density(both, [*base, 7 + k], own) - nothing, abs=1e-9)
+    i, j = np.array(list(combinations(range(5), 2))).T
+    found = given.pairs(7 + i, 7 + j, (sd[i], sd[j]), (np.zeros(10), np.zeros(10)))
+    for k, value in enumerate(found):
+        own = np.array([1.0] * 4 + [sd[i[k]], sd[j[k]]])
+        assert value == pytest.approx(log_density(both, [*base, 7 + i[k], 7 + j[k]], own) - nothing, abs=1e-9)
+
+
+@pytest.mark.parametrize("signs", [(1, 1), (1, -1), (-1, 0), (0, 1)])
+def test_a_pair_of_one_sided_strengths(gram: Gram, signs: tuple[int, int]) -> None:
+    """Against quadrature of the likelihood over the allowed quadrant."""
+    given = gram.given(range(4))
+    G = given.matrix
+
+    def ratio(y: float, x: float) -> float:
+        likelihood = np.exp(G[0, 8] * x + G[0, 9] * y - 0.5 * (G[8, 8] * x * x + G[9, 9] * y * y) - G[8, 9] * x * y)
+        return float(likelihood * norm.pdf(x, scale=0.5) * norm.pdf(y, scale=0.8))
+
+    ends = [(0.0, 4.0) if s > 0 else (-4.0, 0.0) if s < 0 else (-4.0, 4.0) for s in signs]
+    whole, _ = dblquad(ratio, *ends[0], *ends[1], epsabs=1e-10)
+    share = 0.5 ** sum(s != 0 for s in signs)
+    (found,) = given.pairs([7], [8], (np.array([0.5]), np.array([0.8])), (np.array(signs[:1]), np.array(signs[1:])))
+    assert found == pytest.approx(np.log(whole / share), abs=1e-5)
+
+
+def test_evidences_of_the_old_engine(gram: Gram, columns: dict[str, Array]) -> None:
+    both = np.concatenate(list(columns.values()))
+    marginal = Marginal(both[:, 1:5], both[:, 0])
+    for sign in (-1, 0, 1):
+        old = strength(*marginal.products(both[:, 8:]), 0.6, sign)
+        new = gram.given(range(4)).singles(7 + np.arange(5), 0.6, sign)
+        np.testing.assert_allclose(new.log_bayes, old.log_bayes, atol=1e-9)
+        np.testing.assert_allclose(new.value, old.value, atol=1e-9)
+        np.testing.assert_allclose(new.sd, old.sd, atol=1e-9)
+
+
+def test_most_probable_values(gram: Gram, columns: dict[str, Array]) -> None:
+    both, sd = np.concatenate(list(columns.values())), np.array([0.5, 2.0, 1.0, 0.3])
+    X = both[:, 1:5]
+    ridge = np.linalg.solve(X.T @ X + np.diag(sd**-2.0), X.T @ both[:, 0])
+    np.testing.assert_allclose(gram.given([]).most_probable(range(4), sd), ridge, atol=1e-10)
