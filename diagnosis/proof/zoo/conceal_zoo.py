@@ -11,7 +11,7 @@ import numpy as np
 from diagnosis.proof.cases.case_files import DEFINITION, keep_apart, write_case
 from diagnosis.proof.zoo.case import BASELINE, CONTROLS, GROUPS, Oracle, ZooCase
 from diagnosis.proof.zoo.draw import draw_case, oracle_of
-from diagnosis.proof.zoo.families import FAMILIES
+from diagnosis.proof.zoo.families import FAMILIES, find_family
 from diagnosis.proof.zoo.recorder import measure, record
 from diagnosis.proof.zoo.truth import truth_of
 from models.assembly.gearbox import FOLDER, load_gearbox, names_a_file
@@ -68,20 +68,17 @@ def zoo_plans(
     for group in counts:
         if group not in GROUPS:
             raise InputError(f"{group!r} is not a group of cases of the zoo{did_you_mean(group, GROUPS)}")
-    for family in families or ():
-        if family not in FAMILIES:
-            raise InputError(f"{family!r} is not a family of the zoo{did_you_mean(family, FAMILIES)}")
-    chosen = tuple(families or FAMILIES)
+    chosen = {name: find_family(name) for name in families or FAMILIES}
     rng = np.random.default_rng([seed, 1])
     if machine is not None and families is None:
-        fit = tuple(name for name in chosen if machine in FAMILIES[name].machines)
+        fit = {name: family for name, family in chosen.items() if machine in family.machines}
         chosen = fit or chosen  # a definition of the user: the families themselves say what they cannot split
-    order = [str(name) for name in rng.permutation(chosen)]
+    order = [str(name) for name in rng.permutation(list(chosen))]
     plans: list[ZooPlan] = []
     for group, number in counts.items():
         for i in range(number):
             family = order[len(plans) % len(order)]
-            machines = FAMILIES[family].machines
+            machines = chosen[family].machines
             plans.append(
                 ZooPlan(
                     group=group,

@@ -26,7 +26,7 @@ from diagnosis.proof.zoo.effects_dates import DATED_MAKERS, draw_course
 from diagnosis.proof.zoo.effects_heat import HEAT_MAKERS
 from diagnosis.proof.zoo.effects_losses import LOSS_MAKERS
 from diagnosis.proof.zoo.effects_outside import OUTSIDE_MAKERS
-from diagnosis.proof.zoo.families import FAMILIES
+from diagnosis.proof.zoo.families import find_family
 from diagnosis.proof.zoo.faults import AMBIENT, INPUT_FAULTS, SENSOR_FAULTS, Fault, FaultMaker, input_of
 from diagnosis.proof.zoo.oracle_columns import Measurement, design_of
 from diagnosis.proof.zoo.recorder import ZooInstruments, draw_instruments, with_slow_sensors
@@ -79,7 +79,7 @@ def draw_case(
     Parameters
     ----------
     family_name : str
-        Key of :data:`~diagnosis.proof.zoo.families.FAMILIES`
+        See :func:`~diagnosis.proof.zoo.families.find_family`
     machine : str
         Name or file of the nominal definition
     seed : int
@@ -105,11 +105,9 @@ def draw_case(
     InputError
         If family or group are not known, or the definition cannot be split.
     """
-    if family_name not in FAMILIES:
-        raise InputError(f"{family_name!r} is not a family of the zoo{did_you_mean(family_name, FAMILIES)}")
     if group not in GROUPS:
         raise InputError(f"{group!r} is not a group of cases of the zoo{did_you_mean(group, GROUPS)}")
-    drawn = draw_plant(FAMILIES[family_name], machine, seed, baselines=baselines)
+    drawn = draw_plant(find_family(family_name), machine, seed, baselines=baselines)
     return draw_case_of(drawn, load_gearbox(machine), machine, seed, group, name=name, kind=kind,
                         session_deviation=session_deviation, oracle=oracle)  # fmt: skip
 
