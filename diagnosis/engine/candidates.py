@@ -16,7 +16,6 @@ from diagnosis.candidates.hypotheses import Hypothesis
 from diagnosis.engine.fit import Experiment, Fit, Linear
 from diagnosis.engine.gram import Given, Gram, Strengths
 from diagnosis.engine.point import AT_ONCE, Column, Machine, Point
-from diagnosis.engine.slopes import Heat
 from diagnosis.engine.unknown import Group, NetworkParameter, TermParameter, Unknown
 from diagnosis.forward.network_on_grid import NetworkOnGrid
 from diagnosis.forward.observation import readings
@@ -180,25 +179,34 @@ def _gram_of(fit: Fit, base: Sequence[Array], chosen: Sequence[Array], names: Se
 
 def _columns(part: Linear, some: Sequence[tuple[Hypothesis, TermOnGrid]]) -> Array:
     """Readings per unit of strength for all variants of some candidates, shape (K + 1, channels, n)."""
-    columns = [column for candidate, on_grid in some for column in candidate_columns(part.point, candidate, on_grid)]
-    return part.point.responses(columns)
+    point, trajectory = part.point, part.point.trajectory
+    count = sum(len(candidate.variants) for candidate, _ in some)
+    into = np.zeros((len(trajectory.piece.steps), trajectory.decay.shape[-1], count))
+    loss, shown, first = np.zeros((len(into), count)), {}, 0
+    for candidate, on_grid in some:
+        mine = slice(first, first + len(candidate.variants))
+        if on_grid.term.kind == "sensor":
+            shown[mine.start] = _faults(point, candidate, on_grid)
+        else:
+            heat, own = on_grid.heat(trajectory, candidate.variants)
+            into[:, : heat.shape[1], mine] = heat if np.isfinite(heat.sum()) else np.nan_to_num(heat)
+            loss[:, mine] = np.nan_to_num(own)
+        first = mine.stop
+    result = point.heated(into, loss)
+    for start, columns in shown.items():
+        result[:, :, start : start + columns.shape[2]] = columns
+    return result
 
 
-def candidate_columns(point: Point, candidate: Hypothesis, on_grid: TermOnGrid) -> Iterator[Column]:
-    """Columns per unit of strength of all variants of a candidate."""
-    term = on_grid.term
-    if term.kind != "sensor":
-        into, loss = on_grid.heat(point.trajectory, candidate.variants)
-        into, loss = np.nan_to_num(into), np.nan_to_num(loss)
-        coupled = len(point.machine.model.coupled)
-        for v in range(into.shape[2]):
-            yield Column(heat=Heat(into=np.pad(into[:, :, v], ((0, 0), (0, coupled))), loss=loss[:, v]))
-        return
+def _faults(point: Point, candidate: Hypothesis, on_grid: TermOnGrid) -> Array:
+    """Change of the recorded readings per unit of strength of a fault, shape (K + 1, channels, variants)."""
     read = readings(point.machine.model, point.trajectory, point.sensors)
+    columns = []
     for variant in candidate.variants:
         values = np.array(variant)
-        values[0] *= term.strength.sd  # by a difference of the size that the fault typically has
-        yield Column(shown=(on_grid.distorted(point.trajectory, point.sensors, read, values) - read) / values[0])
+        values[0] *= on_grid.term.strength.sd  # by a difference of the size that the fault typically has
+        columns.append((on_grid.distorted(point.trajectory, point.sensors, read, values) - read) / values[0])
+    return np.stack(columns, axis=2)
 
 
 def _chunks(candidates: Sequence[Hypothesis], most: int) -> Iterator[list[int]]:

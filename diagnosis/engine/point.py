@@ -255,22 +255,37 @@ class Point:
     def _whole(self, into: Array) -> Array:
         return np.pad(into, ((0, 0), (0, len(self.machine.model.coupled))))
 
+    def heated(self, into: Array, loss: Array) -> Array:
+        """Change of the readings for many heats in one pass.
+
+        Parameters
+        ----------
+        into : Array, shape (K, parts + coupled, columns)
+            See :class:`diagnosis.engine.slopes.Heat`
+        loss : Array, shape (K, columns)
+
+        Returns
+        -------
+        Array, shape (K + 1, channels, columns)
+        """
+        T = self.trajectory.response(into)
+        read = reading_columns(self.machine.model, self.trajectory, self.sensors, T, loss)
+        return self.setting.passed_on(self.trajectory, read)
+
     def responses(self, columns: Sequence[Column]) -> Array:
         """Change of the readings per unit of many columns, in one pass, shape (K + 1, channels, columns)."""
-        model, trajectory = self.machine.model, self.trajectory
         result = np.zeros((*self.read.shape, len(columns)))
+        for i, column in enumerate(columns):
+            if column.reading is not None:
+                result[:, :, i] = column.reading
+        result = self.setting.passed_on(self.trajectory, result)
+        for i, column in enumerate(columns):
+            if column.shown is not None:
+                result[:, :, i] += column.shown
         heated = [i for i, column in enumerate(columns) if column.heat is not None]
         for first in range(0, len(heated), AT_ONCE):
             some = heated[first : first + AT_ONCE]
             heats = [heat for i in some if (heat := columns[i].heat) is not None]
-            T = trajectory.response(np.stack([heat.into for heat in heats], axis=-1))
-            loss = np.stack([heat.loss for heat in heats], axis=-1)
-            result[:, :, some] = reading_columns(model, trajectory, self.sensors, T, loss)
-        for i, column in enumerate(columns):
-            if column.reading is not None:
-                result[:, :, i] += column.reading
-        result = self.setting.passed_on(trajectory, result)
-        for i, column in enumerate(columns):
-            if column.shown is not None:
-                result[:, :, i] += column.shown
+            into, loss = (np.stack(each, axis=-1) for each in zip(*((h.into, h.loss) for h in heats), strict=True))
+            result[:, :, some] += self.heated(into, loss)
         return result
