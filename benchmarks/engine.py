@@ -1,6 +1,6 @@
 """What the inference engine costs, next to the old one in the same run.
 
-python -m benchmarks.engine [contract] [control] [week] [turbine RECORDING] [--jobs 2]
+python -m benchmarks.engine [contract] [control] [week] [turbine RECORDING] [--jobs 1]
 
 Contract: 26 h of the FZG rig at 10 s with 7 channels; preparation, calibration, Gram matrix of all candidates of the
 catalogue with 300 further columns, and five refits. ``control`` is the same with nothing concealed. The old engine does
@@ -10,15 +10,15 @@ the same steps without the further columns, as it cannot have them.
 from __future__ import annotations
 
 import argparse
-import multiprocessing
+import json
 import resource
+import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -109,27 +109,18 @@ def old(gearbox: str, recordings: Sequence[str], jobs: int) -> dict[str, float]:
     return clock.stages
 
 
-def _apart(queue: Any, run: Callable[..., dict[str, float]], arguments: tuple[Any, ...]) -> None:
-    stages = run(*arguments)
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    queue.put((stages, peak / (1e9 if sys.platform == "darwin" else 1e6)))
-
-
-def measured(run: Callable[..., dict[str, float]], *arguments: Any) -> tuple[dict[str, float], float]:
+def measured(run: str, gearbox: str, recordings: Sequence[str], jobs: int) -> tuple[dict[str, float], float]:
     """Stages [s] and peak memory [GB] in a fresh process (of that process alone)."""
-    context = multiprocessing.get_context("spawn")
-    queue = context.Queue()
-    process = context.Process(target=_apart, args=(queue, run, arguments))
-    process.start()
-    result = queue.get()
-    process.join()
-    return result
+    command = [sys.executable, "-m", "benchmarks.engine", "--one", run, gearbox, *recordings, "--jobs", str(jobs)]
+    text = subprocess.run(command, check=True, capture_output=True, text=True).stdout
+    stages, peak = json.loads(text.splitlines()[-1])
+    return stages, peak
 
 
 def compare(name: str, gearbox: str, recordings: Sequence[str], jobs: int) -> None:
     """Print one table."""
-    (ours, ours_GB), (theirs, theirs_GB) = (measured(run, gearbox, recordings, jobs) for run in (new, old))
-    print(f"\n{name}: wall time on {jobs} processes [s]\n{'':28}{'new':>8}{'share':>8}{'old':>8}{'ratio':>8}")
+    (ours, ours_GB), (theirs, theirs_GB) = (measured(run, gearbox, recordings, jobs) for run in RUNS)
+    print(f"\n{name}: wall time with {jobs} process(es) [s]\n{'':28}{'new':>8}{'share':>8}{'old':>8}{'ratio':>8}")
     whole = sum(ours.values())
     for stage, seconds in ours.items():
         before = theirs.get(stage)
@@ -140,12 +131,22 @@ def compare(name: str, gearbox: str, recordings: Sequence[str], jobs: int) -> No
     print(f"{'peak memory of one process':28}{ours_GB:8.2f}{'':8}{theirs_GB:8.2f}   GB", flush=True)
 
 
+RUNS = {"new": new, "old": old}
+
+
 def main() -> None:
     """Run the sizes that are asked for."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("sizes", nargs="*", default=["contract"], help="contract, control, week, turbine RECORDING")
-    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--jobs", type=int, default=1)
+    parser.add_argument("--one", choices=list(RUNS), help="one engine on GEARBOX RECORDING..., for this script itself")
     given = parser.parse_args()
+    if given.one:
+        gearbox, *recordings = given.sizes
+        stages = RUNS[given.one](gearbox, recordings, given.jobs)
+        peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (1e9 if sys.platform == "darwin" else 1e6)
+        print(json.dumps([stages, peak]))
+        return
     sizes = list(given.sizes)
     with tempfile.TemporaryDirectory() as folder:
         while sizes:
