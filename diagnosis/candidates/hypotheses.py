@@ -189,14 +189,15 @@ def scan(
         Processes
     """
     intervals = sum(len(piece.steps) for piece in problem.pieces)
-    chunks = list(_chunks(hypotheses, max(8, min(CHUNK, CHUNK_VALUES // max(intervals, 1)))))
-    work = [(problem, fit, marginal, chunk) for chunk in chunks]
+    most = max(8, min(CHUNK, CHUNK_VALUES // max(intervals, 1)))
+    work = [(problem, fit, marginal, chunk) for chunk in chunks(hypotheses, most)]
     results = run_parallel(_scan_chunk, work, jobs=jobs, batches=BUNDLES * jobs)
     scored = [one for result in results for one in result]
     return sorted(scored, key=lambda s: -s.log_bayes)
 
 
-def _chunks(hypotheses: Sequence[Hypothesis], most: int) -> Iterator[list[Hypothesis]]:
+def chunks(hypotheses: Sequence[Hypothesis], most: int) -> Iterator[list[Hypothesis]]:
+    """Hypotheses in order, in lists that have so many variants at most, or one hypothesis."""
     chunk: list[Hypothesis] = []
     columns = 0
     for hypothesis in hypotheses:

@@ -4,7 +4,7 @@ their priors, all whitened and put into one Gram matrix with the unknowns.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
-from diagnosis.candidates.hypotheses import Hypothesis
+from diagnosis.candidates.hypotheses import Hypothesis, chunks
 from diagnosis.engine.fit import Experiment, Fit, Linear
 from diagnosis.engine.gram import Given, Gram, Strengths
 from diagnosis.engine.point import AT_ONCE, Column, Machine, Point
@@ -90,37 +90,38 @@ def scan(fit: Fit, candidates: Sequence[Hypothesis], further: Sequence[Sequence[
     -------
     Scan
     """
-    candidates = [c for c in candidates if c.term is not None]
     count, model = len(fit.z), fit.experiment.machine.model
-    on_grid = [_on_grid(model, c.term) for c in candidates if c.term is not None]
+    placed = [(c, _on_grid(model, c.term)) for c in candidates if c.term is not None]
+    candidates, strengths = [c for c, _ in placed], [on_grid.term.strength for _, on_grid in placed]
     base = _whitened_base(fit, further)
     known = range(count)
     chosen = [np.empty((len(W), len(candidates)), order="F") for W in base]
-    best, mean, signs = [], [], []
+    best: list[int] = []
+    mean, signs = [], []
     weigh = _Marginal(fit, base)
     intervals = max(len(part.point.trajectory.T) for part in fit.parts)
-    for some in _chunks(candidates, max(16, min(AT_ONCE, VALUES_AT_ONCE // intervals))):
-        blocks = [part.filter(_columns(part, [(candidates[i], on_grid[i]) for i in some])) for part in fit.parts]
+    for chunk in chunks(candidates, max(16, min(AT_ONCE, VALUES_AT_ONCE // intervals))):
+        some = placed[len(best) : len(best) + len(chunk)]
+        blocks = [part.filter(_columns(part, some)) for part in fit.parts]
         products, first = weigh.products(blocks), 0
-        for i in some:
-            c, n = candidates[i], len(candidates[i].variants)
+        for c, on_grid in some:
+            n = len(c.variants)
             way = np.sign(c.variants[:, 0]).astype(int)
             sign = way if len(set(way.tolist())) > 1 else np.full(n, c.sign)
-            assert c.term is not None  # noqa: S101 - only terms are here
-            found = products.singles(np.arange(first, first + n), c.term.strength.sd, sign)
+            found = products.singles(np.arange(first, first + n), on_grid.term.strength.sd, sign)
             at = int(np.argmax(found.log_bayes))
+            for kept, block in zip(chosen, blocks, strict=True):
+                kept[:, len(best)] = block[:, first + at]
             best.append(at)
             mean.append(float(np.logaddexp.reduce(found.log_bayes) - np.log(n)))
             signs.append(int(sign[at]))
-            for kept, block in zip(chosen, blocks, strict=True):
-                kept[:, i] = block[:, first + at]
             first += n
     extra = base[0].shape[1] - 1 - count
     return Scan(
         candidates=tuple(candidates), best=tuple(best), log_bayes=np.array(mean),
         gram=_gram_of(fit, base, chosen, [c.label for c in candidates]), unknowns=known,
         further=range(count, count + extra), of_candidates=range(count + extra, count + extra + len(candidates)),
-        sd=np.array([c.term.strength.sd for c in candidates if c.term is not None]), sign=np.array(signs, dtype=int),
+        sd=np.array([strength.sd for strength in strengths]), sign=np.array(signs, dtype=int),
     )  # fmt: skip
 
 
@@ -128,9 +129,7 @@ class _Marginal:
     """Products of columns with the residual, and of themselves, with the unknowns of a fit marginalised."""
 
     def __init__(self, fit: Fit, base: Sequence[Array]) -> None:
-        self._J = [part.columns for part in fit.parts]
-        count = len(fit.z)
-        self._root = np.linalg.cholesky(np.eye(count) + np.sum([J.T @ J for J in self._J], axis=0))
+        self._J, self._root = [part.columns for part in fit.parts], fit.root
         along = np.sum([J.T @ W[:, 0] for J, W in zip(self._J, base, strict=True)], axis=0)
         at = solve_triangular(self._root.T, solve_triangular(self._root, along, lower=True))
         self._rest = [W[:, 0] - J @ at for J, W in zip(self._J, base, strict=True)]
@@ -164,17 +163,15 @@ def _gram_of(fit: Fit, base: Sequence[Array], chosen: Sequence[Array], names: Se
     """Gram matrices by recording."""
     of_recording: dict[str, Array] = {}
     determinants: dict[str, float] = {}
-    rows: dict[str, int] = {}
     for part, W, X in zip(fit.parts, base, chosen, strict=True):
         name = part.point.trajectory.piece.recording
         across = W.T @ X
         of_recording[name] = of_recording.get(name, 0.0) + np.block([[W.T @ W, across], [across.T, X.T @ X]])
         determinants[name] = determinants.get(name, 0.0) + part.filter.log_determinant
-        rows[name] = rows.get(name, 0) + int(np.isfinite(part.point.residual).sum())
     known = [unknown.parameter.name for unknown in fit.experiment.unknowns]
     extra = base[0].shape[1] - 1 - len(known)
     labels = (*known, *(f"further_{i}" for i in range(extra)), *names)
-    return Gram(labels=labels, of_recording=of_recording, log_determinants=determinants, rows=rows)
+    return Gram(labels=labels, of_recording=of_recording, log_determinants=determinants)
 
 
 def _columns(part: Linear, some: Sequence[tuple[Hypothesis, TermOnGrid]]) -> Array:
@@ -207,19 +204,6 @@ def _faults(point: Point, candidate: Hypothesis, on_grid: TermOnGrid) -> Array:
         values[0] *= on_grid.term.strength.sd  # by a difference of the size that the fault typically has
         columns.append((on_grid.distorted(point.trajectory, point.sensors, read, values) - read) / values[0])
     return np.stack(columns, axis=2)
-
-
-def _chunks(candidates: Sequence[Hypothesis], most: int) -> Iterator[list[int]]:
-    chunk: list[int] = []
-    columns = 0
-    for index, candidate in enumerate(candidates):
-        if chunk and columns + len(candidate.variants) > most:
-            yield chunk
-            chunk, columns = [], 0
-        chunk.append(index)
-        columns += len(candidate.variants)
-    if chunk:
-        yield chunk
 
 
 @lru_cache(maxsize=2048)
@@ -274,12 +258,8 @@ def refit(fit: Fit, candidate: Hypothesis, variant: int, strength: float, *, ite
     one = replace(candidate, variants=candidate.variants[[variant]])
     assert candidate.term is not None  # noqa: S101 - parameters out of their priors have no term
     on_grid = _on_grid(fit.experiment.machine.model, candidate.term)
-    normal, right = np.eye(len(fit.z)), np.zeros(len(fit.z))
-    for part in fit.parts:
-        x = part.filter(_columns(part, [(one, on_grid)]))[:, 0]
-        normal += part.columns.T @ part.columns
-        right += part.columns.T @ x
-    aside = -np.linalg.solve(normal, right)  # of the other unknowns, per unit of strength
+    along = sum(part.columns.T @ part.filter(_columns(part, [(one, on_grid)]))[:, 0] for part in fit.parts)
+    aside = -fit.covariance @ along  # of the other unknowns, per unit of strength
     guesses = [part.point.trajectory for part in fit.parts]
     experiment, own = with_candidate(fit, candidate, variant)
     lower, upper = experiment.bounds

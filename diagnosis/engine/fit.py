@@ -233,17 +233,18 @@ class Fit:
     @cached_property
     def covariance(self) -> Array:
         """Of ``z``, from the curvature, shape (unknowns, unknowns)."""
-        root = solve_triangular(self._root, np.eye(len(self.z)), lower=True)
+        root = solve_triangular(self.root, np.eye(len(self.z)), lower=True)
         return np.asarray(root.T @ root)
 
     @cached_property
     def log_evidence(self) -> float:
         """Laplace approximation, determinants of the noise filters included, up to ``-M/2 ln 2 pi``."""
         filters = sum(part.filter.log_determinant for part in self.parts)
-        return -0.5 * (self.objective + filters) - float(np.log(np.diag(self._root)).sum())
+        return -0.5 * (self.objective + filters) - float(np.log(np.diag(self.root)).sum())
 
     @cached_property
-    def _root(self) -> Array:
+    def root(self) -> Array:
+        """Lower Cholesky factor of the curvature ``1 + J^T J`` in whitened units, shape (unknowns, unknowns)."""
         normal = np.eye(len(self.z))
         for part in self.parts:
             normal += part.columns.T @ part.columns

@@ -42,14 +42,11 @@ class Gram:
     of_recording : mapping of str to Array, shape (columns, columns)
     log_determinants : mapping of str to float
         Of the noise of every recording
-    rows : mapping of str to int
-        Readings of every recording
     """
 
     labels: tuple[str, ...]
     of_recording: Mapping[str, Array]
     log_determinants: Mapping[str, float]
-    rows: Mapping[str, int]
 
     def given(
         self, unknowns: Index, amplitudes: Array | float = 1.0, recordings: Collection[str] | None = None

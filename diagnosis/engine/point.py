@@ -12,6 +12,7 @@ from diagnosis.engine.slopes import Heat, LawSlopes
 from diagnosis.forward.grid import Piece
 from diagnosis.forward.network_on_grid import Balance, NetworkOnGrid
 from diagnosis.forward.observation import Sensors, reading_columns, readings
+from diagnosis.forward.sensor_fault import delayed
 from diagnosis.forward.term_on_grid import TermOnGrid, input_slope, moved_heat
 from diagnosis.forward.trajectory import Trajectory, parameter_heats, settled_balance
 from models.base.types import Array
@@ -118,14 +119,10 @@ class Setting:
     def _by_clock(self, trajectory: Trajectory, read: Array) -> Array:
         if not self.clock:
             return read
-        time = trajectory.piece.time
-        at = np.interp(time - self.clock, time, np.arange(len(time)))
-        low = np.minimum(at.astype(int), len(time) - 2)
-        share = (at - low).reshape(-1, *[1] * (read.ndim - 1))
-        late = (1.0 - share) * read[low] + share * read[low + 1]
+        late = delayed(read, trajectory.piece.time, self.clock)
         losses = [is_total_loss(name) for name in self.channels]
         late[:, losses] = read[:, losses]
-        return np.asarray(late)
+        return late
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

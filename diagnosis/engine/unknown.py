@@ -6,7 +6,7 @@ exact derivative of the readings. Parameters of a calibration, faults of measure
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -19,6 +19,7 @@ from models.quantities.quantities import TOTAL_LOSS
 
 Scope = frozenset[str] | None
 LAG_STEP = 0.01  # relative
+TERM_STEP = 0.05  # of a prior sd
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,7 +30,7 @@ class Group:
     ----------
     name : str
     amplitude : float
-        Prior standard deviation of every unknown's ``z``; 0 where the group is absent
+        Factor on the prior standard deviation of every unknown, above 0
     """
 
     name: str
@@ -78,21 +79,26 @@ class _Prior:
     group: Group = CALIBRATION
     scope: Scope = None
 
+    @property
+    def sd(self) -> float:
+        """Prior standard deviation: of the logarithm of a log-normal number, else in its unit."""
+        return self.parameter.sd * self.group.amplitude
+
     def value(self, z: float) -> float:
         """Value at `z`, held at the bounds."""
         p = self.parameter
-        value = p.start * np.exp(p.sd * z) if p.log else p.start + p.sd * z
+        value = p.start * np.exp(self.sd * z) if p.log else p.start + self.sd * z
         return float(min(max(value, p.lower), p.upper))
 
     def z_of(self, value: float) -> float:
         """The ``z`` of the nearest possible value."""
         p = self.parameter
         value = min(max(value, p.lower), p.upper)
-        return float(np.log(value / p.start) / p.sd if p.log else (value - p.start) / p.sd)
+        return float(np.log(value / p.start) / self.sd if p.log else (value - p.start) / self.sd)
 
     def per_z(self, z: float) -> float:
         """Change of the value with `z`, at a bound that to the inside."""
-        return self.value(z) * self.parameter.sd if self.parameter.log else self.parameter.sd
+        return self.value(z) * self.sd if self.parameter.log else self.sd
 
     def bounds(self) -> tuple[float, float]:
         """Lowest and highest ``z``."""
@@ -224,7 +230,7 @@ class TermParameter(_Prior):
     """A parameter of a term outside the network: an input shifted, or a reading distorted."""
 
     label: str
-    names: tuple[str, ...] = field(default=())
+    names: tuple[str, ...]
 
     def act(self, setting: Setting, z: float) -> None:
         """Set the term's parameter."""
@@ -232,9 +238,8 @@ class TermParameter(_Prior):
 
     def column(self, point: Point, z: float) -> Column:
         """Difference of the shifted heat or of the distorted reading."""
-        p = self.parameter
-        step = 0.05 * p.sd * (self.value(z) if p.log else 1.0)
-        return point.term_column(self.label, self.names.index(p.name), step) * self.per_z(z)
+        per_z = self.per_z(z)
+        return point.term_column(self.label, self.names.index(self.parameter.name), TERM_STEP * per_z) * per_z
 
 
 def in_scope(unknown: Unknown, recording: str) -> bool:

@@ -39,16 +39,29 @@ def passed_on(term: Term, law: Array, time: Array, changes: Array, channels: Seq
         if term.form == "lag":
             changes[:, index] = lagged(before, np.diff(time), float(law[0]))
         elif term.form == "clock":
-            at = np.interp(time - law, time, np.arange(len(time)))
-            low = np.minimum(at.astype(int), len(time) - 2)
-            share = (at - low).reshape(along.shape)
-            changes[:, index] = (1.0 - share) * before[low] + share * before[low + 1]
+            changes[:, index] = delayed(before, time, law)
         elif term.form == "stuck":
             begin = int(np.argmax(law != 0.0))  # the reading is held as it was when the law set in
             changes[:, index] = before + along * (before[begin] - before)
     if term.form == "swapped":
         changes[:, channels] += along[:, None] * (changes[:, channels[::-1]] - changes[:, channels])
     return changes
+
+
+def delayed(values: Array, time: Array, late: Array | float) -> Array:
+    """Return values as they come `late` [s] after their time, on straight lines between the points.
+
+    Parameters
+    ----------
+    values : Array, shape (K + 1, ...)
+    time : Array, shape (K + 1,)
+        [s]
+    late : Array, shape (K + 1,), or float
+    """
+    at = np.interp(time - late, time, np.arange(len(time)))
+    low = np.minimum(at.astype(int), len(time) - 2)
+    share = (at - low).reshape(-1, *[1] * (values.ndim - 1))
+    return np.asarray((1.0 - share) * values[low] + share * values[low + 1])
 
 
 def columns_as_recorded(columns: Mapping[str, Array], terms: Iterable[Term]) -> dict[str, Array]:

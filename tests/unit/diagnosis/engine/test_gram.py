@@ -27,7 +27,7 @@ def columns() -> dict[str, Array]:
 @pytest.fixture
 def gram(columns: dict[str, Array]) -> Gram:
     return Gram(labels=tuple(f"x{i}" for i in range(12)), of_recording={n: W.T @ W for n, W in columns.items()},
-                log_determinants={"a": 3.0, "b": -1.0}, rows=ROWS)  # fmt: skip
+                log_determinants={"a": 3.0, "b": -1.0})  # fmt: skip
 
 
 def log_density(W: Array, which: list[int], sd: Array | float = 1.0) -> float:
