@@ -92,13 +92,14 @@ def check_file(path: Path) -> None:
     InputError
     """
     try:
-        if not path.exists():
-            raise InputError(f"{path}: no such file")
-        if not path.is_file():
-            raise InputError(f"{path}: is not a file but {'a folder' if path.is_dir() else 'a device or pipe'}")
-        size = path.stat().st_size
+        exists, file, folder = path.exists(), path.is_file(), path.is_dir()
+        size = path.stat().st_size if file else 0
     except (OSError, ValueError) as error:  # a name that is too long, or holds NUL
         raise InputError(f"{path}: cannot be read ({getattr(error, 'strerror', None) or error})") from error
+    if not exists:
+        raise InputError(f"{path}: no such file")
+    if not file:
+        raise InputError(f"{path}: is not a file but {'a folder' if folder else 'a device or pipe'}")
     if size == 0:
         raise InputError(f"{path}: {_EMPTY}")
 
