@@ -11,7 +11,6 @@ from builder.base import console
 from builder.commands.conceal_in_zoo import conceal_in_zoo
 from builder.commands.conceal_into import conceal_into
 from models.assembly.gearbox import load_gearbox
-from models.base.atomic_write import atomic_folder
 from models.base.errors import InputError
 
 
@@ -115,7 +114,7 @@ def conceal(
         return
     if control or place is not None or date is not None:
         raise InputError("--control, --place and --date go with --into")
-    from diagnosis.proof.cases.case_files import keep_apart, keep_other_cases
+    from diagnosis.proof.cases.case_files import staged_folders
     from diagnosis.proof.cases.conceal import conceal_set, random_plans  # imports scipy.signal
     from diagnosis.proof.cases.concealed_case import Plan
 
@@ -130,17 +129,13 @@ def conceal(
         plans = [Plan(group="single", effects=(effect,), strength=strength)] * number
     definition = load_gearbox(gearbox)
     recordings, truth = output / "recordings", truth or output / "truth"
-    keep_apart(recordings, truth)
     with (
-        atomic_folder(recordings) as stage,
-        atomic_folder(truth) as truth_stage,
+        staged_folders(recordings, truth) as (stage, truth_stage),
         console.progress_bar("concealing") as progress,
     ):
         names = conceal_set(
             definition, plans, seed=seed, recordings=stage, truth=truth_stage, flat=cases is None, progress=progress
         )
-        keep_other_cases(stage, recordings)
-        keep_other_cases(truth_stage, truth)
     for name in names:
         console.out.print(f"wrote {recordings / ('' if cases is None else name)}, {truth / name}.json")
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 from builder.base import console
-from models.base.atomic_write import atomic_folder
 
 
 def conceal_in_zoo(
@@ -27,7 +26,7 @@ def conceal_in_zoo(
     InputError
         If a group or family is not known, a definition cannot be split, or a folder cannot be written to.
     """
-    from diagnosis.proof.cases.case_files import keep_apart, keep_other_cases
+    from diagnosis.proof.cases.case_files import staged_folders
     from diagnosis.proof.zoo.conceal_zoo import conceal_zoo, random_zoo_plans, zoo_plans
 
     names = None if families is None else [name.strip() for name in families.split(",")]
@@ -37,15 +36,11 @@ def conceal_in_zoo(
     else:
         plans = zoo_plans(seed, {group: number}, families=names, machine=machine)
     recordings, truth = output / "recordings", truth or output / "truth"
-    keep_apart(recordings, truth)
     with (
-        atomic_folder(recordings) as stage,
-        atomic_folder(truth) as truth_stage,
+        staged_folders(recordings, truth) as (stage, truth_stage),
         console.progress_bar("concealing") as progress,
     ):
         made = conceal_zoo(plans, recordings=stage, truth=truth_stage, flat=cases is None, baselines=baselines,
                            session_deviation=session_deviation, progress=progress)  # fmt: skip
-        keep_other_cases(stage, recordings)
-        keep_other_cases(truth_stage, truth)
     for name in made:
         console.out.print(f"wrote {recordings / ('' if cases is None else name)}, {truth / name}.json")

@@ -6,7 +6,6 @@ from pathlib import Path
 
 from builder.base import console
 from models.assembly.gearbox import load_gearbox
-from models.base.atomic_write import atomic_folder
 from models.base.errors import InputError
 
 
@@ -49,26 +48,22 @@ def conceal_into(
         If the recording, the machine and the wish do not go together, or something would be overwritten or cannot be
         written.
     """
-    from diagnosis.proof.cases.case_files import keep_apart, keep_other_cases
+    from diagnosis.proof.cases.case_files import staged_folders
     from diagnosis.proof.injection.inject import Injector, Wish, inject_set  # imports scipy
 
     if control and (effect is not None or place is not None or date is not None):
         raise InputError("--control injects nothing; leave out --effect, --place and --date")
     injector = Injector(load_gearbox(gearbox), recording)
     recordings, truth = output / "recordings", truth or output / "truth"
-    keep_apart(recordings, truth)
     _keep_other_files(recordings, injector.written)
     with (
-        atomic_folder(recordings) as stage,
-        atomic_folder(truth) as truth_stage,
+        staged_folders(recordings, truth) as (stage, truth_stage),
         console.progress_bar("injecting") as progress,
     ):
         names = inject_set(
             injector, Wish(kind=effect, place=place, date=date, control=control), 1 if cases is None else cases,
             seed=seed, recordings=stage, truth=truth_stage, flat=cases is None, progress=progress,
         )  # fmt: skip
-        keep_other_cases(stage, recordings)
-        keep_other_cases(truth_stage, truth)
     for name in names:
         console.out.print(f"wrote {recordings / ('' if cases is None else name)}, {truth / name}.json")
 

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import gzip
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from models.base.atomic_write import atomic_folder
 from models.base.errors import InputError
 from models.base.types import Array
 
@@ -50,6 +52,31 @@ def keep_other_cases(made: Path, output: Path) -> None:
         there = output / file.relative_to(made)
         if there.is_file() and there.read_bytes() != file.read_bytes():
             raise InputError(f"{there}: is of another case, which would be lost; choose another output")
+
+
+@contextmanager
+def staged_folders(recordings: Path, truth: Path) -> Iterator[tuple[Path, Path]]:
+    """Folders to write cases into; both replace those named when all is done, or nothing changes.
+
+    Parameters
+    ----------
+    recordings, truth : Path
+
+    Yields
+    ------
+    recordings, truth : Path
+        Folders to write into
+
+    Raises
+    ------
+    InputError
+        If the truth is to lie among the recordings, or files of another case would be lost.
+    """
+    keep_apart(recordings, truth)
+    with atomic_folder(recordings) as stage, atomic_folder(truth) as truth_stage:
+        yield stage, truth_stage
+        keep_other_cases(stage, recordings)
+        keep_other_cases(truth_stage, truth)
 
 
 def write_case(

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from diagnosis.proof.scoring.truth import What
+from diagnosis.proof.zoo.setting import What
 from models.assembly.gearbox import Gearbox
 from models.mechanisms import CATALOGUE, OPEN_FORM, OPEN_FORMS
 
@@ -33,7 +33,7 @@ class Claim:
     open_form, acts_like : bool
         True if it gives no name: a form found by regression; the catalogue's nearest name
     what : str
-        Kind of thing that it reports as changed, see :class:`diagnosis.proof.scoring.truth.Changed`
+        Kind of thing that it reports as changed, see :class:`diagnosis.proof.zoo.setting.Changed`
     nodes : frozenset of str
         Nodes, channels or input of it, both ends of a link
     sign : int

@@ -7,7 +7,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from diagnosis.proof.scoring.answers import CERTAIN, PARAMETER, Answer, Claim
-from diagnosis.proof.scoring.truth import CONTROL, MEASUREMENT, Changed, TrueEffect, Truth
+from diagnosis.proof.scoring.truth import CONTROL, MEASUREMENT, TrueEffect, Truth
+from diagnosis.proof.zoo.setting import Changed
 
 SIZE_ERROR = 0.2
 VISIBLE, UNSEEN = 10.0, 3.0  # nats that the recordings hold: enough to name an effect, too few to see it

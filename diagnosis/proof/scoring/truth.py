@@ -7,12 +7,12 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
+from diagnosis.proof.zoo.setting import Changed, What
 from models.base.errors import InputError
 from models.mechanisms import CATALOGUE
 
-What = Literal["loss", "link", "capacity", "heat", "sensor", "input", "clock"]
 CONTROL, MESSY, OUTSIDE = "control", "messy", "outside"
 MEASUREMENT = ("sensor", "input", "clock")
 # Names that others gave to mechanisms of the catalogue.
@@ -30,27 +30,6 @@ NEITHER = ("oil_mist", "oil_housing_speed", "ambient_swing", "oil_added", "phase
 LESS_OF_OTHERS = ("radiation change",)
 # Sources of the own plant and of others outside the catalogue whose heat is no mechanical loss.
 NO_LOSS = ("limit_cycle_pump", "phase_change", "drying", "melting wax in a hollow mounting block")
-
-
-@dataclass(frozen=True, kw_only=True)
-class Changed:
-    """A thing that an effect changed.
-
-    Attributes
-    ----------
-    what : str
-    of : str
-        Nominal loss, link, node, channel or input
-    nodes : tuple of str
-        Nominal nodes
-    sign : int
-        1: more of it (of an input: more than recorded; of a sensor: it reads too high), -1: less, 0: neither
-    """
-
-    what: What
-    of: str
-    nodes: tuple[str, ...]
-    sign: int
 
 
 @dataclass(frozen=True, kw_only=True)

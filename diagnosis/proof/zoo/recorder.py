@@ -7,14 +7,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from diagnosis.proof.cases.conceal import DATA_SHEET, SLOW_LAG_S
 from diagnosis.proof.plant.instruments import drop_readings
 from diagnosis.proof.zoo.faults import AMBIENT, Fault, Measured, hold_reading, spoiled
 from diagnosis.proof.zoo.structure import Outcome, Programme, ZooPlant
 from models.base.types import Array
 
-DATA_SHEET = {"noise": 0.2, "resolution": 0.1, "lag_s": 15.0, "lag_sd_s": 5.0}
 SLOW_ROW_S = 60.0  # rows longer than this are means: less noise, lags do not show
-NOISE_K, SLOW_NOISE_K, NOISY_K, SLOW_LAG_S = 0.2, 0.1, (0.4, 0.7), (30.0, 55.0)
+NOISE_K, SLOW_NOISE_K = 0.2, 0.1
 STEP = {"speed": 0.1, "torque": 0.01}  # of recorded inputs; 0.1 of others
 INPUT_NOISE = {AMBIENT: 0.1}
 
