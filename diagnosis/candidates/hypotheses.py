@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import product
+from typing import Literal
 
 import numpy as np
 
@@ -32,6 +33,7 @@ FINER, FINER_ENDS = 9, 33  # values between the neighbours of the best one of a 
 SHARPENED_FROM = 2  # variants of the grid, the best ones
 WIDE_PRIOR = 4.0  # standard deviations of a parameter that is out of its prior
 NEAR_ZERO = 1e-9
+How = Literal["U", "D", "W", "P"]
 CLOCK_SIZES = (-2.0, -1.0, -0.3, 0.3, 1.0, 2.0)  # of the typical one
 
 
@@ -49,6 +51,11 @@ class Hypothesis:
         Index of that parameter among the unknowns
     variants : Array, shape (V, parameters)
         Values of the term's parameters that are tried, the strength 1
+    how : str
+        ``U``: a mechanism of the catalogue; ``D``: from a date on; ``W``: over the hours; ``P``: a parameter outside
+        its prior
+    clock : str or None
+        Parameter of the term that is the start of the recording on the time axis that all recordings share, [s]
     """
 
     name: str
@@ -57,6 +64,8 @@ class Hypothesis:
     term: Term | None = None
     unknown: int | None = None
     variants: Array
+    how: How = "U"
+    clock: str | None = None
 
     @property
     def label(self) -> str:

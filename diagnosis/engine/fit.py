@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -43,6 +43,12 @@ class Experiment:
     filters : tuple of Whitening or None
         Noise filters of an earlier fit of the same pieces; None: those of the point itself. Evidences count their
         determinants, so those of different filters can be compared
+    starts_at : mapping of str to float
+        Start of every recording on the time axis that they share, [s]
+    session_of : mapping of str to str
+        Test session of every recording; between sessions the unknowns may differ a little
+    healthy : frozenset of str
+        Recordings in which the effect that is looked for cannot act
     """
 
     machine: Machine
@@ -51,6 +57,9 @@ class Experiment:
     noise: tuple[Noise, ...]
     starts: tuple[Array, ...]
     filters: tuple[Whitening, ...] | None = None
+    starts_at: Mapping[str, float] = field(default_factory=dict)
+    session_of: Mapping[str, str] = field(default_factory=dict)
+    healthy: frozenset[str] = frozenset()
 
     @property
     def slow(self) -> bool:
