@@ -1,8 +1,8 @@
-"""What the readings say about every explanation, and the one rule that turns it into an answer.
+r"""What the readings say about every explanation, and the one rule that turns it into an answer.
 
 An explanation is nothing, one effect, or two. Its probability goes with its prior and its tempered evidence,
 
-.. math:: P_i \\propto w_i \\exp(\\ln B_i / T), \\quad T = a + b \\max_i \\ln B_i
+.. math:: P_i \propto w_i \exp(\ln B_i / T), \quad T = a + b \max_i \ln B_i
 
 The temper stands for what no catalogue and no model error holds; it is learnt on plants of the zoo
 (``diagnosis/decision/learnt.toml``).
