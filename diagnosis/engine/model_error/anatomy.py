@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
 
@@ -213,8 +213,9 @@ class Anatomy:
 
     @cached_property
     def source_families(self) -> list[Family]:
-        """Sources by the parameters that scale them."""
-        return self._families(self.network.sources)
+        """Sources by the parameters that scale them; what depends on nothing may still go with temperature."""
+        found = self._families(self.network.sources)
+        return [replace(family, coordinates=family.coordinates or (TEMPERATURE,)) for family in found]
 
     @cached_property
     def link_families(self) -> list[Family]:

@@ -113,7 +113,8 @@ class ModelError:
             mine = slice(low - first, high - first)
             if isinstance(change, HeatChange):
                 heat, course = change.heat(view), change.course.along(view)[:, low - begin : high - begin]
-                into[:, :, mine] = heat.into[:, :, None] * course[:, None, :]
+                for part in np.flatnonzero(heat.into.any(axis=0)):  # few
+                    into[:, part, mine] = heat.into[:, part, None] * course
                 loss[:, mine] = heat.loss[:, None] * course
             else:
                 reading[:, point.sensors.channels.index(change.channel), mine.start] = change.reading(view)

@@ -93,8 +93,7 @@ Change = HeatChange | ReadingChange
 def loss_laws(machine: Anatomy) -> Iterator[Change]:
     """Heat of sources by what they depend on; of several in a family, or without a parameter, a factor each."""
     for family in machine.source_families:
-        if smooth := _smooth(family.coordinates, DEGREE):
-            yield _of_sources(family.name, family.members, smooth)
+        yield _of_sources(family.name, family.members, Smooth(coordinates=family.coordinates, highest=DEGREE))
         if len(family.members) > 1 or not family.calibrated:
             yield from (_of_sources(name, (name,)) for name in family.members)
 
@@ -153,7 +152,7 @@ def input_errors(machine: Anatomy) -> Iterator[Change]:
             continue
         if name == TORQUE:
             yield HeatChange(place="offset of torque", heat=heats.torque_heat)
-        elif machine.network.inputs[name].quantity.unit == "degC":
+        elif machine.network.inputs[name].quantity.is_temperature:
             if name != AMBIENT:
                 yield HeatChange(place=f"offset of {name}", heat=partial(heats.offset_heat, name=name))
         elif machine.standard.largest[name] > 0.0:
@@ -178,9 +177,8 @@ def loss_zero(machine: Anatomy) -> Iterator[Change]:
 def fine_loss_laws(machine: Anatomy) -> Iterator[Change]:
     """Loss laws of higher degree."""
     for family in machine.source_families:
-        if family.coordinates:
-            course = Smooth(coordinates=family.coordinates, lowest=FINE_DEGREES[0], highest=FINE_DEGREES[1])
-            yield _of_sources(family.name, family.members, course)
+        course = Smooth(coordinates=family.coordinates, lowest=FINE_DEGREES[0], highest=FINE_DEGREES[1])
+        yield _of_sources(family.name, family.members, course)
 
 
 def losses_by_own_temperature(machine: Anatomy) -> Iterator[Change]:
