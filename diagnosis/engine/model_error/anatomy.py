@@ -49,7 +49,7 @@ class Family:
 
 
 class Anatomy:
-    """What model error may act on, in one order for all pieces.
+    """Laws and places that model error may act on, in one order for all pieces.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ class Anatomy:
 
     @cached_property
     def temperatures(self) -> Mapping[str, Array]:
-        """Of all nodes at the middles of all intervals, [degC]."""
+        """Temperatures of all nodes at the middles of all intervals, [degC]."""
         model, rows = self.model, [point.trajectory for point in self.points]
         T = np.concatenate([t.middle for t in rows])
         found = {part: T[:, index] for index, part in enumerate(self.parts)}
@@ -194,7 +194,7 @@ class Anatomy:
         return felt
 
     def _families(self, laws: Sequence[Source] | Sequence[Link]) -> list[Family]:
-        """Laws that share their parameters; one without any is a family of its own."""
+        """Laws that share their parameters; one without any is a separate family."""
         varying = {p.name for p in self.network.parameters if p.sd > 0.0}
         found: dict[tuple[str, ...], list[Source | Link]] = {}
         for law in laws:

@@ -39,6 +39,7 @@ FINE_DEGREES = (4, 5)
 FEW = 3  # links of a family that have a law each
 SENSOR_LAGS_S = (150.0, 600.0)
 CORE_TIMES_S = (150.0, 600.0, 2400.0)
+CONSTANT = Constant()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,7 +56,7 @@ class HeatChange:
 
     place: str
     heat: Callable[[View], Heat]
-    course: Course = Constant()
+    course: Course = CONSTANT
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -115,7 +116,7 @@ def heat_splits(machine: Anatomy, course: Course | None = None) -> Iterator[Chan
             names = tuple(name for name in family.members if nodes[name] == node)
             for target in machine.split_targets(node):
                 heat = partial(heats.split_heat, names=names, target=target)
-                yield HeatChange(place=f"{' '.join(names)} to {target}", heat=heat, course=course or Constant())
+                yield HeatChange(place=f"{' '.join(names)} to {target}", heat=heat, course=course or CONSTANT)
 
 
 def sensor_places(machine: Anatomy) -> Iterator[Change]:
@@ -229,13 +230,11 @@ GROUPS: Mapping[str, Callable[[Anatomy], Iterator[Change]]] = {
 
 
 def _of_sources(place: str, names: tuple[str, ...], course: Course | None = None) -> HeatChange:
-    return HeatChange(
-        place=f"heat of {place}", heat=partial(heats.source_heat, names=names), course=course or Constant()
-    )
+    return HeatChange(place=f"heat of {place}", heat=partial(heats.source_heat, names=names), course=course or CONSTANT)
 
 
 def _of_links(place: str, names: tuple[str, ...], course: Course | None = None) -> HeatChange:
-    return HeatChange(place=f"path {place}", heat=partial(heats.link_heat, names=names), course=course or Constant())
+    return HeatChange(place=f"path {place}", heat=partial(heats.link_heat, names=names), course=course or CONSTANT)
 
 
 def _everything(machine: Anatomy, course: Course) -> Iterator[Change]:
