@@ -16,6 +16,7 @@ from diagnosis.engine.fit import Experiment, Fit, Linear, Linearised
 from diagnosis.engine.gram import Given, Gram, Strengths, strengths
 from diagnosis.engine.metric import Metric
 from diagnosis.engine.point import AT_ONCE, Machine, Point
+from diagnosis.engine.products import base_of, gram_of
 from diagnosis.engine.unknown import Group, NetworkParameter, TermParameter, Unknown
 from diagnosis.forward.network_on_grid import NetworkOnGrid
 from diagnosis.forward.observation import readings
@@ -92,17 +93,17 @@ def scan(fit: Fit, candidates: Sequence[Hypothesis]) -> Scan:
     count, model = len(fit.z), fit.experiment.machine.model
     placed = [(c, _on_grid(model, c.term)) for c in candidates if c.term is not None]
     candidates, priors = [c for c, _ in placed], [on_grid.term.strength for _, on_grid in placed]
-    base = whitened_base(fit)
+    base = base_of(fit)
     known = range(count)
     chosen = [np.empty((len(W), len(candidates)), order="F") for W in base]
     best: list[int] = []
     mean, signs = [], []
-    metric, residuals = _with_unknowns(fit), [W[:, 0] for W in base]
+    everything, residuals = _with_unknowns(fit), [W[:, 0] for W in base]
     intervals = max(len(part.point.trajectory.T) for part in fit.parts)
     for chunk in chunks(candidates, max(16, min(AT_ONCE, VALUES_AT_ONCE // intervals))):
         some = placed[len(best) : len(best) + len(chunk)]
         blocks = [part.filter(_columns(part, some)) for part in fit.parts]
-        (a, b), first = metric.against(residuals, blocks), 0
+        (a, b), first = everything.against(residuals, blocks), 0
         for c, on_grid in some:
             n = len(c.variants)
             way = np.sign(c.variants[:, 0]).astype(int)
@@ -119,7 +120,7 @@ def scan(fit: Fit, candidates: Sequence[Hypothesis]) -> Scan:
     extra = base[0].shape[1] - 1 - count
     return Scan(
         candidates=tuple(candidates), best=tuple(best), log_bayes=np.array(mean),
-        gram=gram_of(fit, base, chosen, [c.label for c in candidates]), unknowns=known,
+        gram=gram_of(fit.parts, base, chosen), unknowns=known,
         further=range(count, count + extra), of_candidates=range(count + extra, count + extra + len(candidates)),
         sd=np.array([strength.sd for strength in priors]), sign=np.array(signs, dtype=int),
     )  # fmt: skip
@@ -132,31 +133,6 @@ def _with_unknowns(fit: Fit) -> Metric:
         nothing = tuple(np.zeros((len(J), 0)) for J in columns)
         return Metric(sessions=(tuple(range(len(columns))),), shared=tuple(columns), own=nothing)
     return replace(metric, shared=tuple(np.column_stack(both) for both in zip(columns, metric.shared, strict=True)))
-
-
-def whitened_base(fit: Fit) -> list[Array]:
-    """Residual at the priors' middles, unknowns and model error of every piece, whitened, shape (M, n)."""
-    metric = fit.experiment.metric
-    return [
-        np.column_stack([part.residual + part.columns @ fit.z, part.columns,
-                         *([] if metric is None else [metric.shared[index]])])
-        for index, part in enumerate(fit.parts)
-    ]  # fmt: skip
-
-
-def gram_of(fit: Fit, base: Sequence[Array], chosen: Sequence[Array], names: Sequence[str]) -> Gram:
-    """Gram matrices by recording."""
-    of_recording: dict[str, Array] = {}
-    determinants: dict[str, float] = {}
-    for part, W, X in zip(fit.parts, base, chosen, strict=True):
-        name = part.point.trajectory.piece.recording
-        across = W.T @ X
-        of_recording[name] = of_recording.get(name, 0.0) + np.block([[W.T @ W, across], [across.T, X.T @ X]])
-        determinants[name] = determinants.get(name, 0.0) + part.filter.log_determinant
-    known = [unknown.parameter.name for unknown in fit.experiment.unknowns]
-    extra = base[0].shape[1] - 1 - len(known)
-    labels = (*known, *(f"further_{i}" for i in range(extra)), *names)
-    return Gram(labels=labels, of_recording=of_recording, log_determinants=determinants)
 
 
 def _columns(part: Linear, some: Sequence[tuple[Hypothesis, TermOnGrid]]) -> Array:

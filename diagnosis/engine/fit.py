@@ -151,9 +151,7 @@ class Experiment:
         """
         lower, upper = self.bounds
         z = np.zeros(len(self.unknowns)) if z is None else np.clip(z, lower, upper)
-        at = self._attempt(z, guesses)
-        if at is None:
-            raise ArithmeticError("the simulation has no solution where the fit should start")
+        at = self.linearise(z, guesses)
         if self.filters is None:  # those of the start serve on the way, those of the end afterwards
             first = self.with_filters(at.parts).fit(z, _courses(at.parts), iterations=iterations)
             final = self._attempt(first.z, _courses(first.parts))
@@ -187,6 +185,19 @@ class Experiment:
         if not fresh:
             at = self._attempt(z, _courses(at.parts)) or at
         return Fit(experiment=self, z=z, linearised=at)
+
+    def linearise(self, z: Array, guesses: Sequence[Guess] | None = None) -> Linearised:
+        """Simulate all pieces and whiten residuals and columns.
+
+        Raises
+        ------
+        ArithmeticError
+            If the simulation has no solution.
+        """
+        at = self._attempt(z, guesses)
+        if at is None:
+            raise ArithmeticError("the simulation has no solution where the fit should start")
+        return at
 
     def with_filters(self, parts: Sequence[Linear]) -> Experiment:
         """Experiment that is judged by the noise filters of a linearisation."""

@@ -37,16 +37,19 @@ class Gram:
 
     Attributes
     ----------
-    labels : tuple of str
-        Names of the columns after the first, which is the residual at the priors' middles
-    of_recording : mapping of str to Array, shape (columns, columns)
+    of_recording : mapping of str to Array, shape (1 + columns, 1 + columns)
+        The first is the residual at the priors' middles
     log_determinants : mapping of str to float
         Of the noise of every recording
     """
 
-    labels: tuple[str, ...]
     of_recording: Mapping[str, Array]
     log_determinants: Mapping[str, float]
+
+    @property
+    def count(self) -> int:
+        """How many columns there are."""
+        return len(next(iter(self.of_recording.values()))) - 1
 
     def given(
         self, unknowns: Index, amplitudes: Array | float = 1.0, recordings: Collection[str] | None = None
@@ -56,7 +59,7 @@ class Gram:
         Parameters
         ----------
         unknowns : sequence of int
-            Places of the unknowns among :attr:`labels`
+            Places of the unknowns among the columns
         amplitudes : Array, shape (unknowns,), or float
             Prior standard deviations
         recordings : collection of str, optional
@@ -132,7 +135,7 @@ class Given:
         Parameters
         ----------
         candidates : sequence of int
-            Places among the labels
+            Places among the columns
         sd : Array, shape (n,), or float
             Prior of the strengths
         sign : Array of int, shape (n,), or int
@@ -147,7 +150,7 @@ class Given:
         Parameters
         ----------
         first, second : sequence of int
-            Places of the members of n pairs among the labels
+            Places of the members of n pairs among the columns
         sd, sign : tuple of two Array, shape (n,)
             Of either member, see :meth:`singles`
 
