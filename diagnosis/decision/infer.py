@@ -70,13 +70,14 @@ def infer(
         if one.fit is not None:
             judged[one.label] = _fitted_on(calibration, one, len(base.z))
     best = max(judged.values(), key=lambda one: one.log_bayes / TEMPER[0] + one.log_prior)
-    remainder, pairs, alone = 0.0, [], first.log_bayes
+    remainder, alone = 0.0, first.log_bayes
+    pairs: list[Judged] = []
     if best.fit is not None and best.log_bayes > 0.0:
         progress(f"looking beside {best.label}")
         remainder, pairs, there = _beside(calibration, best, candidates, log_prior, len(base.z))
         alone = np.minimum(alone, there)
-    for index, one in enumerate(first.scan.candidates):
-        judged.setdefault(one.label, _by_scan(first, index, float(alone[index])))
+    for index, candidate in enumerate(first.scan.candidates):
+        judged.setdefault(candidate.label, _by_scan(first, index, float(alone[index])))
     every = [*judged.values(), *pairs]
     single = [one for one in every if len(one.effects) == 1]
     log_e = float(logsumexp([one.log_prior + one.log_bayes for one in single]))

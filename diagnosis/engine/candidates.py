@@ -24,6 +24,7 @@ from diagnosis.forward.term_on_grid import TermOnGrid
 from models.base.errors import InputError
 from models.base.parallel import run_parallel
 from models.base.types import Array
+from models.quantities.quantities import is_total_loss
 from models.terms.term import Term
 
 START_SHARES = (1.0, 0.3, 0.03)  # of the strength that the scan promises
@@ -49,6 +50,8 @@ class Scan:
         Their places among the labels of the Gram matrix
     sd, sign : Array, shape (candidates,)
         Prior of the strengths
+    peak_K : Array, shape (candidates,)
+        Largest change of a temperature per unit of strength
     """
 
     candidates: tuple[Hypothesis, ...]
@@ -60,6 +63,7 @@ class Scan:
     of_candidates: range
     sd: Array
     sign: NDArray[np.int_]
+    peak_K: Array
 
     def singles(self, given: Given) -> Strengths:
         """Every candidate alone, in its best shape; the sign of a clock fault is that of its variant."""
@@ -97,12 +101,15 @@ def scan(fit: Fit, candidates: Sequence[Hypothesis]) -> Scan:
     known = range(count)
     chosen = [np.empty((len(W), len(candidates)), order="F") for W in base]
     best: list[int] = []
-    mean, signs = [], []
+    mean, signs, peak = [], [], []
+    warm = [not is_total_loss(name) for name in fit.parts[0].point.sensors.channels]
     everything, residuals = _with_unknowns(fit), [W[:, 0] for W in base]
     intervals = max(len(part.point.trajectory.T) for part in fit.parts)
     for chunk in chunks(candidates, max(16, min(AT_ONCE, VALUES_AT_ONCE // intervals))):
         some = placed[len(best) : len(best) + len(chunk)]
-        blocks = [part.filter(_columns(part, some)) for part in fit.parts]
+        raw = [_columns(part, some) for part in fit.parts]
+        peaks = np.max([np.abs(X[:, warm]).max(axis=(0, 1)) for X in raw], axis=0)
+        blocks = [part.filter(X) for part, X in zip(fit.parts, raw, strict=True)]
         (a, b), first = everything.against(residuals, blocks), 0
         for c, on_grid in some:
             n = len(c.variants)
@@ -114,6 +121,7 @@ def scan(fit: Fit, candidates: Sequence[Hypothesis]) -> Scan:
             for kept, block in zip(chosen, blocks, strict=True):
                 kept[:, len(best)] = block[:, first + at]
             best.append(at)
+            peak.append(float(peaks[first + at]))
             mean.append(float(np.logaddexp.reduce(found.log_bayes) - np.log(n)))
             signs.append(int(sign[at]))
             first += n
@@ -122,7 +130,7 @@ def scan(fit: Fit, candidates: Sequence[Hypothesis]) -> Scan:
         candidates=tuple(candidates), best=tuple(best), log_bayes=np.array(mean),
         gram=gram_of(fit.parts, base, chosen), unknowns=known,
         further=range(count, count + extra), of_candidates=range(count + extra, count + extra + len(candidates)),
-        sd=np.array([strength.sd for strength in priors]), sign=np.array(signs, dtype=int),
+        sd=np.array([strength.sd for strength in priors]), sign=np.array(signs, dtype=int), peak_K=np.array(peak),
     )  # fmt: skip
 
 
