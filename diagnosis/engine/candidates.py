@@ -155,8 +155,8 @@ def _columns(part: Linear, some: Sequence[tuple[Hypothesis, TermOnGrid]]) -> Arr
             shown[mine.start] = _faults(point, candidate, on_grid)
         else:
             heat, own = on_grid.heat(trajectory, candidate.variants)
-            into[:, : heat.shape[1], mine] = heat if np.isfinite(heat.sum()) else np.nan_to_num(heat)
-            loss[:, mine] = np.nan_to_num(own)
+            into[:, : heat.shape[1], mine] = _finite(heat)
+            loss[:, mine] = _finite(own)
         first = mine.stop
     result = point.heated(into, loss)
     for start, columns in shown.items():
@@ -173,6 +173,11 @@ def _faults(point: Point, candidate: Hypothesis, on_grid: TermOnGrid) -> Array:
         values[0] *= on_grid.term.strength.sd  # by a difference of the size that the fault typically has
         columns.append((on_grid.distorted(point.trajectory, point.sensors, read, values) - read) / values[0])
     return np.stack(columns, axis=2)
+
+
+def _finite(heat: Array) -> Array:
+    """A heat without what a law cannot tell, as a factor on a link that another effect has cut off."""
+    return heat if np.isfinite(heat.sum()) else np.nan_to_num(heat, nan=0.0, posinf=0.0, neginf=0.0)
 
 
 @lru_cache(maxsize=2048)
