@@ -23,7 +23,7 @@ from models.network.laws import Parameter, symbol
 HOUR_S = 3600.0
 LINEAR_S, SETTLING_S = 20.0 * HOUR_S, 3.0 * HOUR_S  # of the courses over the hours
 DATE_SD = 0.4  # of the time axis: nearly a uniform prior
-RISES, LENGTHS = (2.0, 5.0), (1.5, 4.0)  # of a slow step and of a change for a while, in distances between dates
+RISES, LENGTHS = (3.0,), (1.5, 4.0)  # of a slow step and of a change for a while, in distances between dates
 STEP, WHILE, HOURS = "step", "for_a_while", "over_hours"  # endings of names
 CHANGED = ("_change", "_error")  # endings of names that a change at a date has no use for
 
@@ -87,24 +87,24 @@ class Course:
 NOW = symbol("now")
 
 
-def step(axis: Axis) -> Course:
-    """From a date on, at once or in some hours, and then constant."""
-    since, rise = symbol("since"), symbol("rise")
+def step(axis: Axis, *, slow: bool = True) -> Course:
+    """From a date on, at once or (if `slow` ones are tried) in some hours, and then constant."""
+    since, rise = symbol("since"), symbol("within")
     rises = axis.distance * np.array(RISES)
     at_once, slowly = _products(axis.dates, [axis.edge_s]), _products([0.0, *axis.dates[::2]], rises)
     return Course(
-        ending=STEP, how="D", says="From a date on", parameters=(axis.moment("since"), _span("rise", axis.edge_s, rises[-1])),
-        variants=np.concatenate([at_once, slowly]), law=sp.Min(sp.Max((NOW - since) / rise, 0), 1),
+        ending=STEP, how="D", says="From a date on", parameters=(axis.moment("since"), _span("within", axis.edge_s, rises[-1])),
+        variants=np.concatenate([at_once, slowly]) if slow else at_once, law=sp.Min(sp.Max((NOW - since) / rise, 0), 1),
     )  # fmt: skip
 
 
 def for_a_while(axis: Axis) -> Course:
     """From one date to another."""
-    since, length = symbol("since"), symbol("length")
+    since, length = symbol("since"), symbol("lasting")
     lengths = axis.distance * np.array(LENGTHS)
     return Course(
         ending=WHILE, how="D", says="From one date to another",
-        parameters=(axis.moment("since"), _span("length", *lengths)), variants=_products(axis.dates[::2], lengths),
+        parameters=(axis.moment("since"), _span("lasting", *lengths)), variants=_products(axis.dates[::2], lengths),
         law=steps(NOW, at=since, width=0.5 * axis.edge_s) - steps(NOW, at=since + length, width=0.5 * axis.edge_s),
     )  # fmt: skip
 

@@ -13,8 +13,10 @@ from diagnosis.engine.fit import Fit
 from diagnosis.engine.point import Column
 from models.base.types import Array
 
-FINER, SPANS = 17, 5  # dates and lengths between the neighbours of the best one
-ROUNDS, CLOSER = 3, 0.25  # how much closer every round looks
+DATES, SPANS, LONGEST = 49, 6, 0.3  # tried per round, and the longest time that a change takes, of the time axis
+ROUNDS = 4
+PLAUSIBLE = 0.01  # of the best one: dates and spans around which the next round looks
+RESOLVED, FINEST_S = 12.0, 30.0  # dates per band, and their least distance
 LOW, HIGH = 0.05, 0.95
 
 
@@ -41,10 +43,12 @@ class Dated:
 
 
 def date_of(
-    fit: Fit, hypothesis: Hypothesis, variant: int, *, distance: float, further: Sequence[Sequence[Column]] = (),
-    amplitudes: Array | float = 1.0,
+    fit: Fit, hypothesis: Hypothesis, *, further: Sequence[Sequence[Column]] = (), amplitudes: Array | float = 1.0,
 ) -> Dated:  # fmt: skip
     """Look for the date of a change between the dates of the scan.
+
+    Dates and the times that a change takes (or lasts) are tried on a grid, which becomes finer where the readings put
+    the date.
 
     Parameters
     ----------
@@ -52,40 +56,41 @@ def date_of(
         Without the change
     hypothesis : Hypothesis
         At a date
-    variant : int
-        Its best one in the scan
-    distance : float
-        Between dates of the scan, [s]
     further : sequence, one per piece, of sequences of Column
         Further unknowns, see :func:`diagnosis.engine.candidates.scan`
     amplitudes : Array, shape (further unknowns,), or float
         Their prior standard deviations
     """
     assert hypothesis.term is not None  # noqa: S101 - a change has one
-    parameters = hypothesis.term.parameters
-    since = next(i for i, p in enumerate(parameters) if p.name.endswith("_since"))
-    span, best = since + 1, np.array(hypothesis.variants[variant])
-    shortest = float(np.min(hypothesis.variants[:, span]))
-    reach, stretch = distance, 4.0
-    while True:
-        dates = best[since] + reach * np.linspace(-1.0, 1.0, FINER)
-        spans = np.unique(np.maximum(best[span] * stretch ** np.linspace(-1.0, 1.0, SPANS), shortest))
-        tried = [replace(hypothesis, variants=_moved(best, since, [date, length])) for length in spans for date in dates]
+    names = [p.name.removeprefix(f"{hypothesis.term.label}_") for p in hypothesis.term.parameters]
+    since, end = names.index("since"), float(hypothesis.variants[0, -1])
+    values, shortest = hypothesis.variants[0], float(hypothesis.variants[:, since + 1].min())
+    dates, spans = np.linspace(0.0, end, DATES), np.geomspace(shortest, LONGEST * end, SPANS)
+    for _ in range(ROUNDS):
+        tried = [replace(hypothesis, variants=_moved(values, since, [at, span])) for span in spans for at in dates]
         found = scan(fit, tried, further)
-        known = [*found.unknowns, *found.further]
         scale = np.concatenate([np.ones(len(found.unknowns)), np.broadcast_to(amplitudes, len(found.further))])
-        single = found.singles(found.gram.given(known, scale))
-        at = int(np.argmax(single.log_bayes))
-        weights = np.exp(single.log_bayes - single.log_bayes[at]).reshape(len(spans), FINER).sum(axis=0)
-        best = tried[at].variants[0]
-        low, high = _band(dates, weights)
-        if reach <= (high - low) or reach < 0.02 * distance:
+        single = found.singles(found.gram.given([*found.unknowns, *found.further], scale))
+        best = int(np.argmax(single.log_bayes))
+        weights = np.exp(single.log_bayes - single.log_bayes[best]).reshape(len(spans), len(dates))
+        low, high = _band(dates, weights.sum(axis=0))
+        dated = Dated(
+            hypothesis=tried[best], log_bayes=float(single.log_bayes[best]), strength=float(single.value[best]),
+            since=float(tried[best].variants[0, since]), low=low, high=high,
+        )  # fmt: skip
+        distance = dates[1] - dates[0]
+        if distance < max((high - low) / RESOLVED, FINEST_S):
             break
-        reach, stretch = max(CLOSER * reach, 0.75 * (high - low)), np.sqrt(stretch)
-    return Dated(
-        hypothesis=tried[at], log_bayes=float(single.log_bayes[at]), strength=float(single.value[at]),
-        since=float(best[since]), low=low, high=high,
-    )  # fmt: skip
+        dates = np.linspace(*_plausible(dates, weights.max(axis=0)), DATES)
+        spans = np.exp(np.linspace(*_plausible(np.log(spans), weights.max(axis=1)), SPANS))
+        spans = np.maximum(spans, shortest)
+    return dated
+
+
+def _plausible(values: Array, weights: Array) -> tuple[float, float]:
+    """From before the first plausible value to after the last one."""
+    at = np.flatnonzero(weights >= PLAUSIBLE)
+    return float(values[max(at[0] - 1, 0)]), float(values[min(at[-1] + 1, len(values) - 1)])
 
 
 def _moved(values: Array, first: int, given: Sequence[float]) -> Array:

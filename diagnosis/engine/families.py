@@ -78,7 +78,7 @@ def changes(factors: Sequence[Placed], catalogue: Sequence[Placed], axis: Axis) 
     return [
         changing(one, course, axis, sd=SENSOR_SD_K if one.name == "sensor_bias" and one.strength.unit == "K" else None)
         for one in laws
-        for course in (courses if one in factors or one.of_measurement or one.name == RADIATION else courses[:1])
+        for course in (courses if one in factors or one.of_measurement or one.name == RADIATION else [step(axis, slow=False)])
         if len(course.variants)
     ]
 
