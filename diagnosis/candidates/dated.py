@@ -186,10 +186,12 @@ def carried_on(placed: Placed, axis: Axis) -> Hypothesis:
     term, clock, base = _renamed(placed, label), _clock(label, axis), hypothesis_of(placed)
     now = {symbol("time"): symbol("time") + symbol(clock.name)}
     other = term.boundary_temperature
-    shown = {key: law.xreplace({symbol("time"): symbol("time") + symbol("start")}) for key, law in term.written.items()}
+    written = {symbol("time"): symbol("time") + symbol("start")}
     term = replace(
-        term, expression=term.expression.xreplace(now), boundary_temperature=None if other is None else other.xreplace(now),
-        written=shown, parameters=(*term.parameters, clock),
+        term, expression=term.expression.xreplace(now),
+        boundary_temperature=None if other is None else other.xreplace(now),
+        written={key: law.xreplace(written) for key, law in term.written.items()},
+        parameters=(*term.parameters, clock),
     )  # fmt: skip
     variants = np.column_stack([base.variants, np.full(len(base.variants), clock.start)])
     return replace(base, term=term, variants=variants, how="C", clock=clock.name)
@@ -211,7 +213,7 @@ def _renamed(placed: Placed, label: str) -> Placed:
     def new(name: str) -> str:
         return f"{label}_{name.removeprefix(f'{placed.label}_')}"
 
-    names = {one.name: new(one.name) for one in (*placed.parameters, *placed.states)}
+    names = {name: new(name) for name in (*(p.name for p in placed.parameters), *(s.name for s in placed.states))}
     if placed.boundary_temperature is not None:
         end = placed.target[-1]
         names |= {end: new(end), f"T_{end}": f"T_{new(end)}"}
@@ -219,7 +221,7 @@ def _renamed(placed: Placed, label: str) -> Placed:
     other = placed.boundary_temperature
     return replace(
         placed, label=label, target=tuple(names.get(one, one) for one in placed.target),
-        written={" ".join(names.get(word, word) for word in key.split(" ")): law for key, law in placed.written.items()},
+        written={" ".join(names.get(word, word) for word in key.split()): law for key, law in placed.written.items()},
         expression=placed.expression.xreplace(own), boundary_temperature=None if other is None else other.xreplace(own),
         parameters=tuple(replace(p, name=names[p.name]) for p in placed.parameters),
         states=tuple(
@@ -265,4 +267,3 @@ def without_repeats(placed: Sequence[Placed]) -> list[Placed]:
         law = one.expression.xreplace({symbol(one.strength.name): sp.Integer(1)})
         found.setdefault((one.kind, frozenset(one.target), one.weights, law), one)
     return list(found.values())
-

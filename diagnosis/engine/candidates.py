@@ -318,7 +318,9 @@ def refit(fit: Fit, candidate: Hypothesis, variant: int, strength: float, *, ite
     one = replace(candidate, variants=candidate.variants[[variant]])
     assert candidate.term is not None  # noqa: S101 - parameters out of their priors have no term
     on_grid = _on_grid(fit.experiment.machine.model, candidate.term)
-    along = sum(part.columns.T @ part.filter(_columns(fit.experiment, part, [(one, on_grid)]))[:, 0] for part in fit.parts)
+    along = sum(
+        part.columns.T @ part.filter(_columns(fit.experiment, part, [(one, on_grid)]))[:, 0] for part in fit.parts
+    )
     aside = -fit.covariance @ along  # of the other unknowns, per unit of strength
     guesses = [part.point.trajectory for part in fit.parts]
     experiment, own = with_candidate(fit, candidate, variant)
