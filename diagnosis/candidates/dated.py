@@ -93,8 +93,10 @@ def step(axis: Axis, *, slow: bool = True) -> Course:
     rises = axis.distance * np.array(RISES)
     at_once, slowly = _products(axis.dates, [axis.edge_s]), _products([0.0, *axis.dates[::2]], rises)
     return Course(
-        ending=STEP, how="D", says="From a date on", parameters=(axis.moment("since"), _span("within", axis.edge_s, rises[-1])),
-        variants=np.concatenate([at_once, slowly]) if slow else at_once, law=sp.Min(sp.Max((NOW - since) / rise, 0), 1),
+        ending=STEP, how="D", says="From a date on",
+        parameters=(axis.moment("since"), _span("within", axis.edge_s, rises[-1])),
+        variants=np.concatenate([at_once, slowly]) if slow else at_once,
+        law=sp.Min(sp.Max((NOW - since) / rise, 0), 1),
     )  # fmt: skip
 
 
@@ -109,7 +111,7 @@ def for_a_while(axis: Axis) -> Course:
     )  # fmt: skip
 
 
-def over_hours(_: Axis) -> Course:
+def over_hours(axis: Axis) -> Course:
     """Slowly over the hours since the first row of the first recording: on and on, or until it has settled."""
     names = ("linear", "settling", "fading")
     linear, settling, fading = (symbol(name) for name in names)
@@ -119,7 +121,7 @@ def over_hours(_: Axis) -> Course:
     decay = sp.exp(-NOW / SETTLING_S)
     return Course(
         ending=HOURS, how="W", says="Slowly over the hours", parameters=parameters, variants=np.eye(3),
-        law=linear * NOW / LINEAR_S + settling * (1 - decay) + fading * decay,
+        law=linear * NOW / max(LINEAR_S, axis.end) + settling * (1 - decay) + fading * decay,
     )  # fmt: skip
 
 
