@@ -167,8 +167,8 @@ def _with_wider_prior(fit: Fit, index: int, iterations: int) -> Fit:
 
 
 def _spread(found: _Scanned, index: int) -> float:
-    """Nats that the best variant of a change at a date is ahead of the mean over all; other shapes are fitted."""
-    if found.candidates[index].how != "D":
+    """Nats that the best course over the hours is ahead of the mean over all; other shapes are fitted."""
+    if found.candidates[index].how != "W":
         return 0.0
     return max(float(found.strengths.log_bayes[index] - found.scan.log_bayes[index]), 0.0)
 
