@@ -192,9 +192,7 @@ def with_pieces_of(experiment: Experiment, other: Experiment) -> Experiment:
     )  # fmt: skip
 
 
-def log_score_gain(
-    final: Fit, plain: Fit, held_out: Experiment, guesses: Sequence[Sequence[Array | None]]
-) -> float:
+def log_score_gain(final: Fit, plain: Fit, held_out: Experiment, guesses: Sequence[Sequence[Array | None]]) -> float:
     r"""Log predictive density of held-out readings of one fit, less that of another one, [nat].
 
     What a fit is unsure of widens its prediction: ``r ~ N(0, 1 + J C J^T)`` in whitened units, with the posterior

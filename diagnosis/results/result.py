@@ -265,8 +265,8 @@ class Diagnosis:
     def _how_sure(self) -> tuple[str, ...]:
         lines = []
         for finding in self.findings:
-            kind = "Name" if finding.grade == "claim" else "Law and place" if finding.acts_like else "One of these names"
-            line = f"{finding.title}: {kind.lower()} with probability {finding.sureness:.2f}"
+            of = "law and place" if finding.acts_like else "one of these" if finding.tie_set else "this name"
+            line = f"{finding.title}: {of}, probability {finding.sureness:.2f}"
             others = [r for r in finding.confusable_with
                       if r.probability >= LEAST_RIVAL and r.mechanism not in finding.tie_set]  # fmt: skip
             if others:
@@ -295,8 +295,10 @@ class Diagnosis:
         for name, fits in (("held-out", self.holdout), ("training", self.train)):
             if fits.before == fits.before:
                 after = f", {fits.after:.2f} K with what was found" if self.findings else ""
-                lines.append(f"RMSE {name}: {fits.before:.2f} K as delivered, {fits.calibrated:.2f} K calibrated{after} "
-                             f"(noise {self.noise_K:.2f} K)")  # fmt: skip
+                lines.append(
+                    f"RMSE {name}: {fits.before:.2f} K as delivered, {fits.calibrated:.2f} K calibrated{after} "
+                    f"(noise {self.noise_K:.2f} K)"
+                )
         if self.findings and math.isfinite(self.holdout_gain):
             way = "better" if self.holdout_gain >= 0.0 else "worse"
             lines.append(
