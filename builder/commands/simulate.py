@@ -6,6 +6,7 @@ import sys
 from collections.abc import Callable, Mapping
 from contextlib import nullcontext
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 import click
@@ -177,10 +178,8 @@ def simulate(
     named = [Path(name) for name in (gearbox, initial, mapping, correction) if name is not None]
     _check_outputs(output, plot, inputs=[*_read_as_files(files, gearbox), *named])
     given = None if initial in (None, RECORDED) else read_initial(str(initial))
-    if gearbox is None:
-        model = _fmu(files[0], correction, mapping, claims_only=claims_only)
-    else:
-        model = _full_model(gearbox, correction, mapping, claims_only=claims_only)
+    model_of = partial(_fmu, files[0]) if gearbox is None else partial(_full_model, gearbox)
+    model = model_of(correction, mapping, claims_only=claims_only)
     cycle, recorded, notes = model.read(files[-1])
     for note in notes:
         console.err.print(f"note: {files[-1]}: {note}")

@@ -11,7 +11,7 @@ from markupsafe import Markup
 
 from diagnosis.report import equation, figures, network_drawing, wording
 from diagnosis.results import number_format as numbers
-from diagnosis.results.result import LEAST_RIVAL, NO_CLAIM, Diagnosis
+from diagnosis.results.result import LEAST_RIVAL, NO_CLAIM, Diagnosis, date_told, values_told
 from diagnosis.results.result_parts import Calibrated, Finding, Fits
 
 PACKAGE = "diagnosis.report"
@@ -32,6 +32,7 @@ def page(diagnosis: Diagnosis) -> str:
         chance=wording.chance,
         sentence=wording.sentence,
         clause=wording.clause,
+        plain=wording.plain,
     )
     with_law = {heat.node for heat in diagnosis.missing_heat if heat.law is not None}
     marked = network_drawing.marks(diagnosis)
@@ -85,6 +86,9 @@ def _finding(finding: Finding, shown: set[str]) -> dict[str, Any]:
     prefix = f"{finding.term.label}_" if finding.term is not None else ""
     return {
         "of": finding,
+        "title": wording.plain(finding.title),
+        "numbers": wording.plain("; ".join(line for line in (values_told(finding), date_told(finding)) if line)),
+        "date": wording.clause(date_told(finding)),
         "mean_heat": numbers.with_error(finding.heat_mean_W, finding.heat_stderr_W),
         "equation": equation.drawn(finding.equation),
         "parameters": [

@@ -254,7 +254,7 @@ class Diagnosis:
         lines: list[str] = []
         for finding in self.findings:
             lines.append(f"{finding.grade.capitalize()}: {finding.says} [{finding.title}]")
-            lines += [f"  {line}" for line in (_values(finding), _when(finding)) if line]
+            lines += [f"  {line}" for line in (values_told(finding), date_told(finding)) if line]
         if self.nearest:
             told = ", ".join(f"{one.mechanism} at {one.place} ({one.probability:.2f})" for one in self.nearest)
             lines.append(f"No name is certain enough to be reported; most like: {told}.")
@@ -265,8 +265,9 @@ class Diagnosis:
     def _how_sure(self) -> tuple[str, ...]:
         lines = []
         for finding in self.findings:
-            of = "law and place" if finding.acts_like else "one of these" if finding.tie_set else "this name"
-            line = f"{finding.title}: {of}, probability {finding.sureness:.2f}"
+            of = "that law and place are right" if finding.acts_like else "of one of these" if finding.tie_set else ""
+            line = " ".join((f"{finding.title}: {finding.grade}, probability", of, _share(finding.sureness)))
+            line = line.replace("  ", " ")
             others = [r for r in finding.confusable_with
                       if r.probability >= LEAST_RIVAL and r.mechanism not in finding.tie_set]  # fmt: skip
             if others:
@@ -331,7 +332,7 @@ class Diagnosis:
         return f"<div><b>{html.escape(head)}</b><ul>{items}</ul></div>"
 
 
-def _values(finding: Finding) -> str:
+def values_told(finding: Finding) -> str:
     """Numbers of a finding for a terminal."""
     values = [(p.name, p.value, p.stderr, p.unit) for p in finding.parameters]
     if finding.heat_mean_W > 0.0:
@@ -345,7 +346,7 @@ def _values(finding: Finding) -> str:
     return ", ".join(told)
 
 
-def _when(finding: Finding) -> str:
+def date_told(finding: Finding) -> str:
     """Date of a finding for a terminal."""
     date = finding.date
     if date is None:
@@ -354,6 +355,11 @@ def _when(finding: Finding) -> str:
     end = "" if date.to_s is None else f", until {date.to_s:.0f} s"
     utc = "" if date.utc is None else f", {date.utc}"
     return f"from {date.from_s:.0f} s of {date.recording} on{band}{utc}{end}"
+
+
+def _share(probability: float) -> str:
+    """A probability; never rounded to certainty."""
+    return f"{probability:.2f}" if probability < 0.995 else "> 0.99"
 
 
 def _or_none(value: float) -> float | None:

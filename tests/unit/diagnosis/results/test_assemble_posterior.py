@@ -171,7 +171,7 @@ def test_scorers_read_the_numbers(claimed: Diagnosis, fzg: Gearbox) -> None:
 def test_the_summary_answers_in_order(claimed: Diagnosis) -> None:
     lines = claimed.summary()
     told = [next(i for i, line in enumerate(lines) if line.startswith(q)) for q in
-            ("Is something missing? Yes", "Where? oil", "What? Claim:", "How sure? windage at oil: this name",
+            ("Is something missing? Yes", "Where? oil", "What? Claim:", "How sure? windage at oil: claim, probability 0.9",
              "How much better? RMSE held-out", "What next?")]  # fmt: skip
     assert told == sorted(told) and told[0] == 1
     text = "\n".join(lines)
