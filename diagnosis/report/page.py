@@ -87,7 +87,7 @@ def _finding(finding: Finding, shown: set[str]) -> dict[str, Any]:
     return {
         "of": finding,
         "title": wording.plain(finding.title),
-        "numbers": wording.plain("; ".join(line for line in (values_told(finding), date_told(finding)) if line)),
+        "numbers": wording.plain(values_told(finding)),
         "date": wording.clause(date_told(finding)),
         "mean_heat": numbers.with_error(finding.heat_mean_W, finding.heat_stderr_W),
         "equation": equation.drawn(finding.equation),

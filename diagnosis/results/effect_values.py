@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from datetime import timedelta
+from datetime import UTC, timedelta
 
 import numpy as np
 import sympy as sp
@@ -150,7 +150,7 @@ def change_of(
         recording=recording.name, from_s=at,
         band_s=(at - BAND_SD * error, at + BAND_SD * error) if 0.0 < error < np.inf else None,
         to_s=None if until is None else until[0] - starts[recording.name],
-        utc=None if recording.start is None else (recording.start + timedelta(seconds=at)).isoformat(),
+        utc=None if recording.start is None else (recording.start + timedelta(seconds=at)).astimezone(UTC).isoformat(),
     )  # fmt: skip
 
 

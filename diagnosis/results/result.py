@@ -31,6 +31,7 @@ LIKELY = 0.5  # probability from which a further place is told
 LEAST_RIVAL = 0.01  # probability of what is told as a rival
 NEAREST, MOST_NEAREST = 0.1, 3  # probability from which an explanation is told that was not reported; of how many
 MOST_UNSEEN = 6  # effects that the summary names of those that cannot be seen
+LONG_S = 7200.0  # times beyond are told in hours
 LITTLE_SPREAD = 0.05  # deviation between sessions that is not worth a word, in prior standard deviations
 NO_CLAIM = ("consistent", "insufficient_data")
 Verdict = Literal[
@@ -248,7 +249,9 @@ class Diagnosis:
         if not self.location or self.verdict in NO_CLAIM:
             return ()
         told = ", ".join(f"{place.node} ({place.probability:.2f})" for place in self.places)
-        return (f"{told}; {self.location[0].regime}",)
+        place = self.location[0]
+        heat = f"; {place.heat_mean_W:.3g} W on average, {place.heat_max_W:.3g} W at most" if place.heat_max_W else ""
+        return (f"{told}{heat}; {place.regime}",)
 
     def _what(self) -> tuple[str, ...]:
         lines: list[str] = []
@@ -351,10 +354,14 @@ def date_told(finding: Finding) -> str:
     date = finding.date
     if date is None:
         return ""
-    band = "" if date.band_s is None else f" ({date.band_s[0]:.0f} to {date.band_s[1]:.0f} s)"
-    end = "" if date.to_s is None else f", until {date.to_s:.0f} s"
-    utc = "" if date.utc is None else f", {date.utc}"
-    return f"from {date.from_s:.0f} s of {date.recording} on{band}{utc}{end}"
+    band = "" if date.band_s is None else f" ({_time(date.band_s[0])} to {_time(date.band_s[1])})"
+    end = "" if date.to_s is None else f", until {_time(date.to_s)}"
+    utc = "" if date.utc is None else f", {date.utc[:16].replace('T', ' ')} UTC"
+    return f"from {_time(date.from_s)} of {date.recording} on{band}{utc}{end}"
+
+
+def _time(seconds: float) -> str:
+    return f"{seconds / 3600.0:.2f} h" if abs(seconds) > LONG_S else f"{seconds:.0f} s"
 
 
 def _share(probability: float) -> str:

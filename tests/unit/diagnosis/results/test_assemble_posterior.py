@@ -265,6 +265,7 @@ def test_a_link_that_changes_at_a_date_acts_like(
     assert np.abs(heat[time < DATE_S - 600.0]).max() < 0.1 * np.abs(heat).max()
     text = str(found)
     assert "[acts like oil_housing_changed at" in text and f"from 2400 s of {RECORDED} on" in text
+    assert "2020-01-01 08:40 UTC, until 3000 s" in text
     stored = found.to_dict()["findings"][0]
     assert stored["acts_like"] and stored["date"]["from_s"] == pytest.approx(DATE_S)
 
