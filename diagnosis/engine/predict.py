@@ -26,7 +26,7 @@ SETTLED_K, MOST_ROUNDS = 0.02, 30  # thick oil at a cold start takes many rounds
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Prediction:
-    """What the sensors would read, free-running.
+    """Free-running readings of the sensors.
 
     Attributes
     ----------
@@ -51,7 +51,7 @@ class Prediction:
 
     @property
     def weights(self) -> Array:
-        """Time that every row stands for, shape (K + 1,), [s]."""
+        """Time that every row represents, shape (K + 1,), [s]."""
         return stands_for(self.piece.time)
 
 
@@ -139,10 +139,10 @@ def _start(experiment: Experiment, index: int, setting: Setting, until: float) -
 
 
 def _likely_start(experiment: Experiment, index: int) -> tuple[Array, Array]:
-    """Start temperatures before the first minutes have said anything, and their standard deviations, (unknown,) each.
+    """Start temperatures by the first rows alone, and their standard deviations, (unknown,) each.
 
-    What is solved with the temperatures, as oil in a tank, may have been left as it was declared or have gone along
-    with the gearbox.
+    A state that is solved with the temperatures, as oil in a tank, may have been left as it was declared, or have
+    followed the gearbox.
     """
     model, parts = experiment.machine.model, experiment.starts[index]
     declared = complete_start(model, parts)[model.n :]
@@ -159,7 +159,7 @@ def rmse(residuals: Array, weights: Array) -> Array:
     ----------
     residuals : Array, shape (rows, channels)
     weights : Array, shape (rows,)
-        Time that every row stands for
+        Time that every row represents
     """
     good = np.isfinite(residuals)
     with np.errstate(invalid="ignore", divide="ignore"):

@@ -1,4 +1,4 @@
-"""What to do next: the experiment or the sensor that decides. Only what is possible is advised."""
+"""The next step: the experiment or the sensor that decides. Only what is possible is advised."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def separation(
     own: Hypothesis, other: Hypothesis, catalogue: Mapping[str, Mechanism], network: ThermalNetwork,
     free: Collection[str],
 ) -> str:  # fmt: skip
-    """The experiment, or the sensor, that tells two effects apart.
+    """The experiment, or the sensor, that distinguishes two effects.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def next_test(
     verdict: Verdict, findings: Sequence[Finding], location: Sequence[Location], unseen: Sequence[NotDetectable],
     catalogue: Mapping[str, Mechanism], *, assumed: Collection[str], free: Collection[str],
 ) -> str:  # fmt: skip
-    """What to measure next; empty if there is nothing to ask for.
+    """The next measurement; empty if there is nothing to ask for.
 
     Parameters
     ----------
@@ -70,13 +70,13 @@ def next_test(
         Parts that can have a sensor
     """
     if verdict == "unexplained" and "T_ambient" in assumed:
-        return "record T_ambient_degC: a constant stands for it, and what the air did is missed elsewhere"
+        return "record T_ambient_degC: a constant replaces it, and effects of the air show up elsewhere"
     for finding in findings:
         if finding.confusable_with and finding.confusable_with[0].probability >= WORTH_ASKING:
             return finding.confusable_with[0].separate_by
     for place in location[1:]:
         if place.probability >= OTHER_PLACE and place.node in free:
-            return f"a temperature sensor at {place.node.replace('_', ' ')}: it tells whether the heat is there"
+            return f"a temperature sensor at {place.node.replace('_', ' ')}: it shows if the heat is there"
     if verdict in ("consistent", "insufficient_data") and unseen:
         wanted, shown = Counter(one.needed for one in unseen).most_common(1)[0]
         return f"{wanted} (it would show {shown} effect{'s' if shown > 1 else ''} that these data cannot)"

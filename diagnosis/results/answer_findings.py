@@ -1,4 +1,4 @@
-"""From answers of the decision to findings: what is said, with which grade, rivals and numbers."""
+"""From answers of the decision to findings: sentence, grade, rivals and numbers."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def _says(answer: Answer, found: Mapping[str, float]) -> str:
     if answer.acts_like:
         return f"Something acts like this, its cause was not found: {says}"
     if len(answer.tied) > 1:
-        return f"One of several effects that these data do not tell apart, the most probable: {says}"
+        return f"One of several effects that these data do not separate, the most probable: {says}"
     return says
 
 

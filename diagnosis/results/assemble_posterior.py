@@ -244,7 +244,9 @@ def _place(
 
 def _predictions(experiment: Experiment, held_out: Experiment, plain: Fit, final: Fit, jobs: int) -> Predictions:
     """Free-running predictions of the training and the held-out pieces: as delivered, calibrated and after."""
-    places = [("train", i, part.point.trajectory.T) for i, part in enumerate(final.parts)]
+    places: list[tuple[str, int, Array | None]] = [
+        ("train", i, part.point.trajectory.T) for i, part in enumerate(final.parts)
+    ]
     places += [("holdout", i, None) for i in range(len(held_out.pieces))]
     of = {"train": experiment, "holdout": held_out}
     work = []

@@ -66,7 +66,7 @@ def _is_bias(term: Term) -> bool:
 
 
 def _whole_bias(fit: Fit, term: Term) -> tuple[float, float]:
-    """A constant error of a channel with the tolerance that was calibrated beside it."""
+    """A constant error of a channel, the calibrated tolerance of its sensor included."""
     chosen = [i for i, unknown in enumerate(fit.experiment.unknowns)
               if unknown.parameter.name == term.strength.name
               or (isinstance(unknown, SensorBias) and unknown.channel == term.target[0])]  # fmt: skip
@@ -137,7 +137,7 @@ def _heats_with(fit: Fit, effect: Hypothesis, values: Array) -> list[Array]:
 def change_of(
     values: Values, effect: Hypothesis, experiment: Experiment, recordings: Sequence[Recording]
 ) -> Change | None:
-    """When an effect begins, told in the recording in which it does; None if it has no date."""
+    """When an effect begins, by the time of the recording in which it does; None if it has no date."""
     if effect.term is None or f"{effect.term.label}{SINCE}" not in values:
         return None
     since, error = values[f"{effect.term.label}{SINCE}"]

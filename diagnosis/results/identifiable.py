@@ -1,4 +1,4 @@
-"""Whether the recordings of an explanation identify sizes, see :mod:`diagnosis.results.ratios_only`."""
+"""Sizes that the recordings of an explanation identify or not, see :mod:`diagnosis.results.ratios_only`."""
 
 from __future__ import annotations
 

@@ -221,9 +221,10 @@ class Diagnosis:
 
     @property
     def first_screen(self) -> tuple[tuple[str, tuple[str, ...]], ...]:
-        """What a reader asks first, and the answers: is something missing, where, what, how sure, how much better,
-        what next. Questions without an answer are left out.
-        """  # fmt: skip
+        """First questions of a reader with their answers; questions without an answer are left out.
+
+        Is something missing, where, what, how sure, how much better, what next, and which effects cannot be seen.
+        """
         asked = (
             ("Is something missing?", (self._missing(),)),
             ("Where?", self._where()),
@@ -237,7 +238,7 @@ class Diagnosis:
 
     def _missing(self) -> str:
         if self.verdict == "insufficient_data":
-            return "These data cannot tell."
+            return "These data cannot decide it."
         reached = f"evidence {self.log_e_value:.1f} nat, {self.threshold:.1f} needed"
         rate = f"false-alarm rate {100.0 * self.false_alarm_rate:g} %"
         if self.log_e_value > self.threshold:
@@ -298,7 +299,7 @@ class Diagnosis:
         lines = []
         for name, fits in (("held-out", self.holdout), ("training", self.train)):
             if fits.before == fits.before:
-                after = f", {fits.after:.2f} K with what was found" if self.findings else ""
+                after = f", {fits.after:.2f} K with the findings" if self.findings else ""
                 lines.append(
                     f"RMSE {name}: {fits.before:.2f} K as delivered, {fits.calibrated:.2f} K calibrated{after} "
                     f"(noise {self.noise_K:.2f} K)"

@@ -1,4 +1,4 @@
-"""The parts of a result: what was found, where, how well it predicts, and what could not be seen."""
+"""The parts of a result: findings, places, errors of the predictions, and effects that could not be seen."""
 
 from __future__ import annotations
 
@@ -108,7 +108,7 @@ class Finding:
     grade : str
         ``claim``: the name is certain enough; ``likely``: one of a few names, or only law and place are known
     tie_set : tuple of str
-        Names that these data do not tell apart, the most probable first; empty of a claim
+        Names that these data do not separate, the most probable first; empty of a claim
     joint_probability : float
         Of all names of the tie set, else `probability`
     acts_like : bool
@@ -157,7 +157,7 @@ class Finding:
 
     @property
     def sureness(self) -> float:
-        """Probability of what the title says."""
+        """Probability that the title is right."""
         return self.joint_probability if self.tie_set and self.joint_probability > 0.0 else self.probability
 
 

@@ -52,7 +52,7 @@ class InferenceSetup:
     noise_K : float
         White noise of a temperature row, [K]
     shapes : tuple of Term
-        Tilts of the formulas that the calibrated network has beside the nominal one
+        Tilts of the formulas, which the nominal network lacks
     """
 
     gearbox: Gearbox

@@ -171,7 +171,7 @@ def test_scorers_read_the_numbers(claimed: Diagnosis, fzg: Gearbox) -> None:
 def test_the_summary_answers_in_order(claimed: Diagnosis) -> None:
     lines = claimed.summary()
     told = [next(i for i, line in enumerate(lines) if line.startswith(q)) for q in
-            ("Is something missing? Yes", "Where? oil", "What? Claim:", "How sure? windage at oil: claim, probability 0.9",
+            ("Is something missing? Yes", "Where? oil", "What? Claim:", "How sure? windage at oil: claim",
              "How much better? RMSE held-out", "What next?")]  # fmt: skip
     assert told == sorted(told) and told[0] == 1
     text = "\n".join(lines)
@@ -194,7 +194,7 @@ def test_a_tie_is_one_item_and_only_likely(assembled: Assemble, prepared: Prepar
     assert finding.title == "windage or pump_heat at oil"
     assert len(found.location) == 1 and found.location[0].probability == pytest.approx(p + q)
     text = str(found)
-    assert "Likely: One of several effects that these data do not tell apart" in text
+    assert "Likely: One of several effects that these data do not separate" in text
     assert "not ruled out" not in text  # the other one is in the name already
     stored = found.to_dict()["findings"][0]
     assert (stored["grade"], stored["tie_set"]) == ("likely", ["windage", "pump_heat"])

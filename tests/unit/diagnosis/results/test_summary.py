@@ -20,14 +20,15 @@ def test_the_verdict_stands_first_then_the_questions_in_order() -> None:
     asked = ["Is something missing?", "Where?", "What?", "How sure?", "How much better?", "What next?",
              "What cannot be seen in these data?"]  # fmt: skip
     assert [line.split("?")[0] + "?" for line in lines[1:] if not line.startswith(" ")] == asked
-    assert "5.21 K as delivered, 3.62 K calibrated, 0.52 K with what was found" in str(missing_physics())
+    assert "5.21 K as delivered, 3.62 K calibrated, 0.52 K with the findings" in str(missing_physics())
     assert "41.3 nat, 3.9 needed" in lines[1]
 
 
 def test_a_claim_and_something_likely_stand_apart_by_words() -> None:
     claim, likely = two_effects().findings
-    likely = replace(likely, grade="likely", tie_set=("bearing_seat_contact", "pocketing"), joint_probability=0.93,
-                     confusable_with=claim.confusable_with or missing_physics().findings[0].confusable_with)  # fmt: skip
+    rivals = missing_physics().findings[0].confusable_with
+    tied = ("bearing_seat_contact", "pocketing")
+    likely = replace(likely, grade="likely", tie_set=tied, joint_probability=0.93, confusable_with=rivals)
     both = replace(two_effects(), findings=(claim, likely))
     what, sure = told(both, "What?"), told(both, "How sure?")
     assert what.startswith("Claim: A thermostat") and "\nLikely: " in what
