@@ -37,6 +37,7 @@ from diagnosis.inference.unknowns import (
 from diagnosis.recordings.recording import Recording
 from diagnosis.setup.inference_setup import CAPACITY_SD, InferenceSetup, prepare
 from diagnosis.setup.shaft import torque_gain
+from diagnosis.setup.time_axis import start_times
 from models.assembly.gearbox import Gearbox
 from models.network.laws import Parameter
 from models.quantities.quantities import TOTAL_LOSS, is_total_loss
@@ -80,6 +81,7 @@ def prepare_experiment(
         unknowns=tuple(unknowns),
         noise=noise,
         starts=tuple(old.starts),
+        starts_at=start_times([*recordings, *holdout]),
     )
 
 
