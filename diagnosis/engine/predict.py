@@ -185,9 +185,9 @@ def overall_rmse(predictions: Sequence[Prediction], columns: Sequence[int]) -> f
 
 
 def with_pieces_of(experiment: Experiment, other: Experiment) -> Experiment:
-    """Machine and unknowns of one experiment with the recordings of another one."""
+    """Machine and unknowns of one experiment with the recordings of another one, judged by noise alone."""
     return replace(
-        experiment, pieces=other.pieces, noise=other.noise, starts=other.starts, filters=other.filters,
+        experiment, pieces=other.pieces, noise=other.noise, starts=other.starts, filters=other.filters, metric=None,
         starts_at=other.starts_at or experiment.starts_at, session_of=other.session_of or experiment.session_of,
     )  # fmt: skip
 

@@ -75,7 +75,9 @@ def finding_of(
 
 def _says(answer: Answer, found: Mapping[str, float]) -> str:
     effect = answer.effect
-    if isinstance(effect.term, Placed):
+    if effect.is_open:
+        says = f"A heat at {effect.place.replace('_', ' ')} that is like no law of the catalogue."
+    elif isinstance(effect.term, Placed):
         says = effect.term.says
     elif effect.term is None:
         says = f"The parameter {effect.place} is {found[names_of(effect)[0]]:.3g}, far from what the definition allows."

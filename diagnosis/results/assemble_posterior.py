@@ -173,9 +173,9 @@ def _remaining(posterior: Posterior) -> str:
 
 
 def _misfit(fit: Fit) -> float:
-    """Mean square of the whitened residuals."""
+    """Mean square of the whitened residuals, model error taken into account."""
     rows = sum(len(part.residual) for part in fit.parts)
-    return float(sum(part.residual @ part.residual for part in fit.parts)) / max(rows, 1)
+    return float(fit.linearised.products[0, 0]) / max(rows, 1)
 
 
 def _floor(setup: InferenceSetup) -> str:

@@ -22,7 +22,7 @@ from models.terms.term import Term
 FORM_ERROR = 0.1  # of a strength and its heat: laws of the literature are hardly known better
 SLOPE_STEP = 1e-4  # of a prior standard deviation
 BAND_SD = 2.0  # 95 %
-SINCE, UNTIL = "_since", "_until"
+SINCE, LASTING = "_since", "_lasting"  # see diagnosis.candidates.dated
 HOT_DEGC = 1e6
 Values = Mapping[str, tuple[float, float]]
 
@@ -145,11 +145,11 @@ def change_of(
     begun = [name for name, start in starts.items() if start <= since] or [min(starts, key=lambda name: starts[name])]
     recording = next(r for r in recordings if r.name == max(begun, key=lambda name: starts[name]))
     at = since - starts[recording.name]
-    until = values.get(f"{effect.term.label}{UNTIL}")
+    lasting = values.get(f"{effect.term.label}{LASTING}")
     return Change(
         recording=recording.name, from_s=at,
         band_s=(at - BAND_SD * error, at + BAND_SD * error) if 0.0 < error < np.inf else None,
-        to_s=None if until is None else until[0] - starts[recording.name],
+        to_s=None if lasting is None else at + lasting[0],
         utc=None if recording.start is None else (recording.start + timedelta(seconds=at)).astimezone(UTC).isoformat(),
     )  # fmt: skip
 

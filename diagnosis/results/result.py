@@ -31,6 +31,7 @@ LIKELY = 0.5  # probability from which a further place is told
 LEAST_RIVAL = 0.01  # probability of what is told as a rival
 NEAREST, MOST_NEAREST = 0.1, 3  # probability from which an explanation is told that was not reported; of how many
 MOST_UNSEEN = 6  # effects that the summary names of those that cannot be seen
+OF_DATE = ("since", "lasting")  # parameters that the date contains
 LONG_S = 7200.0  # times beyond are told in hours
 LITTLE_SPREAD = 0.05  # deviation between sessions that is not worth a word, in prior standard deviations
 NO_CLAIM = ("consistent", "insufficient_data")
@@ -338,7 +339,7 @@ class Diagnosis:
 
 def values_told(finding: Finding) -> str:
     """Numbers of a finding for a terminal."""
-    values = [(p.name, p.value, p.stderr, p.unit) for p in finding.parameters]
+    values = [(p.name, p.value, p.stderr, p.unit) for p in finding.parameters if p.name not in OF_DATE]
     if finding.heat_mean_W > 0.0:
         values.append(("mean |heat|", finding.heat_mean_W, finding.heat_stderr_W, "W"))
     told = [

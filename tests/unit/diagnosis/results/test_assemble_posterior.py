@@ -201,7 +201,7 @@ def test_a_tie_is_one_item_and_only_likely(assembled: Assemble, prepared: Prepar
     assert stored["joint_probability"] == pytest.approx(p + q)
 
 
-def _dated(setup: InferenceSetup, since: float, until: float | None = None) -> Hypothesis:
+def _dated(setup: InferenceSetup, since: float, lasting: float | None = None) -> Hypothesis:
     """The oil loses more or less to the housing from a moment on."""
     label = "dated_oil_housing"
     link = next(k for k in setup.nominal.links if set(k.nodes) == {"oil", "housing_lower"})
@@ -210,8 +210,8 @@ def _dated(setup: InferenceSetup, since: float, until: float | None = None) -> H
         Parameter(name=f"{label}_strength", start=0.0, sd=0.3, lower=-0.9, upper=3.0, log=False),
         Parameter(name=f"{label}_since", unit="s", start=since, sd=100.0, lower=-1e6, upper=1e6, log=False),
     ]
-    if until is not None:
-        parameters.append(replace(parameters[1], name=f"{label}_until", start=until))
+    if lasting is not None:
+        parameters.append(replace(parameters[1], name=f"{label}_lasting", start=lasting))
     since_symbol, time = symbol(f"{label}_since"), symbol("time") + symbol(clock.name)
     term = Term(
         label=label, kind="link_factor", target=(link.name,), parameters=(*parameters, clock),
@@ -244,11 +244,11 @@ def test_a_link_that_changes_at_a_date_acts_like(
     assembled: Assemble, prepared: Prepared, recordings: tuple[Recording, Recording], starts_at: float
 ) -> None:
     setup, experiment, plain = prepared
-    effect = _dated(setup, starts_at + DATE_S, starts_at + 3000.0)
+    effect = _dated(setup, starts_at + DATE_S, 600.0)
     assert effect.term is not None
     own = replace(experiment, starts_at={RECORDED: starts_at, "judged": 0.0})
     fit = _fit_with(plain, effect, {"dated_oil_housing_strength": -0.4, "dated_oil_housing_since": starts_at + DATE_S,
-                                    "dated_oil_housing_until": starts_at + 3000.0})  # fmt: skip
+                                    "dated_oil_housing_lasting": 600.0})  # fmt: skip
     fit = replace(fit, experiment=replace(fit.experiment, starts_at=own.starts_at))
     judged = Judged(effects=(effect,), log_prior=-5.0, log_bayes=60.0, fit=fit)
     answer = Answer(best=judged, effect=effect, grade="likely", probability=0.97, acts_like=True)
