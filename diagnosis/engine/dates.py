@@ -10,7 +10,6 @@ import numpy as np
 from diagnosis.candidates.hypotheses import Hypothesis
 from diagnosis.engine.candidates import scan
 from diagnosis.engine.fit import Fit
-from diagnosis.engine.point import Column
 from models.base.types import Array
 
 DATES, SPANS, LONGEST = 49, 6, 0.3  # tried per round, and the longest time that a change takes, of the time axis
@@ -42,9 +41,7 @@ class Dated:
     high: float
 
 
-def date_of(
-    fit: Fit, hypothesis: Hypothesis, *, further: Sequence[Sequence[Column]] = (), amplitudes: Array | float = 1.0,
-) -> Dated:  # fmt: skip
+def date_of(fit: Fit, hypothesis: Hypothesis) -> Dated:
     """Look for the date of a change between the dates of the scan.
 
     Dates and the times that a change takes (or lasts) are tried on a grid, which becomes finer where the readings put
@@ -56,10 +53,6 @@ def date_of(
         Without the change
     hypothesis : Hypothesis
         At a date
-    further : sequence, one per piece, of sequences of Column
-        Further unknowns, see :func:`diagnosis.engine.candidates.scan`
-    amplitudes : Array, shape (further unknowns,), or float
-        Their prior standard deviations
     """
     assert hypothesis.term is not None  # noqa: S101 - a change has one
     names = [p.name.removeprefix(f"{hypothesis.term.label}_") for p in hypothesis.term.parameters]
@@ -68,9 +61,8 @@ def date_of(
     dates, spans = np.linspace(0.0, end, DATES), np.geomspace(shortest, LONGEST * end, SPANS)
     for _ in range(ROUNDS):
         tried = [replace(hypothesis, variants=_moved(values, since, [at, span])) for span in spans for at in dates]
-        found = scan(fit, tried, further)
-        scale = np.concatenate([np.ones(len(found.unknowns)), np.broadcast_to(amplitudes, len(found.further))])
-        single = found.singles(found.gram.given([*found.unknowns, *found.further], scale))
+        found = scan(fit, tried)
+        single = found.singles(found.gram.given([*found.unknowns, *found.further]))
         best = int(np.argmax(single.log_bayes))
         weights = np.exp(single.log_bayes - single.log_bayes[best]).reshape(len(spans), len(dates))
         low, high = _band(dates, weights.sum(axis=0))
