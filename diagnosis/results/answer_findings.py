@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from diagnosis.candidates.dated import CHANGED, changed_law
 from diagnosis.candidates.hypotheses import Hypothesis
 from diagnosis.decision.posterior import Answer, Posterior
 from diagnosis.engine.fit import Fit
@@ -44,7 +45,7 @@ def finding_of(
     units = {p.name: p.unit for p in (setup.nominal.parameters if term is None else term.parameters)}
     prefix = "" if term is None else f"{term.label}_"
     return Finding(
-        mechanism=effect.name,
+        mechanism=name_in(catalogue, effect),
         family=effect.family,
         place=effect.place,
         node=node_in(setup.nominal, effect),
@@ -65,12 +66,18 @@ def finding_of(
         heat=heat_over_time(pieces, heats) if heats else {},
         term=None if term is None else term.with_values(found),
         grade=answer.grade,
-        tie_set=tuple(dict.fromkeys(one.name for one, _ in answer.tied)),
+        tie_set=tuple(dict.fromkeys(name_in(catalogue, one) for one, _ in answer.tied)),
         joint_probability=sum(p for _, p in answer.tied) if answer.tied else answer.probability,
         acts_like=answer.acts_like,
         date=change_of(values, effect, fit.experiment, recordings),
         switching=switching_of(values, effect),
     )  # fmt: skip
+
+
+def name_in(catalogue: Mapping[str, Mechanism], effect: Hypothesis) -> str:
+    """Name of the law in the catalogue, for one with a date or a course too; else the name of the effect."""
+    law = changed_law(effect)
+    return next((name for name in (law, *(law + ending for ending in CHANGED)) if name in catalogue), effect.name)
 
 
 def _says(answer: Answer, found: Mapping[str, float]) -> str:
@@ -108,13 +115,15 @@ def _rivals(
             odds[_name(other)] = probability
             where[_name(other)] = other
     tied = {_name(other) for other, _ in answer.tied}
+    # The law of the answer with another course in time is no other name.
+    same = "" if own.term is None else name_in(catalogue, own)
+    odds = {name: p for name, p in odds.items() if p >= LEAST_RIVAL and name_in(catalogue, where[name]) != same}
     return tuple(
         Rival(
-            mechanism=where[name].name, place=where[name].place, probability=probability,
+            mechanism=name_in(catalogue, where[name]), place=where[name].place, probability=probability,
             separate_by=separation(own, where[name], catalogue, setup.nominal, free),
         )
         for name, probability in sorted(odds.items(), key=lambda one: (one[0] not in tied, -one[1]))
-        if probability >= LEAST_RIVAL
     )  # fmt: skip
 
 

@@ -10,16 +10,14 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
-import sympy as sp
 
 from diagnosis.candidates.hypotheses import Hypothesis, hypothesis_of
 from diagnosis.decision.posterior import Answer, Expected, Judged, Posterior, Settings
-from diagnosis.engine.candidates import refit
+from diagnosis.engine.candidates import refit, with_candidate
+from diagnosis.engine.families import candidates_of
 from diagnosis.engine.fit import Experiment, Fit, calibrate
-from diagnosis.engine.point import Machine
 from diagnosis.engine.prepare import held_out_experiment, prepare_experiment
-from diagnosis.engine.unknown import NetworkParameter, TermParameter, Unknown
-from diagnosis.forward.network_on_grid import NetworkOnGrid
+from diagnosis.engine.unknown import NetworkParameter
 from diagnosis.proof.scoring.answers import read_answer
 from diagnosis.recordings.recording import Recording
 from diagnosis.report import page
@@ -30,8 +28,6 @@ from diagnosis.setup.inference_setup import InferenceSetup
 from models.assembly.gearbox import Gearbox
 from models.correction.correction import correction_text, read_correction, write_correction
 from models.mechanisms import CATALOGUE, Scale
-from models.network.laws import Parameter, symbol
-from models.terms.term import Term
 from tests.unit.diagnosis.inference_example import recording_of
 
 NODES = ("oil", "housing_lower", "bearing_1", "pinion")
@@ -201,73 +197,51 @@ def test_a_tie_is_one_item_and_only_likely(assembled: Assemble, prepared: Prepar
     assert stored["joint_probability"] == pytest.approx(p + q)
 
 
-def _dated(setup: InferenceSetup, since: float, lasting: float | None = None) -> Hypothesis:
-    """The oil loses more or less to the housing from a moment on."""
-    label = "dated_oil_housing"
-    link = next(k for k in setup.nominal.links if set(k.nodes) == {"oil", "housing_lower"})
-    clock = Parameter(name=f"{label}_clock", unit="s", start=0.0, sd=0.0, lower=-1e9, upper=1e9, log=False)
-    parameters = [
-        Parameter(name=f"{label}_strength", start=0.0, sd=0.3, lower=-0.9, upper=3.0, log=False),
-        Parameter(name=f"{label}_since", unit="s", start=since, sd=100.0, lower=-1e6, upper=1e6, log=False),
-    ]
-    if lasting is not None:
-        parameters.append(replace(parameters[1], name=f"{label}_lasting", start=lasting))
-    since_symbol, time = symbol(f"{label}_since"), symbol("time") + symbol(clock.name)
-    term = Term(
-        label=label, kind="link_factor", target=(link.name,), parameters=(*parameters, clock),
-        expression=symbol(f"{label}_strength") / (1 + sp.exp(-(time - since_symbol) / 60.0)),
-    )  # fmt: skip
-    return Hypothesis(name="oil_housing_changed", place=link.name, family="change", term=term, how="D",
-                      variants=np.array([[p.start for p in term.parameters]]), clock=clock.name)  # fmt: skip
-
-
 def _fit_with(plain: Fit, effect: Hypothesis, values: dict[str, float]) -> Fit:
     """The calibrated machine with a term at given values, not fitted."""
-    term, machine = effect.term, plain.experiment.machine
-    assert term is not None
-    varying = [p for p in term.parameters if p.sd > 0.0]
-    added: list[Unknown]
-    if term.kind == "sensor":
-        machine = Machine(machine.model, (term,))
-        names = tuple(p.name for p in term.parameters)
-        added = [TermParameter(parameter=p, label=term.label, names=names) for p in varying]
-    else:
-        machine = Machine(NetworkOnGrid(term.apply(machine.model.network), machine.model.losses))
-        added = [NetworkParameter(parameter=p) for p in varying]
+    experiment, _ = with_candidate(plain, effect, 0)
+    added = experiment.unknowns[len(plain.z) :]
     z = np.array([*plain.z, *(u.z_of(values[u.parameter.name]) for u in added)])
-    experiment = replace(plain.experiment, machine=machine, unknowns=(*plain.experiment.unknowns, *added))
     return experiment.fit(z, [part.point.trajectory for part in plain.parts], iterations=0)
 
 
 @pytest.mark.parametrize("starts_at", [0.0, AFTER_S])
 def test_a_link_that_changes_at_a_date_acts_like(
-    assembled: Assemble, prepared: Prepared, recordings: tuple[Recording, Recording], starts_at: float
+    assembled: Assemble, prepared: Prepared, fzg: Gearbox, starts_at: float
 ) -> None:
+    """Of the family of changes, also in a recording that is not the first on the time axis."""
     setup, experiment, plain = prepared
-    effect = _dated(setup, starts_at + DATE_S, 600.0)
-    assert effect.term is not None
-    own = replace(experiment, starts_at={RECORDED: starts_at, "judged": 0.0})
-    fit = _fit_with(plain, effect, {"dated_oil_housing_strength": -0.4, "dated_oil_housing_since": starts_at + DATE_S,
-                                    "dated_oil_housing_lasting": 600.0})  # fmt: skip
-    fit = replace(fit, experiment=replace(fit.experiment, starts_at=own.starts_at))
+    starts = {RECORDED: starts_at, "judged": 0.0}
+    own = replace(experiment, starts_at=starts)
+    effect = next(
+        one for one in candidates_of(setup, own, CATALOGUE) if one.label == "radiation_for_a_while@housing_air"
+    )
+    assert effect.term is not None and effect.clock is not None
+    values = {"strength": -0.4, "since": starts_at + DATE_S, "lasting": 1800.0, "start": 0.0}
+    variant = np.array([[values[p.name.removeprefix(f"{effect.term.label}_")] for p in effect.term.parameters]])
+    effect = replace(effect, variants=variant)
+    changed, z = with_candidate(replace(plain, experiment=replace(plain.experiment, starts_at=starts)), effect, 0)
+    fit = changed.fit(np.concatenate([plain.z, z]), [part.point.trajectory for part in plain.parts], iterations=0)
     judged = Judged(effects=(effect,), log_prior=-5.0, log_bayes=60.0, fit=fit)
     answer = Answer(best=judged, effect=effect, grade="likely", probability=0.97, acts_like=True)
     found = assembled(posterior_of(plain, judged), [answer], experiment=own)
     (finding,) = found.findings
     date = finding.date
     assert finding.acts_like and date is not None and date.recording == RECORDED
-    assert date.from_s == pytest.approx(DATE_S) and date.to_s == pytest.approx(3000.0)
-    assert date.band_s is not None and date.band_s[0] < DATE_S < date.band_s[1] < 7200.0
+    assert date.from_s == pytest.approx(DATE_S) and date.to_s == pytest.approx(4200.0)
+    assert date.band_s is not None and date.band_s[0] < DATE_S < date.band_s[1]
     assert date.utc == "2020-01-01T08:40:00+00:00"
-    assert "clock" not in {p.name for p in finding.parameters}
-    _, heat = finding.heat[RECORDED]
-    time = finding.heat[RECORDED][0]
-    assert np.abs(heat[time < DATE_S - 600.0]).max() < 0.1 * np.abs(heat).max()
+    assert {p.name for p in finding.parameters} == {"strength", "since", "lasting"}
+    time, heat = finding.heat[RECORDED]
+    acts, rests = (np.abs(time - 3300.0) < 800.0), (np.abs(time - 3300.0) > 1300.0)
+    assert np.abs(heat[rests]).max() < 0.02 * np.abs(heat[acts]).min()
     text = str(found)
-    assert "[acts like oil_housing_changed at" in text and f"from 2400 s of {RECORDED} on" in text
-    assert "2020-01-01 08:40 UTC, until 3000 s" in text
+    assert "[acts like radiation_error at housing_air]" in text and f"from 2400 s of {RECORDED} on" in text
+    assert "2020-01-01 08:40 UTC, until 4200 s" in text and "since =" not in text
     stored = found.to_dict()["findings"][0]
     assert stored["acts_like"] and stored["date"]["from_s"] == pytest.approx(DATE_S)
+    assert read_answer(found.to_dict(), fzg).claims[0].what == "link"
+    assert correction_of(found, fzg).findings[0].term.label == effect.term.label
 
 
 def test_nothing(assembled: Assemble, prepared: Prepared, windage: Judged) -> None:
