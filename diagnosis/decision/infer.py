@@ -13,7 +13,7 @@ import numpy as np
 from scipy.special import log_ndtr, logsumexp
 
 from diagnosis.candidates.hypotheses import Hypothesis
-from diagnosis.decision.posterior import Expected, Judged, Posterior, Settings
+from diagnosis.decision.posterior import Expected, Judged, Likeness, Posterior, Settings
 from diagnosis.engine.calibration import Calibration
 from diagnosis.engine.candidates import Scan, refit, scan
 from diagnosis.engine.fit import Fit
@@ -94,7 +94,7 @@ def infer(
     log_e = float(logsumexp([one.log_prior + one.log_bayes for one in single]))
     return Posterior(
         nothing=Judged(effects=(), log_prior=0.0, log_bayes=0.0, fit=base), judged=tuple(every), log_e=log_e,
-        threshold=THRESHOLD, temper=TEMPER, error_class=calibration.chosen.name,
+        threshold=THRESHOLD, temper=TEMPER, likeness=_likeness(first), error_class=calibration.chosen.name,
         error_evidence=dict(calibration.evidence), session_s=calibration.session_s, remainder=remainder,
         expected=_expected(first, settings),
     )  # fmt: skip
@@ -247,6 +247,16 @@ def _beside(
     alone = _weighed(second.scan, outside, without).tolist()
     labels = [one.label for one in second.candidates]
     return float(second.log_bayes[order[0]]), pairs, dict(zip(labels, alone, strict=True))
+
+
+def _likeness(found: _Scanned) -> Likeness:
+    """How much alike candidates look in these readings, each in its best shape."""
+    given = found.over.given[found.over.most_probable]
+    unknown = [one.unknown for one in found.candidates if one.unknown is not None]
+    at = np.array([*found.scan.of_candidates, *unknown], dtype=int) + 1
+    inner = given.matrix[np.ix_(at, at)]
+    norm = np.sqrt(np.maximum(np.diag(inner), 1e-12))
+    return Likeness(labels=tuple(one.label for one in found.candidates), cosines=np.abs(inner / norm / norm[:, None]))
 
 
 def _expected(found: _Scanned, settings: Settings) -> tuple[Expected, ...]:
