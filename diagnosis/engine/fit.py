@@ -10,7 +10,7 @@ import numpy as np
 from scipy.linalg import solve_triangular
 
 from diagnosis.engine.point import Column, Machine, Point, Setting
-from diagnosis.engine.unknown import Unknown, in_scope
+from diagnosis.engine.unknown import Scope, Unknown, in_scope
 from diagnosis.forward.grid import Piece
 from diagnosis.forward.trajectory import ROUNDS, Trajectory, simulate
 from diagnosis.inference.whitening import Noise, Whitening
@@ -49,6 +49,8 @@ class Experiment:
         Test session of every recording; between sessions the unknowns may differ a little
     healthy : frozenset of str
         Recordings in which the effect that is looked for cannot act
+    switched_off : frozenset of str
+        Names of the only effects that cannot act in them; empty: none can
     """
 
     machine: Machine
@@ -60,11 +62,18 @@ class Experiment:
     starts_at: Mapping[str, float] = field(default_factory=dict)
     session_of: Mapping[str, str] = field(default_factory=dict)
     healthy: frozenset[str] = frozenset()
+    switched_off: frozenset[str] = frozenset()
 
     @property
     def slow(self) -> bool:
         """True if the rows of any piece lie minutes apart."""
         return any(piece.slow for piece in self.pieces)
+
+    def scope_of(self, effect: str) -> Scope:
+        """Recordings in which a mechanism, or any other addition to the machine, may act; None for all."""
+        if not self.healthy or (self.switched_off and effect not in self.switched_off):
+            return None
+        return frozenset(piece.recording for piece in self.pieces) - self.healthy
 
     @cached_property
     def bounds(self) -> tuple[Array, Array]:
