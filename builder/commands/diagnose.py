@@ -69,7 +69,8 @@ class _OptionsOfMany(click.Command):
 @click.option("--false-alarm-rate", type=click.FloatRange(min=1e-4, max=0.5), default=0.05, show_default=True,
               metavar="P", help="How often recordings that agree may be called inconsistent.")  # fmt: skip
 @click.option("--fleet", is_flag=True,
-              help="RECORDING is a folder with one folder per gearbox; hold* in it is held out, baseline* is a baseline.")  # fmt: skip
+              help="RECORDING is a folder with one folder per gearbox; hold* in it is held out, baseline* is a "
+                   "baseline.")  # fmt: skip
 @worker_options(dask_help="Scheduler of a Dask cluster that the gearboxes of a fleet are spread over.")
 def diagnose(
     recordings: tuple[str, ...],
@@ -154,7 +155,7 @@ def _check_options(recordings: tuple[str, ...], others: tuple[str, ...], dask: s
         )
     if fleet and (len(recordings) != 1 or others):
         raise click.UsageError(
-            "--fleet takes one folder, with a folder per gearbox; what is named hold* in it is held out, baseline* is a baseline"
+            "--fleet takes one folder, with a folder per gearbox; hold* in it is held out, baseline* is a baseline"
         )
 
 

@@ -78,7 +78,7 @@ def make_cases(settings: Settings, recordings: Path, truth: Path, jobs: int, pro
 
 
 def make_zoo_case(name: str, plan: ZooPlan, recordings: Path, truth: Path, baselines: int) -> None:
-    """Draw a case of the zoo and write its recordings, so many baselines among them, and definition into a folder, its truth into a file."""
+    """Draw a case of the zoo and write its recordings, so many baselines too, and its definition; its truth apart."""
     from diagnosis.proof.zoo.conceal_zoo import write_zoo_case
     from diagnosis.proof.zoo.draw import draw_case
 

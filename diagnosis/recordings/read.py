@@ -91,10 +91,11 @@ def read_by_role(
     mapping: Path | None = None,
 ) -> ByRole:
     """Read recordings to learn from, held-out ones and baselines, no two of one name; see :func:`read_recordings`."""
-    train, holdout, baseline = (
-        read_recordings(paths, network, mapping=mapping) for paths in (train, holdout, baseline)
+    return named_apart(
+        read_recordings(train, network, mapping=mapping),
+        read_recordings(holdout, network, mapping=mapping),
+        read_recordings(baseline, network, mapping=mapping),
     )
-    return named_apart(train, holdout, baseline)
 
 
 def named_apart(train: Sequence[Recording], holdout: Sequence[Recording], baseline: Sequence[Recording]) -> ByRole:

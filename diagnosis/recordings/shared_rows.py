@@ -36,8 +36,8 @@ def check_shared_rows(
         shared = _shared(one, other, rows, others)
         if shared and i < judged <= j:
             lines.append(
-                f"{other.path}: is a baseline, but {shared} {one.path}, in which the effect that is looked for may act; "
-                "name a recording, or a part FILE@start..end, from before it"
+                f"{other.path}: is a baseline, but {shared} {one.path}, in which the effect may act; name a "
+                "recording, or a part FILE@start..end, from before it"
             )
         elif shared and i < len(train) <= j < judged:
             lines.append(

@@ -69,7 +69,7 @@ def check_baselines(
         own = _measured([recording])
         if own.isdisjoint(known):
             lines.append(
-                f"{recording.path}: is a baseline, but measures {_listed(own)}, and none of what the recordings measure "
+                f"{recording.path}: is a baseline, but measures {_listed(own)} and nothing that the recordings do "
                 f"({_listed(known)}); is it of another machine, or does its mapping name other nodes?"
             )
     if lines:

@@ -1,4 +1,4 @@
-"""Which recordings ``diagnose`` learns from and which it holds out."""
+"""Which recordings ``diagnose`` learns from, which it holds out, and which are baselines."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ class _ReadError(Exception):
 
 
 @pytest.fixture
-def asked_for(monkeypatch: pytest.MonkeyPatch) -> list[tuple[tuple[str, ...], tuple[str, ...]]]:
-    """What the command would read: (to learn from, held out)."""
-    asked: list[tuple[tuple[str, ...], tuple[str, ...]]] = []
+def asked_for(monkeypatch: pytest.MonkeyPatch) -> list[tuple[tuple[str, ...], ...]]:
+    """What the command would read: (to learn from, held out, baselines)."""
+    asked: list[tuple[tuple[str, ...], ...]] = []
 
-    def read(train: tuple[str, ...], held: tuple[str, ...], *_: object, **__: object) -> None:
-        asked.append((train, held))
+    def read(*given: tuple[str, ...], **_: object) -> None:
+        asked.append(given[:3])
         raise _ReadError
 
-    monkeypatch.setattr(diagnosis.recordings.read, "read_train_and_holdout", read)
+    monkeypatch.setattr(diagnosis.recordings.read, "read_by_role", read)
     return asked
 
 
@@ -45,11 +45,33 @@ def asked_for(monkeypatch: pytest.MonkeyPatch) -> list[tuple[tuple[str, ...], tu
     ],
 )
 def test_all_up_to_the_next_option_is_held_out(
-    words: str, train: tuple[str, ...], held: tuple[str, ...], asked_for: list[tuple[tuple[str, ...], tuple[str, ...]]]
+    words: str, train: tuple[str, ...], held: tuple[str, ...], asked_for: list[tuple[tuple[str, ...], ...]]
 ) -> None:
     done = CliRunner().invoke(diagnose, words.split())
     assert isinstance(done.exception, _ReadError), done.output
-    assert asked_for == [(train, held)]
+    assert asked_for == [(train, held, ())]
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "a --baseline b c --holdout d --jobs 1",
+        "a --baseline b --holdout d --baseline c",
+        "--baseline=b c --holdout d -- a",
+        "a --holdout d --baseline b c --switched-off windage",
+    ],
+)
+def test_baselines_are_named_like_held_out_recordings(words: str, asked_for: list[tuple[tuple[str, ...], ...]]) -> None:
+    done = CliRunner().invoke(diagnose, words.split())
+    assert isinstance(done.exception, _ReadError), done.output
+    assert asked_for == [(("a",), ("d",), ("b", "c"))]
+
+
+@pytest.mark.parametrize("words", ["a --baseline --jobs 1", "a --baseline", "a --fleet --baseline b"])
+def test_baselines_that_are_not_named_or_not_possible(words: str) -> None:
+    done = CliRunner().invoke(diagnose, words.split())
+    assert done.exit_code == 2
+    assert "baseline" in done.output and "Traceback" not in done.output
 
 
 @pytest.mark.parametrize("words", ["a --holdout --jobs 1", "a --holdout", "a --holdout -- b"])
