@@ -23,10 +23,11 @@ WINDAGE_W = 60.0
 
 
 def recorded(
-    fzg: Gearbox, name: str, *, windage_W: float = 0.0, factors: dict[str, float] | None = None, hours: float = 1.5,
+    fzg: Gearbox, name: str, *, windage_W: float = 0.0, drift_K: float = 0.0, factors: dict[str, float] | None = None,
+    hours: float = 1.5,
     seed: int = 0, nodes: tuple[str, ...] = NODES,
 ) -> Recording:  # fmt: skip
-    """The model itself, with noise."""
+    """The model itself, with noise; windage in the oil, and a drift of its thermometer over the whole recording."""
     rng = np.random.default_rng(seed)
     time = np.arange(0.0, 3600.0 * hours, 10.0)
     step = (time // 1200.0).astype(int)
@@ -48,6 +49,7 @@ def recorded(
     driven = columns | {"air_speed_m_s": np.full(len(time), 2.0)}
     made = network.simulate(driven, losses=fzg.losses(), initial=22.0).columns()
     read = {n: made[f"T_{n}_degC"] + 0.1 * rng.standard_normal(len(time)) for n in nodes}
+    read["oil"] = read["oil"] + drift_K * time / time[-1]
     return replace(recording_of(columns, read), name=name, sha256=name)
 
 
@@ -59,8 +61,8 @@ def prepared(fzg: Gearbox) -> tuple[InferenceSetup, Experiment]:
 
 
 @pytest.fixture(scope="module")
-def windage(fzg: Gearbox) -> Hypothesis:
-    placed = CATALOGUE["windage"].placed(fzg.network(), Scale.of(fzg, speed=3300.0, torque=150.0))
+def drift(fzg: Gearbox) -> Hypothesis:
+    placed = CATALOGUE["sensor_drift"].placed(fzg.network(), Scale.of(fzg, speed=3300.0, torque=150.0, duration=5400.0))
     return next(hypothesis_of(p) for p in placed if p.place == "oil")
 
 
@@ -93,19 +95,19 @@ def test_without_held_out_recordings_baselines_are_whole(fzg: Gearbox) -> None:
     assert [piece.recording for piece in setup.holdout.pieces] == ["train"]
 
 
-def test_an_effect_that_acts_in_the_baseline_is_seen_there(fzg: Gearbox, windage: Hypothesis) -> None:
+def test_an_effect_that_acts_in_the_baseline_is_seen_there(fzg: Gearbox, drift: Hypothesis) -> None:
     """With it in the baseline the evidence is large, without it none."""
-    train = recorded(fzg, "train", windage_W=WINDAGE_W)
+    train = recorded(fzg, "train", drift_K=3.0)
     found = {}
-    for watts in (0.0, WINDAGE_W):
-        fit = calibrated(fzg, train, recorded(fzg, "april", windage_W=watts, seed=2))
-        alone = scan_baselines(fit, [windage])
+    for kelvin in (0.0, 3.0):
+        fit = calibrated(fzg, train, recorded(fzg, "april", drift_K=kelvin, seed=2))
+        alone = scan_baselines(fit, [drift])
         assert list(alone.gram.of_recording) == ["april"]
-        found[watts] = float(effects_in_baselines(alone)[0])
-    assert found[0.0] < 2.0 < 5.0 < found[WINDAGE_W]
-    assert not notes_of_baselines(found[0.0], {}, "windage")
-    (note,) = notes_of_baselines(found[WINDAGE_W], {}, "windage")
-    assert "show windage too" in note
+        found[kelvin] = float(effects_in_baselines(alone)[0])
+    assert found[0.0] < 2.0 < 20.0 < found[3.0]
+    assert not notes_of_baselines(found[0.0], {}, "a drift")
+    (note,) = notes_of_baselines(found[3.0], {}, "a drift")
+    assert "show a drift too" in note
 
 
 def test_another_machine_is_told_apart(fzg: Gearbox) -> None:
