@@ -17,7 +17,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -28,10 +28,9 @@ from diagnosis.candidates.hypotheses import parameter_hypotheses
 from diagnosis.candidates.hypotheses import scan as old_scan
 from diagnosis.decision.search import candidates_of
 from diagnosis.engine.candidates import refit_all, scan
-from diagnosis.engine.fit import calibrate
-from diagnosis.engine.point import Column
+from diagnosis.engine.fit import Linearised, calibrate
+from diagnosis.engine.metric import Metric
 from diagnosis.engine.prepare import prepare_experiment
-from diagnosis.engine.slopes import Heat
 from diagnosis.inference.evidence import Marginal
 from diagnosis.recordings.read import read_recordings
 from diagnosis.setup.inference_setup import prepare
@@ -68,17 +67,17 @@ def new(gearbox: str, recordings: Sequence[str], jobs: int) -> dict[str, float]:
     clock.mark("candidates placed")
     rng, parts = np.random.default_rng(0), experiment.machine.model.n
     further = []
-    for piece in experiment.pieces:
-        count = len(piece.steps)
-        columns = []
-        for _ in range(FURTHER):
-            knots = rng.standard_normal((count // LONGEST_KNOT + 1, parts))
-            into = np.repeat(knots, LONGEST_KNOT, axis=0)[:count] * setup.loss_W * 0.01
-            into = np.pad(into, ((0, 0), (0, len(experiment.machine.model.coupled))))
-            columns.append(Column(heat=Heat(into=into, loss=np.zeros(count))))
-        further.append(columns)
+    for part in fit.parts:
+        count = len(part.point.trajectory.piece.steps)
+        knots = rng.standard_normal((count // LONGEST_KNOT + 1, parts, FURTHER))
+        into = np.repeat(knots, LONGEST_KNOT, axis=0)[:count] * setup.loss_W * 0.01
+        further.append(part.filter(part.point.heated(into, np.zeros((count, FURTHER)))))
+    nothing = tuple(np.zeros((len(N), 0)) for N in further)
+    metric = Metric(sessions=(tuple(range(len(further))),), shared=tuple(further), own=nothing)
+    experiment = replace(fit.experiment, metric=metric)
+    fit = replace(fit, experiment=experiment, linearised=Linearised.of(fit.parts, metric))
     clock.mark("-")
-    found = scan(fit, candidates, further)
+    found = scan(fit, candidates)
     clock.mark("columns and Gram matrix")
     given = found.gram.given(found.unknowns).given(found.further)
     singles = found.singles(given)

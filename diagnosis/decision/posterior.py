@@ -25,6 +25,7 @@ Kind = Literal["nothing", "parameter", "measurement", "mechanism", "pair", "outs
 KINDS: tuple[Kind, ...] = get_args(Kind)
 Grade = Literal["claim", "likely"]
 MOST_TIED = 3
+MUCH_LEFT, MUCH_LEFT_SHARE = 20.0, 0.05  # of the evidence, [nat]: beside a name, what shows that its law is another
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,10 +82,10 @@ class Judged:
         if len(self.effects) != 1:
             return "pair" if self.effects else "nothing"
         (effect,) = self.effects
-        if effect.term is None:
-            return "parameter"
         if effect.is_open:
             return "outside"
+        if effect.term is None:
+            return "parameter"
         return "measurement" if effect.term.of_measurement or effect.term.kind == "sensor" else "mechanism"
 
     @property
@@ -147,6 +148,12 @@ class Posterior:
     expected: tuple[Expected, ...] = ()
 
     @property
+    def much_is_left(self) -> bool:
+        """True if the second scan finds much beside the best explanation: its law is not the true one."""
+        gain = self.ranked[0][0].log_bayes
+        return self.remainder > MUCH_LEFT and self.remainder > MUCH_LEFT_SHARE * gain
+
+    @property
     def detected(self) -> bool:
         """True if something is missing."""
         return self.log_e > self.threshold
@@ -201,6 +208,58 @@ class Answer:
     acts_like: bool = False
 
 
-def decide(posterior: Posterior, settings: Settings) -> Sequence[Answer]:
-    """The answers of a posterior: empty if nothing is missing, or if nothing can be named."""
-    raise NotImplementedError
+def decide(posterior: Posterior, settings: Settings) -> tuple[Answer, ...]:
+    """The answers of a posterior: empty if nothing is missing, or if nothing can be named.
+
+    A name counts with all its places and shapes. It is a claim from :attr:`Settings.claim_from` on, unless the second
+    scan finds that much is left beside it, or it is a course over the hours without a cause: then only law and place
+    are found, and it "acts like" that name. Otherwise at most three names that hold the probability together are a tie.
+    """
+    if not posterior.detected:
+        return ()
+    found: list[Answer] = []
+    best = posterior.ranked[0][0]
+    for effect in best.effects:
+        names = _by_name(posterior, beside=tuple(one for one in best.effects if one is not effect))
+        first = next((index for index, one in enumerate(names) if one[0].name == effect.name), None)
+        if first is None:
+            continue
+        names = [names[first], *names[:first], *names[first + 1 :]]
+        held, tied = 0.0, []
+        for one in names[:MOST_TIED]:
+            tied.append(one)
+            held += one[1]
+            if held >= settings.claim_from:
+                break
+        if held < settings.claim_from:
+            continue
+        claimed = len(tied) == 1
+        vague = effect.how == "W" or posterior.much_is_left
+        found.append(Answer(
+            best=best, effect=effect, grade="claim" if claimed and not vague else "likely", probability=tied[0][1],
+            tied=() if claimed else tuple(tied), acts_like=vague,
+        ))  # fmt: skip
+    return tuple(found)
+
+
+def _by_name(posterior: Posterior, beside: Sequence[Hypothesis]) -> list[tuple[Hypothesis, float]]:
+    """Names with their probabilities, each with its most probable place, most probable first.
+
+    Of an effect beside another one, all explanations that hold the other one count.
+    """
+    kept = {one.label for one in beside}
+    total: dict[str, float] = {}
+    shown: dict[str, Hypothesis] = {}
+    whole = 0.0
+    for judged, probability in posterior.ranked:
+        rest = [one for one in judged.effects if one.label not in kept]
+        if kept and len(rest) == len(judged.effects):
+            continue
+        whole += probability
+        for one in rest:
+            shown.setdefault(one.name, one)
+            total[one.name] = total.get(one.name, 0.0) + probability
+    if not kept:
+        whole = 1.0
+    ranked = sorted(total.items(), key=lambda item: -item[1])
+    return [(shown[name], value / max(whole, 1e-300)) for name, value in ranked]

@@ -1,112 +1,106 @@
-"""What the baselines alone say: whether an effect acts in them too, and whether they are of the same machine."""
+"""Tests of the baselines after an inference: an effect that acts in them too, and sessions of another machine."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from diagnosis.candidates.hypotheses import Hypothesis
-from diagnosis.engine.candidates import Scan, scan
-from diagnosis.engine.fit import Fit
-from diagnosis.engine.gram import Gram, Index
-from diagnosis.engine.point import Column
+from diagnosis.engine.candidates import scan
+from diagnosis.engine.fit import Fit, Linearised
+from diagnosis.engine.products import base_of, gram_of
+from diagnosis.engine.sessions import sessions_of
 from models.base.types import Array
 
-LEAST = 5.0  # nats from which it is said
+NOTED_FROM = 5.0  # nats
 
 
-def scan_baselines(fit: Fit, candidates: Sequence[Hypothesis], further: Sequence[Sequence[Column]] = ()) -> Scan:
-    """Linearise the baselines alone, every candidate as if it acted in them.
+def effects_in_baselines(fit: Fit, candidates: Sequence[Hypothesis]) -> Array:
+    """Log Bayes factor of every candidate in the baselines alone, as if it acted there.
 
     Parameters
     ----------
     fit : Fit
-        Of the machine without any of the candidates
+        Machine without any of the candidates; its model error counts
     candidates : sequence of Hypothesis
-    further : sequence, one per piece of the fit, of sequences of Column
-        Such as model error, see :func:`diagnosis.engine.candidates.scan`
+        Terms
 
     Returns
     -------
-    Scan
+    Array, shape (candidates,)
+        Mean over the variants, against a baseline without it, [nat]
     """
+    alone = _baselines_of(fit)
+    return scan(alone, candidates).log_bayes
+
+
+def sessions_apart(fit: Fit) -> dict[str, float]:
+    """Log Bayes factor for every session of baselines on another machine, against the machine of all other recordings.
+
+    Parameters
+    ----------
+    fit : Fit
+        Best explanation, its effects included: what acts in the recordings alone makes no baseline another machine
+
+    Returns
+    -------
+    dict of session to float
+        [nat]
+    """
+    experiment, gram = fit.experiment, gram_of(fit.parts, base_of(fit))
+    every, found = range(gram.count), {}
+    for name in dict.fromkeys(experiment.session_of.get(r, "") for r in sorted(experiment.healthy)):
+        mine = {r for r in gram.of_recording if experiment.session_of.get(r, "") == name}
+        others = set(gram.of_recording) - mine
+        if mine and others:
+            alone = sum(gram.given(every, recordings=some).log_evidence for some in (mine, others))
+            found[name] = alone - gram.given(every).log_evidence
+    return found
+
+
+def notes_of_baselines(acting: float, apart: Mapping[str, float], effect: str = "") -> tuple[str, ...]:
+    """Notes for a report on baselines that are not as they should be.
+
+    Parameters
+    ----------
+    acting : float
+        Evidence in the baselines for the effect that is reported, see :func:`effects_in_baselines`, [nat]
+    apart : mapping of session to float
+        See :func:`sessions_apart`, [nat]
+    effect : str
+        Its name for people
+    """
+    notes = []
+    if effect and acting > NOTED_FROM:
+        notes.append(
+            f"The baselines show {effect} too (evidence {acting:.0f} nats): the reported size is only its growth since "
+            "then. Take baselines from before it began, or leave them out."
+        )
+    notes += [
+        f"Session '{session}' looks like another machine, or one that was rebuilt (evidence {nats:.0f} nats): its "
+        "parameters are not those of the other recordings. Leave it out if that is so."
+        for session, nats in apart.items() if nats > NOTED_FROM
+    ]  # fmt: skip
+    return tuple(notes)
+
+
+def _baselines_of(fit: Fit) -> Fit:
+    """Part of a fit that is about the baselines, in which everything may act."""
     experiment = fit.experiment
     at = [i for i, piece in enumerate(experiment.pieces) if piece.recording in experiment.healthy]
     alone = replace(
         experiment,
+        healthy=frozenset(),
         pieces=tuple(experiment.pieces[i] for i in at),
         noise=tuple(experiment.noise[i] for i in at),
         starts=tuple(experiment.starts[i] for i in at),
         filters=None if experiment.filters is None else tuple(experiment.filters[i] for i in at),
     )
-    parts = tuple(fit.parts[i] for i in at)
-    return scan(Fit(experiment=alone, z=fit.z, parts=parts), candidates, [further[i] for i in at] if further else ())
-
-
-def effects_in_baselines(found: Scan, amplitudes: Array | float = 1.0) -> Array:
-    """Log Bayes factor of every candidate in the baselines, against a baseline without it.
-
-    Parameters
-    ----------
-    found : Scan
-        Of :func:`scan_baselines`
-    amplitudes : Array, shape (further columns,), or float
-        Prior standard deviations of the further columns
-
-    Returns
-    -------
-    Array, shape (candidates,)
-        [nat]
-    """
-    given = found.gram.given(found.unknowns).given(found.further, amplitudes)
-    return found.singles(given).log_bayes
-
-
-def machine_apart(gram: Gram, unknowns: Index, amplitudes: Array | float, session: Sequence[str]) -> float:
-    """Log Bayes factor for a session on a machine of its own, against the machine of all other recordings.
-
-    Parameters
-    ----------
-    gram : Gram
-        Of all recordings
-    unknowns : sequence of int
-        Of machine, sensors, model error, and effects that were found, whose columns are 0 in the baselines
-    amplitudes : Array, shape (unknowns,), or float
-        Prior standard deviations
-    session : sequence of str
-        Its recordings
-
-    Returns
-    -------
-    float
-        [nat]
-    """
-    others = set(gram.of_recording) - set(session)
-    alone = sum(gram.given(unknowns, amplitudes, some).log_evidence for some in (others, set(session)))
-    return alone - gram.given(unknowns, amplitudes).log_evidence
-
-
-def notes_of_baselines(acting: float, apart: dict[str, float], effect: str = "") -> tuple[str, ...]:
-    """What a report says about baselines that are not what they should be.
-
-    Parameters
-    ----------
-    acting : float
-        Of the effect that is reported, see :func:`effects_in_baselines`, [nat]
-    apart : dict of session to float
-        See :func:`machine_apart`, [nat]
-    effect : str
-        What is reported, as people call it
-    """
-    notes = []
-    if effect and acting > LEAST:
-        notes.append(
-            f"The baselines show {effect} too (evidence {acting:.0f} nats): what is reported is then only what it has "
-            "grown by. Take baselines from before it began, or leave them out."
-        )
-    notes += [
-        f"Session {session} looks like another machine, or one that was rebuilt (evidence {nats:.0f} nats): its "
-        "parameters are not those of the other recordings. Leave it out if that is so."
-        for session, nats in apart.items() if nats > LEAST
-    ]  # fmt: skip
-    return tuple(notes)
+    metric = experiment.metric
+    if metric is not None:
+        alone = replace(alone, metric=replace(
+            metric, sessions=sessions_of(alone), shared=tuple(metric.shared[i] for i in at),
+            own=tuple(metric.own[i] for i in at),
+        ))  # fmt: skip
+    parts = [fit.parts[i] for i in at]
+    return Fit(experiment=alone, z=fit.z, linearised=Linearised.of(parts, alone.metric))

@@ -10,12 +10,13 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import solve_triangular
 
 from diagnosis.candidates.hypotheses import Hypothesis, chunks
-from diagnosis.engine.fit import Experiment, Fit, Linear
-from diagnosis.engine.gram import Given, Gram, Strengths
-from diagnosis.engine.point import AT_ONCE, Column, Machine, Point
+from diagnosis.engine.fit import Experiment, Fit, Linear, Linearised
+from diagnosis.engine.gram import Given, Gram, Strengths, strengths
+from diagnosis.engine.metric import Metric
+from diagnosis.engine.point import AT_ONCE, Machine, Point
+from diagnosis.engine.products import base_of, gram_of
 from diagnosis.engine.unknown import Group, NetworkParameter, TermParameter, Unknown
 from diagnosis.forward.network_on_grid import NetworkOnGrid
 from diagnosis.forward.observation import readings
@@ -23,6 +24,7 @@ from diagnosis.forward.term_on_grid import TermOnGrid
 from models.base.errors import InputError
 from models.base.parallel import run_parallel
 from models.base.types import Array
+from models.quantities.quantities import is_total_loss
 from models.terms.term import Term
 
 START_SHARES = (1.0, 0.3, 0.03)  # of the strength that the scan promises
@@ -48,6 +50,8 @@ class Scan:
         Their places among the labels of the Gram matrix
     sd, sign : Array, shape (candidates,)
         Prior of the strengths
+    peak_K : Array, shape (candidates,)
+        Largest change of a temperature per unit of strength
     """
 
     candidates: tuple[Hypothesis, ...]
@@ -59,6 +63,7 @@ class Scan:
     of_candidates: range
     sd: Array
     sign: NDArray[np.int_]
+    peak_K: Array
 
     def singles(self, given: Given) -> Strengths:
         """Every candidate alone, in its best shape; the sign of a clock fault is that of its variant."""
@@ -75,16 +80,15 @@ class Scan:
         return i, j, log_bayes
 
 
-def scan(fit: Fit, candidates: Sequence[Hypothesis], further: Sequence[Sequence[Column]] = ()) -> Scan:
+def scan(fit: Fit, candidates: Sequence[Hypothesis]) -> Scan:
     """Linearise everything at a fit.
 
     Parameters
     ----------
     fit : Fit
+        Model error in its metric becomes columns of the Gram matrix
     candidates : sequence of Hypothesis
         Terms; parameters out of their priors follow from the unknowns themselves
-    further : sequence, one per piece, of sequences of Column
-        Further unknowns such as model error, per unit
 
     Returns
     -------
@@ -92,86 +96,70 @@ def scan(fit: Fit, candidates: Sequence[Hypothesis], further: Sequence[Sequence[
     """
     count, model = len(fit.z), fit.experiment.machine.model
     placed = [(c, _on_grid(model, c.term)) for c in candidates if c.term is not None]
-    candidates, strengths = [c for c, _ in placed], [on_grid.term.strength for _, on_grid in placed]
-    base = _whitened_base(fit, further)
+    candidates, priors = [c for c, _ in placed], [on_grid.term.strength for _, on_grid in placed]
+    base = base_of(fit)
     known = range(count)
     chosen = [np.empty((len(W), len(candidates)), order="F") for W in base]
     best: list[int] = []
-    mean, signs = [], []
-    weigh = _Marginal(fit, base)
+    mean, signs, peak = [], [], []
+    warm = [not is_total_loss(name) for name in fit.parts[0].point.sensors.channels]
+    everything, residuals = _with_unknowns(fit), [W[:, 0] for W in base]
     intervals = max(len(part.point.trajectory.T) for part in fit.parts)
     for chunk in chunks(candidates, max(16, min(AT_ONCE, VALUES_AT_ONCE // intervals))):
         some = placed[len(best) : len(best) + len(chunk)]
-        blocks = [part.filter(_columns(part, some)) for part in fit.parts]
-        products, first = weigh.products(blocks), 0
+        raw = [_acting_columns(fit.experiment, part, some) for part in fit.parts]
+        peaks = np.max([np.abs(X[:, warm]).max(axis=(0, 1)) for X in raw], axis=0)
+        blocks = [part.filter(X) for part, X in zip(fit.parts, raw, strict=True)]
+        (a, b), first = everything.against(residuals, blocks), 0
         for c, on_grid in some:
             n = len(c.variants)
             way = np.sign(c.variants[:, 0]).astype(int)
             sign = way if len(set(way.tolist())) > 1 else np.full(n, c.sign)
-            found = products.singles(np.arange(first, first + n), on_grid.term.strength.sd, sign)
+            mine = slice(first, first + n)
+            found = strengths(a[mine], b[mine], on_grid.term.strength.sd, sign)
             at = int(np.argmax(found.log_bayes))
             for kept, block in zip(chosen, blocks, strict=True):
                 kept[:, len(best)] = block[:, first + at]
             best.append(at)
+            peak.append(float(peaks[first + at]))
             mean.append(float(np.logaddexp.reduce(found.log_bayes) - np.log(n)))
             signs.append(int(sign[at]))
             first += n
     extra = base[0].shape[1] - 1 - count
     return Scan(
         candidates=tuple(candidates), best=tuple(best), log_bayes=np.array(mean),
-        gram=_gram_of(fit, base, chosen, [c.label for c in candidates]), unknowns=known,
+        gram=gram_of(fit.parts, base, chosen), unknowns=known,
         further=range(count, count + extra), of_candidates=range(count + extra, count + extra + len(candidates)),
-        sd=np.array([strength.sd for strength in strengths]), sign=np.array(signs, dtype=int),
+        sd=np.array([strength.sd for strength in priors]), sign=np.array(signs, dtype=int), peak_K=np.array(peak),
     )  # fmt: skip
 
 
-class _Marginal:
-    """Products of columns with the residual, and of themselves, with the unknowns of a fit marginalised."""
-
-    def __init__(self, fit: Fit, base: Sequence[Array]) -> None:
-        self._J, self._root = [part.columns for part in fit.parts], fit.root
-        along = np.sum([J.T @ W[:, 0] for J, W in zip(self._J, base, strict=True)], axis=0)
-        at = solve_triangular(self._root.T, solve_triangular(self._root, along, lower=True))
-        self._rest = [W[:, 0] - J @ at for J, W in zip(self._J, base, strict=True)]
-
-    def products(self, blocks: Sequence[Array]) -> Given:
-        """Of whitened columns of every piece, shape (M, n) each; only row and column 0 and the diagonal are filled."""
-        along = np.sum([J.T @ X for J, X in zip(self._J, blocks, strict=True)], axis=0)
-        along = solve_triangular(self._root, along, lower=True)
-        a = np.sum([X.T @ rest for X, rest in zip(blocks, self._rest, strict=True)], axis=0)
-        b = np.sum([np.einsum("mn,mn->n", X, X) for X in blocks], axis=0) - np.einsum("un,un->n", along, along)
-        matrix = np.zeros((1 + len(a), 1 + len(a)))
-        matrix[0, 1:], matrix[range(1, 1 + len(a)), range(1, 1 + len(a))] = a, b
-        return Given(matrix=matrix, log_determinant=0.0)
+def _with_unknowns(fit: Fit) -> Metric:
+    """The metric of a fit, with its unknowns marginalised as well."""
+    metric, columns = fit.experiment.metric, [part.columns for part in fit.parts]
+    if metric is None:
+        nothing = tuple(np.zeros((len(J), 0)) for J in columns)
+        return Metric(sessions=(tuple(range(len(columns))),), shared=tuple(columns), own=nothing)
+    return replace(metric, shared=tuple(np.column_stack(both) for both in zip(columns, metric.shared, strict=True)))
 
 
-def _whitened_base(fit: Fit, further: Sequence[Sequence[Column]]) -> list[Array]:
-    """Residual at the priors' middles, unknowns and further columns of every piece, whitened, shape (M, n)."""
-    result = []
-    for index, part in enumerate(fit.parts):
-        more, count = further[index] if further else [], len(fit.z)
-        W = np.empty((len(part.residual), 1 + count + len(more)))
-        W[:, 0], W[:, 1 : 1 + count] = part.residual + part.columns @ fit.z, part.columns
-        for first in range(0, len(more), AT_ONCE):
-            some = more[first : first + AT_ONCE]
-            W[:, 1 + count + first : 1 + count + first + len(some)] = part.filter(part.point.responses(some))
-        result.append(W)
+def _acting_columns(
+    experiment: Experiment, part: Linear, some: Sequence[tuple[Hypothesis, TermOnGrid]]
+) -> Array:  # fmt: skip
+    """Readings per unit of strength for all variants of some candidates; 0 of one that cannot act in the recording."""
+    recording, first = part.point.trajectory.piece.recording, 0
+    acting: list[tuple[Hypothesis, TermOnGrid]] = []
+    at: list[int] = []
+    for candidate, on_grid in some:
+        scope, last = experiment.scope_of(candidate.name), first + len(candidate.variants)
+        if scope is None or recording in scope:
+            acting.append((candidate, on_grid))
+            at += range(first, last)
+        first = last
+    result = np.zeros((*part.point.read.shape, first))
+    if acting:
+        result[:, :, at] = _columns(part, acting)
     return result
-
-
-def _gram_of(fit: Fit, base: Sequence[Array], chosen: Sequence[Array], names: Sequence[str]) -> Gram:
-    """Gram matrices by recording."""
-    of_recording: dict[str, Array] = {}
-    determinants: dict[str, float] = {}
-    for part, W, X in zip(fit.parts, base, chosen, strict=True):
-        name = part.point.trajectory.piece.recording
-        across = W.T @ X
-        of_recording[name] = of_recording.get(name, 0.0) + np.block([[W.T @ W, across], [across.T, X.T @ X]])
-        determinants[name] = determinants.get(name, 0.0) + part.filter.log_determinant
-    known = [unknown.parameter.name for unknown in fit.experiment.unknowns]
-    extra = base[0].shape[1] - 1 - len(known)
-    labels = (*known, *(f"further_{i}" for i in range(extra)), *names)
-    return Gram(labels=labels, of_recording=of_recording, log_determinants=determinants)
 
 
 def _columns(part: Linear, some: Sequence[tuple[Hypothesis, TermOnGrid]]) -> Array:
@@ -229,16 +217,17 @@ def with_candidate(fit: Fit, candidate: Hypothesis, variant: int) -> tuple[Exper
     """
     experiment, term = fit.experiment, candidate.term
     assert term is not None  # noqa: S101 - parameters out of their priors have no term
-    machine = experiment.machine
+    machine, scope = experiment.machine, experiment.scope_of(candidate.name)
     names = tuple(p.name for p in term.parameters)
     added: list[Unknown]
     if term.kind in ("sensor", "signal"):
         machine = Machine(machine.model, (*machine.terms, term))
-        added = [TermParameter(parameter=p, group=CANDIDATE, label=term.label, names=names) for p in term.parameters]
+        added = [TermParameter(parameter=p, group=CANDIDATE, scope=scope, label=term.label, names=names)
+                 for p in term.parameters]  # fmt: skip
     else:
         network = term.apply(machine.model.network)
         machine = Machine(NetworkOnGrid(network, machine.model.losses), machine.terms)
-        added = [NetworkParameter(parameter=p, group=CANDIDATE) for p in term.parameters]
+        added = [NetworkParameter(parameter=p, group=CANDIDATE, scope=scope) for p in term.parameters]
     z = [unknown.z_of(value) for unknown, value in zip(added, candidate.variants[variant].tolist(), strict=True)]
     return replace(experiment, machine=machine, unknowns=(*experiment.unknowns, *added)), np.array(z)
 
@@ -258,8 +247,10 @@ def refit(fit: Fit, candidate: Hypothesis, variant: int, strength: float, *, ite
     one = replace(candidate, variants=candidate.variants[[variant]])
     assert candidate.term is not None  # noqa: S101 - parameters out of their priors have no term
     on_grid = _on_grid(fit.experiment.machine.model, candidate.term)
-    along = sum(part.columns.T @ part.filter(_columns(part, [(one, on_grid)]))[:, 0] for part in fit.parts)
-    aside = -fit.covariance @ along  # of the other unknowns, per unit of strength
+    column = [part.filter(_acting_columns(fit.experiment, part, [(one, on_grid)])) for part in fit.parts]
+    both = Linearised.of([replace(part, residual=x[:, 0]) for part, x in zip(fit.parts, column, strict=True)],
+                         fit.experiment.metric)  # fmt: skip
+    aside = -fit.covariance @ both.products[1:, 0]  # of the other unknowns, per unit of strength
     guesses = [part.point.trajectory for part in fit.parts]
     experiment, own = with_candidate(fit, candidate, variant)
     lower, upper = experiment.bounds

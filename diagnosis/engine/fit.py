@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from scipy.linalg import solve_triangular
 
+from diagnosis.engine.metric import Metric
 from diagnosis.engine.point import Column, Machine, Point, Setting
 from diagnosis.engine.unknown import Scope, Unknown, in_scope
 from diagnosis.forward.grid import Piece
@@ -51,6 +52,8 @@ class Experiment:
         Recordings in which the effect that is looked for cannot act
     switched_off : frozenset of str
         Names of the only effects that cannot act in them; empty: none can
+    metric : Metric or None
+        In which residuals are judged, if there is more than noise; of whitened readings under `filters`
     """
 
     machine: Machine
@@ -63,6 +66,7 @@ class Experiment:
     session_of: Mapping[str, str] = field(default_factory=dict)
     healthy: frozenset[str] = frozenset()
     switched_off: frozenset[str] = frozenset()
+    metric: Metric | None = None
 
     @property
     def slow(self) -> bool:
@@ -156,42 +160,53 @@ class Experiment:
         """
         lower, upper = self.bounds
         z = np.zeros(len(self.unknowns)) if z is None else np.clip(z, lower, upper)
-        parts = self._attempt(z, guesses)
-        if parts is None:
-            raise ArithmeticError("the simulation has no solution where the fit should start")
+        at = self.linearise(z, guesses)
         if self.filters is None:  # those of the start serve on the way, those of the end afterwards
-            first = self.with_filters(parts).fit(z, [part.point.trajectory for part in parts], iterations=iterations)
-            final = self._attempt(first.z, [part.point.trajectory for part in first.parts])
-            return Fit(experiment=self, z=first.z, parts=first.parts if final is None else tuple(final))
-        objective, damping, settled, fresh = _objective(parts, z), 0.0, False, True
+            first = self.with_filters(at.parts).fit(z, _courses(at.parts), iterations=iterations)
+            final = self._attempt(first.z, _courses(first.parts))
+            return Fit(experiment=self, z=first.z, linearised=first.linearised if final is None else final)
+        objective, damping, settled, fresh = at.objective(z), 0.0, False, True
         for _ in range(iterations * (SLOW_PATIENCE if self.slow else 1)):
-            step = _step(parts, z, damping, lower, upper)
+            step = at.step(z, damping, lower, upper)
             longest = float(np.max(np.abs(step), initial=0.0))
             step *= min(1.0, FARTHEST_STEP / max(longest, 1e-12))
             tried = np.clip(z + step, lower, upper)
             keep = fresh and longest < NEAR
-            trial = self._attempt(tried, [part.point.trajectory for part in parts], parts if keep else None)
-            reached = np.inf if trial is None else _objective(trial, tried)
+            trial = self._attempt(tried, _courses(at.parts), at.parts if keep else None)
+            reached = np.inf if trial is None else trial.objective(tried)
             if trial is not None and reached <= objective + 1e-6:
-                gained, z, parts, objective = objective - reached, tried, trial, reached
+                gained, z, at, objective = objective - reached, tried, trial, reached
                 damping, settled, fresh = 0.2 * damping, False, not keep
                 if float(np.max(np.abs(step), initial=0.0)) < SETTLED or gained < LEAST_GAIN:
                     break
             elif not fresh:
-                parts, fresh = self._attempt(z, [part.point.trajectory for part in parts]) or parts, True
-                objective = _objective(parts, z)
+                at, fresh = self._attempt(z, _courses(at.parts)) or at, True
+                objective = at.objective(z)
             else:
                 # The trajectory may not have settled at these values yet, and look better than it is. Where switches
                 # follow means over minutes it never settles to the last.
-                again = None if settled or self.slow else self._attempt(z, [part.point.trajectory for part in parts])
+                again = None if settled or self.slow else self._attempt(z, _courses(at.parts))
                 if again is not None:
-                    parts, objective = again, _objective(again, z)
+                    at, objective = again, again.objective(z)
                 settled, damping = True, max(4.0 * damping, 1.0)
                 if damping > 1e3:
                     break
         if not fresh:
-            parts = self._attempt(z, [part.point.trajectory for part in parts]) or parts
-        return Fit(experiment=self, z=z, parts=tuple(parts))
+            at = self._attempt(z, _courses(at.parts)) or at
+        return Fit(experiment=self, z=z, linearised=at)
+
+    def linearise(self, z: Array, guesses: Sequence[Guess] | None = None) -> Linearised:
+        """Simulate all pieces and whiten residuals and columns.
+
+        Raises
+        ------
+        ArithmeticError
+            If the simulation has no solution.
+        """
+        at = self._attempt(z, guesses)
+        if at is None:
+            raise ArithmeticError("the simulation has no solution where the fit should start")
+        return at
 
     def with_filters(self, parts: Sequence[Linear]) -> Experiment:
         """Experiment that is judged by the noise filters of a linearisation."""
@@ -199,13 +214,14 @@ class Experiment:
 
     def _attempt(
         self, z: Array, guesses: Sequence[Guess] | None, kept: Sequence[Linear] | None = None
-    ) -> list[Linear] | None:
+    ) -> Linearised | None:
         try:
             if guesses is None:
-                return [self.linearised(i, z, None, rounds=ROUNDS) for i in range(len(self.pieces))]
-            # Trajectory and unknowns settle together: one round per iteration.
-            return [self.linearised(i, z, guess, kept=None if kept is None else kept[i])
-                    for i, guess in enumerate(guesses)]  # fmt: skip
+                parts = [self.linearised(i, z, None, rounds=ROUNDS) for i in range(len(self.pieces))]
+            else:  # trajectory and unknowns settle together: one round per iteration
+                parts = [self.linearised(i, z, guess, kept=None if kept is None else kept[i])
+                         for i, guess in enumerate(guesses)]  # fmt: skip
+            return Linearised.of(parts, self.metric)
         except (InputError, ArithmeticError, np.linalg.LinAlgError):
             return None
 
@@ -229,6 +245,41 @@ class Linear:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class Linearised:
+    """All pieces linearised at one point.
+
+    Attributes
+    ----------
+    parts : tuple of Linear
+    products : Array, shape (1 + unknowns, 1 + unknowns)
+        Inner products of residual and columns in the metric of the experiment
+    """
+
+    parts: tuple[Linear, ...]
+    products: Array
+
+    @classmethod
+    def of(cls, parts: Sequence[Linear], metric: Metric | None) -> Linearised:
+        """Inner products of linearised pieces."""
+        columns = [np.column_stack([part.residual, part.columns]) for part in parts]
+        products = np.sum([X.T @ X for X in columns], axis=0) if metric is None else metric.products(columns)
+        return cls(parts=tuple(parts), products=products)
+
+    def objective(self, z: Array) -> float:
+        """Squared residuals and priors."""
+        return float(self.products[0, 0] + z @ z)
+
+    def step(self, z: Array, damping: float, lower: Array, upper: Array) -> Array:
+        """The step to the minimum of the linearised objective; what it pushes out of its bounds stays where it is."""
+        normal, right = self.products[1:, 1:] + np.eye(len(z)), self.products[1:, 0] - z
+        normal += damping * np.diag(np.diag(normal))
+        free = ~((z <= lower) & (right < 0.0)) & ~((z >= upper) & (right > 0.0))
+        step = np.zeros(len(z))
+        step[free] = np.linalg.solve(normal[np.ix_(free, free)], right[free])
+        return step
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Fit:
     """The most probable values of the unknowns of an experiment.
 
@@ -236,17 +287,22 @@ class Fit:
     ----------
     experiment : Experiment
     z : Array, shape (unknowns,)
-    parts : tuple of Linear
+    linearised : Linearised
     """
 
     experiment: Experiment
     z: Array
-    parts: tuple[Linear, ...]
+    linearised: Linearised
+
+    @property
+    def parts(self) -> tuple[Linear, ...]:
+        """Every piece, linearised and whitened."""
+        return self.linearised.parts
 
     @property
     def objective(self) -> float:
-        """Squared whitened residuals and priors."""
-        return _objective(self.parts, self.z)
+        """Squared residuals and priors."""
+        return self.linearised.objective(self.z)
 
     @cached_property
     def covariance(self) -> Array:
@@ -256,38 +312,24 @@ class Fit:
 
     @cached_property
     def log_evidence(self) -> float:
-        """Laplace approximation, determinants of the noise filters included, up to ``-M/2 ln 2 pi``."""
-        filters = sum(part.filter.log_determinant for part in self.parts)
-        return -0.5 * (self.objective + filters) - float(np.log(np.diag(self.root)).sum())
+        """Laplace approximation, determinants of noise and metric included, up to ``-M/2 ln 2 pi``."""
+        determinants = sum(part.filter.log_determinant for part in self.parts)
+        if self.experiment.metric is not None:
+            determinants += self.experiment.metric.log_determinant
+        return -0.5 * (self.objective + determinants) - float(np.log(np.diag(self.root)).sum())
 
     @cached_property
     def root(self) -> Array:
-        """Lower Cholesky factor of the curvature ``1 + J^T J`` in whitened units, shape (unknowns, unknowns)."""
-        normal = np.eye(len(self.z))
-        for part in self.parts:
-            normal += part.columns.T @ part.columns
-        return np.asarray(np.linalg.cholesky(normal))
+        """Lower Cholesky factor of the curvature of half the objective, shape (unknowns, unknowns)."""
+        return np.asarray(np.linalg.cholesky(np.eye(len(self.z)) + self.linearised.products[1:, 1:]))
 
 
 def calibrate(experiment: Experiment) -> Fit:
     """The unknowns of the nominal machine: a first fit chooses the noise filters, a second one is judged by them."""
     first = experiment.fit(iterations=FIRST_ITERATIONS)
-    return experiment.with_filters(first.parts).fit(first.z, [part.point.trajectory for part in first.parts])
+    return experiment.with_filters(first.parts).fit(first.z, _courses(first.parts))
 
 
-def _objective(parts: Sequence[Linear], z: Array) -> float:
-    """Squared whitened residuals and priors."""
-    return float(sum(part.residual @ part.residual for part in parts) + z @ z)
-
-
-def _step(parts: Sequence[Linear], z: Array, damping: float, lower: Array, upper: Array) -> Array:
-    """The step to the minimum of the linearised objective; what it pushes out of its bounds stays where it is."""
-    normal, right = np.eye(len(z)), -np.array(z)
-    for part in parts:
-        normal += part.columns.T @ part.columns
-        right += part.columns.T @ part.residual
-    normal += damping * np.diag(np.diag(normal))
-    free = ~((z <= lower) & (right < 0.0)) & ~((z >= upper) & (right > 0.0))
-    step = np.zeros(len(z))
-    step[free] = np.linalg.solve(normal[np.ix_(free, free)], right[free])
-    return step
+def _courses(parts: Sequence[Linear]) -> list[Trajectory]:
+    """Trajectories to linearise about."""
+    return [part.point.trajectory for part in parts]

@@ -37,16 +37,19 @@ class Gram:
 
     Attributes
     ----------
-    labels : tuple of str
-        Names of the columns after the first, which is the residual at the priors' middles
-    of_recording : mapping of str to Array, shape (columns, columns)
+    of_recording : mapping of str to Array, shape (1 + columns, 1 + columns)
+        The first is the residual at the priors' middles
     log_determinants : mapping of str to float
         Of the noise of every recording
     """
 
-    labels: tuple[str, ...]
     of_recording: Mapping[str, Array]
     log_determinants: Mapping[str, float]
+
+    @property
+    def count(self) -> int:
+        """How many columns there are."""
+        return len(next(iter(self.of_recording.values()))) - 1
 
     def given(
         self, unknowns: Index, amplitudes: Array | float = 1.0, recordings: Collection[str] | None = None
@@ -56,7 +59,7 @@ class Gram:
         Parameters
         ----------
         unknowns : sequence of int
-            Places of the unknowns among :attr:`labels`
+            Places of the unknowns among the columns
         amplitudes : Array, shape (unknowns,), or float
             Prior standard deviations
         recordings : collection of str, optional
@@ -132,20 +135,14 @@ class Given:
         Parameters
         ----------
         candidates : sequence of int
-            Places among the labels
+            Places among the columns
         sd : Array, shape (n,), or float
             Prior of the strengths
         sign : Array of int, shape (n,), or int
             Which strengths are possible: -1, 1, or 0 for both
         """
         at = np.asarray(candidates, dtype=int) + 1
-        a, b = self.matrix[0, at], np.maximum(self.matrix[at, at], 0.0)
-        sd, sign = np.broadcast_to(np.asarray(sd, float), at.shape), np.broadcast_to(np.asarray(sign), at.shape)
-        precision = b + 1.0 / np.square(sd)
-        value, own = a / precision, 1.0 / np.sqrt(precision)
-        log_bayes = 0.5 * a * value - 0.5 * np.log1p(b * np.square(sd))
-        log_bayes = log_bayes + np.where(sign != 0, np.log(2.0) + log_ndtr(sign * value / own), 0.0)
-        return Strengths(log_bayes=np.where(b > LEAST, log_bayes, 0.0), value=value, sd=own)
+        return strengths(self.matrix[0, at], self.matrix[at, at], sd, sign)
 
     def pairs(self, first: Index, second: Index, sd: tuple[Array, Array], sign: tuple[Signs, Signs]) -> Array:
         """Log Bayes factors of pairs of candidates against nothing.
@@ -153,7 +150,7 @@ class Given:
         Parameters
         ----------
         first, second : sequence of int
-            Places of the members of n pairs among the labels
+            Places of the members of n pairs among the columns
         sd, sign : tuple of two Array, shape (n,)
             Of either member, see :meth:`singles`
 
@@ -174,6 +171,25 @@ class Given:
         inside = np.where(u == 0, log_ndtr(right) + np.log(2.0), log_ndtr(left) + np.log(2.0))
         both = np.log(np.maximum(_both_below(left, right, u * v * rho), 1e-300)) + np.log(4.0)
         return np.asarray(log_bayes + np.where((u == 0) & (v == 0), 0.0, np.where((u != 0) & (v != 0), both, inside)))
+
+
+def strengths(a: Array, b: Array, sd: Array | float, sign: Signs | int = 0) -> Strengths:
+    """Evidence and size of columns, each alone.
+
+    Parameters
+    ----------
+    a, b : Array, shape (n,)
+        Inner products with the residual, and with itself
+    sd, sign
+        See :meth:`Given.singles`
+    """
+    b = np.maximum(b, 0.0)
+    sd, sign = np.broadcast_to(np.asarray(sd, float), a.shape), np.broadcast_to(np.asarray(sign), a.shape)
+    precision = b + 1.0 / np.square(sd)
+    value, own = a / precision, 1.0 / np.sqrt(precision)
+    log_bayes = 0.5 * a * value - 0.5 * np.log1p(b * np.square(sd))
+    log_bayes = log_bayes + np.where(sign != 0, np.log(2.0) + log_ndtr(sign * value / own), 0.0)
+    return Strengths(log_bayes=np.where(b > LEAST, log_bayes, 0.0), value=value, sd=own)
 
 
 def _both_below(h: Array, k: Array, rho: Array) -> Array:

@@ -35,7 +35,7 @@ from diagnosis.inference.unknowns import (
     TORQUE_GAIN_SD,
 )
 from diagnosis.recordings.recording import Recording
-from diagnosis.setup.baselines import sessions_of
+from diagnosis.setup.baselines import session_by_recording
 from diagnosis.setup.inference_setup import CAPACITY_SD, InferenceSetup, prepare
 from diagnosis.setup.shaft import torque_gain
 from models.assembly.gearbox import Gearbox
@@ -92,7 +92,7 @@ def prepare_experiment(
         unknowns=tuple(unknowns),
         noise=noise,
         starts=tuple(old.starts),
-        session_of=sessions_of(recordings, holdout, baseline),
+        session_of=session_by_recording(recordings, holdout, baseline),
         healthy=frozenset(r.name for r in baseline),
         switched_off=frozenset(switched_off),
     )

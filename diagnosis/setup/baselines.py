@@ -11,7 +11,7 @@ from models.base.errors import InputError, did_you_mean
 from models.quantities.quantities import is_total_loss
 
 
-def sessions_of(
+def session_by_recording(
     train: Sequence[Recording], holdout: Sequence[Recording] = (), baseline: Sequence[Recording] = ()
 ) -> dict[str, str]:
     """Test session of every recording.
@@ -42,7 +42,7 @@ def check_baselines(
     *,
     catalogue: Collection[str] = (),
 ) -> None:
-    """Refuse baselines that tell nothing about the machine of the recordings.
+    """Refuse baselines that show nothing of the machine of the recordings.
 
     Parameters
     ----------
@@ -61,8 +61,8 @@ def check_baselines(
              if n not in catalogue]  # fmt: skip
     if switched_off and not baseline:
         lines.append(
-            f"--switched-off {' '.join(switched_off)}: says what is off in the baselines, but there is none; name the "
-            "recordings in which it is off with --baseline"
+            f"--switched-off {' '.join(switched_off)}: is about baselines, but there are none; name the recordings in "
+            "which it is off with --baseline"
         )
     known = _measured(train)
     for recording in baseline:

@@ -200,10 +200,12 @@ def _as_felt(fault: Fault, plant: ZooPlant) -> Change:
     elif fault.kind == "input_gain":
         law = lambda m: a * course.share(m.hours) * m.inputs[name]  # noqa: E731
     else:
-        mix = next(probe.mix for probe in plant.probes if probe.channel == fault.near)
+        probe = next(probe for probe in plant.probes if probe.channel == fault.near)
+        bodies = {body.name for body in plant.bodies}
+        mix = {name: weight for name, weight in probe.mix.items() if name in bodies}  # laws know no boundary
 
         def law(m):  # type: ignore[no-untyped-def]
-            near = sum(weight * m.T[body] for body, weight in mix.items())
+            near = sum(weight * m.T[body] for body, weight in mix.items()) / sum(mix.values())
             return a * course.share(m.hours) * (near - m.inputs[name])
 
     return Change(kind="input", target=name, law=law)

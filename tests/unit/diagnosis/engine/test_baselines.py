@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from diagnosis.candidates.hypotheses import Hypothesis, hypothesis_of
-from diagnosis.engine.baselines import effects_in_baselines, machine_apart, notes_of_baselines, scan_baselines
-from diagnosis.engine.candidates import scan
+from diagnosis.engine.baselines import effects_in_baselines, notes_of_baselines, sessions_apart
+from diagnosis.engine.candidates import refit, scan
 from diagnosis.engine.fit import Experiment, Fit, calibrate
 from diagnosis.engine.prepare import prepare_experiment
 from diagnosis.recordings.recording import Recording
@@ -87,6 +87,23 @@ def test_where_an_effect_may_act(prepared: tuple[InferenceSetup, Experiment]) ->
     assert replace(nothing_acts, healthy=frozenset()).scope_of("windage") is None
 
 
+def test_an_effect_is_scanned_and_fitted_where_it_may_act(prepared: tuple[InferenceSetup, Experiment]) -> None:
+    """With the baseline the strength comes out; the reading of the baseline does not hang on it."""
+    setup, experiment = prepared
+    fit = calibrate(experiment)
+    placed = CATALOGUE["windage"].placed(experiment.machine.model.network, setup.scale, setup.channels)
+    windage = next(hypothesis_of(p) for p in placed if p.place == "oil")
+    found = scan(fit, [windage])
+    at = found.of_candidates.start + 1
+    assert not found.gram.of_recording["april"][:, at].any() and found.gram.of_recording["train"][at, at] > 0.0
+    reached = refit(fit, windage, found.best[0], float(found.singles(found.gram.given(found.unknowns)).value[0]))
+    unknown, z = reached.experiment.unknowns[len(fit.z)], float(reached.z[len(fit.z)])
+    sd = unknown.parameter.sd * float(np.sqrt(reached.covariance[len(fit.z), len(fit.z)]))
+    assert abs(unknown.value(z) - WINDAGE_W) < 3.0 * sd
+    columns = {p.point.setting.recording: p.columns for p in reached.parts}
+    assert not columns["april"][:, len(fit.z) :].any() and columns["train"][:, len(fit.z)].any()
+
+
 def test_without_held_out_recordings_baselines_are_whole(fzg: Gearbox) -> None:
     train, healthy = recorded(fzg, "train", hours=0.5), recorded(fzg, "april", hours=0.5, seed=2)
     setup, experiment = prepare_experiment(fzg, [train], (), [healthy])
@@ -101,9 +118,7 @@ def test_an_effect_that_acts_in_the_baseline_is_seen_there(fzg: Gearbox, drift: 
     found = {}
     for kelvin in (0.0, 3.0):
         fit = calibrated(fzg, train, recorded(fzg, "april", drift_K=kelvin, seed=2))
-        alone = scan_baselines(fit, [drift])
-        assert list(alone.gram.of_recording) == ["april"]
-        found[kelvin] = float(effects_in_baselines(alone)[0])
+        found[kelvin] = float(effects_in_baselines(fit, [drift])[0])
     assert found[0.0] < 2.0 < 20.0 < found[3.0]
     assert not notes_of_baselines(found[0.0], {}, "a drift")
     (note,) = notes_of_baselines(found[3.0], {}, "a drift")
@@ -115,7 +130,6 @@ def test_another_machine_is_told_apart(fzg: Gearbox) -> None:
     found = {}
     for name, factors in {"same": {}, "other": {"C_oil": 1.4, "h_air": 1.5, "bearing_oil": 0.6}}.items():
         healthy = recorded(fzg, "april", seed=2, factors=factors)
-        gram = scan(calibrated(fzg, train, healthy), []).gram
-        found[name] = machine_apart(gram, range(len(gram.labels)), 1.0, ["april"])
+        found[name] = sessions_apart(calibrated(fzg, train, healthy))["april"]
     assert found["same"] < 0.0 < 10.0 < found["other"]
     assert len(notes_of_baselines(0.0, {"april": found["other"]})) == 1

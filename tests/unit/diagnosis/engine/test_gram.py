@@ -26,7 +26,7 @@ def columns() -> dict[str, Array]:
 
 @pytest.fixture
 def gram(columns: dict[str, Array]) -> Gram:
-    return Gram(labels=tuple(f"x{i}" for i in range(12)), of_recording={n: W.T @ W for n, W in columns.items()},
+    return Gram(of_recording={n: W.T @ W for n, W in columns.items()},
                 log_determinants={"a": 3.0, "b": -1.0})  # fmt: skip
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from diagnosis.recordings.recording import Recording
-from diagnosis.setup.baselines import check_baselines, sessions_of
+from diagnosis.setup.baselines import check_baselines, session_by_recording
 from models.base.errors import InputError
 from models.base.types import Array
 from tests.unit.diagnosis.inference_example import recording_of
@@ -29,21 +29,26 @@ def named(made: Recording, name: str, **changes: Any) -> Recording:
 def test_every_file_of_baselines_is_a_session_and_all_else_is_one(made: Recording) -> None:
     train, held = named(made, "train"), named(made, "hold")
     april, may = named(made, "april"), named(made, "may")
-    found = sessions_of([train], [held], [april, may])
+    found = session_by_recording([train], [held], [april, may])
     assert found == {"train": "", "hold": "", "april": "april", "may": "may"}
 
 
 def test_parts_of_one_file_are_one_session(made: Recording) -> None:
     train, early = named(made, "train"), replace(made, name="early", sha256="train")
     one, two = named(made, "one"), replace(made, name="two", sha256="one")
-    assert sessions_of([train], (), [early, one, two]) == {"train": "", "early": "", "one": "one", "two": "one"}
+    assert session_by_recording([train], (), [early, one, two]) == {
+        "train": "",
+        "early": "",
+        "one": "one",
+        "two": "one",
+    }
 
 
 def test_what_a_mapping_states_comes_first(made: Recording) -> None:
     train, late = named(made, "train"), named(made, "late", session="autumn")
     one, two = named(made, "one", session="spring"), named(made, "two", session="spring")
     part = replace(made, name="part", sha256="one")
-    assert sessions_of([train, late], (), [one, two, part]) == {
+    assert session_by_recording([train, late], (), [one, two, part]) == {
         "train": "", "late": "autumn", "one": "spring", "two": "spring", "part": "spring",
     }  # fmt: skip
 
@@ -57,7 +62,7 @@ def test_what_a_mapping_states_comes_first(made: Recording) -> None:
             r"made.csv: is a baseline, but measures T_pinion and nothing that the recordings do \(T_oil\)",
         ),
         (("oil", "pinion"), ("windge",), "--switched-off windge: is not in the catalogue; did you mean 'windage'"),
-        ((), ("windage",), "--switched-off windage: says what is off in the baselines, but there is none"),
+        ((), ("windage",), "--switched-off windage: is about baselines, but there are none"),
     ],
 )
 def test_refused(channels: tuple[str, ...], off: tuple[str, ...], message: str, made: Recording) -> None:

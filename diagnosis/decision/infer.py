@@ -1,0 +1,226 @@
+"""From an experiment and its candidates to a posterior: scan, race, refit, second scan.
+
+The scan is linear and judges everything. A race of a few Gauss-Newton steps corrects it for the best names; the best of
+them are fitted to the end, model error in place; a second scan beside the best explanation looks for a second effect.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.special import log_ndtr, logsumexp
+
+from diagnosis.candidates.hypotheses import Hypothesis
+from diagnosis.decision.posterior import Expected, Judged, Posterior, Settings
+from diagnosis.engine.calibration import Calibration
+from diagnosis.engine.candidates import Scan, refit, scan
+from diagnosis.engine.fit import Fit
+from diagnosis.engine.sessions import OverSessions, fit_over_sessions, over_sessions
+from models.base.errors import InputError
+from models.base.types import Array
+
+RACED, PLACES, RACE_STEPS = 18, 2, 4
+NEAR_PLACE = 3.0  # nats behind the best place of its name, up to which a second place is raced
+REFITTED, SECONDS = 6, 2
+PAIR_PRIOR = 0.1  # of two effects, to one
+TEMPER = (3.0, 0.1)
+THRESHOLD = 5.0
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Scanned:
+    """Everything judged by straight lines at one point."""
+
+    scan: Scan
+    over: OverSessions
+    log_bayes: Array
+    log_prior: Array
+
+
+def infer(
+    calibration: Calibration, candidates: Sequence[Hypothesis], log_prior: Array, settings: Settings, *,
+    progress: Callable[[str], None] = lambda _: None,
+) -> Posterior:  # fmt: skip
+    """Weigh all explanations.
+
+    Parameters
+    ----------
+    calibration : Calibration
+    candidates : sequence of Hypothesis
+    log_prior : Array, shape (candidates,)
+        Of every candidate, to 1 of nothing
+    settings : Settings
+    progress : callable
+        Told in words what is being done
+    """
+    base = calibration.fit
+    progress(f"scanning {len(candidates)} candidates")
+    first = _scanned(base, candidates, log_prior, len(base.z))
+    order = np.argsort(-(first.log_bayes + TEMPER[0] * first.log_prior))
+    chosen = _raced(first.scan.candidates, first.log_bayes, order)
+    judged: dict[str, Judged] = {}
+    for step, index in enumerate(chosen):
+        progress(f"fitting {first.scan.candidates[index].label} ({step + 1} of {len(chosen)})")
+        one = _refitted(calibration, base, first, index, RACE_STEPS)
+        judged[first.scan.candidates[index].label] = one
+    ahead = sorted(judged.values(), key=lambda one: -(one.log_bayes + TEMPER[0] * one.log_prior))
+    for one in ahead[:REFITTED]:
+        if one.fit is not None:
+            judged[one.label] = _fitted_on(calibration, one, len(base.z))
+    best = max(judged.values(), key=lambda one: one.log_bayes / TEMPER[0] + one.log_prior)
+    remainder, alone = 0.0, first.log_bayes
+    pairs: list[Judged] = []
+    if best.fit is not None and best.log_bayes > 0.0:
+        progress(f"looking beside {best.label}")
+        remainder, pairs, there = _beside(calibration, best, candidates, log_prior, len(base.z))
+        alone = np.minimum(alone, there)
+    for index, candidate in enumerate(first.scan.candidates):
+        judged.setdefault(candidate.label, _by_scan(first, index, float(alone[index])))
+    every = [*judged.values(), *pairs]
+    single = [one for one in every if len(one.effects) == 1]
+    log_e = float(logsumexp([one.log_prior + one.log_bayes for one in single]))
+    return Posterior(
+        nothing=Judged(effects=(), log_prior=0.0, log_bayes=0.0, fit=base), judged=tuple(every), log_e=log_e,
+        threshold=THRESHOLD, temper=TEMPER, error_class=calibration.chosen.name,
+        error_evidence=dict(calibration.evidence), session_s=calibration.session_s, remainder=remainder,
+        expected=_expected(first, settings),
+    )  # fmt: skip
+
+
+def _scanned(fit: Fit, candidates: Sequence[Hypothesis], log_prior: Array, base: int) -> _Scanned:
+    """Scan at a fit; the first `base` of its unknowns and model error may differ between sessions."""
+    found = scan(fit, candidates)
+    known = {one.label: value for one, value in zip(candidates, log_prior.tolist(), strict=True)}
+    own, deviating = range(base, len(fit.z)), [*range(base), *found.further]
+    over = over_sessions(found.gram, fit.experiment, deviating, own)
+    return _Scanned(scan=found, over=over, log_bayes=_over_variants(found, over),
+                    log_prior=np.array([known[one.label] for one in found.candidates]))  # fmt: skip
+
+
+def _over_variants(found: Scan, over: OverSessions) -> Array:
+    """Log Bayes factors of all candidates, over variants and deviations between sessions."""
+    best = over.weighed([found.singles(given).log_bayes for given in over.given])
+    at_mode = found.singles(over.given[over.most_probable]).log_bayes
+    return np.asarray(best - (at_mode - found.log_bayes).clip(min=0.0))
+
+
+def _raced(candidates: Sequence[Hypothesis], log_bayes: Array, order: Iterable[int]) -> list[int]:
+    """Best candidates by name, with a second place where it is near."""
+    of_name: dict[str, list[int]] = {}
+    for index in order:
+        mine = of_name.setdefault(candidates[index].name, [])
+        if not mine and len(of_name) > RACED:
+            break
+        if not mine or (len(mine) < PLACES and log_bayes[mine[0]] - log_bayes[index] < NEAR_PLACE):
+            mine.append(int(index))
+    return [index for mine in list(of_name.values())[:RACED] for index in mine]
+
+
+def _refitted(calibration: Calibration, fit: Fit, found: _Scanned, index: int, iterations: int) -> Judged:
+    """A candidate fitted together with everything else; judged by the scan if there is no solution."""
+    candidate, variant = found.scan.candidates[index], found.scan.best[index]
+    given = found.over.given[found.over.most_probable]
+    strength = float(found.scan.singles(given).value[index])
+    try:
+        reached = refit(fit, candidate, variant, strength, iterations=iterations)
+    except (InputError, ArithmeticError, np.linalg.LinAlgError):
+        return _by_scan(found, index, float(found.log_bayes[index]))
+    one = _by_scan(found, index, float(found.log_bayes[index]))
+    return _judged(calibration, replace(one, fit=reached), len(calibration.fit.z), _spread(found, index))
+
+
+def _spread(found: _Scanned, index: int) -> float:
+    """Nats that the best variant of a candidate with fixed shapes is ahead of the mean over all its variants."""
+    candidate = found.scan.candidates[index]
+    if candidate.how != "D":
+        return 0.0  # shapes are fitted, and weighed by their priors
+    given = found.over.given[found.over.most_probable]
+    return max(float(found.scan.singles(given).log_bayes[index] - found.scan.log_bayes[index]), 0.0)
+
+
+def _judged(calibration: Calibration, one: Judged, base: int, spread: float) -> Judged:
+    """A fitted explanation with its evidence against nothing."""
+    fit = one.fit
+    assert fit is not None  # noqa: S101
+    over = fit_over_sessions(fit, base)
+    covariance, log_bayes = fit.covariance, over.log_evidence - calibration.log_evidence - spread
+    values, sds, at = [], [], base
+    for effect in one.effects:
+        unknown = fit.experiment.unknowns[at]
+        value, sd = unknown.value(float(fit.z[at])), float(np.sqrt(covariance[at, at])) * unknown.parameter.sd
+        if effect.sign:
+            log_bayes += float(np.log(2.0) + log_ndtr(effect.sign * value / sd))
+        values.append(value)
+        sds.append(sd)
+        at += len(effect.term.parameters) if effect.term is not None else 1
+    return replace(one, log_bayes=log_bayes, strength=tuple(values), strength_sd=tuple(sds))
+
+
+def _fitted_on(calibration: Calibration, one: Judged, base: int) -> Judged:
+    """A raced fit continued to its end."""
+    fit = one.fit
+    assert fit is not None  # noqa: S101
+    try:
+        reached = fit.experiment.fit(fit.z, [part.point.trajectory for part in fit.parts])
+    except (InputError, ArithmeticError, np.linalg.LinAlgError):
+        return one
+    gained = fit_over_sessions(reached, base).log_evidence - fit_over_sessions(fit, base).log_evidence
+    spread = 0.0
+    return replace(_judged(calibration, replace(one, fit=reached), base, spread), log_bayes=one.log_bayes + gained)
+
+
+def _by_scan(found: _Scanned, index: int, log_bayes: float) -> Judged:
+    candidate = found.scan.candidates[index]
+    strengths = found.scan.singles(found.over.given[found.over.most_probable])
+    return Judged(
+        effects=(replace(candidate, variants=candidate.variants[[found.scan.best[index]]]),),
+        log_prior=float(found.log_prior[index]), log_bayes=log_bayes,
+        strength=(float(strengths.value[index]),), strength_sd=(float(strengths.sd[index]),),
+    )  # fmt: skip
+
+
+def _beside(
+    calibration: Calibration, best: Judged, candidates: Sequence[Hypothesis], log_prior: Array, base: int
+) -> tuple[float, list[Judged], Array]:
+    """Second effects beside the best explanation, fitted; and all candidates alone, seen from there.
+
+    Returns
+    -------
+    remainder : float
+        Log Bayes factor of the best second effect, [nat]
+    pairs : list of Judged
+    alone : Array, shape (candidates,)
+        Log Bayes factors against nothing at the point of the best explanation, [nat]
+    """
+    fit = best.fit
+    assert fit is not None  # noqa: S101
+    second = _scanned(fit, candidates, log_prior, base)
+    mine = {effect.label for effect in best.effects}
+    order = [i for i in np.argsort(-(second.log_bayes + TEMPER[0] * second.log_prior))
+             if second.scan.candidates[i].label not in mine]  # fmt: skip
+    pairs = []
+    for index in order[:SECONDS]:
+        one = _refitted(calibration, fit, second, int(index), RACE_STEPS + 2)
+        if one.fit is None:
+            continue
+        both = replace(one, effects=(*best.effects, *one.effects),
+                       log_prior=best.log_prior + one.log_prior + float(np.log(PAIR_PRIOR)))  # fmt: skip
+        pairs.append(_judged(calibration, both, base, _spread(second, int(index))))
+    deviating = [*range(base), *second.scan.further]
+    without = over_sessions(second.scan.gram, fit.experiment, deviating)
+    remainder = float(second.log_bayes[order[0]]) if order else 0.0
+    return remainder, pairs, _over_variants(second.scan, without)
+
+
+def _expected(found: _Scanned, settings: Settings) -> tuple[Expected, ...]:
+    """Expected evidence of every candidate at the size that matters."""
+    given = found.over.given[found.over.most_probable]
+    at = np.array(found.scan.of_candidates) + 1
+    b = np.maximum(given.matrix[at, at], 0.0)
+    size = np.where(found.scan.peak_K > 0.0, settings.matters_K / np.maximum(found.scan.peak_K, 1e-12), found.scan.sd)
+    sd = found.scan.sd
+    log_bayes = 0.5 * np.square(b * size) / (b + 1.0 / np.square(sd)) - 0.5 * np.log1p(b * np.square(sd))
+    return tuple(Expected(effect=one, log_bayes=float(value))
+                 for one, value in zip(found.scan.candidates, log_bayes, strict=True))  # fmt: skip

@@ -1,0 +1,98 @@
+"""Calibration with model error in place: the point that everything is linearised at."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from diagnosis.engine.fit import FIRST_ITERATIONS, ITERATIONS, Experiment, Fit, Linear
+from diagnosis.engine.metric import leading_directions
+from diagnosis.engine.model_error import ErrorClass, ModelError, error_classes
+from diagnosis.engine.products import gram_of, whitened_base
+from diagnosis.engine.sessions import fit_over_sessions, sessions_of, with_deviation
+from models.base.types import Array
+
+WIDEST_CLASS = "FULL"  # the point is calibrated with it: no parameter has to stand in for what the model cannot know
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Calibration:
+    """The machine without the effect that is looked for.
+
+    Attributes
+    ----------
+    fit : Fit
+        Model error of the chosen class in its metric, with the most probable deviation between sessions
+    chosen : ErrorClass
+    evidence : mapping of str to float
+        Log evidence of every class, prior included, less that of the best
+    log_evidence : float
+        Over all deviations between sessions
+    session_s : float
+        Their mean, in prior standard deviations
+    """
+
+    fit: Fit
+    chosen: ErrorClass
+    evidence: Mapping[str, float]
+    log_evidence: float
+    session_s: float
+
+
+def calibrate_with_error(experiment: Experiment) -> Calibration:
+    """Fit the unknowns with all model error, choose the class by evidence, fit again with that class.
+
+    Raises
+    ------
+    ArithmeticError
+        If the simulation has no solution with the priors' middles.
+    """
+    error, classes = ModelError.of(experiment), error_classes()
+    (widest,) = (one for one in classes if one.name == WIDEST_CLASS)
+    z = np.zeros(len(experiment.unknowns))
+    at = experiment.linearise(z)
+    for iterations in (FIRST_ITERATIONS, ITERATIONS):
+        here = _judged(experiment, at.parts, _columns(error, at.parts), error.amplitudes(widest), 0.0)
+        fit = here.fit(z, [part.point.trajectory for part in at.parts], iterations=iterations)
+        z, at = fit.z, experiment.linearise(fit.z, [part.point.trajectory for part in fit.parts])
+    columns = _columns(error, at.parts)
+    evidence = _evidence_of_classes(z, at.parts, columns, error, classes)
+    chosen = max(classes, key=lambda one: evidence[one.name])
+    best = max(evidence.values())
+    s = 0.0
+    for _ in range(2 if len(sessions_of(experiment)) > 1 else 1):
+        here = _judged(experiment, at.parts, columns, error.amplitudes(chosen), s)
+        fit = here.fit(z, [part.point.trajectory for part in at.parts], iterations=FIRST_ITERATIONS)
+        over = fit_over_sessions(fit, len(z))
+        z, s = fit.z, float(over.deviations[over.most_probable])
+    return Calibration(fit=fit, chosen=chosen, evidence={name: value - best for name, value in evidence.items()},
+                       log_evidence=over.log_evidence, session_s=over.mean)  # fmt: skip
+
+
+def _columns(error: ModelError, parts: Sequence[Linear]) -> list[Array]:
+    """Whitened columns of all model error, per unit, of every piece, shape (M, n)."""
+    return [part.filter(error.responses(part.point)) for part in parts]
+
+
+def _judged(
+    experiment: Experiment, parts: Sequence[Linear], columns: Sequence[Array], amplitudes: Array, s: float
+) -> Experiment:
+    """The experiment with the filters of a linearisation and the leading directions of model error in its metric."""
+    there = amplitudes > 0.0
+    scaled = [N[:, there] * amplitudes[there] for N in columns]
+    directions = leading_directions(np.sum([N.T @ N for N in scaled], axis=0))
+    shared = [N @ directions for N in scaled]
+    return with_deviation(experiment.with_filters(parts), [part.columns for part in parts], shared, s)
+
+
+def _evidence_of_classes(
+    z: Array, parts: Sequence[Linear], columns: Sequence[Array], error: ModelError, classes: Sequence[ErrorClass]
+) -> dict[str, float]:  # fmt: skip
+    """Log evidence of every class at one point, prior included."""
+    gram, count = gram_of(parts, whitened_base(parts, z, columns)), len(z)
+    given = gram.given(range(count))
+    places = range(count, gram.count)
+    return {one.name: float(np.log(one.prior)) + given.given(places, error.amplitudes(one)).log_evidence
+            for one in classes}  # fmt: skip

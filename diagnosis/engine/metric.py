@@ -1,0 +1,136 @@
+r"""The metric in which residuals are judged: noise, and what is marginalised beside it.
+
+Model error :math:`N n` with :math:`n \sim N(0, 1)` in units of its amplitudes is marginalised exactly in the linearised
+readings; so are deviations :math:`s [J, N]` of every test session from the values that all sessions share. With
+:math:`B` the columns of both, whitened, the inner product of whitened readings is
+:math:`x^T (1 + B B^T)^{-1} y = x^T y - x^T B (1 + B^T B)^{-1} B^T y`.
+
+References
+----------
+Petersen, Pedersen, The Matrix Cookbook (2012), section 3.2 (Woodbury identity) and 9.1 (determinants by blocks).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.linalg import eigh, solve_triangular
+
+from models.base.types import Array
+
+LEAST_DIRECTION, MOST_DIRECTIONS = 0.1, 300  # squared norm of a direction against the noise; how many are carried
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Metric:
+    """Inner products of whitened readings of all pieces.
+
+    Attributes
+    ----------
+    sessions : tuple of tuple of int
+        Pieces of every test session
+    shared : tuple of Array, shape (M, n) each
+        Whitened columns of every piece, times their amplitudes, whose values all sessions share
+    own : tuple of Array, shape (M, m) each
+        The same of the deviations of a session; m = 0 if sessions do not differ
+    """
+
+    sessions: tuple[tuple[int, ...], ...]
+    shared: tuple[Array, ...]
+    own: tuple[Array, ...]
+
+    @cached_property
+    def _roots(self) -> tuple[list[Array], Array]:
+        """Lower Cholesky factors of every session, and of the shared columns given them."""
+        roots, whole = [], np.eye(self.shared[0].shape[1])
+        for pieces in self.sessions:
+            L = [self.own[p] for p in pieces]
+            root = np.asarray(np.linalg.cholesky(np.eye(L[0].shape[1]) + _sum(L, L)))
+            B = [self.shared[p] for p in pieces]
+            across = solve_triangular(root, _sum(L, B), lower=True)
+            whole += _sum(B, B) - across.T @ across
+            roots.append(root)
+        return roots, np.asarray(np.linalg.cholesky(whole))
+
+    @cached_property
+    def log_determinant(self) -> float:
+        """Of what is marginalised."""
+        roots, whole = self._roots
+        return 2.0 * float(sum(np.log(np.diag(root)).sum() for root in (*roots, whole)))
+
+    @cached_property
+    def _across(self) -> list[Array]:
+        pairs = [([self.own[p] for p in pieces], [self.shared[p] for p in pieces]) for pieces in self.sessions]
+        return [solve_triangular(root, _sum(L, B), lower=True)
+                for root, (L, B) in zip(self._roots[0], pairs, strict=True)]  # fmt: skip
+
+    def products(self, columns: Sequence[Array]) -> Array:
+        """Inner products of whitened columns.
+
+        Parameters
+        ----------
+        columns : sequence of Array, shape (M, n) each
+            Of every piece
+
+        Returns
+        -------
+        Array, shape (n, n)
+        """
+        mine, along = self._along(columns)
+        return _sum(columns, columns) - sum((each.T @ each for each in mine), 0.0) - along.T @ along
+
+    def against(self, residuals: Sequence[Array], columns: Sequence[Array]) -> tuple[Array, Array]:
+        """Inner products of many columns with the residual, and of each with itself.
+
+        Parameters
+        ----------
+        residuals : sequence of Array, shape (M,) each
+        columns : sequence of Array, shape (M, n) each
+
+        Returns
+        -------
+        a, b : Array, shape (n,)
+        """
+        own, over = self._along([r[:, None] for r in residuals])
+        mine, along = self._along(columns)
+        a = np.sum([X.T @ r for X, r in zip(columns, residuals, strict=True)], axis=0) - along.T @ over[:, 0]
+        b = np.sum([np.einsum("mn,mn->n", X, X) for X in columns], axis=0) - np.einsum("un,un->n", along, along)
+        for each, r in zip(mine, own, strict=True):
+            a, b = a - each.T @ r[:, 0], b - np.einsum("un,un->n", each, each)
+        return np.asarray(a), np.asarray(b)
+
+    def _along(self, columns: Sequence[Array]) -> tuple[list[Array], Array]:
+        """Components of columns along what is marginalised: of every session, then of what all share."""
+        roots, whole = self._roots
+        mine, along = [], np.zeros((len(whole), columns[0].shape[1]))
+        for root, across, pieces in zip(roots, self._across, self.sessions, strict=True):
+            X = [columns[p] for p in pieces]
+            mine.append(solve_triangular(root, _sum([self.own[p] for p in pieces], X), lower=True))
+            along += _sum([self.shared[p] for p in pieces], X) - across.T @ mine[-1]
+        return mine, solve_triangular(whole, along, lower=True)
+
+
+def leading_directions(products: Array, most: int = MOST_DIRECTIONS) -> Array:
+    """Combinations of columns that carry nearly all of what the columns can do.
+
+    Parameters
+    ----------
+    products : Array, shape (n, n)
+        Inner products of whitened columns with prior N(0, 1) each
+    most : int
+
+    Returns
+    -------
+    Array, shape (n, k)
+        Columns times this have the prior N(0, 1) again; what is left out is far below the noise
+    """
+    values, vectors = eigh(products)
+    chosen = np.flatnonzero(values > LEAST_DIRECTION)[-most:]
+    return np.asarray(vectors[:, chosen])
+
+
+def _sum(left: Sequence[Array], right: Sequence[Array]) -> Array:
+    return np.asarray(np.sum([a.T @ b for a, b in zip(left, right, strict=True)], axis=0))

@@ -1,0 +1,130 @@
+r"""Deviations between test sessions, as a mixture.
+
+A machine does not repeat exactly. Every unknown and every model error may differ from session to session by a share
+:math:`s` of its prior standard deviation; how much is not known, so evidences are weighed over a grid of `s`. All rows
+weigh it, under nothing as under every candidate.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.special import logsumexp
+
+from diagnosis.engine.fit import Experiment, Fit
+from diagnosis.engine.gram import Given, Gram
+from diagnosis.engine.metric import Metric
+from diagnosis.engine.products import base_of, gram_of
+from models.base.types import Array
+
+# Prior of the deviation. Origin: a study on two foreign plants whose factors differed by 1 to 3 % between sessions.
+DEVIATIONS: Mapping[float, float] = {0.0: 0.3, 0.02: 0.2, 0.05: 0.2, 0.1: 0.15, 0.2: 0.1, 0.4: 0.05}
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class OverSessions:
+    """Products of a Gram matrix for every deviation between sessions.
+
+    Attributes
+    ----------
+    deviations, log_priors : Array, shape (S,)
+    given : tuple of Given
+        With unknowns and model error marginalised
+    """
+
+    deviations: Array
+    log_priors: Array
+    given: tuple[Given, ...]
+
+    @property
+    def weights(self) -> Array:
+        """Log prior and evidence of every deviation, shape (S,)."""
+        return np.asarray(self.log_priors + np.array([one.log_evidence for one in self.given]))
+
+    @property
+    def log_evidence(self) -> float:
+        """Of the readings, all deviations weighed."""
+        return float(logsumexp(self.weights))
+
+    @property
+    def mean(self) -> float:
+        """Mean deviation that the readings support, in prior standard deviations."""
+        return float(np.exp(self.weights - self.log_evidence) @ self.deviations)
+
+    @property
+    def most_probable(self) -> int:
+        """Place of the deviation with the largest weight."""
+        return int(np.argmax(self.weights))
+
+    def weighed(self, log_bayes: Sequence[Array]) -> Array:
+        """Log Bayes factors over all deviations from those of each."""
+        return np.asarray(logsumexp(self.weights[:, None] + np.stack(log_bayes), axis=0) - self.log_evidence)
+
+
+def sessions_of(experiment: Experiment) -> tuple[tuple[int, ...], ...]:
+    """Pieces of every test session."""
+    names = [experiment.session_of.get(piece.recording, "") for piece in experiment.pieces]
+    return tuple(tuple(i for i, name in enumerate(names) if name == one) for one in dict.fromkeys(names))
+
+
+def over_sessions(
+    gram: Gram, experiment: Experiment, unknowns: Sequence[int], fixed: Sequence[int] = ()
+) -> OverSessions:
+    """Marginalise unknowns and model error, with deviations between sessions.
+
+    Parameters
+    ----------
+    gram : Gram
+    experiment : Experiment
+        Says which recordings are one session
+    unknowns : sequence of int
+        Columns with prior N(0, 1) that may differ between sessions
+    fixed : sequence of int
+        Columns with prior N(0, 1) that do not
+    """
+    recordings = [{experiment.pieces[p].recording for p in pieces} for pieces in sessions_of(experiment)]
+    prior = DEVIATIONS if len(recordings) > 1 else {0.0: 1.0}
+    every = np.array([*unknowns, *fixed], dtype=int)
+    found = []
+    for s in prior:
+        own = [gram.given(unknowns, s, recordings=names) for names in recordings]
+        matrix = np.sum([one.matrix for one in own], axis=0)
+        whole = Given(matrix=matrix, log_determinant=sum(one.log_determinant for one in own))
+        found.append(whole.given(every))
+    return OverSessions(deviations=np.array(list(prior)), log_priors=np.log(list(prior.values())), given=tuple(found))
+
+
+def with_deviation(experiment: Experiment, columns: Sequence[Array], shared: Sequence[Array], s: float) -> Experiment:
+    """The experiment judged with a deviation between sessions.
+
+    Parameters
+    ----------
+    experiment : Experiment
+        With filters
+    columns, shared : sequence of Array, shape (M, n) each
+        Whitened columns of unknowns, and of model error times its amplitudes
+    s : float
+        In prior standard deviations
+    """
+    own = [
+        s * np.column_stack([J, N]) if s > 0.0 else np.zeros((len(J), 0)) for J, N in zip(columns, shared, strict=True)
+    ]
+    metric = Metric(sessions=sessions_of(experiment), shared=tuple(shared), own=tuple(own))
+    return replace(experiment, metric=metric)
+
+
+def fit_over_sessions(fit: Fit, base: int) -> OverSessions:
+    """A fit with all deviations between sessions weighed.
+
+    Parameters
+    ----------
+    fit : Fit
+    base : int
+        How many of its unknowns, from the first, may differ between sessions; the others are those of an effect
+    """
+    count = len(fit.z)
+    gram = gram_of(fit.parts, base_of(fit))
+    error = range(count, gram.count)
+    return over_sessions(gram, fit.experiment, [*range(base), *error], range(base, count))

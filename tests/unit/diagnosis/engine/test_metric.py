@@ -1,0 +1,71 @@
+"""Marginalising model error and deviations between sessions equals the normal density of the readings."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from diagnosis.engine.gram import Gram
+from diagnosis.engine.metric import Metric, leading_directions
+from diagnosis.engine.sessions import DEVIATIONS, over_sessions
+
+SESSIONS = ((0, 2), (1,))
+ROWS = (30, 24, 18)
+
+
+@pytest.fixture
+def columns():
+    rng = np.random.default_rng(3)
+    return [rng.standard_normal((rows, 9)) for rows in ROWS]
+
+
+def covariance(shared, own):
+    """Of all rows, pieces one after the other."""
+    starts = np.cumsum([0, *ROWS])
+    whole = np.eye(starts[-1])
+    B = np.concatenate(shared)
+    whole += B @ B.T
+    for pieces in SESSIONS:
+        rows = np.concatenate([np.arange(starts[p], starts[p + 1]) for p in pieces])
+        L = np.concatenate([own[p] for p in pieces])
+        whole[np.ix_(rows, rows)] += L @ L.T
+    return whole
+
+
+@pytest.mark.parametrize("own_columns", [0, 4])
+def test_inner_products_equal_those_of_the_covariance(columns, own_columns):
+    shared, own, X = ([W[:, some] for W in columns] for some in (slice(0, 3), slice(0, own_columns), slice(4, 9)))
+    metric = Metric(sessions=SESSIONS, shared=tuple(shared), own=tuple(0.3 * L for L in own))
+    S = covariance(shared, [0.3 * L for L in own])
+    everything = np.concatenate(X)
+    expected = everything.T @ np.linalg.solve(S, everything)
+    np.testing.assert_allclose(metric.products(X), expected, rtol=1e-10)
+    assert metric.log_determinant == pytest.approx(np.linalg.slogdet(S)[1], rel=1e-10)
+    a, b = metric.against([W[:, 0] for W in X], X)
+    np.testing.assert_allclose(a, expected[0], rtol=1e-9)
+    np.testing.assert_allclose(b, np.diag(expected), rtol=1e-9)
+
+
+def test_leading_directions_keep_what_columns_do():
+    rng = np.random.default_rng(1)
+    N = rng.standard_normal((60, 4)) @ rng.standard_normal((4, 25))
+    kept = N @ leading_directions(N.T @ N)
+    assert kept.shape[1] == 4
+    np.testing.assert_allclose(kept @ kept.T, N @ N.T, atol=1e-9)
+
+
+def test_deviations_between_sessions_equal_the_normal_density(columns):
+    experiment = SimpleNamespace(
+        pieces=[SimpleNamespace(recording=name) for name in "abc"], session_of={"a": "one", "b": "two", "c": "one"}
+    )
+    gram = Gram(of_recording={name: W.T @ W for name, W in zip("abc", columns, strict=True)},
+                log_determinants=dict.fromkeys("abc", 1.0))  # fmt: skip
+    found = over_sessions(gram, experiment, range(3), [3])
+    r = np.concatenate([W[:, 0] for W in columns])
+    for s, given in zip(found.deviations, found.given, strict=True):
+        S = covariance([W[:, 1:5] for W in columns], [s * W[:, 1:4] for W in columns])
+        expected = -0.5 * (r @ np.linalg.solve(S, r) + np.linalg.slogdet(S)[1] + 3.0)
+        assert given.log_evidence == pytest.approx(expected, rel=1e-10)
+    weights = np.log(list(DEVIATIONS.values())) + [given.log_evidence for given in found.given]
+    assert found.log_evidence == pytest.approx(np.logaddexp.reduce(weights))
+    assert 0.0 <= found.mean <= 0.4
