@@ -16,7 +16,7 @@ from models.correction.correction import Correction
 from models.correction.instruments import SensorCorrection
 from models.files.cycle import Cycle
 from models.files.cycle_file import RecordedStart
-from models.quantities.quantities import column_of_input, is_total_loss, node_of_channel
+from models.quantities.quantities import TOTAL_LOSS, column_of_input, is_total_loss, node_of_channel
 
 PASSES = 3  # simulations where a shift of an input follows the machine's temperatures
 Columns = Mapping[str, Array]
@@ -39,6 +39,7 @@ def simulated_as_recorded(cycle: Cycle, correction: Correction, run: Callable[[C
         The result, and ``<column>_as_recorded`` of every input that is corrected, and of every channel of the
         correction as its sensor reads it: what is to be compared with the recording
     """
+    late = common_clock(cycle, correction)
     driven = true_inputs(cycle, correction)
     columns = run(driven)
     follows = any(f.kind == "signal" and _hears(f.term.expression.free_symbols) for f in correction.findings)
@@ -49,11 +50,23 @@ def simulated_as_recorded(cycle: Cycle, correction: Correction, run: Callable[[C
         f"{column_of_input(name)}{AS_RECORDED}": values
         for name, values in cycle.inputs.items() if not np.array_equal(values, driven.inputs[name])
     }  # fmt: skip
-    return {**columns, **recorded, **read_as_recorded(columns, correction)}
+    return {**columns, **recorded, **read_as_recorded(columns, correction, late=late)}
+
+
+def common_clock(cycle: Cycle, correction: Correction) -> float:
+    """Seconds by which all inputs of a recording are early; 0 if they differ.
+
+    The model then keeps the clock of the inputs, and the readings are late: so a simulation starts with the first row.
+    """
+    clocks = {one.name: one.clock for one in correction.inputs}
+    found = {clocks.get(name, 0.0) for name in cycle.inputs}
+    return found.pop() if len(found) == 1 else 0.0
 
 
 def true_inputs(cycle: Cycle, correction: Correction, result: Columns | None = None) -> Cycle:
-    """Inputs of a recording as they probably were: clocks, gains and offsets, then the faults that were found.
+    """Inputs of a recording as they probably were: clocks, gains and offsets, then the faults among the findings.
+
+    A clock that all inputs share is left to the readings, see :func:`common_clock`.
 
     Parameters
     ----------
@@ -68,10 +81,11 @@ def true_inputs(cycle: Cycle, correction: Correction, result: Columns | None = N
     InputError
         If a fault needs what a result lacks.
     """
-    inputs = dict(cycle.inputs)
+    inputs, late = dict(cycle.inputs), common_clock(cycle, correction)
     for one in correction.inputs:
         if one.name in inputs:
-            values = delayed(inputs[one.name], cycle.time, one.clock) if one.clock else inputs[one.name]
+            shift = one.clock - late
+            values = delayed(inputs[one.name], cycle.time, shift) if shift else inputs[one.name]
             inputs[one.name] = one.gain * values + one.offset
     for term in (finding.term for finding in correction.findings if finding.of_measurement):
         known = result is not None or not _hears(term.expression.free_symbols)
@@ -82,27 +96,32 @@ def true_inputs(cycle: Cycle, correction: Correction, result: Columns | None = N
     return Cycle(cycle.time, inputs)
 
 
-def read_as_recorded(columns: Columns, correction: Correction) -> dict[str, Array]:
-    """Readings of the recorder's sensors over a simulated cycle, faults that were found included.
+def read_as_recorded(columns: Columns, correction: Correction, *, late: float = 0.0) -> dict[str, Array]:
+    """Readings of the recorder's sensors over a simulated cycle, faults among the findings included.
 
     Parameters
     ----------
     columns : mapping of column name to Array, shape (N,)
         Result with true inputs
     correction : Correction
+    late : float
+        Seconds by which every reading is late, see :func:`common_clock`
 
     Returns
     -------
     dict of column name to Array, shape (N,)
-        ``T_oil_degC_as_recorded`` of every channel of the correction
+        ``T_oil_degC_as_recorded`` of every channel of the correction; of all nodes if readings are late
     """
-    nodes = {name[2:-5] for name in columns if name.startswith("T_") and name.endswith("_degC")}
-    read = {
+    nodes = {name[2:-5] for name in columns if name.startswith("T_") and name.endswith("_degC")} - {"ambient"}
+    everything = [*sorted(nodes), TOTAL_LOSS] if late else []
+    read = {c: np.asarray(columns[channel_column(c)]) for c in everything if channel_column(c) in columns}
+    read |= {
         sensor.channel: _reading(columns, sensor, node_of_channel(sensor.channel, nodes))
         for sensor in correction.sensors
         if channel_column(node_of_channel(sensor.channel, nodes)) in columns
     }
-    return columns_as_recorded(columns, (finding.term for finding in correction.findings), read)
+    found = columns_as_recorded(columns, (finding.term for finding in correction.findings), read)
+    return {name: delayed(values, columns["time_s"], late) for name, values in found.items()} if late else found
 
 
 def _reading(columns: Columns, sensor: SensorCorrection, node: str) -> Array:
