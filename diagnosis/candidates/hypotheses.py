@@ -33,7 +33,7 @@ FINER, FINER_ENDS = 9, 33  # values between the neighbours of the best one of a 
 SHARPENED_FROM = 2  # variants of the grid, the best ones
 WIDE_PRIOR = 4.0  # standard deviations of a parameter that is out of its prior
 NEAR_ZERO = 1e-9
-How = Literal["U", "D", "W", "P"]
+How = Literal["U", "D", "C", "W", "P"]
 CLOCK_SIZES = (-2.0, -1.0, -0.3, 0.3, 1.0, 2.0)  # of the typical one
 
 
@@ -52,7 +52,8 @@ class Hypothesis:
     variants : Array, shape (V, parameters)
         Values of the term's parameters that are tried, the strength 1
     how : str
-        ``U``: a mechanism of the catalogue; ``D``: from a date on; ``W``: over the hours; ``P``: a parameter outside
+        ``U``: a mechanism of the catalogue; ``D``: from a date on; ``C``: a law of time that goes on in the next
+        recording; ``W``: over the hours; ``P``: a parameter outside
         its prior
     clock : str or None
         Parameter of the term that is the start of the recording on the time axis that all recordings share, [s]
@@ -69,8 +70,8 @@ class Hypothesis:
 
     @property
     def label(self) -> str:
-        """Name and place."""
-        return f"{self.name}@{self.place}"
+        """Name and place, and whether a memory goes on in the next recording."""
+        return f"{self.name}@{self.place}" + (" (carried on)" if self.how == "C" else "")
 
     @property
     def is_open(self) -> bool:

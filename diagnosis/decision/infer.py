@@ -24,6 +24,7 @@ from models.base.types import Array
 RACED, PLACES, RACE_STEPS = 18, 2, 4
 NEAR_PLACE = 3.0  # nats behind the best place of its name, up to which a second place is raced
 REFITTED, SECONDS = 6, 2
+WORTH, WORTH_SHARE = 1.0, 0.1  # nats, and share of the best, from which a candidate is worth a fit
 PAIR_PRIOR = 0.1  # of two effects, to one
 TEMPER = (3.0, 0.1)
 THRESHOLD = 5.0
@@ -61,6 +62,8 @@ def infer(
     order = np.argsort(-(first.log_bayes + TEMPER[0] * first.log_prior))
     chosen = _raced(first.scan.candidates, first.log_bayes, order)
     judged: dict[str, Judged] = {}
+    worth = max(WORTH, WORTH_SHARE * float(first.log_bayes.max(initial=0.0)))
+    chosen = [index for index in chosen if first.log_bayes[index] > worth]
     for step, index in enumerate(chosen):
         progress(f"fitting {first.scan.candidates[index].label} ({step + 1} of {len(chosen)})")
         one = _refitted(calibration, base, first, index, RACE_STEPS)
@@ -69,15 +72,18 @@ def infer(
     for one in ahead[:REFITTED]:
         if one.fit is not None:
             judged[one.label] = _fitted_on(calibration, one, len(base.z))
-    best = max(judged.values(), key=lambda one: one.log_bayes / TEMPER[0] + one.log_prior)
-    remainder, alone = 0.0, first.log_bayes
+    remainder, alone = (
+        0.0,
+        {one.label: float(value) for one, value in zip(first.scan.candidates, first.log_bayes, strict=True)},
+    )
     pairs: list[Judged] = []
-    if best.fit is not None and best.log_bayes > 0.0:
+    best = max(judged.values(), key=lambda one: one.log_bayes + TEMPER[0] * one.log_prior, default=None)
+    if best is not None and best.fit is not None and best.log_bayes > 0.0:
         progress(f"looking beside {best.label}")
         remainder, pairs, there = _beside(calibration, best, candidates, log_prior, len(base.z))
-        alone = np.minimum(alone, there)
+        alone |= {label: min(alone[label], value) for label, value in there.items()}
     for index, candidate in enumerate(first.scan.candidates):
-        judged.setdefault(candidate.label, _by_scan(first, index, float(alone[index])))
+        judged.setdefault(candidate.label, _by_scan(first, index, alone[candidate.label]))
     every = [*judged.values(), *pairs]
     single = [one for one in every if len(one.effects) == 1]
     log_e = float(logsumexp([one.log_prior + one.log_bayes for one in single]))
@@ -183,7 +189,7 @@ def _by_scan(found: _Scanned, index: int, log_bayes: float) -> Judged:
 
 def _beside(
     calibration: Calibration, best: Judged, candidates: Sequence[Hypothesis], log_prior: Array, base: int
-) -> tuple[float, list[Judged], Array]:
+) -> tuple[float, list[Judged], dict[str, float]]:
     """Second effects beside the best explanation, fitted; and all candidates alone, seen from there.
 
     Returns
@@ -191,15 +197,15 @@ def _beside(
     remainder : float
         Log Bayes factor of the best second effect, [nat]
     pairs : list of Judged
-    alone : Array, shape (candidates,)
-        Log Bayes factors against nothing at the point of the best explanation, [nat]
+    alone : mapping of label to float
+        Log Bayes factors of all others against nothing at the point of the best explanation, [nat]
     """
     fit = best.fit
     assert fit is not None  # noqa: S101
-    second = _scanned(fit, candidates, log_prior, base)
     mine = {effect.label for effect in best.effects}
-    order = [i for i in np.argsort(-(second.log_bayes + TEMPER[0] * second.log_prior))
-             if second.scan.candidates[i].label not in mine]  # fmt: skip
+    others = np.array([one.label not in mine for one in candidates])
+    second = _scanned(fit, [one for one in candidates if one.label not in mine], log_prior[others], base)
+    order = np.argsort(-(second.log_bayes + TEMPER[0] * second.log_prior))
     pairs = []
     for index in order[:SECONDS]:
         one = _refitted(calibration, fit, second, int(index), RACE_STEPS + 2)
@@ -210,8 +216,9 @@ def _beside(
         pairs.append(_judged(calibration, both, base, _spread(second, int(index))))
     deviating = [*range(base), *second.scan.further]
     without = over_sessions(second.scan.gram, fit.experiment, deviating)
-    remainder = float(second.log_bayes[order[0]]) if order else 0.0
-    return remainder, pairs, _over_variants(second.scan, without)
+    alone = _over_variants(second.scan, without).tolist()
+    labels = [one.label for one in second.scan.candidates]
+    return float(second.log_bayes[order[0]]), pairs, dict(zip(labels, alone, strict=True))
 
 
 def _expected(found: _Scanned, settings: Settings) -> tuple[Expected, ...]:

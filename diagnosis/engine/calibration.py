@@ -14,7 +14,7 @@ from diagnosis.engine.products import gram_of, whitened_base
 from diagnosis.engine.sessions import fit_over_sessions, sessions_of, with_deviation
 from models.base.types import Array
 
-WIDEST_CLASS = "FULL"  # the point is calibrated with it: no parameter has to stand in for what the model cannot know
+WIDEST_CLASS = "full"  # the point is calibrated with it: no parameter has to stand in for what the model cannot know
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -15,9 +15,10 @@ from diagnosis.candidates.hypotheses import Hypothesis, chunks
 from diagnosis.engine.fit import Experiment, Fit, Linear, Linearised
 from diagnosis.engine.gram import Given, Gram, Strengths, strengths
 from diagnosis.engine.metric import Metric
-from diagnosis.engine.point import AT_ONCE, Machine, Point
+from diagnosis.engine.point import AT_ONCE, Column, Machine, Point
 from diagnosis.engine.products import base_of, gram_of
-from diagnosis.engine.unknown import Group, NetworkParameter, TermParameter, Unknown
+from diagnosis.engine.slopes import Heat
+from diagnosis.engine.unknown import TERM_STEP, Group, Held, NetworkParameter, Scope, TermParameter, Unknown
 from diagnosis.forward.network_on_grid import NetworkOnGrid
 from diagnosis.forward.observation import readings
 from diagnosis.forward.term_on_grid import TermOnGrid
@@ -30,6 +31,7 @@ from models.terms.term import Term
 START_SHARES = (1.0, 0.3, 0.03)  # of the strength that the scan promises
 ROUGH, ITERATIONS = 3, 10
 CANDIDATE = Group(name="candidate")
+DATE_STEP_S = 10.0
 VALUES_AT_ONCE = 800_000  # of heats that are held together, per part: bounds the memory of long recordings
 
 
@@ -107,7 +109,7 @@ def scan(fit: Fit, candidates: Sequence[Hypothesis]) -> Scan:
     intervals = max(len(part.point.trajectory.T) for part in fit.parts)
     for chunk in chunks(candidates, max(16, min(AT_ONCE, VALUES_AT_ONCE // intervals))):
         some = placed[len(best) : len(best) + len(chunk)]
-        raw = [_acting_columns(fit.experiment, part, some) for part in fit.parts]
+        raw = [_columns(fit.experiment, part, some) for part in fit.parts]
         peaks = np.max([np.abs(X[:, warm]).max(axis=(0, 1)) for X in raw], axis=0)
         blocks = [part.filter(X) for part, X in zip(fit.parts, raw, strict=True)]
         (a, b), first = everything.against(residuals, blocks), 0
@@ -143,55 +145,81 @@ def _with_unknowns(fit: Fit) -> Metric:
     return replace(metric, shared=tuple(np.column_stack(both) for both in zip(columns, metric.shared, strict=True)))
 
 
-def _acting_columns(
-    experiment: Experiment, part: Linear, some: Sequence[tuple[Hypothesis, TermOnGrid]]
-) -> Array:  # fmt: skip
-    """Readings per unit of strength for all variants of some candidates; 0 of one that cannot act in the recording."""
-    recording, first = part.point.trajectory.piece.recording, 0
-    acting: list[tuple[Hypothesis, TermOnGrid]] = []
-    at: list[int] = []
-    for candidate, on_grid in some:
-        scope, last = experiment.scope_of(candidate.name), first + len(candidate.variants)
-        if scope is None or recording in scope:
-            acting.append((candidate, on_grid))
-            at += range(first, last)
-        first = last
-    result = np.zeros((*part.point.read.shape, first))
-    if acting:
-        result[:, :, at] = _columns(part, acting)
-    return result
+def _columns(experiment: Experiment, part: Linear, some: Sequence[tuple[Hypothesis, TermOnGrid]]) -> Array:
+    """Readings per unit of strength for all variants of some candidates, shape (K + 1, channels, n).
 
-
-def _columns(part: Linear, some: Sequence[tuple[Hypothesis, TermOnGrid]]) -> Array:
-    """Readings per unit of strength for all variants of some candidates, shape (K + 1, channels, n)."""
+    They are zero where a candidate cannot act.
+    """
     point, trajectory = part.point, part.point.trajectory
-    count = sum(len(candidate.variants) for candidate, _ in some)
+    count, recording = sum(len(candidate.variants) for candidate, _ in some), trajectory.piece.recording
+    acting = [in_scope_of(experiment, candidate, recording) for candidate, _ in some]
+    if not any(acting):
+        return np.zeros((*point.read.shape, count))
     into = np.zeros((len(trajectory.piece.steps), trajectory.decay.shape[-1], count))
     loss, shown, first = np.zeros((len(into), count)), {}, 0
-    for candidate, on_grid in some:
+    for (candidate, on_grid), acts in zip(some, acting, strict=True):
         mine = slice(first, first + len(candidate.variants))
-        if on_grid.term.kind == "sensor":
-            shown[mine.start] = _faults(point, candidate, on_grid)
-        else:
-            heat, own = on_grid.heat(trajectory, candidate.variants)
-            into[:, : heat.shape[1], mine] = heat if np.isfinite(heat.sum()) else np.nan_to_num(heat)
-            loss[:, mine] = np.nan_to_num(own)
         first = mine.stop
+        if not acts:
+            continue
+        values = _by_clock(candidate, experiment.starts_at.get(recording))
+        if on_grid.term.kind == "sensor":
+            shown[mine.start] = _faults(point, values, on_grid)
+        else:
+            heat, own = on_grid.heat(trajectory, values)
+            into[:, : heat.shape[1], mine] = _finite(heat)
+            loss[:, mine] = _finite(own)
     result = point.heated(into, loss)
     for start, columns in shown.items():
         result[:, :, start : start + columns.shape[2]] = columns
     return result
 
 
-def _faults(point: Point, candidate: Hypothesis, on_grid: TermOnGrid) -> Array:
+def heat_columns(experiment: Experiment, point: Point, candidate: Hypothesis) -> list[Column]:
+    """Columns of all variants of a candidate that brings heat, in one piece, per unit of strength.
+
+    Parameters
+    ----------
+    experiment : Experiment
+    point : Point
+    candidate : Hypothesis
+        Neither of a parameter nor of a sensor
+    """
+    assert candidate.term is not None  # noqa: S101 - it brings heat
+    trajectory, coupled = point.trajectory, len(point.machine.model.coupled)
+    if not in_scope_of(experiment, candidate, trajectory.piece.recording):
+        return [Column() for _ in candidate.variants]
+    values = _by_clock(candidate, experiment.starts_at.get(trajectory.piece.recording))
+    heat, loss = _on_grid(point.machine.model, candidate.term).heat(trajectory, values)
+    into = np.pad(np.nan_to_num(heat), ((0, 0), (0, coupled), (0, 0)))
+    return [Column(heat=Heat(into=into[:, :, i], loss=loss[:, i])) for i in range(len(values))]
+
+
+def _by_clock(candidate: Hypothesis, starts_at: float | None) -> Array:
+    """Variants of a candidate in a recording that starts at a time of the shared axis, shape (V, parameters)."""
+    if candidate.clock is None or starts_at is None:
+        return candidate.variants
+    assert candidate.term is not None  # noqa: S101 - it has a parameter
+    names = [p.name for p in candidate.term.parameters]
+    values = np.array(candidate.variants)
+    values[:, names.index(candidate.clock)] = starts_at
+    return values
+
+
+def _faults(point: Point, variants: Array, on_grid: TermOnGrid) -> Array:
     """Change of the recorded readings per unit of strength of a fault, shape (K + 1, channels, variants)."""
     read = readings(point.machine.model, point.trajectory, point.sensors)
     columns = []
-    for variant in candidate.variants:
+    for variant in variants:
         values = np.array(variant)
         values[0] *= on_grid.term.strength.sd  # by a difference of the size that the fault typically has
         columns.append((on_grid.distorted(point.trajectory, point.sensors, read, values) - read) / values[0])
     return np.stack(columns, axis=2)
+
+
+def _finite(heat: Array) -> Array:
+    """A heat without what a law cannot tell, as a factor on a link that another effect has cut off."""
+    return heat if np.isfinite(heat.sum()) else np.nan_to_num(heat, nan=0.0, posinf=0.0, neginf=0.0)
 
 
 @lru_cache(maxsize=2048)
@@ -217,19 +245,42 @@ def with_candidate(fit: Fit, candidate: Hypothesis, variant: int) -> tuple[Exper
     """
     experiment, term = fit.experiment, candidate.term
     assert term is not None  # noqa: S101 - parameters out of their priors have no term
-    machine, scope = experiment.machine, experiment.scope_of(candidate.name)
+    machine = experiment.machine
     names = tuple(p.name for p in term.parameters)
-    added: list[Unknown]
-    if term.kind in ("sensor", "signal"):
+    outside = term.kind in ("sensor", "signal")
+    if outside:
         machine = Machine(machine.model, (*machine.terms, term))
-        added = [TermParameter(parameter=p, group=CANDIDATE, scope=scope, label=term.label, names=names)
-                 for p in term.parameters]  # fmt: skip
     else:
-        network = term.apply(machine.model.network)
-        machine = Machine(NetworkOnGrid(network, machine.model.losses), machine.terms)
-        added = [NetworkParameter(parameter=p, group=CANDIDATE, scope=scope) for p in term.parameters]
-    z = [unknown.z_of(value) for unknown, value in zip(added, candidate.variants[variant].tolist(), strict=True)]
+        machine = Machine(NetworkOnGrid(term.apply(machine.model.network), machine.model.losses), machine.terms)
+    values = candidate.variants[variant].tolist()
+    scopes = [_scope(experiment, candidate), *(None for _ in names[1:])]
+    added: list[Unknown] = []
+    for p, value, scope in zip(term.parameters, values, scopes, strict=True):
+        if p.name == candidate.clock:
+            added.append(Held(parameter=p, group=CANDIDATE, label=term.label, names=names,
+                              of_recording=experiment.starts_at))  # fmt: skip
+        elif p.sd == 0.0:
+            held = replace(p, start=value)
+            added.append(Held(parameter=held, group=CANDIDATE, label=term.label, names=names))
+        elif outside:
+            # Differences by a date must be small next to the time that a step takes.
+            step = DATE_STEP_S / p.sd if candidate.clock and p.unit == "s" and not p.log else TERM_STEP
+            added.append(TermParameter(parameter=p, group=CANDIDATE, scope=scope, label=term.label, names=names,
+                                       step=min(step, TERM_STEP)))  # fmt: skip
+        else:
+            added.append(NetworkParameter(parameter=p, group=CANDIDATE, scope=scope))
+    z = [unknown.z_of(value) for unknown, value in zip(added, values, strict=True)]
     return replace(experiment, machine=machine, unknowns=(*experiment.unknowns, *added)), np.array(z)
+
+
+def in_scope_of(experiment: Experiment, candidate: Hypothesis, recording: str) -> bool:
+    """True if a candidate may act in a recording."""
+    scope = _scope(experiment, candidate)
+    return scope is None or recording in scope
+
+
+def _scope(experiment: Experiment, candidate: Hypothesis) -> Scope:
+    return experiment.scope_of(candidate.name, dated=candidate.clock is not None)
 
 
 def refit(fit: Fit, candidate: Hypothesis, variant: int, strength: float, *, iterations: int = ITERATIONS) -> Fit:
@@ -247,7 +298,7 @@ def refit(fit: Fit, candidate: Hypothesis, variant: int, strength: float, *, ite
     one = replace(candidate, variants=candidate.variants[[variant]])
     assert candidate.term is not None  # noqa: S101 - parameters out of their priors have no term
     on_grid = _on_grid(fit.experiment.machine.model, candidate.term)
-    column = [part.filter(_acting_columns(fit.experiment, part, [(one, on_grid)])) for part in fit.parts]
+    column = [part.filter(_columns(fit.experiment, part, [(one, on_grid)])) for part in fit.parts]
     both = Linearised.of([replace(part, residual=x[:, 0]) for part, x in zip(fit.parts, column, strict=True)],
                          fit.experiment.metric)  # fmt: skip
     aside = -fit.covariance @ both.products[1:, 0]  # of the other unknowns, per unit of strength

@@ -73,11 +73,19 @@ class Experiment:
         """True if the rows of any piece lie minutes apart."""
         return any(piece.slow for piece in self.pieces)
 
-    def scope_of(self, effect: str) -> Scope:
-        """Recordings in which a mechanism, or any other addition to the machine, may act; None for all."""
-        if not self.healthy or (self.switched_off and effect not in self.switched_off):
+    def scope_of(self, effect: str, *, dated: bool = False) -> Scope:
+        """Recordings in which an effect may act, those to be predicted too; None for all.
+
+        Parameters
+        ----------
+        effect : str
+            Name of a mechanism, or of another addition to the machine
+        dated : bool
+            True for what begins at a date: baselines are from before it, whatever is switched off in them
+        """
+        if not self.healthy or (self.switched_off and effect not in self.switched_off and not dated):
             return None
-        return frozenset(piece.recording for piece in self.pieces) - self.healthy
+        return frozenset({*self.session_of, *(piece.recording for piece in self.pieces)}) - self.healthy
 
     @cached_property
     def bounds(self) -> tuple[Array, Array]:

@@ -38,6 +38,7 @@ from diagnosis.recordings.recording import Recording
 from diagnosis.setup.baselines import session_by_recording
 from diagnosis.setup.inference_setup import CAPACITY_SD, InferenceSetup, prepare
 from diagnosis.setup.shaft import torque_gain
+from diagnosis.setup.time_axis import start_times
 from models.assembly.gearbox import Gearbox
 from models.network.laws import Parameter
 from models.quantities.quantities import TOTAL_LOSS, is_total_loss
@@ -95,6 +96,7 @@ def prepare_experiment(
         session_of=session_by_recording(recordings, holdout, baseline),
         healthy=frozenset(r.name for r in baseline),
         switched_off=frozenset(switched_off),
+        starts_at=start_times([*recordings, *holdout]),
     )
 
 

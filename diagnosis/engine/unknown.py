@@ -6,7 +6,8 @@ exact derivative of the readings. Parameters of a calibration, faults of measure
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
@@ -231,6 +232,7 @@ class TermParameter(_Prior):
 
     label: str
     names: tuple[str, ...]
+    step: float = TERM_STEP
 
     def act(self, setting: Setting, z: float) -> None:
         """Set the term's parameter."""
@@ -239,7 +241,51 @@ class TermParameter(_Prior):
     def column(self, point: Point, z: float) -> Column:
         """Difference of the shifted heat or of the distorted reading."""
         per_z = self.per_z(z)
-        return point.term_column(self.label, self.names.index(self.parameter.name), TERM_STEP * per_z) * per_z
+        return point.term_column(self.label, self.names.index(self.parameter.name), self.step * per_z) * per_z
+
+
+@dataclass(frozen=True, kw_only=True)
+class Held(_Prior):
+    """A parameter of a term that is not fitted.
+
+    Attributes
+    ----------
+    label : str
+        Of the term
+    names : tuple of str
+        Parameters of the term
+    of_recording : mapping of str to float
+        Value in every recording; elsewhere the start of the parameter
+    """
+
+    label: str
+    names: tuple[str, ...]
+    of_recording: Mapping[str, float] = field(default_factory=dict)
+
+    def value(self, z: float) -> float:  # noqa: ARG002 - of the protocol
+        """The start of the parameter."""
+        return self.parameter.start
+
+    def z_of(self, value: float) -> float:  # noqa: ARG002 - of the protocol
+        """Zero."""
+        return 0.0
+
+    def bounds(self) -> tuple[float, float]:
+        """Zero and zero."""
+        return 0.0, 0.0
+
+    def act(self, setting: Setting, z: float) -> None:
+        """Set the parameter in the network, or in the term outside it."""
+        value = self.of_recording.get(setting.recording, self.value(z))
+        index = setting.machine.parameter_index.get(self.parameter.name)
+        if index is not None:
+            setting.values[index] = value
+        else:
+            setting.of_terms[self.label][self.names.index(self.parameter.name)] = value
+
+    def column(self, point: Point, z: float) -> Column:  # noqa: ARG002 - of the protocol
+        """Nothing."""
+        return Column()
 
 
 def in_scope(unknown: Unknown, recording: str) -> bool:

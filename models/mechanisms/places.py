@@ -147,7 +147,7 @@ def _held(network: ThermalNetwork, holder: str, held: str) -> Iterator[Placement
 
 def _links(network: ThermalNetwork, pattern: str) -> Iterator[Placement]:
     each, rest = _apart(pattern)
-    name = re.sub(r"\W", "_", rest)
+    name = identifier(rest)
     chosen: dict[str, tuple[str, str]] = {}
     for ends in rest.split("+"):
         a, _, b = ends.partition("-")
@@ -166,6 +166,11 @@ def _links(network: ThermalNetwork, pattern: str) -> Iterator[Placement]:
         a, b = rest.split("-")
         own = {link: nodes for link, nodes in chosen.items() if nodes[side] == member}
         yield _between(f"{member}_{b}" if side == 0 else f"{a}_{member}", own)
+
+
+def identifier(name: str) -> str:
+    """Name of a link as an identifier."""
+    return re.sub(r"\W", "_", name)
 
 
 def _between(name: str, chosen: dict[str, tuple[str, str]]) -> Placement:

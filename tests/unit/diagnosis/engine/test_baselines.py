@@ -81,9 +81,10 @@ def test_baselines_are_pieces_of_another_session(prepared: tuple[InferenceSetup,
 
 def test_where_an_effect_may_act(prepared: tuple[InferenceSetup, Experiment]) -> None:
     _, experiment = prepared
-    assert experiment.scope_of("windage") == {"train"} and experiment.scope_of("pocketing") is None
+    assert experiment.scope_of("windage") == {"train", "hold"} and experiment.scope_of("pocketing") is None
+    assert experiment.scope_of("pocketing", dated=True) == {"train", "hold"}
     nothing_acts = replace(experiment, switched_off=frozenset())
-    assert nothing_acts.scope_of("pocketing") == {"train"}
+    assert nothing_acts.scope_of("pocketing") == {"train", "hold"}
     assert replace(nothing_acts, healthy=frozenset()).scope_of("windage") is None
 
 

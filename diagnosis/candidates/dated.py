@@ -1,0 +1,267 @@
+"""Changes of a machine over the time that its recordings share: at a date, over hours, or for a while.
+
+Any law may change: one of the catalogue, a loss, a link, a sensor, an input. The change is the law times a course in
+time, ``strength * law * course(time + start - since)``; `start` is the start of the recording on the time axis that all
+recordings share, so a step is off in earlier recordings and on in later ones.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import sympy as sp
+
+from diagnosis.candidates.hypotheses import How, Hypothesis, hypothesis_of
+from models.base.types import Array
+from models.mechanisms import Placed
+from models.mechanisms.forms import EDGE_S, steps
+from models.network.laws import Parameter, symbol
+
+HOUR_S = 3600.0
+LINEAR_S, SETTLING_S = 20.0 * HOUR_S, 3.0 * HOUR_S  # of the courses over the hours
+DATE_SD = 0.4  # of the time axis: nearly a uniform prior
+RISES, LENGTHS = (3.0,), (1.5, 4.0)  # of a slow step and of a change for a while, in distances between dates
+STEP, WHILE, HOURS = "step", "for_a_while", "over_hours"  # endings of names
+CHANGED = ("_change", "_error")  # endings of names that a change at a date has no use for
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Axis:
+    """The time axis that recordings share.
+
+    Attributes
+    ----------
+    dates : Array, shape (n,)
+        At which something may change, [s]
+    end : float
+        End of the last recording, [s]
+    edge_s : float
+        Shortest time that a change takes, [s]
+    """
+
+    dates: Array
+    end: float
+    edge_s: float = 2.0 * EDGE_S
+
+    @property
+    def distance(self) -> float:
+        """Typical distance of dates, [s]."""
+        return self.end / max(len(self.dates), 1)
+
+    def moment(self, name: str) -> Parameter:
+        """A date as a parameter, [s]."""
+        return Parameter(name=name, unit="s", start=0.5 * self.end, sd=DATE_SD * self.end, lower=-self.end,
+                         upper=2.0 * self.end, log=False)  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Course:
+    """A course in time that a law is multiplied by.
+
+    Attributes
+    ----------
+    ending : str
+        Of the name of a law that has it
+    how : str
+        Family of hypotheses
+    says : str
+        Sentence that comes before the one of the law
+    parameters : tuple of Parameter
+        By local names
+    variants : Array, shape (V, parameters)
+    law : sympy.Expr
+        Of the local parameters and ``now``, the time on the axis [s]
+    """
+
+    ending: str
+    how: How
+    says: str
+    parameters: tuple[Parameter, ...]
+    variants: Array
+    law: sp.Expr
+
+
+NOW = symbol("now")
+
+
+def step(axis: Axis, *, slow: bool = True) -> Course:
+    """From a date on, at once or (if `slow` ones are tried) in some hours, and then constant."""
+    since, rise = symbol("since"), symbol("within")
+    rises = axis.distance * np.array(RISES)
+    at_once, slowly = _products(axis.dates, [axis.edge_s]), _products([0.0, *axis.dates[::2]], rises)
+    return Course(
+        ending=STEP, how="D", says="From a date on", parameters=(axis.moment("since"), _span("within", axis.edge_s, rises[-1])),
+        variants=np.concatenate([at_once, slowly]) if slow else at_once, law=sp.Min(sp.Max((NOW - since) / rise, 0), 1),
+    )  # fmt: skip
+
+
+def for_a_while(axis: Axis) -> Course:
+    """From one date to another."""
+    since, length = symbol("since"), symbol("lasting")
+    lengths = axis.distance * np.array(LENGTHS)
+    return Course(
+        ending=WHILE, how="D", says="From one date to another",
+        parameters=(axis.moment("since"), _span("lasting", *lengths)), variants=_products(axis.dates[::2], lengths),
+        law=steps(NOW, at=since, width=0.5 * axis.edge_s) - steps(NOW, at=since + length, width=0.5 * axis.edge_s),
+    )  # fmt: skip
+
+
+def over_hours(_: Axis) -> Course:
+    """Slowly over the hours since the first row of the first recording: on and on, or until it has settled."""
+    names = ("linear", "settling", "fading")
+    linear, settling, fading = (symbol(name) for name in names)
+    parameters = tuple(
+        Parameter(name=name, start=0.0, sd=0.0, lower=0.0, upper=1.0, log=False) for name in names
+    )  # fmt: skip
+    decay = sp.exp(-NOW / SETTLING_S)
+    return Course(
+        ending=HOURS, how="W", says="Slowly over the hours", parameters=parameters, variants=np.eye(3),
+        law=linear * NOW / LINEAR_S + settling * (1 - decay) + fading * decay,
+    )  # fmt: skip
+
+
+def _span(name: str, low: float, high: float) -> Parameter:
+    middle = float(np.sqrt(low * high))
+    return Parameter(name=name, unit="s", start=middle, sd=max(0.5 * float(np.log(high / low)), 0.5), lower=0.5 * low,
+                     upper=20.0 * high, log=True)  # fmt: skip
+
+
+def _products(first: Iterable[float], second: Iterable[float]) -> Array:
+    return np.array([(a, b) for a in first for b in second]).reshape(-1, 2)
+
+
+def changing(placed: Placed, course: Course, axis: Axis, *, sd: float | None = None) -> Hypothesis:
+    """A law times a course in time.
+
+    Parameters
+    ----------
+    placed : Placed
+        Its shape parameters start from the middles of their grids
+    course : Course
+    axis : Axis
+    sd : float, optional
+        Prior of the strength; by default that of the law
+
+    Returns
+    -------
+    Hypothesis
+        The last of its term's parameters is the clock
+    """
+    label = f"{placed.label}_{course.ending}"
+    term, clock = _renamed(placed, label), _clock(label, axis)
+    strength, *shapes = term.parameters
+    added = tuple(replace(p, name=f"{label}_{p.name}") for p in course.parameters)
+    local = {symbol(p.name): symbol(f"{label}_{p.name}") for p in course.parameters}
+    along = course.law.xreplace(local | {NOW: symbol("time") + symbol(clock.name)})
+    mechanism = placed.mechanism
+    says = f"{course.says}: {mechanism.says[:1].lower()}{mechanism.says[1:]}"
+    name = f"{base_name(placed)}_{course.ending}"
+    shown = term.written["law"] * course.law.xreplace({NOW: symbol("time") + symbol("start")})
+    term = replace(
+        term,
+        mechanism=replace(mechanism, name=name, says=says),
+        written={**term.written, "law": shown},
+        expression=term.expression * along,
+        parameters=(replace(strength, sd=sd or strength.sd), *shapes, *added, clock),
+    )
+    middle = [p.grid[len(p.grid) // 2] if p.grid else p.start for p in shapes]
+    rows = [[1.0, *middle, *variant, clock.start] for variant in course.variants.tolist()]
+    return Hypothesis(name=name, place=placed.place, family=placed.family, term=term, variants=np.array(rows),
+                      how=course.how, clock=clock.name)  # fmt: skip
+
+
+def carried_on(placed: Placed, axis: Axis) -> Hypothesis:
+    """A law of the time since the start of the first recording, instead of every recording.
+
+    Parameters
+    ----------
+    placed : Placed
+        Without memories
+    axis : Axis
+    """
+    label = f"{placed.label}_carried_on"
+    term, clock, base = _renamed(placed, label), _clock(label, axis), hypothesis_of(placed)
+    now = {symbol("time"): symbol("time") + symbol(clock.name)}
+    other = term.boundary_temperature
+    shown = {key: law.xreplace({symbol("time"): symbol("time") + symbol("start")}) for key, law in term.written.items()}
+    term = replace(
+        term, expression=term.expression.xreplace(now), boundary_temperature=None if other is None else other.xreplace(now),
+        written=shown, parameters=(*term.parameters, clock),
+    )  # fmt: skip
+    variants = np.column_stack([base.variants, np.full(len(base.variants), clock.start)])
+    return replace(base, term=term, variants=variants, how="C", clock=clock.name)
+
+
+def _clock(label: str, axis: Axis) -> Parameter:
+    """Start of a recording on the axis.
+
+    Its value for a machine that is not one of the recordings' is the end of the last one: what lasted until then goes
+    on.
+    """
+    return Parameter(name=f"{label}_start", unit="s", start=axis.end, sd=0.0, lower=0.0, upper=10.0 * axis.end,
+                     log=False, description="start of the recording on the time axis of all recordings")  # fmt: skip
+
+
+def _renamed(placed: Placed, label: str) -> Placed:
+    """A law with another label, and so with names of parameters, states and boundary that differ from the law's."""
+
+    def new(name: str) -> str:
+        return f"{label}_{name.removeprefix(f'{placed.label}_')}"
+
+    names = {one.name: new(one.name) for one in (*placed.parameters, *placed.states)}
+    if placed.boundary_temperature is not None:
+        end = placed.target[-1]
+        names |= {end: new(end), f"T_{end}": f"T_{new(end)}"}
+    own = {symbol(old): symbol(name) for old, name in names.items()}
+    other = placed.boundary_temperature
+    return replace(
+        placed, label=label, target=tuple(names.get(one, one) for one in placed.target),
+        written={" ".join(names.get(word, word) for word in key.split(" ")): law for key, law in placed.written.items()},
+        expression=placed.expression.xreplace(own), boundary_temperature=None if other is None else other.xreplace(own),
+        parameters=tuple(replace(p, name=names[p.name]) for p in placed.parameters),
+        states=tuple(
+            replace(s, name=names[s.name], rate=s.rate.xreplace(own),
+                    update=None if s.update is None else s.update.xreplace(own),
+                    averaged_update=None if s.averaged_update is None else s.averaged_update.xreplace(own))
+            for s in placed.states
+        ),
+    )  # fmt: skip
+
+
+def base_name(placed: Placed) -> str:
+    """Name of a law without the ending that says it differs from its nominal value."""
+    for ending in CHANGED:
+        if placed.name.endswith(ending):
+            return placed.name.removesuffix(ending)
+    return placed.name
+
+
+def has_clock(placed: Placed) -> bool:
+    """True if a law depends on the time, and on nothing that it remembers."""
+    return placed.form in (None, "shift") and not placed.states and symbol("time") in placed.expression.free_symbols
+
+
+def changed_law(h: Hypothesis) -> str:
+    """Name of the law that a hypothesis changes, whatever its course in time; the name itself of one without."""
+    for ending in (STEP, WHILE, HOURS):
+        if h.clock is not None and h.name.endswith(f"_{ending}"):
+            return h.name.removesuffix(f"_{ending}")
+    return h.name
+
+
+def may_change(placed: Placed) -> bool:
+    """True if a law can be multiplied by a course: it has none yet, and is no delay, exchange or freezing."""
+    laws = (placed.expression, *(s.rate for s in placed.states))
+    return placed.form in (None, "shift") and all(symbol("time") not in law.free_symbols for law in laws)
+
+
+def without_repeats(placed: Sequence[Placed]) -> list[Placed]:
+    """Laws of which no two are constants times the same losses, links or input."""
+    found: dict[tuple[Any, ...], Placed] = {}
+    for one in placed:
+        law = one.expression.xreplace({symbol(one.strength.name): sp.Integer(1)})
+        found.setdefault((one.kind, frozenset(one.target), one.weights, law), one)
+    return list(found.values())

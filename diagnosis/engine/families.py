@@ -1,0 +1,154 @@
+"""All families of candidates of an experiment, and their prior."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from diagnosis.candidates.dated import (
+    Axis,
+    carried_on,
+    changing,
+    for_a_while,
+    has_clock,
+    may_change,
+    over_hours,
+    step,
+    without_repeats,
+)
+from diagnosis.candidates.factors import factors_of
+from diagnosis.candidates.hypotheses import How, Hypothesis, hypothesis_of
+from diagnosis.engine.fit import Experiment
+from diagnosis.engine.unknown import NetworkParameter
+from diagnosis.forward.grid import Piece
+from diagnosis.setup.inference_setup import STANDSTILL_RPM, InferenceSetup
+from models.base.types import Array
+from models.mechanisms import Mechanism, Placed
+from models.mechanisms.ageing import FAMILY as AGEING
+from models.mechanisms.forms import EDGE_S
+
+SHARES: Mapping[How, float] = {"U": 0.6, "D": 0.2, "C": 0.1, "W": 0.1, "P": 0.03}
+DATES = 14  # of a long recording
+LONG = 0.5  # of the longest recording
+SENSOR_SD_K = 1.0
+RADIATION = "radiation_error"  # the one law of the model that is part of a link
+
+
+def candidates_of(
+    setup: InferenceSetup, experiment: Experiment, catalogue: Mapping[str, Mechanism]
+) -> tuple[Hypothesis, ...]:
+    """All that may be missing, wrong, or changed.
+
+    Parameters
+    ----------
+    setup : InferenceSetup
+    experiment : Experiment
+    catalogue : mapping of str to Mechanism
+
+    Returns
+    -------
+    tuple of Hypothesis
+        Mechanisms of the catalogue (U), changes at a date (D) and over hours (W), laws of time that go on in the next
+        recording (C), parameters outside their priors (P)
+    """
+    network = experiment.machine.model.network
+    placed = [one for m in catalogue.values() for one in m.placed(network, setup.scale, setup.channels)]
+    factors = factors_of(network, setup.scale, setup.channels)
+    axis = axis_of(experiment)
+    several = len({piece.recording for piece in experiment.pieces} - experiment.healthy) > 1
+    return (
+        *(hypothesis_of(one) for one in placed),
+        *changes(factors, placed, axis),
+        *(carried_on(one, axis) for one in placed if several and has_clock(one)),
+        *parameters_outside(experiment),
+    )
+
+
+def changes(factors: Sequence[Placed], catalogue: Sequence[Placed], axis: Axis) -> list[Hypothesis]:
+    """Changes of laws over the time axis.
+
+    The model's own laws, radiation, sensors and inputs may have any course; other mechanisms of the catalogue begin at
+    a date. Ageing has a course of its own already.
+    """
+    known = [one for one in catalogue if may_change(one) and one.family != AGEING]
+    laws = without_repeats([*factors, *known])
+    courses = [step(axis), for_a_while(axis), over_hours(axis)]
+    return [
+        changing(one, course, axis, sd=SENSOR_SD_K if one.name == "sensor_bias" and one.strength.unit == "K" else None)
+        for one in laws
+        for course in (
+            courses if one in factors or one.of_measurement or one.name == RADIATION else [step(axis, slow=False)]
+        )
+        if len(course.variants)
+    ]
+
+
+def parameters_outside(experiment: Experiment) -> list[Hypothesis]:
+    """Every parameter of the network outside its prior."""
+    return [
+        Hypothesis(name="parameter", place=unknown.parameter.name, family="parameter", unknown=index, how="P",
+                   variants=np.ones((1, 1)))
+        for index, unknown in enumerate(experiment.unknowns)
+        if isinstance(unknown, NetworkParameter)
+    ]  # fmt: skip
+
+
+def axis_of(experiment: Experiment) -> Axis:
+    """The time axis of an experiment, with dates at which something may change.
+
+    Long recordings have :data:`DATES` dates, evenly over the time that the machine runs; shorter ones their start and
+    their middle. Nothing changes in healthy recordings, or at the first moment of all.
+    """
+    of_recording: dict[str, list[Piece]] = {}
+    for piece in experiment.pieces:
+        of_recording.setdefault(piece.recording, []).append(piece)
+    names = sorted(of_recording, key=lambda name: experiment.starts_at.get(name, 0.0))
+    span = {name: float(of_recording[name][-1].time[-1] - of_recording[name][0].time[0]) for name in names}
+    sick = [name for name in names if name not in experiment.healthy]
+    dates: list[float] = []
+    for name in sick:
+        start, pieces = experiment.starts_at.get(name, 0.0), of_recording[name]
+        if span[name] >= LONG * max(span[one] for one in sick):
+            dates += [start + date for date in _running(pieces, experiment.machine.inputs)]
+        else:
+            middle = start + pieces[0].time[0] + 0.5 * span[name]
+            dates += [middle] if name == sick[0] else [start, middle]
+    end = max(experiment.starts_at.get(name, 0.0) + float(of_recording[name][-1].time[-1]) for name in names)
+    interval = float(np.median(np.concatenate([piece.steps for piece in experiment.pieces])))
+    return Axis(dates=np.array(sorted(dates)), end=end, edge_s=2.0 * max(EDGE_S, interval if experiment.slow else 0.0))
+
+
+def _running(pieces: Sequence[Piece], inputs: Sequence[str]) -> list[float]:
+    """Dates in a recording, evenly over the time that the machine runs, [s] since its first row."""
+    begin, steps = np.concatenate([p.time[:-1] for p in pieces]), np.concatenate([p.steps for p in pieces])
+    runs = np.ones(len(begin), dtype=bool)
+    if "speed" in inputs:
+        speed = np.concatenate([p.inputs[:, list(inputs).index("speed")] for p in pieces])
+        runs = np.abs(speed) > STANDSTILL_RPM
+    if not runs.any():
+        runs[:] = True
+    passed = np.concatenate([[0.0], np.cumsum(steps * runs)])
+    wanted = (np.arange(DATES) + 0.5) / DATES * passed[-1]
+    at = np.searchsorted(passed, wanted, side="right") - 1
+    at = np.minimum(at, len(begin) - 1)
+    return [float(t) for t in begin[at] + wanted - passed[at]]
+
+
+def log_prior(hypotheses: Sequence[Hypothesis]) -> Array:
+    """Prior of every hypothesis, [nat]: its family's share, uniform over names and then over places.
+
+    Parameters
+    ----------
+    hypotheses : sequence of Hypothesis
+
+    Returns
+    -------
+    Array, shape (hypotheses,)
+        Normalised over all
+    """
+    places = Counter((h.how, h.name) for h in hypotheses)
+    names = Counter(how for how, _ in places)
+    log = np.array([np.log(SHARES[h.how] / names[h.how] / places[h.how, h.name]) for h in hypotheses])
+    return np.asarray(log - np.logaddexp.reduce(log))

@@ -1,0 +1,8 @@
+"""Structured model error: further unknowns with small prior amplitudes for what a lumped model cannot know."""
+
+from __future__ import annotations
+
+from diagnosis.engine.model_error.classes import ErrorClass, error_classes
+from diagnosis.engine.model_error.error_columns import Columns, ModelError
+
+__all__ = ["Columns", "ErrorClass", "ModelError", "error_classes"]

@@ -1,0 +1,135 @@
+"""The unknowns of model error and their columns."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from diagnosis.engine.fit import Experiment
+from diagnosis.engine.model_error.anatomy import Anatomy
+from diagnosis.engine.model_error.classes import ErrorClass
+from diagnosis.engine.model_error.courses import Standard, View
+from diagnosis.engine.model_error.groups import GROUPS, Change, HeatChange
+from diagnosis.engine.point import AT_ONCE, Point
+from models.base.types import Array
+
+VALUES_AT_ONCE = 800_000  # of heats that are held together, per part: bounds the memory of long recordings
+FEWEST_AT_ONCE = 16
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Columns:
+    """Change per unit of some unknowns along one piece.
+
+    Attributes
+    ----------
+    into : Array, shape (K, parts + coupled, n)
+        Heat into every part, see :class:`diagnosis.engine.slopes.Heat`, [W]
+    loss : Array, shape (K, n)
+        Part of it that is mechanical loss, [W]
+    reading : Array, shape (K + 1, channels, n)
+        Change of the readings of sound sensors, [K] or [W]
+    """
+
+    into: Array
+    loss: Array
+    reading: Array
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ModelError:
+    """The unknowns of model error of one experiment: the same for all its pieces, in one order.
+
+    Attributes
+    ----------
+    standard : Standard
+        Sizes that make the unknowns dimensionless
+    changes : tuple of Change
+        All changes, each with one unknown or more
+    of_changes : tuple of str
+        Group of every change
+    """
+
+    standard: Standard
+    changes: tuple[Change, ...]
+    of_changes: tuple[str, ...]
+
+    @classmethod
+    def of(cls, experiment: Experiment, points: Sequence[Point] | None = None) -> ModelError:
+        """Unknowns of a machine with its recordings.
+
+        Parameters
+        ----------
+        experiment : Experiment
+        points : sequence of Point, optional
+            All pieces where they give the sizes; by default at the middles of the priors
+
+        Raises
+        ------
+        ArithmeticError
+            If the temperatures leave all bounds at the middles of the priors.
+        """
+        middles = np.zeros(len(experiment.unknowns))
+        points = points or [experiment.point(index, middles) for index in range(len(experiment.pieces))]
+        machine = Anatomy(experiment, points)
+        found = [(group, change) for group, declare in GROUPS.items() for change in declare(machine)]
+        groups, changes = zip(*found, strict=True)
+        return cls(standard=machine.standard, changes=changes, of_changes=groups)
+
+    @cached_property
+    def labels(self) -> tuple[str, ...]:
+        """Name of every unknown: place and course."""
+        return tuple(f"{group}: {label}" for group, change in zip(self.of_changes, self.changes, strict=True)
+                     for label in change.labels)  # fmt: skip
+
+    @cached_property
+    def groups(self) -> tuple[str, ...]:
+        """Group of every unknown."""
+        return tuple(group for group, change in zip(self.of_changes, self.changes, strict=True) for _ in change.labels)
+
+    def amplitudes(self, one: ErrorClass) -> Array:
+        """Amplitude of every unknown in a class, 0 of those that are absent, shape (unknowns,)."""
+        return np.array([one.amplitudes.get(group, 0.0) for group in self.groups])
+
+    def chunks(self, point: Point) -> Iterator[tuple[int, int]]:
+        """First and last (excluded) of so many unknowns as memory allows at once, for all of them."""
+        size = max(FEWEST_AT_ONCE, min(AT_ONCE, VALUES_AT_ONCE // len(point.trajectory.piece.steps)))
+        return ((first, min(first + size, len(self.groups))) for first in range(0, len(self.groups), size))
+
+    def columns(self, point: Point, first: int = 0, last: int | None = None) -> Columns:
+        """Change per unit of the unknowns from `first` up to `last` (excluded; by default all).
+
+        The point may be that of an extended machine: everything is found by its name.
+        """
+        last = len(self.groups) if last is None else last
+        view, (points, channels) = View(point, self.standard), point.read.shape
+        into = np.zeros((points - 1, point.trajectory.decay.shape[-1], last - first))
+        loss, reading = np.zeros((points - 1, last - first)), np.zeros((points, channels, last - first))
+        for change, begin, end in self._between(first, last):
+            low, high = max(begin, first), min(end, last)
+            mine = slice(low - first, high - first)
+            if isinstance(change, HeatChange):
+                heat, course = change.heat(view), change.course.along(view)[:, low - begin : high - begin]
+                for part in np.flatnonzero(heat.into.any(axis=0)):  # few
+                    into[:, part, mine] = heat.into[:, part, None] * course
+                loss[:, mine] = heat.loss[:, None] * course
+            else:
+                reading[:, point.sensors.channels.index(change.channel), mine.start] = change.reading(view)
+        return Columns(into=into, loss=loss, reading=reading)
+
+    def responses(self, point: Point, first: int = 0, last: int | None = None) -> Array:
+        """Change of what is recorded per unit of some unknowns, shape (K + 1, channels, n); see :meth:`columns`."""
+        found = self.columns(point, first, last)
+        return point.heated(found.into, found.loss) + point.setting.passed_on(point.trajectory, found.reading)
+
+    def _between(self, first: int, last: int) -> Iterator[tuple[Change, int, int]]:
+        """Changes with unknowns in a range; their own first and last unknowns."""
+        begin = 0
+        for change in self.changes:
+            end = begin + len(change.labels)
+            if end > first and begin < last:
+                yield change, begin, end
+            begin = end

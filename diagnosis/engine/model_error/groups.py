@@ -1,0 +1,277 @@
+"""The groups of model error: one declaration each of what it changes, where, and along which courses.
+
+Every group lists changes for a machine by rules of its structure, never by names, so that they hold for every
+definition. The first ten are the base groups; the others are finer and belong to the largest class only.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from diagnosis.engine.model_error import heats
+from diagnosis.engine.model_error.anatomy import AMBIENT, Anatomy, Family
+from diagnosis.engine.model_error.courses import (
+    SPEED,
+    TEMPERATURE,
+    TORQUE,
+    AfterStart,
+    Constant,
+    Course,
+    Hours,
+    LaggedDrive,
+    OwnDifference,
+    OwnTemperature,
+    Smooth,
+    SpeedAndTemperature,
+    View,
+)
+from diagnosis.engine.slopes import Heat
+from diagnosis.forward.recurrence import lagged
+from models.base.types import Array
+from models.quantities.quantities import TOTAL_LOSS
+
+DEGREE, JOINT_DEGREE = 3, 2  # of smooth laws: of one law or few, and of many links together
+FINE_DEGREES = (4, 5)
+FEW = 3  # links of a family that have a law each
+SENSOR_LAGS_S = (150.0, 600.0)
+CORE_TIMES_S = (150.0, 600.0, 2400.0)
+CONSTANT = Constant()
+
+
+@dataclass(frozen=True, kw_only=True)
+class HeatChange:
+    """Heat somewhere along some courses: one unknown per course.
+
+    Attributes
+    ----------
+    place : str
+    heat : callable
+        Heat per unit along the piece of a view
+    course : Course
+    """
+
+    place: str
+    heat: Callable[[View], Heat]
+    course: Course = CONSTANT
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """One name per unknown."""
+        return tuple(f"{self.place}, {label}" for label in self.course.labels)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReadingChange:
+    """Another reading of one channel: one unknown.
+
+    Attributes
+    ----------
+    channel, what : str
+    reading : callable
+        Change per unit along the piece of a view, shape (K + 1,), [K] or [W]
+    """
+
+    channel: str
+    what: str
+    reading: Callable[[View], Array]
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """One name."""
+        return (f"{self.channel}, {self.what}",)
+
+
+Change = HeatChange | ReadingChange
+
+
+# ---------------------------------------------------------------------- base groups
+
+
+def loss_laws(machine: Anatomy) -> Iterator[Change]:
+    """Heat of sources by what they depend on; of several in a family, or without a parameter, a factor each."""
+    for family in machine.source_families:
+        yield _of_sources(family.name, family.members, Smooth(coordinates=family.coordinates, highest=DEGREE))
+        if len(family.members) > 1 or not family.calibrated:
+            yield from (_of_sources(name, (name,)) for name in family.members)
+
+
+def link_laws(machine: Anatomy) -> Iterator[Change]:
+    """Conductances by temperature, speed and what they depend on; a factor each."""
+    for family in machine.link_families:
+        if smooth := _link_course(machine, family):
+            groups = [(name,) for name in family.members] if len(family.members) <= FEW else [family.members]
+            yield from (_of_links(group[0] if len(group) == 1 else family.name, group, smooth) for group in groups)
+        yield from (_of_links(name, (name,)) for name in family.members)
+
+
+def heat_splits(machine: Anatomy, course: Course | None = None) -> Iterator[Change]:
+    """A share of the heat of a source goes to another part; sources of a family in one part go together."""
+    for family in machine.source_families:
+        nodes = {source.name: source.node for source in machine.network.sources}
+        for node in dict.fromkeys(nodes[name] for name in family.members):
+            names = tuple(name for name in family.members if nodes[name] == node)
+            for target in machine.split_targets(node):
+                heat = partial(heats.split_heat, names=names, target=target)
+                yield HeatChange(place=f"{' '.join(names)} to {target}", heat=heat, course=course or CONSTANT)
+
+
+def sensor_places(machine: Anatomy) -> Iterator[Change]:
+    """A thermometer feels a neighbour of its node."""
+    for channel in machine.thermometers:
+        for node in machine.around_sensor(channel):
+            yield ReadingChange(channel=channel, what=f"near {node}", reading=partial(_near, channel, node))
+
+
+def slow_sensors(machine: Anatomy) -> Iterator[Change]:
+    """A share of a thermometer's reading comes late."""
+    for channel in machine.thermometers:
+        for time in machine.resolved(SENSOR_LAGS_S):
+            yield ReadingChange(channel=channel, what=f"{time:g} s late", reading=partial(_late, channel, time))
+
+
+def slow_cores(machine: Anatomy) -> Iterator[Change]:
+    """A share of a part's capacity lies in a core that follows slowly."""
+    for part in machine.parts:
+        for time in machine.resolved(CORE_TIMES_S):
+            yield HeatChange(place=f"core of {part}, {time:g} s", heat=partial(heats.core_heat, part=part, time=time))
+
+
+def missing_links(machine: Anatomy) -> Iterator[Change]:
+    """A heat path between nodes that have none, as a share of the machine's conductance."""
+    for pair in machine.unlinked:
+        yield HeatChange(place="-".join(pair), heat=partial(heats.pair_heat, pair=pair))
+
+
+def input_errors(machine: Anatomy) -> Iterator[Change]:
+    """Offset of the torque, gains of the other inputs, offsets of temperatures; those of the calibration left out."""
+    for name in machine.names:
+        if name in (SPEED, TORQUE) and not {SPEED, TORQUE} <= set(machine.coordinates):
+            continue
+        if name == TORQUE:
+            yield HeatChange(place="offset of torque", heat=heats.torque_heat)
+        elif machine.network.inputs[name].quantity.is_temperature:
+            if name != AMBIENT:
+                yield HeatChange(place=f"offset of {name}", heat=partial(heats.offset_heat, name=name))
+        elif machine.standard.largest[name] > 0.0:
+            yield HeatChange(place=f"gain of {name}", heat=partial(heats.gain_heat, name=name))
+
+
+def capacities(machine: Anatomy) -> Iterator[Change]:
+    """Heat capacity of every part."""
+    return (HeatChange(place=f"capacity of {part}", heat=partial(heats.capacity_heat, part=part))
+            for part in machine.parts)  # fmt: skip
+
+
+def loss_zero(machine: Anatomy) -> Iterator[Change]:
+    """Zero of the measured total loss, as a share of the mean heat."""
+    if TOTAL_LOSS in machine.channels:
+        yield ReadingChange(channel=TOTAL_LOSS, what="zero", reading=_zero)
+
+
+# ---------------------------------------------------------------------- finer groups
+
+
+def fine_loss_laws(machine: Anatomy) -> Iterator[Change]:
+    """Loss laws of higher degree."""
+    for family in machine.source_families:
+        course = Smooth(coordinates=family.coordinates, lowest=FINE_DEGREES[0], highest=FINE_DEGREES[1])
+        yield _of_sources(family.name, family.members, course)
+
+
+def losses_by_own_temperature(machine: Anatomy) -> Iterator[Change]:
+    """Heat of sources by how much warmer than the oil their own parts are."""
+    by = tuple(name for name in (SPEED,) if name in machine.coordinates)
+    for source in machine.network.sources:
+        if own := machine.own_nodes(source):
+            yield _of_sources(source.name, (source.name,), OwnTemperature(nodes=own, coordinates=by))
+
+
+def links_by_operation(machine: Anatomy) -> Iterator[Change]:
+    """Every heat path between parts by speed and temperature."""
+    by = tuple(name for name in (SPEED, TEMPERATURE) if name in machine.coordinates)
+    return (_of_links(name, (name,), SpeedAndTemperature(coordinates=by)) for name in machine.between_parts)
+
+
+def links_by_difference(machine: Anatomy) -> Iterator[Change]:
+    """Every heat path by its own temperature difference."""
+    return (_of_links(link.name, (link.name,), OwnDifference(link=link.name)) for link in machine.conducting)
+
+
+def memories(machine: Anatomy) -> Iterator[Change]:
+    """Losses and links by the operation before."""
+    return _everything(machine, LaggedDrive())
+
+
+def ageing(machine: Anatomy) -> Iterator[Change]:
+    """Losses and links by the hours, losses by the time after the start."""
+    yield from _everything(machine, Hours())
+    yield from (_of_sources(source.name, (source.name,), AfterStart()) for source in machine.network.sources)
+
+
+def splits_by_temperature(machine: Anatomy) -> Iterator[Change]:
+    """Heat splits by temperature."""
+    return heat_splits(machine, Smooth(coordinates=(TEMPERATURE,), highest=1))
+
+
+GROUPS: Mapping[str, Callable[[Anatomy], Iterator[Change]]] = {
+    "a_loss": loss_laws, "a_link": link_laws, "b_split": heat_splits, "c_sensor": sensor_places,
+    "c_lag": slow_sensors, "d_sub": slow_cores, "e_link": missing_links, "f_input": input_errors,
+    "g_cap": capacities, "p_zero": loss_zero,
+    "law_deg5": fine_loss_laws, "loss_own": losses_by_own_temperature, "link_nT": links_by_operation,
+    "link_dT": links_by_difference, "lag": memories, "hours": ageing, "split_T": splits_by_temperature,
+}  # fmt: skip
+
+
+# ---------------------------------------------------------------------- pieces of the declarations
+
+
+def _of_sources(place: str, names: tuple[str, ...], course: Course | None = None) -> HeatChange:
+    return HeatChange(place=f"heat of {place}", heat=partial(heats.source_heat, names=names), course=course or CONSTANT)
+
+
+def _of_links(place: str, names: tuple[str, ...], course: Course | None = None) -> HeatChange:
+    return HeatChange(place=f"path {place}", heat=partial(heats.link_heat, names=names), course=course or CONSTANT)
+
+
+def _everything(machine: Anatomy, course: Course) -> Iterator[Change]:
+    yield from (_of_sources(source.name, (source.name,), course) for source in machine.network.sources)
+    yield from (_of_links(link.name, (link.name,), course) for link in machine.conducting)
+
+
+def _smooth(coordinates: tuple[str, ...], degree: int) -> Smooth | None:
+    return Smooth(coordinates=coordinates, highest=degree) if coordinates else None
+
+
+def _link_course(machine: Anatomy, family: Family) -> Smooth | None:
+    """Free convection outside, flow inside; a few others by their own laws, many together by operation."""
+    few = len(family.members) <= FEW
+    if machine.to_boundary(family):
+        more = [name for name in family.coordinates if name not in (SPEED, TORQUE, TEMPERATURE)]
+        return _smooth((TEMPERATURE, *more), DEGREE)
+    by = tuple(name for name in (SPEED, TEMPERATURE) if name in machine.coordinates)
+    if not few:
+        return _smooth(by, JOINT_DEGREE)
+    return _smooth(by, DEGREE) if machine.of_oil(family) else _smooth(family.coordinates, JOINT_DEGREE)
+
+
+def _lagged(view: View, channel: str, T: Array) -> Array:
+    sensors = view.point.sensors
+    return lagged(T, view.trajectory.piece.steps, float(sensors.lag[sensors.channels.index(channel)]))
+
+
+def _near(channel: str, node: str, view: View) -> Array:
+    own = view.model.parts[view.model.part_index(channel)]
+    return _lagged(view, channel, view.temperature_at_points(node) - view.temperature_at_points(own))
+
+
+def _late(channel: str, time: float, view: View) -> Array:
+    T = _lagged(view, channel, view.temperature_at_points(view.model.parts[view.model.part_index(channel)]))
+    return np.asarray(lagged(T, view.trajectory.piece.steps, time) - T)
+
+
+def _zero(view: View) -> Array:
+    return np.full(len(view.trajectory.T), view.standard.heat)

@@ -1,0 +1,30 @@
+"""One time axis for several recordings."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from diagnosis.recordings.recording import Recording
+
+
+def start_times(recordings: Sequence[Recording]) -> dict[str, float]:
+    """Start of every recording on the axis that they share, [s].
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+        If all have dates these count; else they follow each other in this order without gaps
+
+    Returns
+    -------
+    dict of str to float
+        From 0
+    """
+    if all(recording.start is not None for recording in recordings):
+        first = min((recording.from_s for recording in recordings), default=0.0)
+        return {recording.name: recording.from_s - first for recording in recordings}
+    result, now = {}, 0.0
+    for recording in recordings:
+        result[recording.name] = now
+        now += float(recording.time[-1])
+    return result
