@@ -82,6 +82,41 @@ def test_held_out_recordings_that_are_not_named_are_missed(words: str) -> None:
     assert "--holdout" in done.output and "Traceback" not in done.output
 
 
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (
+            ["--baseline", "pinion.csv"],
+            "pinion.csv: is a baseline, but measures T_pinion and nothing that the recordings",
+        ),
+        (["--baseline", "run.csv@0..3000"], "run.csv: is a baseline, but has the rows of 0 ... 29"),
+        (
+            ["--baseline", "wheel.csv", "--switched-off", "windge"],
+            "windge: is not in the catalogue; did you mean 'windage'",
+        ),
+        (["--switched-off", "windage"], "--switched-off windage: is about baselines, but there are none"),
+        (["--baseline", "loss.csv"], "loss.csv: P_loss is "),
+        (["--baseline", "idle.csv"], "idle.csv: "),
+    ],
+)
+def test_baselines_that_cannot_be_used(words: list[str], message: str, tmp_path: Path) -> None:
+    time = np.arange(0.0, 3600.0, 20.0)
+    table = pd.DataFrame({"time_s": time, "speed_rpm": 1500.0, "torque_Nm": 80.0, "T_oil_degC": 22.0 + time / 200.0})
+    table.to_csv(tmp_path / "run.csv", index=False)
+    table.rename(columns={"T_oil_degC": "T_pinion_degC"}).assign(T_pinion_degC=30.0 + time / 300.0).to_csv(
+        tmp_path / "pinion.csv", index=False
+    )
+    other = table.assign(T_oil_degC=table["T_oil_degC"] + 0.5)
+    other.assign(T_wheel_degC=30.0).to_csv(tmp_path / "wheel.csv", index=False)
+    other.assign(P_loss_W=0.3 + time / 1e5).to_csv(tmp_path / "loss.csv", index=False)
+    other.drop(columns="T_oil_degC").to_csv(tmp_path / "idle.csv", index=False)
+    given = [str(tmp_path / word) if ".csv" in word else word for word in words]
+    done = CliRunner().invoke(diagnose, [str(tmp_path / "run.csv"), *given, "--output", str(tmp_path / "out")])
+    assert isinstance(done.exception, InputError), done.output
+    assert message in str(done.exception)
+    assert not (tmp_path / "out").exists()
+
+
 def test_a_recording_is_never_replaced_by_its_prediction(tmp_path: Path) -> None:
     time = np.arange(0.0, 3600.0, 20.0)
     columns = {"time_s": time, "speed_rpm": 1500.0, "torque_Nm": 80.0, "T_oil_degC": 22.0 + time / 200.0}
