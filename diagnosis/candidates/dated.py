@@ -93,8 +93,10 @@ def step(axis: Axis, *, slow: bool = True) -> Course:
     rises = axis.distance * np.array(RISES)
     at_once, slowly = _products(axis.dates, [axis.edge_s]), _products([0.0, *axis.dates[::2]], rises)
     return Course(
-        ending=STEP, how="D", says="From a date on", parameters=(axis.moment("since"), _span("within", axis.edge_s, rises[-1])),
-        variants=np.concatenate([at_once, slowly]) if slow else at_once, law=sp.Min(sp.Max((NOW - since) / rise, 0), 1),
+        ending=STEP, how="D", says="From a date on",
+        parameters=(axis.moment("since"), _span("within", axis.edge_s, rises[-1])),
+        variants=np.concatenate([at_once, slowly]) if slow else at_once,
+        law=sp.Min(sp.Max((NOW - since) / rise, 0), 1),
     )  # fmt: skip
 
 
@@ -109,7 +111,7 @@ def for_a_while(axis: Axis) -> Course:
     )  # fmt: skip
 
 
-def over_hours(_: Axis) -> Course:
+def over_hours(axis: Axis) -> Course:
     """Slowly over the hours since the first row of the first recording: on and on, or until it has settled."""
     names = ("linear", "settling", "fading")
     linear, settling, fading = (symbol(name) for name in names)
@@ -119,7 +121,7 @@ def over_hours(_: Axis) -> Course:
     decay = sp.exp(-NOW / SETTLING_S)
     return Course(
         ending=HOURS, how="W", says="Slowly over the hours", parameters=parameters, variants=np.eye(3),
-        law=linear * NOW / LINEAR_S + settling * (1 - decay) + fading * decay,
+        law=linear * NOW / max(LINEAR_S, axis.end) + settling * (1 - decay) + fading * decay,
     )  # fmt: skip
 
 
@@ -186,10 +188,12 @@ def carried_on(placed: Placed, axis: Axis) -> Hypothesis:
     term, clock, base = _renamed(placed, label), _clock(label, axis), hypothesis_of(placed)
     now = {symbol("time"): symbol("time") + symbol(clock.name)}
     other = term.boundary_temperature
-    shown = {key: law.xreplace({symbol("time"): symbol("time") + symbol("start")}) for key, law in term.written.items()}
+    written = {symbol("time"): symbol("time") + symbol("start")}
     term = replace(
-        term, expression=term.expression.xreplace(now), boundary_temperature=None if other is None else other.xreplace(now),
-        written=shown, parameters=(*term.parameters, clock),
+        term, expression=term.expression.xreplace(now),
+        boundary_temperature=None if other is None else other.xreplace(now),
+        written={key: law.xreplace(written) for key, law in term.written.items()},
+        parameters=(*term.parameters, clock),
     )  # fmt: skip
     variants = np.column_stack([base.variants, np.full(len(base.variants), clock.start)])
     return replace(base, term=term, variants=variants, how="C", clock=clock.name)
@@ -211,7 +215,7 @@ def _renamed(placed: Placed, label: str) -> Placed:
     def new(name: str) -> str:
         return f"{label}_{name.removeprefix(f'{placed.label}_')}"
 
-    names = {one.name: new(one.name) for one in (*placed.parameters, *placed.states)}
+    names = {name: new(name) for name in (*(p.name for p in placed.parameters), *(s.name for s in placed.states))}
     if placed.boundary_temperature is not None:
         end = placed.target[-1]
         names |= {end: new(end), f"T_{end}": f"T_{new(end)}"}
@@ -219,7 +223,7 @@ def _renamed(placed: Placed, label: str) -> Placed:
     other = placed.boundary_temperature
     return replace(
         placed, label=label, target=tuple(names.get(one, one) for one in placed.target),
-        written={" ".join(names.get(word, word) for word in key.split(" ")): law for key, law in placed.written.items()},
+        written={" ".join(names.get(word, word) for word in key.split()): law for key, law in placed.written.items()},
         expression=placed.expression.xreplace(own), boundary_temperature=None if other is None else other.xreplace(own),
         parameters=tuple(replace(p, name=names[p.name]) for p in placed.parameters),
         states=tuple(

@@ -98,15 +98,17 @@ def _instruments(network: ThermalNetwork, scale: Scale, channels: Sequence[str])
         yield _placed(scale, "signal", f"{name}_{kind}", name, (name,), MEASUREMENT, size, law,
                       f"The recorded {name.replace('_', ' ')} is wrong.")  # fmt: skip
     if TOTAL_LOSS in channels and scale.loss > 0.0:
-        yield _placed(scale, "sensor", "sensor_bias", TOTAL_LOSS, (TOTAL_LOSS,), MEASUREMENT,
-                      _size(LOSS_OFFSET * scale.loss, "W"), sp.Integer(1), "The measured loss is wrong by a constant.")  # fmt: skip
+        size = _size(LOSS_OFFSET * scale.loss, "W")
+        yield _placed(scale, "sensor", "sensor_bias", TOTAL_LOSS, (TOTAL_LOSS,), MEASUREMENT, size, sp.Integer(1),
+                      "The measured loss is wrong by a constant.")  # fmt: skip
 
 
 def _factor(
     scale: Scale, kind: Kind, name: str, place: str, target: tuple[str, ...], family: str, what: str,
 ) -> Placed:  # fmt: skip
-    return _placed(scale, kind, name, place, target, family, _size(FACTOR_SD, "1"), sp.Integer(1),
-                   f"{what[:1].upper()}{what[1:]} is smaller or greater ({{place}}).", is_loss=kind == "loss_factor")  # fmt: skip
+    says = f"{what[:1].upper()}{what[1:]} is smaller or greater ({{place}})."
+    return _placed(scale, kind, name, place, target, family, _size(FACTOR_SD, "1"), sp.Integer(1), says,
+                   is_loss=kind == "loss_factor")  # fmt: skip
 
 
 def _placed(

@@ -21,18 +21,19 @@ from diagnosis.candidates.dated import (
 from diagnosis.candidates.factors import factors_of
 from diagnosis.candidates.hypotheses import How, Hypothesis, hypothesis_of
 from diagnosis.engine.fit import Experiment
-from diagnosis.engine.unknown import NetworkParameter
+from diagnosis.engine.unknown import NetworkParameter, SensorBias
 from diagnosis.forward.grid import Piece
 from diagnosis.setup.inference_setup import STANDSTILL_RPM, InferenceSetup
 from models.base.types import Array
 from models.mechanisms import Mechanism, Placed
 from models.mechanisms.ageing import FAMILY as AGEING
 from models.mechanisms.forms import EDGE_S
+from models.quantities.quantities import is_total_loss
 
 SHARES: Mapping[How, float] = {"U": 0.6, "D": 0.2, "C": 0.1, "W": 0.1, "P": 0.03}
 DATES = 14  # of a long recording
 LONG = 0.5  # of the longest recording
-SENSOR_SD_K = 1.0
+SENSOR_SD_K, TOLERANCES = 1.0, 3.0  # of a step of a thermometer: at least, and so many times its tolerance
 RADIATION = "radiation_error"  # the one law of the model that is part of a link
 
 
@@ -60,29 +61,40 @@ def candidates_of(
     several = len({piece.recording for piece in experiment.pieces} - experiment.healthy) > 1
     return (
         *(hypothesis_of(one) for one in placed),
-        *changes(factors, placed, axis),
+        *changes(factors, placed, axis, _sensor_sd(experiment)),
         *(carried_on(one, axis) for one in placed if several and has_clock(one)),
         *parameters_outside(experiment),
     )
 
 
-def changes(factors: Sequence[Placed], catalogue: Sequence[Placed], axis: Axis) -> list[Hypothesis]:
+def changes(
+    factors: Sequence[Placed], catalogue: Sequence[Placed], axis: Axis, sensor_sd: Mapping[str, float]
+) -> list[Hypothesis]:
     """Changes of laws over the time axis.
 
     The model's own laws, radiation, sensors and inputs may have any course; other mechanisms of the catalogue begin at
-    a date. Ageing has a course of its own already.
+    a date. Ageing has a course already.
     """
     known = [one for one in catalogue if may_change(one) and one.family != AGEING]
     laws = without_repeats([*factors, *known])
     courses = [step(axis), for_a_while(axis), over_hours(axis)]
     return [
-        changing(one, course, axis, sd=SENSOR_SD_K if one.name == "sensor_bias" and one.strength.unit == "K" else None)
+        changing(one, course, axis, sd=sensor_sd.get(one.target[0]) if one.name == "sensor_bias" else None)
         for one in laws
         for course in (
             courses if one in factors or one.of_measurement or one.name == RADIATION else [step(axis, slow=False)]
         )
         if len(course.variants)
     ]
+
+
+def _sensor_sd(experiment: Experiment) -> dict[str, float]:
+    """Prior of a step of every thermometer: some times its tolerance, [K]."""
+    return {
+        unknown.channel: max(SENSOR_SD_K, TOLERANCES * unknown.sd)
+        for unknown in experiment.unknowns
+        if isinstance(unknown, SensorBias) and not is_total_loss(unknown.channel)
+    }
 
 
 def parameters_outside(experiment: Experiment) -> list[Hypothesis]:

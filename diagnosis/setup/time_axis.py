@@ -13,7 +13,8 @@ def start_times(recordings: Sequence[Recording]) -> dict[str, float]:
     Parameters
     ----------
     recordings : sequence of Recording
-        If all have dates these count; else they follow each other in this order without gaps
+        If all have dates these count; else they follow each other in this order without gaps. A
+        name that comes again (learnt from and predicted) counts once
 
     Returns
     -------
@@ -23,8 +24,11 @@ def start_times(recordings: Sequence[Recording]) -> dict[str, float]:
     if all(recording.start is not None for recording in recordings):
         first = min((recording.from_s for recording in recordings), default=0.0)
         return {recording.name: recording.from_s - first for recording in recordings}
-    result, now = {}, 0.0
+    result: dict[str, float] = {}
+    now = 0.0
     for recording in recordings:
+        if recording.name in result:
+            continue
         result[recording.name] = now
         now += float(recording.time[-1])
     return result

@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from diagnosis.engine.fit import Experiment
+from diagnosis.engine.fit import Experiment, Linear
 from diagnosis.engine.model_error.anatomy import Anatomy
 from diagnosis.engine.model_error.classes import ErrorClass
 from diagnosis.engine.model_error.courses import Standard, View
@@ -94,11 +94,6 @@ class ModelError:
         """Amplitude of every unknown in a class, 0 of those that are absent, shape (unknowns,)."""
         return np.array([one.amplitudes.get(group, 0.0) for group in self.groups])
 
-    def chunks(self, point: Point) -> Iterator[tuple[int, int]]:
-        """First and last (excluded) of so many unknowns as memory allows at once, for all of them."""
-        size = max(FEWEST_AT_ONCE, min(AT_ONCE, VALUES_AT_ONCE // len(point.trajectory.piece.steps)))
-        return ((first, min(first + size, len(self.groups))) for first in range(0, len(self.groups), size))
-
     def columns(self, point: Point, first: int = 0, last: int | None = None) -> Columns:
         """Change per unit of the unknowns from `first` up to `last` (excluded; by default all).
 
@@ -122,8 +117,25 @@ class ModelError:
 
     def responses(self, point: Point, first: int = 0, last: int | None = None) -> Array:
         """Change of what is recorded per unit of some unknowns, shape (K + 1, channels, n); see :meth:`columns`."""
-        found = self.columns(point, first, last)
-        return point.heated(found.into, found.loss) + point.setting.passed_on(point.trajectory, found.reading)
+        last = len(self.groups) if last is None else last
+        result = np.empty((*point.read.shape, last - first))
+        for begin, end in self._chunks(point, first, last):
+            found = self.columns(point, begin, end)
+            shown = point.setting.passed_on(point.trajectory, found.reading)
+            result[:, :, begin - first : end - first] = point.heated(found.into, found.loss) + shown
+        return result
+
+    def whitened(self, part: Linear) -> Array:
+        """Whitened columns of all unknowns per unit, shape (M, unknowns)."""
+        result = np.empty((len(part.residual), len(self.groups)))
+        for begin, end in self._chunks(part.point, 0, len(self.groups)):
+            result[:, begin:end] = part.filter(self.responses(part.point, begin, end))
+        return result
+
+    def _chunks(self, point: Point, first: int, last: int) -> Iterator[tuple[int, int]]:
+        """Ranges of so many unknowns as memory allows at once."""
+        size = max(FEWEST_AT_ONCE, min(AT_ONCE, VALUES_AT_ONCE // len(point.trajectory.piece.steps)))
+        return ((begin, min(begin + size, last)) for begin in range(first, last, size))
 
     def _between(self, first: int, last: int) -> Iterator[tuple[Change, int, int]]:
         """Changes with unknowns in a range; their own first and last unknowns."""

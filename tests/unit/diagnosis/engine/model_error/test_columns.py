@@ -37,9 +37,7 @@ class Case:
         self.experiment = experiment
         self.point = self.simulated(experiment)
         self.error = ModelError.of(experiment)
-        self.columns = np.concatenate(
-            [self.error.responses(self.point, *chunk) for chunk in self.error.chunks(self.point)], axis=2
-        )
+        self.columns = self.error.responses(self.point)
 
     def simulated(self, experiment: Experiment) -> Point:
         return experiment.point(0, np.zeros(len(experiment.unknowns)), rounds=12)
@@ -276,9 +274,12 @@ def test_nothing_is_without_a_number(case: Case, rod: Case) -> None:
 
 
 def test_parts_of_the_columns(case: Case) -> None:
-    """Any range gives what the whole gives, also at the point of a machine with one more heat path."""
+    """Any range gives what the whole gives, whitened or not, also at the point of a machine with one more part."""
     some = case.error.responses(case.point, 70, 133)
     np.testing.assert_allclose(some, case.columns[:, :, 70:133], atol=1e-12)
+    (part,) = case.experiment.linearise(np.zeros(len(case.experiment.unknowns))).parts
+    whitened = part.filter(case.error.responses(part.point))
+    np.testing.assert_allclose(case.error.whitened(part), whitened, atol=1e-9)
     machine = case.experiment.machine
     network = machine.model.network.with_node("tank", 500.0).with_link("tank", "oil", lambda _: 1e-9)
     starts = (np.append(case.experiment.starts[0], 30.0),)

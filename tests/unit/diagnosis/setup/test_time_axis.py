@@ -1,0 +1,31 @@
+"""Starts of recordings on their shared axis: by dates, else one after the other."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from datetime import UTC, datetime
+
+import numpy as np
+
+from diagnosis.recordings.recording import Recording
+from diagnosis.setup.time_axis import start_times
+from tests.unit.diagnosis.inference_example import recording_of
+
+
+def made(name: str, duration: float, at: float | None = None) -> Recording:
+    time = np.linspace(0.0, duration, 11)
+    columns = {"time_s": time, "speed_rpm": time, "torque_Nm": time, "T_ambient_degC": time}
+    recording = replace(recording_of(columns, {}), name=name)
+    if at is None:
+        return recording
+    return replace(recording, start=datetime.fromtimestamp(at, UTC), from_s=at, to_s=at + duration)
+
+
+def test_without_dates_they_follow_each_other() -> None:
+    assert start_times([made("a", 100.0), made("b", 50.0), made("c", 10.0)]) == {"a": 0.0, "b": 100.0, "c": 150.0}
+
+
+def test_dates_count_if_all_have_them() -> None:
+    dated = [made("a", 100.0, 5000.0), made("b", 100.0, 1000.0)]
+    assert start_times(dated) == {"a": 4000.0, "b": 0.0}
+    assert start_times([*dated, made("c", 1.0)]) == {"a": 0.0, "b": 100.0, "c": 200.0}
