@@ -9,7 +9,8 @@ from diagnosis.candidates.hypotheses import Hypothesis
 from diagnosis.engine.candidates import scan
 from diagnosis.engine.fit import Fit, Linearised
 from diagnosis.engine.products import base_of, gram_of
-from diagnosis.engine.sessions import sessions_of
+from diagnosis.engine.sessions import over_sessions, sessions_of
+from diagnosis.forward.grid import Piece
 from models.base.types import Array
 
 NOTED_FROM = 5.0  # nats
@@ -37,6 +38,8 @@ def effects_in_baselines(fit: Fit, candidates: Sequence[Hypothesis]) -> Array:
 def sessions_apart(fit: Fit) -> dict[str, float]:
     """Log Bayes factor for every session of baselines on another machine, against the machine of all other recordings.
 
+    That machine may differ between sessions by :data:`diagnosis.engine.sessions.DEVIATIONS`.
+
     Parameters
     ----------
     fit : Fit
@@ -49,12 +52,18 @@ def sessions_apart(fit: Fit) -> dict[str, float]:
     """
     experiment, gram = fit.experiment, gram_of(fit.parts, base_of(fit))
     every, found = range(gram.count), {}
+
+    def log_evidence(pieces: Sequence[Piece]) -> float:
+        return over_sessions(gram, replace(experiment, pieces=tuple(pieces)), every).log_evidence
+
+    together = log_evidence(experiment.pieces)
     for name in dict.fromkeys(experiment.session_of.get(r, "") for r in sorted(experiment.healthy)):
-        mine = {r for r in gram.of_recording if experiment.session_of.get(r, "") == name}
-        others = set(gram.of_recording) - mine
+        mine, others = (
+            [p for p in experiment.pieces if (experiment.session_of.get(p.recording, "") == name) == is_mine]
+            for is_mine in (True, False)
+        )
         if mine and others:
-            alone = sum(gram.given(every, recordings=some).log_evidence for some in (mine, others))
-            found[name] = alone - gram.given(every).log_evidence
+            found[name] = log_evidence(mine) + log_evidence(others) - together
     return found
 
 
