@@ -239,6 +239,7 @@ def test_verb_refuses(given: dict[str, Path], tmp_path: Path) -> None:
         (["--recordings", recordings, "--truth", truths, "--seed", "1"], "--seed is for cases that are made"),
         (["--plant", "zoo", "--removed"], "--removed is for --plant own"),
         (["--families", "walls"], "--families is for --plant zoo"),
+        (["--baselines", "1"], "the own plant records no baselines"),
         (["--continue", str(old), "--cells-every", "2"], "--cells-every does not go with --continue"),
         (["--continue", str(old)], "is not a file of answers that prove wrote"),
     ):
