@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -35,6 +35,7 @@ from diagnosis.inference.unknowns import (
     TORQUE_GAIN_SD,
 )
 from diagnosis.recordings.recording import Recording
+from diagnosis.setup.baselines import session_by_recording
 from diagnosis.setup.inference_setup import CAPACITY_SD, InferenceSetup, prepare
 from diagnosis.setup.shaft import torque_gain
 from diagnosis.setup.time_axis import start_times
@@ -47,7 +48,13 @@ WIDEST = 1e6
 
 
 def prepare_experiment(
-    gearbox: Gearbox, recordings: Sequence[Recording], holdout: Sequence[Recording] = (), *, even: bool = False
+    gearbox: Gearbox,
+    recordings: Sequence[Recording],
+    holdout: Sequence[Recording] = (),
+    baseline: Sequence[Recording] = (),
+    *,
+    switched_off: Collection[str] = (),
+    even: bool = False,
 ) -> tuple[InferenceSetup, Experiment]:
     """Set up an experiment with the recordings to learn from.
 
@@ -56,6 +63,10 @@ def prepare_experiment(
     gearbox : Gearbox
     recordings, holdout : sequence of Recording
         Without any held out, the last quarter of every recording is
+    baseline : sequence of Recording
+        Other sessions of the same machine, in which the effect that is looked for cannot act; they calibrate as well
+    switched_off : collection of str
+        The only mechanisms that are known to be off in the baselines; empty: all are
     even : bool
         True for intervals of one length, see :func:`diagnosis.forward.grid.pieces`
 
@@ -65,14 +76,15 @@ def prepare_experiment(
         Scale, channels and held-out pieces
     experiment : Experiment
     """
-    setup = prepare(gearbox, recordings, holdout, even=even)
+    setup = prepare(gearbox, recordings, holdout, baseline, even=even)
+    everything = (*recordings, *baseline)
     model, old = setup.train.model, setup.train
-    stated = {c.name: c for r in recordings for c in r.channels}
+    stated = {c.name: c for r in everything for c in r.channels}
     steps = np.array([(stated[name].resolution or 0.0) if name in stated else 0.0 for name in setup.channels])
     # A display that rounds is off by up to half a step, however many rows are averaged while it stands still.
     noise = tuple(replace(n, floor_sd=np.maximum(n.floor_sd, steps / np.sqrt(12.0))) for n in old.noise)
     unknowns = usual_unknowns(
-        model.network, recordings, setup.channels, interval=setup.scale.interval,
+        model.network, everything, setup.channels, interval=setup.scale.interval,
         gain_of_torque=torque_gain(gearbox.network()),
     )  # fmt: skip
     return setup, Experiment(
@@ -81,6 +93,9 @@ def prepare_experiment(
         unknowns=tuple(unknowns),
         noise=noise,
         starts=tuple(old.starts),
+        session_of=session_by_recording(recordings, holdout, baseline),
+        healthy=frozenset(r.name for r in baseline),
+        switched_off=frozenset(switched_off),
         starts_at=start_times([*recordings, *holdout]),
     )
 

@@ -68,7 +68,12 @@ class InferenceSetup:
 
 
 def prepare(
-    gearbox: Gearbox, recordings: Sequence[Recording], holdout: Sequence[Recording], *, even: bool = False
+    gearbox: Gearbox,
+    recordings: Sequence[Recording],
+    holdout: Sequence[Recording],
+    baseline: Sequence[Recording] = (),
+    *,
+    even: bool = False,
 ) -> InferenceSetup:
     """Set up the inference.
 
@@ -77,6 +82,8 @@ def prepare(
     gearbox : Gearbox
     recordings, holdout : sequence of Recording
         To learn from, and to judge by
+    baseline : sequence of Recording
+        To learn from as well, as a whole; they do not decide on the scale
     even : bool
         Whether all intervals shall be of one length, see :func:`diagnosis.forward.grid.pieces`
     """
@@ -84,28 +91,31 @@ def prepare(
     nominal = with_shaft(as_defined)
     recordings, holdout = shafts(recordings, as_defined), shafts(holdout, as_defined)
     scale = scale_of(gearbox, recordings)
+    beside = shafts(baseline, as_defined)
+    everything = (*recordings, *beside)
     network = nominal
     shapes = shape_terms(nominal, scale)
     for term in shapes:
         network = term.apply(network)
     model = NetworkOnGrid(network, losses)
-    measured = {c.name for r in recordings for c in r.channels}
+    measured = {c.name for r in everything for c in r.channels}
     temperatures = sorted((c for c in measured if not is_total_loss(c)), key=lambda c: (model.part_index(c), c))
     channels = (*temperatures, *([TOTAL_LOSS] if TOTAL_LOSS in measured else []))
-    stated = [c for r in recordings for c in r.channels]
+    stated = [c for r in everything for c in r.channels]
     unknowns = _wider_capacities(unknowns_of(
         network, channels, lags={c.name: c.lag_s for c in stated if c.lag_s is not None},
-        bias_sd={c.name: c.bias_sd for c in stated if c.bias_sd is not None}, slow=slow_rows(recordings),
-        interval=scale.interval, ambient_assumed=any("T_ambient" in r.assumed for r in recordings),
+        bias_sd={c.name: c.bias_sd for c in stated if c.bias_sd is not None}, slow=slow_rows(everything),
+        interval=scale.interval, ambient_assumed=any("T_ambient" in r.assumed for r in everything),
         torque_gain=torque_gain(as_defined),
     ))  # fmt: skip
-    white = channel_noise(recordings, channels)
-    loss_sd = loss_noise(recordings) if TOTAL_LOSS in channels else (0.0, 0.0)
+    white = channel_noise(everything, channels)
+    loss_sd = loss_noise(everything) if TOTAL_LOSS in channels else (0.0, 0.0)
     loss_W = typical_loss(model, recordings)
     problems = []
     learnt, judged = (pieces(given, model.laws.inputs, channels, even=even) for given in (recordings, holdout))
     if not holdout:
         learnt, judged = split(learnt)
+    learnt = (*learnt, *pieces(beside, model.laws.inputs, channels, even=even))
     for cut in (learnt, judged):
         problems.append(Problem(
             model, cut, unknowns,
