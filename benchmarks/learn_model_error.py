@@ -4,7 +4,7 @@ Run:  python -m benchmarks.learn_model_error draw CASES --seed S --out FOLDER [-
       python -m benchmarks.learn_model_error learn FOLDER [--leave-out FAMILY] [--sweeps 3]
 
 ``draw`` simulates healthy cases, families in turn, calibrates each with model error and keeps its Gram matrix as
-``<seed>_<case>_<family>_<machine>.npz``; an interrupted run continues. ``learn`` starts from the class FULL and climbs
+``<seed>_<case>_<family>_<machine>.npz``; an interrupted run continues. ``learn`` starts from the class full and climbs
 the sum of the log evidences along one group's log amplitude after the other; it prints the amplitudes and, for every
 family, used or left out, the log evidence gained over no model error and over the classes as they are.
 """

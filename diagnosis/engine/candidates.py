@@ -15,9 +15,8 @@ from diagnosis.candidates.hypotheses import Hypothesis, chunks
 from diagnosis.engine.fit import Experiment, Fit, Linear, Linearised
 from diagnosis.engine.gram import Given, Gram, Strengths, strengths
 from diagnosis.engine.metric import Metric
-from diagnosis.engine.point import AT_ONCE, Column, Machine, Point
+from diagnosis.engine.point import AT_ONCE, Machine, Point
 from diagnosis.engine.products import base_of, gram_of
-from diagnosis.engine.slopes import Heat
 from diagnosis.engine.unknown import TERM_STEP, Group, Held, NetworkParameter, Scope, TermParameter, Unknown
 from diagnosis.forward.network_on_grid import NetworkOnGrid
 from diagnosis.forward.observation import readings
@@ -170,26 +169,6 @@ def _columns(experiment: Experiment, part: Linear, some: Sequence[tuple[Hypothes
     for start, columns in shown.items():
         result[:, :, start : start + columns.shape[2]] = columns
     return result
-
-
-def heat_columns(experiment: Experiment, point: Point, candidate: Hypothesis) -> list[Column]:
-    """Columns of all variants of a candidate that brings heat, in one piece, per unit of strength.
-
-    Parameters
-    ----------
-    experiment : Experiment
-    point : Point
-    candidate : Hypothesis
-        Neither of a parameter nor of a sensor
-    """
-    assert candidate.term is not None  # noqa: S101 - it brings heat
-    trajectory, coupled = point.trajectory, len(point.machine.model.coupled)
-    if trajectory.piece.recording in experiment.healthy:
-        return [Column() for _ in candidate.variants]
-    values = _by_clock(candidate, experiment.starts_at.get(trajectory.piece.recording))
-    heat, loss = _on_grid(point.machine.model, candidate.term).heat(trajectory, values)
-    into = np.pad(np.nan_to_num(heat), ((0, 0), (0, coupled), (0, 0)))
-    return [Column(heat=Heat(into=into[:, :, i], loss=loss[:, i])) for i in range(len(values))]
 
 
 def _by_clock(candidate: Hypothesis, starts_at: float | None) -> Array:
