@@ -67,7 +67,8 @@ def marks(diagnosis: Diagnosis) -> Marks:
     names: dict[str, str] = {}
     pointed: list[tuple[str, tuple[str, float]]] = []
     for finding in diagnosis.findings:
-        said = (headline(finding.mechanism), finding.probability)
+        title = " or ".join(headline(one) for one in finding.tie_set or (finding.mechanism,))
+        said = (f"acts like {headline(finding.mechanism)}" if finding.acts_like else title, finding.sureness)
         pointed += [(target, said) for target in _targets(finding)]
         if finding.term is not None and finding.term.kind == "link":
             label = finding.term.label

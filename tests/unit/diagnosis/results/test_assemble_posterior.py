@@ -242,6 +242,7 @@ def test_a_link_that_changes_at_a_date_acts_like(
     assert stored["acts_like"] and stored["date"]["from_s"] == pytest.approx(DATE_S)
     assert read_answer(found.to_dict(), fzg).claims[0].what == "link"
     assert correction_of(found, fzg).findings[0].term.label == effect.term.label
+    assert "strength" not in finding.equation and "since" not in finding.equation
 
 
 def test_nothing(assembled: Assemble, prepared: Prepared, windage: Judged) -> None:
