@@ -7,14 +7,19 @@ from pathlib import Path
 
 import numpy as np
 
-from diagnosis.decision.search import search
+from diagnosis.decision.infer import infer
+from diagnosis.decision.posterior import decide
+from diagnosis.decision.settings import Settings
+from diagnosis.engine.calibration import calibrate_with_error
+from diagnosis.engine.families import candidates_of, log_prior
+from diagnosis.engine.fit import calibrate
+from diagnosis.engine.prepare import prepare_experiment
 from diagnosis.recordings.read import named_apart, read_recordings
 from diagnosis.recordings.recording import Recording
 from diagnosis.recordings.shared_rows import check_shared_rows
-from diagnosis.results.assemble import assembled
+from diagnosis.results.assemble_posterior import assemble
 from diagnosis.results.result import Diagnosis
 from diagnosis.setup.baselines import check_baselines
-from diagnosis.setup.inference_setup import prepare
 from diagnosis.setup.plausibility import check_plausible
 from diagnosis.setup.shaft import shafts, with_shaft
 from models.assembly.gearbox import Gearbox, load_gearbox
@@ -23,6 +28,7 @@ from models.mechanisms import CATALOGUE, Mechanism
 from models.quantities.quantities import is_total_loss
 
 Source = str | Path | Recording
+SETTINGS = Settings()
 
 
 def diagnose(
@@ -32,7 +38,7 @@ def diagnose(
     holdout: Source | Sequence[Source] = (),
     baseline: Source | Sequence[Source] = (),
     switched_off: str | Sequence[str] = (),
-    false_alarm_rate: float = 0.05,
+    settings: Settings = SETTINGS,
     catalogue: Mapping[str, Mechanism] | None = None,
     jobs: int = 1,
     progress: Callable[[str], None] = lambda _: None,
@@ -50,8 +56,8 @@ def diagnose(
         The same machine in other sessions, without the effect that is looked for
     switched_off : str, or several
         Mechanisms that are known to be off in the baselines; by default all are
-    false_alarm_rate : float
-        Probability with which consistent recordings may be called inconsistent, 1e-4 to 0.5
+    settings : Settings
+        The four numbers of the decision
     catalogue : mapping of str to Mechanism, optional
         By default :data:`models.mechanisms.CATALOGUE`
     jobs : int
@@ -69,8 +75,6 @@ def diagnose(
     InputError
         If a recording cannot be used, with file, column and rows.
     """
-    if not 1e-4 <= false_alarm_rate <= 0.5:
-        raise InputError(f"a false-alarm rate of {false_alarm_rate:g} is not possible; 0.0001 to 0.5 is")
     catalogue = CATALOGUE if catalogue is None else catalogue
     gearbox = gearbox if isinstance(gearbox, Gearbox) else load_gearbox(gearbox)
     train, held, healthy = named_apart(*(_read(given, gearbox) for given in (recordings, holdout, baseline)))
@@ -87,12 +91,20 @@ def diagnose(
         judge_temperatures=not gearbox.is_parametric,
     )  # fmt: skip
     progress("reading the recordings and setting up the inference")
-    case = prepare(gearbox, train, held)
-    _refuse_too_short(train, case.train.pieces)
+    setup, experiment = prepare_experiment(gearbox, train, held, healthy, switched_off=off)
+    _refuse_too_short(train, experiment.pieces)
     try:
-        found = search(case, catalogue, false_alarm_rate=false_alarm_rate, jobs=jobs, progress=progress)
+        progress("calibrating the model")
+        plain = calibrate(experiment)
+        progress("calibrating with model error")
+        calibration = calibrate_with_error(experiment)
+        candidates = candidates_of(setup, experiment, catalogue)
+        posterior = infer(calibration, candidates, log_prior(candidates), settings, progress=progress)
         progress("predicting the recordings free-running")
-        return assembled(case, found, catalogue, train, held, false_alarm_rate=false_alarm_rate, jobs=jobs)
+        return assemble(
+            setup, experiment, posterior, decide(posterior, settings), plain=plain, settings=settings,
+            catalogue=catalogue, train=train, held_out=held, jobs=jobs,
+        )  # fmt: skip
     except ArithmeticError as error:
         if type(error) is not ArithmeticError:
             raise  # a division by zero is a fault of ours

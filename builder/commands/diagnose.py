@@ -10,12 +10,14 @@ from typing import TYPE_CHECKING
 import click
 
 from builder.base import console
+from builder.base.decision_settings import settings_options
 from builder.base.workers import worker_options
 from models.assembly.gearbox import known_gearboxes, load_gearbox
 from models.base.errors import InputError, did_you_mean
 from models.files.output_files import refuse_to_replace
 
 if TYPE_CHECKING:
+    from diagnosis.decision.settings import Settings
     from diagnosis.recordings.recording import Recording
     from models.assembly.gearbox import Gearbox
     from models.mechanisms import Mechanism
@@ -66,8 +68,7 @@ class _OptionsOfMany(click.Command):
               help="Leave one of the catalogue's mechanisms out; may be given several times.")  # fmt: skip
 @click.option("--output", type=click.Path(path_type=Path, file_okay=False), default=Path("out/diagnosis"),
               show_default=True, metavar="DIR", help="Folder for the report and what belongs to it.")  # fmt: skip
-@click.option("--false-alarm-rate", type=click.FloatRange(min=1e-4, max=0.5), default=0.05, show_default=True,
-              metavar="P", help="How often recordings that agree may be called inconsistent.")  # fmt: skip
+@settings_options
 @click.option("--fleet", is_flag=True,
               help="RECORDING is a folder with one folder per gearbox; hold* in it is held out, baseline* is a "
                    "baseline.")  # fmt: skip
@@ -82,7 +83,7 @@ def diagnose(
     mechanisms: tuple[Path, ...],
     without: tuple[str, ...],
     output: Path,
-    false_alarm_rate: float,
+    settings: Settings,
     jobs: int,
     fleet: bool,
     dask: str | None,
@@ -116,7 +117,7 @@ def diagnose(
             raise InputError(f"--without-mechanism {name}: is not in the catalogue{did_you_mean(name, CATALOGUE)}")
     if fleet:
         _diagnose_fleet(Path(recordings[0]), definition, output, mapping=mapping, catalogue=catalogue,
-                        switched_off=switched_off, false_alarm_rate=false_alarm_rate, jobs=jobs, dask=dask)  # fmt: skip
+                        switched_off=switched_off, settings=settings, jobs=jobs, dask=dask)  # fmt: skip
         return
     train, held, healthy = read_by_role(recordings, holdout, baseline, definition.network(), mapping=mapping)
     given = [
@@ -129,7 +130,7 @@ def diagnose(
     _print_notes((*train, *held, *healthy))
     with atomic_folder(output) as stage, _show_step() as tell:
         found = run(train, definition, holdout=held, baseline=healthy, switched_off=switched_off,
-                    false_alarm_rate=false_alarm_rate, catalogue=catalogue, jobs=jobs, progress=tell)  # fmt: skip
+                    settings=settings, catalogue=catalogue, jobs=jobs, progress=tell)  # fmt: skip
         tell("writing the report")
         names = [path.name for path in write_files(found, definition, [*train, *held], stage)]
     for line in found.summary():
@@ -161,13 +162,13 @@ def _check_options(recordings: tuple[str, ...], others: tuple[str, ...], dask: s
 
 def _diagnose_fleet(
     folder: Path, gearbox: Gearbox, output: Path, *, mapping: Path | None, catalogue: Mapping[str, Mechanism],
-    switched_off: tuple[str, ...], false_alarm_rate: float, jobs: int, dask: str | None,
+    switched_off: tuple[str, ...], settings: Settings, jobs: int, dask: str | None,
 ) -> None:  # fmt: skip
     from builder.workflows.fleet import SUMMARY, diagnose_fleet, members_of, show_summary
 
     outcomes = diagnose_fleet(
         members_of(folder, without=output), gearbox, output, mapping=mapping, catalogue=catalogue,
-        switched_off=switched_off, false_alarm_rate=false_alarm_rate, jobs=jobs, dask=dask,
+        switched_off=switched_off, settings=settings, jobs=jobs, dask=dask,
     )  # fmt: skip
     show_summary([outcome.row for outcome in outcomes])
     console.out.print(f"wrote {output / SUMMARY}, and a folder for each that was diagnosed")

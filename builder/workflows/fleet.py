@@ -15,6 +15,7 @@ from pathlib import Path
 
 from builder.base import console
 from diagnosis import diagnose
+from diagnosis.decision.settings import Settings
 from diagnosis.recordings.read import ByRole, read_by_role
 from diagnosis.recordings.time_axis import RECORDING_KINDS
 from diagnosis.report.write import names_of_files, write_files
@@ -166,7 +167,7 @@ def diagnose_fleet(
     mapping: Path | None,
     catalogue: Mapping[str, Mechanism],
     switched_off: Sequence[str] = (),
-    false_alarm_rate: float,
+    settings: Settings,
     jobs: int = 1,
     dask: str | None = None,
 ) -> list[Outcome]:
@@ -181,7 +182,7 @@ def diagnose_fleet(
         Gets a folder per gearbox as soon as it is done, and at the end ``summary.csv``
     mapping : Path or None
         See :func:`diagnosis.recordings.read.read_recordings`
-    catalogue, switched_off, false_alarm_rate
+    catalogue, switched_off, settings
         See :func:`diagnosis.diagnose`
     jobs : int
         Gearboxes at the same time on this machine; a single gearbox gets all processes
@@ -216,7 +217,7 @@ def diagnose_fleet(
                     [output / member.name / name for name in files],
                 )
                 recordings = (train, held, healthy)
-                yield member.name, recordings, gearbox, catalogue, switched_off, false_alarm_rate, inside
+                yield member.name, recordings, gearbox, catalogue, switched_off, settings, inside
             except InputError as error:
                 outcomes[member.name] = _without_diagnosis(member.name, error)
 
@@ -238,13 +239,13 @@ def diagnose_fleet(
 
 def _diagnose(
     name: str, recordings: ByRole, gearbox: Gearbox, catalogue: Mapping[str, Mechanism], switched_off: Sequence[str],
-    false_alarm_rate: float, jobs: int,
+    settings: Settings, jobs: int,
 ) -> Outcome:  # fmt: skip
     train, holdout, baseline = recordings
     try:
         with tempfile.TemporaryDirectory() as folder:
             found = diagnose(train, gearbox, holdout=holdout, baseline=baseline, switched_off=switched_off,
-                             catalogue=catalogue, false_alarm_rate=false_alarm_rate, jobs=jobs)  # fmt: skip
+                             catalogue=catalogue, settings=settings, jobs=jobs)  # fmt: skip
             written = write_files(found, gearbox, [*train, *holdout], Path(folder))
             return Outcome(row=_row(name, found), files={path.name: path.read_bytes() for path in written})
     except Exception as error:  # noqa: BLE001 - shown with its traceback at the end, when the others are done

@@ -13,7 +13,8 @@ import numpy as np
 from scipy.special import log_ndtr, logsumexp
 
 from diagnosis.candidates.hypotheses import Hypothesis
-from diagnosis.decision.posterior import Expected, Judged, Likeness, Posterior, Settings
+from diagnosis.decision.posterior import Expected, Judged, Likeness, Posterior
+from diagnosis.decision.settings import Settings
 from diagnosis.engine.calibration import Calibration
 from diagnosis.engine.candidates import Scan, refit, scan
 from diagnosis.engine.fit import Fit

@@ -18,6 +18,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from diagnosis.candidates.hypotheses import Hypothesis
+from diagnosis.decision.settings import Settings
 from diagnosis.engine.fit import Fit
 from models.base.types import Array
 
@@ -26,29 +27,6 @@ KINDS: tuple[Kind, ...] = get_args(Kind)
 Grade = Literal["claim", "likely"]
 MOST_TIED = 3
 MUCH_LEFT, MUCH_LEFT_SHARE = 20.0, 0.05  # of the evidence, [nat]: beside a name, what shows that its law is another
-
-
-@dataclass(frozen=True, kw_only=True)
-class Settings:
-    """The four numbers that a user sets.
-
-    Attributes
-    ----------
-    false_alarm_rate : float
-        How often a healthy machine may be called inconsistent, [-]
-    matters_K, matters_W : float
-        Size from which an effect matters: of a temperature [K], or of a heat [W]; 0 W: 3 % of the typical loss
-    claim_from : float
-        Probability from which a name is a claim, [-]
-    odds_unknown : float
-        Prior odds that a cause is in no catalogue, to one that is in it, [-]
-    """
-
-    false_alarm_rate: float = 0.05
-    matters_K: float = 1.0
-    matters_W: float = 0.0
-    claim_from: float = 0.9
-    odds_unknown: float = 0.1
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

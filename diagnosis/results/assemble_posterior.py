@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from diagnosis.decision.posterior import KINDS, Answer, Judged, Posterior, Settings
+from diagnosis.decision.posterior import KINDS, Answer, Judged, Posterior
+from diagnosis.decision.settings import Settings
 from diagnosis.engine.fit import Experiment, Fit
 from diagnosis.engine.predict import Prediction, log_score_gain, overall_rmse, predict, rmse, with_pieces_of
 from diagnosis.engine.prepare import held_out_experiment

@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 from diagnosis.candidates.hypotheses import Hypothesis, hypothesis_of
-from diagnosis.decision.posterior import Answer, Expected, Judged, Posterior, Settings
+from diagnosis.decision.posterior import Answer, Expected, Judged, Posterior
+from diagnosis.decision.settings import Settings
 from diagnosis.engine.candidates import refit, with_candidate
 from diagnosis.engine.families import candidates_of
 from diagnosis.engine.fit import Experiment, Fit, calibrate
