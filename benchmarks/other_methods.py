@@ -38,7 +38,7 @@ from diagnosis.proof.scoring.lines import Task
 from diagnosis.proof.scoring.outcome import outcome
 from diagnosis.proof.scoring.truth import CONTROL, read_truths
 from diagnosis.recordings.read import read_recordings
-from diagnosis.results.findings import node_of
+from diagnosis.results.places import node_in
 from diagnosis.setup.inference_setup import InferenceSetup, first, prepare
 from models.assembly.gearbox import load_gearbox
 from models.base.parallel import run_parallel
@@ -112,7 +112,7 @@ def _sparse(case: InferenceSetup, base: Explanation, candidates: Sequence[Hypoth
                      knots=knots) for part in case.nominal.parts for is_loss in kinds),
         key=lambda heat: heat.log_bayes,
     )  # fmt: skip
-    here = [h for h in candidates if h.in_network and node_of(case, h) == missing.node]
+    here = [h for h in candidates if h.in_network and node_in(case.nominal, h) == missing.node]
     if missing.log_bayes < threshold_at(0.05) or not here:
         return _answer(case, None)
     weights = np.sqrt(np.concatenate([piece.steps for piece in pieces]))  # intervals are of different lengths
@@ -142,7 +142,7 @@ def _answer(case: InferenceSetup, h: Hypothesis | None) -> dict[str, Any]:
     if h is None:
         return {"verdict": "consistent", "findings": [], "location": []}
     of_measurement = h.term is not None and h.term.of_measurement
-    node = node_of(case, h)
+    node = node_in(case.nominal, h)
     return {
         "verdict": "sensor_fault" if of_measurement else "missing_physics",
         "findings": [

@@ -47,6 +47,7 @@ def commands() -> None:
               help="Folder for the FMU and what belongs to it.  [default: out/<gearbox>]")  # fmt: skip
 @click.option("--correction", type=click.Path(path_type=Path, dir_okay=False), default=None, metavar="FILE",
               help="What diagnose found: the FMU carries it.")  # fmt: skip
+@click.option("--claims-only", is_flag=True, help="Of --correction without what is only likely.")
 @click.option("--couple", multiple=True, metavar="BOUNDARY",
               help="Take the temperature of this boundary from an input BOUNDARY.T_in, to couple the FMU with another "
                    "model (may be given several times).")  # fmt: skip
@@ -64,6 +65,7 @@ def build_fmu(
     fmi: str | None,
     output: Path | None,
     correction: Path | None,
+    claims_only: bool,
     couple: tuple[str, ...],
     preset: str,
     samples: int | None,
@@ -80,6 +82,7 @@ def build_fmu(
         raise click.UsageError("--fmi is about native FMUs, the Python FMU is FMI 2.0; give it without --target python")
     definition = load_gearbox(gearbox)
     found = None if correction is None else read_correction(correction, definition.network(), made_for=definition)
+    found = found.claims_only() if found and claims_only else found
     folder = output if output is not None else Path("out") / Path(gearbox).stem
     report = build(
         definition,

@@ -6,6 +6,7 @@ import sys
 from collections.abc import Callable, Mapping
 from contextlib import nullcontext
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 import click
@@ -65,13 +66,14 @@ class Model:
     correction: Correction | None = None
 
 
-def _full_model(name_or_file: str, correction: Path | None, mapping: Path | None) -> Model:
+def _full_model(name_or_file: str, correction: Path | None, mapping: Path | None, *, claims_only: bool) -> Model:
     from diagnosis.recordings.as_cycle import read_cycle_or_recording
 
     gearbox = load_gearbox(name_or_file)
     network, found = gearbox.network(), None
     if correction is not None:
         found = read_correction(correction, network, made_for=gearbox)
+        found = found.claims_only() if claims_only else found
         network = found.network(gearbox)
     trained = None if gearbox.is_parametric else gearbox.training
 
@@ -101,7 +103,7 @@ def _range_of(trained: Training) -> str:
     )
 
 
-def _fmu(path: Path, correction: Path | None, mapping: Path | None) -> Model:
+def _fmu(path: Path, correction: Path | None, mapping: Path | None, *, claims_only: bool) -> Model:
     from builder.drive.driver import (  # imports fmpy; the full model need not wait for it
         drive_fmu,
         fmu_machine,
@@ -112,6 +114,7 @@ def _fmu(path: Path, correction: Path | None, mapping: Path | None) -> Model:
     machine, found = fmu_machine(path), None
     if correction is not None:
         found = parse_correction(correction)
+        found = found.claims_only() if claims_only else found
         refuse_other_correction(path, found, source=str(correction))
         try:
             found.check_instruments([part.name for part in machine.parts], machine.inputs)
@@ -179,6 +182,7 @@ def _simulated(model: Model, cycle: Cycle, start: Initial, *, is_recording: bool
                                    "recording (with measured temperatures) drives the model with its inputs as they "
                                    "probably were; <column>_as_recorded are those that it has, and the readings of the "
                                    "sensors of the correction, to compare with it.")  # fmt: skip
+@click.option("--claims-only", is_flag=True, help="Of --correction without what is only likely.")
 @click.option("--plot", type=click.Path(path_type=Path), default=None, metavar="FILE", help="Plot: .png, .pdf or .svg.")
 def simulate(
     files: tuple[Path, ...],
@@ -188,6 +192,7 @@ def simulate(
     initial: str | None,
     mapping: Path | None,
     correction: Path | None,
+    claims_only: bool,
     plot: Path | None,
 ) -> None:
     """Drive a CYCLE with an FMU, or with the full model of a gearbox (--gearbox).
@@ -201,7 +206,8 @@ def simulate(
     named = [Path(name) for name in (gearbox, initial, mapping, correction) if name is not None]
     _check_outputs(output, plot, inputs=[*_read_as_files(files, gearbox), *named])
     given = None if initial in (None, RECORDED) else read_initial(str(initial))
-    model = _fmu(files[0], correction, mapping) if gearbox is None else _full_model(gearbox, correction, mapping)
+    model_of = partial(_fmu, files[0]) if gearbox is None else partial(_full_model, gearbox)
+    model = model_of(correction, mapping, claims_only=claims_only)
     cycle, recorded, notes = model.read(files[-1])
     for note in notes:
         console.err.print(f"note: {files[-1]}: {note}")

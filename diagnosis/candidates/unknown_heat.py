@@ -35,7 +35,7 @@ def unknown_heats(network: ThermalNetwork, scale: Scale, axis: Axis, *, losses: 
     -------
     list of Hypothesis
         The variants of each are its functions one by one: columns that are marginalised together, see
-        :func:`diagnosis.engine.outside.judged_together`
+        :func:`diagnosis.engine.outside.judge_outside`
     """
     ways = (False, True) if losses and scale.loss > 0.0 else (False,)
     return [_unknown(network, scale, axis, part.name, is_loss) for part in network.parts for is_loss in ways]

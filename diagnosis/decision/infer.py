@@ -13,11 +13,13 @@ import numpy as np
 from scipy.special import log_ndtr, logsumexp
 
 from diagnosis.candidates.hypotheses import Hypothesis
-from diagnosis.decision.posterior import Expected, Judged, Posterior, Settings
+from diagnosis.decision.posterior import Expected, Judged, Likeness, Posterior, Settings
 from diagnosis.engine.calibration import Calibration
 from diagnosis.engine.candidates import Scan, refit, scan
 from diagnosis.engine.fit import Fit
+from diagnosis.engine.gram import Given, Strengths
 from diagnosis.engine.sessions import OverSessions, fit_over_sessions, over_sessions
+from diagnosis.engine.unknown import Group
 from models.base.errors import InputError
 from models.base.types import Array
 
@@ -26,18 +28,21 @@ NEAR_PLACE = 3.0  # nats behind the best place of its name, up to which a second
 REFITTED, SECONDS = 6, 2
 WORTH, WORTH_SHARE = 1.0, 0.1  # nats, and share of the best, from which a candidate is worth a fit
 PAIR_PRIOR = 0.1  # of two effects, to one
+WIDER = 4.0  # prior standard deviations of a parameter outside its prior, in those of its own
 TEMPER = (3.0, 0.1)
 THRESHOLD = 5.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Scanned:
-    """Everything judged by straight lines at one point."""
+    """Everything judged by straight lines at one point: terms in the order of the scan, then parameters."""
 
     scan: Scan
     over: OverSessions
+    candidates: tuple[Hypothesis, ...]
     log_bayes: Array
     log_prior: Array
+    strengths: Strengths
 
 
 def infer(
@@ -60,21 +65,21 @@ def infer(
     progress(f"scanning {len(candidates)} candidates")
     first = _scanned(base, candidates, log_prior, len(base.z))
     order = np.argsort(-(first.log_bayes + TEMPER[0] * first.log_prior))
-    chosen = _raced(first.scan.candidates, first.log_bayes, order)
+    chosen = _raced(first.candidates, first.log_bayes, order)
     judged: dict[str, Judged] = {}
     worth = max(WORTH, WORTH_SHARE * float(first.log_bayes.max(initial=0.0)))
     chosen = [index for index in chosen if first.log_bayes[index] > worth]
     for step, index in enumerate(chosen):
-        progress(f"fitting {first.scan.candidates[index].label} ({step + 1} of {len(chosen)})")
+        progress(f"fitting {first.candidates[index].label} ({step + 1} of {len(chosen)})")
         one = _refitted(calibration, base, first, index, RACE_STEPS)
-        judged[first.scan.candidates[index].label] = one
+        judged[first.candidates[index].label] = one
     ahead = sorted(judged.values(), key=lambda one: -(one.log_bayes + TEMPER[0] * one.log_prior))
     for one in ahead[:REFITTED]:
         if one.fit is not None:
             judged[one.label] = _fitted_on(calibration, one, len(base.z))
     remainder, alone = (
         0.0,
-        {one.label: float(value) for one, value in zip(first.scan.candidates, first.log_bayes, strict=True)},
+        {one.label: float(value) for one, value in zip(first.candidates, first.log_bayes, strict=True)},
     )
     pairs: list[Judged] = []
     best = max(judged.values(), key=lambda one: one.log_bayes + TEMPER[0] * one.log_prior, default=None)
@@ -82,14 +87,14 @@ def infer(
         progress(f"looking beside {best.label}")
         remainder, pairs, there = _beside(calibration, best, candidates, log_prior, len(base.z))
         alone |= {label: min(alone[label], value) for label, value in there.items()}
-    for index, candidate in enumerate(first.scan.candidates):
+    for index, candidate in enumerate(first.candidates):
         judged.setdefault(candidate.label, _by_scan(first, index, alone[candidate.label]))
     every = [*judged.values(), *pairs]
     single = [one for one in every if len(one.effects) == 1]
     log_e = float(logsumexp([one.log_prior + one.log_bayes for one in single]))
     return Posterior(
         nothing=Judged(effects=(), log_prior=0.0, log_bayes=0.0, fit=base), judged=tuple(every), log_e=log_e,
-        threshold=THRESHOLD, temper=TEMPER, error_class=calibration.chosen.name,
+        threshold=THRESHOLD, temper=TEMPER, likeness=_likeness(first), error_class=calibration.chosen.name,
         error_evidence=dict(calibration.evidence), session_s=calibration.session_s, remainder=remainder,
         expected=_expected(first, settings),
     )  # fmt: skip
@@ -97,19 +102,32 @@ def infer(
 
 def _scanned(fit: Fit, candidates: Sequence[Hypothesis], log_prior: Array, base: int) -> _Scanned:
     """Scan at a fit; the first `base` of its unknowns and model error may differ between sessions."""
-    found = scan(fit, candidates)
+    found = scan(fit, [one for one in candidates if one.term is not None])
+    outside = [one for one in candidates if one.unknown is not None]
+    over = over_sessions(found.gram, fit.experiment, [*range(base), *found.further], range(base, len(fit.z)))
     known = {one.label: value for one, value in zip(candidates, log_prior.tolist(), strict=True)}
-    own, deviating = range(base, len(fit.z)), [*range(base), *found.further]
-    over = over_sessions(found.gram, fit.experiment, deviating, own)
-    return _Scanned(scan=found, over=over, log_bayes=_over_variants(found, over),
-                    log_prior=np.array([known[one.label] for one in found.candidates]))  # fmt: skip
+    every = (*found.candidates, *outside)
+    return _Scanned(
+        scan=found, over=over, candidates=every, log_bayes=_weighed(found, outside, over),
+        log_prior=np.array([known[one.label] for one in every]),
+        strengths=_strengths(found, outside, over.given[over.most_probable]),
+    )  # fmt: skip
 
 
-def _over_variants(found: Scan, over: OverSessions) -> Array:
+def _strengths(found: Scan, outside: Sequence[Hypothesis], given: Given) -> Strengths:
+    """Of every term in its best shape, then of every parameter outside its prior, in prior standard deviations."""
+    terms = found.singles(given)
+    further = given.singles([one.unknown for one in outside if one.unknown is not None], np.sqrt(WIDER**2 - 1.0))
+    return Strengths(**{name: np.concatenate([getattr(terms, name), getattr(further, name)])
+                        for name in ("log_bayes", "value", "sd")})  # fmt: skip
+
+
+def _weighed(found: Scan, outside: Sequence[Hypothesis], over: OverSessions) -> Array:
     """Log Bayes factors of all candidates, over variants and deviations between sessions."""
-    best = over.weighed([found.singles(given).log_bayes for given in over.given])
-    at_mode = found.singles(over.given[over.most_probable]).log_bayes
-    return np.asarray(best - (at_mode - found.log_bayes).clip(min=0.0))
+    each = [_strengths(found, outside, given).log_bayes for given in over.given]
+    best, count = over.weighed(each), len(found.candidates)
+    best[:count] -= (each[over.most_probable][:count] - found.log_bayes).clip(min=0.0)
+    return best
 
 
 def _raced(candidates: Sequence[Hypothesis], log_bayes: Array, order: Iterable[int]) -> list[int]:
@@ -126,24 +144,33 @@ def _raced(candidates: Sequence[Hypothesis], log_bayes: Array, order: Iterable[i
 
 def _refitted(calibration: Calibration, fit: Fit, found: _Scanned, index: int, iterations: int) -> Judged:
     """A candidate fitted together with everything else; judged by the scan if there is no solution."""
-    candidate, variant = found.scan.candidates[index], found.scan.best[index]
-    given = found.over.given[found.over.most_probable]
-    strength = float(found.scan.singles(given).value[index])
+    candidate, one = found.candidates[index], _by_scan(found, index, float(found.log_bayes[index]))
     try:
-        reached = refit(fit, candidate, variant, strength, iterations=iterations)
+        if candidate.unknown is not None:
+            reached = _with_wider_prior(fit, candidate.unknown, iterations)
+        else:
+            strength = float(found.strengths.value[index])
+            reached = refit(fit, candidate, found.scan.best[index], strength, iterations=iterations)
     except (InputError, ArithmeticError, np.linalg.LinAlgError):
-        return _by_scan(found, index, float(found.log_bayes[index]))
-    one = _by_scan(found, index, float(found.log_bayes[index]))
+        return one
     return _judged(calibration, replace(one, fit=reached), len(calibration.fit.z), _spread(found, index))
 
 
+def _with_wider_prior(fit: Fit, index: int, iterations: int) -> Fit:
+    """Everything fitted with one parameter outside its prior."""
+    experiment, z = fit.experiment, fit.z.copy()
+    unknowns = list(experiment.unknowns)
+    unknowns[index] = replace(unknowns[index], group=Group(name="outside its prior", amplitude=WIDER))  # type: ignore[type-var]
+    z[index] /= WIDER
+    wider = replace(experiment, unknowns=tuple(unknowns))
+    return wider.fit(z, [part.point.trajectory for part in fit.parts], iterations=iterations)
+
+
 def _spread(found: _Scanned, index: int) -> float:
-    """Nats that the best variant of a candidate with fixed shapes is ahead of the mean over all its variants."""
-    candidate = found.scan.candidates[index]
-    if candidate.how != "D":
-        return 0.0  # shapes are fitted, and weighed by their priors
-    given = found.over.given[found.over.most_probable]
-    return max(float(found.scan.singles(given).log_bayes[index] - found.scan.log_bayes[index]), 0.0)
+    """Nats that the best course over the hours is ahead of the mean over all; other shapes are fitted."""
+    if found.candidates[index].how != "W":
+        return 0.0
+    return max(float(found.strengths.log_bayes[index] - found.scan.log_bayes[index]), 0.0)
 
 
 def _judged(calibration: Calibration, one: Judged, base: int, spread: float) -> Judged:
@@ -152,15 +179,16 @@ def _judged(calibration: Calibration, one: Judged, base: int, spread: float) -> 
     assert fit is not None  # noqa: S101
     over = fit_over_sessions(fit, base)
     covariance, log_bayes = fit.covariance, over.log_evidence - calibration.log_evidence - spread
-    values, sds, at = [], [], base
+    values, sds, following = [], [], base
     for effect in one.effects:
+        at = following if effect.unknown is None else effect.unknown
         unknown = fit.experiment.unknowns[at]
         value, sd = unknown.value(float(fit.z[at])), float(np.sqrt(covariance[at, at])) * unknown.parameter.sd
         if effect.sign:
             log_bayes += float(np.log(2.0) + log_ndtr(effect.sign * value / sd))
         values.append(value)
         sds.append(sd)
-        at += len(effect.term.parameters) if effect.term is not None else 1
+        following += 0 if effect.term is None else len(effect.term.parameters)
     return replace(one, log_bayes=log_bayes, strength=tuple(values), strength_sd=tuple(sds))
 
 
@@ -178,12 +206,12 @@ def _fitted_on(calibration: Calibration, one: Judged, base: int) -> Judged:
 
 
 def _by_scan(found: _Scanned, index: int, log_bayes: float) -> Judged:
-    candidate = found.scan.candidates[index]
-    strengths = found.scan.singles(found.over.given[found.over.most_probable])
+    candidate = found.candidates[index]
+    variant = found.scan.best[index] if candidate.term is not None else 0
     return Judged(
-        effects=(replace(candidate, variants=candidate.variants[[found.scan.best[index]]]),),
-        log_prior=float(found.log_prior[index]), log_bayes=log_bayes,
-        strength=(float(strengths.value[index]),), strength_sd=(float(strengths.sd[index]),),
+        effects=(replace(candidate, variants=candidate.variants[[variant]]),), log_prior=float(found.log_prior[index]),
+        log_bayes=log_bayes, strength=(float(found.strengths.value[index]),),
+        strength_sd=(float(found.strengths.sd[index]),),
     )  # fmt: skip
 
 
@@ -214,11 +242,21 @@ def _beside(
         both = replace(one, effects=(*best.effects, *one.effects),
                        log_prior=best.log_prior + one.log_prior + float(np.log(PAIR_PRIOR)))  # fmt: skip
         pairs.append(_judged(calibration, both, base, _spread(second, int(index))))
-    deviating = [*range(base), *second.scan.further]
-    without = over_sessions(second.scan.gram, fit.experiment, deviating)
-    alone = _over_variants(second.scan, without).tolist()
-    labels = [one.label for one in second.scan.candidates]
+    without = over_sessions(second.scan.gram, fit.experiment, [*range(base), *second.scan.further])
+    outside = second.candidates[len(second.scan.candidates) :]
+    alone = _weighed(second.scan, outside, without).tolist()
+    labels = [one.label for one in second.candidates]
     return float(second.log_bayes[order[0]]), pairs, dict(zip(labels, alone, strict=True))
+
+
+def _likeness(found: _Scanned) -> Likeness:
+    """How much alike candidates look in these readings, each in its best shape."""
+    given = found.over.given[found.over.most_probable]
+    unknown = [one.unknown for one in found.candidates if one.unknown is not None]
+    at = np.array([*found.scan.of_candidates, *unknown], dtype=int) + 1
+    inner = given.matrix[np.ix_(at, at)]
+    norm = np.sqrt(np.maximum(np.diag(inner), 1e-12))
+    return Likeness(labels=tuple(one.label for one in found.candidates), cosines=np.abs(inner / norm / norm[:, None]))
 
 
 def _expected(found: _Scanned, settings: Settings) -> tuple[Expected, ...]:

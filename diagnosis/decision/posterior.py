@@ -110,6 +110,26 @@ class Expected:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class Likeness:
+    """How much alike effects look in these readings, with everything unknown marginalised.
+
+    Attributes
+    ----------
+    labels : tuple of str
+        Of effects
+    cosines : Array, shape (effects, effects)
+        Magnitude of the cosine between what two of them do to the readings, 0 to 1
+    """
+
+    labels: tuple[str, ...]
+    cosines: Array
+
+    def of(self, first: Hypothesis, second: Hypothesis) -> float:
+        """Magnitude of the cosine between two effects."""
+        return float(self.cosines[self.labels.index(first.label), self.labels.index(second.label)])
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Posterior:
     """All explanations that were judged.
 
@@ -125,6 +145,7 @@ class Posterior:
         From which something is missing, [nat]
     temper : (float, float)
         a and b
+    likeness : Likeness
     error_class : str
         Class of model error that the evidence chose
     error_evidence : mapping of str to float
@@ -141,6 +162,7 @@ class Posterior:
     log_e: float
     threshold: float
     temper: tuple[float, float]
+    likeness: Likeness = Likeness(labels=(), cosines=np.zeros((0, 0)))
     error_class: str = ""
     error_evidence: dict[str, float] = field(default_factory=dict)
     session_s: float = 0.0

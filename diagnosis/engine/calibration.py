@@ -73,7 +73,7 @@ def calibrate_with_error(experiment: Experiment) -> Calibration:
 
 def _columns(error: ModelError, parts: Sequence[Linear]) -> list[Array]:
     """Whitened columns of all model error, per unit, of every piece, shape (M, n)."""
-    return [part.filter(error.responses(part.point)) for part in parts]
+    return [error.whitened(part) for part in parts]
 
 
 def _judged(

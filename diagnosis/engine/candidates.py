@@ -15,9 +15,8 @@ from diagnosis.candidates.hypotheses import Hypothesis, chunks
 from diagnosis.engine.fit import Experiment, Fit, Linear, Linearised
 from diagnosis.engine.gram import Given, Gram, Strengths, strengths
 from diagnosis.engine.metric import Metric
-from diagnosis.engine.point import AT_ONCE, Column, Machine, Point
+from diagnosis.engine.point import AT_ONCE, Machine, Point
 from diagnosis.engine.products import base_of, gram_of
-from diagnosis.engine.slopes import Heat
 from diagnosis.engine.unknown import TERM_STEP, Group, Held, NetworkParameter, Scope, TermParameter, Unknown
 from diagnosis.forward.network_on_grid import NetworkOnGrid
 from diagnosis.forward.observation import readings
@@ -152,7 +151,7 @@ def _columns(experiment: Experiment, part: Linear, some: Sequence[tuple[Hypothes
     """
     point, trajectory = part.point, part.point.trajectory
     count, recording = sum(len(candidate.variants) for candidate, _ in some), trajectory.piece.recording
-    acting = [in_scope_of(experiment, candidate, recording) for candidate, _ in some]
+    acting = [_acts_in(experiment, candidate, recording) for candidate, _ in some]
     if not any(acting):
         return np.zeros((*point.read.shape, count))
     into = np.zeros((len(trajectory.piece.steps), trajectory.decay.shape[-1], count))
@@ -173,26 +172,6 @@ def _columns(experiment: Experiment, part: Linear, some: Sequence[tuple[Hypothes
     for start, columns in shown.items():
         result[:, :, start : start + columns.shape[2]] = columns
     return result
-
-
-def heat_columns(experiment: Experiment, point: Point, candidate: Hypothesis) -> list[Column]:
-    """Columns of all variants of a candidate that brings heat, in one piece, per unit of strength.
-
-    Parameters
-    ----------
-    experiment : Experiment
-    point : Point
-    candidate : Hypothesis
-        Neither of a parameter nor of a sensor
-    """
-    assert candidate.term is not None  # noqa: S101 - it brings heat
-    trajectory, coupled = point.trajectory, len(point.machine.model.coupled)
-    if not in_scope_of(experiment, candidate, trajectory.piece.recording):
-        return [Column() for _ in candidate.variants]
-    values = _by_clock(candidate, experiment.starts_at.get(trajectory.piece.recording))
-    heat, loss = _on_grid(point.machine.model, candidate.term).heat(trajectory, values)
-    into = np.pad(np.nan_to_num(heat), ((0, 0), (0, coupled), (0, 0)))
-    return [Column(heat=Heat(into=into[:, :, i], loss=loss[:, i])) for i in range(len(values))]
 
 
 def _by_clock(candidate: Hypothesis, starts_at: float | None) -> Array:
@@ -273,7 +252,7 @@ def with_candidate(fit: Fit, candidate: Hypothesis, variant: int) -> tuple[Exper
     return replace(experiment, machine=machine, unknowns=(*experiment.unknowns, *added)), np.array(z)
 
 
-def in_scope_of(experiment: Experiment, candidate: Hypothesis, recording: str) -> bool:
+def _acts_in(experiment: Experiment, candidate: Hypothesis, recording: str) -> bool:
     """True if a candidate may act in a recording."""
     scope = _scope(experiment, candidate)
     return scope is None or recording in scope

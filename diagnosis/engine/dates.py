@@ -50,7 +50,7 @@ def date_of(fit: Fit, hypothesis: Hypothesis) -> Dated:
     Parameters
     ----------
     fit : Fit
-        Without the change
+        Without the change; its unknowns and what its metric holds are marginalised
     hypothesis : Hypothesis
         At a date
     """
@@ -62,12 +62,12 @@ def date_of(fit: Fit, hypothesis: Hypothesis) -> Dated:
     for _ in range(ROUNDS):
         tried = [replace(hypothesis, variants=_moved(values, since, [at, span])) for span in spans for at in dates]
         found = scan(fit, tried)
-        single = found.singles(found.gram.given([*found.unknowns, *found.further]))
-        best = int(np.argmax(single.log_bayes))
-        weights = np.exp(single.log_bayes - single.log_bayes[best]).reshape(len(spans), len(dates))
+        best = int(np.argmax(found.log_bayes))
+        weights = np.exp(found.log_bayes - found.log_bayes[best]).reshape(len(spans), len(dates))
         low, high = _band(dates, weights.sum(axis=0))
+        value = found.singles(found.gram.given([*found.unknowns, *found.further])).value
         dated = Dated(
-            hypothesis=tried[best], log_bayes=float(single.log_bayes[best]), strength=float(single.value[best]),
+            hypothesis=tried[best], log_bayes=float(found.log_bayes[best]), strength=float(value[best]),
             since=float(tried[best].variants[0, since]), low=low, high=high,
         )  # fmt: skip
         distance = dates[1] - dates[0]

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from diagnosis.candidates.hypotheses import Hypothesis
-from diagnosis.candidates.unknown_heat import unknown_heats
-from diagnosis.engine.candidates import heat_columns
+from diagnosis.candidates.unknown_heat import shaped, unknown_heats
+from diagnosis.engine.candidates import scan
 from diagnosis.engine.families import axis_of
-from diagnosis.engine.fit import Experiment
+from diagnosis.engine.fit import Experiment, Fit
 from diagnosis.engine.gram import Given, Index
-from diagnosis.engine.point import Column, Point
 from diagnosis.setup.inference_setup import InferenceSetup
 from models.base.types import Array
 from models.quantities.quantities import TOTAL_LOSS
@@ -27,40 +26,68 @@ def outside_of(setup: InferenceSetup, experiment: Experiment) -> list[Hypothesis
                          losses=TOTAL_LOSS in setup.channels)  # fmt: skip
 
 
-def outside_columns(experiment: Experiment, point: Point, hypotheses: Sequence[Hypothesis]) -> list[Column]:
-    """Columns of all functions of unknown heats in one piece, one after the other, per watt."""
-    return [column for one in hypotheses for column in heat_columns(experiment, point, one)]
-
-
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Together:
-    """Evidence of columns that are marginalised together.
+class Outside:
+    """Evidence of an unknown heat.
 
     Attributes
     ----------
+    hypothesis : Hypothesis
+        With one variant: its most probable shape
     log_bayes : float
-        Against nothing, mean over :data:`SIZES`
-    weights : Array, shape (columns,)
-        Most probable ones, at the most probable size
+        Against nothing, shape and size marginalised
+    strength : float
+        Most probable one of that shape, [W]
     """
 
+    hypothesis: Hypothesis
     log_bayes: float
-    weights: Array
+    strength: float
 
 
-def judged_together(given: Given, columns: Index, sd: float) -> Together:
-    """Evidence of one unknown heat.
+def judge_outside(fit: Fit, hypotheses: Sequence[Hypothesis]) -> list[Outside]:
+    """Judge unknown heats: all functions of each are marginalised together.
+
+    Parameters
+    ----------
+    fit : Fit
+        Its unknowns and the model error in its metric are marginalised too
+    hypotheses : sequence of Hypothesis
+        See :func:`outside_of`
+    """
+    functions = [replace(one, variants=row[None, :]) for one in hypotheses for row in one.variants]
+    found = scan(fit, functions)
+    given = found.gram.given([*found.unknowns, *found.further])
+    judged, first = [], found.of_candidates.start
+    for one in hypotheses:
+        assert one.term is not None  # noqa: S101 - it is a heat
+        columns = range(first, first + len(one.variants))
+        log_bayes, weights = judged_together(given, columns, one.term.strength.sd)
+        judged.append(Outside(hypothesis=shaped(one, weights), log_bayes=log_bayes,
+                              strength=float(np.linalg.norm(weights))))  # fmt: skip
+        first = columns.stop
+    return judged
+
+
+def judged_together(given: Given, columns: Index, sd: float) -> tuple[float, Array]:
+    """Evidence of columns that are marginalised together.
 
     Parameters
     ----------
     given : Given
         With everything else that is unknown marginalised
     columns : sequence of int
-        Places of its functions among the labels
+        Places among the labels
     sd : float
-        Prior of the weights: of the strength of its term
+        Prior of the weights
+
+    Returns
+    -------
+    log_bayes : float
+        Against nothing, mean over :data:`SIZES`
+    weights : Array, shape (columns,)
+        Most probable ones, at the most probable size
     """
     found = [given.given(columns, sd * size).log_evidence - given.log_evidence for size in SIZES]
     best = SIZES[int(np.argmax(found))]
-    return Together(log_bayes=float(np.logaddexp.reduce(found) - np.log(len(SIZES))),
-                    weights=given.most_probable(columns, sd * best))  # fmt: skip
+    return float(np.logaddexp.reduce(found) - np.log(len(SIZES))), given.most_probable(columns, sd * best)

@@ -100,6 +100,23 @@ def prepare_experiment(
     )
 
 
+def held_out_experiment(setup: InferenceSetup, experiment: Experiment) -> Experiment:
+    """The held-out pieces with the machine and the unknowns of an experiment.
+
+    Parameters
+    ----------
+    setup : InferenceSetup
+        Of the same recordings, see :func:`prepare_experiment`
+    experiment : Experiment
+    """
+    held, floor = setup.holdout, experiment.noise[0].floor_sd
+    noise = tuple(replace(n, floor_sd=np.maximum(n.floor_sd, floor)) for n in held.noise)
+    return replace(
+        experiment, pieces=tuple(held.pieces), noise=noise, starts=tuple(held.starts), filters=None,
+        healthy=frozenset(),
+    )  # fmt: skip
+
+
 def usual_unknowns(
     network: ThermalNetwork, recordings: Sequence[Recording], channels: Sequence[str], *, interval: float,
     gain_of_torque: Parameter | None = None, group: Group = CALIBRATION,

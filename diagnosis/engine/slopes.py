@@ -122,5 +122,9 @@ class LawSlopes:
 @lru_cache(maxsize=4096)
 def _slopes(law: sp.Expr, arguments: tuple[str, ...], names: tuple[str, ...]) -> Callable[..., tuple[Any, ...]]:
     """Derivatives of one law as a function; kept, since most laws stay as they are when a term is added."""
-    slopes = [sp.diff(law, symbol(name)) for name in names]
+    # What repeats is a straight line between its jumps.
+    whole = {one: sp.Dummy() for one in law.atoms(sp.Mod)}
+    law = law.xreplace({one: one.args[0] - one.args[1] * count for one, count in whole.items()})
+    counts = {count: sp.floor(one.args[0] / one.args[1]) for one, count in whole.items()}
+    slopes = [sp.diff(law, symbol(name)).xreplace(counts) for name in names]
     return compile_function(function_source("slopes", arguments, slopes, vector=True), "slopes")

@@ -14,7 +14,8 @@ from diagnosis.inference.predict import rmse
 from diagnosis.report.chart import Chart, Curve, averaged, drawn
 from diagnosis.report.wording import LOSS, name, time_scale
 from diagnosis.results.number_format import fixed
-from diagnosis.results.result import Diagnosis, Finding, MissingHeat, PredictedRun
+from diagnosis.results.result import Diagnosis
+from diagnosis.results.result_parts import Finding, MissingHeat, PredictedRun
 from models.base.types import Array
 
 STAGES = (("as delivered", "before"), ("calibrated", "calibrated"), ("with what was found", "after"))

@@ -9,11 +9,11 @@ from itertools import pairwise
 from markupsafe import Markup
 
 from diagnosis.report.wording import headline, name, share
-from diagnosis.results.result import Diagnosis, Finding
+from diagnosis.results.result import NO_CLAIM, Diagnosis
+from diagnosis.results.result_parts import Finding
 from models.quantities.quantities import node_of_channel
 from models.simulation.thermal_network import ThermalNetwork
 
-NO_CLAIM = ("consistent", "insufficient_data")
 LIKELY = 0.1  # probability from which a place is pointed out
 ROW_PX = 92
 WIDEST_ROW = 5  # names that a phone has room for

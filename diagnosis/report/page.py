@@ -9,10 +9,10 @@ from typing import Any
 from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
 
-from diagnosis.decision.stage import LEAST_RIVAL
 from diagnosis.report import equation, figures, network_drawing, wording
 from diagnosis.results import number_format as numbers
-from diagnosis.results.result import NOT_ACCEPTED, Calibrated, Diagnosis, Finding, Fits
+from diagnosis.results.result import LEAST_RIVAL, NO_CLAIM, Diagnosis, date_told, values_told
+from diagnosis.results.result_parts import Calibrated, Finding, Fits
 
 PACKAGE = "diagnosis.report"
 SHOWN_RANKS, MOST_RANKS = 10, 300
@@ -32,6 +32,7 @@ def page(diagnosis: Diagnosis) -> str:
         chance=wording.chance,
         sentence=wording.sentence,
         clause=wording.clause,
+        plain=wording.plain,
     )
     with_law = {heat.node for heat in diagnosis.missing_heat if heat.law is not None}
     marked = network_drawing.marks(diagnosis)
@@ -42,8 +43,7 @@ def page(diagnosis: Diagnosis) -> str:
         script=Markup(_text("report.js")),  # noqa: S704 - our own file
         words=wording.WORDS,
         verdict_text=diagnosis.verdict_text,
-        not_accepted=NOT_ACCEPTED,
-        claims=diagnosis.verdict not in network_drawing.NO_CLAIM,
+        claims=diagnosis.verdict not in NO_CLAIM,
         evidence=_evidence(diagnosis),
         findings=[_finding(finding, with_law) for finding in diagnosis.findings],
         stages=figures.STAGES if diagnosis.findings else figures.STAGES[:2],
@@ -86,6 +86,9 @@ def _finding(finding: Finding, shown: set[str]) -> dict[str, Any]:
     prefix = f"{finding.term.label}_" if finding.term is not None else ""
     return {
         "of": finding,
+        "title": wording.plain(finding.title),
+        "numbers": wording.plain(values_told(finding)),
+        "date": wording.clause(date_told(finding)),
         "mean_heat": numbers.with_error(finding.heat_mean_W, finding.heat_stderr_W),
         "equation": equation.drawn(finding.equation),
         "parameters": [

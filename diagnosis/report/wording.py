@@ -26,8 +26,7 @@ WORDS: Mapping[str, str] = {
     "correction is worth counts against this, not against the model as delivered.",
     "with what was found": "The calibrated model with the found physics added.",
     "held out": "Recordings that nothing was fitted to: their error is that of a model that got their inputs and no "
-    "measured temperature beyond the first minutes, which do not count. They may refuse an effect that the others "
-    "would name; so the error is that of a choice, and a little smaller than on recordings that had no say at all.",
+    "measured temperature beyond the first minutes, which do not count. They had no say in what was found.",
     "free-running": "Simulated from the start temperatures on with the recorded inputs alone, never corrected by a "
     "measurement on the way.",
     "RMSE": "Root mean square of simulated less measured: the typical size of the error.",
@@ -36,6 +35,13 @@ WORDS: Mapping[str, str] = {
     "evidence": "Natural logarithm of how many times better the data are predicted with the effect than without it, "
     "averaged over all values of all parameters (log Bayes factor), in nat: 1 nat is a factor of 2.7, 5 nat are 150, "
     "10 nat are 22 000.",
+    "claim": "A name that is certain enough: its probability reached the limit that was asked for.",
+    "likely": "Less than a claim: one of at most three names that these data do not tell apart, or a law and a place "
+    "whose cause was not found (acts like ...). It improves the prediction all the same.",
+    "cannot be seen": "Of an effect at the size that matters these recordings would give evidence of less than 5 nat: "
+    "whether it is there or not, they look the same.",
+    "model error": "What formulas, load sharings and lumped nodes cannot know: further small unknowns with priors, in "
+    "classes between which the data choose. What they can explain is not called missing physics.",
     "threshold": "Evidence that has to be reached before anything is claimed; set by the false-alarm rate asked for.",
     "false-alarm rate": "In how many of 100 healthy cases a mismatch would be claimed at most.",
     "p": "Nominal bound on the chance to reach this evidence although nothing is missing.",
@@ -44,13 +50,12 @@ WORDS: Mapping[str, str] = {
     "shift": "How far the calibration moved a parameter, in standard deviations of its prior. Beyond ±2 it is in "
     "distress: something else probably pulls at it.",
     "noise": "Scatter of a temperature reading from row to row; no model can be closer to single rows than this.",
-    "floor": "What is left unexplained even in a model without faults, because a real gearbox is finer than any "
+    "floor": "Random heat that even a model without faults is granted, because a real gearbox is finer than any "
     "network of few nodes; mismatches below it are not claimed.",
     "missing heat": "Heat that the calibrated model would need at this place to follow the recordings; negative where "
     "it has too much. Tuning the parameters swallows part of an effect that is missing, so the law that was found may "
     "be larger.",
-    "not ruled out": "Explanations that these data cannot tell from the one that is named; one that is more than twice "
-    "as probable was refused: by the held-out recordings, as impossible, or as too small to matter.",
+    "not ruled out": "Explanations that these data leave possible, with their probabilities.",
 }
 
 
@@ -95,6 +100,17 @@ def headline(mechanism: str, place: str = "") -> str:
     if not place:
         return name(mechanism)
     return f"{name(mechanism)}{' ' if mechanism == PARAMETER else ' at '}{name(place)}"
+
+
+def plain(text: str) -> str:
+    """A text of the terminal for a page: names in words, units as printed, no full stop.
+
+    Examples
+    --------
+    >>> plain("windage at housing_lower: on at 60 degC.")
+    'windage at housing lower: on at 60 °C'
+    """
+    return clause(text.replace("_", " "))
 
 
 def clause(text: str) -> str:

@@ -33,19 +33,20 @@ def correction_of(diagnosis: Diagnosis, gearbox: Gearbox) -> Correction:
         if found.term is None:
             continue
         prefix = f"{found.term.label}_"
-        estimates = {
+        estimates = {p.name: (p.start, 0.0) for p in found.term.parameters}
+        estimates |= {
             (p.name if p.name == found.term.label else prefix + p.name): (p.value, p.stderr) for p in found.parameters
         }
         findings.append(Finding.of(
             found.term, estimates, mechanism=found.mechanism, family=found.family, place=found.place, says=found.says,
-            probability=found.probability,
+            probability=found.probability, grade=found.grade,
         ))  # fmt: skip
     for term in diagnosis.shapes:
         name = term.strength.name
         if name in calibrated:
             findings.append(Finding.of(
                 term, {name: (calibrated[name].value, calibrated[name].stderr)}, mechanism="shape",
-                family="calibration", place=name.removeprefix(SHAPE), says=term.strength.description,
+                family="calibration", place=name.removeprefix(SHAPE), says=term.strength.description, grade="learnt",
             ))  # fmt: skip
     return Correction.of(
         gearbox,

@@ -21,12 +21,13 @@ from diagnosis.inference.posterior import Problem
 from diagnosis.inference.predict import Prediction, overall_rmse, predict, rmse
 from diagnosis.inference.shapes import shape_terms
 from diagnosis.recordings.recording import Recording
-from diagnosis.results.findings import finding_of, node_of
+from diagnosis.results.findings import finding_of
 from diagnosis.results.identifiable import scale_notes
+from diagnosis.results.places import node_in
 from diagnosis.results.regime import active, regime, windows
-from diagnosis.results.result import (  # fmt: skip
+from diagnosis.results.result import Diagnosis, Verdict
+from diagnosis.results.result_parts import (
     Calibrated,
-    Diagnosis,
     Finding,
     Fits,
     Location,
@@ -34,7 +35,6 @@ from diagnosis.results.result import (  # fmt: skip
     NotDetectable,
     PredictedRun,
     Ranked,
-    Verdict,
 )
 from diagnosis.setup.inference_setup import FLOORS, InferenceSetup, heat_over_time
 from models.base.parallel import run_parallel
@@ -198,7 +198,7 @@ def _location(
         for _, stage in found.findings:
             own: dict[str, float] = {}  # rivals exclude one another, findings do not
             for fit, probability in zip(stage.fits, stage.probabilities(), strict=True):
-                node = node_of(case, fit.found[-1])
+                node = node_in(case.nominal, fit.found[-1])
                 own[node] = own.get(node, 0.0) + float(probability)
             for node, weight in own.items():
                 weights[node] = 1.0 - (1.0 - weights.get(node, 0.0)) * (1.0 - min(weight, 1.0))
@@ -211,7 +211,7 @@ def _location(
 
 
 def _place(case: InferenceSetup, found: Search, first: Sequence[LatentHeat], node: str, weight: float) -> Location:
-    own = [h for h in found.final.found if node_of(case, h) == node]
+    own = [h for h in found.final.found if node_in(case.nominal, h) == node]
     heats = _summed(found.final, own)
     if not heats:
         candidates = [h for h in first if h.node == node]
@@ -272,7 +272,7 @@ def _missing_heat(
         if not candidates:
             continue
         latent = max(candidates, key=lambda h: h.log_bayes)
-        summed = _summed(found.final, [h for h in found.final.found if node_of(case, h) == node])
+        summed = _summed(found.final, [h for h in found.final.found if node_in(case.nominal, h) == node])
         lacking = [a + b for a, b in zip(summed, latent.mean, strict=True)] if summed else latent.mean
         mean, sd = heat_over_time(pieces, lacking), heat_over_time(pieces, latent.sd)
         law = heat_over_time(pieces, summed) if summed else None

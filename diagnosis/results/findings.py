@@ -12,43 +12,12 @@ from diagnosis.candidates.heat import heats_of, mean_heat_of
 from diagnosis.candidates.hypotheses import Hypothesis
 from diagnosis.decision.search import FORM_DOUBT
 from diagnosis.decision.stage import LEAST_RIVAL, Stage
-from diagnosis.results.result import Finding, ParameterValue, Rival
+from diagnosis.results.places import node_in
+from diagnosis.results.result_parts import Finding, ParameterValue, Rival
 from diagnosis.setup.inference_setup import InferenceSetup, heat_over_time
 from models.mechanisms import Mechanism, Placed
 
 FORM_ERROR = 0.1  # of a strength and its heat: laws of the literature are hardly known better
-
-
-def node_of(case: InferenceSetup, h: Hypothesis) -> str:
-    """The part of the network (or the channel, or the boundary) that a hypothesis acts on."""
-    network, term = case.nominal, h.term
-    if term is None:
-        return _node_of_parameter(case, h.place)
-    if term.kind == "loss_factor":
-        most, _ = max(term.weighted, key=lambda pair: abs(pair[1]))
-        return next(s.node for s in network.sources if s.name == most)
-    if term.kind == "link_factor":
-        parts = {p.name for p in network.parts}
-        ends = next(k.nodes for k in network.links if k.name == term.target[0])
-        return next(node for node in ends if node in parts)
-    if term.kind == "signal":
-        return {"T_ambient": "air", "air_speed": "air"}.get(term.target[0], term.target[0])
-    return term.target[0]
-
-
-def _node_of_parameter(case: InferenceSetup, name: str) -> str:
-    network = case.nominal
-    bare = name.removeprefix("shape_")
-    for source in network.sources:
-        if any(s.name == name or bare.startswith(f"{s.name}_") for s in source.heat.free_symbols):
-            return source.node
-    for link in network.links:
-        if any(s.name == name or bare.startswith(f"{s.name}_") for s in link.conductance.free_symbols):
-            return next(n for n in link.nodes if n in {p.name for p in network.parts})
-    for part in network.parts:
-        if part.capacity is not None and name in {s.name for s in part.capacity.free_symbols}:
-            return part.name
-    return network.parts[0].name
 
 
 def rivals_of(stage: Stage, catalogue: Mapping[str, Mechanism], doubt: float = 0.0) -> tuple[Rival, ...]:
@@ -114,7 +83,7 @@ def finding_of(
         mechanism=h.name,
         family=h.family,
         place=h.place,
-        node=node_of(case, h),
+        node=node_in(case.nominal, h),
         kind="parameter" if h.term is None else "sensor" if h.term.of_measurement else h.term.kind,
         says=_says(h, values),
         reference=h.term.mechanism.reference if isinstance(h.term, Placed) else "",

@@ -1,24 +1,12 @@
-"""The unidentifiable direction of temperatures alone: all heats, conductances and capacities times one factor.
-
-``C dT/dt = P + sum G dT`` keeps its solution when C, P and G grow together. Where nothing in watts was measured, and
-the definition does not fix a size, a recording identifies ratios only (heat over capacity, conductance over capacity),
-and every watt in the result rests on the priors. Whether it is so is asked of the fit itself: the information that the
-recordings have along this direction is compared with what they have on the sizes one by one.
-"""
+"""Sizes that the recordings of an explanation identify or not, see :mod:`diagnosis.results.ratios_only`."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
-import sympy as sp
 
 from diagnosis.candidates.explain import Explanation
+from diagnosis.results.ratios_only import along, notes_along, sizes
 from models.base.types import Array
-from models.network.laws import symbol
-from models.simulation.thermal_network import ThermalNetwork
-
-LITTLE = 0.01  # of what the recordings know about the sizes one by one: a small part of fixed capacity pretends so much
 
 
 def scale_direction(explanation: Explanation) -> Array:
@@ -30,13 +18,11 @@ def scale_direction(explanation: Explanation) -> Array:
         In units of their priors' standard deviations
     """
     fit, network = explanation.fit, explanation.problem.model.network
-    sizes = set(_sizes(network))
+    known = set(sizes(network))
     direction = np.zeros(len(fit.unknowns))
     for index, item in enumerate(fit.unknowns.items):
-        if item.role == "network" and item.target in sizes and item.parameter.sd > 0.0:
-            # A logarithmic one moves by 1, another one by its value.
-            value = 1.0 if item.parameter.log else item.value(float(fit.z[index]))
-            direction[index] = value / item.parameter.sd
+        if item.role == "network" and item.target in known and item.parameter.sd > 0.0:
+            direction[index] = along(item.parameter, item.value(float(fit.z[index])))
     return direction
 
 
@@ -47,32 +33,4 @@ def scale_notes(explanation: Explanation) -> tuple[str, ...]:
     ----------
     explanation : Explanation
     """
-    direction = scale_direction(explanation)
-    each = explanation.fit.white_columns * direction
-    together, alone = each.sum(axis=1), np.square(each).sum(axis=0)[direction != 0.0]
-    if not len(alone) or float(together @ together) > LITTLE * float(alone.sum()):
-        return ()
-    sd = 1.0 / np.sqrt(float(direction @ direction))
-    text = (
-        "only ratios are identified: all heats, conductances and heat capacities together may be larger or smaller by "
-        f"one factor without any change of a temperature. That factor rests on the definition's priors (a factor of "
-        f"{np.exp(sd):.2f} either way, one standard deviation), and so does every number in W, W/K or J/K; measure the "
-        "loss, or one heat flow, to fix it"
-    )
-    return (text,)
-
-
-def _sizes(network: ThermalNetwork) -> Iterator[str]:
-    """Parameters that multiply all the laws they are in, if these are heats, conductances or capacities."""
-    laws = [n.capacity for n in network.parts if n.capacity is not None]
-    laws += [link.conductance for link in network.links] + [source.heat for source in network.sources]
-    others = [law for state in network.states for law in (state.rate, state.update) if law is not None]
-    for parameter in network.parameters:
-        own = symbol(parameter.name)
-        held = [law for law in laws if own in law.free_symbols]
-        if held and not any(own in law.free_symbols for law in others) and all(_is_factor(own, law) for law in held):
-            yield parameter.name
-
-
-def _is_factor(own: sp.Symbol, law: sp.Expr) -> bool:
-    return bool(law.as_independent(own, as_Add=False)[1] == own)
+    return notes_along(scale_direction(explanation), explanation.fit.white_columns)

@@ -8,9 +8,19 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from diagnosis.decision.stage import LEAST_RIVAL, LEAST_SHARE
 from diagnosis.results.number_format import MINUS, with_error
-from models.base.types import Array
+from diagnosis.results.result_parts import (
+    Calibrated,
+    Finding,
+    Fits,
+    Location,
+    MissingHeat,
+    NotDetectable,
+    PredictedRun,
+    Ranked,
+    finding_dict,
+    fits_dict,
+)
 from models.mechanisms import OPEN_FORM
 from models.simulation.thermal_network import ThermalNetwork
 from models.terms.term import Term
@@ -18,7 +28,13 @@ from models.terms.term import Term
 SCHEMA = 1
 FAR_SD, MOST_FAR = 3.0, 3  # standard deviations of a prior, beyond which the summary tells of a parameter; how many
 LIKELY = 0.5  # probability from which a further place is told
-NEAREST, MOST_NEAREST = 0.1, 3  # probability from which what was not accepted is told, and of how many
+LEAST_RIVAL = 0.01  # probability of what is told as a rival
+NEAREST, MOST_NEAREST = 0.1, 3  # probability from which an explanation is told that was not reported; of how many
+MOST_UNSEEN = 6  # effects that the summary names of those that cannot be seen
+OF_DATE = ("since", "lasting")  # parameters that the date contains
+LONG_S = 7200.0  # times beyond are told in hours
+LITTLE_SPREAD = 0.05  # deviation between sessions that is not worth a word, in prior standard deviations
+NO_CLAIM = ("consistent", "insufficient_data")
 Verdict = Literal[
     "consistent", "parameter_error", "missing_physics", "sensor_fault", "unexplained", "insufficient_data"
 ]
@@ -30,215 +46,7 @@ VERDICT_TEXT: Mapping[str, str] = {
     "unexplained": "Something is missing, and it matches no physics in the catalogue.",
     "insufficient_data": "These recordings are too short or too calm to decide.",
 }
-REFUSED = "refused (by the held-out recordings, as impossible, or as too small)"
-AHEAD = f"more probable by what was learnt from, but {REFUSED}"
-NOT_ACCEPTED = f"by what was learnt from, but it was {REFUSED}"
 PARTLY = "Part of what is missing was found; the rest matches no physics in the catalogue."
-
-
-@dataclass(frozen=True, kw_only=True)
-class ParameterValue:
-    """A number that was found, with its standard error and unit."""
-
-    name: str
-    value: float
-    stderr: float
-    unit: str
-
-
-@dataclass(frozen=True, kw_only=True)
-class Rival:
-    """Another explanation that these data do not rule out, and what would.
-
-    Attributes
-    ----------
-    mechanism, place : str
-    probability : float
-    separate_by : str
-        The experiment or sensor that would separate the two
-    """
-
-    mechanism: str
-    place: str
-    probability: float
-    separate_by: str
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Finding:
-    """One effect that was found.
-
-    Attributes
-    ----------
-    mechanism : str
-        Name in the catalogue; ``parameter`` for a parameter out of its prior; of an open form its name
-    family, place, node, kind, reference : str
-        `node`: the part of the network, or the channel, that it acts on
-    equation : str
-        LaTeX
-    probability : float
-        Among all explanations that were compared
-    log_bayes : float
-        Evidence against leaving it out, [nat]
-    parameters : tuple of ParameterValue
-    confusable_with : tuple of Rival
-    heat_mean_W, heat_stderr_W, heat_max_W : float
-        Mean magnitude over the training recordings with its standard error, and the largest one; 0 for a fault of an
-        instrument
-    heat : mapping of recording to (time [s], heat [W]) Arrays
-        Heat of the finding over time; empty for sensor faults
-    term : Term or None
-        With the found values as its parameters' start
-    """
-
-    mechanism: str
-    family: str
-    place: str
-    node: str
-    kind: str
-    #: The finding in one sentence.
-    says: str
-    reference: str
-    equation: str
-    probability: float
-    log_bayes: float
-    parameters: tuple[ParameterValue, ...]
-    confusable_with: tuple[Rival, ...] = ()
-    heat_mean_W: float = 0.0
-    heat_stderr_W: float = 0.0
-    heat_max_W: float = 0.0
-    heat: Mapping[str, tuple[Array, Array]] = field(default_factory=dict)
-    term: Term | None = None
-
-
-@dataclass(frozen=True, kw_only=True)
-class Location:
-    """Where heat comes or goes that the calibrated model cannot explain.
-
-    Attributes
-    ----------
-    node : str
-    probability : float
-    heat_mean_W, heat_max_W : float
-    when : tuple of (recording, from_s, to_s)
-        Windows in which it acts
-    regime : str
-        When it acts in words of speed, torque and temperature
-    """
-
-    node: str
-    probability: float
-    heat_mean_W: float
-    heat_max_W: float
-    when: tuple[tuple[str, float, float], ...]
-    regime: str
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class MissingHeat:
-    """The heat that the calibrated model lacks at the most probable place, over time.
-
-    Attributes
-    ----------
-    recording, node : str
-    time, mean, sd : Array, shape (K,)
-        [s], [W], [W]
-    speed, torque, temperature : Array, shape (K,)
-        Operating point: [1/min], [N m], and the node's temperature [degC]
-    law : Array, shape (K,), or None
-        Heat of the findings there, [W]
-    """
-
-    recording: str
-    node: str
-    time: Array
-    mean: Array
-    sd: Array
-    speed: Array
-    torque: Array
-    temperature: Array
-    law: Array | None
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class PredictedRun:
-    """One recording as measured and as simulated, free-running.
-
-    Attributes
-    ----------
-    recording : str
-    held_out : bool
-    time : Array, shape (rows,)
-        [s]
-    speed, torque : Array, shape (rows,)
-        [1/min], [N m]
-    measured, before, calibrated, after : mapping of channel to Array, shape (rows,)
-        [degC], or [W] for ``P_loss``; before: the model as delivered; calibrated: its parameters tuned inside their
-        priors; after: with the findings
-    counts_from_s : float
-        Rows before it served to find the start temperatures and do not count
-    """
-
-    recording: str
-    held_out: bool
-    time: Array
-    speed: Array
-    torque: Array
-    measured: Mapping[str, Array]
-    before: Mapping[str, Array]
-    calibrated: Mapping[str, Array]
-    after: Mapping[str, Array]
-    counts_from_s: float
-
-
-@dataclass(frozen=True, kw_only=True)
-class Fits:
-    """Root mean square errors of one set of recordings.
-
-    Attributes
-    ----------
-    before, calibrated, after : float
-        Over all temperatures, [K]; NaN without recordings
-    sensors : mapping of channel to (before, calibrated, after)
-        [K], or [W] for ``P_loss``
-    """
-
-    before: float
-    calibrated: float
-    after: float
-    sensors: Mapping[str, tuple[float, float, float]]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Calibrated:
-    """A parameter of the model as calibrated."""
-
-    parameter: str
-    prior: float
-    value: float
-    stderr: float
-    shift_in_sd: float
-    unit: str = "1"
-
-
-@dataclass(frozen=True, kw_only=True)
-class Ranked:
-    """One line of the ranking: every explanation that was scored."""
-
-    mechanism: str
-    place: str
-    family: str
-    log_bayes: float
-    probability: float
-
-
-@dataclass(frozen=True, kw_only=True)
-class NotDetectable:
-    """An effect of typical size that these data could not have shown, and the test that would show it."""
-
-    mechanism: str
-    place: str
-    needed: str
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -283,6 +91,22 @@ class Diagnosis:
         Hashes and version
     notes : tuple of str
         What was cleaned in the recordings
+    kinds : mapping of str to float
+        Probability of every kind of explanation: nothing, parameter, measurement, mechanism, pair, outside
+    claim_from : float
+        Probability from which a name is a claim, as asked for
+    matters_K, matters_W : float
+        Size from which an effect matters, as asked for
+    error_class : str
+        Class of model error that the evidence chose
+    error_evidence : mapping of str to float
+        Log evidence of every class less that of the best, [nat]
+    error_asked : tuple of str
+        Where the data ask for much model error
+    session_s : float
+        Deviation between sessions that the data support, in prior standard deviations
+    holdout_gain : float
+        Log predictive density of the held-out readings: final model less the calibrated one, [nat]; NaN without any
     """
 
     verdict: Verdict
@@ -310,6 +134,15 @@ class Diagnosis:
     shapes: tuple[Term, ...]
     inputs: Mapping[str, Any]
     notes: tuple[str, ...] = ()
+    kinds: Mapping[str, float] = field(default_factory=dict)
+    claim_from: float = 0.9
+    matters_K: float = 1.0
+    matters_W: float = 0.0
+    error_class: str = ""
+    error_evidence: Mapping[str, float] = field(default_factory=dict)
+    error_asked: tuple[str, ...] = ()
+    session_s: float = 0.0
+    holdout_gain: float = math.nan
 
     def to_dict(self) -> dict[str, Any]:
         """Everything of ``diagnosis.json``, schema :data:`SCHEMA`."""
@@ -334,25 +167,35 @@ class Diagnosis:
                 }
                 for place in self.location
             ],
-            "findings": [_finding(finding) for finding in self.findings],
+            "findings": [finding_dict(finding) for finding in self.findings],
             "calibration": [
                 {"parameter": c.parameter, "prior": c.prior, "value": c.value, "stderr": c.stderr,
                  "shift_in_sd": c.shift_in_sd, "unit": c.unit}
                 for c in self.calibration
             ],
-            "fit": {"train": _fits(self.train), "holdout": _fits(self.holdout), "noise_K": self.noise_K,
-                    "floor": self.floor},
+            "fit": {"train": fits_dict(self.train),
+                    "holdout": fits_dict(self.holdout) | {"log_score_gain": _or_none(self.holdout_gain)},
+                    "noise_K": self.noise_K, "floor": self.floor},
+            "kinds": dict(self.kinds),
+            "settings": {"false_alarm_rate": self.false_alarm_rate, "claim_from": self.claim_from,
+                         "matters_K": self.matters_K, "matters_W": self.matters_W},
+            "model_error": {"class": self.error_class, "evidence": dict(self.error_evidence),
+                            "asked": list(self.error_asked)},
+            "sessions": {"deviation_in_sd": self.session_s},
             "remaining": {
-                "p_value": self.remaining_p_value if math.isfinite(self.remaining_p_value) else None,
+                "p_value": _or_none(self.remaining_p_value),
                 "note": self.remaining_note,
-                "misfit": self.misfit if math.isfinite(self.misfit) else None,
+                "misfit": _or_none(self.misfit),
             },
             "ranking": [
                 {"mechanism": r.mechanism, "place": r.place, "family": r.family, "log_bayes": r.log_bayes,
                  "probability": r.probability}
                 for r in self.ranking
             ],
-            "not_visible": [{"mechanism": u.mechanism, "place": u.place, "needed": u.needed} for u in self.unseen],
+            "not_visible": [
+                {"mechanism": u.mechanism, "place": u.place, "needed": u.needed, "expected": _or_none(u.expected)}
+                for u in self.unseen
+            ],
             "next_test": self.next_test,
             "notes": list(self.notes),
             "inputs": dict(self.inputs),
@@ -372,36 +215,117 @@ class Diagnosis:
 
     @property
     def nearest(self) -> tuple[Ranked, ...]:
-        """Best explanations of the training data, most probable first, if nothing was accepted."""
-        if self.findings or self.verdict in ("consistent", "insufficient_data"):
+        """Most probable explanations if something is missing and none could be reported."""
+        if self.findings or self.verdict in NO_CLAIM:
             return ()
         return tuple(one for one in self.ranking[:MOST_NEAREST] if one.probability >= NEAREST)
 
-    def summary(self) -> list[str]:
-        """The diagnosis in about ten lines."""
-        lines = [f"{self.verdict.replace('_', ' ')}: {self.verdict_text}"]
+    @property
+    def first_screen(self) -> tuple[tuple[str, tuple[str, ...]], ...]:
+        """First questions of a reader with their answers; questions without an answer are left out.
+
+        Is something missing, where, what, how sure, how much better, what next, and which effects cannot be seen.
+        """
+        asked = (
+            ("Is something missing?", (self._missing(),)),
+            ("Where?", self._where()),
+            ("What?", self._what()),
+            ("How sure?", self._how_sure()),
+            ("How much better?", self._how_much_better()),
+            ("What next?", (self.next_test,) if self.next_test else ()),
+            ("What cannot be seen in these data?", self._cannot_be_seen()),
+        )
+        return tuple((question, answers) for question, answers in asked if answers)
+
+    def _missing(self) -> str:
+        if self.verdict == "insufficient_data":
+            return "These data cannot decide it."
+        reached = f"evidence {self.log_e_value:.1f} nat, {self.threshold:.1f} needed"
+        rate = f"false-alarm rate {100.0 * self.false_alarm_rate:g} %"
+        if self.log_e_value > self.threshold:
+            where = "in the measurement" if self.verdict == "sensor_fault" else "in the model"
+            return f"Yes, {where}: {reached} ({rate})."
+        return f"Nothing that these data show: {reached} ({rate})."
+
+    def _where(self) -> tuple[str, ...]:
+        if not self.location or self.verdict in NO_CLAIM:
+            return ()
+        told = ", ".join(f"{place.node} ({place.probability:.2f})" for place in self.places)
+        place = self.location[0]
+        heat = f"; {place.heat_mean_W:.3g} W on average, {place.heat_max_W:.3g} W at most" if place.heat_max_W else ""
+        return (f"{told}{heat}; {place.regime}",)
+
+    def _what(self) -> tuple[str, ...]:
+        lines: list[str] = []
         for finding in self.findings:
-            lines += _lines(finding)
-        if self.location and self.verdict not in ("consistent", "insufficient_data"):
-            told = ", ".join(f"{place.node} ({place.probability:.2f})" for place in self.places)
-            lines.append(f"Where: {told}; {self.location[0].regime}")
+            lines.append(f"{finding.grade.capitalize()}: {finding.says} [{finding.title}]")
+            lines += [f"  {line}" for line in (values_told(finding), date_told(finding)) if line]
         if self.nearest:
             told = ", ".join(f"{one.mechanism} at {one.place} ({one.probability:.2f})" for one in self.nearest)
-            lines.append(f"Most like: {told}; {NOT_ACCEPTED}")
-        for name, fits in (("training", self.train), ("held-out", self.holdout)):
-            if fits.before == fits.before:
-                lines.append(
-                    f"RMSE {name}: {fits.before:.2f} K as delivered, {fits.calibrated:.2f} K calibrated, "
-                    f"{fits.after:.2f} K with the findings (noise {self.noise_K:.2f} K)"
+            lines.append(f"No name is certain enough to be reported; most like: {told}.")
+        elif not self.findings and self.verdict not in NO_CLAIM:
+            lines.append("Nothing in the catalogue is like it.")
+        return tuple(lines)
+
+    def _how_sure(self) -> tuple[str, ...]:
+        lines = []
+        for finding in self.findings:
+            of = "that law and place are right" if finding.acts_like else "of one of these" if finding.tie_set else ""
+            line = " ".join((f"{finding.title}: {finding.grade}, probability", of, _share(finding.sureness)))
+            line = line.replace("  ", " ")
+            others = [r for r in finding.confusable_with
+                      if r.probability >= LEAST_RIVAL and r.mechanism not in finding.tie_set]  # fmt: skip
+            if others:
+                line += "; not ruled out: " + ", ".join(
+                    f"{r.mechanism} at {r.place} ({r.probability:.2f})" for r in others[:MOST_NEAREST]
                 )
+            lines.append(line)
+        if not self.findings and self.kinds:
+            told = (f"{kind} {p:.2f}" for kind, p in sorted(self.kinds.items(), key=lambda kind: -kind[1]) if p >= 0.01)
+            lines.append(f"Probabilities: {', '.join(told)}.")
+        if self.error_class:
+            asked = f"; much of it is asked for in {', '.join(self.error_asked)}" if self.error_asked else ""
+            lines.append(f"Model error assumed: class {self.error_class}{asked}.")
+        if self.session_s > LITTLE_SPREAD:
+            lines.append(f"Between sessions the machine differs by {self.session_s:.2f} of the priors' widths.")
         far = sorted((c for c in self.calibration if abs(c.shift_in_sd) > FAR_SD), key=lambda c: -abs(c.shift_in_sd))
         if far:
-            told = ", ".join(f"{c.parameter} = {c.value:.3g} ({abs(c.shift_in_sd):.1f} sd)" for c in far[:MOST_FAR])
-            lines.append(f"Far from what the definition expects: {told}")
+            told = (f"{c.parameter} = {c.value:.3g} ({abs(c.shift_in_sd):.1f} sd)" for c in far[:MOST_FAR])
+            lines.append(f"Far from what the definition expects: {', '.join(told)}.")
         if self.remaining_note:
             lines.append(f"Remaining: {self.remaining_note}")
-        if self.next_test:
-            lines.append(f"Next: {self.next_test}")
+        return tuple(lines)
+
+    def _how_much_better(self) -> tuple[str, ...]:
+        lines = []
+        for name, fits in (("held-out", self.holdout), ("training", self.train)):
+            if fits.before == fits.before:
+                after = f", {fits.after:.2f} K with the findings" if self.findings else ""
+                lines.append(
+                    f"RMSE {name}: {fits.before:.2f} K as delivered, {fits.calibrated:.2f} K calibrated{after} "
+                    f"(noise {self.noise_K:.2f} K)"
+                )
+        if self.findings and math.isfinite(self.holdout_gain):
+            way = "better" if self.holdout_gain >= 0.0 else "worse"
+            lines.append(
+                f"Held-out readings are predicted {way} than by the calibrated model, by "
+                f"{abs(self.holdout_gain):.0f} nat of log score"
+            )
+        return tuple(lines)
+
+    def _cannot_be_seen(self) -> tuple[str, ...]:
+        if not self.unseen:
+            return ()
+        names = list(dict.fromkeys(one.mechanism for one in self.unseen))
+        more = f" and {len(names) - MOST_UNSEEN} more" if len(names) > MOST_UNSEEN else ""
+        return (f"{', '.join(names[:MOST_UNSEEN])}{more}: silence about them means nothing.",)
+
+    def summary(self) -> list[str]:
+        """The diagnosis in some ten lines: the verdict, then the answers of :attr:`first_screen`."""
+        lines = [f"{self.verdict.replace('_', ' ')}: {self.verdict_text}"]
+        for question, answers in self.first_screen:
+            first, *rest = answers
+            lines += [f"{question} {first}", *(f"    {line}" for line in rest)]
         return lines
 
     def __str__(self) -> str:
@@ -413,60 +337,39 @@ class Diagnosis:
         return f"<div><b>{html.escape(head)}</b><ul>{items}</ul></div>"
 
 
-def _lines(finding: Finding) -> list[str]:
-    """A finding for a terminal: what, how strong, what else it may be."""
-    lines = [f"{finding.says} [{finding.mechanism} at {finding.place}, probability {finding.probability:.2f}]"]
-    values = [(p.name, p.value, p.stderr, p.unit) for p in finding.parameters]
+def values_told(finding: Finding) -> str:
+    """Numbers of a finding for a terminal."""
+    values = [(p.name, p.value, p.stderr, p.unit) for p in finding.parameters if p.name not in OF_DATE]
     if finding.heat_mean_W > 0.0:
         values.append(("mean |heat|", finding.heat_mean_W, finding.heat_stderr_W, "W"))
-    if values:
-        told = (
-            f"{name} = {with_error(value, stderr).replace(MINUS, '-')}" + (f" {unit}" if unit != "1" else "")
-            for name, value, stderr, unit in values
-        )
-        lines.append(f"    {', '.join(told)}")
-    rivals = [r for r in finding.confusable_with if r.probability >= LEAST_RIVAL]
-    ahead = [r for r in rivals if finding.probability < LEAST_SHARE * r.probability]
-    for words, some in (("not ruled out", [r for r in rivals if r not in ahead]), (AHEAD, ahead)):
-        if some:
-            named = ", ".join(f"{r.mechanism} at {r.place} ({r.probability:.2f})" for r in some)
-            lines.append(f"    {words}: {named}; {some[0].separate_by}")
-    return lines
+    told = [
+        f"{name} = {with_error(value, stderr).replace(MINUS, '-')}" + (f" {unit}" if unit != "1" else "")
+        for name, value, stderr, unit in values
+    ]
+    if finding.switching is not None:
+        told.append(f"on at {finding.switching.on_degC:.1f} degC, off at {finding.switching.off_degC:.1f} degC")
+    return ", ".join(told)
 
 
-def _finding(finding: Finding) -> dict[str, Any]:
-    return {
-        "mechanism": finding.mechanism,
-        "family": finding.family,
-        "place": finding.place,
-        "node": finding.node,
-        "kind": finding.kind,
-        "says": finding.says,
-        "equation": finding.equation,
-        "reference": finding.reference,
-        "probability": finding.probability,
-        "log_bayes": finding.log_bayes,
-        "heat_W": {"mean": finding.heat_mean_W, "stderr": finding.heat_stderr_W, "max": finding.heat_max_W},
-        "parameters": [
-            {"name": p.name, "value": p.value, "stderr": p.stderr, "unit": p.unit} for p in finding.parameters
-        ],
-        "confusable_with": [
-            {"mechanism": r.mechanism, "place": r.place, "probability": r.probability, "separate_by": r.separate_by}
-            for r in finding.confusable_with
-        ],
-    }
+def date_told(finding: Finding) -> str:
+    """Date of a finding for a terminal."""
+    date = finding.date
+    if date is None:
+        return ""
+    band = "" if date.band_s is None else f" ({_time(date.band_s[0])} to {_time(date.band_s[1])})"
+    end = "" if date.to_s is None else f", until {_time(date.to_s)}"
+    utc = "" if date.utc is None else f", {date.utc[:16].replace('T', ' ')} UTC"
+    return f"from {_time(date.from_s)} of {date.recording} on{band}{utc}{end}"
 
 
-def _fits(fits: Fits) -> dict[str, Any]:
-    def number(value: float) -> float | None:
-        return value if value == value else None
+def _time(seconds: float) -> str:
+    return f"{seconds / 3600.0:.2f} h" if abs(seconds) > LONG_S else f"{seconds:.0f} s"
 
-    return {
-        "rmse_before_K": number(fits.before),
-        "rmse_calibrated_K": number(fits.calibrated),
-        "rmse_after_K": number(fits.after),
-        "sensors": {
-            name: {"before": number(b), "calibrated": number(c), "after": number(a)}
-            for name, (b, c, a) in fits.sensors.items()
-        },
-    }
+
+def _share(probability: float) -> str:
+    """A probability; never rounded to certainty."""
+    return f"{probability:.2f}" if probability < 0.995 else "> 0.99"
+
+
+def _or_none(value: float) -> float | None:
+    return value if math.isfinite(value) else None

@@ -23,6 +23,7 @@ from models.base.types import Array
 from models.mechanisms import Scale
 from models.quantities.quantities import GEARBOX_INPUTS, TOTAL_LOSS, is_total_loss
 from models.simulation.thermal_network import Losses, ThermalNetwork
+from models.terms.term import Term
 
 STANDSTILL_RPM = 10.0
 HELD_OUT_SHARE = 0.25  # of every recording, where none is held out as a whole
@@ -50,6 +51,8 @@ class InferenceSetup:
         Typical total loss, [W]
     noise_K : float
         White noise of a temperature row, [K]
+    shapes : tuple of Term
+        Tilts of the formulas, which the nominal network lacks
     """
 
     gearbox: Gearbox
@@ -61,6 +64,7 @@ class InferenceSetup:
     holdout: Problem
     loss_W: float
     noise_K: float
+    shapes: tuple[Term, ...] = ()
 
 
 def prepare(
@@ -90,7 +94,8 @@ def prepare(
     beside = shafts(baseline, as_defined)
     everything = (*recordings, *beside)
     network = nominal
-    for term in shape_terms(nominal, scale):
+    shapes = shape_terms(nominal, scale)
+    for term in shapes:
         network = term.apply(network)
     model = NetworkOnGrid(network, losses)
     measured = {c.name for r in everything for c in r.channels}
@@ -121,6 +126,7 @@ def prepare(
     return InferenceSetup(
         gearbox=gearbox, nominal=nominal, losses=losses, scale=scale, channels=channels, train=problems[0],
         holdout=problems[1], loss_W=loss_W, noise_K=float(np.median(noises)) if noises else 0.0,
+        shapes=shapes,
     )  # fmt: skip
 
 

@@ -30,6 +30,7 @@ from models.terms.term import FACTORS, Term
 
 HEADER = "# Found by a diagnosis: the same gearbox definition plus this file is the corrected model.\n"
 BOUND_TOLERANCE = 1e-9  # a fit that ends at a bound may exceed it by rounding
+Grade = Literal["claim", "likely", "learnt"]
 Sha256 = Annotated[str, StringConstraints(pattern=r"^[0-9a-f]{64}$")]
 NotNegative = Annotated[float, Field(ge=0.0)]
 
@@ -69,8 +70,9 @@ class FoundParameter(LawParameter):
 class Finding(LawTable):
     """``[[finding]]``: physics that was left out, or a fault of an instrument.
 
-    The first four keys are for people, see :class:`models.mechanisms.Mechanism`; the others, from `label` on, are those
-    of :class:`models.terms.term.Term`.
+    The first five keys and `grade` are for people, see :class:`models.mechanisms.Mechanism`; the others, from `label`
+    on, are those of :class:`models.terms.term.Term`. `grade` is ``claim`` for a name that is certain enough, ``likely``
+    for what acts like it, ``learnt`` for the shape of a law, which names nothing.
     """
 
     mechanism: Text
@@ -78,6 +80,7 @@ class Finding(LawTable):
     place: str = ""
     says: str = ""
     probability: Annotated[float, Field(ge=0.0, le=1.0)] | None = None
+    grade: Grade = "claim"
     label: Name
     target: OneOrMore[Text]
     weights: tuple[float, ...] = ()
@@ -104,6 +107,7 @@ class Finding(LawTable):
         place: str = "",
         says: str = "",
         probability: float | None = None,
+        grade: Grade = "claim",
     ) -> Finding:
         """Return the finding of a term.
 
@@ -131,6 +135,7 @@ class Finding(LawTable):
             place=place,
             says=says,
             probability=probability,
+            grade=grade,
             label=term.label,
             kind=term.kind,
             target=term.target,
@@ -286,11 +291,19 @@ class Correction(Section):
                 f"{gearbox.name!r} is {gearbox.hash[:12]}; use the definition it was made for, or diagnose again"
             )
 
+    def claims_only(self) -> Correction:
+        """Return the correction without what is only likely; calibrated values and shapes of laws name nothing."""
+        return self.model_copy(update={"findings": tuple(f for f in self.findings if f.grade != "likely")})
+
     def summary(self) -> dict[str, Any]:
         """Return the names of the findings and a hash of the whole, for a report."""
         return {
             "sha256": hashlib.sha256(correction_text(self).encode()).hexdigest(),
-            "findings": [f"{f.mechanism} at {f.place}" for f in self.findings if f.mechanism != "shape"],
+            "findings": [
+                f"{'acts like ' if f.grade == 'likely' else ''}{f.mechanism} at {f.place}"
+                for f in self.findings
+                if f.mechanism != "shape"
+            ],
         }
 
     @property

@@ -10,7 +10,7 @@ from models.mechanisms.mechanism import Mechanism, Memory
 
 FAMILY_OUT = "heat to the surroundings"
 FAMILY_IN = "heat inside the gearbox"
-COOL_DOWN = "stop hot and record the whole cool-down with at least two housing sensors"
+COOL_DOWN = "stop hot and record the whole cool-down, of the housing above all"
 
 foundation_conduction = Mechanism(
     name="foundation_conduction",

@@ -67,7 +67,7 @@ sensor_gain = _sensor(
     says="The sensor at {place} shows a wrong share of the rise above ambient: heat flows along its leads, or its gain "
     "is off.",
     reference="stem conduction of a thermocouple: 1 to 5 % of the rise; estimate",
-    experiment="insulate the leads, or press a second sensor on next to it",
+    experiment="insulate the leads and repeat: the error changes",
 )
 
 sensor_lag = _sensor(

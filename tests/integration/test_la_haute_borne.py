@@ -14,7 +14,8 @@ from diagnosis.candidates.explain import calibrated
 from diagnosis.recordings.read import read_recordings
 from diagnosis.recordings.recording import Recording
 from diagnosis.results.identifiable import scale_direction, scale_notes
-from diagnosis.results.result import Diagnosis, PredictedRun
+from diagnosis.results.result import Diagnosis
+from diagnosis.results.result_parts import PredictedRun
 from diagnosis.setup.inference_setup import prepare
 from models.assembly.gearbox import load_gearbox
 

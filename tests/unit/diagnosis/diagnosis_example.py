@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from diagnosis.inference.shapes import shape_terms
-from diagnosis.results.result import (
+from diagnosis.results.result import Diagnosis
+from diagnosis.results.result_parts import (
     Calibrated,
-    Diagnosis,
     Finding,
     Fits,
     Location,

@@ -10,12 +10,11 @@ import sympy as sp
 
 from diagnosis.candidates.dated import Axis
 from diagnosis.candidates.hypotheses import Hypothesis
-from diagnosis.candidates.unknown_heat import shaped
-from diagnosis.engine.candidates import Scan, heat_columns, refit, scan, with_candidate
+from diagnosis.engine.candidates import Scan, _columns, _on_grid, refit, scan, with_candidate
 from diagnosis.engine.dates import date_of
 from diagnosis.engine.families import axis_of, candidates_of, log_prior
 from diagnosis.engine.fit import Experiment, Fit, calibrate
-from diagnosis.engine.outside import judged_together, outside_columns, outside_of
+from diagnosis.engine.outside import judge_outside, outside_of
 from diagnosis.engine.prepare import prepare_experiment
 from diagnosis.recordings.recording import Recording
 from diagnosis.setup.inference_setup import InferenceSetup
@@ -138,7 +137,9 @@ def test_columns_are_those_of_repeated_simulation(fit: Fit, air: Hypothesis) -> 
     size = 0.01
     for index, part in enumerate(fit.parts):
         one = replace(air, variants=air.variants[[variant]])
-        (column,) = part.point.responses(heat_columns(fit.experiment, part.point, one)).transpose(2, 0, 1)
+        assert one.term is not None
+        on_grid = _on_grid(fit.experiment.machine.model, one.term)
+        column = _columns(fit.experiment, part, [(one, on_grid)])[:, :, 0]
         own[0] = experiment.unknowns[len(fit.z)].z_of(size)
         there = experiment.point(index, np.concatenate([fit.z, own]), part.point.trajectory, rounds=12).read
         own[0] = experiment.unknowns[len(fit.z)].z_of(-size)
@@ -194,23 +195,14 @@ def test_a_sensor_that_steps_is_dated_and_fitted(
 def test_an_unknown_heat_is_seen_where_it_acts(prepared: tuple[InferenceSetup, Experiment], fit: Fit) -> None:
     """The change at a date is a heat in the housing, most of all; refitted in its shape it explains about as much."""
     setup, experiment = prepared
-    unknown = outside_of(setup, experiment)
-    known = scan(fit, [], [outside_columns(experiment, part.point, unknown) for part in fit.parts])
-    given, first, found = known.gram.given(known.unknowns), known.further.start, {}
-    for one in unknown:
-        assert one.is_open
-        assert one.term is not None
-        count = len(one.variants)
-        found[one.place] = (one, judged_together(given, range(first, first + count), one.term.strength.sd))
-        first += count
-    assert first == known.further.stop
-    place = max(found, key=lambda node: found[node][1].log_bayes)
-    one, judged = found[place]
-    assert judged.log_bayes > 20.0
-    assert judged.log_bayes > found["shaft_1"][1].log_bayes
-    shape = shaped(one, judged.weights)
-    refitted = refit(fit, shape, 0, float(np.linalg.norm(judged.weights)))
-    assert refitted.log_evidence - fit.log_evidence > 0.7 * judged.log_bayes
+    found = judge_outside(fit, outside_of(setup, experiment))
+    assert all(one.hypothesis.is_open for one in found)
+    of_place = {one.hypothesis.place: one.log_bayes for one in found}
+    best = max(found, key=lambda one: one.log_bayes)
+    assert best.log_bayes > 20.0
+    assert best.log_bayes > of_place["shaft_1"]
+    refitted = refit(fit, best.hypothesis, 0, best.strength)
+    assert refitted.log_evidence - fit.log_evidence > 0.7 * best.log_bayes
 
 
 def test_prior_of_families(candidates: tuple[Hypothesis, ...]) -> None:

@@ -108,7 +108,7 @@ def test_without_a_finding_nothing_is_said_to_be_found(pages: dict[str, str]) ->
         text = Text(pages[name][: pages[name].index('<section id="words">')]).plain
         for never in ("What was found", "with what was found", "Missing heat", "pointed out"):
             assert never not in text, never
-    assert "Below the threshold" in Text(pages["consistent"]).plain
+    assert "Nothing that these data show: evidence" in Text(pages["consistent"]).plain
     assert "none: it is in the recording, not in the gearbox" in Text(pages["sensor_fault"]).plain
 
 

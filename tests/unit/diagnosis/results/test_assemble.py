@@ -78,14 +78,15 @@ def test_places_of_rivals_add_up_and_those_of_findings_do_not_exclude_one_anothe
         fits = [SimpleNamespace(found=[place]) for place, _ in hypotheses]
         return None, SimpleNamespace(fits=fits, probabilities=lambda: [p for _, p in hypotheses])
 
-    monkeypatch.setattr(assemble, "node_of", lambda _case, place: place)
+    monkeypatch.setattr(assemble, "node_in", lambda _network, place: place)
     monkeypatch.setattr(assemble, "_place", lambda _case, _found, _first, node, weight: (node, pytest.approx(weight)))
     two_coolers = look(("inlet", 0.6), ("inlet", 0.4))
     found: Any = SimpleNamespace(findings=[two_coolers, look(("air", 0.9), ("inlet", 0.09), ("oil", 0.01))])
     something: Any = [None]
-    assert assemble._location(NOTHING, found, something, ()) == (("inlet", 1.0), ("air", 0.9))
+    case: Any = SimpleNamespace(nominal=None)
+    assert assemble._location(case, found, something, ()) == (("inlet", 1.0), ("air", 0.9))
     found.findings = [look(("inlet", 0.5), ("air", 0.5)), look(("air", 0.5), ("oil", 0.5))]
-    assert assemble._location(NOTHING, found, something, ()) == (("air", 0.75), ("inlet", 0.5), ("oil", 0.5))
+    assert assemble._location(case, found, something, ()) == (("air", 0.75), ("inlet", 0.5), ("oil", 0.5))
 
 
 def test_a_place_tells_the_heat_of_all_that_was_found_there(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -95,7 +96,7 @@ def test_a_place_tells_the_heat_of_all_that_was_found_there(monkeypatch: pytest.
     )
     part = SimpleNamespace(trajectory=SimpleNamespace(piece=piece, middle=np.full((40, 1), 60.0)))
     heats = {"rain": [np.full(40, -2.0)], "fan": [np.full(40, 35.0)], "bias": []}
-    monkeypatch.setattr(assemble, "node_of", lambda _case, _h: "oil")
+    monkeypatch.setattr(assemble, "node_in", lambda _network, _h: "oil")
     monkeypatch.setattr(assemble, "heats_of", lambda _final, h: heats[h])
     case: Any = SimpleNamespace(nominal=SimpleNamespace(parts=[SimpleNamespace(name="oil")]))
     for found, heat in ((["rain", "fan"], 33.0), (["rain", "bias"], -2.0), (["bias"], 0.0)):

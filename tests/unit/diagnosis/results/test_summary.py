@@ -1,35 +1,62 @@
-"""The few lines that a terminal or a notebook shows of a diagnosis."""
+"""The summary of a diagnosis on a terminal."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
-from diagnosis.report.page import page
-from diagnosis.results.result import AHEAD, NOT_ACCEPTED, VERDICT_TEXT, Ranked
-from tests.unit.diagnosis.diagnosis_example import consistent, missing_physics, unexplained
+from diagnosis.report import page
+from diagnosis.results.result import VERDICT_TEXT, Diagnosis
+from diagnosis.results.result_parts import Change, Ranked, Switching
+from tests.unit.diagnosis.diagnosis_example import consistent, missing_physics, two_effects, unexplained
 
 
-def test_what_was_found_where_and_how_well_it_fits() -> None:
+def told(diagnosis: Diagnosis, question: str) -> str:
+    return "\n".join(dict(diagnosis.first_screen).get(question, ()))
+
+
+def test_the_verdict_stands_first_then_the_questions_in_order() -> None:
     lines = missing_physics().summary()
     assert lines[0] == f"missing physics: {VERDICT_TEXT['missing_physics']}"
-    assert "[windage at oil, probability 0.9" in lines[1]
-    assert "strength = 18.4 ± 1.1 W, " in lines[2] and lines[2].endswith(", mean |heat| = 21.0 ± 1.3 W")
-    assert any(line.strip().startswith("not ruled out: pocketing at ") for line in lines)
-    assert "Where: oil (0.96); speed above 2900 1/min" in lines
-    assert "RMSE held-out: 5.21 K as delivered, 3.62 K calibrated, 0.52 K with the findings (noise 0.20 K)" in lines
-    assert lines[-1].startswith("Next: Hold 20 m/s")
-    assert len(lines) <= 10
+    asked = ["Is something missing?", "Where?", "What?", "How sure?", "How much better?", "What next?",
+             "What cannot be seen in these data?"]  # fmt: skip
+    assert [line.split("?")[0] + "?" for line in lines[1:] if not line.startswith(" ")] == asked
+    assert "5.21 K as delivered, 3.62 K calibrated, 0.52 K with the findings" in str(missing_physics())
+    assert "41.3 nat, 3.9 needed" in lines[1]
 
 
-def test_a_rival_that_the_held_out_recordings_refused_is_not_told_as_one_among_others() -> None:
-    found = missing_physics()
-    (finding,) = found.findings
-    first, *rest = finding.confusable_with
-    reported = replace(finding, probability=0.1, confusable_with=(replace(first, probability=0.21), *rest))
-    lines = [line.strip() for line in replace(found, findings=(reported,)).summary()]
-    assert any(line.startswith(f"{AHEAD}: {first.mechanism} at {first.place} (0.21)") for line in lines)
-    near = replace(reported, confusable_with=(replace(first, probability=0.19), *rest))
-    assert AHEAD not in str(replace(found, findings=(near,)))
+def test_a_claim_and_something_likely_stand_apart_by_words() -> None:
+    claim, likely = two_effects().findings
+    rivals = missing_physics().findings[0].confusable_with
+    tied = ("bearing_seat_contact", "pocketing")
+    likely = replace(likely, grade="likely", tie_set=tied, joint_probability=0.93, confusable_with=rivals)
+    both = replace(two_effects(), findings=(claim, likely))
+    what, sure = told(both, "What?"), told(both, "How sure?")
+    assert what.startswith("Claim: A thermostat") and "\nLikely: " in what
+    assert (
+        "bearing_seat_contact at bearing_1_housing or pocketing at oil: likely, probability of one of these 0.93"
+        in sure
+    )
+    assert "not ruled out: churning_swirl at oil (0.02)" in sure  # and the tied one is not told twice
+
+
+def test_names_that_only_act_like_it_are_told_as_such() -> None:
+    (finding,) = missing_physics().findings
+    found = replace(missing_physics(), findings=(replace(finding, grade="likely", acts_like=True),))
+    assert "[acts like windage at oil]" in told(found, "What?")
+    assert "likely, probability that law and place are right 0.91" in told(found, "How sure?")
+
+
+def test_dates_and_switches() -> None:
+    (finding,) = missing_physics().findings
+    change = Change(recording="train_1", from_s=20634.0, band_s=(20100.0, 21100.0))
+    found = replace(finding, date=change, switching=Switching(on_degC=73.0, off_degC=67.0))
+    what = told(replace(missing_physics(), findings=(found,)), "What?")
+    assert "on at 73.0 degC, off at 67.0 degC" in what
+    assert "from 5.73 h of train_1 on (5.58 h to 5.86 h)" in what
+    stored = replace(missing_physics(), findings=(found,)).to_dict()["findings"][0]
+    assert stored["date"] == {"recording": "train_1", "from_s": 20634.0, "band_s": [20100.0, 21100.0], "to_s": None,
+                              "utc": None}  # fmt: skip
+    assert stored["switching"] == {"on_degC": 73.0, "off_degC": 67.0}
 
 
 def test_what_is_nearest_to_something_without_a_name_is_told() -> None:
@@ -40,23 +67,21 @@ def test_what_is_nearest_to_something_without_a_name_is_told() -> None:
         )
     )  # fmt: skip
     nameless = replace(unexplained(), findings=(), ranking=ranking)
-    reported = f"Most like: open_after_faster_loss at mesh (0.65), open_torque_loss at mesh (0.33); {NOT_ACCEPTED}"
-    assert reported in nameless.summary()
-    shown = page(nameless)
-    assert "<b>Most like:</b> open form (after faster, a loss) at mesh (0.65)" in shown
-    assert NOT_ACCEPTED in shown
+    reported = "most like: open_after_faster_loss at mesh (0.65), open_torque_loss at mesh (0.33)."
+    assert reported in told(nameless, "What?")
+    assert "<b>Most like:</b> open form (after faster, a loss) at mesh (0.65)" in page(nameless)
     for other in (unexplained(), replace(consistent(), ranking=ranking)):
-        assert other.nearest == () and "Most like" not in str(other) and "<b>Most like" not in page(other)
+        assert other.nearest == () and "most like" not in str(other) and "<b>Most like" not in page(other)
 
 
 def test_parameters_far_from_their_priors_are_told_the_farthest_first() -> None:
     usual = consistent()
-    assert not any(line.startswith("Far from") for line in usual.summary())  # all within 2.6 sd
+    assert "Far from" not in str(usual)  # all within 2.6 sd
     seal, bearing, *rest = usual.calibration
     far = (replace(bearing, parameter="bearing", value=1.9, shift_in_sd=3.2),
            replace(seal, parameter="seal", value=0.319, shift_in_sd=-4.57))  # fmt: skip
-    lines = replace(usual, calibration=(*far, *rest)).summary()
-    assert "Far from what the definition expects: seal = 0.319 (4.6 sd), bearing = 1.9 (3.2 sd)" in lines
+    sure = told(replace(usual, calibration=(*far, *rest)), "How sure?")
+    assert "Far from what the definition expects: seal = 0.319 (4.6 sd), bearing = 1.9 (3.2 sd)" in sure
 
 
 def test_every_likely_place_is_told_with_what_the_first_one_does() -> None:
@@ -66,4 +91,5 @@ def test_every_likely_place_is_told_with_what_the_first_one_does() -> None:
     both = replace(
         base, location=(first, replace(other, node="air", probability=0.52), replace(other, probability=0.48))
     )
-    assert "Where: oil (0.96), air (0.52); speed above 2900 1/min" in str(both).splitlines()
+    expected = "oil (0.96), air (0.52); 21 W on average, 66 W at most; speed above 2900 1/min"
+    assert told(both, "Where?") == expected

@@ -1,0 +1,231 @@
+"""Free-running prediction of a recording: its inputs and nothing else, but for the start temperatures.
+
+Start temperatures of parts without a sensor are unknown; they are taken from the first minutes, which do not count.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from diagnosis.engine.fit import PASSES, Experiment, Fit, Linear
+from diagnosis.engine.point import Setting
+from diagnosis.forward.grid import Piece, stands_for
+from diagnosis.forward.observation import reading_columns
+from diagnosis.forward.trajectory import ROUNDS, Trajectory, complete_start, free_running, simulate
+from models.base.types import Array
+from models.quantities.quantities import is_total_loss
+
+START_S = 600.0
+LEFT_ALONE_SD_K = 2.0
+START_ROUNDS, START_SETTLED_K = 3, 0.01
+SETTLED_K, MOST_ROUNDS = 0.02, 30  # thick oil at a cold start takes many rounds
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Prediction:
+    """Free-running readings of the sensors.
+
+    Attributes
+    ----------
+    piece : Piece
+    trajectory : Trajectory
+    read : Array, shape (K + 1, channels)
+        [degC] or [W]
+    counts_from : float
+        Time from which it counts, [s]
+    """
+
+    piece: Piece
+    trajectory: Trajectory
+    read: Array
+    counts_from: float
+
+    @property
+    def residual(self) -> Array:
+        """Measured minus read where it counts, NaN elsewhere, shape (K + 1, channels)."""
+        late = self.piece.time >= self.counts_from
+        return np.where(late[:, None], self.piece.measured - self.read, np.nan)
+
+    @property
+    def weights(self) -> Array:
+        """Time that every row represents, shape (K + 1,), [s]."""
+        return stands_for(self.piece.time)
+
+
+def predict(experiment: Experiment, index: int, z: Array | None, *, guess: Array | None = None) -> Prediction:
+    """Predict one piece.
+
+    Parameters
+    ----------
+    experiment : Experiment
+    index : int
+        Which piece
+    z : Array, shape (unknowns,), or None
+        None: the model as delivered, with sensors without lag and bias
+    guess : Array, shape (K + 1, parts), optional
+        Temperatures to linearise about first, of another prediction: it saves time and nothing else
+
+    Raises
+    ------
+    ArithmeticError
+        If the temperatures leave all bounds.
+    """
+    setting, piece = _setting(experiment, index, z), experiment.pieces[index]
+    span = float(piece.time[-1] - piece.time[0])
+    counts_from = float(piece.time[0]) + min(START_S, 0.2 * span)
+    start = _start(experiment, index, setting, counts_from)
+    try:
+        trajectory = _free_run(setting, piece, start, guess)
+    except ArithmeticError:  # what the first minutes ask of it leads nowhere
+        trajectory = _free_run(setting, piece, experiment.starts[index], None)
+    return Prediction(piece=piece, trajectory=trajectory, read=setting.read(trajectory), counts_from=counts_from)
+
+
+def _setting(experiment: Experiment, index: int, z: Array | None) -> Setting:
+    if z is not None:
+        return experiment.setting(index, z)
+    setting = experiment.setting(index, np.zeros(len(experiment.unknowns)))
+    nothing = np.zeros(len(setting.channels))
+    return replace(setting, lag=nothing, bias=nothing, loss_gain=1.0, loss_delay=0.0)
+
+
+def _passes(setting: Setting) -> int:
+    return PASSES if any(shift.follows for shift in setting.machine.shifts) else 1
+
+
+def _free_run(setting: Setting, piece: Piece, start: Array, guess: Array | None) -> Trajectory:
+    """The trajectory of a whole piece that nothing measured guides."""
+    model, trajectory = setting.machine.model, None
+    for _ in range(_passes(setting)):
+        adjusted = replace(setting.piece(piece, trajectory), guided=False)
+        if any(state.update is not None for state in model.network.states):
+            trajectory = free_running(model, adjusted, setting.values, start, guess=guess)
+        else:
+            about = guess if trajectory is None else trajectory
+            trajectory = simulate(model, adjusted, setting.values, start, guess=about, rounds=MOST_ROUNDS,
+                                  settled_K=SETTLED_K)  # fmt: skip
+    assert trajectory is not None  # noqa: S101 - one run at least
+    return trajectory
+
+
+def _start(experiment: Experiment, index: int, setting: Setting, until: float) -> Array:
+    """Start temperatures of all parts, [degC]: as probable as can be by what the first minutes show."""
+    model, whole = experiment.machine.model, experiment.pieces[index]
+    likely, sd = _likely_start(experiment, index)
+    start, piece, noise = likely, whole.until(until), experiment.noise[index]
+    early = replace(setting, samples=setting.samples[: len(piece.steps)])
+    temperatures = [i for i, name in enumerate(piece.channels) if not is_total_loss(name)]
+    seen = np.isfinite(piece.measured[:, temperatures])
+    channel_sd, precision, count = noise.channel_sd[temperatures], np.diag(1.0 / sd**2), len(likely)
+    trajectory: Trajectory | None = None
+    for _ in range(START_ROUNDS):
+        adjusted = early.piece(piece, trajectory)
+        try:
+            trajectory = simulate(model, adjusted, early.values, start, guess=trajectory, settled_K=SETTLED_K)
+        except ArithmeticError:
+            return np.array(experiment.starts[index])
+        free = trajectory.response(np.zeros((len(piece.steps), model.n, count)), np.eye(count))
+        columns = reading_columns(model, trajectory, early.sensors, free, np.zeros((len(piece.steps), count)))
+        residual = ((piece.measured - early.read(trajectory))[:, temperatures] / channel_sd)[seen]
+        J = (columns[:, temperatures] / channel_sd[:, None])[seen]
+        step = np.linalg.solve(precision + J.T @ J, J.T @ residual + precision @ (likely - start))
+        start = start + step
+        if float(np.max(np.abs(step))) < START_SETTLED_K:
+            break
+    return start
+
+
+def _likely_start(experiment: Experiment, index: int) -> tuple[Array, Array]:
+    """Start temperatures by the first rows alone, and their standard deviations, (unknown,) each.
+
+    A state that is solved with the temperatures, as oil in a tank, may have been left as it was declared, or have
+    followed the gearbox.
+    """
+    model, parts = experiment.machine.model, experiment.starts[index]
+    declared = complete_start(model, parts)[model.n :]
+    warm = float(np.mean(parts))
+    start = np.concatenate([parts, 0.5 * (declared + warm)])
+    sd = np.concatenate([experiment.noise[index].start_sd, LEFT_ALONE_SD_K + 0.5 * np.abs(warm - declared)])
+    return start, sd
+
+
+def rmse(residuals: Array, weights: Array) -> Array:
+    """Root mean square per channel, shape (channels,); NaN where nothing was measured.
+
+    Parameters
+    ----------
+    residuals : Array, shape (rows, channels)
+    weights : Array, shape (rows,)
+        Time that every row represents
+    """
+    good = np.isfinite(residuals)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.asarray(np.sqrt((weights @ np.where(good, residuals, 0.0) ** 2) / (weights @ good)))
+
+
+def overall_rmse(predictions: Sequence[Prediction], columns: Sequence[int]) -> float:
+    """Root mean square of the residuals of some channels of several predictions; NaN where nothing was measured.
+
+    Parameters
+    ----------
+    predictions : sequence of Prediction
+    columns : sequence of int
+        Which channels
+    """
+    squares = total = 0.0
+    for predicted in predictions:
+        residual = predicted.residual[:, columns]
+        good = np.isfinite(residual)
+        squares += float((predicted.weights @ np.where(good, residual, 0.0) ** 2).sum())
+        total += float((predicted.weights @ good).sum())
+    return float(np.sqrt(squares / total)) if total > 0.0 else float("nan")
+
+
+def with_pieces_of(experiment: Experiment, other: Experiment) -> Experiment:
+    """Machine and unknowns of one experiment with the recordings of another one, judged by noise alone."""
+    return replace(
+        experiment, pieces=other.pieces, noise=other.noise, starts=other.starts, filters=other.filters, metric=None,
+        starts_at=other.starts_at or experiment.starts_at, session_of=other.session_of or experiment.session_of,
+    )  # fmt: skip
+
+
+def log_score_gain(final: Fit, plain: Fit, held_out: Experiment, guesses: Sequence[Sequence[Array | None]]) -> float:
+    r"""Log predictive density of held-out readings of one fit, less that of another one, [nat].
+
+    What a fit is unsure of widens its prediction: ``r ~ N(0, 1 + J C J^T)`` in whitened units, with the posterior
+    covariance C of the unknowns. The noise filters of `plain` judge both. Switches follow what was measured, as in
+    learning.
+
+    Parameters
+    ----------
+    final, plain : Fit
+    held_out : Experiment
+    guesses : (sequence of Array or None, same)
+        Temperatures of every piece to linearise about first, for `final` and `plain`
+
+    Returns
+    -------
+    float
+        NaN without held-out recordings, or without a prediction
+    """
+    if not held_out.pieces:
+        return float("nan")
+    try:
+        there = with_pieces_of(plain.experiment, held_out)
+        parts = [there.linearised(i, plain.z, guess, rounds=ROUNDS) for i, guess in enumerate(guesses[1])]
+        other = with_pieces_of(final.experiment, held_out).with_filters(parts)
+        own = [other.linearised(i, final.z, guess, rounds=ROUNDS) for i, guess in enumerate(guesses[0])]
+    except (ArithmeticError, np.linalg.LinAlgError):
+        return float("nan")
+    return _log_density(own, final) - _log_density(parts, plain)
+
+
+def _log_density(parts: Sequence[Linear], fit: Fit) -> float:
+    residual = np.concatenate([part.residual for part in parts])
+    X = np.concatenate([part.columns for part in parts]) @ np.linalg.cholesky(fit.covariance)
+    inner, along = np.eye(X.shape[1]) + X.T @ X, X.T @ residual
+    quadratic = float(residual @ residual - along @ np.linalg.solve(inner, along))
+    return -0.5 * (quadratic + float(np.linalg.slogdet(inner)[1]))

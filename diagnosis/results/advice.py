@@ -1,0 +1,87 @@
+"""The next step: the experiment or the sensor that decides. Only what is possible is advised."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Collection, Mapping, Sequence
+
+from diagnosis.candidates.hypotheses import Hypothesis
+from diagnosis.results.places import node_in
+from diagnosis.results.result import Verdict
+from diagnosis.results.result_parts import Finding, Location, NotDetectable
+from models.mechanisms import Mechanism
+from models.quantities.quantities import is_total_loss, node_of_channel
+from models.simulation.thermal_network import ThermalNetwork
+
+OTHER_OPERATION = "a second recording with other speeds and torques"
+TURNING = ("mesh", "pinion", "wheel", "gear", "shaft", "sun", "planet", "carrier")  # no wire leads there
+WORTH_ASKING = 0.05  # probability of a rival, from which telling it apart is the next thing
+OTHER_PLACE = 0.1  # probability of a further place, from which a sensor there is
+
+
+def without_sensor(network: ThermalNetwork, channels: Sequence[str]) -> frozenset[str]:
+    """Parts that have no thermometer and can have one."""
+    parts = [part.name for part in network.parts]
+    measured = {node_of_channel(name, parts) for name in channels if not is_total_loss(name)}
+    return frozenset(p for p in parts if p not in measured and not p.startswith(TURNING))
+
+
+def separation(
+    own: Hypothesis, other: Hypothesis, catalogue: Mapping[str, Mechanism], network: ThermalNetwork,
+    free: Collection[str],
+) -> str:  # fmt: skip
+    """The experiment, or the sensor, that distinguishes two effects.
+
+    Parameters
+    ----------
+    own, other : Hypothesis
+    catalogue : mapping of str to Mechanism
+    network : ThermalNetwork
+    free : collection of str
+        Parts that can have a sensor, see :func:`without_sensor`
+    """
+    if own.name == other.name:
+        node = node_in(network, other)
+        return f"a temperature sensor at {node.replace('_', ' ')}" if node in free else OTHER_OPERATION
+    if own.name in catalogue:
+        return catalogue[own.name].separation(other.name)
+    if other.name in catalogue:
+        return catalogue[other.name].separation(own.name)
+    return OTHER_OPERATION
+
+
+def next_test(
+    verdict: Verdict, findings: Sequence[Finding], location: Sequence[Location], unseen: Sequence[NotDetectable],
+    catalogue: Mapping[str, Mechanism], *, assumed: Collection[str], free: Collection[str],
+) -> str:  # fmt: skip
+    """The next measurement; empty if there is nothing to ask for.
+
+    Parameters
+    ----------
+    verdict : str
+    findings : sequence of Finding
+    location : sequence of Location
+        Most probable first
+    unseen : sequence of NotDetectable
+    catalogue : mapping of str to Mechanism
+    assumed : collection of str
+        Inputs that were not recorded
+    free : collection of str
+        Parts that can have a sensor
+    """
+    if verdict == "unexplained" and "T_ambient" in assumed:
+        return "record T_ambient_degC: a constant replaces it, and effects of the air show up elsewhere"
+    for finding in findings:
+        if finding.confusable_with and finding.confusable_with[0].probability >= WORTH_ASKING:
+            return finding.confusable_with[0].separate_by
+    for place in location[1:]:
+        if place.probability >= OTHER_PLACE and place.node in free:
+            return f"a temperature sensor at {place.node.replace('_', ' ')}: it shows if the heat is there"
+    if verdict in ("consistent", "insufficient_data") and unseen:
+        wanted, shown = Counter(one.needed for one in unseen).most_common(1)[0]
+        return f"{wanted} (it would show {shown} effect{'s' if shown > 1 else ''} that these data cannot)"
+    if verdict == "unexplained":
+        return "repeat the operation in which the heat is missing with one input changed at a time"
+    if findings and findings[0].mechanism in catalogue:
+        return catalogue[findings[0].mechanism].experiment
+    return ""

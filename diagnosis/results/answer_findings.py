@@ -1,0 +1,131 @@
+"""From answers of the decision to findings: sentence, grade, rivals and numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from diagnosis.candidates.dated import CHANGED, changed_law
+from diagnosis.candidates.hypotheses import Hypothesis
+from diagnosis.decision.posterior import Answer, Posterior
+from diagnosis.engine.fit import Fit
+from diagnosis.recordings.recording import Recording
+from diagnosis.results.advice import separation, without_sensor
+from diagnosis.results.effect_values import change_of, heats_of, mean_heat_of, names_of, switching_of, values_of
+from diagnosis.results.places import node_in
+from diagnosis.results.result import LEAST_RIVAL
+from diagnosis.results.result_parts import Finding, ParameterValue, Rival
+from diagnosis.setup.inference_setup import InferenceSetup, heat_over_time
+from models.mechanisms import Mechanism, Placed
+
+
+def finding_of(
+    answer: Answer, fit: Fit, setup: InferenceSetup, posterior: Posterior, catalogue: Mapping[str, Mechanism],
+    recordings: Sequence[Recording],
+) -> Finding:  # fmt: skip
+    """An answer with the numbers of a fit.
+
+    Parameters
+    ----------
+    answer : Answer
+    fit : Fit
+        With the effect of the answer among its unknowns
+    setup : InferenceSetup
+    posterior : Posterior
+    catalogue : mapping of str to Mechanism
+    recordings : sequence of Recording
+        Learnt from
+    """
+    effect, term = answer.effect, answer.effect.term
+    values, heats = values_of(fit, effect), heats_of(fit, effect)
+    pieces = [part.point.trajectory.piece for part in fit.parts]
+    mean, stderr = mean_heat_of(fit, effect)
+    found = {name: value for name, (value, _) in values.items()}
+    units = {p.name: p.unit for p in (setup.nominal.parameters if term is None else term.parameters)}
+    prefix = "" if term is None else f"{term.label}_"
+    return Finding(
+        mechanism=name_in(catalogue, effect),
+        family=effect.family,
+        place=effect.place,
+        node=node_in(setup.nominal, effect),
+        kind="parameter" if term is None else "sensor" if term.of_measurement else term.kind,
+        says=_says(answer, found),
+        reference=term.mechanism.reference if isinstance(term, Placed) else "",
+        equation="" if term is None else term.with_values(found).equation(found),
+        probability=answer.probability,
+        log_bayes=answer.best.log_bayes,
+        parameters=tuple(
+            ParameterValue(name=name.removeprefix(prefix), value=value, stderr=sd, unit=units.get(name, "1"))
+            for name, (value, sd) in values.items() if name != effect.clock
+        ),
+        confusable_with=_rivals(answer, setup, posterior, catalogue),
+        heat_mean_W=mean,
+        heat_stderr_W=stderr,
+        heat_max_W=max((float(np.abs(heat).max()) for heat in heats), default=0.0),
+        heat=heat_over_time(pieces, heats) if heats else {},
+        term=None if term is None else term.with_values(found),
+        grade=answer.grade,
+        tie_set=tuple(dict.fromkeys(name_in(catalogue, one) for one, _ in answer.tied)),
+        joint_probability=sum(p for _, p in answer.tied) if answer.tied else answer.probability,
+        acts_like=answer.acts_like,
+        date=change_of(values, effect, fit.experiment, recordings),
+        switching=switching_of(values, effect),
+    )  # fmt: skip
+
+
+def name_in(catalogue: Mapping[str, Mechanism], effect: Hypothesis) -> str:
+    """Name of the law in the catalogue, for one with a date or a course too; else the name of the effect."""
+    law = changed_law(effect)
+    return next((name for name in (law, *(law + ending for ending in CHANGED)) if name in catalogue), effect.name)
+
+
+def _says(answer: Answer, found: Mapping[str, float]) -> str:
+    effect = answer.effect
+    if effect.is_open:
+        says = f"A heat at {effect.place.replace('_', ' ')} that is like no law of the catalogue."
+    elif isinstance(effect.term, Placed):
+        says = effect.term.says
+    elif effect.term is None:
+        says = f"The parameter {effect.place} is {found[names_of(effect)[0]]:.3g}, far from what the definition allows."
+    else:
+        says = f"{effect.name.replace('_', ' ').capitalize()} at {effect.place.replace('_', ' ')}."
+    if answer.acts_like:
+        return f"Something acts like this, its cause was not found: {says}"
+    if len(answer.tied) > 1:
+        return f"One of several effects that these data do not separate, the most probable: {says}"
+    return says
+
+
+def _rivals(
+    answer: Answer, setup: InferenceSetup, posterior: Posterior, catalogue: Mapping[str, Mechanism]
+) -> tuple[Rival, ...]:
+    """Other names at their most probable places: those of the tie set with its probabilities, then everything else."""
+    own, free = answer.effect, without_sensor(setup.nominal, setup.channels)
+    beside = {effect.label for effect in answer.best.effects}
+    odds: dict[str, float] = {}
+    where: dict[str, Hypothesis] = {}
+    for judged, probability in posterior.ranked:
+        for other in judged.effects:
+            if other.label not in beside and _name(other) != _name(own):
+                odds[_name(other)] = odds.get(_name(other), 0.0) + probability
+                where.setdefault(_name(other), other)
+    for other, probability in answer.tied:
+        if _name(other) != _name(own):
+            odds[_name(other)] = probability
+            where[_name(other)] = other
+    tied = {_name(other) for other, _ in answer.tied}
+    # The law of the answer with another course in time is no other name.
+    same = "" if own.term is None else name_in(catalogue, own)
+    odds = {name: p for name, p in odds.items() if p >= LEAST_RIVAL and name_in(catalogue, where[name]) != same}
+    return tuple(
+        Rival(
+            mechanism=name_in(catalogue, where[name]), place=where[name].place, probability=probability,
+            separate_by=separation(own, where[name], catalogue, setup.nominal, free),
+        )
+        for name, probability in sorted(odds.items(), key=lambda one: (one[0] not in tied, -one[1]))
+    )  # fmt: skip
+
+
+def _name(effect: Hypothesis) -> str:
+    return effect.label if effect.term is None else effect.name

@@ -1,0 +1,336 @@
+"""From posterior and answers to the result: verdict, places, findings, fits, courses, and what to do next."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from diagnosis.decision.posterior import KINDS, Answer, Judged, Posterior, Settings
+from diagnosis.engine.fit import Experiment, Fit
+from diagnosis.engine.predict import Prediction, log_score_gain, overall_rmse, predict, rmse, with_pieces_of
+from diagnosis.engine.prepare import held_out_experiment
+from diagnosis.inference.noise import HEAT_FRACTION, PARAMETRIC_FRACTION, PARAMETRIC_K
+from diagnosis.recordings.recording import Recording
+from diagnosis.results.advice import next_test, without_sensor
+from diagnosis.results.answer_findings import finding_of
+from diagnosis.results.effect_values import heats_of, names_of, slope
+from diagnosis.results.places import node_in
+from diagnosis.results.ratios_only import ratio_notes
+from diagnosis.results.regime import active, regime, windows
+from diagnosis.results.result import Diagnosis, Verdict
+from diagnosis.results.result_parts import Calibrated, Fits, Location, NotDetectable, PredictedRun, Ranked
+from diagnosis.setup.inference_setup import InferenceSetup
+from models.base.parallel import run_parallel
+from models.base.types import Array
+from models.base.version import project_version
+from models.mechanisms import Mechanism
+from models.quantities.quantities import is_total_loss
+
+VISIBLE_NAT = 5.0  # expected evidence below which an effect cannot be seen
+ENOUGH_VISIBLE = 0.2  # of the effects that were asked for, for a "consistent" that means something
+LEAST_PLACE = 0.02  # probability of a place that is told
+MOST_RANKED = 500
+STATES = ("before", "calibrated", "after")
+Predictions = Mapping[str, Mapping[str, Sequence[Prediction]]]
+
+
+def assemble(
+    setup: InferenceSetup,
+    experiment: Experiment,
+    posterior: Posterior,
+    answers: Sequence[Answer],
+    *,
+    plain: Fit,
+    settings: Settings,
+    catalogue: Mapping[str, Mechanism],
+    train: Sequence[Recording],
+    held_out: Sequence[Recording],
+    jobs: int = 1,
+    error_asked: Sequence[str] = (),
+) -> Diagnosis:
+    """The result of a decision.
+
+    Parameters
+    ----------
+    setup : InferenceSetup
+    experiment : Experiment
+        Of the nominal machine
+    posterior : Posterior
+    answers : sequence of Answer
+        Most important first
+    plain : Fit
+        The nominal machine calibrated without model error
+    settings : Settings
+    catalogue : mapping of str to Mechanism
+    train, held_out : sequence of Recording
+    jobs : int
+        Processes
+    error_asked : sequence of str
+        Where the data ask for much model error
+    """
+    final = _final(posterior, answers, plain)
+    findings = tuple(
+        finding_of(answer, answer.best.fit or final, setup, posterior, catalogue, train) for answer in answers
+    )
+    unseen = _unseen(posterior, catalogue)
+    verdict = _verdict(posterior, answers, unseen)
+    location = _location(setup, posterior) if posterior.detected else ()
+    judged = held_out_experiment(setup, experiment)
+    predictions = _predictions(experiment, judged, plain, final, jobs)
+    courses = [[p.trajectory.T for p in predictions["holdout"][state]] for state in ("after", "calibrated")]
+    assumed = {name for r in (*train, *held_out) for name in r.assumed}
+    return Diagnosis(
+        verdict=verdict,
+        gearbox=setup.gearbox.name,
+        log_e_value=posterior.log_e,
+        threshold=posterior.threshold,
+        p_value=float(min(1.0, np.exp(-max(posterior.log_e, -50.0)))),
+        false_alarm_rate=settings.false_alarm_rate,
+        location=location,
+        findings=findings,
+        calibration=_calibration(final, plain, answers),
+        train=_fits(setup, predictions["train"]),
+        holdout=_fits(setup, predictions["holdout"]),
+        noise_K=setup.noise_K,
+        floor=_floor(setup),
+        misfit=_misfit(final),
+        remaining_p_value=float(min(1.0, np.exp(-max(posterior.remainder, -50.0)))),
+        remaining_note=_remaining(posterior),
+        ranking=_ranking(posterior),
+        unseen=unseen,
+        next_test=next_test(
+            verdict, findings, location, unseen, catalogue, assumed=assumed,
+            free=without_sensor(setup.nominal, setup.channels),
+        ),
+        missing_heat=(),
+        courses=_courses(setup, predictions),
+        network=setup.nominal,
+        shapes=setup.shapes,
+        inputs={
+            "recordings": {r.name: r.sha256 for r in train},
+            "held_out": {r.name: r.sha256 for r in held_out},
+            "gearbox": setup.gearbox.hash,
+            "version": project_version(),
+        },
+        notes=(*ratio_notes(final), *(f"{r.name}: {note}" for r in (*train, *held_out) for note in r.notes)),
+        kinds={kind: posterior.of(kind) for kind in KINDS},
+        claim_from=settings.claim_from,
+        matters_K=settings.matters_K,
+        matters_W=settings.matters_W,
+        error_class=posterior.error_class,
+        error_evidence=posterior.error_evidence,
+        error_asked=tuple(error_asked),
+        session_s=posterior.session_s,
+        holdout_gain=log_score_gain(final, plain, judged, courses),
+    )  # fmt: skip
+
+
+def _final(posterior: Posterior, answers: Sequence[Answer], plain: Fit) -> Fit:
+    """The fit that predicts: of the best answer, else of the machine with nothing missing."""
+    first = answers[0].best.fit if answers else None
+    return first or posterior.nothing.fit or plain
+
+
+# ---------------------------------------------------------------------- verdict
+
+
+def _verdict(posterior: Posterior, answers: Sequence[Answer], unseen: Sequence[NotDetectable]) -> Verdict:
+    if answers and all(answer.effect.term is None for answer in answers):
+        return "parameter_error"
+    if not posterior.detected:
+        asked = {one.effect.name for one in posterior.expected}
+        visible = 1.0 - len({one.mechanism for one in unseen}) / max(len(asked), 1)
+        return "insufficient_data" if asked and visible < ENOUGH_VISIBLE else "consistent"
+    if not answers or any(answer.best.kind == "outside" or answer.effect.is_open for answer in answers):
+        return "unexplained"
+    terms = [answer.effect.term for answer in answers]
+    if all(term is None or term.of_measurement or term.kind == "sensor" for term in terms):
+        return "sensor_fault"
+    return "missing_physics"
+
+
+def _unseen(posterior: Posterior, catalogue: Mapping[str, Mechanism]) -> tuple[NotDetectable, ...]:
+    """Mechanisms that would not have been seen at the size that matters, at their best place."""
+    best: dict[str, tuple[float, str]] = {}
+    for one in posterior.expected:
+        name = one.effect.name
+        if name in catalogue and one.log_bayes > best.get(name, (-np.inf, ""))[0]:
+            best[name] = (one.log_bayes, one.effect.place)
+    return tuple(
+        NotDetectable(mechanism=name, place=place, needed=catalogue[name].experiment, expected=reached)
+        for name, (reached, place) in sorted(best.items()) if reached < VISIBLE_NAT
+    )  # fmt: skip
+
+
+def _remaining(posterior: Posterior) -> str:
+    if not posterior.detected:
+        return ""
+    if posterior.remainder > posterior.threshold:
+        return f"a further effect would still help (evidence {posterior.remainder:.0f} nat)"
+    return "nothing that stands out of noise and model error"
+
+
+def _misfit(fit: Fit) -> float:
+    """Mean square of the whitened residuals, model error taken into account."""
+    rows = sum(len(part.residual) for part in fit.parts)
+    return float(fit.linearised.products[0, 0]) / max(rows, 1)
+
+
+def _floor(setup: InferenceSetup) -> str:
+    share = HEAT_FRACTION
+    text = f"of the typical loss ({setup.loss_W:.0f} W) in every part"
+    if setup.gearbox.is_parametric:  # watts are known but for a common factor
+        share = PARAMETRIC_FRACTION
+        text += f"; of a part of little heat capacity {PARAMETRIC_K:.1f} K"
+    return f"random heat of {100.0 * share:.1f} % {text}"
+
+
+# ---------------------------------------------------------------------- where
+
+
+def _location(setup: InferenceSetup, posterior: Posterior) -> tuple[Location, ...]:
+    """Places by probability, over everything that was judged; what acts there as the best fit with it has it."""
+    weights: dict[str, float] = {}
+    best: dict[str, Judged] = {}
+    nodes: dict[str, str] = {}
+    for judged, probability in posterior.ranked:
+        for effect in judged.effects:
+            nodes.setdefault(effect.label, node_in(setup.nominal, effect))
+        for node in {nodes[effect.label] for effect in judged.effects}:
+            weights[node] = weights.get(node, 0.0) + probability
+            if judged.fit is not None:
+                best.setdefault(node, judged)
+    told = sorted(((n, w) for n, w in weights.items() if w >= LEAST_PLACE), key=lambda item: -item[1])
+    return tuple(_place(setup, node, weight, best.get(node), nodes) for node, weight in told)
+
+
+def _place(
+    setup: InferenceSetup, node: str, weight: float, judged: Judged | None, nodes: Mapping[str, str]
+) -> Location:
+    fit = None if judged is None else judged.fit
+    effects = () if judged is None else judged.effects
+    laws = [] if fit is None else [
+        heats for effect in effects if nodes[effect.label] == node and (heats := heats_of(fit, effect))
+    ]  # fmt: skip
+    if fit is None or not laws:
+        return Location(node=node, probability=min(weight, 1.0), heat_mean_W=0.0, heat_max_W=0.0, when=(),
+                        regime="always")  # fmt: skip
+    heats = [np.sum(values, axis=0) for values in zip(*laws, strict=True)]
+    trajectories = [part.point.trajectory for part in fit.parts]
+    pieces = [trajectory.piece for trajectory in trajectories]
+    together, steps = np.concatenate(heats), np.concatenate([piece.steps for piece in pieces])
+    inputs = np.concatenate([piece.inputs for piece in pieces])
+    signals = {"speed": (np.abs(inputs[:, 0]), "1/min"), "torque": (np.abs(inputs[:, 1]), "N m")}
+    parts = [part.name for part in setup.nominal.parts]
+    if node in parts:
+        T = np.concatenate([trajectory.middle[:, parts.index(node)] for trajectory in trajectories])
+        signals[f"temperature of {node}"] = (T, "degC")
+    signals["time"] = (np.concatenate([piece.middle for piece in pieces]) / 3600.0, "h")
+    acting = active(together, steps)
+    split = np.split(acting, np.cumsum([len(heat) for heat in heats])[:-1])
+    when = [(piece.recording, a, b) for piece, acts in zip(pieces, split, strict=True)
+            for a, b in windows(piece.middle, acts)]  # fmt: skip
+    return Location(
+        node=node, probability=min(weight, 1.0), heat_mean_W=float(np.average(together, weights=steps)),
+        heat_max_W=float(together[np.argmax(np.abs(together))]), when=tuple(when),
+        regime=regime(acting, signals, steps),
+    )  # fmt: skip
+
+
+# ---------------------------------------------------------------------- fits and courses
+
+
+def _predictions(experiment: Experiment, held_out: Experiment, plain: Fit, final: Fit, jobs: int) -> Predictions:
+    """Free-running predictions of the training and the held-out pieces: as delivered, calibrated and after."""
+    places: list[tuple[str, int, Array | None]] = [
+        ("train", i, part.point.trajectory.T) for i, part in enumerate(final.parts)
+    ]
+    places += [("holdout", i, None) for i in range(len(held_out.pieces))]
+    of = {"train": experiment, "holdout": held_out}
+    work = []
+    for name, index, near in places:
+        own = (with_pieces_of(fit.experiment, of[name]) for fit in (plain, final))
+        work.append((*(replace(one, filters=None) for one in own), plain.z, final.z, index, near))
+    three = run_parallel(_predicted, work, jobs=jobs)
+    return {
+        name: {state: [them[which] for (one, *_), them in zip(places, three, strict=True) if one == name]
+               for which, state in enumerate(STATES)}
+        for name in of
+    }  # fmt: skip
+
+
+def _predicted(
+    plain: Experiment, final: Experiment, z: Array, z_final: Array, index: int, near: Array | None
+) -> tuple[Prediction, Prediction, Prediction]:
+    """One piece as delivered, calibrated and after; each starts from the one before, or the last from one `near` it."""
+    before = predict(plain, index, None)
+    tuned = predict(plain, index, z, guess=before.trajectory.T)
+    return before, tuned, predict(final, index, z_final, guess=tuned.trajectory.T if near is None else near)
+
+
+def _fits(setup: InferenceSetup, predictions: Mapping[str, Sequence[Prediction]]) -> Fits:
+    temperatures = [i for i, name in enumerate(setup.channels) if not is_total_loss(name)]
+    nothing = [np.zeros((0, len(setup.channels)))]
+    each = {
+        state: rmse(np.concatenate([p.residual for p in found] or nothing),
+                    np.concatenate([p.weights for p in found] or [np.zeros(0)]))
+        for state, found in predictions.items()
+    }  # fmt: skip
+    overall = {state: overall_rmse(found, temperatures) for state, found in predictions.items()}
+    sensors = {
+        name: (float(each["before"][i]), float(each["calibrated"][i]), float(each["after"][i]))
+        for i, name in enumerate(setup.channels)
+    }
+    return Fits(before=overall["before"], calibrated=overall["calibrated"], after=overall["after"], sensors=sensors)
+
+
+def _courses(setup: InferenceSetup, predictions: Predictions) -> tuple[PredictedRun, ...]:
+    def by_channel(values: Array) -> dict[str, Array]:
+        return {name: values[:, i] for i, name in enumerate(setup.channels)}
+
+    result, parts = [], [part.name for part in setup.nominal.parts]
+    for which, states in predictions.items():
+        for before, calibrated, after in zip(*(states[state] for state in STATES), strict=True):
+            piece = before.piece
+            at = np.clip(np.arange(len(piece.time)), 0, len(piece.steps) - 1)
+            others = {name: after.trajectory.T[:, i] for i, name in enumerate(parts)}
+            result.append(PredictedRun(
+                recording=piece.recording, held_out=which == "holdout", time=piece.time, speed=piece.inputs[at, 0],
+                torque=piece.inputs[at, 1], measured=by_channel(piece.measured), before=by_channel(before.read),
+                calibrated=by_channel(calibrated.read), after=others | by_channel(after.read),
+                counts_from_s=before.counts_from,
+            ))  # fmt: skip
+    return tuple(result)
+
+
+def _calibration(final: Fit, plain: Fit, answers: Sequence[Answer]) -> tuple[Calibrated, ...]:
+    """Every usual parameter, and how far it is from its prior as the definition has it: that of one found is wider."""
+    stated = {unknown.parameter.name: unknown for unknown in plain.experiment.unknowns}
+    found = {name for answer in answers for effect in answer.best.effects if effect.term is not None
+             for name in names_of(effect)}  # fmt: skip
+    sd, result = np.sqrt(np.diag(final.covariance)), []
+    for unknown, z, own in zip(final.experiment.unknowns, final.z.tolist(), sd.tolist(), strict=True):
+        p = unknown.parameter
+        if p.name in found or p.name not in stated:
+            continue
+        value = unknown.value(z)
+        result.append(Calibrated(
+            parameter=p.name, prior=p.start, value=value, stderr=slope(unknown, z) * own,
+            shift_in_sd=stated[p.name].z_of(value), unit=p.unit,
+        ))  # fmt: skip
+    return tuple(result)
+
+
+def _ranking(posterior: Posterior) -> tuple[Ranked, ...]:
+    """Everything that was judged, most probable first; of a pair both names."""
+    return tuple(
+        Ranked(
+            mechanism=" + ".join(effect.name for effect in one.effects),
+            place=" + ".join(effect.place for effect in one.effects),
+            family=" + ".join(dict.fromkeys(effect.family for effect in one.effects)), log_bayes=one.log_bayes,
+            probability=probability,
+        )
+        for one, probability in posterior.ranked[:MOST_RANKED]
+    )  # fmt: skip

@@ -1,0 +1,37 @@
+"""Where a hypothesis acts, in the nodes of the network."""
+
+from __future__ import annotations
+
+from diagnosis.candidates.hypotheses import Hypothesis
+from models.simulation.thermal_network import ThermalNetwork
+
+
+def node_in(network: ThermalNetwork, h: Hypothesis) -> str:
+    """The part of the network (or the channel, or the boundary) that a hypothesis acts on."""
+    term = h.term
+    if term is None:
+        return _node_of_parameter(network, h.place)
+    if term.kind == "loss_factor":
+        most, _ = max(term.weighted, key=lambda pair: abs(pair[1]))
+        return next(s.node for s in network.sources if s.name == most)
+    if term.kind == "link_factor":
+        parts = {p.name for p in network.parts}
+        ends = next(k.nodes for k in network.links if k.name == term.target[0])
+        return next(node for node in ends if node in parts)
+    if term.kind == "signal":
+        return {"T_ambient": "air", "air_speed": "air"}.get(term.target[0], term.target[0])
+    return term.target[0]
+
+
+def _node_of_parameter(network: ThermalNetwork, name: str) -> str:
+    bare = name.removeprefix("shape_")
+    for source in network.sources:
+        if any(s.name == name or bare.startswith(f"{s.name}_") for s in source.heat.free_symbols):
+            return source.node
+    for link in network.links:
+        if any(s.name == name or bare.startswith(f"{s.name}_") for s in link.conductance.free_symbols):
+            return next(n for n in link.nodes if n in {p.name for p in network.parts})
+    for part in network.parts:
+        if part.capacity is not None and name in {s.name for s in part.capacity.free_symbols}:
+            return part.name
+    return network.parts[0].name

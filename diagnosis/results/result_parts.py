@@ -1,0 +1,364 @@
+"""The parts of a result: findings, places, errors of the predictions, and effects that could not be seen."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+from models.base.types import Array
+from models.terms.term import Term
+
+Grade = Literal["claim", "likely"]
+PARAMETER = "parameter"
+
+
+@dataclass(frozen=True, kw_only=True)
+class ParameterValue:
+    """A number that was found, with its standard error and unit."""
+
+    name: str
+    value: float
+    stderr: float
+    unit: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rival:
+    """Another explanation that these data do not rule out, and what would.
+
+    Attributes
+    ----------
+    mechanism, place : str
+    probability : float
+    separate_by : str
+        The experiment or sensor that would separate the two
+    """
+
+    mechanism: str
+    place: str
+    probability: float
+    separate_by: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Change:
+    """When an effect begins, and ends if it does.
+
+    Attributes
+    ----------
+    recording : str
+        In which it begins
+    from_s : float
+        Since the first row of that recording, [s]
+    band_s : (float, float) or None
+        95 % band of `from_s`, [s]; None if unknown
+    to_s : float or None
+        End, since the first row of the same recording, [s]; None: it stays
+    utc : str or None
+        Begin by the clock, ISO 8601; None for a recording without dates
+    """
+
+    recording: str
+    from_s: float
+    band_s: tuple[float, float] | None = None
+    to_s: float | None = None
+    utc: str | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Switching:
+    """Temperatures at which a two-point control switches.
+
+    Attributes
+    ----------
+    on_degC, off_degC : float
+    """
+
+    on_degC: float
+    off_degC: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Finding:
+    """One effect that was found.
+
+    Attributes
+    ----------
+    mechanism : str
+        Name in the catalogue; ``parameter`` for a parameter out of its prior; of an open form its name
+    family, place, node, kind, reference : str
+        `node`: the part of the network, or the channel, that it acts on
+    equation : str
+        LaTeX
+    probability : float
+        Among all explanations that were compared
+    log_bayes : float
+        Evidence against leaving it out, [nat]
+    parameters : tuple of ParameterValue
+    confusable_with : tuple of Rival
+    heat_mean_W, heat_stderr_W, heat_max_W : float
+        Mean magnitude over the training recordings with its standard error, and the largest one; 0 for a fault of an
+        instrument
+    heat : mapping of recording to (time [s], heat [W]) Arrays
+        Heat of the finding over time; empty for sensor faults
+    term : Term or None
+        With the found values as its parameters' start
+    grade : str
+        ``claim``: the name is certain enough; ``likely``: one of a few names, or only law and place are known
+    tie_set : tuple of str
+        Names that these data do not separate, the most probable first; empty of a claim
+    joint_probability : float
+        Of all names of the tie set, else `probability`
+    acts_like : bool
+        True if the law and the place were found but not the cause: `mechanism` is the nearest name
+    date : Change or None
+        When it begins, if not with the first recording
+    switching : Switching or None
+        Of a two-point control
+    """
+
+    mechanism: str
+    family: str
+    place: str
+    node: str
+    kind: str
+    #: The finding in one sentence.
+    says: str
+    reference: str
+    equation: str
+    probability: float
+    log_bayes: float
+    parameters: tuple[ParameterValue, ...]
+    confusable_with: tuple[Rival, ...] = ()
+    heat_mean_W: float = 0.0
+    heat_stderr_W: float = 0.0
+    heat_max_W: float = 0.0
+    heat: Mapping[str, tuple[Array, Array]] = field(default_factory=dict)
+    term: Term | None = None
+    grade: Grade = "claim"
+    tie_set: tuple[str, ...] = ()
+    joint_probability: float = math.nan
+    acts_like: bool = False
+    date: Change | None = None
+    switching: Switching | None = None
+
+    @property
+    def title(self) -> str:
+        """Names and places as its grade allows them."""
+        if self.acts_like:
+            return f"acts like {named(self.mechanism, self.place)}"
+        places = {r.mechanism: r.place for r in reversed(self.confusable_with)} | {self.mechanism: self.place}
+        tied = self.tie_set or (self.mechanism,)
+        if len({places.get(name, self.place) for name in tied}) == 1:
+            return named(" or ".join(tied), self.place)
+        return " or ".join(named(name, places.get(name, self.place)) for name in tied)
+
+    @property
+    def sureness(self) -> float:
+        """Probability that the title is right."""
+        return self.joint_probability if self.tie_set and self.joint_probability > 0.0 else self.probability
+
+
+@dataclass(frozen=True, kw_only=True)
+class Location:
+    """Where heat comes or goes that the calibrated model cannot explain.
+
+    Attributes
+    ----------
+    node : str
+    probability : float
+    heat_mean_W, heat_max_W : float
+    when : tuple of (recording, from_s, to_s)
+        Windows in which it acts
+    regime : str
+        When it acts in words of speed, torque and temperature
+    """
+
+    node: str
+    probability: float
+    heat_mean_W: float
+    heat_max_W: float
+    when: tuple[tuple[str, float, float], ...]
+    regime: str
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class MissingHeat:
+    """The heat that the calibrated model lacks at the most probable place, over time.
+
+    Attributes
+    ----------
+    recording, node : str
+    time, mean, sd : Array, shape (K,)
+        [s], [W], [W]
+    speed, torque, temperature : Array, shape (K,)
+        Operating point: [1/min], [N m], and the node's temperature [degC]
+    law : Array, shape (K,), or None
+        Heat of the findings there, [W]
+    """
+
+    recording: str
+    node: str
+    time: Array
+    mean: Array
+    sd: Array
+    speed: Array
+    torque: Array
+    temperature: Array
+    law: Array | None
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PredictedRun:
+    """One recording as measured and as simulated, free-running.
+
+    Attributes
+    ----------
+    recording : str
+    held_out : bool
+    time : Array, shape (rows,)
+        [s]
+    speed, torque : Array, shape (rows,)
+        [1/min], [N m]
+    measured, before, calibrated, after : mapping of channel to Array, shape (rows,)
+        [degC], or [W] for ``P_loss``; before: the model as delivered; calibrated: its parameters tuned inside their
+        priors; after: with the findings
+    counts_from_s : float
+        Rows before it served to find the start temperatures and do not count
+    """
+
+    recording: str
+    held_out: bool
+    time: Array
+    speed: Array
+    torque: Array
+    measured: Mapping[str, Array]
+    before: Mapping[str, Array]
+    calibrated: Mapping[str, Array]
+    after: Mapping[str, Array]
+    counts_from_s: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fits:
+    """Root mean square errors of one set of recordings.
+
+    Attributes
+    ----------
+    before, calibrated, after : float
+        Over all temperatures, [K]; NaN without recordings
+    sensors : mapping of channel to (before, calibrated, after)
+        [K], or [W] for ``P_loss``
+    """
+
+    before: float
+    calibrated: float
+    after: float
+    sensors: Mapping[str, tuple[float, float, float]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Calibrated:
+    """A parameter of the model as calibrated."""
+
+    parameter: str
+    prior: float
+    value: float
+    stderr: float
+    shift_in_sd: float
+    unit: str = "1"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ranked:
+    """One line of the ranking: every explanation that was scored."""
+
+    mechanism: str
+    place: str
+    family: str
+    log_bayes: float
+    probability: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class NotDetectable:
+    """An effect that these data could not have shown, and the test that would show it.
+
+    Attributes
+    ----------
+    mechanism, place : str
+        `place`: where it would show best
+    needed : str
+        Test that would show it
+    expected : float
+        Expected evidence at the size that matters, [nat]; NaN if unknown
+    """
+
+    mechanism: str
+    place: str
+    needed: str
+    expected: float = math.nan
+
+
+def named(mechanism: str, place: str) -> str:
+    """A mechanism and its place.
+
+    Examples
+    --------
+    >>> named("windage", "oil"), named("parameter", "h_air")
+    ('windage at oil', 'parameter h_air')
+    """
+    return f"{mechanism} {place}" if mechanism == PARAMETER else f"{mechanism} at {place}"
+
+
+def finding_dict(finding: Finding) -> dict[str, Any]:
+    """A finding as it stands in ``diagnosis.json``."""
+    date, switching = finding.date, finding.switching
+    return {
+        "mechanism": finding.mechanism,
+        "family": finding.family,
+        "place": finding.place,
+        "node": finding.node,
+        "kind": finding.kind,
+        "grade": finding.grade,
+        "acts_like": finding.acts_like,
+        "tie_set": list(finding.tie_set),
+        "joint_probability": finding.sureness,
+        "says": finding.says,
+        "equation": finding.equation,
+        "reference": finding.reference,
+        "probability": finding.probability,
+        "log_bayes": finding.log_bayes,
+        "heat_W": {"mean": finding.heat_mean_W, "stderr": finding.heat_stderr_W, "max": finding.heat_max_W},
+        "date": None if date is None else {
+            "recording": date.recording, "from_s": date.from_s, "to_s": date.to_s, "utc": date.utc,
+            "band_s": None if date.band_s is None else list(date.band_s),
+        },
+        "switching": None if switching is None else {"on_degC": switching.on_degC, "off_degC": switching.off_degC},
+        "parameters": [
+            {"name": p.name, "value": p.value, "stderr": p.stderr, "unit": p.unit} for p in finding.parameters
+        ],
+        "confusable_with": [
+            {"mechanism": r.mechanism, "place": r.place, "probability": r.probability, "separate_by": r.separate_by}
+            for r in finding.confusable_with
+        ],
+    }  # fmt: skip
+
+
+def fits_dict(fits: Fits) -> dict[str, Any]:
+    """Errors as they stand in ``diagnosis.json``."""
+
+    def number(value: float) -> float | None:
+        return value if value == value else None
+
+    return {
+        "rmse_before_K": number(fits.before),
+        "rmse_calibrated_K": number(fits.calibrated),
+        "rmse_after_K": number(fits.after),
+        "sensors": {
+            name: {"before": number(b), "calibrated": number(c), "after": number(a)}
+            for name, (b, c, a) in fits.sensors.items()
+        },
+    }
