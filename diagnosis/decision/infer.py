@@ -28,7 +28,6 @@ RACED, PLACES, RACE_STEPS = 18, 2, 4
 NEAR_PLACE = 3.0  # nats behind the best place of its name, up to which a second place is raced
 REFITTED, SECONDS = 6, 2
 WORTH, WORTH_SHARE = 1.0, 0.1  # nats, and share of the best, from which a candidate is worth a fit
-PAIR_PRIOR = 0.1  # of two effects, to one
 WIDER = 4.0  # prior standard deviations of a parameter outside its prior, in those of its own
 TEMPER = (3.0, 0.1)
 THRESHOLD = 5.0
@@ -65,7 +64,7 @@ def infer(
     base = calibration.fit
     progress(f"scanning {len(candidates)} candidates")
     first = _scanned(base, candidates, log_prior, len(base.z))
-    order = np.argsort(-(first.log_bayes + TEMPER[0] * first.log_prior))
+    order = np.argsort(-(first.log_bayes + first.log_prior))
     chosen = _raced(first.candidates, first.log_bayes, order)
     judged: dict[str, Judged] = {}
     worth = max(WORTH, WORTH_SHARE * float(first.log_bayes.max(initial=0.0)))
@@ -74,7 +73,7 @@ def infer(
         progress(f"fitting {first.candidates[index].label} ({step + 1} of {len(chosen)})")
         one = _refitted(calibration, base, first, index, RACE_STEPS)
         judged[first.candidates[index].label] = one
-    ahead = sorted(judged.values(), key=lambda one: -(one.log_bayes + TEMPER[0] * one.log_prior))
+    ahead = sorted(judged.values(), key=lambda one: -(one.log_bayes + one.log_prior))
     for one in ahead[:REFITTED]:
         if one.fit is not None:
             judged[one.label] = _fitted_on(calibration, one, len(base.z))
@@ -83,7 +82,7 @@ def infer(
         {one.label: float(value) for one, value in zip(first.candidates, first.log_bayes, strict=True)},
     )
     pairs: list[Judged] = []
-    best = max(judged.values(), key=lambda one: one.log_bayes + TEMPER[0] * one.log_prior, default=None)
+    best = max(judged.values(), key=lambda one: one.log_bayes + one.log_prior, default=None)
     if best is not None and best.fit is not None and best.log_bayes > 0.0:
         progress(f"looking beside {best.label}")
         remainder, pairs, there = _beside(calibration, best, candidates, log_prior, len(base.z))
@@ -234,14 +233,14 @@ def _beside(
     mine = {effect.label for effect in best.effects}
     others = np.array([one.label not in mine for one in candidates])
     second = _scanned(fit, [one for one in candidates if one.label not in mine], log_prior[others], base)
-    order = np.argsort(-(second.log_bayes + TEMPER[0] * second.log_prior))
+    order = np.argsort(-(second.log_bayes + second.log_prior))
     pairs = []
     for index in order[:SECONDS]:
         one = _refitted(calibration, fit, second, int(index), RACE_STEPS + 2)
         if one.fit is None:
             continue
         both = replace(one, effects=(*best.effects, *one.effects),
-                       log_prior=best.log_prior + one.log_prior + float(np.log(PAIR_PRIOR)))  # fmt: skip
+                       log_prior=best.log_prior + one.log_prior)  # fmt: skip
         pairs.append(_judged(calibration, both, base, _spread(second, int(index))))
     without = over_sessions(second.scan.gram, fit.experiment, [*range(base), *second.scan.further])
     outside = second.candidates[len(second.scan.candidates) :]
