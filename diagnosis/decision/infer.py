@@ -6,6 +6,7 @@ them are fitted to the end, model error in place; a second scan beside the best 
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
@@ -19,6 +20,7 @@ from diagnosis.engine.calibration import Calibration
 from diagnosis.engine.candidates import Scan, refit, scan
 from diagnosis.engine.fit import Fit
 from diagnosis.engine.gram import Given, Strengths
+from diagnosis.engine.outside import judge_outside
 from diagnosis.engine.sessions import OverSessions, fit_over_sessions, over_sessions
 from diagnosis.engine.unknown import Group
 from models.base.errors import InputError
@@ -47,7 +49,7 @@ class _Scanned:
 
 def infer(
     calibration: Calibration, candidates: Sequence[Hypothesis], log_prior: Array, settings: Settings, *,
-    progress: Callable[[str], None] = lambda _: None,
+    outside: Sequence[Hypothesis] = (), progress: Callable[[str], None] = lambda _: None,
 ) -> Posterior:  # fmt: skip
     """Weigh all explanations.
 
@@ -58,6 +60,8 @@ def infer(
     log_prior : Array, shape (candidates,)
         Of every candidate, to 1 of nothing
     settings : Settings
+    outside : sequence of Hypothesis
+        Unknown heats, judged where something is missing
     progress : callable
         Told in words what is being done
     """
@@ -89,12 +93,12 @@ def infer(
         alone |= {label: min(alone[label], value) for label, value in there.items()}
     for index, candidate in enumerate(first.candidates):
         judged.setdefault(candidate.label, _by_scan(first, index, alone[candidate.label]))
-    every = [*judged.values(), *pairs]
-    single = [one for one in every if len(one.effects) == 1]
-    log_e = float(logsumexp([one.log_prior + one.log_bayes for one in single]))
+    log_e = float(logsumexp([one.log_prior + one.log_bayes for one in judged.values()]))
+    unknown = _unknown(base, outside) if log_e > THRESHOLD else []
+    every = [*judged.values(), *pairs, *unknown]
     return Posterior(
         nothing=Judged(effects=(), log_prior=0.0, log_bayes=0.0, fit=base), judged=tuple(every), log_e=log_e,
-        threshold=THRESHOLD, temper=TEMPER, likeness=_likeness(first), error_class=calibration.chosen.name,
+        threshold=THRESHOLD, temper=TEMPER, likeness=_likeness(first), odds_unknown=settings.odds_unknown, error_class=calibration.chosen.name,
         error_evidence=dict(calibration.evidence), session_s=calibration.session_s, remainder=remainder,
         expected=_expected(first, settings),
     )  # fmt: skip
@@ -247,6 +251,16 @@ def _beside(
     alone = _weighed(second.scan, outside, without).tolist()
     labels = [one.label for one in second.candidates]
     return float(second.log_bayes[order[0]]), pairs, dict(zip(labels, alone, strict=True))
+
+
+def _unknown(fit: Fit, outside: Sequence[Hypothesis]) -> list[Judged]:
+    """Heats that no catalogue has, all functions of each marginalised."""
+    names = Counter(one.name for one in outside)
+    return [
+        Judged(effects=(one.hypothesis,), log_prior=-float(np.log(names[one.hypothesis.name])), log_bayes=one.log_bayes,
+               strength=(one.strength,), strength_sd=(0.0,))
+        for one in judge_outside(fit, outside)
+    ]  # fmt: skip
 
 
 def _likeness(found: _Scanned) -> Likeness:

@@ -159,6 +159,8 @@ class Posterior:
     temper : (float, float)
         a and b
     likeness : Likeness
+    odds_unknown : float
+        Prior odds of a cause that is in no catalogue, see :class:`~diagnosis.decision.settings.Settings`
     error_class : str
         Class of model error that the evidence chose
     error_evidence : mapping of str to float
@@ -176,6 +178,7 @@ class Posterior:
     threshold: float
     temper: tuple[float, float]
     likeness: Likeness = Likeness(labels=(), cosines=np.zeros((0, 0)))
+    odds_unknown: float = 0.1
     error_class: str = ""
     error_evidence: dict[str, float] = field(default_factory=dict)
     session_s: float = 0.0
@@ -205,18 +208,20 @@ class Posterior:
         of_names: dict[tuple[str, ...], list[Judged]] = {}
         for one in self.judged:
             of_names.setdefault(one.names, []).append(one)
-            if len(one.effects) == 1:
+            if len(one.effects) == 1 and one.kind != "outside":
                 mass[one.names[0]] = mass.get(one.names[0], 0.0) + float(np.exp(one.log_prior))
         pair = float(np.log(PAIR_PRIOR / max(len(mass), 1)))
-        log_bayes = []
+        unknown = float(np.log(self.odds_unknown * max(len(mass), 1)))  # to one name of the catalogue
+        log_bayes, log_prior = [], []
         for names, members in of_names.items():
             within = sum(np.log(mass.get(name, 1.0)) for name in names)
             mean = float(logsumexp([one.log_prior + one.log_bayes for one in members]) - within)
             log_bayes.append(mean + (pair if len(names) > 1 else 0.0))
+            log_prior.append(unknown if members[0].kind == "outside" else 0.0)
         values = np.array(log_bayes)
         a, b = self.temper
         most = max(float(values.max(initial=0.0)), 0.0)
-        log = np.where(values >= REFUTED * most, values / (a + b * most), -np.inf)
+        log = np.where(values >= REFUTED * most, np.array(log_prior) + values / (a + b * most), -np.inf)
         chance = self.something * np.exp(log - logsumexp(log))
         found = [
             Explanation(names=names, members=tuple(sorted(members, key=lambda one: -one.log_prior - one.log_bayes)),
