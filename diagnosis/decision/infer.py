@@ -31,7 +31,7 @@ NEAR_PLACE = 3.0  # nats behind the best place of its name, up to which a second
 REFITTED, SECONDS = 6, 2
 WORTH, WORTH_SHARE = 1.0, 0.1  # nats, and share of the best, from which a candidate is worth a fit
 WIDER = 4.0  # prior standard deviations of a parameter outside its prior, in those of its own
-TEMPER = (3.0, 0.1)
+TEMPER = (3.0, 0.05)
 THRESHOLD = 5.0
 
 
@@ -98,7 +98,8 @@ def infer(
     every = [*judged.values(), *pairs, *unknown]
     return Posterior(
         nothing=Judged(effects=(), log_prior=0.0, log_bayes=0.0, fit=base), judged=tuple(every), log_e=log_e,
-        threshold=THRESHOLD, temper=TEMPER, likeness=_likeness(first), odds_unknown=settings.odds_unknown, error_class=calibration.chosen.name,
+        threshold=THRESHOLD, temper=TEMPER, likeness=_likeness(first), odds_unknown=settings.odds_unknown,
+        error_class=calibration.chosen.name,
         error_evidence=dict(calibration.evidence), session_s=calibration.session_s, remainder=remainder,
         expected=_expected(first, settings),
     )  # fmt: skip

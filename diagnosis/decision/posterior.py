@@ -31,6 +31,7 @@ Kind = Literal["nothing", "parameter", "measurement", "mechanism", "pair", "outs
 KINDS: tuple[Kind, ...] = get_args(Kind)
 Grade = Literal["claim", "likely"]
 MOST_TIED = 3
+DOUBT = 2.0  # nats from the threshold over which a half becomes three quarters of belief that something is missing
 ALIKE = 0.9  # cosine of what two effects do to the readings, from which these data do not tell them apart
 REFUTED = 0.3  # of the best log Bayes factor: a name that explains less is refuted
 PAIR_PRIOR = 0.1  # of two effects, to one
@@ -199,7 +200,7 @@ class Posterior:
     @property
     def something(self) -> float:
         """Probability that something is missing: one half at the threshold."""
-        return float(expit((self.log_e - self.threshold) / self.temper[0]))
+        return float(expit((self.log_e - self.threshold) / DOUBT))
 
     @cached_property
     def explanations(self) -> tuple[Explanation, ...]:
@@ -303,12 +304,12 @@ def decide(posterior: Posterior, settings: Settings) -> tuple[Answer, ...]:
 
 def _answer(posterior: Posterior, best: Judged, effect: Hypothesis, enough: float) -> Answer | None:
     """The narrowest set of names that holds enough probability."""
-    name, others = name_of(effect), {name_of(one) for one in best.effects if one is not effect}
+    name = name_of(effect)
     vague = effect.how == "W" or effect.is_open or posterior.much_is_left
     own = posterior.of_names([name])
     if own >= enough:
         return Answer(best=best, effect=effect, grade="likely" if vague else "claim", probability=own, acts_like=vague)
-    rivals = _rivals(posterior, effect, others)
+    rivals = _rivals(posterior, effect)
     for count in range(2, MOST_TIED + 1):
         if posterior.of_names([name_of(one) for one in rivals[:count]]) >= enough:
             tied = tuple((one, posterior.of_names([name_of(one)])) for one in rivals[:count])
@@ -319,14 +320,19 @@ def _answer(posterior: Posterior, best: Judged, effect: Hypothesis, enough: floa
     return None
 
 
-def _rivals(posterior: Posterior, effect: Hypothesis, beside: Collection[str]) -> list[Hypothesis]:
-    """Best effect of every name that may stand in place of an effect, itself first, most probable first."""
-    found = {name_of(effect): effect}
+def _rivals(posterior: Posterior, effect: Hypothesis) -> list[Hypothesis]:
+    """Best effect of every name that may stand in place of an effect, itself first, most probable first.
+
+    What explanations with the effect's own name hold beside it stands not in its place.
+    """
+    own = name_of(effect)
+    beside = {name for one in posterior.explanations if own in one.names for name in one.names if name != own}
+    found = {own: effect}
     for judged, _ in posterior.ranked:
-        for one in judged.effects:
-            if name_of(one) not in beside:
+        if own not in judged.names:
+            for one in judged.effects:
                 found.setdefault(name_of(one), one)
-    return list(found.values())
+    return [one for name, one in found.items() if name not in beside]
 
 
 def _act_on_the_same(first: Hypothesis, second: Hypothesis) -> bool:
