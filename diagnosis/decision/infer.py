@@ -202,7 +202,7 @@ def _fitted_on(calibration: Calibration, one: Judged, base: int) -> Judged:
     fit = one.fit
     assert fit is not None  # noqa: S101
     try:
-        reached = fit.experiment.fit(fit.z, [part.point.trajectory for part in fit.parts])
+        reached = fit.experiment.fit(fit.z, at=fit.linearised)
     except (InputError, ArithmeticError, np.linalg.LinAlgError):
         return one
     gained = fit_over_sessions(reached, base).log_evidence - fit_over_sessions(fit, base).log_evidence
