@@ -21,17 +21,17 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
+from diagnosis.candidates.explain import best_fits, calibrated
+from diagnosis.decision.search import candidates_of
+from diagnosis.inference.evidence import Marginal
 
 from benchmarks.diagnose import make_recordings
-from diagnosis.candidates.explain import best_fits, calibrated
 from diagnosis.candidates.hypotheses import parameter_hypotheses
 from diagnosis.candidates.hypotheses import scan as old_scan
-from diagnosis.decision.search import candidates_of
 from diagnosis.engine.candidates import refit_all, scan
 from diagnosis.engine.fit import Linearised, calibrate
 from diagnosis.engine.metric import Metric
 from diagnosis.engine.prepare import prepare_experiment
-from diagnosis.inference.evidence import Marginal
 from diagnosis.recordings.read import read_recordings
 from diagnosis.setup.inference_setup import prepare
 from models.assembly.gearbox import load_gearbox

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from markupsafe import Markup
 
+from diagnosis.engine.predict import rmse
 from diagnosis.forward.grid import stands_for
-from diagnosis.inference.predict import rmse
 from diagnosis.report.chart import Chart, Curve, averaged, drawn
 from diagnosis.report.wording import LOSS, name, time_scale
 from diagnosis.results.number_format import fixed

@@ -86,7 +86,7 @@ class Diagnosis:
     network : ThermalNetwork
         The nominal one
     shapes : tuple of Term
-        Tilts of the formulas that were calibrated along, see :mod:`diagnosis.inference.shapes`
+        Tilts of the formulas that were calibrated along, see :mod:`diagnosis.setup.shapes`
     inputs : mapping
         Hashes and version
     notes : tuple of str

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from diagnosis.inference.posterior import Problem
+from diagnosis.inference.unknowns import unknowns_of
 
 from diagnosis.forward.grid import Piece, pieces
 from diagnosis.forward.network_on_grid import NetworkOnGrid
-from diagnosis.inference.noise import noise_of, start_guess
-from diagnosis.inference.posterior import Problem
-from diagnosis.inference.unknowns import unknowns_of
+from diagnosis.setup.noise import noise_of, start_guess
 from models.assembly.gearbox import Gearbox
 from models.base.types import Array
 from models.files.cycle import Cycle

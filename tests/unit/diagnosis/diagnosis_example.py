@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from diagnosis.inference.shapes import shape_terms
 from diagnosis.results.result import Diagnosis
 from diagnosis.results.result_parts import (
     Calibrated,
@@ -20,6 +19,7 @@ from diagnosis.results.result_parts import (
     Ranked,
     Rival,
 )
+from diagnosis.setup.shapes import shape_terms
 from models.assembly.gearbox import load_gearbox
 from models.base.types import Array
 from models.mechanisms import CATALOGUE, Placed, Scale

@@ -8,13 +8,13 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+from diagnosis.inference.posterior import Problem
 
 from diagnosis.candidates.hypotheses import Hypothesis, Scored
 from diagnosis.forward.grid import Piece
 from diagnosis.forward.network_on_grid import NetworkOnGrid, named_values
 from diagnosis.forward.observation import readings
 from diagnosis.forward.trajectory import simulate
-from diagnosis.inference.posterior import Problem
 from diagnosis.recordings.recording import Channel, Recording
 from models.assembly.gearbox import Gearbox
 from models.base.types import Array

@@ -8,8 +8,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-
-from diagnosis.candidates import explain
 from diagnosis.candidates.explain import (
     DISTORTED,
     Explanation,
@@ -22,6 +20,13 @@ from diagnosis.candidates.explain import (
     without,
 )
 from diagnosis.candidates.heat import _heats_with, heats_of, mean_heat_of
+from diagnosis.decision.stage import Stage
+from diagnosis.inference.evidence import Marginal
+from diagnosis.inference.posterior import Problem
+from diagnosis.inference.unknowns import unknowns_of
+from diagnosis.results.findings import _with_form, finding_of
+
+from diagnosis.candidates import explain
 from diagnosis.candidates.hypotheses import (
     _lines,
     hypothesis_of,
@@ -31,15 +36,10 @@ from diagnosis.candidates.hypotheses import (
     two_point_columns,
 )
 from diagnosis.decision import acceptance
-from diagnosis.decision.stage import Stage
 from diagnosis.forward.grid import Piece
 from diagnosis.forward.network_on_grid import NetworkOnGrid, named_values
 from diagnosis.forward.observation import readings
 from diagnosis.forward.trajectory import simulate
-from diagnosis.inference.evidence import Marginal
-from diagnosis.inference.posterior import Problem
-from diagnosis.inference.unknowns import unknowns_of
-from diagnosis.results.findings import _with_form, finding_of
 from models.assembly.gearbox import Gearbox
 from models.mechanisms import CATALOGUE, Scale
 from tests.unit.diagnosis.inference_example import CHANNELS, damaged

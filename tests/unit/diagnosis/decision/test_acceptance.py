@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-
-from diagnosis.candidates import explain
 from diagnosis.candidates.explain import Explanation
-from diagnosis.candidates.hypotheses import hypothesis_of
-from diagnosis.decision import acceptance, search
 from diagnosis.decision.stage import Stage, log_e_value
 from diagnosis.inference.posterior import Problem
 from diagnosis.inference.unknowns import Unknown, Unknowns
+
+from diagnosis.candidates import explain
+from diagnosis.candidates.hypotheses import hypothesis_of
+from diagnosis.decision import acceptance, search
 from models.assembly.gearbox import Gearbox
 from models.base.types import Array
 from models.mechanisms import CATALOGUE, Scale

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from diagnosis.inference.evidence import Marginal
 
 from diagnosis.candidates.hypotheses import Hypothesis, hypothesis_of
 from diagnosis.candidates.hypotheses import scan as old_scan
@@ -13,7 +14,6 @@ from diagnosis.engine.candidates import refit, refit_all, scan
 from diagnosis.engine.fit import Experiment, Fit, calibrate
 from diagnosis.engine.prepare import prepare_experiment
 from diagnosis.engine.unknown import ClockOffset, Group, InputGain, SensorBias
-from diagnosis.inference.evidence import Marginal
 from diagnosis.recordings.recording import Recording
 from diagnosis.setup.inference_setup import InferenceSetup
 from models.assembly.gearbox import Gearbox

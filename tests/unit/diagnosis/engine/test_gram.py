@@ -6,11 +6,11 @@ from itertools import combinations
 
 import numpy as np
 import pytest
+from diagnosis.inference.evidence import Marginal, strength
 from scipy.integrate import dblquad
 from scipy.stats import multivariate_normal, norm
 
 from diagnosis.engine.gram import Gram
-from diagnosis.inference.evidence import Marginal, strength
 from models.base.types import Array
 
 ROWS, UNKNOWNS, FURTHER, CANDIDATES = {"a": 30, "b": 12}, 4, 3, 5

@@ -7,14 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import sympy as sp
+from diagnosis.inference.evidence import Marginal, strength
+from diagnosis.inference.latent import knots_of, latent_heat
+from diagnosis.inference.posterior import Problem
 
 from diagnosis.forward.grid import Piece, pieces
 from diagnosis.forward.network_on_grid import NetworkOnGrid
-from diagnosis.inference.evidence import Marginal, strength
-from diagnosis.inference.latent import knots_of, latent_heat
-from diagnosis.inference.noise import loss_noise
-from diagnosis.inference.posterior import Problem
-from diagnosis.inference.whitening import Noise, Whitening, reading_variance
+from diagnosis.forward.whitening import Noise, Whitening, reading_variance
+from diagnosis.setup.noise import loss_noise
 from models.assembly.gearbox import Gearbox
 from models.base.types import Array
 from models.files.cycle import Cycle

@@ -8,18 +8,18 @@ from typing import Any
 
 import numpy as np
 import pytest
-
 from diagnosis.candidates.explain import calibrated
 from diagnosis.decision.holdout import Judge, at_holdout
+from diagnosis.inference.posterior import Problem, _gauss_newton
+from diagnosis.inference.unknowns import Unknowns, unknowns_of
+
 from diagnosis.forward.grid import Piece
 from diagnosis.forward.network_on_grid import NetworkOnGrid
 from diagnosis.forward.observation import readings
 from diagnosis.forward.trajectory import simulate
-from diagnosis.inference.noise import noise_of
-from diagnosis.inference.posterior import Problem, _gauss_newton
-from diagnosis.inference.unknowns import Unknowns, unknowns_of
-from diagnosis.inference.whitening import Whitening
+from diagnosis.forward.whitening import Whitening
 from diagnosis.setup.inference_setup import InferenceSetup, floored
+from diagnosis.setup.noise import noise_of
 from models.assembly.gearbox import Gearbox
 from models.base.types import Array
 from models.mechanisms import CATALOGUE, Scale

@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from diagnosis.inference.posterior import Problem
+from diagnosis.inference.predict import START_S, predict
+from diagnosis.inference.unknowns import unknowns_of
 
 from diagnosis.forward.grid import Piece
 from diagnosis.forward.network_on_grid import NetworkOnGrid
 from diagnosis.forward.observation import readings
 from diagnosis.forward.trajectory import complete_start, simulate
-from diagnosis.inference.posterior import Problem
-from diagnosis.inference.predict import START_S, predict
-from diagnosis.inference.unknowns import unknowns_of
 from models.assembly.gearbox import Gearbox
 from models.base.types import Array
 from models.mechanisms import CATALOGUE, Scale

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from diagnosis.candidates.explain import Explanation
+from diagnosis.inference.posterior import Problem
 
 from diagnosis.candidates import explain
-from diagnosis.candidates.explain import Explanation
 from diagnosis.candidates.hypotheses import hypothesis_of
 from diagnosis.decision import search
-from diagnosis.inference.posterior import Problem
 from models.assembly.gearbox import Gearbox, load_gearbox
 from models.mechanisms import CATALOGUE, Scale
 from tests.unit.diagnosis.inference_example import CHANNELS

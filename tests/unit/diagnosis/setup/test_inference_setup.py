@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
 from diagnosis.candidates.explain import calibrated
+
 from diagnosis.recordings.recording import Channel, Recording
 from diagnosis.setup.inference_setup import HELD_OUT_SHARE, START_S, prepare, split
 from models.assembly.gearbox import Gearbox
