@@ -56,12 +56,12 @@ class Hypothesis:
 
     @property
     def is_open(self) -> bool:
-        """Whether it is a mere form, of something that no catalogue has."""
+        """True if it is a mere form, of something that no catalogue has."""
         return self.family == OPEN_FORM
 
     @property
     def sign(self) -> int:
-        """Of the strength; 0 where it may be either."""
+        """Sign of the strength; 0 if it may be either."""
         if self.term is None:
             return 0
         p = self.term.strength
@@ -69,7 +69,7 @@ class Hypothesis:
 
     @property
     def in_network(self) -> bool:
-        """Whether it is heat, and so becomes part of the network."""
+        """True if it is heat, and so becomes part of the network."""
         return self.term is not None and self.term.kind not in ("sensor", "signal")
 
 

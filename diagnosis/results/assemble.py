@@ -105,7 +105,6 @@ def assemble(
             verdict, findings, location, unseen, catalogue, assumed=assumed,
             free=without_sensor(setup.nominal, setup.channels),
         ),
-        missing_heat=(),
         courses=_courses(setup, predictions),
         network=setup.nominal,
         shapes=setup.shapes,

@@ -14,7 +14,6 @@ from diagnosis.results.result_parts import (
     Finding,
     Fits,
     Location,
-    MissingHeat,
     NotDetectable,
     PredictedRun,
     Ranked,
@@ -81,7 +80,6 @@ class Diagnosis:
     unseen : tuple of NotDetectable
     next_test : str
         What to measure next
-    missing_heat : tuple of MissingHeat
     courses : tuple of PredictedRun
     network : ThermalNetwork
         The nominal one
@@ -128,7 +126,6 @@ class Diagnosis:
     ranking: tuple[Ranked, ...]
     unseen: tuple[NotDetectable, ...]
     next_test: str
-    missing_heat: tuple[MissingHeat, ...]
     courses: tuple[PredictedRun, ...]
     network: ThermalNetwork
     shapes: tuple[Term, ...]

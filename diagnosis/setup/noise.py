@@ -1,4 +1,4 @@
-"""What the noise of a recording is taken to be, before anything is explained."""
+"""Assumed noise of a recording, before anything is explained."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def channel_noise(recordings: Sequence[Recording], channels: Sequence[str]) -> M
 def display_noise(recordings: Sequence[Recording], channels: Sequence[str]) -> Array:
     """Standard deviation of the rounding of every display, shape (channels,), [K] or [W]; 0 if its step is unknown."""
     stated = {c.name: c.resolution or 0.0 for r in recordings for c in r.channels}
-    return np.array([stated.get(name, 0.0) for name in channels]) / np.sqrt(12.0)
+    return np.asarray([stated.get(name, 0.0) for name in channels], dtype=float) / float(np.sqrt(12.0))
 
 
 def noise_of(
