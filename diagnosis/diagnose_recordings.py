@@ -13,6 +13,7 @@ from diagnosis.decision.settings import Settings
 from diagnosis.engine.calibration import calibrate_with_error
 from diagnosis.engine.families import candidates_of, log_prior
 from diagnosis.engine.fit import calibrate
+from diagnosis.engine.outside import outside_of
 from diagnosis.engine.prepare import prepare_experiment
 from diagnosis.recordings.read import named_apart, read_recordings
 from diagnosis.recordings.recording import Recording
@@ -99,7 +100,10 @@ def diagnose(
         progress("calibrating with model error")
         calibration = calibrate_with_error(experiment)
         candidates = candidates_of(setup, experiment, catalogue)
-        posterior = infer(calibration, candidates, log_prior(candidates), settings, progress=progress)
+        posterior = infer(
+            calibration, candidates, log_prior(candidates), settings, outside=outside_of(setup, experiment),
+            progress=progress,
+        )  # fmt: skip
         progress("predicting the recordings free-running")
         return assemble(
             setup, experiment, posterior, decide(posterior, settings), plain=plain, settings=settings,

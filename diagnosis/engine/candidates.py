@@ -151,7 +151,7 @@ def _columns(experiment: Experiment, part: Linear, some: Sequence[tuple[Hypothes
     """
     point, trajectory = part.point, part.point.trajectory
     count, recording = sum(len(candidate.variants) for candidate, _ in some), trajectory.piece.recording
-    acting = [in_scope_of(experiment, candidate, recording) for candidate, _ in some]
+    acting = [_acts_in(experiment, candidate, recording) for candidate, _ in some]
     if not any(acting):
         return np.zeros((*point.read.shape, count))
     into = np.zeros((len(trajectory.piece.steps), trajectory.decay.shape[-1], count))
@@ -252,7 +252,7 @@ def with_candidate(fit: Fit, candidate: Hypothesis, variant: int) -> tuple[Exper
     return replace(experiment, machine=machine, unknowns=(*experiment.unknowns, *added)), np.array(z)
 
 
-def in_scope_of(experiment: Experiment, candidate: Hypothesis, recording: str) -> bool:
+def _acts_in(experiment: Experiment, candidate: Hypothesis, recording: str) -> bool:
     """True if a candidate may act in a recording."""
     scope = _scope(experiment, candidate)
     return scope is None or recording in scope
