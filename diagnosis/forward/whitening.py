@@ -61,7 +61,7 @@ class Noise:
     capacity: float = 0.0
 
     def with_floor(self, times: float) -> Noise:
-        """This noise with its random heats multiplied."""
+        """Noise with its random heats multiplied."""
         return replace(self, heat_sd=self.heat_sd * times)
 
 
