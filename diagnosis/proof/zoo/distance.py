@@ -15,6 +15,7 @@ import numpy as np
 from diagnosis.engine.fit import Experiment
 from diagnosis.engine.point import Machine, Point
 from diagnosis.engine.prepare import usual_unknowns
+from diagnosis.engine.unknown import NetworkParameter
 from diagnosis.forward.grid import pieces
 from diagnosis.forward.network_on_grid import NetworkOnGrid
 from diagnosis.forward.trajectory import Trajectory
@@ -152,10 +153,14 @@ def _experiment(gearbox: Gearbox, recordings: Sequence[Recording]) -> Experiment
     channels = sorted((c.name for c in recordings[0].channels), key=lambda name: (model.part_index(name), name))
     cut = pieces(recordings, model.laws.inputs, channels)
     white = dict.fromkeys(channels, 0.1)
+    stated = {p.name: p for p in network.parameters}  # priors of the definition, capacities as narrow as it has them
+    usual = usual_unknowns(network, recordings, channels, interval=1.0, gain_of_torque=gain)
     return Experiment(
         machine=Machine(model),
         pieces=tuple(cut),
-        unknowns=tuple(usual_unknowns(network, recordings, channels, interval=1.0, gain_of_torque=gain)),
+        unknowns=tuple(
+            replace(u, parameter=stated[u.parameter.name]) if isinstance(u, NetworkParameter) else u for u in usual
+        ),
         noise=tuple(noise_of(model, piece, white, 1.0, parametric=gearbox.is_parametric) for piece in cut),
         starts=tuple(start_guess(model, piece) for piece in cut),
     )
