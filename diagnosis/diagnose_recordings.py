@@ -18,7 +18,7 @@ from diagnosis.engine.prepare import prepare_experiment
 from diagnosis.recordings.read import named_apart, read_recordings
 from diagnosis.recordings.recording import Recording
 from diagnosis.recordings.shared_rows import check_shared_rows
-from diagnosis.results.assemble_posterior import assemble
+from diagnosis.results.assemble import assemble
 from diagnosis.results.result import Diagnosis
 from diagnosis.setup.baselines import check_baselines
 from diagnosis.setup.plausibility import check_plausible

@@ -1,4 +1,4 @@
-"""What a user decides about a diagnosis."""
+"""Numbers of a diagnosis that its user decides."""
 
 from __future__ import annotations
 

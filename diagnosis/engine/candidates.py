@@ -197,7 +197,7 @@ def _faults(point: Point, variants: Array, on_grid: TermOnGrid) -> Array:
 
 
 def _finite(heat: Array) -> Array:
-    """A heat without what a law cannot tell, as a factor on a link that another effect has cut off."""
+    """A heat without values that are no numbers, as of a factor on a link that another effect has cut off."""
     return heat if np.isfinite(heat.sum()) else np.nan_to_num(heat, nan=0.0, posinf=0.0, neginf=0.0)
 
 

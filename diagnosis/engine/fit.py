@@ -14,7 +14,7 @@ from diagnosis.engine.point import Column, Machine, Point, Setting
 from diagnosis.engine.unknown import Scope, Unknown, in_scope
 from diagnosis.forward.grid import Piece
 from diagnosis.forward.trajectory import ROUNDS, Trajectory, simulate
-from diagnosis.inference.whitening import Noise, Whitening
+from diagnosis.forward.whitening import Noise, Whitening
 from models.base.errors import InputError
 from models.base.types import Array
 
