@@ -310,8 +310,8 @@ def _answer(posterior: Posterior, best: Judged, effect: Hypothesis, enough: floa
         if posterior.of_names([name_of(one) for one in rivals[:count]]) >= enough:
             tied = tuple((one, posterior.of_names([name_of(one)])) for one in rivals[:count])
             return Answer(best=best, effect=effect, grade="likely", probability=own, tied=tied, acts_like=vague)
-    alike = [name_of(one) for one in rivals
-             if posterior.likeness.of(effect, one) >= posterior.rule.alike or _act_on_the_same(effect, one)]  # fmt: skip
+    least, likeness = posterior.rule.alike, posterior.likeness
+    alike = [name_of(one) for one in rivals if likeness.of(effect, one) >= least or _act_on_the_same(effect, one)]
     if posterior.of_names([name, *alike]) >= enough:
         return Answer(best=best, effect=effect, grade="likely", probability=own, acts_like=True)
     return None
