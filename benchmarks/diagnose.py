@@ -29,7 +29,7 @@ from diagnosis.proof.plant.cycles import Programme, ambient, programmes
 from diagnosis.proof.plant.instruments import record
 from diagnosis.proof.plant.plant import Plant
 from diagnosis.proof.plant.plant_run import run_plant
-from diagnosis.recordings.read import read_train_and_holdout
+from diagnosis.recordings.read import read_by_role
 from diagnosis.report.write import write_files
 from models.assembly.gearbox import load_gearbox
 from models.mechanisms import CATALOGUE
@@ -103,7 +103,7 @@ def once(train: Sequence[str], holdout: Sequence[str], share: float, jobs: int) 
     names = sorted(CATALOGUE)
     kept = {EFFECT, *names[:: round(1.0 / share)]}
     catalogue = {name: CATALOGUE[name] for name in names if name in kept}
-    learnt, judged = read_train_and_holdout(train, holdout, gearbox.network())
+    learnt, judged, _ = read_by_role(train, holdout, (), gearbox.network())
     found = diagnose(learnt, gearbox, holdout=judged, catalogue=catalogue, jobs=jobs,
                      progress=lambda line: marks.append((line, time.perf_counter())))  # fmt: skip
     marks.append(("writing the report", time.perf_counter()))

@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from diagnosis.decision.search import search
-from diagnosis.recordings.read import read_recordings
+from diagnosis.decision.infer import infer
+from diagnosis.decision.posterior import decide
+from diagnosis.decision.settings import Settings
+from diagnosis.engine.calibration import calibrate_with_error
+from diagnosis.engine.families import candidates_of, log_prior
+from diagnosis.engine.fit import calibrate
+from diagnosis.engine.outside import outside_of
+from diagnosis.engine.prepare import prepare_experiment
+from diagnosis.recordings.read import named_apart, read_recordings
 from diagnosis.recordings.recording import Recording
 from diagnosis.recordings.shared_rows import check_shared_rows
-from diagnosis.results.assemble import assembled
+from diagnosis.results.assemble import assemble
 from diagnosis.results.result import Diagnosis
-from diagnosis.setup.inference_setup import prepare
+from diagnosis.setup.baselines import check_baselines
 from diagnosis.setup.plausibility import check_plausible
 from diagnosis.setup.shaft import shafts, with_shaft
 from models.assembly.gearbox import Gearbox, load_gearbox
@@ -23,6 +29,7 @@ from models.mechanisms import CATALOGUE, Mechanism
 from models.quantities.quantities import is_total_loss
 
 Source = str | Path | Recording
+SETTINGS = Settings()
 
 
 def diagnose(
@@ -30,7 +37,9 @@ def diagnose(
     gearbox: Gearbox | str | Path = "fzg",
     *,
     holdout: Source | Sequence[Source] = (),
-    false_alarm_rate: float = 0.05,
+    baseline: Source | Sequence[Source] = (),
+    switched_off: str | Sequence[str] = (),
+    settings: Settings = SETTINGS,
     catalogue: Mapping[str, Mechanism] | None = None,
     jobs: int = 1,
     progress: Callable[[str], None] = lambda _: None,
@@ -44,8 +53,12 @@ def diagnose(
     gearbox : Gearbox, name or path
     holdout : path, Recording, or several
         To judge by; without any, the last quarter of every recording is held out
-    false_alarm_rate : float
-        Probability with which consistent recordings may be called inconsistent, 1e-4 to 0.5
+    baseline : path, Recording, or several
+        The same machine in other sessions, without the effect that is looked for
+    switched_off : str, or several
+        Mechanisms that are known to be off in the baselines; by default all are
+    settings : Settings
+        The four numbers of the decision
     catalogue : mapping of str to Mechanism, optional
         By default :data:`models.mechanisms.CATALOGUE`
     jobs : int
@@ -63,28 +76,39 @@ def diagnose(
     InputError
         If a recording cannot be used, with file, column and rows.
     """
-    if not 1e-4 <= false_alarm_rate <= 0.5:
-        raise InputError(f"a false-alarm rate of {false_alarm_rate:g} is not possible; 0.0001 to 0.5 is")
     catalogue = CATALOGUE if catalogue is None else catalogue
     gearbox = gearbox if isinstance(gearbox, Gearbox) else load_gearbox(gearbox)
-    train, held = _read(recordings, gearbox), _read(holdout, gearbox)
+    train, held, healthy = named_apart(*(_read(given, gearbox) for given in (recordings, holdout, baseline)))
+    off = (switched_off,) if isinstance(switched_off, str) else tuple(switched_off)
     if not train:
         raise InputError("no recording was given to learn from")
-    check_shared_rows(train, held)
-    _refuse_unusable(train)
+    check_shared_rows(train, held, healthy)
+    _refuse_unusable([*train, *healthy])
+    check_baselines(train, healthy, off, catalogue=catalogue)
     # Models without geometry have too wide priors for a check of temperatures.
     network = gearbox.network()
     check_plausible(
-        shafts([*train, *held], network), with_shaft(network), gearbox.loss_laws(),
+        shafts([*train, *held, *healthy], network), with_shaft(network), gearbox.loss_laws(),
         judge_temperatures=not gearbox.is_parametric,
     )  # fmt: skip
     progress("reading the recordings and setting up the inference")
-    case = prepare(gearbox, train, held)
-    _refuse_too_short(train, case.train.pieces)
+    setup, experiment = prepare_experiment(gearbox, train, held, healthy, switched_off=off)
+    _refuse_too_short(train, experiment.pieces)
     try:
-        found = search(case, catalogue, false_alarm_rate=false_alarm_rate, jobs=jobs, progress=progress)
+        progress("calibrating the model")
+        plain = calibrate(experiment)
+        progress("calibrating with model error")
+        calibration = calibrate_with_error(experiment)
+        candidates = candidates_of(setup, experiment, catalogue)
+        posterior = infer(
+            calibration, candidates, log_prior(candidates), settings, outside=outside_of(setup, experiment),
+            progress=progress,
+        )  # fmt: skip
         progress("predicting the recordings free-running")
-        return assembled(case, found, catalogue, train, held, false_alarm_rate=false_alarm_rate, jobs=jobs)
+        return assemble(
+            setup, experiment, posterior, decide(posterior, settings), plain=plain, settings=settings,
+            catalogue=catalogue, train=train, held_out=held, jobs=jobs,
+        )  # fmt: skip
     except ArithmeticError as error:
         if type(error) is not ArithmeticError:
             raise  # a division by zero is a fault of ours
@@ -95,12 +119,7 @@ def _read(sources: Source | Sequence[Source], gearbox: Gearbox) -> tuple[Recordi
     given = [sources] if isinstance(sources, str | Path | Recording) else list(sources)
     paths = [s for s in given if not isinstance(s, Recording)]
     read = iter(read_recordings(paths, gearbox.network()) if paths else ())
-    result = [s if isinstance(s, Recording) else next(read) for s in given]
-    names = [r.name for r in result]
-    return tuple(
-        replace(r, name=f"{r.name}_{names[: i + 1].count(r.name)}") if names.count(r.name) > 1 else r
-        for i, r in enumerate(result)
-    )
+    return tuple(s if isinstance(s, Recording) else next(read) for s in given)
 
 
 def _refuse_unusable(recordings: Sequence[Recording]) -> None:

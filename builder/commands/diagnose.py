@@ -10,12 +10,14 @@ from typing import TYPE_CHECKING
 import click
 
 from builder.base import console
+from builder.base.decision_settings import settings_options
 from builder.base.workers import worker_options
 from models.assembly.gearbox import known_gearboxes, load_gearbox
 from models.base.errors import InputError, did_you_mean
 from models.files.output_files import refuse_to_replace
 
 if TYPE_CHECKING:
+    from diagnosis.decision.settings import Settings
     from diagnosis.recordings.recording import Recording
     from models.assembly.gearbox import Gearbox
     from models.mechanisms import Mechanism
@@ -23,32 +25,41 @@ if TYPE_CHECKING:
 MOST_NOTES = 8  # on the terminal
 
 
-class _HoldoutOfMany(click.Command):
-    """A command whose ``--holdout`` takes every word up to the next option, as in its usage line."""
+OF_MANY = ("--holdout", "--baseline")  # options that name several recordings
+
+
+class _OptionsOfMany(click.Command):
+    """A command some options of which take every word up to the next option, as in its usage line."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Put a separate ``--holdout`` before every held-out recording, because click reads one value per option."""
+        """Put the option before each of its recordings, because click reads one value per option."""
         words: list[str] = []
-        held_out = False
+        option = ""
         for place, word in enumerate(args):
-            if word.startswith("-") and words[-1:] == ["--holdout"]:
-                raise click.UsageError(f"--holdout names no recording; {word} follows it", ctx)
+            if word.startswith("-") and words and words[-1] in OF_MANY:
+                raise click.UsageError(f"{words[-1]} names no recording; {word} follows it", ctx)
             if word == "--":
                 return super().parse_args(ctx, words + args[place:])
             if word.startswith("-"):
-                held_out = word.partition("=")[0] == "--holdout"
-            elif held_out and words[-1] != "--holdout":
-                words.append("--holdout")
+                name = word.partition("=")[0]
+                option = name if name in OF_MANY else ""
+            elif option and words[-1] != option:
+                words.append(option)
             words.append(word)
         return super().parse_args(ctx, words)
 
 
-@click.command("diagnose", cls=_HoldoutOfMany, options_metavar="")
+@click.command("diagnose", cls=_OptionsOfMany, options_metavar="")
 @click.argument("recordings", nargs=-1, required=True, metavar="RECORDING... [OPTIONS]")
 @click.option("--gearbox", default="fzg", show_default=True, metavar="NAME|FILE",
               help=f"Name ({', '.join(known_gearboxes())}) or definition file (TOML).")  # fmt: skip
 @click.option("--holdout", multiple=True, metavar="RECORDING...",
               help="To judge by: all up to the next option.  [default: the last quarter of each]")  # fmt: skip
+@click.option("--baseline", multiple=True, metavar="RECORDING...",
+              help="The same machine in other sessions, healthy: all up to the next option.")  # fmt: skip
+@click.option("--switched-off", multiple=True, metavar="NAME",
+              help="Only this mechanism is known to be off in the baselines; may be given several times.  [default: "
+                   "every effect is]")  # fmt: skip
 @click.option("--mapping", type=click.Path(path_type=Path, dir_okay=False), default=None, metavar="FILE",
               help="What the columns mean.  [default: <stem>.toml or mapping.toml next to each]")  # fmt: skip
 @click.option("--mechanisms", type=click.Path(path_type=Path, dir_okay=False), multiple=True,
@@ -57,20 +68,22 @@ class _HoldoutOfMany(click.Command):
               help="Leave one of the catalogue's mechanisms out; may be given several times.")  # fmt: skip
 @click.option("--output", type=click.Path(path_type=Path, file_okay=False), default=Path("out/diagnosis"),
               show_default=True, metavar="DIR", help="Folder for the report and what belongs to it.")  # fmt: skip
-@click.option("--false-alarm-rate", type=click.FloatRange(min=1e-4, max=0.5), default=0.05, show_default=True,
-              metavar="P", help="How often recordings that agree may be called inconsistent.")  # fmt: skip
+@settings_options
 @click.option("--fleet", is_flag=True,
-              help="RECORDING is a folder with one folder per gearbox; hold* in it is held out.")  # fmt: skip
+              help="RECORDING is a folder with one folder per gearbox; hold* in it is held out, baseline* is a "
+                   "baseline.")  # fmt: skip
 @worker_options(dask_help="Scheduler of a Dask cluster that the gearboxes of a fleet are spread over.")
 def diagnose(
     recordings: tuple[str, ...],
     gearbox: str,
     holdout: tuple[str, ...],
+    baseline: tuple[str, ...],
+    switched_off: tuple[str, ...],
     mapping: Path | None,
     mechanisms: tuple[Path, ...],
     without: tuple[str, ...],
     output: Path,
-    false_alarm_rate: float,
+    settings: Settings,
     jobs: int,
     fleet: bool,
     dask: str | None,
@@ -83,13 +96,13 @@ def diagnose(
     Of a fleet every gearbox gets its own report, and all together one table (summary.csv).
     """
     from diagnosis import diagnose as run
-    from diagnosis.recordings.read import read_train_and_holdout
+    from diagnosis.recordings.read import read_by_role
     from diagnosis.report.write import names_of_files, write_files
     from models.base.atomic_write import atomic_folder
     from models.mechanisms import CATALOGUE
     from models.mechanisms.user_files import check_placeable, load_mechanisms
 
-    _check_options(recordings, holdout, dask, fleet=fleet)
+    _check_options(recordings, (*holdout, *baseline), dask, fleet=fleet)
     definition = load_gearbox(gearbox)
     catalogue = dict(CATALOGUE)
     for file in mechanisms:
@@ -104,20 +117,20 @@ def diagnose(
             raise InputError(f"--without-mechanism {name}: is not in the catalogue{did_you_mean(name, CATALOGUE)}")
     if fleet:
         _diagnose_fleet(Path(recordings[0]), definition, output, mapping=mapping, catalogue=catalogue,
-                        false_alarm_rate=false_alarm_rate, jobs=jobs, dask=dask)  # fmt: skip
+                        switched_off=switched_off, settings=settings, jobs=jobs, dask=dask)  # fmt: skip
         return
-    train, held = read_train_and_holdout(recordings, holdout, definition.network(), mapping=mapping)
+    train, held, healthy = read_by_role(recordings, holdout, baseline, definition.network(), mapping=mapping)
     given = [
-        *(p for r in (*train, *held) for p in r.files),
+        *(p for r in (*train, *held, *healthy) for p in r.files),
         *mechanisms,
         Path(gearbox),
         *([mapping] if mapping else []),
     ]
     refuse_to_replace(given, [output / name for name in names_of_files((*train, *held))])
-    _print_notes((*train, *held))
+    _print_notes((*train, *held, *healthy))
     with atomic_folder(output) as stage, _show_step() as tell:
-        found = run(train, definition, holdout=held, false_alarm_rate=false_alarm_rate, catalogue=catalogue,
-                    jobs=jobs, progress=tell)  # fmt: skip
+        found = run(train, definition, holdout=held, baseline=healthy, switched_off=switched_off,
+                    settings=settings, catalogue=catalogue, jobs=jobs, progress=tell)  # fmt: skip
         tell("writing the report")
         names = [path.name for path in write_files(found, definition, [*train, *held], stage)]
     for line in found.summary():
@@ -136,26 +149,26 @@ def _print_notes(recordings: Sequence[Recording]) -> None:
         console.err.print(f"{len(notes) - MOST_NOTES} more notes stand in the report")
 
 
-def _check_options(recordings: tuple[str, ...], holdout: tuple[str, ...], dask: str | None, *, fleet: bool) -> None:
+def _check_options(recordings: tuple[str, ...], others: tuple[str, ...], dask: str | None, *, fleet: bool) -> None:
     if not fleet and dask is not None:
         raise click.UsageError(
             "--dask spreads the gearboxes of a fleet; give --fleet with it, or --jobs for one gearbox"
         )
-    if fleet and (len(recordings) != 1 or holdout):
+    if fleet and (len(recordings) != 1 or others):
         raise click.UsageError(
-            "--fleet takes one folder, with a folder per gearbox; what is named hold* in it is held out"
+            "--fleet takes one folder, with a folder per gearbox; hold* in it is held out, baseline* is a baseline"
         )
 
 
 def _diagnose_fleet(
     folder: Path, gearbox: Gearbox, output: Path, *, mapping: Path | None, catalogue: Mapping[str, Mechanism],
-    false_alarm_rate: float, jobs: int, dask: str | None,
+    switched_off: tuple[str, ...], settings: Settings, jobs: int, dask: str | None,
 ) -> None:  # fmt: skip
     from builder.workflows.fleet import SUMMARY, diagnose_fleet, members_of, show_summary
 
     outcomes = diagnose_fleet(
         members_of(folder, without=output), gearbox, output, mapping=mapping, catalogue=catalogue,
-        false_alarm_rate=false_alarm_rate, jobs=jobs, dask=dask,
+        switched_off=switched_off, settings=settings, jobs=jobs, dask=dask,
     )  # fmt: skip
     show_summary([outcome.row for outcome in outcomes])
     console.out.print(f"wrote {output / SUMMARY}, and a folder for each that was diagnosed")

@@ -18,7 +18,7 @@ from models.base.errors import InputError
 
 LINES = 20  # of progress where there is no terminal
 MADE = ("plant", "cases", "seed", "families", "removed")  # options of cases that are made
-ONLY_NEW = (*MADE, "gearbox", "cells_every", "answers")  # that an old file has
+ONLY_NEW = (*MADE, "gearbox", "cells_every", "baselines", "answers")  # that an old file has
 
 
 @click.command("prove")
@@ -38,6 +38,8 @@ ONLY_NEW = (*MADE, "gearbox", "cells_every", "answers")  # that an old file has
               help="Zoo: families of plants to draw from.  [default: all]")  # fmt: skip
 @click.option("--cells-every", type=click.IntRange(min=0), default=0, show_default=True, metavar="N",
               help="Every N-th case is also diagnosed with fewer sensors and shorter recordings; 0: none.")  # fmt: skip
+@click.option("--baselines", type=click.IntRange(min=0, max=20), default=0, show_default=True, metavar="N",
+              help="Baselines of a case (baseline_*) that its diagnosis gets, the first N.")  # fmt: skip
 @click.option("--removed", is_flag=True,
               help="Own plant: mechanisms that are alone in a case once more with their entry removed.")  # fmt: skip
 @click.option("--answers", type=click.Path(path_type=Path, dir_okay=False), default=None, metavar="FILE",
@@ -50,7 +52,7 @@ ONLY_NEW = (*MADE, "gearbox", "cells_every", "answers")  # that an old file has
 @click.pass_context
 def prove(
     context: click.Context, plant: Literal["own", "zoo"], cases: int | None, seed: int | None, recordings: Path | None,
-    truth: Path | None, gearbox: str | None, families: str, cells_every: int, removed: bool,
+    truth: Path | None, gearbox: str | None, families: str, cells_every: int, baselines: int, removed: bool,
     answers: Path | None, continued: Path | None, jobs: int, output: Path,
 ) -> None:  # fmt: skip
     """Test the diagnosis on sealed cases: hide effects, diagnose blindly, hash the answers, open the truth, score.
@@ -76,18 +78,22 @@ def prove(
         if wrong:
             raise InputError(f"--{_dashed(wrong[0])} is for cases that are made; --recordings names cases that exist")
         file = answers or output / "given.jsonl"
-        begin_lines(file, Settings(plant="given", gearbox=gearbox or "fzg", cells_every=cells_every))
+        begin_lines(file, Settings(plant="given", gearbox=gearbox or "fzg", cells_every=cells_every,
+                                   baselines=baselines))  # fmt: skip
     else:
         if plant == "own" and families:
             raise InputError("--families is for --plant zoo")
         if plant == "zoo" and removed:
             raise InputError("--removed is for --plant own; the zoo has effects outside the catalogue")
+        if plant == "own" and baselines:
+            raise InputError("--baselines is for --plant zoo and --recordings; the own plant records no baselines")
         mix, chosen, machine = (PROOF_MIX, OWN_PROOF, "fzg") if plant == "own" else (ZOO_MIX, ZOO_PROOF[0], "")
         number = sum(mix_of(cases or sum(mix.values()), mix).values())  # refuses too few
         chosen = chosen if seed is None else seed
         file = answers or output / f"{chosen}.jsonl"
         begin_lines(file, Settings(plant=plant, seed=chosen, cases=number, gearbox=gearbox or machine,
-                                   families=families, cells_every=cells_every, removed=removed))  # fmt: skip
+                                   families=families, cells_every=cells_every, baselines=baselines,
+                                   removed=removed))  # fmt: skip
     with _progress() as progress:
         result = run(file, output, recordings=recordings, truth=truth, jobs=jobs, progress=progress)
     _show(result, output)

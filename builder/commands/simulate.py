@@ -52,6 +52,8 @@ class Model:
         From cycle, start temperatures and a function that takes the progress, to the columns of the result
     groups : mapping of str to tuple of str
         Nodes that are drawn together
+    correction : Correction or None
+        Whose physics it holds
     """
 
     title: str
@@ -61,6 +63,7 @@ class Model:
     domain: str
     run: Callable[[Cycle, Initial, console.Report], dict[str, Array]]
     groups: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    correction: Correction | None = None
 
 
 def _full_model(name_or_file: str, correction: Path | None, mapping: Path | None, *, claims_only: bool) -> Model:
@@ -75,9 +78,10 @@ def _full_model(name_or_file: str, correction: Path | None, mapping: Path | None
     trained = None if gearbox.is_parametric else gearbox.training
 
     def run(cycle: Cycle, initial: Initial, progress: console.Report) -> dict[str, Array]:
-        losses = gearbox.loss_laws()
-        result = network.simulate(cycle, losses=losses, initial=initial, trained=trained, progress=progress)
-        return _with_readings(result.columns(), found)
+        result = network.simulate(
+            cycle, losses=gearbox.loss_laws(), initial=initial, trained=trained, progress=progress
+        )
+        return result.columns()
 
     return Model(
         title=f"{gearbox.name}, full model",
@@ -87,6 +91,7 @@ def _full_model(name_or_file: str, correction: Path | None, mapping: Path | None
         domain="the domain of the losses" if trained is None else _range_of(trained),
         run=run,
         groups=network.groups,
+        correction=found,
     )
 
 
@@ -111,9 +116,13 @@ def _fmu(path: Path, correction: Path | None, mapping: Path | None, *, claims_on
         found = parse_correction(correction)
         found = found.claims_only() if claims_only else found
         refuse_other_correction(path, found, source=str(correction))
+        try:
+            found.check_instruments([part.name for part in machine.parts], machine.inputs)
+        except InputError as error:
+            raise InputError("\n".join(f"{correction}: {line}" for line in str(error).splitlines())) from error
 
     def run(cycle: Cycle, initial: Initial, progress: console.Report) -> dict[str, Array]:
-        return _with_readings(drive_fmu(path, cycle, initial=initial, progress=progress), found)
+        return drive_fmu(path, cycle, initial=initial, progress=progress)
 
     return Model(
         title=path.name,
@@ -122,16 +131,33 @@ def _fmu(path: Path, correction: Path | None, mapping: Path | None, *, claims_on
         nodes=tuple(part.name for part in machine.parts),
         domain="the surrogate's training domain",
         run=run,
+        correction=found,
     )
 
 
-def _with_readings(columns: dict[str, Array], correction: Correction | None) -> dict[str, Array]:
-    """Add what the recorder shows of channels with a faulty sensor."""
+def _without_biases(start: RecordedStart, correction: Correction | None) -> RecordedStart:
     if correction is None:
-        return columns
-    from diagnosis.forward.sensor_fault import columns_as_recorded
+        return start
+    from diagnosis.forward.recorder import true_start
 
-    return columns | columns_as_recorded(columns, (finding.term for finding in correction.findings))
+    return true_start(start, correction)
+
+
+def _simulated(model: Model, cycle: Cycle, start: Initial, *, is_recording: bool) -> dict[str, Array]:
+    """Simulate; with a correction, from the inputs as they were, and with readings of the recorder's sensors."""
+
+    def run(driven: Cycle) -> dict[str, Array]:
+        with console.progress_bar("simulating") as progress:
+            return model.run(driven, start, progress)
+
+    if model.correction is None:
+        return run(cycle)
+    from diagnosis.forward.recorder import read_as_recorded, simulated_as_recorded
+
+    if is_recording:
+        return simulated_as_recorded(cycle, model.correction, run)
+    columns = run(cycle)
+    return columns | read_as_recorded(columns, model.correction)
 
 
 @click.command("simulate")
@@ -152,8 +178,10 @@ def _with_readings(columns: dict[str, Array], correction: Correction | None) -> 
               help="What the columns of a recording mean.  [default: <stem>.toml or mapping.toml next to it, else as "
                    "the definition states]")  # fmt: skip
 @click.option("--correction", type=click.Path(path_type=Path, dir_okay=False), default=None,
-              metavar="FILE", help="What diagnose found: the full model carries it, an FMU was built with it. Channels "
-                                   "of faulty sensors have a column <column>_as_recorded as well.")  # fmt: skip
+              metavar="FILE", help="Result of diagnose: the full model carries it, an FMU was built with it. A "
+                                   "recording (with measured temperatures) drives the model with its inputs as they "
+                                   "probably were; <column>_as_recorded are those that it has, and the readings of the "
+                                   "sensors of the correction, to compare with it.")  # fmt: skip
 @click.option("--claims-only", is_flag=True, help="Of --correction without what is only likely.")
 @click.option("--plot", type=click.Path(path_type=Path), default=None, metavar="FILE", help="Plot: .png, .pdf or .svg.")
 def simulate(
@@ -183,6 +211,7 @@ def simulate(
     cycle, recorded, notes = model.read(files[-1])
     for note in notes:
         console.err.print(f"note: {files[-1]}: {note}")
+    recorded = _without_biases(recorded, model.correction)
     start = recorded.of(model.nodes) if initial == RECORDED else given
     if start is not None:
         if isinstance(start, Mapping):  # a result also has temperatures of boundaries
@@ -191,8 +220,7 @@ def simulate(
         start = start_temperatures(start, model.nodes, source=source)
     if output_interval is not None:
         cycle = cycle.refined(output_interval)
-    with console.progress_bar("simulating") as progress:
-        columns = model.run(cycle, start, progress)
+    columns = _simulated(model, cycle, start, is_recording=bool(recorded.temperatures))
     with nullcontext() if plot is None else atomic_file(plot) as picture:
         if picture is not None:
             from builder.drive.plots import plot_cycle

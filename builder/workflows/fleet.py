@@ -15,8 +15,8 @@ from pathlib import Path
 
 from builder.base import console
 from diagnosis import diagnose
-from diagnosis.recordings.read import read_train_and_holdout
-from diagnosis.recordings.recording import Recording
+from diagnosis.decision.settings import Settings
+from diagnosis.recordings.read import ByRole, read_by_role
 from diagnosis.recordings.time_axis import RECORDING_KINDS
 from diagnosis.report.write import names_of_files, write_files
 from diagnosis.results.result import Diagnosis
@@ -28,6 +28,7 @@ from models.files.output_files import refuse_to_replace, write_table
 from models.mechanisms import Mechanism
 
 HELD_OUT = "hold"  # prefix of held-out recordings, or of a folder with them
+BASELINE = "baseline"  # of baselines
 SUMMARY = "summary.csv"
 ERROR = "error"  # instead of a verdict
 NAN = float("nan")
@@ -41,8 +42,8 @@ class Member:
     ----------
     name : str
         Name of its folder
-    train, holdout : tuple of Path
-        Training and held-out recordings
+    train, holdout, baseline : tuple of Path
+        Recordings to learn from, held-out ones and baselines
     fault : str
         Reason why its folder cannot be used, or ``""``
     """
@@ -50,6 +51,7 @@ class Member:
     name: str
     train: tuple[Path, ...] = ()
     holdout: tuple[Path, ...] = ()
+    baseline: tuple[Path, ...] = ()
     fault: str = ""
 
 
@@ -104,7 +106,8 @@ class Outcome:
 def members_of(folder: Path, *, without: Path) -> tuple[Member, ...]:
     """The gearboxes of a fleet: every folder in `folder`, with the recordings in it.
 
-    A recording whose name begins with ``hold``, and every one in a folder ``hold...`` inside, is held out.
+    A recording whose name begins with ``hold``, and every one in a folder ``hold...`` inside, is held out; those of
+    ``baseline...`` are baselines.
 
     Parameters
     ----------
@@ -131,18 +134,22 @@ def members_of(folder: Path, *, without: Path) -> tuple[Member, ...]:
 def _member(home: Path) -> Member:
     try:
         own = _recordings(home)
-        apart = [p for p in sorted(home.iterdir()) if p.is_dir() and _is_held_out(p)]
-        held = [p for p in own if _is_held_out(p)] + [p for inner in apart for p in _recordings(inner)]
+        inside = [p for p in sorted(home.iterdir()) if p.is_dir()]
+        held, healthy = (
+            tuple(p for p in own if _is_called(p, role))
+            + tuple(p for inner in inside if _is_called(inner, role) for p in _recordings(inner))
+            for role in (HELD_OUT, BASELINE)
+        )
     except OSError as error:
         return Member(name=home.name, fault=f"{error.filename}: cannot be read ({error.strerror})")
-    train = tuple(p for p in own if not _is_held_out(p))
+    train = tuple(p for p in own if p not in (*held, *healthy))
     kinds = ", ".join(RECORDING_KINDS)
     fault = "" if train else f"{home}: has no recording to learn from ({kinds}; {HELD_OUT}... is held out)"
-    return Member(name=home.name, train=train, holdout=tuple(held), fault=fault)
+    return Member(name=home.name, train=train, holdout=held, baseline=healthy, fault=fault)
 
 
-def _is_held_out(path: Path) -> bool:
-    return path.name.lower().startswith(HELD_OUT)
+def _is_called(path: Path, role: str) -> bool:
+    return path.name.lower().startswith(role)
 
 
 def _recordings(folder: Path) -> list[Path]:
@@ -159,7 +166,8 @@ def diagnose_fleet(
     *,
     mapping: Path | None,
     catalogue: Mapping[str, Mechanism],
-    false_alarm_rate: float,
+    switched_off: Sequence[str] = (),
+    settings: Settings,
     jobs: int = 1,
     dask: str | None = None,
 ) -> list[Outcome]:
@@ -174,7 +182,7 @@ def diagnose_fleet(
         Gets a folder per gearbox as soon as it is done, and at the end ``summary.csv``
     mapping : Path or None
         See :func:`diagnosis.recordings.read.read_recordings`
-    catalogue, false_alarm_rate
+    catalogue, switched_off, settings
         See :func:`diagnosis.diagnose`
     jobs : int
         Gearboxes at the same time on this machine; a single gearbox gets all processes
@@ -200,12 +208,16 @@ def diagnose_fleet(
             try:
                 if member.fault:
                     raise InputError(member.fault)
-                train, held = read_train_and_holdout(member.train, member.holdout, network, mapping=mapping)
+                train, held, healthy = read_by_role(
+                    member.train, member.holdout, member.baseline, network, mapping=mapping
+                )
                 files = names_of_files((*train, *held))
                 refuse_to_replace(
-                    [p for r in (*train, *held) for p in r.files], [output / member.name / name for name in files]
+                    [p for r in (*train, *held, *healthy) for p in r.files],
+                    [output / member.name / name for name in files],
                 )
-                yield member.name, train, held, gearbox, catalogue, false_alarm_rate, inside
+                recordings = (train, held, healthy)
+                yield member.name, recordings, gearbox, catalogue, switched_off, settings, inside
             except InputError as error:
                 outcomes[member.name] = _without_diagnosis(member.name, error)
 
@@ -226,13 +238,14 @@ def diagnose_fleet(
 
 
 def _diagnose(
-    name: str, train: tuple[Recording, ...], holdout: tuple[Recording, ...], gearbox: Gearbox,
-    catalogue: Mapping[str, Mechanism], false_alarm_rate: float, jobs: int,
+    name: str, recordings: ByRole, gearbox: Gearbox, catalogue: Mapping[str, Mechanism], switched_off: Sequence[str],
+    settings: Settings, jobs: int,
 ) -> Outcome:  # fmt: skip
+    train, holdout, baseline = recordings
     try:
         with tempfile.TemporaryDirectory() as folder:
-            found = diagnose(train, gearbox, holdout=holdout, catalogue=catalogue, false_alarm_rate=false_alarm_rate,
-                             jobs=jobs)  # fmt: skip
+            found = diagnose(train, gearbox, holdout=holdout, baseline=baseline, switched_off=switched_off,
+                             catalogue=catalogue, settings=settings, jobs=jobs)  # fmt: skip
             written = write_files(found, gearbox, [*train, *holdout], Path(folder))
             return Outcome(row=_row(name, found), files={path.name: path.read_bytes() for path in written})
     except Exception as error:  # noqa: BLE001 - shown with its traceback at the end, when the others are done

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 # Of a proof on plants of the zoo.
 ZOO_MIX = {"control": 20, "single": 13, "date": 9, "sensor": 6, "pair": 5, "outside": 5, "messy": 2}
 
+ZOO_BASELINES = 2  # that every case of the zoo has, whether or not its diagnosis gets them
+
 Progress = Callable[[str, int, int], None]
 
 
@@ -60,7 +62,8 @@ def make_cases(settings: Settings, recordings: Path, truth: Path, jobs: int, pro
         drawn = zoo_plans(settings.seed, mix_of(settings.cases, ZOO_MIX), families=families,
                           machine=settings.gearbox or None)  # fmt: skip
         plans = dict(zip(names, drawn, strict=True))
-        work = [(name, plans[name], recordings, truth) for name in missing]
+        baselines = max(ZOO_BASELINES, settings.baselines)
+        work = [(name, plans[name], recordings, truth, baselines) for name in missing]
         for done, _ in enumerate(iterate_parallel(make_zoo_case, work, jobs=jobs), start=1):
             progress("making recordings", len(names) - len(missing) + done, len(names))
         return {}
@@ -74,12 +77,12 @@ def make_cases(settings: Settings, recordings: Path, truth: Path, jobs: int, pro
     return {name: plan.effects[0] for name, plan in zip(names, own, strict=True) if plan.group == "single"}
 
 
-def make_zoo_case(name: str, plan: ZooPlan, recordings: Path, truth: Path) -> None:
-    """Draw a case of the zoo and write its recordings and definition into a folder, its truth into a file."""
+def make_zoo_case(name: str, plan: ZooPlan, recordings: Path, truth: Path, baselines: int) -> None:
+    """Draw a case of the zoo and write its recordings, so many baselines too, and its definition; its truth apart."""
     from diagnosis.proof.zoo.conceal_zoo import write_zoo_case
     from diagnosis.proof.zoo.draw import draw_case
 
-    case = draw_case(plan.family, plan.machine, plan.seed, plan.group, name=name, kind=plan.kind)
+    case = draw_case(plan.family, plan.machine, plan.seed, plan.group, name=name, kind=plan.kind, baselines=baselines)
     write_zoo_case(case, recordings / name, truth / f"{name}.json")
 
 

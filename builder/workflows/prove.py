@@ -81,10 +81,12 @@ def prove(
     cases = sorted(path.name for path in recordings.iterdir() if path.is_dir())
     tasks = lines.tasks_of(settings, cases, alone)
     for task, record in records.items():
-        if task not in tasks or record["recordings"] != hash_of(lines.files_of(recordings, task)[0]):
+        if task not in tasks or record["recordings"] != hash_of(
+            lines.files_of(recordings, task, settings.baselines)[0]
+        ):
             raise InputError(f"{file}: {task.case} was answered from other recordings than those in {recordings}")
     missing = [task for task in tasks if task not in records]
-    work = ((task, *lines.files_of(recordings, task), settings.gearbox) for task in missing)
+    work = ((task, *lines.files_of(recordings, task, settings.baselines), settings.gearbox) for task in missing)
     for task, record in iterate_parallel(diagnose, work, jobs=jobs):
         lines.refuse_other_code(file, code)
         lines.append_line(file, task, record)

@@ -68,7 +68,7 @@ class Course:
         Of the name of a law that has it
     how : str
         Family of hypotheses
-    says : str
+    sentence : str
         Sentence that comes before the one of the law
     parameters : tuple of Parameter
         By local names
@@ -79,7 +79,7 @@ class Course:
 
     ending: str
     how: How
-    says: str
+    sentence: str
     parameters: tuple[Parameter, ...]
     variants: Array
     law: sp.Expr
@@ -99,7 +99,7 @@ def step(axis: Axis, *, slow: bool = True) -> Course:
     rises = axis.distance * np.array(RISES)
     at_once, slowly = _products(axis.dates, [axis.edge_s]), _products([0.0, *axis.dates[::2]], rises)
     return Course(
-        ending=STEP, how="D", says="From a date on",
+        ending=STEP, how="D", sentence="From a date on",
         parameters=(axis.moment("since"), _span("within", axis.edge_s, rises[-1])),
         variants=np.concatenate([at_once, slowly]) if slow else at_once,
         law=sp.Min(sp.Max((NOW - since) / rise, 0), 1),
@@ -111,7 +111,7 @@ def for_a_while(axis: Axis) -> Course:
     since, length = symbol("since"), symbol("lasting")
     lengths = axis.distance * np.array(LENGTHS)
     return Course(
-        ending=WHILE, how="D", says="From one date to another",
+        ending=WHILE, how="D", sentence="From one date to another",
         parameters=(axis.moment("since"), _span("lasting", *lengths)), variants=_products(axis.dates[::2], lengths),
         law=steps(NOW, at=since, width=0.5 * axis.edge_s) - steps(NOW, at=since + length, width=0.5 * axis.edge_s),
     )  # fmt: skip
@@ -126,7 +126,7 @@ def over_hours(axis: Axis) -> Course:
     )  # fmt: skip
     decay = sp.exp(-NOW / SETTLING_S)
     return Course(
-        ending=HOURS, how="W", says="Slowly over the hours", parameters=parameters, variants=np.eye(3),
+        ending=HOURS, how="W", sentence="Slowly over the hours", parameters=parameters, variants=np.eye(3),
         law=linear * NOW / max(LINEAR_S, axis.end) + settling * (1 - decay) + fading * decay,
     )  # fmt: skip
 
@@ -164,7 +164,7 @@ def changing(placed: Placed, course: Course, axis: Axis, *, sd: float | None = N
     added = tuple(replace(p, name=f"{label}_{p.name}") for p in course.parameters)
     along = renamed(course.along, {p.name: f"{label}_{p.name}" for p in course.parameters} | {START: clock.name})
     mechanism = placed.mechanism
-    says = f"{course.says}: {mechanism.says[:1].lower()}{mechanism.says[1:]}"
+    says = f"{course.sentence}: {mechanism.says[:1].lower()}{mechanism.says[1:]}"
     name = f"{base_name(placed)}_{course.ending}"
     term = replace(
         term,
@@ -240,7 +240,7 @@ def _renamed(placed: Placed, label: str) -> Placed:
 
 
 def base_name(placed: Placed) -> str:
-    """Name of a law without the ending that says it differs from its nominal value."""
+    """Name of a law without the ending for a difference from its nominal value."""
     for ending in CHANGED:
         if placed.name.endswith(ending):
             return placed.name.removesuffix(ending)

@@ -6,6 +6,7 @@ them are fitted to the end, model error in place; a second scan beside the best 
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
@@ -13,11 +14,13 @@ import numpy as np
 from scipy.special import log_ndtr, logsumexp
 
 from diagnosis.candidates.hypotheses import Hypothesis
-from diagnosis.decision.posterior import Expected, Judged, Likeness, Posterior, Settings
+from diagnosis.decision.posterior import Expected, Judged, Likeness, Posterior
+from diagnosis.decision.settings import Settings
 from diagnosis.engine.calibration import Calibration
 from diagnosis.engine.candidates import Scan, refit, scan
 from diagnosis.engine.fit import Fit
 from diagnosis.engine.gram import Given, Strengths
+from diagnosis.engine.outside import judge_outside
 from diagnosis.engine.sessions import OverSessions, fit_over_sessions, over_sessions
 from diagnosis.engine.unknown import Group
 from models.base.errors import InputError
@@ -27,9 +30,8 @@ RACED, PLACES, RACE_STEPS = 18, 2, 4
 NEAR_PLACE = 3.0  # nats behind the best place of its name, up to which a second place is raced
 REFITTED, SECONDS = 6, 2
 WORTH, WORTH_SHARE = 1.0, 0.1  # nats, and share of the best, from which a candidate is worth a fit
-PAIR_PRIOR = 0.1  # of two effects, to one
 WIDER = 4.0  # prior standard deviations of a parameter outside its prior, in those of its own
-TEMPER = (3.0, 0.1)
+TEMPER = (3.0, 0.05)
 THRESHOLD = 5.0
 
 
@@ -47,7 +49,7 @@ class _Scanned:
 
 def infer(
     calibration: Calibration, candidates: Sequence[Hypothesis], log_prior: Array, settings: Settings, *,
-    progress: Callable[[str], None] = lambda _: None,
+    outside: Sequence[Hypothesis] = (), progress: Callable[[str], None] = lambda _: None,
 ) -> Posterior:  # fmt: skip
     """Weigh all explanations.
 
@@ -58,13 +60,15 @@ def infer(
     log_prior : Array, shape (candidates,)
         Of every candidate, to 1 of nothing
     settings : Settings
+    outside : sequence of Hypothesis
+        Unknown heats, judged where something is missing
     progress : callable
         Told in words what is being done
     """
     base = calibration.fit
     progress(f"scanning {len(candidates)} candidates")
     first = _scanned(base, candidates, log_prior, len(base.z))
-    order = np.argsort(-(first.log_bayes + TEMPER[0] * first.log_prior))
+    order = np.argsort(-(first.log_bayes + first.log_prior))
     chosen = _raced(first.candidates, first.log_bayes, order)
     judged: dict[str, Judged] = {}
     worth = max(WORTH, WORTH_SHARE * float(first.log_bayes.max(initial=0.0)))
@@ -73,7 +77,7 @@ def infer(
         progress(f"fitting {first.candidates[index].label} ({step + 1} of {len(chosen)})")
         one = _refitted(calibration, base, first, index, RACE_STEPS)
         judged[first.candidates[index].label] = one
-    ahead = sorted(judged.values(), key=lambda one: -(one.log_bayes + TEMPER[0] * one.log_prior))
+    ahead = sorted(judged.values(), key=lambda one: -(one.log_bayes + one.log_prior))
     for one in ahead[:REFITTED]:
         if one.fit is not None:
             judged[one.label] = _fitted_on(calibration, one, len(base.z))
@@ -82,19 +86,20 @@ def infer(
         {one.label: float(value) for one, value in zip(first.candidates, first.log_bayes, strict=True)},
     )
     pairs: list[Judged] = []
-    best = max(judged.values(), key=lambda one: one.log_bayes + TEMPER[0] * one.log_prior, default=None)
+    best = max(judged.values(), key=lambda one: one.log_bayes + one.log_prior, default=None)
     if best is not None and best.fit is not None and best.log_bayes > 0.0:
         progress(f"looking beside {best.label}")
         remainder, pairs, there = _beside(calibration, best, candidates, log_prior, len(base.z))
         alone |= {label: min(alone[label], value) for label, value in there.items()}
     for index, candidate in enumerate(first.candidates):
         judged.setdefault(candidate.label, _by_scan(first, index, alone[candidate.label]))
-    every = [*judged.values(), *pairs]
-    single = [one for one in every if len(one.effects) == 1]
-    log_e = float(logsumexp([one.log_prior + one.log_bayes for one in single]))
+    log_e = float(logsumexp([one.log_prior + one.log_bayes for one in judged.values()]))
+    unknown = _unknown(base, outside) if log_e > THRESHOLD else []
+    every = [*judged.values(), *pairs, *unknown]
     return Posterior(
         nothing=Judged(effects=(), log_prior=0.0, log_bayes=0.0, fit=base), judged=tuple(every), log_e=log_e,
-        threshold=THRESHOLD, temper=TEMPER, likeness=_likeness(first), error_class=calibration.chosen.name,
+        threshold=THRESHOLD, temper=TEMPER, likeness=_likeness(first), odds_unknown=settings.odds_unknown,
+        error_class=calibration.chosen.name,
         error_evidence=dict(calibration.evidence), session_s=calibration.session_s, remainder=remainder,
         expected=_expected(first, settings),
     )  # fmt: skip
@@ -233,20 +238,30 @@ def _beside(
     mine = {effect.label for effect in best.effects}
     others = np.array([one.label not in mine for one in candidates])
     second = _scanned(fit, [one for one in candidates if one.label not in mine], log_prior[others], base)
-    order = np.argsort(-(second.log_bayes + TEMPER[0] * second.log_prior))
+    order = np.argsort(-(second.log_bayes + second.log_prior))
     pairs = []
     for index in order[:SECONDS]:
         one = _refitted(calibration, fit, second, int(index), RACE_STEPS + 2)
         if one.fit is None:
             continue
         both = replace(one, effects=(*best.effects, *one.effects),
-                       log_prior=best.log_prior + one.log_prior + float(np.log(PAIR_PRIOR)))  # fmt: skip
+                       log_prior=best.log_prior + one.log_prior)  # fmt: skip
         pairs.append(_judged(calibration, both, base, _spread(second, int(index))))
     without = over_sessions(second.scan.gram, fit.experiment, [*range(base), *second.scan.further])
     outside = second.candidates[len(second.scan.candidates) :]
     alone = _weighed(second.scan, outside, without).tolist()
     labels = [one.label for one in second.candidates]
     return float(second.log_bayes[order[0]]), pairs, dict(zip(labels, alone, strict=True))
+
+
+def _unknown(fit: Fit, outside: Sequence[Hypothesis]) -> list[Judged]:
+    """Heats that no catalogue has, all functions of each marginalised."""
+    names = Counter(one.name for one in outside)
+    return [
+        Judged(effects=(one.hypothesis,), log_prior=-float(np.log(names[one.hypothesis.name])), log_bayes=one.log_bayes,
+               strength=(one.strength,), strength_sd=(0.0,))
+        for one in judge_outside(fit, outside)
+    ]  # fmt: skip
 
 
 def _likeness(found: _Scanned) -> Likeness:

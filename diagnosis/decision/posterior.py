@@ -1,54 +1,41 @@
 r"""What the readings say about every explanation, and the one rule that turns it into an answer.
 
-An explanation is nothing, one effect, or two. Its probability goes with its prior and its tempered evidence,
+An explanation is nothing, one effect, or two. Effects of one law (at all places, from a date on, over the hours) are
+one name. The evidence of a name is the Bayesian mean over its places, courses and shapes. Between names it is tempered,
 
-.. math:: P_i \propto w_i \exp(\ln B_i / T), \quad T = a + b \max_i \ln B_i
+.. math:: P_i \propto \exp(\ln B_i / T), \quad T = a + b \max_i \ln B_i
 
-The temper stands for what no catalogue and no model error holds; it is learnt on plants of the zoo
-(``diagnosis/decision/learnt.toml``).
+because no law of the catalogue has exactly the form that the machine has: what a name is behind the best one counts in
+proportion to what there is to be explained. Names that explain less than a share of it are refuted. The numbers are
+learnt on plants of the zoo and of a stranger, see ``diagnosis/engine/learnt.toml``.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal, get_args
 
 import numpy as np
+from scipy.special import expit, logsumexp
 
+from diagnosis.candidates.dated import changed_law
 from diagnosis.candidates.hypotheses import Hypothesis
+from diagnosis.decision.settings import Settings
 from diagnosis.engine.fit import Fit
 from models.base.types import Array
+from models.terms.term import Term
 
 Kind = Literal["nothing", "parameter", "measurement", "mechanism", "pair", "outside"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
 Grade = Literal["claim", "likely"]
 MOST_TIED = 3
+DOUBT = 2.0  # nats from the threshold over which a half becomes three quarters of belief that something is missing
+ALIKE = 0.9  # cosine of what two effects do to the readings, from which these data do not tell them apart
+REFUTED = 0.3  # of the best log Bayes factor: a name that explains less is refuted
+PAIR_PRIOR = 0.1  # of two effects, to one
 MUCH_LEFT, MUCH_LEFT_SHARE = 20.0, 0.05  # of the evidence, [nat]: beside a name, what shows that its law is another
-
-
-@dataclass(frozen=True, kw_only=True)
-class Settings:
-    """The four numbers that a user sets.
-
-    Attributes
-    ----------
-    false_alarm_rate : float
-        How often a healthy machine may be called inconsistent, [-]
-    matters_K, matters_W : float
-        Size from which an effect matters: of a temperature [K], or of a heat [W]; 0 W: 3 % of the typical loss
-    claim_from : float
-        Probability from which a name is a claim, [-]
-    odds_unknown : float
-        Prior odds that a cause is in no catalogue, to one that is in it, [-]
-    """
-
-    false_alarm_rate: float = 0.05
-    matters_K: float = 1.0
-    matters_W: float = 0.0
-    claim_from: float = 0.9
-    odds_unknown: float = 0.1
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -89,9 +76,34 @@ class Judged:
         return "measurement" if effect.term.of_measurement or effect.term.kind == "sensor" else "mechanism"
 
     @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the laws, whatever their places and courses."""
+        return tuple(sorted(name_of(effect) for effect in self.effects))
+
+    @property
     def label(self) -> str:
         """Names and places."""
         return " + ".join(effect.label for effect in self.effects) or "nothing"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Explanation:
+    """A name, or two, at whatever places.
+
+    Attributes
+    ----------
+    names : tuple of str
+    members : tuple of Judged
+        Most probable first
+    log_bayes : float
+        Mean Bayes factor over places, courses and shapes; of a pair with the prior of a second effect, [nat]
+    probability : float
+    """
+
+    names: tuple[str, ...]
+    members: tuple[Judged, ...]
+    log_bayes: float
+    probability: float
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -125,7 +137,9 @@ class Likeness:
     cosines: Array
 
     def of(self, first: Hypothesis, second: Hypothesis) -> float:
-        """Magnitude of the cosine between two effects."""
+        """Magnitude of the cosine between two effects; 0 of those that were not compared."""
+        if first.label not in self.labels or second.label not in self.labels:
+            return 0.0
         return float(self.cosines[self.labels.index(first.label), self.labels.index(second.label)])
 
 
@@ -146,6 +160,8 @@ class Posterior:
     temper : (float, float)
         a and b
     likeness : Likeness
+    odds_unknown : float
+        Prior odds of a cause that is in no catalogue, see :class:`~diagnosis.decision.settings.Settings`
     error_class : str
         Class of model error that the evidence chose
     error_evidence : mapping of str to float
@@ -163,6 +179,7 @@ class Posterior:
     threshold: float
     temper: tuple[float, float]
     likeness: Likeness = Likeness(labels=(), cosines=np.zeros((0, 0)))
+    odds_unknown: float = 0.1
     error_class: str = ""
     error_evidence: dict[str, float] = field(default_factory=dict)
     session_s: float = 0.0
@@ -172,7 +189,7 @@ class Posterior:
     @property
     def much_is_left(self) -> bool:
         """True if the second scan finds much beside the best explanation: its law is not the true one."""
-        gain = self.ranked[0][0].log_bayes
+        gain = self.explanations[0].log_bayes
         return self.remainder > MUCH_LEFT and self.remainder > MUCH_LEFT_SHARE * gain
 
     @property
@@ -180,25 +197,59 @@ class Posterior:
         """True if something is missing."""
         return self.log_e > self.threshold
 
+    @property
+    def something(self) -> float:
+        """Probability that something is missing: one half at the threshold."""
+        return float(expit((self.log_e - self.threshold) / DOUBT))
+
     @cached_property
-    def probabilities(self) -> Array:
-        """Of nothing, then of everything judged, shape (1 + judged,)."""
+    def explanations(self) -> tuple[Explanation, ...]:
+        """Names, or pairs of names, with their probabilities; most probable first."""
+        mass: dict[str, float] = {}
+        of_names: dict[tuple[str, ...], list[Judged]] = {}
+        for one in self.judged:
+            of_names.setdefault(one.names, []).append(one)
+            if len(one.effects) == 1 and one.kind != "outside":
+                mass[one.names[0]] = mass.get(one.names[0], 0.0) + float(np.exp(one.log_prior))
+        pair = float(np.log(PAIR_PRIOR / max(len(mass), 1)))
+        unknown = float(np.log(self.odds_unknown * max(len(mass), 1)))  # to one name of the catalogue
+        log_bayes, log_prior = [], []
+        for names, members in of_names.items():
+            within = sum(np.log(mass.get(name, 1.0)) for name in names)
+            mean = float(logsumexp([one.log_prior + one.log_bayes for one in members]) - within)
+            log_bayes.append(mean + (pair if len(names) > 1 else 0.0))
+            log_prior.append(unknown if members[0].kind == "outside" else 0.0)
+        values = np.array(log_bayes)
         a, b = self.temper
-        log_bayes = np.array([0.0, *(one.log_bayes for one in self.judged)])
-        prior = np.array([self.nothing.log_prior, *(one.log_prior for one in self.judged)])
-        log = prior + log_bayes / (a + b * max(float(log_bayes.max()), 0.0))
-        return np.asarray(np.exp(log - np.logaddexp.reduce(log)))
+        most = max(float(values.max(initial=0.0)), 0.0)
+        log = np.where(values >= REFUTED * most, np.array(log_prior) + values / (a + b * most), -np.inf)
+        chance = self.something * np.exp(log - logsumexp(log))
+        found = [
+            Explanation(names=names, members=tuple(sorted(members, key=lambda one: -one.log_prior - one.log_bayes)),
+                        log_bayes=value, probability=p)
+            for (names, members), value, p in zip(of_names.items(), log_bayes, chance.tolist(), strict=True)
+        ]  # fmt: skip
+        return tuple(sorted(found, key=lambda one: -one.probability))
 
     @cached_property
     def ranked(self) -> tuple[tuple[Judged, float], ...]:
         """Everything judged with its probability, most probable first."""
-        return tuple(sorted(zip(self.judged, self.probabilities[1:].tolist(), strict=True), key=lambda one: -one[1]))
+        result = []
+        for explanation in self.explanations:
+            log = np.array([one.log_prior + one.log_bayes for one in explanation.members])
+            shares = explanation.probability * np.exp(log - logsumexp(log))
+            result += list(zip(explanation.members, shares.tolist(), strict=True))
+        return tuple(sorted(result, key=lambda one: -one[1]))
 
     def of(self, kind: Kind) -> float:
         """Probability of a kind of explanation."""
         if kind == "nothing":
-            return float(self.probabilities[0])
+            return 1.0 - self.something
         return float(sum(p for one, p in self.ranked if one.kind == kind))
+
+    def of_names(self, names: Collection[str]) -> float:
+        """Probability that any of some names is there."""
+        return float(sum(one.probability for one in self.explanations if not set(names).isdisjoint(one.names)))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -230,58 +281,66 @@ class Answer:
     acts_like: bool = False
 
 
+def name_of(effect: Hypothesis) -> str:
+    """Name of the law of an effect, whatever its place and course; of a parameter its own name."""
+    return effect.place if effect.unknown is not None else changed_law(effect)
+
+
 def decide(posterior: Posterior, settings: Settings) -> tuple[Answer, ...]:
     """The answers of a posterior: empty if nothing is missing, or if nothing can be named.
 
-    A name counts with all its places and shapes. It is a claim from :attr:`Settings.claim_from` on, unless the second
-    scan finds that much is left beside it, or it is a course over the hours without a cause: then only law and place
-    are found, and it "acts like" that name. Otherwise at most three names that hold the probability together are a tie.
+    A name is a claim if its probability reaches :attr:`Settings.claim_from`. Else at most three names that reach it
+    together are a tie. Else names that look alike in these readings, or act on the same thing, and reach it together
+    are one answer: it "acts like" the best of them. So does what leaves much beside it, and what only has a course over
+    the hours: law and place are found, not the cause.
     """
     if not posterior.detected:
         return ()
-    found: list[Answer] = []
-    best = posterior.ranked[0][0]
-    for effect in best.effects:
-        names = _by_name(posterior, beside=tuple(one for one in best.effects if one is not effect))
-        first = next((index for index, one in enumerate(names) if one[0].name == effect.name), None)
-        if first is None:
-            continue
-        names = [names[first], *names[:first], *names[first + 1 :]]
-        held, tied = 0.0, []
-        for one in names[:MOST_TIED]:
-            tied.append(one)
-            held += one[1]
-            if held >= settings.claim_from:
-                break
-        if held < settings.claim_from:
-            continue
-        claimed = len(tied) == 1
-        vague = effect.how == "W" or posterior.much_is_left
-        found.append(Answer(
-            best=best, effect=effect, grade="claim" if claimed and not vague else "likely", probability=tied[0][1],
-            tied=() if claimed else tuple(tied), acts_like=vague,
-        ))  # fmt: skip
-    return tuple(found)
+    explanation = posterior.explanations[0]
+    best = explanation.members[0]
+    answers = [_answer(posterior, best, effect, settings.claim_from) for effect in best.effects]
+    return tuple(one for one in answers if one is not None)
 
 
-def _by_name(posterior: Posterior, beside: Sequence[Hypothesis]) -> list[tuple[Hypothesis, float]]:
-    """Names with their probabilities, each with its most probable place, most probable first.
+def _answer(posterior: Posterior, best: Judged, effect: Hypothesis, enough: float) -> Answer | None:
+    """The narrowest set of names that holds enough probability."""
+    name = name_of(effect)
+    vague = effect.how == "W" or effect.is_open or posterior.much_is_left
+    own = posterior.of_names([name])
+    if own >= enough:
+        return Answer(best=best, effect=effect, grade="likely" if vague else "claim", probability=own, acts_like=vague)
+    rivals = _rivals(posterior, effect)
+    for count in range(2, MOST_TIED + 1):
+        if posterior.of_names([name_of(one) for one in rivals[:count]]) >= enough:
+            tied = tuple((one, posterior.of_names([name_of(one)])) for one in rivals[:count])
+            return Answer(best=best, effect=effect, grade="likely", probability=own, tied=tied, acts_like=vague)
+    alike = [one for one in rivals if posterior.likeness.of(effect, one) >= ALIKE or _act_on_the_same(effect, one)]
+    if posterior.of_names([name, *(name_of(one) for one in alike)]) >= enough:
+        return Answer(best=best, effect=effect, grade="likely", probability=own, acts_like=True)
+    return None
 
-    Of an effect beside another one, all explanations that hold the other one count.
+
+def _rivals(posterior: Posterior, effect: Hypothesis) -> list[Hypothesis]:
+    """Best effect of every name that may stand in place of an effect, itself first, most probable first.
+
+    What explanations with the effect's own name hold beside it stands not in its place.
     """
-    kept = {one.label for one in beside}
-    total: dict[str, float] = {}
-    shown: dict[str, Hypothesis] = {}
-    whole = 0.0
-    for judged, probability in posterior.ranked:
-        rest = [one for one in judged.effects if one.label not in kept]
-        if kept and len(rest) == len(judged.effects):
-            continue
-        whole += probability
-        for one in rest:
-            shown.setdefault(one.name, one)
-            total[one.name] = total.get(one.name, 0.0) + probability
-    if not kept:
-        whole = 1.0
-    ranked = sorted(total.items(), key=lambda item: -item[1])
-    return [(shown[name], value / max(whole, 1e-300)) for name, value in ranked]
+    own = name_of(effect)
+    beside = {name for one in posterior.explanations if own in one.names for name in one.names if name != own}
+    found = {own: effect}
+    for judged, _ in posterior.ranked:
+        if own not in judged.names:
+            for one in judged.effects:
+                found.setdefault(name_of(one), one)
+    return [one for name, one in found.items() if name not in beside]
+
+
+def _act_on_the_same(first: Hypothesis, second: Hypothesis) -> bool:
+    """True if two effects change the same thing: the same heats, links, channels or inputs."""
+    if first.term is None or second.term is None:
+        return False
+    return _sort(first.term) == _sort(second.term) and not set(first.term.target).isdisjoint(second.term.target)
+
+
+def _sort(term: Term) -> str:
+    return {"source": "heat", "loss_factor": "heat", "link": "link", "link_factor": "link"}.get(term.kind, term.kind)

@@ -147,16 +147,20 @@ def _with_unknowns(fit: Fit) -> Metric:
 def _columns(experiment: Experiment, part: Linear, some: Sequence[tuple[Hypothesis, TermOnGrid]]) -> Array:
     """Readings per unit of strength for all variants of some candidates, shape (K + 1, channels, n).
 
-    They are zero in healthy recordings.
+    They are zero where a candidate cannot act.
     """
     point, trajectory = part.point, part.point.trajectory
     count, recording = sum(len(candidate.variants) for candidate, _ in some), trajectory.piece.recording
-    if recording in experiment.healthy:
+    acting = [_acts_in(experiment, candidate, recording) for candidate, _ in some]
+    if not any(acting):
         return np.zeros((*point.read.shape, count))
     into = np.zeros((len(trajectory.piece.steps), trajectory.decay.shape[-1], count))
     loss, shown, first = np.zeros((len(into), count)), {}, 0
-    for candidate, on_grid in some:
+    for (candidate, on_grid), acts in zip(some, acting, strict=True):
         mine = slice(first, first + len(candidate.variants))
+        first = mine.stop
+        if not acts:
+            continue
         values = _by_clock(candidate, experiment.starts_at.get(recording))
         if on_grid.term.kind == "sensor":
             shown[mine.start] = _faults(point, values, on_grid)
@@ -164,7 +168,6 @@ def _columns(experiment: Experiment, part: Linear, some: Sequence[tuple[Hypothes
             heat, own = on_grid.heat(trajectory, values)
             into[:, : heat.shape[1], mine] = _finite(heat)
             loss[:, mine] = _finite(own)
-        first = mine.stop
     result = point.heated(into, loss)
     for start, columns in shown.items():
         result[:, :, start : start + columns.shape[2]] = columns
@@ -194,7 +197,7 @@ def _faults(point: Point, variants: Array, on_grid: TermOnGrid) -> Array:
 
 
 def _finite(heat: Array) -> Array:
-    """A heat without what a law cannot tell, as a factor on a link that another effect has cut off."""
+    """A heat without values that are no numbers, as of a factor on a link that another effect has cut off."""
     return heat if np.isfinite(heat.sum()) else np.nan_to_num(heat, nan=0.0, posinf=0.0, neginf=0.0)
 
 
@@ -229,7 +232,7 @@ def with_candidate(fit: Fit, candidate: Hypothesis, variant: int) -> tuple[Exper
     else:
         machine = Machine(NetworkOnGrid(term.apply(machine.model.network), machine.model.losses), machine.terms)
     values = candidate.variants[variant].tolist()
-    scopes = [_scope(experiment), *(None for _ in names[1:])]
+    scopes = [_scope(experiment, candidate), *(None for _ in names[1:])]
     added: list[Unknown] = []
     for p, value, scope in zip(term.parameters, values, scopes, strict=True):
         if p.name == candidate.clock:
@@ -249,11 +252,14 @@ def with_candidate(fit: Fit, candidate: Hypothesis, variant: int) -> tuple[Exper
     return replace(experiment, machine=machine, unknowns=(*experiment.unknowns, *added)), np.array(z)
 
 
-def _scope(experiment: Experiment) -> Scope:
-    """Recordings in which a candidate may act, those to be predicted too; None for all."""
-    if not experiment.healthy:
-        return None
-    return frozenset({*experiment.starts_at, *(piece.recording for piece in experiment.pieces)}) - experiment.healthy
+def _acts_in(experiment: Experiment, candidate: Hypothesis, recording: str) -> bool:
+    """True if a candidate may act in a recording."""
+    scope = _scope(experiment, candidate)
+    return scope is None or recording in scope
+
+
+def _scope(experiment: Experiment, candidate: Hypothesis) -> Scope:
+    return experiment.scope_of(candidate.name, dated=candidate.clock is not None)
 
 
 def refit(fit: Fit, candidate: Hypothesis, variant: int, strength: float, *, iterations: int = ITERATIONS) -> Fit:

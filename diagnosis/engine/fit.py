@@ -11,10 +11,10 @@ from scipy.linalg import solve_triangular
 
 from diagnosis.engine.metric import Metric
 from diagnosis.engine.point import Column, Machine, Point, Setting
-from diagnosis.engine.unknown import Unknown, in_scope
+from diagnosis.engine.unknown import Scope, Unknown, in_scope
 from diagnosis.forward.grid import Piece
 from diagnosis.forward.trajectory import ROUNDS, Trajectory, simulate
-from diagnosis.inference.whitening import Noise, Whitening
+from diagnosis.forward.whitening import Noise, Whitening
 from models.base.errors import InputError
 from models.base.types import Array
 
@@ -50,6 +50,8 @@ class Experiment:
         Test session of every recording; between sessions the unknowns may differ a little
     healthy : frozenset of str
         Recordings in which the effect that is looked for cannot act
+    switched_off : frozenset of str
+        Names of the only effects that cannot act in them; empty: none can
     metric : Metric or None
         In which residuals are judged, if there is more than noise; of whitened readings under `filters`
     """
@@ -63,12 +65,27 @@ class Experiment:
     starts_at: Mapping[str, float] = field(default_factory=dict)
     session_of: Mapping[str, str] = field(default_factory=dict)
     healthy: frozenset[str] = frozenset()
+    switched_off: frozenset[str] = frozenset()
     metric: Metric | None = None
 
     @property
     def slow(self) -> bool:
         """True if the rows of any piece lie minutes apart."""
         return any(piece.slow for piece in self.pieces)
+
+    def scope_of(self, effect: str, *, dated: bool = False) -> Scope:
+        """Recordings in which an effect may act, those to be predicted too; None for all.
+
+        Parameters
+        ----------
+        effect : str
+            Name of a mechanism, or of another addition to the machine
+        dated : bool
+            True for what begins at a date: baselines are from before it, whatever is switched off in them
+        """
+        if not self.healthy or (self.switched_off and effect not in self.switched_off and not dated):
+            return None
+        return frozenset({*self.session_of, *(piece.recording for piece in self.pieces)}) - self.healthy
 
     @cached_property
     def bounds(self) -> tuple[Array, Array]:

@@ -45,7 +45,7 @@ class OverSessions:
 
     @property
     def log_evidence(self) -> float:
-        """Of the readings, all deviations weighed."""
+        """Log evidence of the readings, all deviations weighed."""
         return float(logsumexp(self.weights))
 
     @property

@@ -96,10 +96,3 @@ def delay_column(trajectory: Trajectory, delay: float) -> Array:
     step = 1.0
     later, earlier = (delayed_loss(trajectory, delay + way * step) for way in (1.0, -1.0))
     return np.asarray((later - earlier) / (2.0 * step))
-
-
-def lag_column(trajectory: Trajectory, node: int, lag: float) -> Array:
-    """Change of a reading per second of lag, shape (K + 1,), [K/s]."""
-    step = 0.5
-    T, steps = trajectory.T[:, node], trajectory.piece.steps
-    return np.asarray((lagged(T, steps, lag + step) - lagged(T, steps, lag)) / step)

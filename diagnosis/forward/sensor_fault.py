@@ -7,9 +7,10 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 
 from diagnosis.forward.recurrence import lagged
+from models.base.errors import InputError
 from models.base.types import Array
 from models.network.laws import compile_function, function_source
-from models.quantities.quantities import column_of, is_total_loss, node_of_channel
+from models.quantities.quantities import column_of, is_total_loss, node_of_channel, quantity_of_column
 from models.terms.term import Term
 
 AS_RECORDED = "_as_recorded"  # ending of columns of readings
@@ -64,7 +65,9 @@ def delayed(values: Array, time: Array, late: Array | float) -> Array:
     return np.asarray((1.0 - share) * values[low] + share * values[low + 1])
 
 
-def columns_as_recorded(columns: Mapping[str, Array], terms: Iterable[Term]) -> dict[str, Array]:
+def columns_as_recorded(
+    columns: Mapping[str, Array], terms: Iterable[Term], read: Mapping[str, Array] | None = None
+) -> dict[str, Array]:
     """Return the readings of faulty sensors over a simulated cycle.
 
     Parameters
@@ -73,34 +76,64 @@ def columns_as_recorded(columns: Mapping[str, Array], terms: Iterable[Term]) -> 
         A result in the columns of the file contract, two rows or more
     terms : iterable of Term
         Those of kind ``sensor`` count, with their parameters at their start
+    read : mapping of channel to Array, shape (N,), optional
+        Readings without these faults; by default the truth
 
     Returns
     -------
     dict of column name to Array, shape (N,)
-        ``T_oil_degC_as_recorded`` for every channel that a term distorts
+        ``T_oil_degC_as_recorded`` for every channel that is in `read` or that a term distorts
     """
     time = columns["time_s"]
-    temperatures = {name[:-5]: T for name, T in columns.items() if name.startswith("T_") and name.endswith("_degC")}
-    nodes = {name[2:] for name in temperatures}
-    read: dict[str, Array] = {}
+    nodes = {name[2:-5] for name in columns if name.startswith("T_") and name.endswith("_degC")}
+    read = dict(read or {})
     for term in terms:
-        true = {channel: _column(node_of_channel(channel, nodes)) for channel in term.target}
+        true = {channel: channel_column(node_of_channel(channel, nodes)) for channel in term.target}
         channels = [channel for channel in term.target if true[channel] in columns]
         if term.kind != "sensor" or not channels:
             continue
-        parameters = {p.name: p.start for p in term.parameters}
-        signals = {"time": time, **columns, **temperatures, **parameters}
-        names = sorted(symbol.name for symbol in term.expression.free_symbols)
-        function = compile_function(function_source("law", names, [term.expression], vector=True), "law")
-        law = np.broadcast_to(np.asarray(function(*(signals[name] for name in names))[0], dtype=float), time.shape)
+        law = law_along(term, columns)
         readings = np.stack([read.get(name, columns[true[name]]) for name in channels], axis=-1)
         if term.form == "shift":
             readings = readings + law[:, None]
         readings = passed_on(term, law, time, readings, range(len(channels)))
         read |= dict(zip(channels, readings.T, strict=True))
-    return {f"{_column(channel)}{AS_RECORDED}": values for channel, values in read.items()}
+    return {f"{channel_column(channel)}{AS_RECORDED}": values for channel, values in read.items()}
 
 
-def _column(channel: str) -> str:
+def law_along(term: Term, columns: Mapping[str, Array]) -> Array:
+    """Law of a term along a result, with its parameters at their start, shape (N,).
+
+    Raises
+    ------
+    InputError
+        If the law needs what the result lacks.
+    """
+    signals = {"time": columns["time_s"], **{quantity_name(name): values for name, values in columns.items()}}
+    signals |= {p.name: np.asarray(p.start) for p in term.parameters}
+    names = sorted(symbol.name for symbol in term.expression.free_symbols)
+    missing = [name for name in names if name not in signals]
+    if missing:
+        raise InputError(f"{term.label}: its law needs {', '.join(missing)}, which a result does not have")
+    function = compile_function(function_source("law", names, [term.expression], vector=True), "law")
+    law = np.asarray(function(*(signals[name] for name in names))[0], dtype=float)
+    return np.broadcast_to(law, columns["time_s"].shape)
+
+
+def quantity_name(column: str) -> str:
+    """Name in laws of a column of a result.
+
+    Examples
+    --------
+    >>> quantity_name("T_oil_degC"), quantity_name("torque_Nm"), quantity_name("oil_flow")
+    ('T_oil', 'torque', 'oil_flow')
+    """
+    known = quantity_of_column(column)
+    if known is not None:
+        return known.name
+    return column[:-5] if column.startswith("T_") and column.endswith("_degC") else column
+
+
+def channel_column(channel: str) -> str:
     """Column of a channel: a node, one of its sensors, or the total loss."""
     return column_of(channel if is_total_loss(channel) else f"T_{channel}")

@@ -3,6 +3,7 @@
 ```toml
 schema = 1
 max_gap_s = 1800
+session = "before the overhaul"        # of its test; between sessions the machine may differ a little
 rows = ["2017-08-01..2018-01-12"]     # seconds or ISO 8601; by default all
 missing = ["---", "Bad"]              # further texts for a missing value
 time = { column = "time_utc", unit = "iso8601" }
@@ -35,7 +36,7 @@ from pydantic import Field, field_validator, model_validator
 from diagnosis.recordings.quantities import AUXILIARY, IGNORE, looks_like_kelvin
 from models.base.errors import InputError, did_you_mean
 from models.definition.messages import validate_section
-from models.definition.sections import Name, Section
+from models.definition.sections import Name, Section, Text
 from models.files import toml_file
 from models.files.table_file import TextForm
 from models.quantities.quantities import SENSOR, quantity_of
@@ -135,6 +136,7 @@ class RecordingMapping(Section):
     csv: Csv = Csv()
     missing: tuple[str, ...] = ()
     max_gap_s: Positive | None = None
+    session: Text | None = None
     rows: tuple[str, ...] | None = None
     constants: dict[Name, float] = Field(default_factory=dict)
     columns: dict[str, Column] = Field(default_factory=dict)

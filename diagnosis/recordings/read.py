@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from typing import TypeAlias
 
 import numpy as np
 
@@ -33,6 +34,7 @@ FEWEST_ROWS = 3
 SHORTEST_GAP_S, GAP_STEPS = 60.0, 3.0  # a gap is longer than both, unless stated
 SLOW_GAPS = 10.0  # ambient temperature and air speed change slowly: holes so many times longer are bridged
 LEAST_USABLE = 0.1  # share of the rows
+ByRole: TypeAlias = tuple[tuple[Recording, ...], tuple[Recording, ...], tuple[Recording, ...]]
 
 
 def read_recordings(
@@ -80,13 +82,41 @@ def read_recordings(
     return tuple(recordings)
 
 
-def read_train_and_holdout(
-    train: Sequence[str | Path], holdout: Sequence[str | Path], network: RecordedMachine, *, mapping: Path | None = None
-) -> tuple[tuple[Recording, ...], tuple[Recording, ...]]:
-    """Read recordings for training and hold-out, no two of one name; see :func:`read_recordings`."""
-    learnt, held = (read_recordings(paths, network, mapping=mapping) for paths in (train, holdout))
-    taken = {recording.name for recording in learnt}
-    return learnt, tuple(replace(r, name=f"{r.name}_held_out") if r.name in taken else r for r in held)
+def read_by_role(
+    train: Sequence[str | Path],
+    holdout: Sequence[str | Path],
+    baseline: Sequence[str | Path],
+    network: RecordedMachine,
+    *,
+    mapping: Path | None = None,
+) -> ByRole:
+    """Read recordings to learn from, held-out ones and baselines, no two of one name; see :func:`read_recordings`."""
+    return named_apart(
+        read_recordings(train, network, mapping=mapping),
+        read_recordings(holdout, network, mapping=mapping),
+        read_recordings(baseline, network, mapping=mapping),
+    )
+
+
+def named_apart(train: Sequence[Recording], holdout: Sequence[Recording], baseline: Sequence[Recording]) -> ByRole:
+    """Return the recordings by role; one whose name is taken gets its role, and a number if need be, added."""
+    taken: set[str] = set()
+
+    def apart(recording: Recording, ending: str) -> Recording:
+        name, number = recording.name, 2
+        if name in taken and ending:
+            name = f"{name}_{ending}"
+        first = name
+        while name in taken:
+            name, number = f"{first}_{number}", number + 1
+        taken.add(name)
+        return replace(recording, name=name)
+
+    return (
+        tuple(apart(recording, "") for recording in train),
+        tuple(apart(recording, "held_out") for recording in holdout),
+        tuple(apart(recording, "baseline") for recording in baseline),
+    )
 
 
 def read_recording(
@@ -169,6 +199,7 @@ def read_recording(
         segments=segments,
         assumed=tuple(found.assumed),
         notes=tuple(found.notes),
+        session=files[0].mapping.session or "",
     )
 
 

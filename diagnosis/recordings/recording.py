@@ -83,6 +83,8 @@ class Recording:
         Inputs that were not recorded; they have the value of the definition
     notes : tuple of str
         What was cleaned or assumed
+    session : str
+        Test session as its mapping file states it; empty if it does not
     """
 
     name: str
@@ -101,3 +103,4 @@ class Recording:
     segments: tuple[slice, ...]
     assumed: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    session: str = ""

@@ -16,23 +16,30 @@ SHARED_ROWS, SHARED_SHARE = 20, 0.2  # distinct rows that two recordings have in
 MIX = np.uint64(0x9E3779B97F4A7C15)  # odd and without a pattern: joins hashes
 
 
-def check_shared_rows(train: Sequence[Recording], holdout: Sequence[Recording] = ()) -> None:
+def check_shared_rows(
+    train: Sequence[Recording], holdout: Sequence[Recording] = (), baseline: Sequence[Recording] = ()
+) -> None:
     """Refuse recordings that share rows.
 
     Parameters
     ----------
-    train, holdout : sequence of Recording
+    train, holdout, baseline : sequence of Recording
 
     Raises
     ------
     InputError
         With every pair that shares rows.
     """
-    given = [(recording, _distinct_rows(recording)) for recording in (*train, *holdout)]
-    lines = []
+    given = [(recording, _distinct_rows(recording)) for recording in (*train, *holdout, *baseline)]
+    lines, judged = [], len(train) + len(holdout)
     for (i, (one, rows)), (j, (other, others)) in combinations(enumerate(given), 2):
         shared = _shared(one, other, rows, others)
-        if shared and i < len(train) <= j:
+        if shared and i < judged <= j:
+            lines.append(
+                f"{other.path}: is a baseline, but {shared} {one.path}, in which the effect may act; name a "
+                "recording, or a part FILE@start..end, from before it"
+            )
+        elif shared and i < len(train) <= j < judged:
             lines.append(
                 f"{other.path}: is held out, but {shared} {one.path}, which is used for training; hold out another "
                 "recording, or a part FILE@start..end that does not overlap"

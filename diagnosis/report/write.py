@@ -25,7 +25,7 @@ def names_of_files(recordings: Sequence[Recording]) -> tuple[str, ...]:
 
 
 def correction_of(diagnosis: Diagnosis, gearbox: Gearbox) -> Correction:
-    """What a diagnosis found as a correction of the definition: findings, calibrated parameters and formula shapes."""
+    """A diagnosis as a correction of the definition: findings, calibrated parameters and formula shapes."""
     nominal = {p.name: p for p in gearbox.network().parameters}
     calibrated = {c.parameter: c for c in diagnosis.calibration}
     findings = []

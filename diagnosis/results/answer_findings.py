@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from diagnosis.candidates.dated import CHANGED, changed_law
+from diagnosis.candidates.dated import CHANGED, HOURS, STEP, WHILE, changed_law
 from diagnosis.candidates.hypotheses import Hypothesis
 from diagnosis.decision.posterior import Answer, Posterior
 from diagnosis.engine.fit import Fit
@@ -18,6 +18,8 @@ from diagnosis.results.result import LEAST_RIVAL
 from diagnosis.results.result_parts import Finding, ParameterValue, Rival
 from diagnosis.setup.inference_setup import InferenceSetup, heat_over_time
 from models.mechanisms import Mechanism, Placed
+
+ENDINGS = (STEP, WHILE, HOURS, "carried_on")
 
 
 def finding_of(
@@ -52,7 +54,7 @@ def finding_of(
         kind="parameter" if term is None else "sensor" if term.of_measurement else term.kind,
         says=_says(answer, found),
         reference=term.mechanism.reference if isinstance(term, Placed) else "",
-        equation="" if term is None else term.with_values(found).equation(found),
+        equation=_equation(effect, found),
         probability=answer.probability,
         log_bayes=answer.best.log_bayes,
         parameters=tuple(
@@ -97,35 +99,45 @@ def _says(answer: Answer, found: Mapping[str, float]) -> str:
     return says
 
 
+def _equation(effect: Hypothesis, found: Mapping[str, float]) -> str:
+    """The law with its numbers as LaTeX; the time of one with a date is that of the first recording."""
+    term = effect.term
+    if term is None:
+        return ""
+    local = {name.removeprefix(f"{term.label}_"): 0.0 if name == effect.clock else value
+             for name, value in found.items()}  # fmt: skip
+    before = next((term.label.removesuffix(f"_{end}") for end in ENDINGS if term.label.endswith(f"_{end}")), term.label)
+    known = {**found, **local, **{f"{before}_{name}": value for name, value in local.items()}}
+    return term.with_values(found).equation(known)
+
+
 def _rivals(
     answer: Answer, setup: InferenceSetup, posterior: Posterior, catalogue: Mapping[str, Mechanism]
 ) -> tuple[Rival, ...]:
     """Other names at their most probable places: those of the tie set with its probabilities, then everything else."""
+
+    def key(effect: Hypothesis) -> str:
+        return effect.label if effect.term is None else name_in(catalogue, effect)
+
     own, free = answer.effect, without_sensor(setup.nominal, setup.channels)
-    beside = {effect.label for effect in answer.best.effects}
+    others = {effect.label for effect in answer.best.effects}
     odds: dict[str, float] = {}
     where: dict[str, Hypothesis] = {}
     for judged, probability in posterior.ranked:
         for other in judged.effects:
-            if other.label not in beside and _name(other) != _name(own):
-                odds[_name(other)] = odds.get(_name(other), 0.0) + probability
-                where.setdefault(_name(other), other)
+            if other.label not in others and key(other) != key(own):
+                odds[key(other)] = odds.get(key(other), 0.0) + probability
+                where.setdefault(key(other), other)
+    tied: dict[str, float] = {}
     for other, probability in answer.tied:
-        if _name(other) != _name(own):
-            odds[_name(other)] = probability
-            where[_name(other)] = other
-    tied = {_name(other) for other, _ in answer.tied}
-    # The law of the answer with another course in time is no other name.
-    same = "" if own.term is None else name_in(catalogue, own)
-    odds = {name: p for name, p in odds.items() if p >= LEAST_RIVAL and name_in(catalogue, where[name]) != same}
+        if key(other) != key(own):
+            tied[key(other)] = tied.get(key(other), 0.0) + probability
+            where[key(other)] = other
     return tuple(
         Rival(
             mechanism=name_in(catalogue, where[name]), place=where[name].place, probability=probability,
             separate_by=separation(own, where[name], catalogue, setup.nominal, free),
         )
-        for name, probability in sorted(odds.items(), key=lambda one: (one[0] not in tied, -one[1]))
+        for name, probability in sorted({**odds, **tied}.items(), key=lambda one: (one[0] not in tied, -one[1]))
+        if probability >= LEAST_RIVAL
     )  # fmt: skip
-
-
-def _name(effect: Hypothesis) -> str:
-    return effect.label if effect.term is None else effect.name

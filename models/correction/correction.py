@@ -7,7 +7,7 @@ same when the catalogue changes.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
@@ -18,6 +18,7 @@ from pydantic import Field, StringConstraints, model_validator
 from models.assembly.gearbox import Gearbox
 from models.base.atomic_write import atomic_file
 from models.base.errors import InputError, did_you_mean
+from models.correction.instruments import InputCorrection, SensorCorrection, named_twice, unknown_to_machine
 from models.definition.messages import validate_section
 from models.definition.sections import Name, OneOrMore, Section, Text
 from models.files.toml_file import parse_schema_1, read_text
@@ -192,6 +193,15 @@ class Correction(Section):
     recordings: tuple[Identity, ...] = Field(default=(), alias="recording")
     calibration: tuple[Estimate, ...] = Field(default=(), alias="calibrated")
     findings: tuple[Finding, ...] = Field(default=(), alias="finding")
+    sensors: tuple[SensorCorrection, ...] = Field(default=(), alias="sensor")
+    inputs: tuple[InputCorrection, ...] = Field(default=(), alias="input")
+
+    @model_validator(mode="after")
+    def _instruments_are_named_once(self) -> Self:
+        faults = list(named_twice(self.sensors, self.inputs))
+        if faults:
+            raise ValueError("; ".join(faults))
+        return self
 
     @classmethod
     def of(
@@ -200,6 +210,8 @@ class Correction(Section):
         *,
         findings: Iterable[Finding] = (),
         calibration: Iterable[Estimate] = (),
+        sensors: Iterable[SensorCorrection] = (),
+        inputs: Iterable[InputCorrection] = (),
         recordings: Mapping[str, str] | None = None,
         version: str = "",
     ) -> Correction:
@@ -209,6 +221,8 @@ class Correction(Section):
             recording=tuple(Identity(name=name, sha256=sha256) for name, sha256 in (recordings or {}).items()),
             calibrated=tuple(calibration),
             finding=tuple(findings),
+            sensor=tuple(sensors),
+            input=tuple(inputs),
             version=version,
         )
 
@@ -250,6 +264,18 @@ class Correction(Section):
         """
         self.check_made_for(gearbox)
         return self.apply(gearbox.network(), as_recorded=as_recorded)
+
+    def check_instruments(self, nodes: Collection[str], inputs: Collection[str]) -> None:
+        """Refuse sensors at nodes and inputs that a machine lacks.
+
+        Raises
+        ------
+        InputError
+            With all of them.
+        """
+        faults = list(unknown_to_machine(self.sensors, self.inputs, nodes=nodes, known_inputs=inputs))
+        if faults:
+            raise InputError("\n".join(faults))
 
     def check_made_for(self, gearbox: Gearbox) -> None:
         """Refuse another definition than the one that the correction was made for.
@@ -351,6 +377,7 @@ def read_correction(path: str | Path, network: ThermalNetwork, *, made_for: Gear
         if made_for is not None:
             correction.check_made_for(made_for)
         correction.apply(network, as_recorded=True)
+        correction.check_instruments(network.node_names, network.inputs)
     except InputError as error:
         raise InputError("\n".join(f"{path}: {line}" for line in str(error).splitlines())) from error
     return correction

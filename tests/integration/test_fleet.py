@@ -74,6 +74,16 @@ def diagnosed(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[P
     return out, run("diagnose", folder, "--fleet", "--jobs", 2, "--output", out)
 
 
+def test_baselines_lie_in_the_folder_of_a_gearbox(tmp_path: Path) -> None:
+    for name in ("a/baseline/train.csv", "a/baseline_1.csv", "a/hold_1.csv", "a/train.csv"):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).touch()
+    (member,) = members_of(tmp_path, without=tmp_path / "out")
+    home = tmp_path / "a"
+    assert (member.train, member.holdout) == ((home / "train.csv",), (home / "hold_1.csv",))
+    assert member.baseline == (home / "baseline_1.csv", home / "baseline" / "train.csv")
+
+
 def test_every_gearbox_has_its_row_and_the_good_ones_their_report(diagnosed: tuple[Path, int]) -> None:
     out, status = diagnosed
     assert status == 2

@@ -109,7 +109,8 @@ def test_a_proof_of_the_zoo_is_continued_while_its_cases_are_made(
     """Machines are drawn with the plants, so every case brings its definition; two rounds of making."""
     output, made = tmp_path / "out", []
 
-    def make(name: str, plan: Any, recordings: Path, truths: Path) -> None:
+    def make(name: str, plan: Any, recordings: Path, truths: Path, baselines: int) -> None:
+        assert baselines == proof_cases.ZOO_BASELINES
         if len(made) == 4:
             made.append("interrupted")
             raise KeyboardInterrupt
@@ -215,7 +216,12 @@ def test_files_of_a_cell(sensors: Any, kept: int, tmp_path: Path) -> None:
     assert len(values) == 3 + kept and values["T_oil_degC"] == "3"
     stated = tomllib.loads(files["mapping.toml"].decode())["columns"]
     assert set(stated) == {"T_oil_degC"} | ({"T_pinion_degC"} if sensors == "rich" else set())
-    files, arguments = lines.files_of(tmp_path, Task(case="case_001", data="600 s", removed="windage"))
+    files, arguments = lines.files_of(tmp_path, Task(case="case_001", sensors=sensors), 1)
+    assert arguments[-2:] == ["--baseline", "baseline_1.csv.gz"]
+    assert gzip.decompress(files["baseline_1.csv.gz"]) == gzip.decompress(files["train_1.csv.gz"])
+    with pytest.raises(InputError, match="holds 1 recordings named baseline_\\*, but 2 are asked for"):
+        lines.files_of(tmp_path, Task(case="case_001"), 2)
+    files, arguments = lines.files_of(tmp_path, Task(case="case_001", data="600 s", removed="windage"), 1)
     assert set(files) == {"train_2.csv.gz", "mapping.toml"}
     assert arguments == ["train_2.csv.gz@0..600", "--without-mechanism", "windage"]
 
@@ -233,6 +239,7 @@ def test_verb_refuses(given: dict[str, Path], tmp_path: Path) -> None:
         (["--recordings", recordings, "--truth", truths, "--seed", "1"], "--seed is for cases that are made"),
         (["--plant", "zoo", "--removed"], "--removed is for --plant own"),
         (["--families", "walls"], "--families is for --plant zoo"),
+        (["--baselines", "1"], "the own plant records no baselines"),
         (["--continue", str(old), "--cells-every", "2"], "--cells-every does not go with --continue"),
         (["--continue", str(old)], "is not a file of answers that prove wrote"),
     ):

@@ -11,8 +11,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from diagnosis.forward.recurrence import lagged
 from models.assembly.gearbox import Gearbox
 from models.correction.correction import Correction, Estimate, Finding, write_correction
+from models.correction.instruments import InputCorrection, SensorCorrection
+from models.files.cycle import Cycle
 from models.mechanisms import CATALOGUE
 from models.mechanisms.scale import Scale
 
@@ -97,6 +100,46 @@ def test_a_faulty_sensor_is_shown_next_to_the_truth_by_fmu_and_full_model(
     assert run_cli("simulate", fzg_native, plain, "--output", tmp_path / "no.csv", "--correction", file) == 2
     shown = " ".join(capsys.readouterr().err.split())
     assert "fzg.fmu: was not built with" in shown and "build it again with build-fmu --correction" in shown
+
+
+def test_a_recording_with_known_instruments_is_what_the_corrected_model_reads(
+    run_cli: RunCli, fzg: Gearbox, fzg_native: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Ambient probe 1.5 K too high, oil probe 0.8 K too high and slow: within the noise for the full model."""
+    rng, time, noise = np.random.default_rng(0), 10.0 * np.arange(720), 0.1
+    true = {"time_s": time, "speed_rpm": np.where(time % 2400.0 < 1200.0, 1200.0, 2600.0),
+            "torque_Nm": np.full(len(time), 100.0), "T_ambient_degC": 21.0 + np.sin(time / 900.0),
+            "air_speed_m_s": np.full(len(time), 2.0)}  # fmt: skip
+    made = fzg.network().simulate(Cycle.from_columns(true), losses=fzg.losses(), initial=30.0).columns()
+    slow = lagged(made["T_oil_degC"], np.diff(time), 40.0)
+    recorded = true | {
+        "T_ambient_degC": true["T_ambient_degC"] + 1.5,
+        "T_oil_degC": slow + 0.8 + noise * rng.standard_normal(len(time)),
+        "T_pinion_degC": made["T_pinion_degC"] + noise * rng.standard_normal(len(time)),
+    }
+    recording, out, file = tmp_path / "run.csv", tmp_path / "out.csv", tmp_path / "correction.toml"
+    pd.DataFrame(recorded).to_csv(recording, index=False)
+    inputs = [InputCorrection(name="T_ambient", offset=-1.5)]
+    sensors = [SensorCorrection(channel="oil", bias=0.8, lag=40.0), SensorCorrection(channel="pinion")]
+    write_correction(Correction.of(fzg, sensors=sensors, inputs=inputs), file)
+    worst = {}
+    for name, driver in {"full": ("--gearbox", "fzg"), "fmu": (fzg_native,)}.items():
+        assert run_cli("simulate", *driver, recording, "--output", out, "--correction", file, "--initial", "30") == 0
+        result = pd.read_csv(out)
+        errors = [result[f"T_{n}_degC_as_recorded"] - recorded[f"T_{n}_degC"] for n in ("oil", "pinion")]
+        worst[name] = max(float(np.sqrt(np.mean(error**2))) for error in errors)
+        np.testing.assert_allclose(result["T_ambient_degC"], true["T_ambient_degC"], atol=2e-6)
+        np.testing.assert_allclose(result["T_ambient_degC_as_recorded"], recorded["T_ambient_degC"], atol=2e-6)
+    assert worst["full"] < 1.1 * noise
+    assert worst["fmu"] < 1.0  # its networks were trained for half a second
+    pd.DataFrame(recorded).drop(columns=["T_oil_degC", "T_pinion_degC"]).to_csv(recording, index=False)
+    assert run_cli("simulate", fzg_native, recording, "--output", out, "--correction", file) == 0
+    np.testing.assert_allclose(pd.read_csv(out)["T_ambient_degC"], recorded["T_ambient_degC"], atol=2e-6)
+    file.write_text(file.read_text().replace('"T_ambient"', '"T_ambiant"'))
+    for driver in ((fzg_native,), ("--gearbox", "fzg")):
+        assert run_cli("simulate", *driver, recording, "--output", tmp_path / "no.csv", "--correction", file) == 2
+        shown = " ".join(capsys.readouterr().err.split())
+        assert "correction.toml: [[input]] 'T_ambiant' is no input; did you mean 'T_ambient'?" in shown
 
 
 @pytest.mark.parametrize(

@@ -46,6 +46,8 @@ class Settings:
         Every n-th case is also diagnosed with fewer sensors and shorter recordings; 0: none
     families : str
         Families of the zoo, separated by commas; empty: all
+    baselines : int
+        How many baselines of a case a diagnosis of everything gets
     removed : bool
         True to diagnose every mechanism that is alone in a case once more with its entry removed from the catalogue
     """
@@ -56,6 +58,7 @@ class Settings:
     gearbox: str = "fzg"
     families: str = ""
     cells_every: int = 0
+    baselines: int = 0
     removed: bool = False
 
 
@@ -108,14 +111,16 @@ def tasks_of(settings: Settings, cases: Sequence[str], alone: Mapping[str, str])
     return tasks
 
 
-def files_of(recordings: Path, task: Task) -> tuple[dict[str, bytes], list[str]]:
+def files_of(recordings: Path, task: Task, baselines: int = 0) -> tuple[dict[str, bytes], list[str]]:
     """Files that a diagnosis gets, and its arguments.
 
     Parameters
     ----------
     recordings : Path
-        Folder with one folder per case: ``train_*`` to learn from, ``hold_*`` held out
+        Folder with one folder per case: ``train_*`` to learn from, ``hold_*`` held out, ``baseline_*``
     task : Task
+    baselines : int
+        How many of the baselines, in the order of their names, unless recordings are cut short
 
     Returns
     -------
@@ -126,7 +131,7 @@ def files_of(recordings: Path, task: Task) -> tuple[dict[str, bytes], list[str]]
     Raises
     ------
     InputError
-        If the folder has no recording to learn from.
+        If the folder has no recording to learn from, or too few baselines.
     """
     folder = recordings / task.case
     paths = sorted(path for path in folder.glob("*") if path.name.endswith(ENDINGS))
@@ -134,11 +139,16 @@ def files_of(recordings: Path, task: Task) -> tuple[dict[str, bytes], list[str]]
     hold = [p for p in paths if p.name.startswith("hold") and task.data == "full"]
     if not train:
         raise InputError(f"{folder}: holds no recording named train_* ({', '.join(ENDINGS)})")
-    files = {path.name: _with_sensors(path, task.sensors) for path in (*train, *hold)}
+    healthy = [p for p in paths if p.name.startswith("baseline")][:baselines] if task.data == "full" else []
+    if task.data == "full" and len(healthy) < baselines:
+        raise InputError(f"{folder}: holds {len(healthy)} recordings named baseline_*, but {baselines} are asked for")
+    files = {path.name: _with_sensors(path, task.sensors) for path in (*train, *hold, *healthy)}
     part = "@0..600" if task.data == "600 s" else ""
     arguments = [f"{path.name}{part}" for path in train]
     for path in hold:
         arguments += ["--holdout", path.name]
+    for path in healthy:
+        arguments += ["--baseline", path.name]
     if (folder / MAPPING).exists():
         text = (folder / MAPPING).read_text(encoding="utf-8")
         files[MAPPING] = (text if task.sensors == SENSORS[0] else _of_columns(text, files[train[0].name])).encode()

@@ -1,4 +1,4 @@
-"""Which recordings ``diagnose`` learns from and which it holds out."""
+"""Which recordings ``diagnose`` learns from, which it holds out, and which are baselines."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ class _ReadError(Exception):
 
 
 @pytest.fixture
-def asked_for(monkeypatch: pytest.MonkeyPatch) -> list[tuple[tuple[str, ...], tuple[str, ...]]]:
-    """What the command would read: (to learn from, held out)."""
-    asked: list[tuple[tuple[str, ...], tuple[str, ...]]] = []
+def asked_for(monkeypatch: pytest.MonkeyPatch) -> list[tuple[tuple[str, ...], ...]]:
+    """What the command would read: (to learn from, held out, baselines)."""
+    asked: list[tuple[tuple[str, ...], ...]] = []
 
-    def read(train: tuple[str, ...], held: tuple[str, ...], *_: object, **__: object) -> None:
-        asked.append((train, held))
+    def read(*given: tuple[str, ...], **_: object) -> None:
+        asked.append(given[:3])
         raise _ReadError
 
-    monkeypatch.setattr(diagnosis.recordings.read, "read_train_and_holdout", read)
+    monkeypatch.setattr(diagnosis.recordings.read, "read_by_role", read)
     return asked
 
 
@@ -45,11 +45,33 @@ def asked_for(monkeypatch: pytest.MonkeyPatch) -> list[tuple[tuple[str, ...], tu
     ],
 )
 def test_all_up_to_the_next_option_is_held_out(
-    words: str, train: tuple[str, ...], held: tuple[str, ...], asked_for: list[tuple[tuple[str, ...], tuple[str, ...]]]
+    words: str, train: tuple[str, ...], held: tuple[str, ...], asked_for: list[tuple[tuple[str, ...], ...]]
 ) -> None:
     done = CliRunner().invoke(diagnose, words.split())
     assert isinstance(done.exception, _ReadError), done.output
-    assert asked_for == [(train, held)]
+    assert asked_for == [(train, held, ())]
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "a --baseline b c --holdout d --jobs 1",
+        "a --baseline b --holdout d --baseline c",
+        "--baseline=b c --holdout d -- a",
+        "a --holdout d --baseline b c --switched-off windage",
+    ],
+)
+def test_baselines_are_named_like_held_out_recordings(words: str, asked_for: list[tuple[tuple[str, ...], ...]]) -> None:
+    done = CliRunner().invoke(diagnose, words.split())
+    assert isinstance(done.exception, _ReadError), done.output
+    assert asked_for == [(("a",), ("d",), ("b", "c"))]
+
+
+@pytest.mark.parametrize("words", ["a --baseline --jobs 1", "a --baseline", "a --fleet --baseline b"])
+def test_baselines_that_are_not_named_or_not_possible(words: str) -> None:
+    done = CliRunner().invoke(diagnose, words.split())
+    assert done.exit_code == 2
+    assert "baseline" in done.output and "Traceback" not in done.output
 
 
 @pytest.mark.parametrize("words", ["a --holdout --jobs 1", "a --holdout", "a --holdout -- b"])
@@ -58,6 +80,41 @@ def test_held_out_recordings_that_are_not_named_are_missed(words: str) -> None:
     done = CliRunner().invoke(diagnose, words.split())
     assert done.exit_code == 2
     assert "--holdout" in done.output and "Traceback" not in done.output
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (
+            ["--baseline", "pinion.csv"],
+            "pinion.csv: is a baseline, but measures T_pinion and nothing that the recordings",
+        ),
+        (["--baseline", "run.csv@0..3000"], "run.csv: is a baseline, but has the rows of 0 ... 29"),
+        (
+            ["--baseline", "wheel.csv", "--switched-off", "windge"],
+            "windge: is not in the catalogue; did you mean 'windage'",
+        ),
+        (["--switched-off", "windage"], "--switched-off windage: is about baselines, but there are none"),
+        (["--baseline", "loss.csv"], "loss.csv: P_loss is "),
+        (["--baseline", "idle.csv"], "idle.csv: "),
+    ],
+)
+def test_baselines_that_cannot_be_used(words: list[str], message: str, tmp_path: Path) -> None:
+    time = np.arange(0.0, 3600.0, 20.0)
+    table = pd.DataFrame({"time_s": time, "speed_rpm": 1500.0, "torque_Nm": 80.0, "T_oil_degC": 22.0 + time / 200.0})
+    table.to_csv(tmp_path / "run.csv", index=False)
+    table.rename(columns={"T_oil_degC": "T_pinion_degC"}).assign(T_pinion_degC=30.0 + time / 300.0).to_csv(
+        tmp_path / "pinion.csv", index=False
+    )
+    other = table.assign(T_oil_degC=table["T_oil_degC"] + 0.5)
+    other.assign(T_wheel_degC=30.0).to_csv(tmp_path / "wheel.csv", index=False)
+    other.assign(P_loss_W=0.3 + time / 1e5).to_csv(tmp_path / "loss.csv", index=False)
+    other.drop(columns="T_oil_degC").to_csv(tmp_path / "idle.csv", index=False)
+    given = [str(tmp_path / word) if ".csv" in word else word for word in words]
+    done = CliRunner().invoke(diagnose, [str(tmp_path / "run.csv"), *given, "--output", str(tmp_path / "out")])
+    assert isinstance(done.exception, InputError), done.output
+    assert message in str(done.exception)
+    assert not (tmp_path / "out").exists()
 
 
 def test_a_recording_is_never_replaced_by_its_prediction(tmp_path: Path) -> None:

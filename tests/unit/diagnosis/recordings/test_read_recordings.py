@@ -14,7 +14,7 @@ import pandas as pd
 import pytest
 
 import diagnosis
-from diagnosis.recordings.read import read_recordings
+from diagnosis.recordings.read import named_apart, read_by_role, read_recordings
 from diagnosis.recordings.recording import Recording
 from diagnosis.recordings.shared_rows import check_shared_rows
 from diagnosis.recordings.time_axis import part_of
@@ -345,6 +345,29 @@ def test_a_copy_in_another_form_is_still_the_same_rows(tmp_path: Path, network: 
     ):
         check_shared_rows(train, held)
     check_shared_rows(train, read_recordings([write(tmp_path / "c.csv", table(seed=1))], network))
+
+
+def test_a_baseline_is_not_a_recording_that_is_learnt_from_or_held_out(tmp_path: Path, network: ThermalNetwork) -> None:
+    path = write(tmp_path / "a.csv", table())
+    before, after = (read_recordings([f"{path}@{part}"], network) for part in ("0..900", "901..1990"))
+    check_shared_rows(after, (), before)
+    train, held, healthy = read_by_role([path], [], [path], network)
+    assert [r.name for r in (*train, *held, *healthy)] == ["a", "a_baseline"]
+    for roles in ((train, ()), ((), train)):
+        with pytest.raises(InputError, match=r"a.csv: is a baseline, but has the rows of 0 ... 1990 s in common"):
+            check_shared_rows(*roles, healthy)
+
+
+def test_names_of_recordings_differ_whatever_their_role(tmp_path: Path, network: ThermalNetwork) -> None:
+    one = read_recordings([write(tmp_path / "a.csv", table())], network)
+    named = named_apart((*one, *one), one, (*one, *one))
+    assert [[r.name for r in role] for role in named] == [["a", "a_2"], ["a_held_out"], ["a_baseline", "a_baseline_2"]]
+
+
+def test_a_mapping_states_the_session(tmp_path: Path, network: ThermalNetwork) -> None:
+    path = write(tmp_path / "a.csv", table())
+    assert read(path, network).session == ""
+    assert read(path, network, 'session = "before the overhaul"\n').session == "before the overhaul"
 
 
 def test_a_recording_named_twice_is_refused(tmp_path: Path, network: ThermalNetwork) -> None:

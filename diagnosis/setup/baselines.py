@@ -1,0 +1,84 @@
+"""Baselines: recordings of the same machine in which the effect that is looked for cannot act, and test sessions."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+
+import numpy as np
+
+from diagnosis.recordings.recording import Recording
+from models.base.errors import InputError, did_you_mean
+from models.quantities.quantities import is_total_loss
+
+
+def session_by_recording(
+    train: Sequence[Recording], holdout: Sequence[Recording] = (), baseline: Sequence[Recording] = ()
+) -> dict[str, str]:
+    """Test session of every recording.
+
+    All that is learnt from and held out is one session, called ``""``; every file of baselines is another, called like
+    its first recording. Parts of one file belong together. What a mapping states comes first.
+
+    Parameters
+    ----------
+    train, holdout, baseline : sequence of Recording
+
+    Returns
+    -------
+    dict of recording to session
+    """
+    given = {r.name: r.session for r in (*train, *holdout)}
+    of_file = {r.sha256: r.session for r in (*train, *holdout)}
+    for recording in baseline:
+        usual = of_file.setdefault(recording.sha256, recording.session or recording.name)
+        given[recording.name] = recording.session or usual
+    return given
+
+
+def check_baselines(
+    train: Sequence[Recording],
+    baseline: Sequence[Recording],
+    switched_off: Collection[str] = (),
+    *,
+    catalogue: Collection[str] = (),
+) -> None:
+    """Refuse baselines that show nothing of the machine of the recordings.
+
+    Parameters
+    ----------
+    train, baseline : sequence of Recording
+    switched_off : collection of str
+        Mechanisms that are known to be off in the baselines
+    catalogue : collection of str
+        Names of all mechanisms
+
+    Raises
+    ------
+    InputError
+        If a baseline shares no channel with the recordings, or a mechanism is unknown or has no baseline.
+    """
+    lines = [f"--switched-off {n}: is not in the catalogue{did_you_mean(n, catalogue)}" for n in switched_off
+             if n not in catalogue]  # fmt: skip
+    if switched_off and not baseline:
+        lines.append(
+            f"--switched-off {' '.join(switched_off)}: is about baselines, but there are none; name the recordings in "
+            "which it is off with --baseline"
+        )
+    known = _measured(train)
+    for recording in baseline:
+        own = _measured([recording])
+        if own.isdisjoint(known):
+            lines.append(
+                f"{recording.path}: is a baseline, but measures {_listed(own)} and nothing that the recordings do "
+                f"({_listed(known)}); is it of another machine, or does its mapping name other nodes?"
+            )
+    if lines:
+        raise InputError("\n".join(lines))
+
+
+def _measured(recordings: Sequence[Recording]) -> set[str]:
+    return {c.name for r in recordings for c in r.channels if np.isfinite(c.values).any()}
+
+
+def _listed(channels: Collection[str]) -> str:
+    return ", ".join(name if is_total_loss(name) else f"T_{name}" for name in sorted(channels)) or "nothing"

@@ -1,0 +1,115 @@
+"""How the columns of a recorder differ from the machine: tables ``[[sensor]]`` and ``[[input]]`` of a correction.
+
+```toml
+[[sensor]]
+channel = "oil"                # a node, <node>__<sensor>, or P_loss
+bias = 0.8                     # reading less truth, [K] or [W]
+bias_stderr = 0.1
+lag = 25.0                     # time constant, [s]
+mix = [{ node = "housing_lower", share = 0.05, stderr = 0.02 }]
+
+[[input]]
+name = "T_ambient"
+offset = -1.5                  # truth = gain * recorded (clock seconds before) + offset
+```
+
+They are for recordings; a network or an FMU holds nothing of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Iterator
+from typing import Annotated, Self
+
+from pydantic import Field, model_validator
+
+from models.base.errors import did_you_mean
+from models.definition.sections import Name, Section
+from models.quantities.quantities import TOTAL_LOSS, is_total_loss, node_of_channel
+
+AIR = "air"  # the surroundings, for a machine whose network has no such node
+NotNegative = Annotated[float, Field(ge=0.0, le=1e9)]
+Number = Annotated[float, Field(ge=-1e9, le=1e9)]
+Positive = Annotated[float, Field(gt=0.0, le=1e9)]
+
+
+class Mix(Section):
+    """Share of another node in a reading: reading = (1 - share) node + share other node."""
+
+    node: Name
+    share: Annotated[float, Field(ge=-1.0, le=1.0)]
+    stderr: NotNegative = 0.0
+
+
+class SensorCorrection(Section):
+    """``[[sensor]]``: a channel of the recorder. The mix comes first, then lag or delay, gain, and bias."""
+
+    channel: Name
+    bias: Number = 0.0
+    bias_stderr: NotNegative = 0.0
+    lag: NotNegative = 0.0
+    lag_stderr: NotNegative = 0.0
+    gain: Positive = 1.0
+    gain_stderr: NotNegative = 0.0
+    delay: Number = 0.0
+    delay_stderr: NotNegative = 0.0
+    mix: tuple[Mix, ...] = ()
+
+    @model_validator(mode="after")
+    def _fits_its_channel(self) -> Self:
+        if is_total_loss(self.channel) and (self.lag or self.mix):
+            raise ValueError(f"{TOTAL_LOSS} has gain, delay and bias; lag and mix are those of a temperature")
+        if not is_total_loss(self.channel) and (self.gain != 1.0 or self.delay):
+            raise ValueError(f"gain and delay are those of {TOTAL_LOSS}; a temperature has mix, lag and bias")
+        nodes = [one.node for one in self.mix]
+        if len(set(nodes)) < len(nodes):
+            raise ValueError("a node is mixed in twice; keep one")
+        return self
+
+
+class InputCorrection(Section):
+    """``[[input]]``: truth = gain * recorded + offset, of the moment `clock` seconds before."""
+
+    name: Name
+    gain: Positive = 1.0
+    gain_stderr: NotNegative = 0.0
+    offset: Number = 0.0
+    offset_stderr: NotNegative = 0.0
+    clock: Number = 0.0
+    clock_stderr: NotNegative = 0.0
+
+
+def named_twice(sensors: Iterable[SensorCorrection], inputs: Iterable[InputCorrection]) -> Iterator[str]:
+    """Yield a fault for every channel or input with two tables."""
+    for kind, names in (("sensor", [s.channel for s in sensors]), ("input", [i.name for i in inputs])):
+        for name in dict.fromkeys(names):
+            if names.count(name) > 1:
+                yield f"{names.count(name)} tables [[{kind}]] are about {name!r}; keep one"
+
+
+def unknown_to_machine(
+    sensors: Iterable[SensorCorrection],
+    inputs: Iterable[InputCorrection],
+    *,
+    nodes: Collection[str],
+    known_inputs: Collection[str],
+) -> Iterator[str]:
+    """Yield a fault for every channel, mixed node or input that a machine lacks.
+
+    Parameters
+    ----------
+    sensors, inputs
+    nodes : collection of str
+        With a temperature
+    known_inputs : collection of str
+    """
+    for sensor in sensors:
+        node = node_of_channel(sensor.channel, nodes)
+        if not is_total_loss(sensor.channel) and node not in nodes:
+            yield f"[[sensor]] {sensor.channel!r} is at no node{did_you_mean(node, nodes)}"
+        for one in sensor.mix:
+            if one.node not in (*nodes, AIR):
+                yield f"[[sensor]] {sensor.channel!r} mixes in {one.node!r}, no node{did_you_mean(one.node, nodes)}"
+    for given in inputs:
+        if given.name not in known_inputs:
+            yield f"[[input]] {given.name!r} is no input{did_you_mean(given.name, known_inputs)}"
