@@ -1,10 +1,9 @@
-"""What the inference engine costs, next to the old one in the same run.
+"""What the inference engine costs.
 
 python -m benchmarks.engine [contract] [control] [week] [turbine RECORDING] [--jobs 1]
 
 Contract: 26 h of the FZG rig at 10 s with 7 channels; preparation, calibration, Gram matrix of all candidates of the
-catalogue with 300 further columns, and five refits. ``control`` is the same with nothing concealed. The old engine does
-the same steps without the further columns, as it cannot have them.
+catalogue with 300 further columns, and five refits. ``control`` is the same with nothing concealed.
 """
 
 from __future__ import annotations
@@ -21,19 +20,14 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
-from diagnosis.candidates.explain import best_fits, calibrated
-from diagnosis.decision.search import candidates_of
-from diagnosis.inference.evidence import Marginal
 
 from benchmarks.diagnose import make_recordings
-from diagnosis.candidates.hypotheses import parameter_hypotheses
-from diagnosis.candidates.hypotheses import scan as old_scan
 from diagnosis.engine.candidates import refit_all, scan
+from diagnosis.engine.families import candidates_of
 from diagnosis.engine.fit import Linearised, calibrate
 from diagnosis.engine.metric import Metric
 from diagnosis.engine.prepare import prepare_experiment
 from diagnosis.recordings.read import read_recordings
-from diagnosis.setup.inference_setup import prepare
 from models.assembly.gearbox import load_gearbox
 from models.mechanisms import CATALOGUE
 
@@ -55,15 +49,15 @@ class Clock:
         self._since = now
 
 
-def new(gearbox: str, recordings: Sequence[str], jobs: int) -> dict[str, float]:
-    """All stages of the new engine."""
+def stages_of(gearbox: str, recordings: Sequence[str], jobs: int) -> dict[str, float]:
+    """Wall time of all stages, [s]."""
     machine = load_gearbox(gearbox)
     read, clock = read_recordings(recordings, machine.network()), Clock()
     setup, experiment = prepare_experiment(machine, read)
     clock.mark("preparation")
     fit = calibrate(experiment)
     clock.mark("calibration")
-    candidates = candidates_of(setup, CATALOGUE)
+    candidates = candidates_of(setup, experiment, CATALOGUE)
     clock.mark("candidates placed")
     rng, parts = np.random.default_rng(0), experiment.machine.model.n
     further = []
@@ -91,46 +85,22 @@ def new(gearbox: str, recordings: Sequence[str], jobs: int) -> dict[str, float]:
     return clock.stages
 
 
-def old(gearbox: str, recordings: Sequence[str], jobs: int) -> dict[str, float]:
-    """The same steps of the old engine, without pairs and further columns."""
-    machine = load_gearbox(gearbox)
-    read, clock = read_recordings(recordings, machine.network()), Clock()
-    setup = prepare(machine, read, ())
-    clock.mark("preparation")
-    base = calibrated(setup.train)
-    clock.mark("calibration")
-    candidates = [*candidates_of(setup, CATALOGUE), *parameter_hypotheses(base.problem)]
-    clock.mark("candidates placed")
-    scored = old_scan(base.problem, base.fit, Marginal.of(base.fit), candidates, jobs=jobs)
-    clock.mark("columns and Gram matrix")
-    best_fits(base, [(base, s) for s in scored[:REFITS]], jobs=jobs)
-    clock.mark("five refits")
-    return clock.stages
-
-
-def measured(run: str, gearbox: str, recordings: Sequence[str], jobs: int) -> tuple[dict[str, float], float]:
+def measured(gearbox: str, recordings: Sequence[str], jobs: int) -> tuple[dict[str, float], float]:
     """Stages [s] and peak memory [GB] in a fresh process (of that process alone)."""
-    command = [sys.executable, "-m", "benchmarks.engine", "--one", run, gearbox, *recordings, "--jobs", str(jobs)]
+    command = [sys.executable, "-m", "benchmarks.engine", "--one", gearbox, *recordings, "--jobs", str(jobs)]
     text = subprocess.run(command, check=True, capture_output=True, text=True).stdout
     stages, peak = json.loads(text.splitlines()[-1])
     return stages, peak
 
 
-def compare(name: str, gearbox: str, recordings: Sequence[str], jobs: int) -> None:
+def show(name: str, gearbox: str, recordings: Sequence[str], jobs: int) -> None:
     """Print one table."""
-    (ours, ours_GB), (theirs, theirs_GB) = (measured(run, gearbox, recordings, jobs) for run in RUNS)
-    print(f"\n{name}: wall time with {jobs} process(es) [s]\n{'':28}{'new':>8}{'share':>8}{'old':>8}{'ratio':>8}")
-    whole = sum(ours.values())
-    for stage, seconds in ours.items():
-        before = theirs.get(stage)
-        tail = "" if before is None else f"{before:8.2f}{seconds / before:8.2f}"
-        print(f"{stage:28}{seconds:8.2f}{seconds / whole:8.0%}{tail}")
-    total = sum(theirs.values())
-    print(f"{'sum':28}{whole:8.2f}{'':8}{total:8.2f}{whole / total:8.2f}")
-    print(f"{'peak memory of one process':28}{ours_GB:8.2f}{'':8}{theirs_GB:8.2f}   GB", flush=True)
-
-
-RUNS = {"new": new, "old": old}
+    stages, peak_GB = measured(gearbox, recordings, jobs)
+    whole = sum(stages.values())
+    print(f"\n{name}: wall time with {jobs} process(es) [s]")
+    for stage, seconds in stages.items():
+        print(f"{stage:28}{seconds:8.2f}{seconds / whole:8.0%}")
+    print(f"{'sum':28}{whole:8.2f}\n{'peak memory of one process':28}{peak_GB:8.2f} GB", flush=True)
 
 
 def main() -> None:
@@ -138,11 +108,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("sizes", nargs="*", default=["contract"], help="contract, control, week, turbine RECORDING")
     parser.add_argument("--jobs", type=int, default=1)
-    parser.add_argument("--one", choices=list(RUNS), help="one engine on GEARBOX RECORDING..., for this script itself")
+    parser.add_argument("--one", action="store_true", help="GEARBOX RECORDING..., for this script itself")
     given = parser.parse_args()
     if given.one:
         gearbox, *recordings = given.sizes
-        stages = RUNS[given.one](gearbox, recordings, given.jobs)
+        stages = stages_of(gearbox, recordings, given.jobs)
         peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (1e9 if sys.platform == "darwin" else 1e6)
         print(json.dumps([stages, peak]))
         return
@@ -151,13 +121,13 @@ def main() -> None:
         while sizes:
             size = sizes.pop(0)
             if size == "turbine":
-                compare("turbine", "la_haute_borne", [sizes.pop(0)], given.jobs)
+                show("turbine", "la_haute_borne", [sizes.pop(0)], given.jobs)
                 continue
             room = Path(folder) / size
             room.mkdir()
             hours = (168.0,) if size == "week" else (20.0, 6.0)
             made = make_recordings(room, hours, 10.0, effect=None if size == "control" else "windage")
-            compare(size, "fzg", [str(path) for path in made], given.jobs)
+            show(size, "fzg", [str(path) for path in made], given.jobs)
 
 
 if __name__ == "__main__":
