@@ -15,6 +15,7 @@ from diagnosis.engine.families import candidates_of, log_prior
 from diagnosis.engine.fit import calibrate
 from diagnosis.engine.outside import outside_of
 from diagnosis.engine.prepare import prepare_experiment
+from diagnosis.engine.set_apart import calibrate_apart
 from diagnosis.recordings.read import named_apart, read_recordings
 from diagnosis.recordings.recording import Recording
 from diagnosis.recordings.shared_rows import check_shared_rows
@@ -97,8 +98,9 @@ def diagnose(
     try:
         progress("calibrating the model")
         plain = calibrate(experiment)
+        others, apart = calibrate_apart(experiment, plain)
         progress("calibrating with model error")
-        calibration = calibrate_with_error(experiment)
+        calibration = calibrate_with_error(experiment, apart)
         candidates = candidates_of(setup, experiment, catalogue)
         posterior = infer(
             calibration, candidates, log_prior(candidates), settings, outside=outside_of(setup, experiment),
@@ -107,7 +109,7 @@ def diagnose(
         progress("predicting the recordings free-running")
         return assemble(
             setup, experiment, posterior, decide(posterior, settings), plain=plain, settings=settings,
-            catalogue=catalogue, train=train, held_out=held, jobs=jobs,
+            others=others, apart=apart, catalogue=catalogue, train=train, held_out=held, jobs=jobs,
         )  # fmt: skip
     except ArithmeticError as error:
         if type(error) is not ArithmeticError:

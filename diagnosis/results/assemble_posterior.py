@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -12,6 +12,7 @@ from diagnosis.decision.settings import Settings
 from diagnosis.engine.fit import Experiment, Fit
 from diagnosis.engine.predict import Prediction, log_score_gain, overall_rmse, predict, rmse, with_pieces_of
 from diagnosis.engine.prepare import held_out_experiment
+from diagnosis.engine.set_apart import calibrate_without_error
 from diagnosis.inference.noise import HEAT_FRACTION, PARAMETRIC_FRACTION, PARAMETRIC_K
 from diagnosis.recordings.recording import Recording
 from diagnosis.results.advice import next_test, without_sensor
@@ -44,6 +45,8 @@ def assemble(
     answers: Sequence[Answer],
     *,
     plain: Fit,
+    others: Fit | None = None,
+    apart: Sequence[str] = (),
     settings: Settings,
     catalogue: Mapping[str, Mechanism],
     train: Sequence[Recording],
@@ -63,6 +66,10 @@ def assemble(
         Most important first
     plain : Fit
         The nominal machine calibrated without model error
+    others : Fit or None
+        So calibrated without the channels in `apart`
+    apart : sequence of str
+        Channels at odds with all others; they are faulty if the posterior says so
     settings : Settings
     catalogue : mapping of str to Mechanism
     train, held_out : sequence of Recording
@@ -71,7 +78,9 @@ def assemble(
     error_asked : sequence of str
         Where the data ask for much model error
     """
-    final = _final(posterior, answers, plain)
+    faulty = _faulty(posterior, apart)
+    plain = others if faulty and others is not None else plain
+    final = _final(answers, plain, faulty)
     findings = tuple(
         finding_of(answer, answer.best.fit or final, setup, posterior, catalogue, train) for answer in answers
     )
@@ -80,6 +89,7 @@ def assemble(
     location = _location(setup, posterior) if posterior.detected else ()
     judged = held_out_experiment(setup, experiment)
     predictions = _predictions(experiment, judged, plain, final, jobs)
+    counting = [name for name in setup.channels if name not in faulty]
     courses = [[p.trajectory.T for p in predictions["holdout"][state]] for state in ("after", "calibrated")]
     assumed = {name for r in (*train, *held_out) for name in r.assumed}
     return Diagnosis(
@@ -92,8 +102,9 @@ def assemble(
         location=location,
         findings=findings,
         calibration=_calibration(final, plain, answers),
-        train=_fits(setup, predictions["train"]),
-        holdout=_fits(setup, predictions["holdout"]),
+        train=_fits(setup, predictions["train"], counting),
+        holdout=_fits(setup, predictions["holdout"], counting),
+        faulty=faulty,
         noise_K=setup.noise_K,
         floor=_floor(setup),
         misfit=_misfit(final),
@@ -128,10 +139,25 @@ def assemble(
     )  # fmt: skip
 
 
-def _final(posterior: Posterior, answers: Sequence[Answer], plain: Fit) -> Fit:
-    """The fit that predicts: of the best answer, else of the machine with nothing missing."""
+def _faulty(posterior: Posterior, apart: Sequence[str]) -> tuple[str, ...]:
+    """Channels set apart that are more probably faulty than not."""
+    return tuple(
+        channel for channel in apart
+        if sum(p for one, p in posterior.ranked
+               if any(e.term is not None and e.term.kind == "sensor" and channel in e.term.target for e in one.effects)
+               ) > 0.5
+    )  # fmt: skip
+
+
+def _final(answers: Sequence[Answer], plain: Fit, faulty: Sequence[str]) -> Fit:
+    """The fit that predicts: of the best answer, without model error; else of the machine as calibrated."""
     first = answers[0].best.fit if answers else None
-    return first or posterior.nothing.fit or plain
+    if first is None:
+        return plain
+    try:
+        return calibrate_without_error(first, faulty)
+    except ArithmeticError:  # no solution without what model error allows
+        return first
 
 
 # ---------------------------------------------------------------------- verdict
@@ -271,8 +297,8 @@ def _predicted(
     return before, tuned, predict(final, index, z_final, guess=tuned.trajectory.T if near is None else near)
 
 
-def _fits(setup: InferenceSetup, predictions: Mapping[str, Sequence[Prediction]]) -> Fits:
-    temperatures = [i for i, name in enumerate(setup.channels) if not is_total_loss(name)]
+def _fits(setup: InferenceSetup, predictions: Mapping[str, Sequence[Prediction]], counting: Collection[str]) -> Fits:
+    temperatures = [i for i, name in enumerate(setup.channels) if not is_total_loss(name) and name in counting]
     nothing = [np.zeros((0, len(setup.channels)))]
     each = {
         state: rmse(np.concatenate([p.residual for p in found] or nothing),

@@ -107,6 +107,8 @@ class Diagnosis:
         Deviation between sessions that the data support, in prior standard deviations
     holdout_gain : float
         Log predictive density of the held-out readings: final model less the calibrated one, [nat]; NaN without any
+    faulty : tuple of str
+        Channels that neither the calibration nor the errors over all temperatures count, because their sensors fail
     """
 
     verdict: Verdict
@@ -143,6 +145,7 @@ class Diagnosis:
     error_asked: tuple[str, ...] = ()
     session_s: float = 0.0
     holdout_gain: float = math.nan
+    faulty: tuple[str, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """Everything of ``diagnosis.json``, schema :data:`SCHEMA`."""
@@ -175,7 +178,7 @@ class Diagnosis:
             ],
             "fit": {"train": fits_dict(self.train),
                     "holdout": fits_dict(self.holdout) | {"log_score_gain": _or_none(self.holdout_gain)},
-                    "noise_K": self.noise_K, "floor": self.floor},
+                    "faulty_channels": list(self.faulty), "noise_K": self.noise_K, "floor": self.floor},
             "kinds": dict(self.kinds),
             "settings": {"false_alarm_rate": self.false_alarm_rate, "claim_from": self.claim_from,
                          "matters_K": self.matters_K, "matters_W": self.matters_W},
