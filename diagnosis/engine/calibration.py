@@ -34,6 +34,8 @@ class Calibration:
         Over all deviations between sessions, of the most probable unknowns of all readings
     session_s : float
         Their mean, in prior standard deviations
+    of_others : Calibration or None
+        By the readings without the channels set apart alone, if there are any
     """
 
     fit: Fit
@@ -41,6 +43,7 @@ class Calibration:
     evidence: Mapping[str, float]
     log_evidence: float
     session_s: float
+    of_others: Calibration | None = None
 
 
 def calibrate_with_error(experiment: Experiment, apart: Collection[str] = ()) -> Calibration:
@@ -69,7 +72,7 @@ def calibrate_with_error(experiment: Experiment, apart: Collection[str] = ()) ->
     all_readings = _judged(experiment, at.parts, _columns(error, at.parts), error.amplitudes(chosen), found.session_s)
     over = fit_over_sessions(all_readings.fit(fit.z, courses), len(fit.z))
     return replace(found, fit=all_readings.fit(fit.z, courses, iterations=0), log_evidence=over.log_evidence,
-                   session_s=over.mean)  # fmt: skip
+                   session_s=over.mean, of_others=found)  # fmt: skip
 
 
 def _calibrated(experiment: Experiment, error: ModelError, classes: Sequence[ErrorClass]) -> Calibration:

@@ -81,13 +81,15 @@ def _residual(experiment: Experiment, fit: Fit, index: int) -> Array:
     return np.asarray(experiment.pieces[index].measured - fit.parts[index].point.read)
 
 
-def calibrate_without_error(fit: Fit, apart: Collection[str] = ()) -> Fit:
+def calibrate_without_error(fit: Fit, plain: Fit, apart: Collection[str] = ()) -> Fit:
     """An explanation calibrated as the nominal machine is, by noise alone: what predicts, and what an FMU holds.
 
     Parameters
     ----------
     fit : Fit
         With model error in its metric
+    plain : Fit
+        The nominal machine so calibrated: where the search for its unknowns begins
     apart : collection of str
         Channels that do not count; what describes their sensors stays as it is
 
@@ -98,7 +100,10 @@ def calibrate_without_error(fit: Fit, apart: Collection[str] = ()) -> Fit:
     """
     every = replace(fit.experiment, filters=None, metric=None)
     counting = without_channels(every, apart) if apart else every
-    first = counting.fit(fit.z, _courses(fit), iterations=FIRST_ITERATIONS)
+    usual = zip(every.unknowns, plain.experiment.unknowns, plain.z.tolist(), strict=False)
+    z = fit.z.copy()
+    z[: len(plain.z)] = [mine.z_of(own.value(there)) for mine, own, there in usual]
+    first = counting.fit(z, _courses(fit), iterations=FIRST_ITERATIONS)
     found = counting.with_filters(first.parts).fit(first.z, _courses(first))
     if not apart:
         return found

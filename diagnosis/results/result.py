@@ -21,6 +21,7 @@ from diagnosis.results.result_parts import (
     finding_dict,
     fits_dict,
 )
+from models.correction.instruments import InputCorrection, SensorCorrection
 from models.mechanisms import OPEN_FORM
 from models.simulation.thermal_network import ThermalNetwork
 from models.terms.term import Term
@@ -109,6 +110,15 @@ class Diagnosis:
         Log predictive density of the held-out readings: final model less the calibrated one, [nat]; NaN without any
     faulty : tuple of str
         Channels that neither the calibration nor the errors over all temperatures count, because their sensors fail
+    terms : tuple of Term
+        What the model that predicts has more than the nominal one, with its values as the parameters' start and their
+        standard errors as `sd`; of an effect without a name that is certain enough too
+    sensors : tuple of SensorCorrection
+        How its sensors differ from the machine, without what is in `terms`
+    true_inputs : tuple of InputCorrection
+        What it took the inputs to be
+    starts_at : mapping of str to float
+        Start of every recording on the time axis that they share, [s]: the clock of terms with a date
     """
 
     verdict: Verdict
@@ -146,6 +156,10 @@ class Diagnosis:
     session_s: float = 0.0
     holdout_gain: float = math.nan
     faulty: tuple[str, ...] = ()
+    terms: tuple[Term, ...] = ()
+    sensors: tuple[SensorCorrection, ...] = ()
+    true_inputs: tuple[InputCorrection, ...] = ()
+    starts_at: Mapping[str, float] = field(default_factory=dict)
 
     def to_dict(self) -> dict[str, Any]:
         """Everything of ``diagnosis.json``, schema :data:`SCHEMA`."""
