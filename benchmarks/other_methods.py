@@ -17,6 +17,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from diagnosis.candidates.explain import Explanation
+from diagnosis.decision.search import threshold_at
+from diagnosis.inference.evidence import Marginal
+from diagnosis.inference.latent import knots_of, latent_heat
+from diagnosis.inference.posterior import Fit, Problem
+from diagnosis.inference.predict import Prediction, predict
 from pysindy import STLSQ
 from rich.console import Console
 from rich.table import Table
@@ -26,14 +32,8 @@ from sklearn.neural_network import MLPRegressor
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
-from diagnosis.candidates.explain import Explanation
 from diagnosis.candidates.hypotheses import Hypothesis, hypothesis_of, scan
-from diagnosis.decision.search import threshold_at
 from diagnosis.forward.term_on_grid import TermOnGrid
-from diagnosis.inference.evidence import Marginal
-from diagnosis.inference.latent import knots_of, latent_heat
-from diagnosis.inference.posterior import Fit, Problem
-from diagnosis.inference.predict import Prediction, predict
 from diagnosis.proof.scoring.lines import Task
 from diagnosis.proof.scoring.outcome import outcome
 from diagnosis.proof.scoring.truth import CONTROL, read_truths

@@ -19,7 +19,7 @@ from diagnosis.engine.set_apart import calibrate_apart
 from diagnosis.recordings.read import named_apart, read_recordings
 from diagnosis.recordings.recording import Recording
 from diagnosis.recordings.shared_rows import check_shared_rows
-from diagnosis.results.assemble_posterior import Others, assemble, faulty_channels
+from diagnosis.results.assemble import Others, assemble, faulty_channels
 from diagnosis.results.result import Diagnosis
 from diagnosis.setup.baselines import check_baselines
 from diagnosis.setup.plausibility import check_plausible

@@ -162,7 +162,7 @@ def _prove_real(name: str, output: Path, jobs: int) -> None:
     for finding in result["findings"]:
         console.out.print(f"{finding['grade']}: {finding['title']} ({finding['probability']:.2f})")
     console.table(f"{name}: {result['verdict'].replace('_', ' ')}", ["", "", "limit", ""], rows_of(result))
-    console.out.print(f"wrote {output / RESULT}, report, correction and FMU beside it")
+    console.out.print(f"wrote {output / RESULT}, report, correction and FMU next to it")
 
 
 def _dashed(name: str) -> str:

@@ -68,7 +68,7 @@ def overall(errors: dict[str, float], without: Collection[str] = ()) -> float:
 def _read(
     fmu: Path, correction: Correction, run: PredictedRun, recording: Recording, starts_at: float
 ) -> dict[str, Array]:
-    """What the sensors read of the FMU at the rows of a run, by channel."""
+    """Readings of the FMU by the sensors at the rows of a run, by channel."""
     begin = float(run.time[0])
     rows = (recording.time >= begin - 1e-6) & (recording.time <= run.time[-1] + 1e-6)
     cycle = Cycle(recording.time[rows] - begin, {name: values[rows] for name, values in recording.inputs.items()})

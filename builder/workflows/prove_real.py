@@ -116,12 +116,12 @@ def data_file(name: str) -> Path:
     InputError
         If it is in neither, as of a program installed from a wheel.
     """
-    beside = Path(str(resources.files("builder"))).parent
-    for folder in (beside / DATA, Path.cwd() / DATA):
+    root = Path(str(resources.files("builder"))).parent
+    for folder in (root / DATA, Path.cwd() / DATA):
         if (folder / name).is_file():
             return folder / name
     raise InputError(
-        f"{DATA / name}: is neither beside the program ({beside}) nor in the current folder; an installed program has "
+        f"{DATA / name}: is neither next to the program ({root}) nor in the current folder; an installed program has "
         "no recordings: get the source of the project and run the command in its folder"
     )
 
@@ -129,7 +129,7 @@ def data_file(name: str) -> Path:
 def result_of(
     plant: RealPlant, found: Diagnosis, errors: Mapping[str, dict[str, float]], seconds: float
 ) -> dict[str, Any]:
-    """What ``real.json`` holds.
+    """The content of ``real.json``.
 
     Parameters
     ----------

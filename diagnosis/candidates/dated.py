@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,7 @@ from diagnosis.candidates.hypotheses import How, Hypothesis, hypothesis_of
 from models.base.types import Array
 from models.mechanisms import Placed
 from models.mechanisms.forms import EDGE_S, steps
-from models.network.laws import Parameter, symbol
+from models.network.laws import Parameter, renamed, symbol
 
 HOUR_S = 3600.0
 LINEAR_S, SETTLING_S = 20.0 * HOUR_S, 3.0 * HOUR_S  # of the courses over the hours
@@ -67,7 +68,7 @@ class Course:
         Of the name of a law that has it
     how : str
         Family of hypotheses
-    says : str
+    sentence : str
         Sentence that comes before the one of the law
     parameters : tuple of Parameter
         By local names
@@ -78,13 +79,18 @@ class Course:
 
     ending: str
     how: How
-    says: str
+    sentence: str
     parameters: tuple[Parameter, ...]
     variants: Array
     law: sp.Expr
 
+    @cached_property
+    def along(self) -> sp.Expr:
+        """The law in a recording that begins at :data:`START`."""
+        return self.law.xreplace({NOW: symbol("time") + symbol(START)})
 
-NOW = symbol("now")
+
+NOW, START = symbol("now"), "start"
 
 
 def step(axis: Axis, *, slow: bool = True) -> Course:
@@ -93,7 +99,7 @@ def step(axis: Axis, *, slow: bool = True) -> Course:
     rises = axis.distance * np.array(RISES)
     at_once, slowly = _products(axis.dates, [axis.edge_s]), _products([0.0, *axis.dates[::2]], rises)
     return Course(
-        ending=STEP, how="D", says="From a date on",
+        ending=STEP, how="D", sentence="From a date on",
         parameters=(axis.moment("since"), _span("within", axis.edge_s, rises[-1])),
         variants=np.concatenate([at_once, slowly]) if slow else at_once,
         law=sp.Min(sp.Max((NOW - since) / rise, 0), 1),
@@ -105,7 +111,7 @@ def for_a_while(axis: Axis) -> Course:
     since, length = symbol("since"), symbol("lasting")
     lengths = axis.distance * np.array(LENGTHS)
     return Course(
-        ending=WHILE, how="D", says="From one date to another",
+        ending=WHILE, how="D", sentence="From one date to another",
         parameters=(axis.moment("since"), _span("lasting", *lengths)), variants=_products(axis.dates[::2], lengths),
         law=steps(NOW, at=since, width=0.5 * axis.edge_s) - steps(NOW, at=since + length, width=0.5 * axis.edge_s),
     )  # fmt: skip
@@ -120,7 +126,7 @@ def over_hours(axis: Axis) -> Course:
     )  # fmt: skip
     decay = sp.exp(-NOW / SETTLING_S)
     return Course(
-        ending=HOURS, how="W", says="Slowly over the hours", parameters=parameters, variants=np.eye(3),
+        ending=HOURS, how="W", sentence="Slowly over the hours", parameters=parameters, variants=np.eye(3),
         law=linear * NOW / max(LINEAR_S, axis.end) + settling * (1 - decay) + fading * decay,
     )  # fmt: skip
 
@@ -156,16 +162,14 @@ def changing(placed: Placed, course: Course, axis: Axis, *, sd: float | None = N
     term, clock = _renamed(placed, label), _clock(label, axis)
     strength, *shapes = term.parameters
     added = tuple(replace(p, name=f"{label}_{p.name}") for p in course.parameters)
-    local = {symbol(p.name): symbol(f"{label}_{p.name}") for p in course.parameters}
-    along = course.law.xreplace(local | {NOW: symbol("time") + symbol(clock.name)})
+    along = renamed(course.along, {p.name: f"{label}_{p.name}" for p in course.parameters} | {START: clock.name})
     mechanism = placed.mechanism
-    says = f"{course.says}: {mechanism.says[:1].lower()}{mechanism.says[1:]}"
+    says = f"{course.sentence}: {mechanism.says[:1].lower()}{mechanism.says[1:]}"
     name = f"{base_name(placed)}_{course.ending}"
-    shown = term.written["law"] * course.law.xreplace({NOW: symbol("time") + symbol("start")})
     term = replace(
         term,
         mechanism=replace(mechanism, name=name, says=says),
-        written={**term.written, "law": shown},
+        written={**term.written, "law": term.written["law"] * course.along},
         expression=term.expression * along,
         parameters=(replace(strength, sd=sd or strength.sd), *shapes, *added, clock),
     )
@@ -188,7 +192,7 @@ def carried_on(placed: Placed, axis: Axis) -> Hypothesis:
     term, clock, base = _renamed(placed, label), _clock(label, axis), hypothesis_of(placed)
     now = {symbol("time"): symbol("time") + symbol(clock.name)}
     other = term.boundary_temperature
-    written = {symbol("time"): symbol("time") + symbol("start")}
+    written = {symbol("time"): symbol("time") + symbol(START)}
     term = replace(
         term, expression=term.expression.xreplace(now),
         boundary_temperature=None if other is None else other.xreplace(now),
@@ -219,24 +223,24 @@ def _renamed(placed: Placed, label: str) -> Placed:
     if placed.boundary_temperature is not None:
         end = placed.target[-1]
         names |= {end: new(end), f"T_{end}": f"T_{new(end)}"}
-    own = {symbol(old): symbol(name) for old, name in names.items()}
     other = placed.boundary_temperature
     return replace(
         placed, label=label, target=tuple(names.get(one, one) for one in placed.target),
         written={" ".join(names.get(word, word) for word in key.split()): law for key, law in placed.written.items()},
-        expression=placed.expression.xreplace(own), boundary_temperature=None if other is None else other.xreplace(own),
+        expression=renamed(placed.expression, names),
+        boundary_temperature=None if other is None else renamed(other, names),
         parameters=tuple(replace(p, name=names[p.name]) for p in placed.parameters),
         states=tuple(
-            replace(s, name=names[s.name], rate=s.rate.xreplace(own),
-                    update=None if s.update is None else s.update.xreplace(own),
-                    averaged_update=None if s.averaged_update is None else s.averaged_update.xreplace(own))
+            replace(s, name=names[s.name], rate=renamed(s.rate, names),
+                    update=None if s.update is None else renamed(s.update, names),
+                    averaged_update=None if s.averaged_update is None else renamed(s.averaged_update, names))
             for s in placed.states
         ),
     )  # fmt: skip
 
 
 def base_name(placed: Placed) -> str:
-    """Name of a law without the ending that says it differs from its nominal value."""
+    """Name of a law without the ending for a difference from its nominal value."""
     for ending in CHANGED:
         if placed.name.endswith(ending):
             return placed.name.removesuffix(ending)

@@ -197,7 +197,7 @@ def _faults(point: Point, variants: Array, on_grid: TermOnGrid) -> Array:
 
 
 def _finite(heat: Array) -> Array:
-    """A heat without what a law cannot tell, as a factor on a link that another effect has cut off."""
+    """A heat without values that are no numbers, as of a factor on a link that another effect has cut off."""
     return heat if np.isfinite(heat.sum()) else np.nan_to_num(heat, nan=0.0, posinf=0.0, neginf=0.0)
 
 
@@ -298,7 +298,7 @@ def refit(fit: Fit, candidate: Hypothesis, variant: int, strength: float, *, ite
     if not rough:
         raise ArithmeticError(f"no simulation has a solution with {candidate.label}")
     best = min(rough, key=lambda one: one.objective)
-    return experiment.fit(best.z, [part.point.trajectory for part in best.parts], iterations=iterations - ROUGH)
+    return experiment.fit(best.z, iterations=iterations - ROUGH, at=best.linearised)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

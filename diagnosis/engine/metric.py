@@ -1,4 +1,4 @@
-r"""The metric in which residuals are judged: noise, and what is marginalised beside it.
+r"""The metric in which residuals are judged: noise, and what is marginalised with it.
 
 Model error :math:`N n` with :math:`n \sim N(0, 1)` in units of its amplitudes is marginalised exactly in the linearised
 readings; so are deviations :math:`s [J, N]` of every test session from the values that all sessions share. With
@@ -125,7 +125,7 @@ def leading_directions(products: Array, most: int = MOST_DIRECTIONS) -> Array:
     Returns
     -------
     Array, shape (n, k)
-        Columns times this have the prior N(0, 1) again; what is left out is far below the noise
+        Columns times this have the prior N(0, 1) again; directions that are left out are far below the noise
     """
     values, vectors = eigh(products)
     chosen = np.flatnonzero(values > LEAST_DIRECTION)[-most:]

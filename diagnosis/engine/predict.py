@@ -15,10 +15,10 @@ from diagnosis.engine.point import Setting
 from diagnosis.forward.grid import Piece, stands_for
 from diagnosis.forward.observation import reading_columns
 from diagnosis.forward.trajectory import ROUNDS, Trajectory, complete_start, free_running, simulate
+from diagnosis.setup.inference_setup import START_S
 from models.base.types import Array
 from models.quantities.quantities import is_total_loss
 
-START_S = 600.0
 LEFT_ALONE_SD_K = 2.0
 START_ROUNDS, START_SETTLED_K = 3, 0.01
 SETTLED_K, MOST_ROUNDS = 0.02, 30  # thick oil at a cold start takes many rounds

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from dataclasses import replace
 
-import numpy as np
-
 from diagnosis.engine.fit import Experiment
 from diagnosis.engine.point import Machine
 from diagnosis.engine.unknown import (
@@ -22,21 +20,10 @@ from diagnosis.engine.unknown import (
     Unknown,
 )
 from diagnosis.forward.grid import slow_rows
-from diagnosis.inference.unknowns import (
-    AMBIENT_ASSUMED_SD_K,
-    AMBIENT_SD_K,
-    BIAS_SD_K,
-    LAG_S,
-    LAG_SD,
-    LOSS_DELAY_ROWS,
-    LOSS_GAIN_SD,
-    LOSS_OFFSET_SD_W,
-    SHORTEST_LAG_S,
-    TORQUE_GAIN_SD,
-)
 from diagnosis.recordings.recording import Recording
 from diagnosis.setup.baselines import session_by_recording
-from diagnosis.setup.inference_setup import CAPACITY_SD, InferenceSetup, prepare
+from diagnosis.setup.inference_setup import InferenceSetup, prepare
+from diagnosis.setup.noise import start_guess
 from diagnosis.setup.shaft import torque_gain
 from diagnosis.setup.time_axis import start_times
 from models.assembly.gearbox import Gearbox
@@ -44,6 +31,13 @@ from models.network.laws import Parameter
 from models.quantities.quantities import TOTAL_LOSS, is_total_loss
 from models.simulation.thermal_network import ThermalNetwork
 
+BIAS_SD_K, LOSS_OFFSET_SD_W, LOSS_GAIN_SD = 0.3, 2.0, 0.02
+LOSS_DELAY_ROWS = 0.5  # a row may be the mean of the time before its stamp, of that after it, or a moment
+LAG_S, LAG_SD = 15.0, 0.8  # of its logarithm: a sensor's lag is that of its seat, not of its data sheet
+SHORTEST_LAG_S = 3.0
+TORQUE_GAIN_SD, AMBIENT_SD_K = 0.01, 0.3
+AMBIENT_ASSUMED_SD_K = 4.0  # of a hall whose temperature nobody recorded
+CAPACITY_SD = 0.3  # at least: one temperature represents a body that has many
 WIDEST = 1e6
 
 
@@ -77,22 +71,16 @@ def prepare_experiment(
     experiment : Experiment
     """
     setup = prepare(gearbox, recordings, holdout, baseline, even=even)
-    everything = (*recordings, *baseline)
-    model, old = setup.train.model, setup.train
-    stated = {c.name: c for r in everything for c in r.channels}
-    steps = np.array([(stated[name].resolution or 0.0) if name in stated else 0.0 for name in setup.channels])
-    # A display that rounds is off by up to half a step, however many rows are averaged while it stands still.
-    noise = tuple(replace(n, floor_sd=np.maximum(n.floor_sd, steps / np.sqrt(12.0))) for n in old.noise)
     unknowns = usual_unknowns(
-        model.network, everything, setup.channels, interval=setup.scale.interval,
+        setup.model.network, (*recordings, *baseline), setup.channels, interval=setup.scale.interval,
         gain_of_torque=torque_gain(gearbox.network()),
     )  # fmt: skip
     return setup, Experiment(
-        machine=Machine(model),
-        pieces=tuple(old.pieces),
+        machine=Machine(setup.model),
+        pieces=setup.learnt,
         unknowns=tuple(unknowns),
-        noise=noise,
-        starts=tuple(old.starts),
+        noise=tuple(setup.noise_in(piece) for piece in setup.learnt),
+        starts=tuple(start_guess(setup.model, piece) for piece in setup.learnt),
         session_of=session_by_recording(recordings, holdout, baseline),
         healthy=frozenset(r.name for r in baseline),
         switched_off=frozenset(switched_off),
@@ -109,12 +97,15 @@ def held_out_experiment(setup: InferenceSetup, experiment: Experiment) -> Experi
         Of the same recordings, see :func:`prepare_experiment`
     experiment : Experiment
     """
-    held, floor = setup.holdout, experiment.noise[0].floor_sd
-    noise = tuple(replace(n, floor_sd=np.maximum(n.floor_sd, floor)) for n in held.noise)
+    pieces = setup.held_out
     return replace(
-        experiment, pieces=tuple(held.pieces), noise=noise, starts=tuple(held.starts), filters=None,
+        experiment,
+        pieces=pieces,
+        noise=tuple(setup.noise_in(piece) for piece in pieces),
+        starts=tuple(start_guess(setup.model, piece) for piece in pieces),
+        filters=None,
         healthy=frozenset(),
-    )  # fmt: skip
+    )
 
 
 def usual_unknowns(

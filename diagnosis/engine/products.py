@@ -27,7 +27,7 @@ def whitened_base(parts: Sequence[Linear], z: Array, error: Sequence[Array] = ()
 
 
 def base_of(fit: Fit) -> list[Array]:
-    """The same of a fit, with the model error of its metric."""
+    """Inner products of a fit, with the model error of its metric."""
     metric = fit.experiment.metric
     return whitened_base(fit.parts, fit.z, () if metric is None else metric.shared)
 

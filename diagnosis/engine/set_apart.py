@@ -89,7 +89,7 @@ def calibrate_without_error(fit: Fit, plain: Fit, apart: Collection[str] = ()) -
     fit : Fit
         With model error in its metric
     plain : Fit
-        The nominal machine so calibrated: where the search for its unknowns begins
+        The nominal machine so calibrated: a second start of the search, because there may be several basins
     apart : collection of str
         Channels that do not count; what describes their sensors stays as it is
 
@@ -101,15 +101,26 @@ def calibrate_without_error(fit: Fit, plain: Fit, apart: Collection[str] = ()) -
     every = replace(fit.experiment, filters=None, metric=None)
     counting = without_channels(every, apart) if apart else every
     usual = zip(every.unknowns, plain.experiment.unknowns, plain.z.tolist(), strict=False)
-    z = fit.z.copy()
-    z[: len(plain.z)] = [mine.z_of(own.value(there)) for mine, own, there in usual]
-    first = counting.fit(z, _courses(fit), iterations=FIRST_ITERATIONS)
-    found = counting.with_filters(first.parts).fit(first.z, _courses(first))
+    nominal = fit.z.copy()
+    nominal[: len(plain.z)] = [mine.z_of(own.value(there)) for mine, own, there in usual]
+    reached = [one for start in (fit.z, nominal) if (one := _calibrated_from(counting, start, fit)) is not None]
+    if not reached:
+        raise ArithmeticError("the simulation has no solution without model error")
+    found = max(reached, key=lambda one: one.log_evidence)
     if not apart:
         return found
     terms = {term.label: term for term in every.machine.terms}
     own = [_describes(unknown, terms, apart) for unknown in every.unknowns]
     return every.fit(np.where(own, fit.z, found.z), _courses(found), iterations=0)
+
+
+def _calibrated_from(experiment: Experiment, z: Array, near: Fit) -> Fit | None:
+    """The fit that a start leads to; None without a solution."""
+    try:
+        first = experiment.fit(z, _courses(near), iterations=FIRST_ITERATIONS)
+        return experiment.with_filters(first.parts).fit(first.z, _courses(first))
+    except (ArithmeticError, np.linalg.LinAlgError):
+        return None
 
 
 def _describes(unknown: Unknown, terms: Mapping[str, Term], channels: Collection[str]) -> bool:

@@ -72,8 +72,8 @@ def reading_columns(
     read = np.empty((len(T), len(sensors.channels), T.shape[-1]))
     for index, name in enumerate(sensors.channels):
         if is_total_loss(name):
-            middle = 0.5 * (T[1:] + T[:-1])
-            loss = np.einsum("kn,knc->kc", trajectory.loss_slope, middle) + direct_loss
+            slope = 0.5 * trajectory.loss_slope[:, None, :]
+            loss = (slope @ T[1:] + slope @ T[:-1])[:, 0] + direct_loss
             read[:, index] = total_at_points(loss) * sensors.loss_gain
         else:
             read[:, index] = lagged(T[:, model.part_index(name)], trajectory.piece.steps, sensors.lag[index])
@@ -96,10 +96,3 @@ def delay_column(trajectory: Trajectory, delay: float) -> Array:
     step = 1.0
     later, earlier = (delayed_loss(trajectory, delay + way * step) for way in (1.0, -1.0))
     return np.asarray((later - earlier) / (2.0 * step))
-
-
-def lag_column(trajectory: Trajectory, node: int, lag: float) -> Array:
-    """Change of a reading per second of lag, shape (K + 1,), [K/s]."""
-    step = 0.5
-    T, steps = trajectory.T[:, node], trajectory.piece.steps
-    return np.asarray((lagged(T, steps, lag + step) - lagged(T, steps, lag)) / step)

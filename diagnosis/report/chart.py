@@ -59,7 +59,7 @@ class Chart:
     title, x_label, y_label : str
         Labels carry the unit
     note : str
-        Said beside the title
+        Text next to the title
     curves : tuple of Curve
     shade : tuple of (from, to)
         Stretches of the x axis that are set back

@@ -1,24 +1,23 @@
-"""The charts of a diagnosis: courses of every sensor, their errors, and the missing heat."""
+"""The charts of a diagnosis: courses of every sensor, their errors, and heats of findings."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from markupsafe import Markup
 
+from diagnosis.engine.predict import rmse
 from diagnosis.forward.grid import stands_for
-from diagnosis.inference.predict import rmse
 from diagnosis.report.chart import Chart, Curve, averaged, drawn
 from diagnosis.report.wording import LOSS, name, time_scale
 from diagnosis.results.number_format import fixed
 from diagnosis.results.result import Diagnosis
-from diagnosis.results.result_parts import Finding, MissingHeat, PredictedRun
+from diagnosis.results.result_parts import Finding, PredictedRun
 from models.base.types import Array
 
-STAGES = (("as delivered", "before"), ("calibrated", "calibrated"), ("with what was found", "after"))
+STAGES = (("as delivered", "before"), ("calibrated", "calibrated"), ("with the findings", "after"))
 SENSOR_PX, ERROR_PX, INPUT_PX = 190, 120, 90
 ERROR_POINTS = 240
 BAND_SD = 2.0
@@ -107,7 +106,7 @@ def _panel(course: PredictedRun, title: str, noise: float, *, shows_after: bool)
 
 
 def found_heat(finding: Finding) -> list[Markup]:
-    """The heat of what was found over time, by recording."""
+    """The heat of a finding over time, by recording."""
     charts = []
     for recording, (time, heat) in finding.heat.items():
         seconds, symbol = time_scale(_end(time))
@@ -115,60 +114,3 @@ def found_heat(finding: Finding) -> list[Markup]:
         charts.append(drawn(Chart(title=recording, x_label=f"Time in {symbol}", y_label="Heat in W", curves=(curve,),
                                   height=ERROR_PX, level=True)))  # fmt: skip
     return charts
-
-
-@dataclass(frozen=True, kw_only=True)
-class HeatPanel:
-    """The missing heat of one node: over time, and against the operating point."""
-
-    node: str
-    has_law: bool
-    over_time: tuple[Markup, ...]
-    against: tuple[Markup, ...]
-
-
-def missing_heat(diagnosis: Diagnosis) -> list[HeatPanel]:
-    """Missing heat by node, in the order of the diagnosis."""
-    nodes = dict.fromkeys(heat.node for heat in diagnosis.missing_heat)
-    return [_heat(node, [heat for heat in diagnosis.missing_heat if heat.node == node]) for node in nodes]
-
-
-def _heat(node: str, heats: Sequence[MissingHeat]) -> HeatPanel:
-    quantities = (
-        ("Against speed", "Speed of the input shaft in 1/min", "speed"),
-        ("Against torque", "Torque at the input shaft in N m", "torque"),
-        ("Against temperature", f"Temperature of {name(node)} in °C", "temperature"),
-    )
-    against = []
-    for title, label, attribute in quantities:
-        x = np.concatenate([getattr(heat, attribute) for heat in heats])
-        if not np.any(x):  # a machine without a shaft
-            continue
-        curves = [Curve(label="missing heat", look="missing", x=x, y=np.concatenate([h.mean for h in heats]),
-                        kind="points")]  # fmt: skip
-        if any(heat.law is not None for heat in heats):
-            law = np.concatenate([np.full(len(h.time), np.nan) if h.law is None else h.law for h in heats])
-            curves.append(Curve(label="law that was found", look="law", x=x, y=law, kind="points"))
-        against.append(drawn(Chart(title=title, x_label=label, y_label="Heat in W", curves=tuple(curves), level=True)))
-    return HeatPanel(
-        node=node,
-        has_law=any(heat.law is not None for heat in heats),
-        over_time=tuple(_over_time(heats)),
-        against=tuple(against),
-    )
-
-
-def _over_time(heats: Sequence[MissingHeat]) -> Iterator[Markup]:
-    for heat in heats:
-        seconds, symbol = time_scale(_end(heat.time))
-        time = heat.time / seconds
-        curves = [
-            Curve(label="95 % band", look="missing", x=time, y=heat.mean + BAND_SD * heat.sd,
-                  low=heat.mean - BAND_SD * heat.sd, kind="band"),
-            Curve(label="missing heat", look="missing", x=time, y=heat.mean),
-        ]  # fmt: skip
-        if heat.law is not None:
-            curves.append(Curve(label="law that was found", look="law", x=time, y=heat.law))
-        span = (float(time[0]), float(time[-1])) if len(time) > 1 else None
-        yield drawn(Chart(title=heat.recording, x_label=f"Time in {symbol}", y_label="Heat in W", x_range=span,
-                          curves=tuple(curves), level=True))  # fmt: skip

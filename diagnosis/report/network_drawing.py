@@ -24,12 +24,12 @@ UNITS = 1000
 
 @dataclass(frozen=True, kw_only=True)
 class Marks:
-    """What a drawing points out.
+    """Highlights of a drawing.
 
     Attributes
     ----------
     nodes, links : mapping of str to (str, float)
-        Name to what is said about it, and its probability
+        Name to a text about it, and its probability
     names : mapping of str to str
         Nodes that are called otherwise than in the network
     """
@@ -43,14 +43,14 @@ class Marks:
         return name(self.names.get(node, node))
 
     def told(self, network: ThermalNetwork) -> list[tuple[str, str, float]]:
-        """Parts, what is said about them, and its probability."""
+        """Parts, the text about them, and its probability."""
         parts = [(self.called(node), *said) for node, said in self.nodes.items()]
         ends = {link.name: " to ".join(map(self.called, link.nodes)) for link in network.links}
         return parts + [(f"path from {ends[link]}", *said) for link, said in self.links.items()]
 
 
 def corrected(diagnosis: Diagnosis) -> ThermalNetwork:
-    """The network with what was found; faults of instruments leave it as it is."""
+    """The network with the findings; faults of instruments leave it as it is."""
     network = diagnosis.network
     for finding in diagnosis.findings:
         if finding.term is not None:
@@ -146,7 +146,7 @@ def _targets(finding: Finding) -> tuple[str, ...]:
 
 
 def _meant(network: ThermalNetwork, target: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Nodes and links that a name stands for: of a node, a group, a loss, or a link."""
+    """Nodes and links that a name denotes: of a node, a group, a loss, or a link."""
     if target in network.node_names:
         return (target,), ()
     if target in network.groups:

@@ -1,4 +1,4 @@
-"""The page: everything a diagnosis says, put into the template."""
+"""The page: everything that a diagnosis contains, put into the template."""
 
 from __future__ import annotations
 
@@ -34,7 +34,6 @@ def page(diagnosis: Diagnosis) -> str:
         clause=wording.clause,
         plain=wording.plain,
     )
-    with_law = {heat.node for heat in diagnosis.missing_heat if heat.law is not None}
     marked = network_drawing.marks(diagnosis)
     measured = {channel for course in diagnosis.courses for channel in course.measured}
     return environment.from_string(_text("report.html.j2")).render(
@@ -45,13 +44,12 @@ def page(diagnosis: Diagnosis) -> str:
         verdict_text=diagnosis.verdict_text,
         claims=diagnosis.verdict not in NO_CLAIM,
         evidence=_evidence(diagnosis),
-        findings=[_finding(finding, with_law) for finding in diagnosis.findings],
+        findings=[_finding(finding) for finding in diagnosis.findings],
         stages=figures.STAGES if diagnosis.findings else figures.STAGES[:2],
         network=network_drawing.drawn(network_drawing.corrected(diagnosis), diagnosis.network, measured, marked),
         told=marked.told(network_drawing.corrected(diagnosis)),
         fits=[("Held out", _rows(diagnosis.holdout)), ("Learned from", _rows(diagnosis.train))],
         panels=figures.courses(diagnosis),
-        heats=figures.missing_heat(diagnosis),
         has_noise=diagnosis.noise_K > 0.0,
         calibration=[_calibrated(diagnosis, one) for one in sorted(diagnosis.calibration, key=_unmoved)],
         ranking=diagnosis.ranking[:MOST_RANKS],
@@ -69,7 +67,7 @@ def _text(file: str) -> str:
 
 
 def _evidence(diagnosis: Diagnosis) -> dict[str, Any] | None:
-    """Evidence and threshold, and where both are on a bar; None where nothing was tested."""
+    """Evidence and threshold, and where both are on a bar; None if nothing was tested."""
     found, needed = diagnosis.log_e_value, diagnosis.threshold
     if not (math.isfinite(found) and math.isfinite(needed)):
         return None
@@ -81,8 +79,8 @@ def _evidence(diagnosis: Diagnosis) -> dict[str, Any] | None:
     }
 
 
-def _finding(finding: Finding, shown: set[str]) -> dict[str, Any]:
-    """What the template needs; `shown`: nodes whose found heat is drawn with the missing one."""
+def _finding(finding: Finding) -> dict[str, Any]:
+    """A finding as the template needs it."""
     prefix = f"{finding.term.label}_" if finding.term is not None else ""
     return {
         "of": finding,
@@ -96,7 +94,7 @@ def _finding(finding: Finding, shown: set[str]) -> dict[str, Any]:
             for p in finding.parameters
         ],
         "rivals": [rival for rival in finding.confusable_with if rival.probability >= LEAST_RIVAL],
-        "heat": figures.found_heat(finding) if finding.node not in shown else [],
+        "heat": figures.found_heat(finding),
     }
 
 

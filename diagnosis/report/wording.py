@@ -24,19 +24,19 @@ WORDS: Mapping[str, str] = {
     "as delivered": "The model as its definition has it, before any recording was seen.",
     "calibrated": "The same model with its existing parameters tuned to the recordings, each inside its prior. What a "
     "correction is worth counts against this, not against the model as delivered.",
-    "with what was found": "The calibrated model with the found physics added.",
+    "with the findings": "The calibrated model with the found physics added.",
     "held out": "Recordings that nothing was fitted to: their error is that of a model that got their inputs and no "
-    "measured temperature beyond the first minutes, which do not count. They had no say in what was found.",
+    "measured temperature beyond the first minutes, which do not count. They had no say in the findings.",
     "free-running": "Simulated from the start temperatures on with the recorded inputs alone, never corrected by a "
     "measurement on the way.",
     "RMSE": "Root mean square of simulated less measured: the typical size of the error.",
     "probability": "Share of the belief among all explanations that were compared, weighed before by how usual each "
-    "is; not the chance that a thing of this name is in the gearbox if the true cause is none of them.",
+    "is; not the chance that a thing of this name is in the gearbox if the true cause is not among them.",
     "evidence": "Natural logarithm of how many times better the data are predicted with the effect than without it, "
     "averaged over all values of all parameters (log Bayes factor), in nat: 1 nat is a factor of 2.7, 5 nat are 150, "
     "10 nat are 22 000.",
     "claim": "A name that is certain enough: its probability reached the limit that was asked for.",
-    "likely": "Less than a claim: one of at most three names that these data do not tell apart, or a law and a place "
+    "likely": "Less than a claim: one of at most three names that these data cannot separate, or a law and a place "
     "whose cause was not found (acts like ...). It improves the prediction all the same.",
     "cannot be seen": "Of an effect at the size that matters these recordings would give evidence of less than 5 nat: "
     "whether it is there or not, they look the same.",
@@ -47,14 +47,11 @@ WORDS: Mapping[str, str] = {
     "p": "Nominal bound on the chance to reach this evidence although nothing is missing.",
     "standard error": "68 % of such estimates lie within ± this of the truth, if the form of the law is right.",
     "prior": "What the definition states about a parameter before any recording: a value, and how far off it may be.",
-    "shift": "How far the calibration moved a parameter, in standard deviations of its prior. Beyond ±2 it is in "
-    "distress: something else probably pulls at it.",
+    "shift": "How far the calibration moved a parameter, in standard deviations of its prior. Beyond ±2 "
+    "something else probably pulls at it.",
     "noise": "Scatter of a temperature reading from row to row; no model can be closer to single rows than this.",
     "floor": "Random heat that even a model without faults is granted, because a real gearbox is finer than any "
     "network of few nodes; mismatches below it are not claimed.",
-    "missing heat": "Heat that the calibrated model would need at this place to follow the recordings; negative where "
-    "it has too much. Tuning the parameters swallows part of an effect that is missing, so the law that was found may "
-    "be larger.",
     "not ruled out": "Explanations that these data leave possible, with their probabilities.",
 }
 
@@ -190,7 +187,7 @@ def windows(when: Sequence[tuple[str, float, float]]) -> list[tuple[str, str]]:
     >>> windows([("a", 0.0, 3600.0), ("a", 32400.0, 64800.0), ("b", 0.0, 90.0)])
     [('a', '0.0 to 1.0, 9.0 to 18.0 h'), ('b', '0 to 90 s')]
 
-    Of many the longest are told.
+    Of many the longest are given.
     """
     told = []
     for recording in dict.fromkeys(name for name, _, _ in when):

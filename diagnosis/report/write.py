@@ -27,7 +27,7 @@ def names_of_files(recordings: Sequence[Recording]) -> tuple[str, ...]:
 
 
 def correction_of(diagnosis: Diagnosis, gearbox: Gearbox) -> Correction:
-    """What a diagnosis found as a correction of the definition: the model that predicts, and how it was recorded."""
+    """A diagnosis as a correction of the definition: the model that predicts, and how it was recorded."""
     nominal = {p.name: p for p in gearbox.network().parameters}
     calibrated = {c.parameter: c for c in diagnosis.calibration}
     findings = [_finding_of(term, diagnosis) for term in diagnosis.terms]

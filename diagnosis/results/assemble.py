@@ -1,437 +1,412 @@
-"""From what the search found to the result: places, findings, fits, courses, and what to do next."""
+"""From posterior and answers to the result: verdict, places, findings, fits, courses, and what to do next."""
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from diagnosis.candidates.explain import Explanation
-from diagnosis.candidates.heat import heats_of
-from diagnosis.candidates.hypotheses import Hypothesis
-from diagnosis.decision.acceptance import SECOND_GAIN
-from diagnosis.decision.holdout import at_holdout
-from diagnosis.decision.search import Search
-from diagnosis.decision.stage import TEMPER, Stage, log_weights
-from diagnosis.inference.evidence import Marginal
-from diagnosis.inference.latent import LatentHeat, knots_of, latent_heat
-from diagnosis.inference.noise import HEAT_FRACTION, PARAMETRIC_FRACTION, PARAMETRIC_K
-from diagnosis.inference.posterior import Problem
-from diagnosis.inference.predict import Prediction, overall_rmse, predict, rmse
-from diagnosis.inference.shapes import shape_terms
+from diagnosis.decision.posterior import KINDS, Answer, Judged, Posterior
+from diagnosis.decision.settings import Settings
+from diagnosis.engine.fit import Experiment, Fit
+from diagnosis.engine.predict import Prediction, log_score_gain, overall_rmse, predict, rmse, with_pieces_of
+from diagnosis.engine.prepare import held_out_experiment
+from diagnosis.engine.set_apart import calibrate_without_error, without_channels
 from diagnosis.recordings.recording import Recording
-from diagnosis.results.findings import finding_of
-from diagnosis.results.identifiable import scale_notes
+from diagnosis.results.advice import next_test, without_sensor
+from diagnosis.results.answer_findings import finding_of
+from diagnosis.results.effect_values import heats_of, names_of, slope
+from diagnosis.results.instruments import sensors_and_inputs_of
 from diagnosis.results.places import node_in
+from diagnosis.results.ratios_only import ratio_notes
 from diagnosis.results.regime import active, regime, windows
 from diagnosis.results.result import Diagnosis, Verdict
-from diagnosis.results.result_parts import (
-    Calibrated,
-    Finding,
-    Fits,
-    Location,
-    MissingHeat,
-    NotDetectable,
-    PredictedRun,
-    Ranked,
-)
-from diagnosis.setup.inference_setup import FLOORS, InferenceSetup, heat_over_time
+from diagnosis.results.result_parts import Calibrated, Fits, Location, NotDetectable, PredictedRun, Ranked
+from diagnosis.setup.inference_setup import InferenceSetup
+from diagnosis.setup.noise import HEAT_FRACTION, PARAMETRIC_FRACTION, PARAMETRIC_K
 from models.base.parallel import run_parallel
 from models.base.types import Array
 from models.base.version import project_version
-from models.mechanisms import OPEN_FORM, Mechanism
-from models.quantities.quantities import TOTAL_LOSS, is_total_loss
+from models.mechanisms import Mechanism
+from models.quantities.quantities import is_total_loss
+from models.terms.term import Term
 
-ENOUGH_VISIBLE = 0.2  # of the catalogue, for a "consistent" that means something
-REMAINING_W_SHARE = 0.03  # of the typical loss: a smaller remainder is not worth a word
-MOST_MISFIT = 1.0  # noise and structural floor themselves make 0.6 of it in recordings that are explained
-UNEXPLAINED_SHARE = 0.25  # of the evidence that is left when the catalogue has done its best
+VISIBLE_NAT = 5.0  # expected evidence below which an effect cannot be seen
+ENOUGH_VISIBLE = 0.2  # of the effects that were asked for, for a "consistent" that means something
+LEAST_PLACE = 0.02  # probability of a place that is told
+MOST_RANKED = 500
+STATES = ("before", "calibrated", "after")
+PROBABLY = 0.5
+Predictions = Mapping[str, Mapping[str, Sequence[Prediction]]]
 
 
-def assembled(
-    case: InferenceSetup, found: Search, catalogue: Mapping[str, Mechanism], train: Sequence[Recording],
-    holdout: Sequence[Recording], *, false_alarm_rate: float, jobs: int = 1,
-) -> Diagnosis:  # fmt: skip
-    """The result of a search.
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Others:
+    """The machine by all channels but faulty ones.
+
+    Attributes
+    ----------
+    fit : Fit
+        The nominal machine calibrated by them, without model error
+    posterior : Posterior
+    channels : tuple of str
+        The faulty ones
+    """
+
+    fit: Fit
+    posterior: Posterior
+    channels: tuple[str, ...]
+
+
+def assemble(
+    setup: InferenceSetup,
+    experiment: Experiment,
+    posterior: Posterior,
+    answers: Sequence[Answer],
+    *,
+    plain: Fit,
+    others: Others | None = None,
+    settings: Settings,
+    catalogue: Mapping[str, Mechanism],
+    train: Sequence[Recording],
+    held_out: Sequence[Recording],
+    jobs: int = 1,
+    error_asked: Sequence[str] = (),
+) -> Diagnosis:
+    """The result of a decision.
 
     Parameters
     ----------
-    case : InferenceSetup
-    found : Search
+    setup : InferenceSetup
+    experiment : Experiment
+        Of the nominal machine
+    posterior : Posterior
+    answers : sequence of Answer
+        Most important first
+    plain : Fit
+        The nominal machine calibrated without model error
+    others : Others or None
+        What all but faulty channels say, if there are any
+    settings : Settings
     catalogue : mapping of str to Mechanism
-    train, holdout : sequence of Recording
-    false_alarm_rate : float
+    train, held_out : sequence of Recording
     jobs : int
         Processes
+    error_asked : sequence of str
+        Where the data ask for much model error
     """
-    detected = found.detected
-    findings = tuple(finding_of(case, found.final, h, stage, catalogue) for h, stage in found.findings if detected)
-    both = [found.final, found.calibrated] if detected else []
-    remaining, first = run_parallel(_latents, [(case, explanation) for explanation in both], jobs=jobs) or ((), ())
-    unseen = _unseen(found.stages[-1], catalogue, found.threshold)
-    misfit = max(found.final.misfit, found.judge.misfit if detected else 0.0)
-    left = _much_is_left(misfit, first, remaining)
-    verdict = _verdict(found, findings, unseen, left=left, detected=detected, catalogue=catalogue)
-    location = _location(case, found, findings, first) if detected else ()
-    shown = _shown(findings, location)
-    missing = _missing_heat(case, found, remaining if findings else first, shown) if detected else ()
-    predictions = _predictions(case, found, jobs)
-    remaining_p, note = _remaining(found, remaining, case, left=left, misfit=misfit, detected=detected)
+    faulty = () if others is None else others.channels
+    final = _final(answers, plain if others is None else others.fit, faulty)
+    findings = tuple(
+        finding_of(answer, answer.best.fit or final, setup, posterior, catalogue, train) for answer in answers
+    )
+    unseen = _unseen(posterior, catalogue)
+    verdict = _verdict(posterior, answers, unseen)
+    location = _location(setup, posterior) if posterior.detected else ()
+    judged = held_out_experiment(setup, experiment)
+    predictions = _predictions(experiment, judged, plain, final, jobs)
+    terms = _terms(answers, final)
+    sensors, true_inputs = sensors_and_inputs_of(
+        final, findings=[term.label for term in terms], inputs=setup.gearbox.network().inputs
+    )
+    counting = [name for name in setup.channels if name not in faulty]
+    courses = [[p.trajectory.T for p in predictions["holdout"][state]] for state in ("after", "calibrated")]
+    assumed = {name for r in (*train, *held_out) for name in r.assumed}
     return Diagnosis(
         verdict=verdict,
-        gearbox=case.gearbox.name,
-        log_e_value=found.stages[0].log_e_value,
-        threshold=found.threshold,
-        p_value=float(min(1.0, np.exp(-max(found.stages[0].log_e_value, -50.0)))),
-        false_alarm_rate=false_alarm_rate,
+        gearbox=setup.gearbox.name,
+        log_e_value=posterior.log_e,
+        threshold=posterior.threshold,
+        p_value=float(min(1.0, np.exp(-max(posterior.log_e, -50.0)))),
+        false_alarm_rate=settings.false_alarm_rate,
         location=location,
         findings=findings,
-        calibration=_calibration(case, found.final),
-        train=_fits(case, predictions, "train"),
-        holdout=_fits(case, predictions, "holdout"),
-        noise_K=case.noise_K,
-        floor=_floor(case, found),
-        misfit=misfit,
-        remaining_p_value=remaining_p,
-        remaining_note=note,
-        ranking=_ranking(found),
+        calibration=_calibration(final, plain, answers),
+        train=_fits(setup, predictions["train"], counting),
+        holdout=_fits(setup, predictions["holdout"], counting),
+        faulty=faulty,
+        terms=terms,
+        sensors=sensors,
+        true_inputs=true_inputs,
+        starts_at=experiment.starts_at,
+        noise_K=setup.noise_K,
+        floor=_floor(setup),
+        misfit=_misfit(final),
+        remaining_p_value=float(min(1.0, np.exp(-max(posterior.remainder, -50.0)))),
+        remaining_note=_remaining(posterior, others),
+        ranking=_ranking(posterior),
         unseen=unseen,
-        next_test=_next_test(verdict, findings, unseen, catalogue, {i for r in (*train, *holdout) for i in r.assumed}),
-        missing_heat=missing,
-        courses=_courses(case, predictions),
-        network=case.nominal,
-        shapes=shape_terms(case.nominal, case.scale),
+        next_test=next_test(
+            verdict, findings, location, unseen, catalogue, assumed=assumed,
+            free=without_sensor(setup.nominal, setup.channels),
+        ),
+        courses=_courses(setup, predictions),
+        network=setup.nominal,
+        shapes=setup.shapes,
         inputs={
             "recordings": {r.name: r.sha256 for r in train},
-            "held_out": {r.name: r.sha256 for r in holdout},
-            "gearbox": case.gearbox.hash,
+            "held_out": {r.name: r.sha256 for r in held_out},
+            "gearbox": setup.gearbox.hash,
             "version": project_version(),
         },
-        notes=(
-            *scale_notes(found.final),
-            *(f"{r.name}: {note}" for r in (*train, *holdout) for note in r.notes),
-        ),
-    )
+        notes=(*ratio_notes(final), *(f"{r.name}: {note}" for r in (*train, *held_out) for note in r.notes)),
+        kinds={kind: posterior.of(kind) for kind in KINDS},
+        claim_from=settings.claim_from,
+        matters_K=settings.matters_K,
+        matters_W=settings.matters_W,
+        error_class=posterior.error_class,
+        error_evidence=posterior.error_evidence,
+        error_asked=tuple(error_asked),
+        session_s=posterior.session_s,
+        holdout_gain=log_score_gain(final, plain, without_channels(judged, faulty), courses),
+    )  # fmt: skip
 
 
-def _floor(case: InferenceSetup, found: Search) -> str:
-    share, floor = HEAT_FRACTION, found.final.problem.floor
-    text = f"in every part: {'assumed' if floor == FLOORS[0] else 'raised because the remainder asks for it'}"
-    if case.gearbox.is_parametric:  # watts are known but for a common factor
-        share = PARAMETRIC_FRACTION
-        text += f"; of a part of little heat capacity {PARAMETRIC_K * floor:.1f} K"
-    return f"random heat of {100.0 * share * floor:.1f} % of the typical loss ({case.loss_W:.0f} W) {text}"
+def faulty_channels(posterior: Posterior, apart: Sequence[str]) -> tuple[str, ...]:
+    """Channels at odds with all others whose sensors are more probably at fault than not."""
+    return tuple(
+        channel for channel in apart
+        if sum(p for one, p in posterior.ranked
+               if any(e.term is not None and e.term.kind == "sensor" and channel in e.term.target for e in one.effects)
+               ) > PROBABLY
+    )  # fmt: skip
+
+
+def _final(answers: Sequence[Answer], plain: Fit, faulty: Sequence[str]) -> Fit:
+    """The fit that predicts: of the best answer, without model error; else of the machine as calibrated."""
+    first = answers[0].best.fit if answers else None
+    if first is None:
+        return plain
+    try:
+        return calibrate_without_error(first, plain, faulty)
+    except ArithmeticError:  # no solution without what model error allows
+        return first
+
+
+def _terms(answers: Sequence[Answer], final: Fit) -> tuple[Term, ...]:
+    """Terms of the fit that predicts, with its values and standard errors."""
+    found = {}
+    for unknown, z, sd in zip(final.experiment.unknowns, final.z.tolist(),
+                              np.sqrt(np.diag(final.covariance)).tolist(), strict=True):  # fmt: skip
+        found[unknown.parameter.name] = (unknown.value(z), slope(unknown, z) * sd)
+    return tuple(
+        replace(effect.term, parameters=tuple(
+            replace(p, start=found.get(p.name, (p.start, 0.0))[0], sd=found.get(p.name, (p.start, 0.0))[1])
+            for p in effect.term.parameters
+        ))
+        for effect in (answers[0].best.effects if answers and answers[0].best.fit is not None else ())
+        if effect.term is not None
+    )  # fmt: skip
 
 
 # ---------------------------------------------------------------------- verdict
 
 
-def _verdict(
-    found: Search, findings: Sequence[Finding], unseen: Sequence[NotDetectable], *, left: bool, detected: bool,
-    catalogue: Mapping[str, Mechanism],
-) -> Verdict:  # fmt: skip
-    if not detected:
-        physics = {s.hypothesis.name for s in found.stages[-1].scored if s.hypothesis.name in catalogue}
-        visible = 1.0 - len({u.mechanism for u in unseen}) / max(len(physics), 1)
-        return "insufficient_data" if visible < ENOUGH_VISIBLE else "consistent"
-    if not findings:
-        return "unexplained"
-    kinds = {f.kind for f in findings}
-    if left or any(f.family == OPEN_FORM for f in findings):
-        return "unexplained"
-    if kinds <= {"sensor"}:
-        return "sensor_fault"
-    if kinds <= {"parameter", "sensor"}:
+def _verdict(posterior: Posterior, answers: Sequence[Answer], unseen: Sequence[NotDetectable]) -> Verdict:
+    if answers and all(answer.effect.term is None for answer in answers):
         return "parameter_error"
+    if not posterior.detected:
+        asked = {one.effect.name for one in posterior.expected}
+        visible = 1.0 - len({one.mechanism for one in unseen}) / max(len(asked), 1)
+        return "insufficient_data" if asked and visible < ENOUGH_VISIBLE else "consistent"
+    if not answers and posterior.of("nothing") + posterior.of("parameter") > 0.5:
+        return "parameter_error"
+    if not answers or any(answer.best.kind == "outside" or answer.effect.is_open for answer in answers):
+        return "unexplained"
+    terms = [answer.effect.term for answer in answers]
+    if all(term is None or term.of_measurement or term.kind == "sensor" for term in terms):
+        return "sensor_fault"
     return "missing_physics"
 
 
-def _much_is_left(misfit: float, first: Sequence[LatentHeat], remaining: Sequence[LatentHeat]) -> bool:
-    """Whether residuals are too large, or an unknown heat explains them about as well as it explained the whole."""
-    if misfit > MOST_MISFIT:
-        return True
-    before = max((h.log_bayes for h in first), default=0.0)
-    after = max((h.log_bayes for h in remaining), default=0.0)
-    return after > SECOND_GAIN and after > UNEXPLAINED_SHARE * before
+def _unseen(posterior: Posterior, catalogue: Mapping[str, Mechanism]) -> tuple[NotDetectable, ...]:
+    """Mechanisms that would not have been seen at the size that matters, at their best place."""
+    best: dict[str, tuple[float, str]] = {}
+    for one in posterior.expected:
+        name = one.effect.name
+        if name in catalogue and one.log_bayes > best.get(name, (-np.inf, ""))[0]:
+            best[name] = (one.log_bayes, one.effect.place)
+    return tuple(
+        NotDetectable(mechanism=name, place=place, needed=catalogue[name].experiment, expected=reached)
+        for name, (reached, place) in sorted(best.items()) if reached < VISIBLE_NAT
+    )  # fmt: skip
 
 
-def _remaining(
-    found: Search, remaining: Sequence[LatentHeat], case: InferenceSetup, *, left: bool, misfit: float, detected: bool
-) -> tuple[float, str]:
-    last = found.stages[-1]
-    p_value = float(min(1.0, np.exp(-max(last.log_e_value, 0.0)))) if last.accepted is None else float("nan")
-    if not detected:
-        return p_value, ""
-    best = max(remaining, key=lambda h: h.log_bayes)
-    steps = np.concatenate([piece.steps for piece in case.train.pieces])
-    size = float(np.sqrt(np.average(np.concatenate(best.mean) ** 2, weights=steps)))
-    small = size < REMAINING_W_SHARE * case.loss_W and not left
-    notes = []
-    if best.log_bayes >= SECOND_GAIN and not small:
-        notes.append(f"an unknown heat of about {size:.0f} W (rms) in {best.node} would still help")
-    if misfit > MOST_MISFIT:
-        notes.append(f"what is left is {misfit:.2g} times what noise and structural floor allow (mean square)")
-    return p_value, "; ".join(notes) or "nothing that stands out of noise and structural floor"
+def _remaining(posterior: Posterior, others: Others | None) -> str:
+    if not posterior.detected:
+        return ""
+    if others is not None:
+        channels, rest = ", ".join(others.channels), others.posterior
+        if rest.detected:
+            return (f"something else is missing too (evidence {rest.log_e:.0f} nat without {channels}): "
+                    "leave that out of the recordings and diagnose again")  # fmt: skip
+        return f"without {channels} nothing stands out of noise and model error (evidence {rest.log_e:.1f} nat)"
+    if posterior.remainder > posterior.threshold:
+        return f"a further effect would still help (evidence {posterior.remainder:.0f} nat)"
+    return "nothing that stands out of noise and model error"
+
+
+def _misfit(fit: Fit) -> float:
+    """Mean square of the whitened residuals, model error taken into account."""
+    rows = sum(len(part.residual) for part in fit.parts)
+    return float(fit.linearised.products[0, 0]) / max(rows, 1)
+
+
+def _floor(setup: InferenceSetup) -> str:
+    share = HEAT_FRACTION
+    text = f"of the typical loss ({setup.loss_W:.0f} W) in every part"
+    if setup.gearbox.is_parametric:  # watts are known but for a common factor
+        share = PARAMETRIC_FRACTION
+        text += f"; of a part of little heat capacity {PARAMETRIC_K:.1f} K"
+    return f"random heat of {100.0 * share:.1f} % {text}"
 
 
 # ---------------------------------------------------------------------- where
 
 
-def _latents(case: InferenceSetup, explanation: Explanation) -> tuple[LatentHeat, ...]:
-    """Unknown heat in every part, as mechanical loss (where the loss is measured) and not."""
-    marginal, knots = Marginal.of(explanation.fit), knots_of(explanation.problem.pieces)
-    kinds = (True, False) if TOTAL_LOSS in case.channels else (False,)
-    return tuple(
-        latent_heat(explanation.problem.model, explanation.fit, marginal, part.name, loss_W=case.loss_W,
-                    is_loss=is_loss, knots=knots)
-        for part in case.nominal.parts for is_loss in kinds
-    )  # fmt: skip
-
-
-def _location(
-    case: InferenceSetup, found: Search, findings: Sequence[Finding], first: Sequence[LatentHeat]
-) -> tuple[Location, ...]:
-    """Places by probability: of what was found, with its rivals' places; else by the unknown heat alone."""
+def _location(setup: InferenceSetup, posterior: Posterior) -> tuple[Location, ...]:
+    """Places by probability, over everything that was judged; what acts there as the best fit with it has it."""
     weights: dict[str, float] = {}
-    if findings:
-        for _, stage in found.findings:
-            own: dict[str, float] = {}  # rivals exclude one another, findings do not
-            for fit, probability in zip(stage.fits, stage.probabilities(), strict=True):
-                node = node_in(case.nominal, fit.found[-1])
-                own[node] = own.get(node, 0.0) + float(probability)
-            for node, weight in own.items():
-                weights[node] = 1.0 - (1.0 - weights.get(node, 0.0)) * (1.0 - min(weight, 1.0))
-    else:
-        logs = np.array([h.log_bayes for h in first]) / TEMPER
-        for latent, weight in zip(first, np.exp(logs - np.logaddexp.reduce(logs)), strict=True):
-            weights[latent.node] = weights.get(latent.node, 0.0) + float(weight)
-    chosen = sorted(((n, w) for n, w in weights.items() if w >= 0.02), key=lambda item: -item[1])
-    return tuple(_place(case, found, first, node, weight) for node, weight in chosen)
+    best: dict[str, Judged] = {}
+    nodes: dict[str, str] = {}
+    for judged, probability in posterior.ranked:
+        for effect in judged.effects:
+            nodes.setdefault(effect.label, node_in(setup.nominal, effect))
+        for node in {nodes[effect.label] for effect in judged.effects}:
+            weights[node] = weights.get(node, 0.0) + probability
+            if judged.fit is not None:
+                best.setdefault(node, judged)
+    told = sorted(((n, w) for n, w in weights.items() if w >= LEAST_PLACE), key=lambda item: -item[1])
+    return tuple(_place(setup, node, weight, best.get(node), nodes) for node, weight in told)
 
 
-def _place(case: InferenceSetup, found: Search, first: Sequence[LatentHeat], node: str, weight: float) -> Location:
-    own = [h for h in found.final.found if node_in(case.nominal, h) == node]
-    heats = _summed(found.final, own)
-    if not heats:
-        candidates = [h for h in first if h.node == node]
-        if own or not candidates:
-            return Location(node=node, probability=min(weight, 1.0), heat_mean_W=0.0, heat_max_W=0.0, when=(),
-                            regime="always")  # fmt: skip
-        heats = list(max(candidates, key=lambda h: h.log_bayes).mean)
-    parts = found.final.fit.parts
-    together = np.concatenate(heats)
-    T = np.concatenate([p.trajectory.middle[:, p_index(case, node)] for p in parts])
-    inputs = np.concatenate([p.trajectory.piece.inputs for p in parts])
-    hours = np.concatenate([p.trajectory.piece.middle for p in parts]) / 3600.0
-    steps = np.concatenate([p.trajectory.piece.steps for p in parts])
+def _place(
+    setup: InferenceSetup, node: str, weight: float, judged: Judged | None, nodes: Mapping[str, str]
+) -> Location:
+    fit = None if judged is None else judged.fit
+    effects = () if judged is None else judged.effects
+    laws = [] if fit is None else [
+        heats for effect in effects if nodes[effect.label] == node and (heats := heats_of(fit, effect))
+    ]  # fmt: skip
+    if fit is None or not laws:
+        return Location(node=node, probability=min(weight, 1.0), heat_mean_W=0.0, heat_max_W=0.0, when=(),
+                        regime="always")  # fmt: skip
+    heats = [np.sum(values, axis=0) for values in zip(*laws, strict=True)]
+    trajectories = [part.point.trajectory for part in fit.parts]
+    pieces = [trajectory.piece for trajectory in trajectories]
+    together, steps = np.concatenate(heats), np.concatenate([piece.steps for piece in pieces])
+    inputs = np.concatenate([piece.inputs for piece in pieces])
+    signals = {"speed": (np.abs(inputs[:, 0]), "1/min"), "torque": (np.abs(inputs[:, 1]), "N m")}
+    parts = [part.name for part in setup.nominal.parts]
+    if node in parts:
+        T = np.concatenate([trajectory.middle[:, parts.index(node)] for trajectory in trajectories])
+        signals[f"temperature of {node}"] = (T, "degC")
+    signals["time"] = (np.concatenate([piece.middle for piece in pieces]) / 3600.0, "h")
     acting = active(together, steps)
-    signals = {"speed": (np.abs(inputs[:, 0]), "1/min"), "torque": (np.abs(inputs[:, 1]), "N m"),
-               f"temperature of {node}": (T, "degC"), "time": (hours, "h")}  # fmt: skip
-    words = regime(acting, signals, steps)
-    when, before = [], 0
-    for part, heat in zip(parts, heats, strict=True):
-        piece = part.trajectory.piece
-        own_acting = acting[before : before + len(heat)]
-        when += [(piece.recording, a, b) for a, b in windows(piece.middle, own_acting)]
-        before += len(heat)
+    split = np.split(acting, np.cumsum([len(heat) for heat in heats])[:-1])
+    when = [(piece.recording, a, b) for piece, acts in zip(pieces, split, strict=True)
+            for a, b in windows(piece.middle, acts)]  # fmt: skip
     return Location(
         node=node, probability=min(weight, 1.0), heat_mean_W=float(np.average(together, weights=steps)),
-        heat_max_W=float(together[np.argmax(np.abs(together))]), when=tuple(when), regime=words,
+        heat_max_W=float(together[np.argmax(np.abs(together))]), when=tuple(when),
+        regime=regime(acting, signals, steps),
     )  # fmt: skip
-
-
-def _summed(final: Explanation, found: Sequence[Hypothesis]) -> list[Array]:
-    """Heats of several things that were found, together, of every piece, [W]; empty where none of them is a heat."""
-    laws = [heats for h in found if (heats := heats_of(final, h))]
-    return [np.sum(values, axis=0) for values in zip(*laws, strict=True)]
-
-
-def p_index(case: InferenceSetup, node: str) -> int:
-    """Index of a node among the parts; of the first part for one that is none (a boundary, an input)."""
-    names = [part.name for part in case.nominal.parts]
-    return names.index(node) if node in names else 0
-
-
-def _shown(findings: Sequence[Finding], location: Sequence[Location]) -> list[str]:
-    nodes = [f.node for f in findings if f.kind not in ("sensor", "signal")]
-    return list(dict.fromkeys(nodes or [place.node for place in location[:1]]))
-
-
-def _missing_heat(
-    case: InferenceSetup, found: Search, latents: Sequence[LatentHeat], nodes: Sequence[str]
-) -> tuple[MissingHeat, ...]:
-    """What was found, and what an unknown heat would add to it; without findings that heat alone.
-
-    Taken with the parameters of the final explanation: those of the calibration without it have swallowed most of it.
-    """
-    result = []
-    pieces = [part.trajectory.piece for part in found.final.fit.parts]
-    for node in nodes:
-        candidates = [h for h in latents if h.node == node]
-        if not candidates:
-            continue
-        latent = max(candidates, key=lambda h: h.log_bayes)
-        summed = _summed(found.final, [h for h in found.final.found if node_in(case.nominal, h) == node])
-        lacking = [a + b for a, b in zip(summed, latent.mean, strict=True)] if summed else latent.mean
-        mean, sd = heat_over_time(pieces, lacking), heat_over_time(pieces, latent.sd)
-        law = heat_over_time(pieces, summed) if summed else None
-        index = p_index(case, node)
-        T = heat_over_time(pieces, [p.trajectory.middle[:, index] for p in found.final.fit.parts])
-        speed, torque = (heat_over_time(pieces, [np.abs(p.inputs[:, i]) for p in pieces]) for i in (0, 1))
-        result += [
-            MissingHeat(
-                recording=name, node=node, time=time, mean=values, sd=sd[name][1], speed=speed[name][1],
-                torque=torque[name][1], temperature=T[name][1], law=None if law is None else law[name][1],
-            )
-            for name, (time, values) in mean.items()
-        ]  # fmt: skip
-    return tuple(result)
 
 
 # ---------------------------------------------------------------------- fits and courses
 
 
-Predictions = dict[str, dict[str, list[Prediction]]]
-
-
-def _predictions(case: InferenceSetup, found: Search, jobs: int) -> Predictions:
-    """Free-running predictions: as delivered, calibrated and after, of the training and held-out pieces."""
-    problems = {
-        "train": (case.train, found.calibrated.problem, found.final.problem),
-        "holdout": (case.holdout, at_holdout(case, found.calibrated), at_holdout(case, found.final)),
-    }
-    zs = (found.calibrated.fit.z, found.final.fit.z)
-    places = [(name, index) for name, (nominal, *_) in problems.items() for index in range(len(nominal.pieces))]
-    fitted = found.final.fit.without_parts().courses
-    near = {"train": fitted, "holdout": (None,) * len(case.holdout.pieces)}
-    three = run_parallel(
-        _predicted, [(*problems[name], *zs, index, near[name][index]) for name, index in places], jobs=jobs
-    )
+def _predictions(experiment: Experiment, held_out: Experiment, plain: Fit, final: Fit, jobs: int) -> Predictions:
+    """Free-running predictions of the training and the held-out pieces: as delivered, calibrated and after."""
+    places: list[tuple[str, int, Array | None]] = [
+        ("train", i, part.point.trajectory.T) for i, part in enumerate(final.parts)
+    ]
+    places += [("holdout", i, None) for i in range(len(held_out.pieces))]
+    of = {"train": experiment, "holdout": held_out}
+    work = []
+    for name, index, near in places:
+        own = (with_pieces_of(fit.experiment, of[name]) for fit in (plain, final))
+        work.append((*(replace(one, filters=None) for one in own), plain.z, final.z, index, near))
+    three = run_parallel(_predicted, work, jobs=jobs)
     return {
-        name: {state: [them[which] for (one, _), them in zip(places, three, strict=True) if one == name]
-               for which, state in enumerate(("before", "calibrated", "after"))}
-        for name in problems
+        name: {state: [them[which] for (one, *_), them in zip(places, three, strict=True) if one == name]
+               for which, state in enumerate(STATES)}
+        for name in of
     }  # fmt: skip
 
 
 def _predicted(
-    nominal: Problem, calibrated: Problem, final: Problem, z: Array, z_final: Array, index: int, near: Array | None
+    plain: Experiment, final: Experiment, z: Array, z_final: Array, index: int, near: Array | None
 ) -> tuple[Prediction, Prediction, Prediction]:
     """One piece as delivered, calibrated and after; each starts from the one before, or the last from one `near` it."""
-    before = predict(nominal, index, np.zeros(len(nominal.unknowns)), as_delivered=True)
-    tuned = predict(calibrated, index, z, guess=before.trajectory.T)
+    before = predict(plain, index, None)
+    tuned = predict(plain, index, z, guess=before.trajectory.T)
     return before, tuned, predict(final, index, z_final, guess=tuned.trajectory.T if near is None else near)
 
 
-def _fits(case: InferenceSetup, predictions: Predictions, which: str) -> Fits:
-    per_state, overall = {}, {}
-    temperatures = [i for i, name in enumerate(case.channels) if not is_total_loss(name)]
-    for state, predicted in predictions[which].items():
-        nothing = [np.zeros((0, len(case.channels)))]
-        residual = np.concatenate([p.residual for p in predicted] or nothing)
-        per_state[state] = rmse(residual, np.concatenate([p.weights for p in predicted] or [np.zeros(0)]))
-        overall[state] = overall_rmse(predicted, temperatures)
+def _fits(setup: InferenceSetup, predictions: Mapping[str, Sequence[Prediction]], counting: Collection[str]) -> Fits:
+    temperatures = [i for i, name in enumerate(setup.channels) if not is_total_loss(name) and name in counting]
+    nothing = [np.zeros((0, len(setup.channels)))]
+    each = {
+        state: rmse(np.concatenate([p.residual for p in found] or nothing),
+                    np.concatenate([p.weights for p in found] or [np.zeros(0)]))
+        for state, found in predictions.items()
+    }  # fmt: skip
+    overall = {state: overall_rmse(found, temperatures) for state, found in predictions.items()}
     sensors = {
-        name: (float(per_state["before"][i]), float(per_state["calibrated"][i]), float(per_state["after"][i]))
-        for i, name in enumerate(case.channels)
+        name: (float(each["before"][i]), float(each["calibrated"][i]), float(each["after"][i]))
+        for i, name in enumerate(setup.channels)
     }
     return Fits(before=overall["before"], calibrated=overall["calibrated"], after=overall["after"], sensors=sensors)
 
 
-def _courses(case: InferenceSetup, predictions: Predictions) -> tuple[PredictedRun, ...]:
-    result = []
+def _courses(setup: InferenceSetup, predictions: Predictions) -> tuple[PredictedRun, ...]:
+    def by_channel(values: Array) -> dict[str, Array]:
+        return {name: values[:, i] for i, name in enumerate(setup.channels)}
+
+    result, parts = [], [part.name for part in setup.nominal.parts]
     for which, states in predictions.items():
-        for before, calibrated, after in zip(states["before"], states["calibrated"], states["after"], strict=True):
+        for before, calibrated, after in zip(*(states[state] for state in STATES), strict=True):
             piece = before.piece
             at = np.clip(np.arange(len(piece.time)), 0, len(piece.steps) - 1)
+            others = {name: after.trajectory.T[:, i] for i, name in enumerate(parts)}
             result.append(PredictedRun(
                 recording=piece.recording, held_out=which == "holdout", time=piece.time, speed=piece.inputs[at, 0],
-                torque=piece.inputs[at, 1], measured=_by_channel(case, piece.measured),
-                before=_by_channel(case, before.read), calibrated=_by_channel(case, calibrated.read),
-                after={**_unmeasured(case, after), **_by_channel(case, after.read)},
+                torque=piece.inputs[at, 1], measured=by_channel(piece.measured), before=by_channel(before.read),
+                calibrated=by_channel(calibrated.read), after=others | by_channel(after.read),
                 counts_from_s=before.counts_from,
+                start=dict(zip(parts, after.trajectory.T[0].tolist(), strict=True)),
             ))  # fmt: skip
     return tuple(result)
 
 
-def _by_channel(case: InferenceSetup, values: Array) -> dict[str, Array]:
-    return {name: values[:, i] for i, name in enumerate(case.channels)}
-
-
-def _unmeasured(case: InferenceSetup, prediction: Prediction) -> dict[str, Array]:
-    names = [part.name for part in case.nominal.parts]
-    return {name: prediction.trajectory.T[:, i] for i, name in enumerate(names)}
-
-
-def _calibration(case: InferenceSetup, final: Explanation) -> tuple[Calibrated, ...]:
-    """Every parameter, how far it is from its prior as the definition has it: that of one found far off is wider."""
-    stated = {(item.role, item.target): item for item in case.train.unknowns.items}
-    sd = np.sqrt(np.diag(final.fit.covariance))
-    taken = {p.name for h in final.found if h.term is not None for p in h.term.parameters}
-    result = []
-    for index, item in enumerate(final.fit.unknowns.items):
-        if item.target in taken:
+def _calibration(final: Fit, plain: Fit, answers: Sequence[Answer]) -> tuple[Calibrated, ...]:
+    """Every usual parameter, and how far it is from its prior as the definition has it: that of one found is wider."""
+    stated = {unknown.parameter.name: unknown for unknown in plain.experiment.unknowns}
+    found = {name for answer in answers for effect in answer.best.effects if effect.term is not None
+             for name in names_of(effect)}  # fmt: skip
+    sd, result = np.sqrt(np.diag(final.covariance)), []
+    for unknown, z, own in zip(final.experiment.unknowns, final.z.tolist(), sd.tolist(), strict=True):
+        p = unknown.parameter
+        if p.name in found or p.name not in stated:
             continue
-        value, p = item.value(float(final.fit.z[index])), item.parameter
-        per_z = value * p.sd if p.log else p.sd
+        value = unknown.value(z)
         result.append(Calibrated(
-            parameter=item.target if item.role == "network" else p.name, prior=p.start, value=value,
-            stderr=float(abs(per_z) * sd[index]), shift_in_sd=stated[item.role, item.target].z(value), unit=p.unit,
+            parameter=p.name, prior=p.start, value=value, stderr=slope(unknown, z) * own,
+            shift_in_sd=stated[p.name].z_of(value), unit=p.unit,
         ))  # fmt: skip
     return tuple(result)
 
 
-# ---------------------------------------------------------------------- ranking and advice
-
-
-def _ranking(found: Search) -> tuple[Ranked, ...]:
-    """Everything of the first look: by its fit where it was fitted in earnest, the rest by the scan.
-
-    Probabilities are those of what was compared in the end; what the held-out recordings refused has none.
-    """
-    stage = found.stages[0]
-    left = [fit.found[-1].label for fit in stage.fits]
-    probability = dict(zip(left, stage.probabilities() if left else (), strict=True))
-    rows = [
-        Ranked(mechanism=s.hypothesis.name, place=s.hypothesis.place, family=s.hypothesis.family,
-               log_bayes=stage.fitted.get(s.hypothesis.label, s.log_bayes),
-               probability=float(probability.get(s.hypothesis.label, 0.0)))
-        for s in stage.scored
-        if s.hypothesis.label in stage.fitted or not s.hypothesis.is_open
-    ]  # fmt: skip
-    return tuple(sorted(rows, key=lambda r: (-r.probability, -r.log_bayes)))
-
-
-def _unseen(stage: Stage, catalogue: Mapping[str, Mechanism], threshold: float) -> tuple[NotDetectable, ...]:
-    """Mechanisms that would not have been seen at their typical strength, at their best place."""
-    best: dict[str, tuple[float, str]] = {}
-    competing = [s for s in stage.scored if not s.hypothesis.is_open]
-    for s, weight in zip(competing, log_weights(competing), strict=True):
-        name, reached = s.hypothesis.name, s.expected + float(weight)
-        if name in catalogue and reached > best.get(name, (-np.inf, ""))[0]:
-            best[name] = (reached, s.hypothesis.place)
+def _ranking(posterior: Posterior) -> tuple[Ranked, ...]:
+    """Everything that was judged, most probable first; of a pair both names."""
     return tuple(
-        NotDetectable(mechanism=name, place=place, needed=catalogue[name].experiment)
-        for name, (reached, place) in sorted(best.items()) if reached < threshold
+        Ranked(
+            mechanism=" + ".join(effect.name for effect in one.effects),
+            place=" + ".join(effect.place for effect in one.effects),
+            family=" + ".join(dict.fromkeys(effect.family for effect in one.effects)), log_bayes=one.log_bayes,
+            probability=probability,
+        )
+        for one, probability in posterior.ranked[:MOST_RANKED]
     )  # fmt: skip
-
-
-def _next_test(
-    verdict: Verdict, findings: Sequence[Finding], unseen: Sequence[NotDetectable], catalogue: Mapping[str, Mechanism],
-    assumed: Collection[str],
-) -> str:  # fmt: skip
-    if verdict == "unexplained" and "T_ambient" in assumed:
-        return "record T_ambient_degC: a constant stands for it, and what the air did is missed elsewhere"
-    for finding in findings:
-        if finding.confusable_with and finding.confusable_with[0].probability >= 0.05:
-            return finding.confusable_with[0].separate_by
-    if verdict in ("consistent", "insufficient_data") and unseen:
-        wanted = Counter(u.needed for u in unseen).most_common(1)[0][0]
-        shown = sum(u.needed == wanted for u in unseen)
-        return f"{wanted} (it would show {shown} effect{'s' if shown > 1 else ''} that these data cannot)"
-    if verdict == "unexplained":
-        return "repeat the operation in which the heat is missing with one input changed at a time"
-    if findings and findings[0].mechanism in catalogue:
-        return catalogue[findings[0].mechanism].experiment
-    return ""

@@ -14,7 +14,6 @@ from diagnosis.results.result_parts import (
     Finding,
     Fits,
     Location,
-    MissingHeat,
     NotDetectable,
     PredictedRun,
     Ranked,
@@ -82,12 +81,11 @@ class Diagnosis:
     unseen : tuple of NotDetectable
     next_test : str
         What to measure next
-    missing_heat : tuple of MissingHeat
     courses : tuple of PredictedRun
     network : ThermalNetwork
         The nominal one
     shapes : tuple of Term
-        Tilts of the formulas that were calibrated along, see :mod:`diagnosis.inference.shapes`
+        Tilts of the formulas that were calibrated along, see :mod:`diagnosis.setup.shapes`
     inputs : mapping
         Hashes and version
     notes : tuple of str
@@ -140,7 +138,6 @@ class Diagnosis:
     ranking: tuple[Ranked, ...]
     unseen: tuple[NotDetectable, ...]
     next_test: str
-    missing_heat: tuple[MissingHeat, ...]
     courses: tuple[PredictedRun, ...]
     network: ThermalNetwork
     shapes: tuple[Term, ...]

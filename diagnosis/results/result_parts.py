@@ -185,32 +185,6 @@ class Location:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class MissingHeat:
-    """The heat that the calibrated model lacks at the most probable place, over time.
-
-    Attributes
-    ----------
-    recording, node : str
-    time, mean, sd : Array, shape (K,)
-        [s], [W], [W]
-    speed, torque, temperature : Array, shape (K,)
-        Operating point: [1/min], [N m], and the node's temperature [degC]
-    law : Array, shape (K,), or None
-        Heat of the findings there, [W]
-    """
-
-    recording: str
-    node: str
-    time: Array
-    mean: Array
-    sd: Array
-    speed: Array
-    torque: Array
-    temperature: Array
-    law: Array | None
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
 class PredictedRun:
     """One recording as measured and as simulated, free-running.
 

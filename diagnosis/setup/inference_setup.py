@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from diagnosis.candidates.explain import Explanation, calibrated, evidence_of, settled
-from diagnosis.forward.grid import Piece, pieces, slow_rows
+from diagnosis.forward.grid import Piece, pieces
 from diagnosis.forward.network_on_grid import NetworkOnGrid
-from diagnosis.inference.noise import channel_noise, loss_noise, noise_of, start_guess
-from diagnosis.inference.posterior import Problem
-from diagnosis.inference.predict import START_S
-from diagnosis.inference.shapes import shape_terms
-from diagnosis.inference.unknowns import Unknowns, unknowns_of
-from diagnosis.inference.whitening import Whitening
+from diagnosis.forward.whitening import Noise
 from diagnosis.recordings.recording import Recording
-from diagnosis.setup.shaft import shafts, torque_gain, with_shaft
+from diagnosis.setup.noise import channel_noise, display_noise, loss_noise, noise_of
+from diagnosis.setup.shaft import shafts, with_shaft
+from diagnosis.setup.shapes import shape_terms
 from models.assembly.gearbox import Gearbox
 from models.base.types import Array
 from models.mechanisms import Scale
@@ -26,10 +22,8 @@ from models.simulation.thermal_network import Losses, ThermalNetwork
 from models.terms.term import Term
 
 STANDSTILL_RPM = 10.0
-HELD_OUT_SHARE = 0.25  # of every recording, where none is held out as a whole
-CAPACITY_SD = 0.3  # at least: one temperature stands for a body that has many
-FLOORS = (1.0, 2.0, 4.0)  # times the structural floor that is assumed at least
-FLOOR_GAIN = 10.0  # log evidence that a higher floor has to bring
+HELD_OUT_SHARE = 0.25  # of every recording, if none is held out as a whole
+START_S = 600.0  # readings that only serve to find the start temperatures of a prediction
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -42,29 +36,54 @@ class InferenceSetup:
     nominal : ThermalNetwork
         As the definition has it
     losses : Losses
+    model : NetworkOnGrid
+        The nominal network with the tilts of its laws
+    shapes : tuple of Term
+        Tilts of the laws, which the nominal network lacks
     scale : Scale
         Typical sizes in these recordings
     channels : tuple of str
-    train, holdout : Problem
-        The same network, unknowns and noise with the pieces to learn from and to judge by
+    learnt, held_out : tuple of Piece
+        To learn from and to judge by
     loss_W : float
         Typical total loss, [W]
-    noise_K : float
-        White noise of a temperature row, [K]
-    shapes : tuple of Term
-        Tilts of the formulas, which the nominal network lacks
+    white_K : mapping of channel to float
+        White noise of one row of every temperature, [K]
+    white_loss : (float, float)
+        White noise of one row of the total loss: a constant part [W] and one relative to the loss [-]
+    display : Array, shape (channels,)
+        Rounding error of every display, [K] or [W]; 0 if its step is not known
     """
 
     gearbox: Gearbox
     nominal: ThermalNetwork
     losses: Losses
+    model: NetworkOnGrid
+    shapes: tuple[Term, ...]
     scale: Scale
     channels: tuple[str, ...]
-    train: Problem
-    holdout: Problem
+    learnt: tuple[Piece, ...]
+    held_out: tuple[Piece, ...]
     loss_W: float
-    noise_K: float
-    shapes: tuple[Term, ...] = ()
+    white_K: Mapping[str, float]
+    white_loss: tuple[float, float]
+    display: Array
+
+    @property
+    def noise_K(self) -> float:
+        """Median white noise of a temperature row, [K]."""
+        return float(np.median(list(self.white_K.values()))) if self.white_K else 0.0
+
+    def noise_in(self, piece: Piece) -> Noise:
+        """Noise of one piece.
+
+        A display that rounds is off by up to half a step, however many rows are averaged while it stands still.
+        """
+        noise = noise_of(
+            self.model, piece, self.white_K, self.loss_W, loss_noise=self.white_loss,
+            parametric=self.gearbox.is_parametric,
+        )  # fmt: skip
+        return replace(noise, floor_sd=np.maximum(noise.floor_sd, self.display))
 
 
 def prepare(
@@ -85,64 +104,49 @@ def prepare(
     baseline : sequence of Recording
         To learn from as well, as a whole; they do not decide on the scale
     even : bool
-        Whether all intervals shall be of one length, see :func:`diagnosis.forward.grid.pieces`
+        True for intervals of one length, see :func:`diagnosis.forward.grid.pieces`
     """
     as_defined, losses = gearbox.network(), gearbox.loss_laws()
     nominal = with_shaft(as_defined)
-    recordings, holdout = shafts(recordings, as_defined), shafts(holdout, as_defined)
+    recordings, holdout, baseline = (shafts(given, as_defined) for given in (recordings, holdout, baseline))
+    everything = (*recordings, *baseline)
     scale = scale_of(gearbox, recordings)
-    beside = shafts(baseline, as_defined)
-    everything = (*recordings, *beside)
-    network = nominal
     shapes = shape_terms(nominal, scale)
+    network = nominal
     for term in shapes:
         network = term.apply(network)
     model = NetworkOnGrid(network, losses)
     measured = {c.name for r in everything for c in r.channels}
     temperatures = sorted((c for c in measured if not is_total_loss(c)), key=lambda c: (model.part_index(c), c))
     channels = (*temperatures, *([TOTAL_LOSS] if TOTAL_LOSS in measured else []))
-    stated = [c for r in everything for c in r.channels]
-    unknowns = _wider_capacities(unknowns_of(
-        network, channels, lags={c.name: c.lag_s for c in stated if c.lag_s is not None},
-        bias_sd={c.name: c.bias_sd for c in stated if c.bias_sd is not None}, slow=slow_rows(everything),
-        interval=scale.interval, ambient_assumed=any("T_ambient" in r.assumed for r in everything),
-        torque_gain=torque_gain(as_defined),
-    ))  # fmt: skip
-    white = channel_noise(everything, channels)
-    loss_sd = loss_noise(everything) if TOTAL_LOSS in channels else (0.0, 0.0)
-    loss_W = typical_loss(model, recordings)
-    problems = []
-    learnt, judged = (pieces(given, model.laws.inputs, channels, even=even) for given in (recordings, holdout))
+    learnt, held_out, healthy = (
+        pieces(given, model.laws.inputs, channels, even=even) for given in (recordings, holdout, baseline)
+    )
     if not holdout:
-        learnt, judged = split(learnt)
-    learnt = (*learnt, *pieces(beside, model.laws.inputs, channels, even=even))
-    for cut in (learnt, judged):
-        problems.append(Problem(
-            model, cut, unknowns,
-            [noise_of(model, p, white, loss_W, loss_noise=loss_sd, parametric=gearbox.is_parametric) for p in cut],
-            [start_guess(model, p) for p in cut],
-        ))  # fmt: skip
-    noises = [white[name] for name in channels if not is_total_loss(name)]
+        learnt, held_out = tuple(map(first_part, learnt)), tuple(map(last_part, learnt))
     return InferenceSetup(
-        gearbox=gearbox, nominal=nominal, losses=losses, scale=scale, channels=channels, train=problems[0],
-        holdout=problems[1], loss_W=loss_W, noise_K=float(np.median(noises)) if noises else 0.0,
-        shapes=shapes,
+        gearbox=gearbox, nominal=nominal, losses=losses, model=model, shapes=shapes, scale=scale, channels=channels,
+        learnt=(*learnt, *healthy), held_out=held_out, loss_W=typical_loss(model, recordings),
+        white_K=channel_noise(everything, channels),
+        white_loss=loss_noise(everything) if TOTAL_LOSS in channels else (0.0, 0.0),
+        display=display_noise(everything, channels),
     )  # fmt: skip
 
 
-def split(whole: Sequence[Piece]) -> tuple[tuple[Piece, ...], tuple[Piece, ...]]:
-    """Split pieces in time: readings of the first part to learn from, those of the last part held out.
+def first_part(piece: Piece) -> Piece:
+    """A piece with the readings to learn from: all but the last part."""
+    return replace(piece, measured=np.where(_late(piece)[:, None], np.nan, piece.measured))
 
-    The readings of the first minutes stay in both, for the start temperatures.
-    """
-    learnt, judged = [], []
-    for piece in whole:
-        span = piece.time[-1] - piece.time[0]
-        late = piece.time > piece.time[0] + (1.0 - HELD_OUT_SHARE) * span
-        early = piece.time <= piece.time[0] + min(START_S, 0.2 * span)
-        learnt.append(replace(piece, measured=np.where(late[:, None], np.nan, piece.measured)))
-        judged.append(replace(piece, measured=np.where((late | early)[:, None], piece.measured, np.nan)))
-    return tuple(learnt), tuple(judged)
+
+def last_part(piece: Piece) -> Piece:
+    """A piece with the readings to judge by: the last part, and the first minutes for the start temperatures."""
+    early = piece.time <= piece.time[0] + min(START_S, 0.2 * (piece.time[-1] - piece.time[0]))
+    return replace(piece, measured=np.where((_late(piece) | early)[:, None], piece.measured, np.nan))
+
+
+def _late(piece: Piece) -> Array:
+    begin, end = piece.time[0], piece.time[-1]
+    return np.asarray(piece.time > begin + (1.0 - HELD_OUT_SHARE) * (end - begin))
 
 
 def scale_of(gearbox: Gearbox, recordings: Sequence[Recording]) -> Scale:
@@ -179,71 +183,6 @@ def typical_loss(model: NetworkOnGrid, recordings: Sequence[Recording]) -> float
         values.append(power[np.abs(speed) > STANDSTILL_RPM])
     found = np.concatenate(values) if values else np.zeros(0)
     return float(np.median(found)) if len(found) else 1.0
-
-
-def _wider_capacities(unknowns: Unknowns) -> Unknowns:
-    items = [
-        replace(i, parameter=replace(i.parameter, sd=max(i.parameter.sd, CAPACITY_SD)))
-        if i.role == "network" and i.target.startswith("C_") else i
-        for i in unknowns.items
-    ]  # fmt: skip
-    return Unknowns(items)
-
-
-# ---------------------------------------------------------------------- the structural floor
-
-
-def floored(explanation: Explanation) -> Explanation:
-    """The explanation judged by the structural floor that its own remainder asks for.
-
-    A formula that is a little wrong leaves a remainder like any other effect. How large such remainders are on this
-    gearbox is not known beforehand; so the floor is raised where the data ask for it, by the evidence under the present
-    explanation, and falls again when a better one has been found (not where rows are means over minutes).
-
-    Returns
-    -------
-    Explanation
-        Fitted again if the noise floor changed and the fit has a solution
-    """
-    evidences = [_evidence(explanation, times) for times in FLOORS]
-    best = int(np.argmax(evidences))
-    times = FLOORS[best] if evidences[best] - evidences[0] >= FLOOR_GAIN else FLOORS[0]
-    if explanation.problem.slow:
-        # Means over minutes do not show when a switch acted. What that leaves is no small random heat, and stays,
-        # whatever explains the rest: with a floor that falls, looks took it for effects (seen on wind turbines).
-        times = max(times, explanation.problem.floor)
-    if times == explanation.problem.floor:
-        return explanation
-    problem = explanation.problem.changed(floor=times, whitenings=None)
-    try:
-        fit = problem.fit(explanation.fit.z, [part.trajectory for part in explanation.fit.parts], iterations=2)
-        again = settled(problem, fit)
-    except ArithmeticError:  # at the edge of what can be simulated
-        return explanation
-    found = explanation.found
-    return replace(again, found=found, log_evidence=evidence_of(found, again.fit))
-
-
-def _evidence(explanation: Explanation, times: float) -> float:
-    """Log evidence with another floor, the linearisation kept, determinants of the filters included."""
-    problem, fit = explanation.problem, explanation.fit
-    residuals, columns, determinant = [], [], 0.0
-    for part, noise in zip(fit.parts, problem.noise, strict=True):
-        whitening = Whitening(problem.model, part.trajectory, part.sensors, noise.with_floor(times))
-        white = whitening(np.concatenate([part.residual[:, :, None], part.columns], axis=2))
-        residuals.append(white[:, 0])
-        columns.append(white[:, 1:])
-        determinant += whitening.log_determinant
-    J = np.concatenate(columns)
-    residual = np.concatenate(residuals) + J @ fit.z
-    normal, right = np.eye(J.shape[1]) + J.T @ J, J.T @ residual
-    quadratic = float(residual @ residual - right @ np.linalg.solve(normal, right))
-    return -0.5 * (quadratic + float(np.linalg.slogdet(normal)[1]) + determinant)
-
-
-def first(case: InferenceSetup) -> Explanation:
-    """The calibrated model, judged by the floor that it asks for."""
-    return floored(calibrated(case.train))
 
 
 def heat_over_time(parts: Sequence[Piece], heats: Sequence[Array]) -> dict[str, tuple[Array, Array]]:

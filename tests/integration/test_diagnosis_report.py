@@ -107,10 +107,10 @@ def test_pointing_at_a_chart_tells_its_values(browser: Any, folder: Path) -> Non
     assert left == 0
     assert text.startswith("Time in min: ")
     values = {line.rpartition(": ")[0]: float(line.rpartition(": ")[2]) for line in text.splitlines()}
-    assert set(values) == {"Time in min", "measured", "as delivered", "calibrated", "with what was found"}
+    assert set(values) == {"Time in min", "measured", "as delivered", "calibrated", "with the findings"}
     example = next(c for c in EXAMPLES["missing_physics"]().courses if c.recording == "hold_1")
     row = int(abs(example.time - 60.0 * values["Time in min"]).argmin())
-    assert values["with what was found"] == pytest.approx(example.after["oil"][row], abs=0.5)
+    assert values["with the findings"] == pytest.approx(example.after["oil"][row], abs=0.5)
     assert values["as delivered"] == pytest.approx(example.before["oil"][row], abs=0.5)
 
 

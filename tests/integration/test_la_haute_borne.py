@@ -8,12 +8,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from diagnosis.candidates.explain import calibrated
+from diagnosis.results.identifiable import scale_direction, scale_notes
 
 from diagnosis import diagnose
-from diagnosis.candidates.explain import calibrated
 from diagnosis.recordings.read import read_recordings
 from diagnosis.recordings.recording import Recording
-from diagnosis.results.identifiable import scale_direction, scale_notes
 from diagnosis.results.result import Diagnosis
 from diagnosis.results.result_parts import PredictedRun
 from diagnosis.setup.inference_setup import prepare

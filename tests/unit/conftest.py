@@ -1,15 +1,17 @@
-"""One smooth ride of the rig, simulated, on the grid, and as a problem of inference."""
+"""One smooth ride of the rig, simulated, on the grid, and as an experiment."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
+from diagnosis.engine.fit import Experiment
+from diagnosis.engine.point import Machine
+from diagnosis.engine.prepare import usual_unknowns
 from diagnosis.forward.grid import Piece, pieces
 from diagnosis.forward.network_on_grid import NetworkOnGrid
-from diagnosis.inference.noise import noise_of, start_guess
-from diagnosis.inference.posterior import Problem
-from diagnosis.inference.unknowns import unknowns_of
+from diagnosis.recordings.recording import Recording
+from diagnosis.setup.noise import noise_of, start_guess
 from models.assembly.gearbox import Gearbox
 from models.base.types import Array
 from models.files.cycle import Cycle
@@ -40,14 +42,23 @@ def model(fzg: Gearbox) -> NetworkOnGrid:
 
 
 @pytest.fixture(scope="session")
-def piece(model: NetworkOnGrid, ride: dict[str, Array], simulated: dict[str, Array]) -> Piece:
-    channels = {n: simulated["P_loss_W" if n == "P_loss" else f"T_{n}_degC"] for n in CHANNELS}
-    (found,) = pieces([recording_of(ride, channels)], model.laws.inputs, CHANNELS, even=True)
+def recorded(ride: dict[str, Array], simulated: dict[str, Array]) -> Recording:
+    return recording_of(ride, {n: simulated["P_loss_W" if n == "P_loss" else f"T_{n}_degC"] for n in CHANNELS})
+
+
+@pytest.fixture(scope="session")
+def piece(model: NetworkOnGrid, recorded: Recording) -> Piece:
+    (found,) = pieces([recorded], model.laws.inputs, CHANNELS, even=True)
     return found
 
 
 @pytest.fixture(scope="session")
-def problem(fzg: Gearbox, model: NetworkOnGrid, piece: Piece) -> Problem:
+def experiment(model: NetworkOnGrid, piece: Piece, recorded: Recording) -> Experiment:
     white = dict.fromkeys(CHANNELS, 0.2) | {"P_loss": 5.0}
-    noise = noise_of(model, piece, white, 250.0)
-    return Problem(model, [piece], unknowns_of(fzg.network(), CHANNELS), [noise], [start_guess(model, piece)])
+    return Experiment(
+        machine=Machine(model),
+        pieces=(piece,),
+        unknowns=tuple(usual_unknowns(model.network, [recorded], CHANNELS, interval=10.0)),
+        noise=(noise_of(model, piece, white, 250.0),),
+        starts=(start_guess(model, piece),),
+    )

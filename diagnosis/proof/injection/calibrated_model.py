@@ -9,12 +9,14 @@ from functools import cached_property
 import numpy as np
 import sympy as sp
 
-from diagnosis.candidates.explain import Explanation, calibrated
+from diagnosis.engine.fit import Fit
+from diagnosis.engine.fit import calibrate as fitted
+from diagnosis.engine.prepare import prepare_experiment
+from diagnosis.engine.unknown import InputGain, InputOffset, NetworkParameter
 from diagnosis.forward.recurrence import lagged
-from diagnosis.inference.unknowns import shifted
 from diagnosis.proof.injection.control import Control, find_control
 from diagnosis.proof.injection.real_recording import RealRecording
-from diagnosis.setup.inference_setup import InferenceSetup, prepare
+from diagnosis.setup.inference_setup import InferenceSetup
 from diagnosis.setup.shaft import shafts
 from models.assembly.gearbox import Gearbox
 from models.base.errors import InputError
@@ -70,7 +72,7 @@ class CalibratedModel:
     nominal : ThermalNetwork
         Links, sources and nodes as the definition has them
     network : ThermalNetwork
-        With the tilts of its laws; see :mod:`diagnosis.inference.shapes`
+        With the tilts of its laws; see :mod:`diagnosis.setup.shapes`
     losses : Losses
     parameters : mapping of str to float
     start : mapping of node to float
@@ -207,48 +209,46 @@ def calibrate(gearbox: Gearbox, real: RealRecording) -> CalibratedModel:
             f"{real.path}: the model of {gearbox.file} cannot be calibrated to it ({error}); name another part of the "
             "recording, or inject a fault of measurement"
         ) from error
-    problem, z = found.problem, found.fit.z
-    network = problem.model.network
-    values = dict(zip([p.name for p in network.parameters], problem.unknowns.network_values(network, z), strict=True))
-    sensors = problem.unknowns.sensors(setup.channels, z)
-    first = found.fit.parts[0].trajectory
+    first = found.parts[0].point
+    network = first.machine.model.network
     return CalibratedModel(
         real=real, nominal=setup.nominal, network=network, losses=setup.losses,
-        parameters={name: float(value) for name, value in values.items()},
-        start={part.name: float(T) for part, T in zip(network.parts, first.T[0], strict=True)},
+        parameters={p.name: float(value) for p, value in zip(network.parameters, first.setting.values, strict=True)},
+        start={part.name: float(T) for part, T in zip(network.parts, first.trajectory.T[0], strict=True)},
         cycle=_cycle(setup, found, real),
-        lags=dict(zip(sensors.channels, map(float, sensors.lag), strict=True)), misfit_K=misfit, left_out=left_out,
-        control=find_control(real),
+        lags=dict(zip(first.setting.channels, map(float, first.setting.lag), strict=True)), misfit_K=misfit,
+        left_out=left_out, control=find_control(real),
     )  # fmt: skip
 
 
 def _fitted(
     gearbox: Gearbox, real: RealRecording, left_out: tuple[str, ...], floor: float
-) -> tuple[InferenceSetup, Explanation, dict[str, float]]:
+) -> tuple[InferenceSetup, Fit, dict[str, float]]:
     """Fit with a multiple of the structural floor; also the misfit of every temperature sensor, [K]."""
     kept = tuple(c for c in real.recording.channels if c.name not in left_out)
     recording = replace(real.recording, channels=kept)
-    setup = prepare(gearbox, [recording], [recording])
-    found = calibrated(setup.train.changed(floor=floor))
-    residual = np.concatenate([part.residual for part in found.fit.parts])
+    setup, experiment = prepare_experiment(gearbox, [recording], [recording])
+    found = fitted(replace(experiment, noise=tuple(noise.with_floor(floor) for noise in experiment.noise)))
+    residual = np.concatenate([part.point.residual for part in found.parts])
     size = np.sqrt(np.nanmean(residual**2, axis=0))
     return setup, found, {n: float(s) for n, s in zip(setup.channels, size, strict=True) if not is_total_loss(n)}
 
 
-def _farthest(found: Explanation) -> float:
+def _farthest(found: Fit) -> float:
     """Return the largest distance of a network parameter from its prior, in standard deviations."""
-    pairs = zip(found.problem.unknowns.items, found.fit.z, strict=True)
-    return max((abs(float(z)) for item, z in pairs if item.role == "network"), default=0.0)
+    pairs = zip(found.experiment.unknowns, found.z, strict=True)
+    return max((abs(float(z)) for unknown, z in pairs if isinstance(unknown, NetworkParameter)), default=0.0)
 
 
-def _cycle(setup: InferenceSetup, found: Explanation, real: RealRecording) -> Cycle:
+def _cycle(setup: InferenceSetup, found: Fit, real: RealRecording) -> Cycle:
     """Return the inputs in blocks, with the gain of the torque and the offset of the ambient temperature that fit."""
     (recording,) = shafts([real.recording], setup.gearbox.network())
-    names = list(setup.train.model.laws.inputs)
+    names = setup.model.laws.inputs
     samples = np.stack([recording.inputs[name] for name in names], axis=-1)
-    for item, z in zip(found.problem.unknowns.items, found.fit.z, strict=True):
-        if item.role in ("torque_gain", "ambient_offset"):
-            samples = shifted(samples, names, item.role, item.value(float(z)))
+    setting = replace(found.parts[0].point.setting, samples=samples)
+    for unknown, z in zip(found.experiment.unknowns, found.z, strict=True):
+        if isinstance(unknown, InputGain | InputOffset):
+            unknown.act(setting, float(z))
     size = max(1, round(BLOCK_S / real.step_s))
     begins = np.arange(0, len(samples), size)
     counts = np.diff(np.append(begins, len(samples)))

@@ -12,16 +12,19 @@ from pathlib import Path
 
 import numpy as np
 
-from diagnosis.forward.grid import pieces, slow_rows
+from diagnosis.engine.fit import Experiment
+from diagnosis.engine.point import Machine, Point
+from diagnosis.engine.prepare import usual_unknowns
+from diagnosis.engine.unknown import NetworkParameter
+from diagnosis.forward.grid import pieces
 from diagnosis.forward.network_on_grid import NetworkOnGrid
-from diagnosis.inference.noise import noise_of, start_guess
-from diagnosis.inference.posterior import Linearised, Problem
-from diagnosis.inference.unknowns import unknowns_of
+from diagnosis.forward.trajectory import Trajectory
 from diagnosis.proof.zoo.families.family import Family
 from diagnosis.proof.zoo.programmes import MINUTES_S, programmes
 from diagnosis.proof.zoo.simulate import simulate
 from diagnosis.proof.zoo.structure import Programme, Variant, ZooPlant
 from diagnosis.recordings.recording import Channel, Recording
+from diagnosis.setup.noise import noise_of, start_guess
 from diagnosis.setup.shaft import shafts, torque_gain, with_shaft
 from models.assembly.gearbox import Gearbox, load_gearbox
 from models.base.errors import InputError
@@ -113,7 +116,7 @@ def distance_K(plant: ZooPlant, session: Sequence[Programme]) -> float:
         for programme, outcome in zip(learnt, outcomes, strict=True)
     ]
     try:
-        return _fitted_rms(_problem(gearbox, recordings))
+        return _fitted_rms(_experiment(gearbox, recordings))
     except (ArithmeticError, np.linalg.LinAlgError, InputError):
         return np.inf
 
@@ -140,7 +143,7 @@ def as_recording(plant: ZooPlant, programme: Programme, readings: dict[str, Arra
     )
 
 
-def _problem(gearbox: Gearbox, recordings: Sequence[Recording]) -> Problem:
+def _experiment(gearbox: Gearbox, recordings: Sequence[Recording]) -> Experiment:
     """The nominal model and its usual unknowns, without shapes of laws."""
     network = gearbox.network()
     recordings = shafts(recordings, network)
@@ -148,62 +151,67 @@ def _problem(gearbox: Gearbox, recordings: Sequence[Recording]) -> Problem:
     network = with_shaft(network)
     model = NetworkOnGrid(network, gearbox.loss_laws())
     channels = sorted((c.name for c in recordings[0].channels), key=lambda name: (model.part_index(name), name))
-    unknowns = unknowns_of(network, channels, slow=slow_rows(recordings), torque_gain=gain)
     cut = pieces(recordings, model.laws.inputs, channels)
     white = dict.fromkeys(channels, 0.1)
-    noise = [noise_of(model, piece, white, 1.0, parametric=gearbox.is_parametric) for piece in cut]
-    return Problem(model, cut, unknowns, noise, [start_guess(model, piece) for piece in cut])
+    stated = {p.name: p for p in network.parameters}  # priors of the definition, capacities as narrow as it has them
+    usual = usual_unknowns(network, recordings, channels, interval=1.0, gain_of_torque=gain)
+    return Experiment(
+        machine=Machine(model),
+        pieces=tuple(cut),
+        unknowns=tuple(
+            replace(u, parameter=stated[u.parameter.name]) if isinstance(u, NetworkParameter) else u for u in usual
+        ),
+        noise=tuple(noise_of(model, piece, white, 1.0, parametric=gearbox.is_parametric) for piece in cut),
+        starts=tuple(start_guess(model, piece) for piece in cut),
+    )
 
 
-def _fitted_rms(problem: Problem) -> float:
+def _fitted_rms(experiment: Experiment) -> float:
     """Root mean square of the residual at the least squares over all rows, [K]."""
-    lower, upper = problem.unknowns.bounds
-    z, parts, best, damping = np.zeros(len(problem.unknowns)), None, np.inf, 1e-2
-    guesses: Sequence[object] = [None] * len(problem.pieces)
+    lower, upper = experiment.bounds
+    z, points, best, damping = np.zeros(len(experiment.unknowns)), None, np.inf, 1e-2
+    guesses: Sequence[Trajectory | None] = [None] * len(experiment.pieces)
     tried = z
     for _ in range(ITERATIONS):
-        trial = [
-            problem.linearise(i, tried, guess, rounds=3)  # type: ignore[arg-type]
-            for i, guess in enumerate(guesses)
-        ]
+        trial = [experiment.point(i, tried, guess, rounds=3) for i, guess in enumerate(guesses)]
         rms = _rms(trial)
-        if parts is None or rms < best:
+        if points is None or rms < best:
             settled = rms > (1.0 - SETTLED) * best
-            z, parts, best, damping = tried, trial, rms, 0.3 * damping
-            guesses = [part.trajectory for part in parts]
+            z, points, best, damping = tried, trial, rms, 0.3 * damping
+            guesses = [point.trajectory for point in points]
             if settled:
                 break
         else:
             damping *= 30.0
-        step = _step(parts, z, damping)
+        step = _step(experiment, points, z, damping)
         tried = np.clip(z + np.clip(step, -3.0, 3.0), lower, upper)
     return best
 
 
-def _step(parts: Sequence[Linearised], z: Array, damping: float) -> Array:
+def _step(experiment: Experiment, points: Sequence[Point], z: Array, damping: float) -> Array:
     normal, right = np.eye(len(z)) / WIDER**2, -z / WIDER**2
-    for part in parts:
-        residual, columns = _weighted(part)
+    for point in points:
+        residual, columns = _weighted(point, experiment.columns(point, z))
         normal = normal + columns.T @ columns / PER_ROW_K**2
         right = right + columns.T @ residual / PER_ROW_K**2
     return np.asarray(np.linalg.solve(normal + damping * np.diag(np.diag(normal)), right))
 
 
-def _weighted(part: Linearised) -> tuple[Array, Array]:
+def _weighted(point: Point, columns: Array) -> tuple[Array, Array]:
     """Residual and columns of all readings, weighted by the width of the intervals."""
-    time = part.trajectory.piece.time
+    time, residual = point.trajectory.piece.time, point.residual
     width = np.sqrt(np.gradient(time) / np.median(np.diff(time)))
-    seen = np.isfinite(part.residual)
+    seen = np.isfinite(residual)
     weight = np.broadcast_to(width[:, None], seen.shape)[seen]
-    return part.residual[seen] * weight, part.columns[seen] * weight[:, None]
+    return residual[seen] * weight, columns[seen] * weight[:, None]
 
 
-def _rms(parts: Sequence[Linearised]) -> float:
+def _rms(points: Sequence[Point]) -> float:
     squares, weights = 0.0, 0.0
-    for part in parts:
-        time = part.trajectory.piece.time
-        width = np.broadcast_to(np.gradient(time)[:, None], part.residual.shape)
-        seen = np.isfinite(part.residual)
-        squares += float(np.sum(width[seen] * part.residual[seen] ** 2))
+    for point in points:
+        time, residual = point.trajectory.piece.time, point.residual
+        width = np.broadcast_to(np.gradient(time)[:, None], residual.shape)
+        seen = np.isfinite(residual)
+        squares += float(np.sum(width[seen] * residual[seen] ** 2))
         weights += float(width[seen].sum())
     return float(np.sqrt(squares / weights))

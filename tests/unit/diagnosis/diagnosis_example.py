@@ -6,20 +6,19 @@ from dataclasses import replace
 
 import numpy as np
 
-from diagnosis.inference.shapes import shape_terms
 from diagnosis.results.result import Diagnosis
 from diagnosis.results.result_parts import (
     Calibrated,
     Finding,
     Fits,
     Location,
-    MissingHeat,
     NotDetectable,
     ParameterValue,
     PredictedRun,
     Ranked,
     Rival,
 )
+from diagnosis.setup.shapes import shape_terms
 from models.assembly.gearbox import load_gearbox
 from models.base.types import Array
 from models.mechanisms import CATALOGUE, Placed, Scale
@@ -60,7 +59,6 @@ def missing_physics() -> Diagnosis:
                      when=(("train_1", 32400.0, 64800.0),)),
         ),
         courses=tuple(_course(name, lacking=6.0) for name in RECORDINGS),
-        missing_heat=tuple(_heat(name) for name in ("train_1", "train_2")),
         train=_fits(4.13, 2.98, 0.41),
         holdout=_fits(5.21, 3.62, 0.52),
         remaining_p_value=0.41,
@@ -98,7 +96,7 @@ def sensor_fault() -> Diagnosis:
         parameters=(ParameterValue(name=drift.strength.name, value=-3.12, stderr=0.15, unit="K"),),
     )  # fmt: skip
     return replace(
-        missing_physics(), verdict="sensor_fault", findings=(finding,), location=(), missing_heat=(),
+        missing_physics(), verdict="sensor_fault", findings=(finding,), location=(),
         ranking=_ranking(("sensor_drift", "bearing_1", 0.998)), next_test="Exchange the sensor and repeat.",
     )  # fmt: skip
 
@@ -128,9 +126,8 @@ def unexplained() -> Diagnosis:
         heat={"train_2": (np.linspace(0.0, 7200.0, 200), 30.0 * (np.linspace(0.0, 20.0, 200) % 4.0 < 1.0))},
     )  # fmt: skip
     place = replace(base.location[0], node="housing_lower", probability=0.83, regime="no regime of speed or torque")
-    without_law = tuple(replace(one, node="housing_lower", law=None) for one in base.missing_heat)
     return replace(
-        base, verdict="unexplained", findings=(heat,), location=(place,), missing_heat=without_law,
+        base, verdict="unexplained", findings=(heat,), location=(place,),
         train=_fits(4.1, 3.0, 1.9), holdout=_fits(5.2, 3.6, 3.1), misfit=2.7, remaining_p_value=0.001,
         remaining_note="Heat in the lower housing whose cause is not in the catalogue.",
     )  # fmt: skip
@@ -219,7 +216,6 @@ def _diagnosis(**given: object) -> Diagnosis:
             NotDetectable(mechanism="hot_neighbour", place="housing_lower", needed="let the rig stand for a night"),
         ),
         "next_test": "",
-        "missing_heat": (),
         "network": NETWORK,
         "shapes": SHAPES,
         "inputs": {"gearbox": "3f7a" * 16, "recordings": ["9b1c" * 16, "04de" * 16], "version": "0.1.0"},
@@ -282,23 +278,4 @@ def _course(name: str, *, lacking: float, duration: float | None = None, held_ou
         calibrated=calibrated,
         after=after,
         counts_from_s=0.05 * duration,
-    )
-
-
-def _heat(name: str) -> MissingHeat:
-    duration = RECORDINGS[name][0]
-    time = np.linspace(0.0, duration, 300)
-    speed = _speed(time, duration)
-    law = _law(speed)
-    scatter = np.random.default_rng(3).normal(0.0, 4.0, len(time))
-    return MissingHeat(
-        recording=name,
-        node="oil",
-        time=time,
-        mean=law + scatter,
-        sd=np.full(len(time), 4.0),
-        speed=speed,
-        torque=np.where(time % (duration / 3.0) < duration / 6.0, 94.0, 30.0),
-        temperature=27.0 + 50.0 * time / duration,
-        law=law,
     )

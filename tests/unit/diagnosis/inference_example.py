@@ -1,29 +1,24 @@
-"""Recordings, scores and judges made up for the tests of the inference."""
+"""Recordings made up for the tests of the inference, and a machine with known parameters."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 
-from diagnosis.candidates.hypotheses import Hypothesis, Scored
-from diagnosis.forward.grid import Piece
+from diagnosis.engine.fit import Experiment
+from diagnosis.engine.point import Machine
+from diagnosis.engine.unknown import NetworkParameter
 from diagnosis.forward.network_on_grid import NetworkOnGrid, named_values
 from diagnosis.forward.observation import readings
 from diagnosis.forward.trajectory import simulate
-from diagnosis.inference.posterior import Problem
 from diagnosis.recordings.recording import Channel, Recording
-from models.assembly.gearbox import Gearbox
 from models.base.types import Array
-from models.mechanisms import CATALOGUE, OPEN_FORM, Scale
+from models.terms.term import Term
 
 CHANNELS = ("housing_lower", "oil", "bearing_1", "P_loss")
-
-# A fit without unknowns, and a problem that has no other.
-NOTHING: Any = SimpleNamespace(at=lambda fit: fit, unknowns=SimpleNamespace(items=()), z=(), slow=False)
 
 
 def recording_of(columns: dict[str, Array], channels: dict[str, Array]) -> Recording:
@@ -36,28 +31,42 @@ def recording_of(columns: dict[str, Array], channels: dict[str, Array]) -> Recor
     )  # fmt: skip
 
 
-def damaged(fzg: Gearbox, piece: Piece, problem: Problem) -> tuple[Piece, Scale, float]:
-    """The ride with a bearing damage that sets in between two moments of the grid; the scale, and the moment [s]."""
-    network = problem.model.network
-    scale = Scale.of(fzg, speed=2600.0, torque=150.0, duration=float(piece.time[-1]))
-    placed, true = CATALOGUE["bearing_damage"].placed(network, scale)[0], 0.29 * scale.duration
-    given = dict(zip((p.name for p in placed.parameters), (60.0, true, 0.3), strict=True))
-    model = NetworkOnGrid(placed.apply(network), fzg.losses())
-    trajectory = simulate(model, piece, named_values(model.network, given), problem.starts[0])
-    sensors = problem.unknowns.sensors(CHANNELS, np.zeros(len(problem.unknowns)))
-    return replace(piece, measured=readings(model, trajectory, sensors)), scale, true
+def with_measured(experiment: Experiment, measured: Array) -> Experiment:
+    """The experiment with other readings of its only piece."""
+    return replace(experiment, pieces=(replace(experiment.pieces[0], measured=measured),))
 
 
-def scored_as(name: str, place: str, log_bayes: float) -> Scored:
-    term: Any = None if name == "parameter" else SimpleNamespace(of_measurement=False, parameters=(), states=())
-    family = OPEN_FORM if name.startswith("open_") else ""
-    h = Hypothesis(name=name, place=place, family=family, variants=np.ones((1, 1)), term=term)
-    return Scored(
-        hypothesis=h, log_bayes=log_bayes, best=0, values=np.zeros(1), log_bayes_of=np.array([log_bayes]), expected=0.0
+def with_term(experiment: Experiment, term: Term) -> Experiment:
+    """The experiment of a machine that has a term, whose parameters are further unknowns."""
+    model = experiment.machine.model
+    return replace(
+        experiment,
+        machine=Machine(NetworkOnGrid(term.apply(model.network), model.losses)),
+        unknowns=(*experiment.unknowns, *(NetworkParameter(parameter=p) for p in term.parameters)),
     )
 
 
-def judge_of(base: Any, gain: Any = 0.0) -> Any:
-    """A judge by held-out recordings that gain so much, or what a function of an explanation says."""
-    case: Any = SimpleNamespace(holdout=SimpleNamespace(slow=False))
-    return SimpleNamespace(case=case, base=base, floor=1.0, gain=gain if callable(gain) else lambda _: gain)
+def at(experiment: Experiment, values: Mapping[str, float]) -> Array:
+    """Unknowns at their middles, but for some values by name."""
+    return np.array([u.z_of(values[u.parameter.name]) if u.parameter.name in values else 0.0
+                     for u in experiment.unknowns])  # fmt: skip
+
+
+def acting(experiment: Experiment, term: Term, values: Mapping[str, float], *, guided: bool = True) -> Experiment:
+    """The experiment as it would have been recorded with a term in the machine.
+
+    Parameters
+    ----------
+    experiment : Experiment
+    term : Term
+    values : mapping of str to float
+        Of the term's parameters, by their names without the label
+    guided : bool
+        False: switches follow the simulation
+    """
+    model = NetworkOnGrid(term.apply(experiment.machine.model.network), experiment.machine.model.losses)
+    named = {f"{term.label}_{name}": value for name, value in values.items()}
+    piece = replace(experiment.pieces[0], guided=guided)
+    trajectory = simulate(model, piece, named_values(model.network, named), experiment.starts[0], rounds=12)
+    sensors = experiment.setting(0, np.zeros(len(experiment.unknowns))).sensors
+    return with_measured(experiment, readings(model, trajectory, sensors))

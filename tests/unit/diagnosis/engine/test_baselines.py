@@ -73,7 +73,7 @@ def calibrated(fzg: Gearbox, train: Recording, healthy: Recording) -> Fit:
 def test_baselines_are_pieces_of_another_session(prepared: tuple[InferenceSetup, Experiment]) -> None:
     setup, experiment = prepared
     assert [piece.recording for piece in experiment.pieces] == ["train", "april"]
-    assert [piece.recording for piece in setup.holdout.pieces] == ["hold"]
+    assert [piece.recording for piece in setup.held_out] == ["hold"]
     assert experiment.session_of == {"train": "", "hold": "", "april": "april"}
     assert experiment.healthy == {"april"} and "wheel" in setup.channels
     assert np.isfinite(experiment.pieces[1].measured).any(axis=0).all()
@@ -110,7 +110,7 @@ def test_without_held_out_recordings_baselines_are_whole(fzg: Gearbox) -> None:
     setup, experiment = prepare_experiment(fzg, [train], (), [healthy])
     last = [piece.time[np.isfinite(piece.measured).any(axis=1)][-1] for piece in experiment.pieces]
     assert last[0] <= 0.76 * 1800.0 and last[1] > 0.95 * 1800.0
-    assert [piece.recording for piece in setup.holdout.pieces] == ["train"]
+    assert [piece.recording for piece in setup.held_out] == ["train"]
 
 
 def test_an_effect_that_acts_in_the_baseline_is_seen_there(fzg: Gearbox, drift: Hypothesis) -> None:

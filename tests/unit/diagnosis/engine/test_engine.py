@@ -1,4 +1,4 @@
-"""Unknowns, the linearisation and the scan: against repeated simulation and against the old engine."""
+"""Unknowns, the linearisation and the scan: against repeated simulation."""
 
 from __future__ import annotations
 
@@ -8,12 +8,10 @@ import numpy as np
 import pytest
 
 from diagnosis.candidates.hypotheses import Hypothesis, hypothesis_of
-from diagnosis.candidates.hypotheses import scan as old_scan
 from diagnosis.engine.candidates import refit, refit_all, scan
 from diagnosis.engine.fit import Experiment, Fit, calibrate
 from diagnosis.engine.prepare import prepare_experiment
 from diagnosis.engine.unknown import ClockOffset, Group, InputGain, SensorBias
-from diagnosis.inference.evidence import Marginal
 from diagnosis.recordings.recording import Recording
 from diagnosis.setup.inference_setup import InferenceSetup
 from models.assembly.gearbox import Gearbox
@@ -122,33 +120,6 @@ def test_scope(prepared: tuple[InferenceSetup, Experiment]) -> None:
     apart = np.subtract(*readings.values())
     np.testing.assert_allclose(apart[:, at], 2.0)
     assert not np.delete(apart, at, axis=1).any()
-
-
-def test_the_scan_agrees_with_the_old_engine(
-    prepared: tuple[InferenceSetup, Experiment], fit: Fit, hypotheses: list[Hypothesis]
-) -> None:
-    """The old engine, given the same linearisation of the unknowns, finds the same evidences."""
-    setup, _ = prepared
-    found = scan(fit, hypotheses)
-    whitened = [part.filter(part.point.residual[:, :, None])[:, 0] + part.columns @ fit.z for part in fit.parts]
-    marginal = Marginal(np.concatenate([part.columns for part in fit.parts]), np.concatenate(whitened))
-    old_part = setup.train.with_whitenings([part.filter for part in fit.parts])
-    old_parts = [
-        replace(old_part.linearise(i, fit.z, part.point.trajectory, rounds=1), trajectory=part.point.trajectory,
-                sensors=part.point.sensors)
-        for i, part in enumerate(fit.parts)
-    ]  # fmt: skip
-    old_fit = replace(old_part.fit(fit.z, [p.trajectory for p in old_parts], iterations=0), parts=tuple(old_parts))
-    old = {s.hypothesis.label: s for s in old_scan(old_part, old_fit, marginal, hypotheses)}
-    for candidate, log_bayes, best in zip(found.candidates, found.log_bayes, found.best, strict=True):
-        assert log_bayes == pytest.approx(old[candidate.label].log_bayes, abs=1e-6, rel=1e-9), candidate.label
-        assert best == old[candidate.label].best
-    # In its best shape, from the one Gram matrix.
-    singles = found.singles(found.gram.given(found.unknowns))
-    for candidate, value, log_bayes in zip(found.candidates, singles.value, singles.log_bayes, strict=True):
-        scored = old[candidate.label]
-        assert log_bayes == pytest.approx(scored.log_bayes_of[scored.best], abs=1e-6, rel=1e-9)
-        assert value == pytest.approx(scored.values[scored.best], rel=1e-6, abs=1e-9)
 
 
 def test_what_is_there_is_found_and_fitted(fit: Fit, hypotheses: list[Hypothesis]) -> None:

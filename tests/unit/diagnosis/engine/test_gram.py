@@ -1,4 +1,4 @@
-"""The Gram matrix: every evidence against the normal density of the readings themselves, and against the old engine."""
+"""The Gram matrix: every evidence against the normal density of the readings themselves."""
 
 from __future__ import annotations
 
@@ -9,8 +9,7 @@ import pytest
 from scipy.integrate import dblquad
 from scipy.stats import multivariate_normal, norm
 
-from diagnosis.engine.gram import Gram
-from diagnosis.inference.evidence import Marginal, strength
+from diagnosis.engine.gram import Gram, strengths
 from models.base.types import Array
 
 ROWS, UNKNOWNS, FURTHER, CANDIDATES = {"a": 30, "b": 12}, 4, 3, 5
@@ -79,15 +78,17 @@ def test_a_pair_of_one_sided_strengths(gram: Gram, signs: tuple[int, int]) -> No
     assert found == pytest.approx(np.log(whole / share), abs=1e-5)
 
 
-def test_evidences_of_the_old_engine(gram: Gram, columns: dict[str, Array]) -> None:
-    both = np.concatenate(list(columns.values()))
-    marginal = Marginal(both[:, 1:5], both[:, 0])
-    for sign in (-1, 0, 1):
-        old = strength(*marginal.products(both[:, 8:]), 0.6, sign)
-        new = gram.given(range(4)).singles(7 + np.arange(5), 0.6, sign)
-        np.testing.assert_allclose(new.log_bayes, old.log_bayes, atol=1e-9)
-        np.testing.assert_allclose(new.value, old.value, atol=1e-9)
-        np.testing.assert_allclose(new.sd, old.sd, atol=1e-9)
+@pytest.mark.parametrize("sign", [-1, 0, 1])
+def test_a_single_is_the_integral_over_the_strength(sign: int) -> None:
+    rng = np.random.default_rng(2)
+    x, residual, sd = rng.normal(size=30), rng.normal(size=30) + 0.4, 0.7
+    found = strengths(np.array([x @ residual]), np.array([x @ x]), sd, sign)
+    s = np.linspace(-8.0 * sd, 8.0 * sd, 400_001)
+    prior = np.exp(-0.5 * (s / sd) ** 2) / (sd * np.sqrt(2.0 * np.pi))
+    if sign:
+        prior = np.where(sign * s > 0.0, 2.0 * prior, 0.0)
+    ratio = np.exp(s * (x @ residual) - 0.5 * s**2 * (x @ x))
+    assert found.log_bayes[0] == pytest.approx(np.log(np.trapezoid(prior * ratio, s)), abs=1e-3)
 
 
 def test_most_probable_values(gram: Gram, columns: dict[str, Array]) -> None:

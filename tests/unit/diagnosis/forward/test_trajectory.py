@@ -13,7 +13,7 @@ from diagnosis.forward.network_on_grid import SLOW_NEAR_K, SLOW_REACH_K, Network
 from diagnosis.forward.recurrence import lagged
 from diagnosis.forward.term_on_grid import TermOnGrid
 from diagnosis.forward.trajectory import parameter_heats, settled_balance, simulate
-from diagnosis.inference.shapes import shape_terms
+from diagnosis.setup.shapes import shape_terms
 from models.assembly.gearbox import Gearbox
 from models.base.types import Array
 from models.files.cycle import Cycle

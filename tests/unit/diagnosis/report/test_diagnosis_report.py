@@ -106,7 +106,7 @@ def test_errors_are_told_for_every_sensor_of_both_sets() -> None:
 def test_without_a_finding_nothing_is_said_to_be_found(pages: dict[str, str]) -> None:
     for name in ("consistent", "insufficient_data"):
         text = Text(pages[name][: pages[name].index('<section id="words">')]).plain
-        for never in ("What was found", "with what was found", "Missing heat", "pointed out"):
+        for never in ("What was found", "with the findings", "pointed out"):
             assert never not in text, never
     assert "Nothing that these data show: evidence" in Text(pages["consistent"]).plain
     assert "none: it is in the recording, not in the gearbox" in Text(pages["sensor_fault"]).plain
@@ -125,7 +125,6 @@ def test_names_from_files_cannot_break_out_of_the_page() -> None:
     diagnosis = replace(
         base, gearbox=hostile, notes=(hostile,), next_test=hostile, inputs={hostile: hostile},
         courses=tuple(replace(course, recording=hostile) for course in base.courses[:2]),
-        missing_heat=tuple(replace(heat, recording=hostile) for heat in base.missing_heat),
         findings=(replace(base.findings[0], says=hostile, equation="$" + hostile),),
     )  # fmt: skip
     text = page(diagnosis)

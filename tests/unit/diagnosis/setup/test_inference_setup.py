@@ -8,9 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from diagnosis.candidates.explain import calibrated
+from diagnosis.engine.fit import calibrate
+from diagnosis.engine.prepare import prepare_experiment
 from diagnosis.recordings.recording import Channel, Recording
-from diagnosis.setup.inference_setup import HELD_OUT_SHARE, START_S, prepare, split
+from diagnosis.setup.inference_setup import HELD_OUT_SHARE, START_S, first_part, last_part, prepare
 from models.assembly.gearbox import Gearbox
 from models.files.cycle import Cycle
 
@@ -46,20 +47,20 @@ def hotter(recording: Recording) -> Recording:
 
 def test_readings_held_out_do_not_touch_what_is_learnt(fzg: Gearbox, recordings: tuple[Recording, Recording]) -> None:
     train, hold = recordings
-    one, other = (prepare(fzg, [train], [held]) for held in (hold, hotter(hold)))
-    assert [p.recording for p in one.train.pieces] == ["ride_1"]
-    assert [p.recording for p in one.holdout.pieces] == ["ride_2"]
-    for mine, theirs in zip(one.train.pieces, other.train.pieces, strict=True):
-        np.testing.assert_array_equal(mine.measured, theirs.measured)
-    assert not np.array_equal(one.holdout.pieces[0].measured, other.holdout.pieces[0].measured)
-    np.testing.assert_array_equal(calibrated(one.train).fit.z, calibrated(other.train).fit.z)
+    (one, mine), (other, theirs) = (prepare_experiment(fzg, [train], [held]) for held in (hold, hotter(hold)))
+    assert [p.recording for p in one.learnt] == ["ride_1"]
+    assert [p.recording for p in one.held_out] == ["ride_2"]
+    for a, b in zip(one.learnt, other.learnt, strict=True):
+        np.testing.assert_array_equal(a.measured, b.measured)
+    assert not np.array_equal(one.held_out[0].measured, other.held_out[0].measured)
+    np.testing.assert_array_equal(calibrate(mine).z, calibrate(theirs).z)
 
 
 def test_without_a_held_out_recording_the_last_quarter_is_held_out(
     fzg: Gearbox, recordings: tuple[Recording, Recording]
 ) -> None:
     case = prepare(fzg, [recordings[0]], [])
-    (learnt,), (judged,) = case.train.pieces, case.holdout.pieces
+    (learnt,), (judged,) = case.learnt, case.held_out
     time, read = learnt.time, np.isfinite(learnt.measured).all(axis=1)
     late = time > time[0] + (1.0 - HELD_OUT_SHARE) * (time[-1] - time[0])
     assert pytest.approx(0.25) == HELD_OUT_SHARE and 0.2 < late.mean() < 0.3
@@ -71,7 +72,7 @@ def test_without_a_held_out_recording_the_last_quarter_is_held_out(
 
 
 def test_splitting_leaves_the_given_pieces_alone(fzg: Gearbox, recordings: tuple[Recording, Recording]) -> None:
-    whole = prepare(fzg, [recordings[0]], [recordings[1]]).train.pieces
+    whole = prepare(fzg, [recordings[0]], [recordings[1]]).learnt
     before = whole[0].measured.copy()
-    split(whole)
+    first_part(whole[0]), last_part(whole[0])
     np.testing.assert_array_equal(whole[0].measured, before)

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from diagnosis.engine.prepare import prepare_experiment
 from diagnosis.recordings.read import read_recording
-from diagnosis.setup.inference_setup import prepare
 from diagnosis.setup.shaft import recording_with_shaft, torque_gain, with_shaft
 from models.assembly.gearbox import load_gearbox, read_gearbox
 from models.mechanisms import CATALOGUE
@@ -19,10 +19,10 @@ ROOT = Path(__file__).parents[4]
 def test_a_machine_without_shaft_is_set_up_with_zeros() -> None:
     rod = load_gearbox("heated_rod")
     recording = read_recording(ROOT / "examples" / "data" / "heated_rod.csv.gz@0..3600", rod.network())
-    case = prepare(rod, [recording], ())
+    case, experiment = prepare_experiment(rod, [recording])
     assert tuple(case.nominal.inputs)[:2] == ("speed", "torque")
-    assert not case.train.pieces[0].inputs[:, :2].any()
-    assert "torque_gain" not in {item.role for item in case.train.unknowns.items}
+    assert not case.learnt[0].inputs[:, :2].any()
+    assert "torque_gain" not in {u.parameter.name for u in experiment.unknowns}
     assert case.channels[5:7] == ("cell_6__NTC6", "cell_6__NTC7")
     assert case.scale.duration == pytest.approx(3600.0, abs=20.0)
     catalogue = CATALOGUE.values()

@@ -1,4 +1,4 @@
-"""What the noise of a recording is taken to be, before anything is explained."""
+"""Assumed noise of a recording, before anything is explained."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from scipy.optimize import nnls
 
 from diagnosis.forward.grid import Piece, slow_rows, white_sd
 from diagnosis.forward.network_on_grid import NetworkOnGrid
-from diagnosis.inference.whitening import Noise
+from diagnosis.forward.whitening import Noise
 from diagnosis.recordings.recording import Recording
 from models.base.types import Array
 from models.quantities.quantities import is_total_loss, node_of_channel
@@ -71,6 +71,12 @@ def channel_noise(recordings: Sequence[Recording], channels: Sequence[str]) -> M
             if slow_rows(recordings):
                 result[name] = min(result[name], SLOW_SD_K)
     return result
+
+
+def display_noise(recordings: Sequence[Recording], channels: Sequence[str]) -> Array:
+    """Standard deviation of the rounding of every display, shape (channels,), [K] or [W]; 0 if its step is unknown."""
+    stated = {c.name: c.resolution or 0.0 for r in recordings for c in r.channels}
+    return np.asarray([stated.get(name, 0.0) for name in channels], dtype=float) / float(np.sqrt(12.0))
 
 
 def noise_of(

@@ -2,33 +2,13 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-from typing import Any
-
 import numpy as np
 import pytest
 
-from diagnosis.candidates import explain
-from diagnosis.candidates.explain import Explanation
 from diagnosis.candidates.hypotheses import hypothesis_of
-from diagnosis.decision import search
-from diagnosis.inference.posterior import Problem
 from models.assembly.gearbox import Gearbox, load_gearbox
 from models.mechanisms import CATALOGUE, Scale
 from tests.unit.diagnosis.inference_example import CHANNELS
-
-
-def test_parameters_of_what_was_found_are_no_further_explanation(fzg: Gearbox, problem: Problem) -> None:
-    (placed,) = CATALOGUE["cooler_thermostat"].placed(problem.model.network, Scale.of(fzg))
-    found = hypothesis_of(placed)
-    case: Any = SimpleNamespace(train=SimpleNamespace(model=problem.model), scale=Scale.of(fzg), channels=CHANNELS)
-    nothing: Any = None
-    before = Explanation(problem=problem, fit=nothing, log_evidence=0.0)
-    after = Explanation(problem=explain._with(problem, found), fit=nothing, log_evidence=0.0, found=(found,))
-    candidates = search.candidates_of(case, CATALOGUE)
-    labels = [{h.label for h in search.hypotheses_of(candidates, e)} for e in (before, after)]
-    assert len(after.problem.unknowns) > len(problem.unknowns)
-    assert labels[1] == labels[0] - {found.label}
 
 
 def test_oil_that_thickens_costs_more_in_bearings_and_less_in_the_mesh(fzg: Gearbox) -> None:

@@ -1,7 +1,7 @@
 """The noise of a recording, and the filter that turns residuals into independent standard normal numbers.
 
 A free-running residual wanders for hours: one forgotten watt in the oil shows in every later row. Judged row by row it
-looks like overwhelming evidence. The noise model therefore holds what a real gearbox always has beside its model: a
+looks like overwhelming evidence. The noise model therefore holds what a real gearbox always has besides its model: a
 random heat in every part (an Ornstein-Uhlenbeck process, the *structural floor*), unknown start temperatures, and white
 sensor noise. A Kalman filter of the linearised network gives the innovations of any signal under this noise; the same
 filter applied to a derivative gives that derivative in the same, whitened units.
@@ -31,7 +31,7 @@ JUMP_SHARE = 0.3  # of a change within one interval: whether it came early or la
 
 @dataclass(frozen=True, kw_only=True)
 class Noise:
-    """What a recording shows beside the model.
+    """Noise of a recording: everything that its model leaves out.
 
     Attributes
     ----------
@@ -48,7 +48,7 @@ class Noise:
     start_sd : Array, shape (parts,)
         Uncertainty of the start temperatures, [K]
     capacity : float
-        Sum of the heat capacities that `heat_sd` is told for, [J/K]: it goes with them, else the floor would decide on
+        Sum of the heat capacities that `heat_sd` is given for, [J/K]: it goes with them, else the floor would decide on
         the size of a gearbox whose recordings tell ratios only; 0 where it is fixed
     """
 
@@ -61,7 +61,7 @@ class Noise:
     capacity: float = 0.0
 
     def with_floor(self, times: float) -> Noise:
-        """The same with its random heats multiplied."""
+        """Noise with its random heats multiplied."""
         return replace(self, heat_sd=self.heat_sd * times)
 
 
@@ -145,12 +145,13 @@ class Whitening:
         result = np.empty((points, m, count))
         for first in range(0, count, AT_ONCE):
             some = slice(first, first + AT_ONCE)
-            now = np.zeros((size + m, min(AT_ONCE, count - first)))
-            for k, step in enumerate(self._step):
-                now[size:] = columns[k, :, some]
-                now[size:][~self._seen[k]] = 0.0
-                now = step @ now
-                result[k, :, some] = now[size:]
+            given = np.where(self._seen[:, :, None], columns[:, :, some], 0.0)
+            now, after = np.zeros((2, size + m, given.shape[2]))
+            for step, reading, innovation in zip(self._step, given, result[:, :, some], strict=True):
+                now[size:] = reading
+                np.dot(step, now, out=after)
+                innovation[...] = after[size:]
+                now, after = after, now
         result[~self._seen] = 0.0
         return result.reshape(points * m, count)
 

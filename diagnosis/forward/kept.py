@@ -1,0 +1,29 @@
+"""What many columns ask of one trajectory is computed once and kept as long as that trajectory."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, TypeVar
+from weakref import WeakKeyDictionary
+
+Kept = TypeVar("Kept")
+_known: WeakKeyDictionary[Any, dict[tuple[Any, str], Any]] = WeakKeyDictionary()
+
+
+def kept(model: object, trajectory: object, name: str, found: Callable[[], Kept]) -> Kept:
+    """What is `found` along a trajectory of a model.
+
+    Parameters
+    ----------
+    model, trajectory : object
+        Compared by identity
+    name : str
+        What it is
+    found : callable
+        Computes it; what it gives must not hold the trajectory
+    """
+    known = _known.setdefault(trajectory, {})
+    if (model, name) not in known:
+        known[model, name] = found()
+    result: Kept = known[model, name]
+    return result

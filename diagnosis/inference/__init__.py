@@ -1,1 +1,0 @@
-"""Calibration: unknowns, noise, whitening, posterior, evidence."""

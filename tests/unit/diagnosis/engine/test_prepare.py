@@ -1,0 +1,42 @@
+"""The usual unknowns follow from the recordings."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from diagnosis.engine.prepare import CAPACITY_SD, usual_unknowns
+from diagnosis.engine.unknown import LossDelay, SensorLag
+from diagnosis.forward.network_on_grid import NetworkOnGrid
+from diagnosis.recordings.recording import Recording
+from tests.unit.diagnosis.inference_example import CHANNELS
+
+
+def test_air_that_nobody_recorded_is_less_certain(model: NetworkOnGrid, recorded: Recording) -> None:
+    sd = []
+    for one in (recorded, replace(recorded, assumed=("T_ambient",))):
+        found = usual_unknowns(model.network, [one], CHANNELS, interval=10.0)
+        sd.append(next(u.parameter.sd for u in found if u.parameter.name == "ambient_offset"))
+    assert sd[0] < 1.0 < 3.0 < sd[1]
+
+
+def test_rows_that_are_minutes_apart_are_means(model: NetworkOnGrid, recorded: Recording) -> None:
+    """They show neither lags nor which end of the row is stamped."""
+    slow = replace(recorded, time=60.0 * recorded.time)
+    fast, means = (usual_unknowns(model.network, [one], CHANNELS, interval=10.0) for one in (recorded, slow))
+    for kind, count in ((LossDelay, 1), (SensorLag, 3)):
+        assert [sum(isinstance(u, kind) for u in found) for found in (fast, means)] == [count, 0]
+
+
+def test_a_temperature_represents_a_body_that_has_many(model: NetworkOnGrid, recorded: Recording) -> None:
+    stated = {p.name: p.sd for p in model.network.parameters}
+    found = {
+        u.parameter.name: u.parameter.sd for u in usual_unknowns(model.network, [recorded], CHANNELS, interval=1.0)
+    }
+    capacities = [name for name in found if name.startswith("C_")]
+    assert capacities and all(found[name] == max(stated[name], CAPACITY_SD) for name in capacities)
+    assert found["mesh"] == pytest.approx(stated["mesh"])
+    assert set(found) >= {name for name, sd in stated.items() if sd > 0.0}
+    assert np.isfinite(list(found.values())).all()

@@ -1,0 +1,91 @@
+"""Candidates on recordings of the model itself: their shapes are fitted, and what they are is found."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from diagnosis.candidates.hypotheses import hypothesis_of
+from diagnosis.engine.candidates import Scan, refit, scan
+from diagnosis.engine.fit import Experiment, Fit, calibrate
+from models.assembly.gearbox import Gearbox
+from models.mechanisms import CATALOGUE, Placed, Scale
+from tests.unit.diagnosis.inference_example import CHANNELS, acting, with_measured
+
+
+@pytest.fixture(scope="module")
+def scale(fzg: Gearbox, experiment: Experiment) -> Scale:
+    return Scale.of(fzg, speed=2600.0, torque=150.0, duration=float(experiment.pieces[0].time[-1]))
+
+
+def found_with(base: Fit, placed: Placed) -> tuple[Scan, Fit]:
+    """The scan of one candidate, and the fit with it."""
+    scanned = scan(base, [hypothesis_of(placed)])
+    strength = float(scanned.singles(scanned.gram.given(scanned.unknowns)).value[0])
+    return scanned, refit(base, scanned.candidates[0], scanned.best[0], strength)
+
+
+def value_of(fit: Fit, name: str) -> float:
+    return next(u.value(z) for u, z in zip(fit.experiment.unknowns, fit.z.tolist(), strict=True)
+                if u.parameter.name == name)  # fmt: skip
+
+
+def test_a_moment_is_found_between_the_grid(experiment: Experiment, scale: Scale) -> None:
+    """A bearing damage that sets in between two moments of the grid."""
+    placed = CATALOGUE["bearing_damage"].placed(experiment.machine.model.network, scale)[0]
+    names = [p.name.removeprefix(f"{placed.label}_") for p in placed.parameters]
+    true = 0.29 * scale.duration
+    concealed = acting(experiment, placed, dict(zip(names, (60.0, true, 0.3), strict=True)))
+    # From the nearest moment of the grid: the scan of so short a ride may prefer another one.
+    base, one = calibrate(concealed), hypothesis_of(placed)
+    nearest = int(np.argmin(np.abs(one.variants[:, 1] - true)))
+    found = refit(base, one, nearest, 60.0)
+    of_grid = one.variants[nearest, 1]
+    assert abs(value_of(found, placed.parameters[1].name) - true) < 0.5 * abs(of_grid - true)
+    assert found.log_evidence > base.log_evidence + 20.0
+
+
+@pytest.mark.parametrize("late_s", [90.0, -90.0])
+def test_a_clock_may_be_early_or_late(fzg: Gearbox, experiment: Experiment, late_s: float) -> None:
+    placed, *_ = CATALOGUE["clock_offset"].placed(experiment.machine.model.network, Scale.of(fzg), CHANNELS)
+    piece = experiment.pieces[0]
+    measured = np.array(piece.measured)
+    for index, name in enumerate(CHANNELS):
+        if name != "P_loss":
+            measured[:, index] = np.interp(piece.time - late_s, piece.time, piece.measured[:, index])
+    scanned, found = found_with(calibrate(with_measured(experiment, measured)), placed)
+    # Late readings come from the row before, early ones from the next: a variant supports its own sign only.
+    assert scanned.sign[0] == np.sign(scanned.candidates[0].variants[scanned.best[0], 0]) == np.sign(late_s)
+    # Late readings and slow sensors look alike: part of it goes into their lags.
+    assert value_of(found, placed.strength.name) == pytest.approx(late_s, abs=20.0)
+
+
+@pytest.mark.parametrize("late_s", [5.0, -5.0])
+def test_the_end_of_a_row_of_losses_that_is_stamped_is_learnt(
+    fzg: Gearbox, experiment: Experiment, late_s: float
+) -> None:
+    """Means of the ten seconds before their stamp, or after it, with temperatures of that moment: no fault."""
+    piece = experiment.pieces[0]
+    measured, index = np.array(piece.measured), CHANNELS.index("P_loss")
+    measured[:, index] = np.interp(piece.time - late_s, piece.time, piece.measured[:, index])
+    base = calibrate(with_measured(experiment, measured))
+    assert value_of(base, "delay_P_loss") == pytest.approx(late_s, abs=1.0)
+    clocks = CATALOGUE["clock_offset"].placed(experiment.machine.model.network, Scale.of(fzg), CHANNELS)
+    scanned = scan(base, [hypothesis_of(placed) for placed in clocks])
+    assert len(scanned.log_bayes) == 2 and scanned.log_bayes.max() < 0.0
+
+
+def test_a_set_point_is_found(experiment: Experiment, scale: Scale) -> None:
+    """A switch moves by jumps, so the derivative with respect to its set point is no guide; the grid has to lead."""
+    (placed,) = CATALOGUE["fan_thermostat"].placed(experiment.machine.model.network, scale)
+    nominal = experiment.point(0, np.zeros(len(experiment.unknowns))).trajectory.T
+    parts = experiment.machine.model.parts
+    housing = nominal[:, [parts.index(f"housing_{half}") for half in ("lower", "upper")]].mean(axis=1)
+    true = float(np.percentile(housing, 85))
+    values = {"strength": scale.conductance, "set_point": true, "band": 2.0}
+    base = calibrate(acting(experiment, placed, values, guided=False))
+    _, found = found_with(base, placed)
+    # Once on, it stays on: only the upper edge is seen.
+    edge = value_of(found, f"{placed.label}_set_point") + 0.5 * value_of(found, f"{placed.label}_band")
+    assert edge == pytest.approx(true + 1.0, abs=1.5)
+    assert found.log_evidence > base.log_evidence + 20.0

@@ -1,0 +1,44 @@
+"""The assumed noise of a recording."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from diagnosis.forward.grid import Piece
+from diagnosis.forward.network_on_grid import NetworkOnGrid
+from diagnosis.setup.noise import display_noise, loss_noise, noise_of
+from models.base.types import Array
+from tests.unit.diagnosis.inference_example import CHANNELS, recording_of
+
+
+def test_loss_noise_has_a_constant_and_a_relative_part(ride: dict[str, Array]) -> None:
+    rng = np.random.default_rng(3)
+    truth = np.repeat(np.linspace(20.0, 600.0, 100), 60)
+    values = truth * (1.0 + 0.02 * rng.normal(size=len(truth))) + 2.0 * rng.normal(size=len(truth))
+    rows = {k: np.resize(v, len(truth)) for k, v in ride.items()} | {"time_s": 10.0 * np.arange(len(truth))}
+    constant, relative = loss_noise([recording_of(rows, {"P_loss": values})])
+    assert constant == pytest.approx(2.0, abs=0.6)
+    assert relative == pytest.approx(0.02, abs=0.002)
+
+
+def test_watts_are_no_start_temperature(model: NetworkOnGrid, piece: Piece) -> None:
+    """How uncertain an unmeasured start is goes with how hot the gearbox is, whatever it loses."""
+    white = dict.fromkeys(CHANNELS, 0.2) | {"P_loss": 5.0}
+    watts, hot = np.array(piece.measured), np.array(piece.measured)
+    watts[0, CHANNELS.index("P_loss")] = 700.0
+    hot[0, CHANNELS.index("oil")] = 92.0
+    sd = [noise_of(model, replace(piece, measured=m), white, 250.0).start_sd for m in (piece.measured, watts, hot)]
+    np.testing.assert_array_equal(sd[1], sd[0])
+    unknown = [index for index, name in enumerate(model.parts) if name not in CHANNELS]
+    assert (sd[0][unknown] < 4.0).all()  # everything is near the air of 22 degC
+    assert (sd[2][unknown] > 10.0).all() and (sd[2][unknown] < 15.0).all()
+
+
+def test_a_display_is_off_by_up_to_half_its_step(ride: dict[str, Array]) -> None:
+    recording = recording_of(ride, {name: np.zeros(len(ride["time_s"])) for name in ("oil", "bearing_1")})
+    stated = tuple(replace(c, resolution=0.5) if c.name == "oil" else c for c in recording.channels)
+    found = display_noise([replace(recording, channels=stated)], ("oil", "bearing_1", "P_loss"))
+    np.testing.assert_allclose(found, [0.5 / np.sqrt(12.0), 0.0, 0.0])
