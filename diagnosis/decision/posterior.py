@@ -250,7 +250,7 @@ class Posterior:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Answer:
-    """One effect that is reported: a name, or a set of names that these data do not tell apart.
+    """One effect that is reported: a name, or a set of names that these data do not separate.
 
     Attributes
     ----------
@@ -287,8 +287,8 @@ def decide(posterior: Posterior, settings: Settings) -> tuple[Answer, ...]:
 
     A name is a claim if its probability reaches :attr:`Settings.claim_from`. Else at most three names that reach it
     together are a tie. Else names that look alike in these readings, or act on the same thing, and reach it together
-    are one answer: it "acts like" the best of them. So does what leaves much unexplained, and what only has a course over
-    the hours: law and place are found, not the cause.
+    are one answer: it "acts like" the best of them. So does what leaves much unexplained, and what only has a course
+    over the hours: law and place are found, not the cause.
     """
     if not posterior.detected:
         return ()
