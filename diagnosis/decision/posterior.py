@@ -218,7 +218,8 @@ class Posterior:
         values = np.array(log_bayes)
         a, b = self.rule.temper
         most = max(float(values.max(initial=0.0)), 0.0)
-        log = np.where(values >= self.rule.refuted * most, np.array(log_prior) + values / (a + b * most), -np.inf)
+        left = (values >= self.rule.refuted * most) | (most == 0.0)
+        log = np.where(left, np.array(log_prior) + values / (a + b * most), -np.inf)
         chance = self.something * np.exp(log - logsumexp(log))
         found = [
             Explanation(names=names, members=tuple(sorted(members, key=lambda one: -one.log_prior - one.log_bayes)),
