@@ -16,41 +16,9 @@ from diagnosis.recordings.recording import Recording
 from diagnosis.setup.inference_setup import InferenceSetup
 from models.assembly.gearbox import Gearbox
 from models.mechanisms import CATALOGUE, Scale
-from tests.unit.diagnosis.inference_example import recording_of
+from tests.unit.diagnosis.inference_example import NODES, recorded
 
-NODES = ("oil", "housing_lower", "bearing_1", "pinion")
 WINDAGE_W = 60.0
-
-
-def recorded(
-    fzg: Gearbox, name: str, *, windage_W: float = 0.0, drift_K: float = 0.0, factors: dict[str, float] | None = None,
-    hours: float = 1.5,
-    seed: int = 0, nodes: tuple[str, ...] = NODES,
-) -> Recording:  # fmt: skip
-    """The model itself, with noise; windage in the oil, and a drift of its thermometer over the whole recording."""
-    rng = np.random.default_rng(seed)
-    time = np.arange(0.0, 3600.0 * hours, 10.0)
-    step = (time // 1200.0).astype(int)
-    columns = {
-        "time_s": time,
-        "speed_rpm": rng.uniform(800.0, 3300.0, step.max() + 1)[step],
-        "torque_Nm": rng.uniform(40.0, 160.0, step.max() + 1)[step],
-        "T_ambient_degC": np.full(len(time), 22.0),
-    }
-    network = fzg.network()
-    term = next(
-        p for p in CATALOGUE["windage"].placed(network, Scale.of(fzg, speed=3300.0, torque=150.0)) if p.place == "oil"
-    )
-    if windage_W:
-        network = term.apply(network, {term.strength.name: windage_W})
-    values = factors or {}
-    network = replace(network, parameters=tuple(
-        replace(p, start=values.get(p.name, 1.0) * p.start) for p in network.parameters))  # fmt: skip
-    driven = columns | {"air_speed_m_s": np.full(len(time), 2.0)}
-    made = network.simulate(driven, losses=fzg.losses(), initial=22.0).columns()
-    read = {n: made[f"T_{n}_degC"] + 0.1 * rng.standard_normal(len(time)) for n in nodes}
-    read["oil"] = read["oil"] + drift_K * time / time[-1]
-    return replace(recording_of(columns, read), name=name, sha256=name)
 
 
 @pytest.fixture(scope="module")

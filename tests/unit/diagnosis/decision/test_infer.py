@@ -1,0 +1,111 @@
+"""A short ride of the rig from calibration to answers, and which candidates are fitted."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from diagnosis.candidates.hypotheses import Hypothesis, hypothesis_of
+from diagnosis.decision.infer import NEAR_PLACE, PLACES, RACED, _raced, infer
+from diagnosis.decision.posterior import KINDS, Posterior, decide
+from diagnosis.decision.settings import Settings
+from diagnosis.engine.calibration import calibrate_with_error
+from diagnosis.engine.families import axis_of, changes, log_prior, parameters_outside
+from diagnosis.engine.prepare import prepare_experiment
+from models.assembly.gearbox import Gearbox
+from models.mechanisms import CATALOGUE, Placed
+from tests.unit.diagnosis.inference_example import recorded
+
+LOOKED_FOR = ("windage", "air_cooling_change", "sensor_bias", "hot_neighbour")
+WINDAGE_W, AT_RPM, HOURS = 100.0, 3300.0, 1.5
+
+
+def inferred(fzg: Gearbox, windage_W: float) -> Posterior:
+    """A ride with windage in the oil, or without it, and a healthy one of another day."""
+    train = recorded(fzg, "train", windage_W=windage_W, hours=HOURS)
+    setup, experiment = prepare_experiment(fzg, [train], [train], [recorded(fzg, "april", seed=2, hours=HOURS)])
+    network = experiment.machine.model.network
+    placed = [one for name in LOOKED_FOR for one in CATALOGUE[name].placed(network, setup.scale, setup.channels)]
+    windage = [one for one in placed if one.label == "windage_oil"]
+    candidates = [*(hypothesis_of(one) for one in placed), *changes([], windage, axis_of(experiment), {}),
+                  *parameters_outside(experiment)]  # fmt: skip
+    return infer(calibrate_with_error(experiment), candidates, log_prior(candidates), Settings())
+
+
+@pytest.fixture(scope="module")
+def healthy(fzg: Gearbox) -> Posterior:
+    return inferred(fzg, 0.0)
+
+
+@pytest.fixture(scope="module")
+def concealed(fzg: Gearbox) -> Posterior:
+    return inferred(fzg, WINDAGE_W)
+
+
+def test_a_healthy_machine_stays_silent(healthy: Posterior) -> None:
+    assert not healthy.detected and healthy.of("nothing") > 0.9
+    assert decide(healthy, Settings()) == ()
+
+
+def test_a_concealed_effect_is_detected_and_first(concealed: Posterior) -> None:
+    assert concealed.detected
+    best = concealed.explanations[0]
+    assert best.names == ("windage",) and best.members[0].label == "windage@oil"
+    assert sum(concealed.of(kind) for kind in KINDS) == pytest.approx(1.0)
+    answers = decide(concealed, Settings())
+    assert [one.effect.label for one in answers] == ["windage@oil"]
+
+
+def test_its_size_is_found(concealed: Posterior) -> None:
+    best = concealed.explanations[0].members[0]
+    assert best.fit is not None and concealed.nothing.fit is not None
+    count = len(concealed.nothing.fit.z)
+    strength, exponent = (u.value(z) for u, z in zip(best.fit.experiment.unknowns[count:], best.fit.z[count:].tolist(),
+                                                     strict=True))  # fmt: skip
+    assert best.strength[0] == pytest.approx(strength)
+    term = best.effects[0].term
+    assert isinstance(term, Placed) and term.scale is not None
+    at_full_speed = (AT_RPM / term.scale.speed) ** exponent
+    assert abs(strength * at_full_speed - WINDAGE_W) < 3.0 * best.strength_sd[0] * at_full_speed
+
+
+def test_a_change_at_a_date_competes_under_the_name_of_its_law(concealed: Posterior) -> None:
+    members = {one.label: one for one in concealed.explanations[0].members}
+    dated = members["windage_step@oil"]
+    assert dated.effects[0].how == "D" and dated.names == ("windage",)
+    # It was there from the first row on: a date brings nothing.
+    assert dated.log_bayes < members["windage@oil"].log_bayes + 1.0
+
+
+def test_every_candidate_is_judged_and_the_best_are_fitted(healthy: Posterior, concealed: Posterior) -> None:
+    labels = [one.label for one in concealed.judged]
+    assert len(labels) == len(set(labels)) and {one.label for one in healthy.judged} <= set(labels)
+    fitted = [one for one in concealed.judged if one.fit is not None]
+    assert 1 <= len(fitted) < len(labels)
+    assert max(concealed.judged, key=lambda one: one.log_bayes + one.log_prior) in fitted
+
+
+# ------------------------------------------------------------------ the race
+
+
+def named(name: str, place: str) -> Hypothesis:
+    return Hypothesis(name=name, place=place, family="heat", variants=np.ones((1, 1)))
+
+
+def test_a_name_is_fitted_at_its_best_place_and_at_a_near_one() -> None:
+    candidates = [named("near", "a"), named("near", "b"), named("near", "c"), named("far", "a"), named("far", "b")]
+    log_bayes = np.array([20.0, 19.0, 18.5, 15.0, 15.0 - NEAR_PLACE])
+    chosen = _raced(candidates, log_bayes, np.argsort(-log_bayes))
+    assert chosen == [0, 1, 3] and PLACES == 2
+
+
+def test_names_share_the_race() -> None:
+    """Many near places of one name take no room from other names."""
+    candidates = [
+        *(named("one", f"{i}") for i in range(3 * RACED)),
+        *(named(f"law_{i}", "a") for i in range(2 * RACED)),
+    ]
+    log_bayes = -0.01 * np.arange(len(candidates))
+    chosen = _raced(candidates, log_bayes, np.argsort(-log_bayes))
+    names = [candidates[i].name for i in chosen]
+    assert len(set(names)) == RACED and names.count("one") == PLACES
