@@ -21,7 +21,8 @@ import numpy as np
 
 from diagnosis.engine.calibration import WIDEST_CLASS, calibrate_with_error
 from diagnosis.engine.gram import Given
-from diagnosis.engine.model_error import ModelError, error_classes
+from diagnosis.engine.learnt import error_classes
+from diagnosis.engine.model_error import ModelError
 from diagnosis.engine.prepare import prepare_experiment
 from diagnosis.engine.products import gram_of, whitened_base
 from diagnosis.proof.zoo.conceal_zoo import write_zoo_case

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,7 @@ from diagnosis.candidates.hypotheses import How, Hypothesis, hypothesis_of
 from models.base.types import Array
 from models.mechanisms import Placed
 from models.mechanisms.forms import EDGE_S, steps
-from models.network.laws import Parameter, symbol
+from models.network.laws import Parameter, renamed, symbol
 
 HOUR_S = 3600.0
 LINEAR_S, SETTLING_S = 20.0 * HOUR_S, 3.0 * HOUR_S  # of the courses over the hours
@@ -83,8 +84,13 @@ class Course:
     variants: Array
     law: sp.Expr
 
+    @cached_property
+    def along(self) -> sp.Expr:
+        """The law in a recording that begins at :data:`START`."""
+        return self.law.xreplace({NOW: symbol("time") + symbol(START)})
 
-NOW = symbol("now")
+
+NOW, START = symbol("now"), "start"
 
 
 def step(axis: Axis, *, slow: bool = True) -> Course:
@@ -156,16 +162,14 @@ def changing(placed: Placed, course: Course, axis: Axis, *, sd: float | None = N
     term, clock = _renamed(placed, label), _clock(label, axis)
     strength, *shapes = term.parameters
     added = tuple(replace(p, name=f"{label}_{p.name}") for p in course.parameters)
-    local = {symbol(p.name): symbol(f"{label}_{p.name}") for p in course.parameters}
-    along = course.law.xreplace(local | {NOW: symbol("time") + symbol(clock.name)})
+    along = renamed(course.along, {p.name: f"{label}_{p.name}" for p in course.parameters} | {START: clock.name})
     mechanism = placed.mechanism
     says = f"{course.sentence}: {mechanism.says[:1].lower()}{mechanism.says[1:]}"
     name = f"{base_name(placed)}_{course.ending}"
-    shown = term.written["law"] * course.law.xreplace({NOW: symbol("time") + symbol("start")})
     term = replace(
         term,
         mechanism=replace(mechanism, name=name, says=says),
-        written={**term.written, "law": shown},
+        written={**term.written, "law": term.written["law"] * course.along},
         expression=term.expression * along,
         parameters=(replace(strength, sd=sd or strength.sd), *shapes, *added, clock),
     )
@@ -188,7 +192,7 @@ def carried_on(placed: Placed, axis: Axis) -> Hypothesis:
     term, clock, base = _renamed(placed, label), _clock(label, axis), hypothesis_of(placed)
     now = {symbol("time"): symbol("time") + symbol(clock.name)}
     other = term.boundary_temperature
-    written = {symbol("time"): symbol("time") + symbol("start")}
+    written = {symbol("time"): symbol("time") + symbol(START)}
     term = replace(
         term, expression=term.expression.xreplace(now),
         boundary_temperature=None if other is None else other.xreplace(now),
@@ -219,17 +223,17 @@ def _renamed(placed: Placed, label: str) -> Placed:
     if placed.boundary_temperature is not None:
         end = placed.target[-1]
         names |= {end: new(end), f"T_{end}": f"T_{new(end)}"}
-    own = {symbol(old): symbol(name) for old, name in names.items()}
     other = placed.boundary_temperature
     return replace(
         placed, label=label, target=tuple(names.get(one, one) for one in placed.target),
         written={" ".join(names.get(word, word) for word in key.split()): law for key, law in placed.written.items()},
-        expression=placed.expression.xreplace(own), boundary_temperature=None if other is None else other.xreplace(own),
+        expression=renamed(placed.expression, names),
+        boundary_temperature=None if other is None else renamed(other, names),
         parameters=tuple(replace(p, name=names[p.name]) for p in placed.parameters),
         states=tuple(
-            replace(s, name=names[s.name], rate=s.rate.xreplace(own),
-                    update=None if s.update is None else s.update.xreplace(own),
-                    averaged_update=None if s.averaged_update is None else s.averaged_update.xreplace(own))
+            replace(s, name=names[s.name], rate=renamed(s.rate, names),
+                    update=None if s.update is None else renamed(s.update, names),
+                    averaged_update=None if s.averaged_update is None else renamed(s.averaged_update, names))
             for s in placed.states
         ),
     )  # fmt: skip

@@ -20,6 +20,7 @@ from diagnosis.engine.calibration import Calibration
 from diagnosis.engine.candidates import Scan, refit, scan
 from diagnosis.engine.fit import Fit
 from diagnosis.engine.gram import Given, Strengths
+from diagnosis.engine.learnt import rule
 from diagnosis.engine.outside import judge_outside
 from diagnosis.engine.sessions import OverSessions, fit_over_sessions, over_sessions
 from diagnosis.engine.unknown import Group
@@ -30,9 +31,6 @@ RACED, PLACES, RACE_STEPS = 18, 2, 4
 NEAR_PLACE = 3.0  # nats behind the best place of its name, up to which a second place is raced
 REFITTED, SECONDS = 6, 2
 WORTH, WORTH_SHARE = 1.0, 0.1  # nats, and share of the best, from which a candidate is worth a fit
-WIDER = 4.0  # prior standard deviations of a parameter outside its prior, in those of its own
-TEMPER = (3.0, 0.1)
-THRESHOLD = 5.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -94,11 +92,13 @@ def infer(
     for index, candidate in enumerate(first.candidates):
         judged.setdefault(candidate.label, _by_scan(first, index, alone[candidate.label]))
     log_e = float(logsumexp([one.log_prior + one.log_bayes for one in judged.values()]))
-    unknown = _unknown(base, outside) if log_e > THRESHOLD else []
+    threshold = rule().threshold(calibration.chosen, settings.false_alarm_rate)
+    unknown = _unknown(base, outside) if log_e > threshold else []
     every = [*judged.values(), *pairs, *unknown]
     return Posterior(
         nothing=Judged(effects=(), log_prior=0.0, log_bayes=0.0, fit=base), judged=tuple(every), log_e=log_e,
-        threshold=THRESHOLD, temper=TEMPER, likeness=_likeness(first), odds_unknown=settings.odds_unknown, error_class=calibration.chosen.name,
+        threshold=threshold, rule=rule(), likeness=_likeness(first), odds_unknown=settings.odds_unknown,
+        error_class=calibration.chosen.name,
         error_evidence=dict(calibration.evidence), session_s=calibration.session_s, remainder=remainder,
         expected=_expected(first, settings),
     )  # fmt: skip
@@ -121,7 +121,8 @@ def _scanned(fit: Fit, candidates: Sequence[Hypothesis], log_prior: Array, base:
 def _strengths(found: Scan, outside: Sequence[Hypothesis], given: Given) -> Strengths:
     """Of every term in its best shape, then of every parameter outside its prior, in prior standard deviations."""
     terms = found.singles(given)
-    further = given.singles([one.unknown for one in outside if one.unknown is not None], np.sqrt(WIDER**2 - 1.0))
+    wider = np.sqrt(rule().wider ** 2 - 1.0)
+    further = given.singles([one.unknown for one in outside if one.unknown is not None], wider)
     return Strengths(**{name: np.concatenate([getattr(terms, name), getattr(further, name)])
                         for name in ("log_bayes", "value", "sd")})  # fmt: skip
 
@@ -164,8 +165,8 @@ def _with_wider_prior(fit: Fit, index: int, iterations: int) -> Fit:
     """Everything fitted with one parameter outside its prior."""
     experiment, z = fit.experiment, fit.z.copy()
     unknowns = list(experiment.unknowns)
-    unknowns[index] = replace(unknowns[index], group=Group(name="outside its prior", amplitude=WIDER))  # type: ignore[type-var]
-    z[index] /= WIDER
+    unknowns[index] = replace(unknowns[index], group=Group(name="outside its prior", amplitude=rule().wider))  # type: ignore[type-var]
+    z[index] /= rule().wider
     wider = replace(experiment, unknowns=tuple(unknowns))
     return wider.fit(z, [part.point.trajectory for part in fit.parts], iterations=iterations)
 
@@ -201,7 +202,7 @@ def _fitted_on(calibration: Calibration, one: Judged, base: int) -> Judged:
     fit = one.fit
     assert fit is not None  # noqa: S101
     try:
-        reached = fit.experiment.fit(fit.z, [part.point.trajectory for part in fit.parts])
+        reached = fit.experiment.fit(fit.z, at=fit.linearised)
     except (InputError, ArithmeticError, np.linalg.LinAlgError):
         return one
     gained = fit_over_sessions(reached, base).log_evidence - fit_over_sessions(fit, base).log_evidence

@@ -24,6 +24,7 @@ from diagnosis.candidates.dated import changed_law
 from diagnosis.candidates.hypotheses import Hypothesis
 from diagnosis.decision.settings import Settings
 from diagnosis.engine.fit import Fit
+from diagnosis.engine.learnt import Rule
 from models.base.types import Array
 from models.terms.term import Term
 
@@ -31,10 +32,6 @@ Kind = Literal["nothing", "parameter", "measurement", "mechanism", "pair", "outs
 KINDS: tuple[Kind, ...] = get_args(Kind)
 Grade = Literal["claim", "likely"]
 MOST_TIED = 3
-ALIKE = 0.9  # cosine of what two effects do to the readings, from which these data do not tell them apart
-REFUTED = 0.3  # of the best log Bayes factor: a name that explains less is refuted
-PAIR_PRIOR = 0.1  # of two effects, to one
-MUCH_LEFT, MUCH_LEFT_SHARE = 20.0, 0.05  # of the evidence, [nat]: beside a name, what shows that its law is another
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -156,8 +153,7 @@ class Posterior:
         Log of the mean Bayes factor over everything that competes with nothing, [nat]
     threshold : float
         From which something is missing, [nat]
-    temper : (float, float)
-        a and b
+    rule : Rule
     likeness : Likeness
     odds_unknown : float
         Prior odds of a cause that is in no catalogue, see :class:`~diagnosis.decision.settings.Settings`
@@ -176,7 +172,7 @@ class Posterior:
     judged: tuple[Judged, ...]
     log_e: float
     threshold: float
-    temper: tuple[float, float]
+    rule: Rule
     likeness: Likeness = Likeness(labels=(), cosines=np.zeros((0, 0)))
     odds_unknown: float = 0.1
     error_class: str = ""
@@ -189,7 +185,8 @@ class Posterior:
     def much_is_left(self) -> bool:
         """True if the second scan finds much beside the best explanation: its law is not the true one."""
         gain = self.explanations[0].log_bayes
-        return self.remainder > MUCH_LEFT and self.remainder > MUCH_LEFT_SHARE * gain
+        least, share = self.rule.much_left
+        return self.remainder > max(least, share * gain)
 
     @property
     def detected(self) -> bool:
@@ -199,7 +196,7 @@ class Posterior:
     @property
     def something(self) -> float:
         """Probability that something is missing: one half at the threshold."""
-        return float(expit((self.log_e - self.threshold) / self.temper[0]))
+        return float(expit((self.log_e - self.threshold) / self.rule.doubt))
 
     @cached_property
     def explanations(self) -> tuple[Explanation, ...]:
@@ -210,7 +207,7 @@ class Posterior:
             of_names.setdefault(one.names, []).append(one)
             if len(one.effects) == 1 and one.kind != "outside":
                 mass[one.names[0]] = mass.get(one.names[0], 0.0) + float(np.exp(one.log_prior))
-        pair = float(np.log(PAIR_PRIOR / max(len(mass), 1)))
+        pair = float(np.log(self.rule.pair / max(len(mass), 1)))
         unknown = float(np.log(self.odds_unknown * max(len(mass), 1)))  # to one name of the catalogue
         log_bayes, log_prior = [], []
         for names, members in of_names.items():
@@ -219,9 +216,9 @@ class Posterior:
             log_bayes.append(mean + (pair if len(names) > 1 else 0.0))
             log_prior.append(unknown if members[0].kind == "outside" else 0.0)
         values = np.array(log_bayes)
-        a, b = self.temper
+        a, b = self.rule.temper
         most = max(float(values.max(initial=0.0)), 0.0)
-        log = np.where(values >= REFUTED * most, np.array(log_prior) + values / (a + b * most), -np.inf)
+        log = np.where(values >= self.rule.refuted * most, np.array(log_prior) + values / (a + b * most), -np.inf)
         chance = self.something * np.exp(log - logsumexp(log))
         found = [
             Explanation(names=names, members=tuple(sorted(members, key=lambda one: -one.log_prior - one.log_bayes)),
@@ -303,30 +300,36 @@ def decide(posterior: Posterior, settings: Settings) -> tuple[Answer, ...]:
 
 def _answer(posterior: Posterior, best: Judged, effect: Hypothesis, enough: float) -> Answer | None:
     """The narrowest set of names that holds enough probability."""
-    name, others = name_of(effect), {name_of(one) for one in best.effects if one is not effect}
+    name = name_of(effect)
     vague = effect.how == "W" or effect.is_open or posterior.much_is_left
     own = posterior.of_names([name])
     if own >= enough:
         return Answer(best=best, effect=effect, grade="likely" if vague else "claim", probability=own, acts_like=vague)
-    rivals = _rivals(posterior, effect, others)
+    rivals = _rivals(posterior, effect)
     for count in range(2, MOST_TIED + 1):
         if posterior.of_names([name_of(one) for one in rivals[:count]]) >= enough:
             tied = tuple((one, posterior.of_names([name_of(one)])) for one in rivals[:count])
             return Answer(best=best, effect=effect, grade="likely", probability=own, tied=tied, acts_like=vague)
-    alike = [one for one in rivals if posterior.likeness.of(effect, one) >= ALIKE or _act_on_the_same(effect, one)]
-    if posterior.of_names([name, *(name_of(one) for one in alike)]) >= enough:
+    least, likeness = posterior.rule.alike, posterior.likeness
+    alike = [name_of(one) for one in rivals if likeness.of(effect, one) >= least or _act_on_the_same(effect, one)]
+    if posterior.of_names([name, *alike]) >= enough:
         return Answer(best=best, effect=effect, grade="likely", probability=own, acts_like=True)
     return None
 
 
-def _rivals(posterior: Posterior, effect: Hypothesis, beside: Collection[str]) -> list[Hypothesis]:
-    """Best effect of every name that may stand in place of an effect, itself first, most probable first."""
-    found = {name_of(effect): effect}
+def _rivals(posterior: Posterior, effect: Hypothesis) -> list[Hypothesis]:
+    """Best effect of every name that may stand in place of an effect, itself first, most probable first.
+
+    What explanations with the effect's own name hold beside it stands not in its place.
+    """
+    own = name_of(effect)
+    beside = {name for one in posterior.explanations if own in one.names for name in one.names if name != own}
+    found = {own: effect}
     for judged, _ in posterior.ranked:
-        for one in judged.effects:
-            if name_of(one) not in beside:
+        if own not in judged.names:
+            for one in judged.effects:
                 found.setdefault(name_of(one), one)
-    return list(found.values())
+    return [one for name, one in found.items() if name not in beside]
 
 
 def _act_on_the_same(first: Hypothesis, second: Hypothesis) -> bool:

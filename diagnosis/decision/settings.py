@@ -21,7 +21,7 @@ class Settings:
         Prior odds that a cause is in no catalogue, to one that is in it, [-]
     """
 
-    false_alarm_rate: float = 0.05
+    false_alarm_rate: float = 0.02
     matters_K: float = 1.0
     matters_W: float = 0.0
     claim_from: float = 0.9

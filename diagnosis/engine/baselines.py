@@ -38,7 +38,7 @@ def effects_in_baselines(fit: Fit, candidates: Sequence[Hypothesis]) -> Array:
 def sessions_apart(fit: Fit) -> dict[str, float]:
     """Log Bayes factor for every session of baselines on another machine, against the machine of all other recordings.
 
-    That machine may differ between sessions by :data:`diagnosis.engine.sessions.DEVIATIONS`.
+    That machine may differ between sessions by :func:`diagnosis.engine.learnt.deviation_priors`.
 
     Parameters
     ----------

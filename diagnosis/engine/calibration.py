@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from diagnosis.engine.fit import FIRST_ITERATIONS, ITERATIONS, Experiment, Fit, Linear
+from diagnosis.engine.learnt import ErrorClass, error_classes
 from diagnosis.engine.metric import leading_directions
-from diagnosis.engine.model_error import ErrorClass, ModelError, error_classes
+from diagnosis.engine.model_error import ModelError
 from diagnosis.engine.products import gram_of, whitened_base
 from diagnosis.engine.sessions import fit_over_sessions, sessions_of, with_deviation
 from models.base.types import Array

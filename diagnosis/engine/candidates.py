@@ -298,7 +298,7 @@ def refit(fit: Fit, candidate: Hypothesis, variant: int, strength: float, *, ite
     if not rough:
         raise ArithmeticError(f"no simulation has a solution with {candidate.label}")
     best = min(rough, key=lambda one: one.objective)
-    return experiment.fit(best.z, [part.point.trajectory for part in best.parts], iterations=iterations - ROUGH)
+    return experiment.fit(best.z, iterations=iterations - ROUGH, at=best.linearised)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

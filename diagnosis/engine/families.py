@@ -19,8 +19,9 @@ from diagnosis.candidates.dated import (
     without_repeats,
 )
 from diagnosis.candidates.factors import factors_of
-from diagnosis.candidates.hypotheses import How, Hypothesis, hypothesis_of
+from diagnosis.candidates.hypotheses import Hypothesis, hypothesis_of
 from diagnosis.engine.fit import Experiment
+from diagnosis.engine.learnt import family_priors
 from diagnosis.engine.unknown import NetworkParameter, SensorBias
 from diagnosis.forward.grid import Piece
 from diagnosis.setup.inference_setup import STANDSTILL_RPM, InferenceSetup
@@ -30,7 +31,6 @@ from models.mechanisms.ageing import FAMILY as AGEING
 from models.mechanisms.forms import EDGE_S
 from models.quantities.quantities import is_total_loss
 
-SHARES: Mapping[How, float] = {"U": 0.6, "D": 0.2, "C": 0.1, "W": 0.1, "P": 0.03}
 DATES = 14  # of a long recording
 LONG = 0.5  # of the longest recording
 SENSOR_SD_K, TOLERANCES = 1.0, 3.0  # of a step of a thermometer: at least, and so many times its tolerance
@@ -162,5 +162,6 @@ def log_prior(hypotheses: Sequence[Hypothesis]) -> Array:
     """
     places = Counter((h.how, h.name) for h in hypotheses)
     names = Counter(how for how, _ in places)
-    log = np.array([np.log(SHARES[h.how] / names[h.how] / places[h.how, h.name]) for h in hypotheses])
+    shares = family_priors()
+    log = np.array([np.log(shares[h.how] / names[h.how] / places[h.how, h.name]) for h in hypotheses])
     return np.asarray(log - np.logaddexp.reduce(log))

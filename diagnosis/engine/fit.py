@@ -148,8 +148,9 @@ class Experiment:
         return Linear(point=point, filter=whiten, residual=white[:, 0], columns=white[:, 1:])
 
     def fit(
-        self, z: Array | None = None, guesses: Sequence[Guess] | None = None, *, iterations: int = ITERATIONS
-    ) -> Fit:
+        self, z: Array | None = None, guesses: Sequence[Guess] | None = None, *, iterations: int = ITERATIONS,
+        at: Linearised | None = None,
+    ) -> Fit:  # fmt: skip
         """The most probable unknowns.
 
         Parameters
@@ -160,6 +161,8 @@ class Experiment:
             Where to linearise first, see :func:`diagnosis.forward.trajectory.simulate`
         iterations : int
             At most
+        at : Linearised, optional
+            Where an earlier fit ended: at `z`, in the same metric
 
         Raises
         ------
@@ -168,7 +171,7 @@ class Experiment:
         """
         lower, upper = self.bounds
         z = np.zeros(len(self.unknowns)) if z is None else np.clip(z, lower, upper)
-        at = self.linearise(z, guesses)
+        at = at or self.linearise(z, guesses)
         if self.filters is None:  # those of the start serve on the way, those of the end afterwards
             first = self.with_filters(at.parts).fit(z, _courses(at.parts), iterations=iterations)
             final = self._attempt(first.z, _courses(first.parts))

@@ -7,7 +7,7 @@ weigh it, under nothing as under every candidate.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,12 +15,10 @@ from scipy.special import logsumexp
 
 from diagnosis.engine.fit import Experiment, Fit
 from diagnosis.engine.gram import Given, Gram
+from diagnosis.engine.learnt import deviation_priors
 from diagnosis.engine.metric import Metric
 from diagnosis.engine.products import base_of, gram_of
 from models.base.types import Array
-
-# Prior of the deviation. Origin: a study on two foreign plants whose factors differed by 1 to 3 % between sessions.
-DEVIATIONS: Mapping[float, float] = {0.0: 0.3, 0.02: 0.2, 0.05: 0.2, 0.1: 0.15, 0.2: 0.1, 0.4: 0.05}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -85,7 +83,7 @@ def over_sessions(
         Columns with prior N(0, 1) that do not
     """
     recordings = [{experiment.pieces[p].recording for p in pieces} for pieces in sessions_of(experiment)]
-    prior = DEVIATIONS if len(recordings) > 1 else {0.0: 1.0}
+    prior = deviation_priors() if len(recordings) > 1 else {0.0: 1.0}
     every = np.array([*unknowns, *fixed], dtype=int)
     found = []
     for s in prior:

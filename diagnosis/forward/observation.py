@@ -72,8 +72,8 @@ def reading_columns(
     read = np.empty((len(T), len(sensors.channels), T.shape[-1]))
     for index, name in enumerate(sensors.channels):
         if is_total_loss(name):
-            middle = 0.5 * (T[1:] + T[:-1])
-            loss = np.einsum("kn,knc->kc", trajectory.loss_slope, middle) + direct_loss
+            slope = 0.5 * trajectory.loss_slope[:, None, :]
+            loss = (slope @ T[1:] + slope @ T[:-1])[:, 0] + direct_loss
             read[:, index] = total_at_points(loss) * sensors.loss_gain
         else:
             read[:, index] = lagged(T[:, model.part_index(name)], trajectory.piece.steps, sensors.lag[index])

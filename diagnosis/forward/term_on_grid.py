@@ -13,10 +13,11 @@ import sympy as sp
 
 from diagnosis.forward.extra_states import Memories
 from diagnosis.forward.grid import Piece
+from diagnosis.forward.kept import kept
 from diagnosis.forward.network_on_grid import NetworkOnGrid
 from diagnosis.forward.observation import Sensors
 from diagnosis.forward.sensor_fault import passed_on
-from diagnosis.forward.trajectory import Trajectory
+from diagnosis.forward.trajectory import Trajectory, settled_balance
 from models.base.types import Array
 from models.network.laws import compile_each, symbol
 from models.simulation.thermal_network import BASE_SIGNALS
@@ -243,6 +244,10 @@ def _compiled(
 
 def input_slope(model: NetworkOnGrid, trajectory: Trajectory, name: str) -> tuple[Array, Array]:
     """Net heat, shape (K, parts), and loss, (K,), per unit of an input."""
+    return kept(model, trajectory, f"slope {name}", lambda: _input_slope(model, trajectory, name))
+
+
+def _input_slope(model: NetworkOnGrid, trajectory: Trajectory, name: str) -> tuple[Array, Array]:
     step = INPUT_STEP.get(name, OTHER_INPUT_STEP)
     samples = np.array(trajectory.piece.samples)
     samples[..., model.laws.inputs.index(name)] += step
@@ -256,7 +261,8 @@ def moved_heat(model: NetworkOnGrid, trajectory: Trajectory, moved: Piece) -> tu
     power = trajectory.tangent.at(T[:, model.loss_nodes])
     changed = power
     if not np.array_equal(moved.samples[..., :2], piece.samples[..., :2]):
-        changed = power + model.loss_at(moved.samples, T) - model.loss_at(piece.samples, T)
-    here = model.balance(piece, T, trajectory.values, power, trajectory.memory)
+        before = kept(model, trajectory, "losses", lambda: model.loss_at(piece.samples, T))
+        changed = power + model.loss_at(moved.samples, T) - before
+    here = settled_balance(model, trajectory)
     there = model.balance(moved, T, trajectory.values, changed, trajectory.memory)
     return there.heat - here.heat, (there.sources - here.sources)[:, model.is_loss].sum(axis=-1)

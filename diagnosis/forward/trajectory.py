@@ -18,6 +18,7 @@ import numpy as np
 from scipy.special import exprel
 
 from diagnosis.forward.grid import Piece
+from diagnosis.forward.kept import kept
 from diagnosis.forward.matrix_exponential import exponential
 from diagnosis.forward.network_on_grid import HIGHEST_T, LOWEST_T, Balance, LossTangent, NetworkOnGrid
 from models.base.types import Array
@@ -418,16 +419,19 @@ def _walked(
     """The solution about temperatures at the middles; temperatures and states at the grid points."""
     solved = _linearised(model, piece, values, T, tangent, memory)
     now = complete_start(model, start)
-    result = np.empty((len(T) + 1, len(now)))
-    result[0] = now
-    for k in range(len(T)):
-        now = solved.decay[k] @ now + solved.driven[k]
-        result[k + 1] = now
+    result = np.concatenate([now[None, :], solved.driven])
+    for decay, after in zip(solved.decay, result[1:], strict=True):
+        after += decay @ now
+        now = after
     return solved, result
 
 
 def settled_balance(model: NetworkOnGrid, trajectory: Trajectory) -> Balance:
     """The heat balance along a settled trajectory; its own is that of the one before, about which it was solved."""
+    return kept(model, trajectory, "balance", lambda: _settled_balance(model, trajectory))
+
+
+def _settled_balance(model: NetworkOnGrid, trajectory: Trajectory) -> Balance:
     T = trajectory.middle
     power = trajectory.tangent.at(T[:, model.loss_nodes])
     return model.balance(trajectory.piece, T, trajectory.values, power, trajectory.memory)

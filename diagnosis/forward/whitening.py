@@ -145,12 +145,13 @@ class Whitening:
         result = np.empty((points, m, count))
         for first in range(0, count, AT_ONCE):
             some = slice(first, first + AT_ONCE)
-            now = np.zeros((size + m, min(AT_ONCE, count - first)))
-            for k, step in enumerate(self._step):
-                now[size:] = columns[k, :, some]
-                now[size:][~self._seen[k]] = 0.0
-                now = step @ now
-                result[k, :, some] = now[size:]
+            given = np.where(self._seen[:, :, None], columns[:, :, some], 0.0)
+            now, after = np.zeros((2, size + m, given.shape[2]))
+            for step, reading, innovation in zip(self._step, given, result[:, :, some], strict=True):
+                now[size:] = reading
+                np.dot(step, now, out=after)
+                innovation[...] = after[size:]
+                now, after = after, now
         result[~self._seen] = 0.0
         return result.reshape(points * m, count)
 

@@ -143,6 +143,8 @@ def _verdict(posterior: Posterior, answers: Sequence[Answer], unseen: Sequence[N
         asked = {one.effect.name for one in posterior.expected}
         visible = 1.0 - len({one.mechanism for one in unseen}) / max(len(asked), 1)
         return "insufficient_data" if asked and visible < ENOUGH_VISIBLE else "consistent"
+    if not answers and posterior.of("nothing") + posterior.of("parameter") > 0.5:
+        return "parameter_error"
     if not answers or any(answer.best.kind == "outside" or answer.effect.is_open for answer in answers):
         return "unexplained"
     terms = [answer.effect.term for answer in answers]

@@ -63,6 +63,35 @@ def symbol(name: str) -> sp.Symbol:
     return sp.Symbol(name, real=True)
 
 
+def renamed(law: sp.Expr, names: Mapping[str, str]) -> sp.Expr:
+    """A law with other names of some signals or parameters.
+
+    What sympy finds out when it builds an expression does not depend on names: it is not looked for again, which takes
+    long for minima and maxima.
+
+    Parameters
+    ----------
+    law : sympy.Expr
+    names : mapping of str to str
+        New name by old one; no two of the new law's names become one
+    """
+    given = {symbol(old): symbol(new) for old, new in names.items()}
+    done: dict[sp.Basic, sp.Basic] = {}
+
+    def replaced(one: sp.Basic) -> sp.Basic:
+        if not one.args:
+            return given.get(one, one)
+        if one not in done:
+            args = [replaced(arg) for arg in one.args]
+            if all(new is old for new, old in zip(args, one.args, strict=True)):
+                done[one] = one
+            else:
+                done[one] = one.func(*args, evaluate=False) if isinstance(one, sp.Min | sp.Max) else one.func(*args)
+        return done[one]
+
+    return replaced(law)
+
+
 class Signals:
     """The signals of a network by name, as symbols or as numbers: ``s.speed``, ``s.T_oil``, ``s["T_oil"]``.
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from diagnosis.engine.model_error.classes import ErrorClass, error_classes
 from diagnosis.engine.model_error.error_columns import Columns, ModelError
 
-__all__ = ["Columns", "ErrorClass", "ModelError", "error_classes"]
+__all__ = ["Columns", "ModelError"]

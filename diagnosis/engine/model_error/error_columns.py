@@ -9,8 +9,8 @@ from functools import cached_property
 import numpy as np
 
 from diagnosis.engine.fit import Experiment, Linear
+from diagnosis.engine.learnt import ErrorClass
 from diagnosis.engine.model_error.anatomy import Anatomy
-from diagnosis.engine.model_error.classes import ErrorClass
 from diagnosis.engine.model_error.courses import Standard, View
 from diagnosis.engine.model_error.groups import GROUPS, Change, HeatChange
 from diagnosis.engine.point import AT_ONCE, Point

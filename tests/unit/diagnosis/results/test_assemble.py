@@ -17,6 +17,7 @@ from diagnosis.decision.settings import Settings
 from diagnosis.engine.candidates import refit, with_candidate
 from diagnosis.engine.families import candidates_of
 from diagnosis.engine.fit import Experiment, Fit, calibrate
+from diagnosis.engine.learnt import rule
 from diagnosis.engine.prepare import held_out_experiment, prepare_experiment
 from diagnosis.engine.unknown import NetworkParameter
 from diagnosis.proof.scoring.answers import read_answer
@@ -92,7 +93,7 @@ def judged_of(prepared: Prepared, name: str, place: str, log_bayes: float) -> Ju
 def posterior_of(nothing: Fit, *judged: Judged, log_e: float = 80.0, **given: Any) -> Posterior:
     return Posterior(
         nothing=Judged(effects=(), log_prior=0.0, log_bayes=0.0, fit=nothing), judged=judged, log_e=log_e,
-        threshold=4.0, temper=(3.0, 0.0), **given,
+        threshold=4.0, rule=replace(rule(), temper=(3.0, 0.0)), **given,
     )  # fmt: skip
 
 

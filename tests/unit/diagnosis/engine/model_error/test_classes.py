@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from diagnosis.engine.fit import Experiment
-from diagnosis.engine.model_error import ErrorClass, ModelError, error_classes
+from diagnosis.engine.learnt import ErrorClass, error_classes
+from diagnosis.engine.model_error import ModelError
 from diagnosis.engine.model_error.groups import GROUPS
 from diagnosis.engine.prepare import prepare_experiment
 from diagnosis.recordings.read import read_train_and_holdout
@@ -74,18 +75,19 @@ def test_groups_of_a_machine_with_slow_rows() -> None:
 
 def test_classes() -> None:
     classes = error_classes()
-    assert len(classes) == 8
     assert sum(one.prior for one in classes) == pytest.approx(1.0)
-    assert len({one.name for one in classes}) == 8
+    assert len({one.name for one in classes}) == len(classes)
     for one in classes:
         assert set(one.amplitudes) <= set(GROUPS) and all(value > 0.0 for value in one.amplitudes.values())
-    assert set(classes[-1].amplitudes) == set(GROUPS)
-    assert all(set(one.amplitudes) <= set(BASE) for one in classes[:-1])
+    large = [one for one in classes if set(one.amplitudes) == set(GROUPS)]
+    assert large[0].name == "full"
+    assert all(one in large or set(one.amplitudes) <= set(BASE) for one in classes)
+    assert min(one.threshold for one in large) > max(one.threshold for one in classes if one not in large)
 
 
 def test_amplitudes() -> None:
     error = ModelError.of(made("fzg"))
-    one = ErrorClass(name="made up", prior=1.0, amplitudes={"a_loss": 0.1, "e_link": 0.02})
+    one = ErrorClass(name="made up", prior=1.0, threshold=5.0, amplitudes={"a_loss": 0.1, "e_link": 0.02})
     found = error.amplitudes(one)
     assert found.shape == (len(error.labels),)
     for value, group in zip(found, error.groups, strict=True):

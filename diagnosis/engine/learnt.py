@@ -1,0 +1,107 @@
+"""All learnt numbers of the diagnosis, from ``diagnosis/engine/learnt.toml``; their origin stands there."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+
+import numpy as np
+
+from models.files.toml_file import parse_schema_1, read_text
+
+FILE = "learnt.toml"
+
+
+@dataclass(frozen=True, kw_only=True)
+class ErrorClass:
+    """A class of model error.
+
+    Attributes
+    ----------
+    name : str
+    prior : float
+    threshold : float
+        Evidence from which something is missing if the readings choose this class, [nat]
+    amplitudes : mapping of group to float
+        Prior standard deviations of the groups' unknowns; groups that are not named are absent
+    """
+
+    name: str
+    prior: float
+    threshold: float
+    amplitudes: Mapping[str, float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rule:
+    """Numbers of the rule of decision, see :mod:`diagnosis.decision.posterior`.
+
+    Attributes
+    ----------
+    rate : float
+        False-alarm rate that the thresholds of the classes are for, [-]
+    temper : (float, float)
+        a [nat] and b [-]
+    doubt : float
+        Width about the threshold, [nat]
+    pair : float
+        Prior of two effects, to one
+    refuted, alike : float
+        Share of the best evidence; cosine, [-]
+    much_left : (float, float)
+        Evidence left next to a name, [nat] and [-]
+    wider : float
+        Prior of a parameter outside its prior, in its own standard deviations
+    """
+
+    rate: float
+    temper: tuple[float, float]
+    doubt: float
+    pair: float
+    refuted: float
+    alike: float
+    much_left: tuple[float, float]
+    wider: float
+
+    def threshold(self, error: ErrorClass, rate: float) -> float:
+        """Evidence from which something is missing, [nat].
+
+        Parameters
+        ----------
+        error : ErrorClass
+        rate : float
+            False-alarm rate that a user asks for
+        """
+        return error.threshold + self.temper[0] * float(np.log(self.rate / rate))
+
+
+@cache
+def _document() -> Mapping[str, object]:
+    return parse_schema_1(read_text(files("diagnosis.engine") / FILE), file=FILE, kind="learnt numbers")
+
+
+@cache
+def error_classes() -> tuple[ErrorClass, ...]:
+    """Classes of model error with their priors; the largest of the study is ``full``."""
+    return tuple(ErrorClass(**one) for one in _document()["class"])  # type: ignore[attr-defined]
+
+
+@cache
+def rule() -> Rule:
+    """Numbers of the rule of decision."""
+    found = dict(_document()["decision"])  # type: ignore[call-overload]
+    return Rule(**found | {name: tuple(found[name]) for name in ("temper", "much_left")})
+
+
+@cache
+def family_priors() -> Mapping[str, float]:
+    """Prior of every family of candidates."""
+    return dict(_document()["prior"]["families"])  # type: ignore[index]
+
+
+@cache
+def deviation_priors() -> Mapping[float, float]:
+    """Prior of the deviation between sessions, in prior standard deviations of the unknowns."""
+    return {float(s): p for s, p in _document()["prior"]["deviations"].items()}  # type: ignore[index]
