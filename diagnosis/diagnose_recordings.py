@@ -15,10 +15,11 @@ from diagnosis.engine.families import candidates_of, log_prior
 from diagnosis.engine.fit import calibrate
 from diagnosis.engine.outside import outside_of
 from diagnosis.engine.prepare import prepare_experiment
+from diagnosis.engine.set_apart import calibrate_apart
 from diagnosis.recordings.read import named_apart, read_recordings
 from diagnosis.recordings.recording import Recording
 from diagnosis.recordings.shared_rows import check_shared_rows
-from diagnosis.results.assemble import assemble
+from diagnosis.results.assemble import Others, assemble, faulty_channels
 from diagnosis.results.result import Diagnosis
 from diagnosis.setup.baselines import check_baselines
 from diagnosis.setup.plausibility import check_plausible
@@ -99,16 +100,20 @@ def diagnose(
     try:
         progress("calibrating the model")
         plain = calibrate(experiment)
+        others, apart = calibrate_apart(experiment, plain)
         progress("calibrating with model error")
-        calibration = calibrate_with_error(experiment)
+        calibration = calibrate_with_error(experiment, apart)
         candidates = candidates_of(setup, experiment, catalogue)
-        posterior = infer(
-            calibration, candidates, log_prior(candidates), settings, outside=outside_of(setup, experiment),
-            progress=progress,
-        )  # fmt: skip
+        weights, outside = log_prior(candidates), outside_of(setup, experiment)
+        posterior = infer(calibration, candidates, weights, settings, outside=outside, progress=progress)
+        faulty, rest = faulty_channels(posterior, apart), None
+        if faulty and calibration.of_others is not None:
+            progress(f"looking at the machine without {', '.join(apart)}")
+            rest = infer(calibration.of_others, candidates, weights, settings, progress=progress)
         progress("predicting the recordings free-running")
         return assemble(
             setup, experiment, posterior, decide(posterior, settings), plain=plain, settings=settings,
+            others=Others(fit=others, posterior=rest, channels=faulty) if rest is not None else None,
             catalogue=catalogue, train=train, held_out=held, jobs=jobs,
         )  # fmt: skip
     except ArithmeticError as error:

@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import click
 from click.core import ParameterSource
@@ -16,9 +16,14 @@ from builder.base import console
 from builder.base.workers import jobs_option
 from models.base.errors import InputError
 
+if TYPE_CHECKING:
+    from diagnosis.proof.scoring.lines import Settings
+
 LINES = 20  # of progress where there is no terminal
 MADE = ("plant", "cases", "seed", "families", "removed")  # options of cases that are made
+REAL = ("rod",)  # plants with a recording in examples/data
 ONLY_NEW = (*MADE, "gearbox", "cells_every", "baselines", "answers")  # that an old file has
+NOT_REAL = (*ONLY_NEW, "recordings", "truth", "answers", "continued")
 
 
 @click.command("prove")
@@ -42,6 +47,8 @@ ONLY_NEW = (*MADE, "gearbox", "cells_every", "baselines", "answers")  # that an 
               help="Baselines of a case (baseline_*) that its diagnosis gets, the first N.")  # fmt: skip
 @click.option("--removed", is_flag=True,
               help="Own plant: mechanisms that are alone in a case once more with their entry removed.")  # fmt: skip
+@click.option("--real", type=click.Choice(REAL), default=None,
+              help="A real plant from start to FMU instead: diagnosis, corrected FMU, comparison.")  # fmt: skip
 @click.option("--answers", type=click.Path(path_type=Path, dir_okay=False), default=None, metavar="FILE",
               help="File that gets a line per case.  [default: <seed>.jsonl in --output]")  # fmt: skip
 @click.option("--continue", "continued", type=click.Path(path_type=Path, dir_okay=False, exists=True), default=None,
@@ -53,47 +60,41 @@ ONLY_NEW = (*MADE, "gearbox", "cells_every", "baselines", "answers")  # that an 
 def prove(
     context: click.Context, plant: Literal["own", "zoo"], cases: int | None, seed: int | None, recordings: Path | None,
     truth: Path | None, gearbox: str | None, families: str, cells_every: int, baselines: int, removed: bool,
-    answers: Path | None, continued: Path | None, jobs: int, output: Path,
+    real: str | None, answers: Path | None, continued: Path | None, jobs: int, output: Path,
 ) -> None:  # fmt: skip
     """Test the diagnosis on sealed cases: hide effects, diagnose blindly, hash the answers, open the truth, score.
 
     Every diagnosis is a process that gets the recordings of one case and nothing else. Its answer is added to a file,
     with which an interrupted proof is continued.
     """
-    from builder.workflows.proof_cases import ZOO_MIX
+    typed = [name for name in NOT_REAL if context.get_parameter_source(name) == ParameterSource.COMMANDLINE]
+    if real is not None:
+        if typed:
+            raise InputError(f"--{_dashed(typed[0])} does not go with --real, which is one recording of a real plant")
+        _prove_real(real, output, jobs)
+        return
     from builder.workflows.prove import prove as run
-    from diagnosis.proof.cases.conceal import PROOF_MIX, mix_of
     from diagnosis.proof.scoring.lines import Settings, begin_lines
-    from diagnosis.proof.scoring.seeds import OWN_PROOF, ZOO_PROOF
 
-    typed = [n for n in ONLY_NEW if context.get_parameter_source(n) == ParameterSource.COMMANDLINE]
     if (recordings is None) != (truth is None):
         raise InputError("--recordings and --truth go together: a folder per case, and what is concealed in them")
     if continued is not None:
-        if typed:
-            raise InputError(f"--{_dashed(typed[0])} does not go with --continue: {continued} has its options")
+        wrong = [name for name in typed if name in ONLY_NEW]
+        if wrong:
+            raise InputError(f"--{_dashed(wrong[0])} does not go with --continue: {continued} has its options")
         file = continued
     elif recordings is not None:
-        wrong = [n for n in typed if n in MADE]
+        wrong = [name for name in typed if name in MADE]
         if wrong:
             raise InputError(f"--{_dashed(wrong[0])} is for cases that are made; --recordings names cases that exist")
         file = answers or output / "given.jsonl"
         begin_lines(file, Settings(plant="given", gearbox=gearbox or "fzg", cells_every=cells_every,
                                    baselines=baselines))  # fmt: skip
     else:
-        if plant == "own" and families:
-            raise InputError("--families is for --plant zoo")
-        if plant == "zoo" and removed:
-            raise InputError("--removed is for --plant own; the zoo has effects outside the catalogue")
-        if plant == "own" and baselines:
-            raise InputError("--baselines is for --plant zoo and --recordings; the own plant records no baselines")
-        mix, chosen, machine = (PROOF_MIX, OWN_PROOF, "fzg") if plant == "own" else (ZOO_MIX, ZOO_PROOF[0], "")
-        number = sum(mix_of(cases or sum(mix.values()), mix).values())  # refuses too few
-        chosen = chosen if seed is None else seed
-        file = answers or output / f"{chosen}.jsonl"
-        begin_lines(file, Settings(plant=plant, seed=chosen, cases=number, gearbox=gearbox or machine,
-                                   families=families, cells_every=cells_every, baselines=baselines,
-                                   removed=removed))  # fmt: skip
+        settings = _settings_of_made(plant, cases, seed, gearbox=gearbox, families=families, cells_every=cells_every,
+                                     baselines=baselines, removed=removed)  # fmt: skip
+        file = answers or output / f"{settings.seed}.jsonl"
+        begin_lines(file, settings)
     with _progress() as progress:
         result = run(file, output, recordings=recordings, truth=truth, jobs=jobs, progress=progress)
     _show(result, output)
@@ -132,8 +133,40 @@ def score(results: Path, truth: Path, gearbox: str, output: Path) -> None:
     _show(outcome(truths, records, load_gearbox(gearbox)), output)
 
 
+def _settings_of_made(
+    plant: Literal["own", "zoo"], cases: int | None, seed: int | None, *, gearbox: str | None, families: str,
+    cells_every: int, baselines: int, removed: bool,
+) -> Settings:  # fmt: skip
+    """Settings of a proof with cases that are made; refuses what does not fit the kind of plant."""
+    from builder.workflows.proof_cases import ZOO_MIX
+    from diagnosis.proof.cases.conceal import PROOF_MIX, mix_of
+    from diagnosis.proof.scoring.lines import Settings
+    from diagnosis.proof.scoring.seeds import OWN_PROOF, ZOO_PROOF
+
+    if plant == "own" and families:
+        raise InputError("--families is for --plant zoo")
+    if plant == "zoo" and removed:
+        raise InputError("--removed is for --plant own; the zoo has effects outside the catalogue")
+    if plant == "own" and baselines:
+        raise InputError("--baselines is for --plant zoo and --recordings; the own plant records no baselines")
+    mix, chosen, machine = (PROOF_MIX, OWN_PROOF, "fzg") if plant == "own" else (ZOO_MIX, ZOO_PROOF[0], "")
+    number = sum(mix_of(cases or sum(mix.values()), mix).values())  # refuses too few
+    return Settings(plant=plant, seed=chosen if seed is None else seed, cases=number, gearbox=gearbox or machine,
+                    families=families, cells_every=cells_every, baselines=baselines, removed=removed)  # fmt: skip
+
+
+def _prove_real(name: str, output: Path, jobs: int) -> None:
+    from builder.workflows.prove_real import PLANTS, RESULT, prove_real, rows_of
+
+    result = prove_real(PLANTS[name], output, jobs=jobs, progress=lambda text: console.err.print(text))
+    for finding in result["findings"]:
+        console.out.print(f"{finding['grade']}: {finding['title']} ({finding['probability']:.2f})")
+    console.table(f"{name}: {result['verdict'].replace('_', ' ')}", ["", "", "limit", ""], rows_of(result))
+    console.out.print(f"wrote {output / RESULT}, report, correction and FMU next to it")
+
+
 def _dashed(name: str) -> str:
-    return name.replace("_", "-")
+    return {"continued": "continue"}.get(name, name.replace("_", "-"))
 
 
 def _show(result: Mapping[str, Any], output: Path) -> None:

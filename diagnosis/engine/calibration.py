@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from diagnosis.engine.metric import leading_directions
 from diagnosis.engine.model_error import ModelError
 from diagnosis.engine.products import gram_of, whitened_base
 from diagnosis.engine.sessions import fit_over_sessions, sessions_of, with_deviation
+from diagnosis.engine.set_apart import without_channels
 from models.base.types import Array
 
 WIDEST_CLASS = "full"  # the point is calibrated with it: no parameter has to stand in for what the model cannot know
@@ -25,14 +26,17 @@ class Calibration:
     Attributes
     ----------
     fit : Fit
-        Model error of the chosen class in its metric, with the most probable deviation between sessions
+        Model error of the chosen class in its metric, with the most probable deviation between sessions; all readings
+        at the point that those without a channel set apart lead to
     chosen : ErrorClass
     evidence : mapping of str to float
         Log evidence of every class, prior included, less that of the best
     log_evidence : float
-        Over all deviations between sessions
+        Over all deviations between sessions, of the most probable unknowns of all readings
     session_s : float
         Their mean, in prior standard deviations
+    of_others : Calibration or None
+        By the readings without the channels set apart alone, if there are any
     """
 
     fit: Fit
@@ -40,10 +44,18 @@ class Calibration:
     evidence: Mapping[str, float]
     log_evidence: float
     session_s: float
+    of_others: Calibration | None = None
 
 
-def calibrate_with_error(experiment: Experiment) -> Calibration:
+def calibrate_with_error(experiment: Experiment, apart: Collection[str] = ()) -> Calibration:
     """Fit the unknowns with all model error, choose the class by evidence, fit again with that class.
+
+    Parameters
+    ----------
+    experiment : Experiment
+    apart : collection of str
+        Channels that do not count until the class and the point are found, see
+        :func:`diagnosis.engine.set_apart.calibrate_apart`
 
     Raises
     ------
@@ -51,6 +63,20 @@ def calibrate_with_error(experiment: Experiment) -> Calibration:
         If the simulation has no solution with the priors' middles.
     """
     error, classes = ModelError.of(experiment), error_classes()
+    found = _calibrated(without_channels(experiment, apart) if apart else experiment, error, classes)
+    if not apart:
+        return found
+    fit = found.fit
+    courses = [part.point.trajectory for part in fit.parts]
+    at = experiment.linearise(fit.z, courses)
+    (chosen,) = (one for one in classes if one.name == found.chosen.name)
+    all_readings = _judged(experiment, at.parts, _columns(error, at.parts), error.amplitudes(chosen), found.session_s)
+    over = fit_over_sessions(all_readings.fit(fit.z, courses), len(fit.z))
+    return replace(found, fit=all_readings.fit(fit.z, courses, iterations=0), log_evidence=over.log_evidence,
+                   session_s=over.mean, of_others=found)  # fmt: skip
+
+
+def _calibrated(experiment: Experiment, error: ModelError, classes: Sequence[ErrorClass]) -> Calibration:
     (widest,) = (one for one in classes if one.name == WIDEST_CLASS)
     z = np.zeros(len(experiment.unknowns))
     at = experiment.linearise(z)

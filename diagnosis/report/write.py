@@ -14,8 +14,10 @@ from diagnosis.results.result import Diagnosis
 from models.assembly.gearbox import Gearbox
 from models.correction.correction import Correction, Estimate, Finding, write_correction
 from models.quantities.quantities import is_total_loss
+from models.terms.term import Term
 
 SHAPE = "shape_"
+UNNAMED, IMPROVES = "without a name", "It improves the prediction; what it is, the data do not say."
 REPORT, NUMBERS, CORRECTION = "report.html", "diagnosis.json", "correction.toml"
 
 
@@ -25,22 +27,10 @@ def names_of_files(recordings: Sequence[Recording]) -> tuple[str, ...]:
 
 
 def correction_of(diagnosis: Diagnosis, gearbox: Gearbox) -> Correction:
-    """A diagnosis as a correction of the definition: findings, calibrated parameters and formula shapes."""
+    """A diagnosis as a correction of the definition: the model that predicts, and how it was recorded."""
     nominal = {p.name: p for p in gearbox.network().parameters}
     calibrated = {c.parameter: c for c in diagnosis.calibration}
-    findings = []
-    for found in diagnosis.findings:
-        if found.term is None:
-            continue
-        prefix = f"{found.term.label}_"
-        estimates = {p.name: (p.start, 0.0) for p in found.term.parameters}
-        estimates |= {
-            (p.name if p.name == found.term.label else prefix + p.name): (p.value, p.stderr) for p in found.parameters
-        }
-        findings.append(Finding.of(
-            found.term, estimates, mechanism=found.mechanism, family=found.family, place=found.place, says=found.says,
-            probability=found.probability, grade=found.grade,
-        ))  # fmt: skip
+    findings = [_finding_of(term, diagnosis) for term in diagnosis.terms]
     for term in diagnosis.shapes:
         name = term.strength.name
         if name in calibrated:
@@ -56,9 +46,24 @@ def correction_of(diagnosis: Diagnosis, gearbox: Gearbox) -> Correction:
             for c in diagnosis.calibration
             if c.parameter in nominal
         ),
+        sensors=diagnosis.sensors,
+        inputs=diagnosis.true_inputs,
         recordings=dict(diagnosis.inputs["recordings"]),
         version=str(diagnosis.inputs["version"]),
     )
+
+
+def _finding_of(term: Term, diagnosis: Diagnosis) -> Finding:
+    """A term of the predicting model: its finding, or a note that its name is not certain enough for one."""
+    estimates = {p.name: (p.start, p.sd) for p in term.parameters}
+    found = next((f for f in diagnosis.findings if f.term is not None and f.term.label == term.label), None)
+    if found is None:
+        return Finding.of(term, estimates, mechanism=UNNAMED, place=" ".join(term.target), says=IMPROVES,
+                          grade="learnt")  # fmt: skip
+    return Finding.of(
+        term, estimates, mechanism=found.mechanism, family=found.family, place=found.place, says=found.says,
+        probability=found.probability, grade=found.grade,
+    )  # fmt: skip
 
 
 def prediction_table(diagnosis: Diagnosis, recording: Recording) -> pd.DataFrame:

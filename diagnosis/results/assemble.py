@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,10 +12,12 @@ from diagnosis.decision.settings import Settings
 from diagnosis.engine.fit import Experiment, Fit
 from diagnosis.engine.predict import Prediction, log_score_gain, overall_rmse, predict, rmse, with_pieces_of
 from diagnosis.engine.prepare import held_out_experiment
+from diagnosis.engine.set_apart import calibrate_without_error, without_channels
 from diagnosis.recordings.recording import Recording
 from diagnosis.results.advice import next_test, without_sensor
 from diagnosis.results.answer_findings import finding_of
 from diagnosis.results.effect_values import heats_of, names_of, slope
+from diagnosis.results.instruments import sensors_and_inputs_of
 from diagnosis.results.places import node_in
 from diagnosis.results.ratios_only import ratio_notes
 from diagnosis.results.regime import active, regime, windows
@@ -28,13 +30,33 @@ from models.base.types import Array
 from models.base.version import project_version
 from models.mechanisms import Mechanism
 from models.quantities.quantities import is_total_loss
+from models.terms.term import Term
 
 VISIBLE_NAT = 5.0  # expected evidence below which an effect cannot be seen
-ENOUGH_VISIBLE = 0.2  # of the effects that were asked for, for a "consistent" that means something
+ENOUGH_VISIBLE = 0.1  # of the effects that were asked for, for a "consistent" that means something
 LEAST_PLACE = 0.02  # probability of a place that is told
 MOST_RANKED = 500
 STATES = ("before", "calibrated", "after")
+PROBABLY = 0.5
 Predictions = Mapping[str, Mapping[str, Sequence[Prediction]]]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Others:
+    """The machine by all channels but faulty ones.
+
+    Attributes
+    ----------
+    fit : Fit
+        The nominal machine calibrated by them, without model error
+    posterior : Posterior
+    channels : tuple of str
+        The faulty ones
+    """
+
+    fit: Fit
+    posterior: Posterior
+    channels: tuple[str, ...]
 
 
 def assemble(
@@ -44,6 +66,7 @@ def assemble(
     answers: Sequence[Answer],
     *,
     plain: Fit,
+    others: Others | None = None,
     settings: Settings,
     catalogue: Mapping[str, Mechanism],
     train: Sequence[Recording],
@@ -63,6 +86,8 @@ def assemble(
         Most important first
     plain : Fit
         The nominal machine calibrated without model error
+    others : Others or None
+        What all but faulty channels say, if there are any
     settings : Settings
     catalogue : mapping of str to Mechanism
     train, held_out : sequence of Recording
@@ -71,7 +96,8 @@ def assemble(
     error_asked : sequence of str
         Where the data ask for much model error
     """
-    final = _final(posterior, answers, plain)
+    faulty = () if others is None else others.channels
+    final = _final(answers, plain if others is None else others.fit, faulty)
     findings = tuple(
         finding_of(answer, answer.best.fit or final, setup, posterior, catalogue, train) for answer in answers
     )
@@ -80,6 +106,11 @@ def assemble(
     location = _location(setup, posterior) if posterior.detected else ()
     judged = held_out_experiment(setup, experiment)
     predictions = _predictions(experiment, judged, plain, final, jobs)
+    terms = _terms(answers, final)
+    sensors, true_inputs = sensors_and_inputs_of(
+        final, findings=[term.label for term in terms], inputs=setup.gearbox.network().inputs
+    )
+    counting = [name for name in setup.channels if name not in faulty]
     courses = [[p.trajectory.T for p in predictions["holdout"][state]] for state in ("after", "calibrated")]
     assumed = {name for r in (*train, *held_out) for name in r.assumed}
     return Diagnosis(
@@ -92,13 +123,18 @@ def assemble(
         location=location,
         findings=findings,
         calibration=_calibration(final, plain, answers),
-        train=_fits(setup, predictions["train"]),
-        holdout=_fits(setup, predictions["holdout"]),
+        train=_fits(setup, predictions["train"], counting),
+        holdout=_fits(setup, predictions["holdout"], counting),
+        faulty=faulty,
+        terms=terms,
+        sensors=sensors,
+        true_inputs=true_inputs,
+        starts_at=experiment.starts_at,
         noise_K=setup.noise_K,
         floor=_floor(setup),
         misfit=_misfit(final),
         remaining_p_value=float(min(1.0, np.exp(-max(posterior.remainder, -50.0)))),
-        remaining_note=_remaining(posterior),
+        remaining_note=_remaining(posterior, others),
         ranking=_ranking(posterior),
         unseen=unseen,
         next_test=next_test(
@@ -123,14 +159,45 @@ def assemble(
         error_evidence=posterior.error_evidence,
         error_asked=tuple(error_asked),
         session_s=posterior.session_s,
-        holdout_gain=log_score_gain(final, plain, judged, courses),
+        holdout_gain=log_score_gain(final, plain, without_channels(judged, faulty), courses),
     )  # fmt: skip
 
 
-def _final(posterior: Posterior, answers: Sequence[Answer], plain: Fit) -> Fit:
-    """The fit that predicts: of the best answer, else of the machine with nothing missing."""
+def faulty_channels(posterior: Posterior, apart: Sequence[str]) -> tuple[str, ...]:
+    """Channels at odds with all others whose sensors are more probably at fault than not."""
+    return tuple(
+        channel for channel in apart
+        if sum(p for one, p in posterior.ranked
+               if any(e.term is not None and e.term.kind == "sensor" and channel in e.term.target for e in one.effects)
+               ) > PROBABLY
+    )  # fmt: skip
+
+
+def _final(answers: Sequence[Answer], plain: Fit, faulty: Sequence[str]) -> Fit:
+    """The fit that predicts: of the best answer, without model error; else of the machine as calibrated."""
     first = answers[0].best.fit if answers else None
-    return first or posterior.nothing.fit or plain
+    if first is None:
+        return plain
+    try:
+        return calibrate_without_error(first, plain, faulty)
+    except ArithmeticError:  # no solution without what model error allows
+        return first
+
+
+def _terms(answers: Sequence[Answer], final: Fit) -> tuple[Term, ...]:
+    """Terms of the fit that predicts, with its values and standard errors."""
+    found = {}
+    for unknown, z, sd in zip(final.experiment.unknowns, final.z.tolist(),
+                              np.sqrt(np.diag(final.covariance)).tolist(), strict=True):  # fmt: skip
+        found[unknown.parameter.name] = (unknown.value(z), slope(unknown, z) * sd)
+    return tuple(
+        replace(effect.term, parameters=tuple(
+            replace(p, start=found.get(p.name, (p.start, 0.0))[0], sd=found.get(p.name, (p.start, 0.0))[1])
+            for p in effect.term.parameters
+        ))
+        for effect in (answers[0].best.effects if answers and answers[0].best.fit is not None else ())
+        if effect.term is not None
+    )  # fmt: skip
 
 
 # ---------------------------------------------------------------------- verdict
@@ -140,7 +207,7 @@ def _verdict(posterior: Posterior, answers: Sequence[Answer], unseen: Sequence[N
     if answers and all(answer.effect.term is None for answer in answers):
         return "parameter_error"
     if not posterior.detected:
-        asked = {one.effect.name for one in posterior.expected}
+        asked = {one.effect.name for one in posterior.expected if one.effect.how == "U"}
         visible = 1.0 - len({one.mechanism for one in unseen}) / max(len(asked), 1)
         return "insufficient_data" if asked and visible < ENOUGH_VISIBLE else "consistent"
     if not answers and posterior.of("nothing") + posterior.of("parameter") > 0.5:
@@ -166,9 +233,15 @@ def _unseen(posterior: Posterior, catalogue: Mapping[str, Mechanism]) -> tuple[N
     )  # fmt: skip
 
 
-def _remaining(posterior: Posterior) -> str:
+def _remaining(posterior: Posterior, others: Others | None) -> str:
     if not posterior.detected:
         return ""
+    if others is not None:
+        channels, rest = ", ".join(others.channels), others.posterior
+        if rest.detected:
+            return (f"something else is missing too (evidence {rest.log_e:.0f} nat without {channels}): "
+                    "leave that out of the recordings and diagnose again")  # fmt: skip
+        return f"without {channels} nothing stands out of noise and model error (evidence {rest.log_e:.1f} nat)"
     if posterior.remainder > posterior.threshold:
         return f"a further effect would still help (evidence {posterior.remainder:.0f} nat)"
     return "nothing that stands out of noise and model error"
@@ -272,8 +345,8 @@ def _predicted(
     return before, tuned, predict(final, index, z_final, guess=tuned.trajectory.T if near is None else near)
 
 
-def _fits(setup: InferenceSetup, predictions: Mapping[str, Sequence[Prediction]]) -> Fits:
-    temperatures = [i for i, name in enumerate(setup.channels) if not is_total_loss(name)]
+def _fits(setup: InferenceSetup, predictions: Mapping[str, Sequence[Prediction]], counting: Collection[str]) -> Fits:
+    temperatures = [i for i, name in enumerate(setup.channels) if not is_total_loss(name) and name in counting]
     nothing = [np.zeros((0, len(setup.channels)))]
     each = {
         state: rmse(np.concatenate([p.residual for p in found] or nothing),
@@ -303,6 +376,7 @@ def _courses(setup: InferenceSetup, predictions: Predictions) -> tuple[Predicted
                 torque=piece.inputs[at, 1], measured=by_channel(piece.measured), before=by_channel(before.read),
                 calibrated=by_channel(calibrated.read), after=others | by_channel(after.read),
                 counts_from_s=before.counts_from,
+                start=dict(zip(parts, after.trajectory.T[0].tolist(), strict=True)),
             ))  # fmt: skip
     return tuple(result)
 

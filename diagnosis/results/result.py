@@ -20,6 +20,7 @@ from diagnosis.results.result_parts import (
     finding_dict,
     fits_dict,
 )
+from models.correction.instruments import InputCorrection, SensorCorrection
 from models.mechanisms import OPEN_FORM
 from models.simulation.thermal_network import ThermalNetwork
 from models.terms.term import Term
@@ -105,6 +106,17 @@ class Diagnosis:
         Deviation between sessions that the data support, in prior standard deviations
     holdout_gain : float
         Log predictive density of the held-out readings: final model less the calibrated one, [nat]; NaN without any
+    faulty : tuple of str
+        Channels that neither the calibration nor the errors over all temperatures count, because their sensors fail
+    terms : tuple of Term
+        What the model that predicts has more than the nominal one, with its values as the parameters' start and their
+        standard errors as `sd`; of an effect without a name that is certain enough too
+    sensors : tuple of SensorCorrection
+        How its sensors differ from the machine, without what is in `terms`
+    true_inputs : tuple of InputCorrection
+        What it took the inputs to be
+    starts_at : mapping of str to float
+        Start of every recording on the time axis that they share, [s]: the clock of terms with a date
     """
 
     verdict: Verdict
@@ -140,6 +152,11 @@ class Diagnosis:
     error_asked: tuple[str, ...] = ()
     session_s: float = 0.0
     holdout_gain: float = math.nan
+    faulty: tuple[str, ...] = ()
+    terms: tuple[Term, ...] = ()
+    sensors: tuple[SensorCorrection, ...] = ()
+    true_inputs: tuple[InputCorrection, ...] = ()
+    starts_at: Mapping[str, float] = field(default_factory=dict)
 
     def to_dict(self) -> dict[str, Any]:
         """Everything of ``diagnosis.json``, schema :data:`SCHEMA`."""
@@ -172,7 +189,7 @@ class Diagnosis:
             ],
             "fit": {"train": fits_dict(self.train),
                     "holdout": fits_dict(self.holdout) | {"log_score_gain": _or_none(self.holdout_gain)},
-                    "noise_K": self.noise_K, "floor": self.floor},
+                    "faulty_channels": list(self.faulty), "noise_K": self.noise_K, "floor": self.floor},
             "kinds": dict(self.kinds),
             "settings": {"false_alarm_rate": self.false_alarm_rate, "claim_from": self.claim_from,
                          "matters_K": self.matters_K, "matters_W": self.matters_W},

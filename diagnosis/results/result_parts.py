@@ -201,6 +201,8 @@ class PredictedRun:
         priors; after: with the findings
     counts_from_s : float
         Rows before it served to find the start temperatures and do not count
+    start : mapping of node to float
+        Temperatures of all nodes at the first row, with the findings, [degC]
     """
 
     recording: str
@@ -213,6 +215,7 @@ class PredictedRun:
     calibrated: Mapping[str, Array]
     after: Mapping[str, Array]
     counts_from_s: float
+    start: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, kw_only=True)

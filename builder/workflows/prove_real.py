@@ -1,0 +1,188 @@
+"""A real plant from its definition and its recording to a corrected FMU, in one go."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from builder.native.native_fmu import build_native_fmu
+from builder.workflows.held_out_fmu import errors_of, fmu_errors, overall
+from diagnosis.diagnose_recordings import diagnose
+from diagnosis.recordings.read import read_by_role
+from diagnosis.report.write import CORRECTION, write_files
+from diagnosis.results.result import Diagnosis
+from models.assembly.gearbox import load_gearbox
+from models.base.atomic_write import atomic_folder
+from models.base.errors import InputError
+from models.base.version import project_version
+from models.correction.correction import read_correction
+
+RESULT = "real.json"
+SCHEMA = 1
+DATA = Path("examples") / "data"
+STATES = ("before", "calibrated", "after")
+MOST_RATIO, MOST_FMU_K, MOST_S = 0.9, 0.02, 180.0  # after to calibrated; FMU less report; from start to end
+
+
+@dataclass(frozen=True, kw_only=True)
+class RealPlant:
+    """A plant with a recording in ``examples/data``.
+
+    Attributes
+    ----------
+    name : str
+    definition : str
+        Of the machine as first modelled
+    file : str
+    train, hold : str
+        Parts of it to learn from and to judge by
+    broken : tuple of str
+        Channels that those who recorded them call broken
+    """
+
+    name: str
+    definition: str
+    file: str
+    train: str
+    hold: str
+    broken: tuple[str, ...] = ()
+
+
+PLANTS: Mapping[str, RealPlant] = {
+    "rod": RealPlant(name="rod", definition="heated_rod", file="heated_rod.csv.gz", train="0..28800",
+                     hold="28800..86390", broken=("cell_6__NTC7",)),
+}  # fmt: skip
+
+
+def prove_real(
+    plant: RealPlant, output: Path, *, jobs: int = 1, progress: Callable[[str], None] = lambda _: None
+) -> dict[str, Any]:
+    """Diagnose a real plant, build the FMU that its correction makes, and compare that with the held-out recording.
+
+    Parameters
+    ----------
+    plant : RealPlant
+    output : Path
+        Gets everything that a diagnosis writes, ``<definition>_native.fmu`` and ``real.json``
+    jobs : int
+        Processes
+    progress : callable
+        Told in words what is being done
+
+    Returns
+    -------
+    dict
+        ``real.json``: errors over the held-out recording by channel, limits, and which of them are kept
+
+    Raises
+    ------
+    InputError
+        If the recording is not there, or no FMU can be built here.
+    """
+    begin = time.perf_counter()
+    file, gearbox = data_file(plant.file), load_gearbox(plant.definition)
+    network = gearbox.network()
+    train, held, _ = read_by_role([f"{file}@{plant.train}"], [f"{file}@{plant.hold}"], [], network)
+    with atomic_folder(output) as stage:
+        found = diagnose(train, gearbox, holdout=held, jobs=jobs, progress=progress)
+        progress("writing the report")
+        write_files(found, gearbox, [*train, *held], stage)
+        correction = read_correction(stage / CORRECTION, network, made_for=gearbox)
+        progress("building the FMU")
+        fmu = stage / f"{plant.definition}_native.fmu"
+        build_native_fmu(
+            gearbox, None, (), fmu, network=gearbox.network_of_laws(correction.network(gearbox)),
+            correction=correction,
+        )  # fmt: skip
+        progress("driving the FMU")
+        errors = {state: errors_of(found, state) for state in STATES} | {
+            "fmu": fmu_errors(fmu, correction, found, held)
+        }
+        result = result_of(plant, found, errors, time.perf_counter() - begin)
+        (stage / RESULT).write_text(json.dumps(result, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+    return result
+
+
+def data_file(name: str) -> Path:
+    """A recording of ``examples/data``: of the checkout that this program is from, or that one works in.
+
+    Raises
+    ------
+    InputError
+        If it is in neither, as of a program installed from a wheel.
+    """
+    root = Path(str(resources.files("builder"))).parent
+    for folder in (root / DATA, Path.cwd() / DATA):
+        if (folder / name).is_file():
+            return folder / name
+    raise InputError(
+        f"{DATA / name}: is neither next to the program ({root}) nor in the current folder; an installed program has "
+        "no recordings: get the source of the project and run the command in its folder"
+    )
+
+
+def result_of(
+    plant: RealPlant, found: Diagnosis, errors: Mapping[str, dict[str, float]], seconds: float
+) -> dict[str, Any]:
+    """The content of ``real.json``.
+
+    Parameters
+    ----------
+    plant : RealPlant
+    found : Diagnosis
+    errors : mapping of state to mapping of channel to float
+        Over the held-out recording: before, calibrated, after, and of the FMU, [K]
+    seconds : float
+        From start to end
+    """
+    every = {state: overall(of) for state, of in errors.items()}
+    sound = {state: overall(of, plant.broken) for state, of in errors.items()}
+    ratio, off = sound["after"] / sound["calibrated"], abs(sound["fmu"] - sound["after"])
+    return {
+        "schema": SCHEMA,
+        "plant": plant.name,
+        "definition": plant.definition,
+        "recording": {"file": plant.file, "train": plant.train, "hold": plant.hold},
+        "version": project_version(),
+        "verdict": found.verdict,
+        "findings": [{"title": one.title, "grade": one.grade, "probability": one.sureness} for one in found.findings],
+        "broken": {"known": list(plant.broken), "found": list(found.faulty)},
+        "rmse_K": {"all": every, "without_broken": sound},
+        "channels": {name: {state: of[name] for state, of in errors.items()} for name in errors["after"]},
+        "ratio": ratio,
+        "fmu_less_report_K": off,
+        "seconds": seconds,
+        "limits": {"ratio": MOST_RATIO, "fmu_less_report_K": MOST_FMU_K, "seconds": MOST_S},
+        "kept": {
+            "broken_found": set(found.faulty) == set(plant.broken),
+            "ratio": ratio <= MOST_RATIO,
+            "fmu_less_report_K": off <= MOST_FMU_K,
+            "seconds": seconds <= MOST_S,
+        },
+    }
+
+
+def rows_of(result: Mapping[str, Any]) -> list[list[str]]:
+    """The table of a result: what, its value, its limit, and whether it is kept."""
+    kept, limits, rmse = result["kept"], result["limits"], result["rmse_K"]
+    broken = result["broken"]
+    rows = [["broken channels", ", ".join(broken["found"]) or "none found", ", ".join(broken["known"]),
+             _word(kept["broken_found"])]]  # fmt: skip
+    for which, title in (("without_broken", "without them"), ("all", "with them")):
+        rows += [[f"held-out rmse {title}, {state}", f"{rmse[which][state]:.3f} K", "", ""] for state in rmse[which]]
+    return [
+        *rows,
+        ["after / calibrated, without them", f"{result['ratio']:.3f}", f"{limits['ratio']:g}", _word(kept["ratio"])],
+        ["FMU less report, without them", f"{result['fmu_less_report_K']:.4f} K",
+         f"{limits['fmu_less_report_K']:g} K", _word(kept["fmu_less_report_K"])],
+        ["from start to end", f"{result['seconds']:.0f} s", f"{limits['seconds']:g} s", _word(kept["seconds"])],
+    ]  # fmt: skip
+
+
+def _word(kept: bool) -> str:
+    return "kept" if kept else "not kept"

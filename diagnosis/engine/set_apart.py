@@ -1,0 +1,137 @@
+"""Channels that a calibration should not start from: a broken sensor pulls every parameter to its bounds."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from diagnosis.engine.fit import FIRST_ITERATIONS, Experiment, Fit, calibrate
+from diagnosis.engine.unknown import SensorBias, SensorLag, TermParameter, Unknown
+from diagnosis.forward.trajectory import Trajectory
+from models.base.types import Array
+from models.quantities.quantities import is_total_loss
+from models.terms.term import Term
+
+SUSPECT, MANY = 3.0, 10.0  # times what the median channel is missed by: with the channel in the fit, and without it
+MOST_SHARE = 0.25  # of the temperatures: more that are off are no fault of a sensor
+FEWEST = 4  # temperatures, for a median that means something
+
+
+def calibrate_apart(experiment: Experiment, plain: Fit) -> tuple[Fit, tuple[str, ...]]:
+    """Calibrate the nominal machine without the channels that are at odds with all others.
+
+    A channel is set apart if the machine, calibrated by the other ones, misses it by :data:`MANY` times what it misses
+    the median channel by. Its readings count again in the search: what is wrong there is still to be found.
+
+    Parameters
+    ----------
+    experiment : Experiment
+    plain : Fit
+        Of all channels
+
+    Returns
+    -------
+    fit : Fit
+        Of the channels that are left
+    apart : tuple of str
+        Channels that were set apart, mostly none
+    """
+    fit, apart = plain, tuple[str, ...]()
+    names = [name for name in experiment.pieces[0].channels if not is_total_loss(name)]
+    if len(names) < FEWEST:
+        return fit, apart
+    for _ in range(max(int(MOST_SHARE * len(names)), 1)):
+        off = _missed_by(experiment, fit, apart)
+        worst = max(off, key=lambda name: off[name])
+        if off[worst] < SUSPECT:
+            break
+        try:
+            tried = calibrate(without_channels(experiment, (*apart, worst)))
+            if _missed_by(experiment, tried, apart)[worst] < MANY:
+                break
+        except ArithmeticError:  # no solution without it
+            break
+        fit, apart = tried, (*apart, worst)
+    return fit, apart
+
+
+def without_channels(experiment: Experiment, names: Collection[str]) -> Experiment:
+    """The experiment without what some channels show."""
+    left = [name not in names for name in experiment.pieces[0].channels]
+    pieces = (replace(piece, measured=np.where(left, piece.measured, np.nan)) for piece in experiment.pieces)
+    return replace(experiment, pieces=tuple(pieces))
+
+
+def _missed_by(experiment: Experiment, fit: Fit, apart: Collection[str]) -> dict[str, float]:
+    """How much every temperature is missed by, to the median one; without those that are apart."""
+    of_pieces = [_residual(experiment, fit, index) for index in range(len(experiment.pieces))]
+    squares = np.square(np.concatenate(of_pieces))
+    seen = np.isfinite(squares).sum(axis=0)
+    rms = np.sqrt(np.nansum(squares, axis=0) / np.maximum(seen, 1))
+    found = {name: float(value) for name, value in zip(experiment.pieces[0].channels, rms, strict=True)
+             if not is_total_loss(name) and name not in apart}  # fmt: skip
+    middle = max(float(np.median(list(found.values()))), 1e-9)
+    return {name: value / middle for name, value in found.items()}
+
+
+def _residual(experiment: Experiment, fit: Fit, index: int) -> Array:
+    """Measured minus read of a piece, with the readings that the fit left out."""
+    return np.asarray(experiment.pieces[index].measured - fit.parts[index].point.read)
+
+
+def calibrate_without_error(fit: Fit, plain: Fit, apart: Collection[str] = ()) -> Fit:
+    """An explanation calibrated as the nominal machine is, by noise alone: what predicts, and what an FMU holds.
+
+    Parameters
+    ----------
+    fit : Fit
+        With model error in its metric
+    plain : Fit
+        The nominal machine so calibrated: a second start of the search, because there may be several basins
+    apart : collection of str
+        Channels that do not count; what describes their sensors stays as it is
+
+    Raises
+    ------
+    ArithmeticError
+        If there is no solution.
+    """
+    every = replace(fit.experiment, filters=None, metric=None)
+    counting = without_channels(every, apart) if apart else every
+    usual = zip(every.unknowns, plain.experiment.unknowns, plain.z.tolist(), strict=False)
+    nominal = fit.z.copy()
+    nominal[: len(plain.z)] = [mine.z_of(own.value(there)) for mine, own, there in usual]
+    reached = [one for start in (fit.z, nominal) if (one := _calibrated_from(counting, start, fit)) is not None]
+    if not reached:
+        raise ArithmeticError("the simulation has no solution without model error")
+    found = max(reached, key=lambda one: one.log_evidence)
+    if not apart:
+        return found
+    terms = {term.label: term for term in every.machine.terms}
+    own = [_describes(unknown, terms, apart) for unknown in every.unknowns]
+    return every.fit(np.where(own, fit.z, found.z), _courses(found), iterations=0)
+
+
+def _calibrated_from(experiment: Experiment, z: Array, near: Fit) -> Fit | None:
+    """The fit that a start leads to; None without a solution."""
+    try:
+        first = experiment.fit(z, _courses(near), iterations=FIRST_ITERATIONS)
+        return experiment.with_filters(first.parts).fit(first.z, _courses(first))
+    except (ArithmeticError, np.linalg.LinAlgError):
+        return None
+
+
+def _describes(unknown: Unknown, terms: Mapping[str, Term], channels: Collection[str]) -> bool:
+    """True if an unknown is about the sensors of some channels, and nothing else."""
+    if isinstance(unknown, SensorBias | SensorLag):
+        return unknown.channel in channels
+    if not isinstance(unknown, TermParameter):
+        return False
+    term = terms[unknown.label]
+    return term.kind == "sensor" and set(term.target) <= set(channels)
+
+
+def _courses(fit: Fit) -> list[Trajectory]:
+    return [part.point.trajectory for part in fit.parts]
