@@ -28,10 +28,11 @@ SETTLED_K = 0.02
 TEMPERATURE_STEP_K = 0.05
 STATE_STEP = 0.05  # of a state that is solved with the temperatures, mostly a temperature itself
 # Where switches run free: a switching that comes a step later moves a temperature by more, so rounds end early.
-FREE_ROUNDS, FREE_SETTLED_K = 3, 0.2
+FREE_ROUNDS, FREE_SETTLED_K = 3, 0.05
 # From a cold start, losses linearised there are no good at operating temperature: it takes further rounds until their
 # tangents have arrived.
-MOST_FREE_ROUNDS, LOSS_ARRIVED = 10, 0.01
+MOST_FREE_ROUNDS, LOSS_ARRIVED = 20, 0.01
+WINDOW = 180  # fine intervals of a slow recording that are settled before the next: some hours
 RUNAWAY_T = 1500.0  # degC; beyond it there is no trajectory
 # A switching that no row shows, be they means over minutes or noisy near a set-point, sends a guided trajectory astray.
 # Further off than this, switches follow the simulated temperature until it is back.
@@ -201,12 +202,50 @@ def free_running(
     """
     fine, at = piece.finer()
     count = len(fine.steps)
-    T = np.broadcast_to(start[: model.n], (count + 1, model.n))
-    if guess is not None:
-        T = np.stack([np.interp(fine.time, piece.time, course) for course in guess.T], axis=-1)
+    # Whatever came before it is settled, so that a window needs few rounds, however often a switch acts.
+    alone = {*model.switches, *model.actuated, *model.coupled} >= set(range(len(model.network.states)))
+    length = WINDOW if alone and piece.slow else count
+    T = np.empty((count + 1, model.n))
+    states = np.zeros((count, len(model.network.states)))
+    now, held = complete_start(model, start), None
+    for first in range(0, count, length):
+        last = min(first + length, count)
+        window = replace(fine, time=fine.time[first : last + 1], samples=fine.samples[first:last],
+                         measured=fine.measured[first : last + 1], counts=fine.counts[first : last + 1])  # fmt: skip
+        near = None
+        if guess is not None and length == count:
+            near = np.stack([np.interp(fine.time, piece.time, course) for course in guess.T], axis=-1)
+        found = _settled_window(model, window, values, now, near, held)
+        T[first : last + 1], states[first:last], now, held = found.T, found.memory, found.end, found.held
+    # What rows minutes apart show are means, over as much around every grid point; at the ends over what there is.
+    half = piece.samples.shape[1] // 2 if piece.slow else 0
+    total = np.concatenate([np.zeros((1, model.n)), np.cumsum(T, axis=0)])
+    low, high = np.maximum(at - half, 0), np.minimum(at + half, count) + 1
+    means = (total[high] - total[low]) / (high - low)[:, None]
+    memory = np.add.reduceat(states, at[:-1]) / np.diff(at)[:, None]
+    unguided = replace(piece, guided=False)
+    return replace(_round(model, unguided, values, start, means, None, None, given=memory), T=means)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Window:
+    """Settled temperatures and memories of some intervals, all that is stepped at their end, and switches there."""
+
+    T: Array
+    seen: Array
+    memory: Array
+    end: Array
+    held: dict[int, float]
+
+
+def _settled_window(
+    model: NetworkOnGrid, fine: Piece, values: Array, start: Array, near: Array | None, held: dict[int, float] | None
+) -> _Window:
+    """Rounds of stepping until temperatures and tangents of the losses have settled."""
+    T = np.broadcast_to(start[: model.n], (len(fine.steps) + 1, model.n)) if near is None else near
     tangent: LossTangent | None = None
     states: Array | None = None
-    shift = np.inf  # of the mean temperatures in the last round, whatever the switches did meanwhile, K
+    shift, found = np.inf, None  # of the mean temperatures in the last round, whatever the switches did meanwhile, K
     for done in range(MOST_FREE_ROUNDS):
         middle = np.clip(0.5 * (T[1:] + T[:-1]), LOWEST_T, HIGHEST_T)
         last, tangent = tangent, model.loss_tangent(fine, middle, tangent)
@@ -214,24 +253,18 @@ def free_running(
         if done >= FREE_ROUNDS and still:
             break
         power = tangent.at(middle[:, model.loss_nodes])
-        held = np.clip(T, LOWEST_T, HIGHEST_T)
-        memory = model.memory(fine, held, held, values, power, states)
+        inside = np.clip(T, LOWEST_T, HIGHEST_T)
+        memory = model.memory(fine, inside, inside, values, power, states)
         nothing = np.full_like(T, np.nan)
-        before, (T, _, states) = T, _stepped(model, fine, values, start, middle, tangent, memory, nothing)
+        found = _stepped(model, fine, values, start, middle, tangent, memory, nothing, held)
+        before, T, states = T, found.T, found.memory
         if not np.isfinite(T).all():
-            raise ArithmeticError(f"the temperatures of {piece.recording} run away with these parameters")
+            raise ArithmeticError(f"the temperatures of {fine.recording} run away with these parameters")
         shift = float(np.max(np.abs((T - before).mean(axis=0))))
         if float(np.max(np.abs(T - before))) < FREE_SETTLED_K:
             break
-    # What rows minutes apart show are means, over as much around every grid point; at the ends over what there is.
-    half = piece.samples.shape[1] // 2 if piece.slow else 0
-    total = np.concatenate([np.zeros((1, model.n)), np.cumsum(T, axis=0)])
-    low, high = np.maximum(at - half, 0), np.minimum(at + half, count) + 1
-    means = (total[high] - total[low]) / (high - low)[:, None]
-    assert states is not None  # noqa: S101 - rounds >= 1
-    memory = np.add.reduceat(states, at[:-1]) / np.diff(at)[:, None]
-    unguided = replace(piece, guided=False)
-    return replace(_round(model, unguided, values, start, means, None, None, given=memory), T=means)
+    assert found is not None  # noqa: S101 - rounds >= 1
+    return found
 
 
 def _arrived(model: NetworkOnGrid, last: LossTangent, tangent: LossTangent, middle: Array) -> bool:
@@ -243,8 +276,8 @@ def _arrived(model: NetworkOnGrid, last: LossTangent, tangent: LossTangent, midd
 
 def _stepped(
     model: NetworkOnGrid, piece: Piece, values: Array, start: Array, middle: Array, tangent: LossTangent,
-    memory: Array, guide: Array,
-) -> tuple[Array, Array, Array]:  # fmt: skip
+    memory: Array, guide: Array, held: dict[int, float] | None = None,
+) -> _Window:  # fmt: skip
     """Temperatures at the grid points where switches follow them as they come; the other memories are given.
 
     Linearised about the temperatures `middle` once for every position of the switches, and of what follows them, as a
@@ -253,10 +286,8 @@ def _stepped(
 
     Returns
     -------
-    T, seen : Array, shape (K + 1, parts)
-        Temperatures, and those that the switches followed, [degC]
-    memory : Array, shape (K, states)
-        As given, except for the values computed here
+    _Window
+        With the temperatures that the switches followed; memories as given, except for the values computed here
     """
     switches, actuated, acting, kept = model.switches, model.actuated, model.acting, memory.copy()
     corners = list(product((0.0, 1.0), repeat=len(acting)))
@@ -274,7 +305,7 @@ def _stepped(
     n, now = model.n, complete_start(model, start)
     result, seen = np.empty((len(kept) + 1, len(now))), np.empty((len(kept) + 1, n))
     result[0] = now
-    state = {index: model.network.states[index].start for index in (*switches, *actuated)}
+    state = {index: model.network.states[index].start for index in (*switches, *actuated)} | (held or {})
     for k, (signals, h) in enumerate(zip(table, piece.steps.tolist(), strict=True)):
         near = np.abs(now[:n] - guide[k]) < ASTRAY_K  # not where nothing was measured
         seen[k] = np.where(near, guide[k], now[:n])
@@ -295,7 +326,7 @@ def _stepped(
         result[k + 1] = now
     seen[-1] = now[:n]
     kept[:, model.coupled] = 0.5 * (result[1:, n:] + result[:-1, n:])
-    return result[:, :n], seen, kept
+    return _Window(T=result[:, :n], seen=seen, memory=kept, end=now, held=state)
 
 
 def _between(
@@ -399,7 +430,7 @@ def _round(
     solved, result = _walked(model, piece, values, start, T, tangent, memory)
     read = model.switched_by
     if read and given is None and np.nanmax(np.abs(result[:, : model.n] - guide)[:, read], initial=0.0) > ASTRAY_K:
-        seen = _stepped(model, piece, values, start, T, tangent, memory, guide)[1]
+        seen = _stepped(model, piece, values, start, T, tangent, memory, guide).seen
         memory = model.memory(piece, T_ref, seen, values, power, states)
         solved, result = _walked(model, piece, values, start, T, tangent, memory)
     n = model.n
