@@ -21,7 +21,7 @@ from pathlib import Path
 
 from benchmarks.diagnose import make_recordings
 from diagnosis.decision.infer import infer
-from diagnosis.decision.posterior import Settings
+from diagnosis.decision.settings import Settings
 from diagnosis.engine.calibration import calibrate_with_error
 from diagnosis.engine.families import candidates_of, log_prior
 from diagnosis.engine.prepare import prepare_experiment

@@ -28,7 +28,7 @@ from diagnosis.engine.products import gram_of, whitened_base
 from diagnosis.proof.zoo.conceal_zoo import write_zoo_case
 from diagnosis.proof.zoo.draw import draw_case
 from diagnosis.proof.zoo.families import FAMILIES
-from diagnosis.recordings.read import read_train_and_holdout
+from diagnosis.recordings.read import read_recordings
 from models.assembly.gearbox import load_gearbox
 from models.base.errors import InputError
 from models.base.types import Array
@@ -87,7 +87,7 @@ def keep(family: str, machine: str, seed: int, file: Path) -> None:
     with tempfile.TemporaryDirectory() as folder:
         write_zoo_case(case, Path(folder), None)
         paths = [str(path) for path in sorted(Path(folder).glob("train_*.csv.gz"))]
-        recordings, _ = read_train_and_holdout(paths, [], gearbox.network())
+        recordings = read_recordings(paths, gearbox.network())
     _, experiment = prepare_experiment(gearbox, recordings, recordings)
     found = calibrate_with_error(experiment)
     fit, error = found.fit, ModelError.of(experiment)

@@ -13,16 +13,11 @@ import json
 import math
 import warnings
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from diagnosis.candidates.explain import Explanation
-from diagnosis.decision.search import threshold_at
-from diagnosis.inference.evidence import Marginal
-from diagnosis.inference.latent import knots_of, latent_heat
-from diagnosis.inference.posterior import Fit, Problem
-from diagnosis.inference.predict import Prediction, predict
 from pysindy import STLSQ
 from rich.console import Console
 from rich.table import Table
@@ -32,14 +27,20 @@ from sklearn.neural_network import MLPRegressor
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
-from diagnosis.candidates.hypotheses import Hypothesis, hypothesis_of, scan
+from benchmarks.latent_heat import latent_heat
+from diagnosis.candidates.hypotheses import Hypothesis, hypothesis_of
+from diagnosis.decision.infer import THRESHOLD
+from diagnosis.engine.candidates import scan
+from diagnosis.engine.fit import Experiment, Fit, Linearised, calibrate
+from diagnosis.engine.predict import Prediction, predict
+from diagnosis.engine.prepare import held_out_experiment, prepare_experiment
 from diagnosis.forward.term_on_grid import TermOnGrid
 from diagnosis.proof.scoring.lines import Task
 from diagnosis.proof.scoring.outcome import outcome
 from diagnosis.proof.scoring.truth import CONTROL, read_truths
 from diagnosis.recordings.read import read_recordings
 from diagnosis.results.places import node_in
-from diagnosis.setup.inference_setup import InferenceSetup, first, prepare
+from diagnosis.setup.inference_setup import InferenceSetup
 from models.assembly.gearbox import load_gearbox
 from models.base.parallel import run_parallel
 from models.base.types import Array
@@ -55,69 +56,63 @@ MEMORIES_S = (600.0, 3600.0)  # over which the black box remembers its inputs
 MOST_ROWS = 20_000
 
 
-class _ParametersHeld:
-    """In place of :class:`diagnosis.inference.evidence.Marginal`: the residual after calibration, all parameters
-    held."""
-
-    def __init__(self, fit: Fit) -> None:
-        self.columns, self.rest = fit.white_columns, fit.white_residual
-
-    def products(self, columns: Array) -> tuple[Array, Array]:
-        return np.asarray(columns.T @ self.rest), np.einsum("mn,mn->n", columns, columns)
-
-
-def answers_to(case: InferenceSetup, even: InferenceSetup) -> dict[str, Any]:
+def answers_to(setup: InferenceSetup, experiment: Experiment, even: tuple[Experiment, Experiment]) -> dict[str, Any]:
     """Answers of the methods to one case.
 
     Parameters
     ----------
-    case : InferenceSetup
-    even : InferenceSetup
-        The case on intervals of one length, on which the network remembers its inputs
+    setup : InferenceSetup
+    experiment : Experiment
+    even : (Experiment, Experiment)
+        Recordings to learn from and to judge by on intervals of one length, on which the network remembers its inputs
 
     Returns
     -------
     dict
         For every method of :data:`METHODS` the part of ``diagnosis.json`` that the rules read, and :data:`ERRORS`
     """
-    base = first(case)
+    base = calibrate(experiment)
     candidates = [
         hypothesis_of(placed)
         for mechanism in CATALOGUE.values()
-        for placed in mechanism.placed(base.problem.model.network, case.scale, case.channels)
+        for placed in mechanism.placed(experiment.machine.model.network, setup.scale, setup.channels)
     ]
     return {
-        "naive": _naive(case, base, candidates),
-        "sparse": _sparse(case, base, candidates),
+        "naive": _naive(setup, base, candidates),
+        "sparse": _sparse(setup, base, candidates),
         **_errors(even, base),
     }
 
 
-def _naive(case: InferenceSetup, base: Explanation, candidates: Sequence[Hypothesis]) -> dict[str, Any]:
-    """Regress the calibrated residual on the response to each candidate; the best wins, at the tool's own threshold."""
-    scored = scan(base.problem, base.fit, _ParametersHeld(base.fit), candidates)  # type: ignore[arg-type]
-    logs = np.array([s.log_bayes for s in scored])
-    if float(np.logaddexp.reduce(logs) - np.log(len(logs))) < threshold_at(0.05):
-        return _answer(case, None)
-    return _answer(case, scored[0].hypothesis)
+def _naive(setup: InferenceSetup, base: Fit, candidates: Sequence[Hypothesis]) -> dict[str, Any]:
+    """Regress the calibrated residual on the response to each candidate, all parameters held; the best wins.
+
+    The threshold is that of the tool.
+    """
+    parts = [replace(part, columns=part.columns[:, :0]) for part in base.parts]
+    held = Fit(experiment=replace(base.experiment, unknowns=()), z=np.zeros(0), linearised=Linearised.of(parts, None))
+    scanned = scan(held, candidates)
+    logs = scanned.log_bayes
+    if float(np.logaddexp.reduce(logs) - np.log(len(logs))) < THRESHOLD:
+        return _answer(setup, None)
+    return _answer(setup, scanned.candidates[int(np.argmax(logs))])
 
 
-def _sparse(case: InferenceSetup, base: Explanation, candidates: Sequence[Hypothesis]) -> dict[str, Any]:
+def _sparse(setup: InferenceSetup, base: Fit, candidates: Sequence[Hypothesis]) -> dict[str, Any]:
     """Heat that is missing at the likeliest node, regressed sparsely on the catalogue's heats there."""
-    marginal, pieces = Marginal.of(base.fit), base.problem.pieces
-    knots = knots_of(pieces)
-    kinds = (True, False) if TOTAL_LOSS in case.channels else (False,)
+    kinds = (True, False) if TOTAL_LOSS in setup.channels else (False,)
     missing = max(
-        (latent_heat(base.problem.model, base.fit, marginal, part.name, loss_W=case.loss_W, is_loss=is_loss,
-                     knots=knots) for part in case.nominal.parts for is_loss in kinds),
+        (latent_heat(base, part.name, loss_W=setup.loss_W, is_loss=is_loss)
+         for part in setup.nominal.parts for is_loss in kinds),
         key=lambda heat: heat.log_bayes,
     )  # fmt: skip
-    here = [h for h in candidates if h.in_network and node_in(case.nominal, h) == missing.node]
-    if missing.log_bayes < threshold_at(0.05) or not here:
-        return _answer(case, None)
-    weights = np.sqrt(np.concatenate([piece.steps for piece in pieces]))  # intervals are of different lengths
+    here = [h for h in candidates if h.in_network and node_in(setup.nominal, h) == missing.node]
+    if missing.log_bayes < THRESHOLD or not here:
+        return _answer(setup, None)
+    # Intervals are of different lengths.
+    weights = np.sqrt(np.concatenate([part.point.trajectory.piece.steps for part in base.parts]))
     columns = weights[:, None] * np.column_stack([_heat(base, h) for h in here])
-    target = weights * np.concatenate(missing.mean)
+    target = weights * missing.mean
     norms = np.linalg.norm(columns, axis=0)
     here = [h for h, norm in zip(here, norms, strict=True) if norm > 0.0]
     columns = columns[:, norms > 0.0] / norms[norms > 0.0]
@@ -127,22 +122,22 @@ def _sparse(case: InferenceSetup, base: Explanation, candidates: Sequence[Hypoth
             columns, target[:, None]
         )
     sizes = np.abs(np.ravel(found.coef_))
-    return _answer(case, here[int(sizes.argmax())] if sizes.any() else None)
+    return _answer(setup, here[int(sizes.argmax())] if sizes.any() else None)
 
 
-def _heat(base: Explanation, h: Hypothesis) -> Array:
+def _heat(base: Fit, h: Hypothesis) -> Array:
     """Heat of a candidate with its middle shape along the calibrated run, all parts together, [W] per strength."""
     assert h.term is not None  # noqa: S101 - it is in the network
-    term, shape = TermOnGrid(base.problem.model, h.term), h.variants[[len(h.variants) // 2]]
-    heats = [term.heat(part.trajectory, shape)[0][:, :, 0].sum(axis=1) for part in base.fit.parts]
+    term, shape = TermOnGrid(base.experiment.machine.model, h.term), h.variants[[len(h.variants) // 2]]
+    heats = [term.heat(part.point.trajectory, shape)[0][:, :, 0].sum(axis=1) for part in base.parts]
     return np.asarray(np.nan_to_num(np.concatenate(heats)))
 
 
-def _answer(case: InferenceSetup, h: Hypothesis | None) -> dict[str, Any]:
+def _answer(setup: InferenceSetup, h: Hypothesis | None) -> dict[str, Any]:
     if h is None:
         return {"verdict": "consistent", "findings": [], "location": []}
     of_measurement = h.term is not None and h.term.of_measurement
-    node = node_in(case.nominal, h)
+    node = node_in(setup.nominal, h)
     return {
         "verdict": "sensor_fault" if of_measurement else "missing_physics",
         "findings": [
@@ -156,18 +151,16 @@ def _answer(case: InferenceSetup, h: Hypothesis | None) -> dict[str, Any]:
 # ---------------------------------------------------------------------- black box
 
 
-def _errors(even: InferenceSetup, base: Explanation) -> dict[str, float | None]:
+def _errors(even: tuple[Experiment, Experiment], base: Fit) -> dict[str, float | None]:
     """Held-out error of the calibrated model, alone and with a network on its residual.
 
     The network goes from inputs, their fading memories and the calibrated prediction to the residual.
     """
-    temperatures = [i for i, name in enumerate(even.channels) if not is_total_loss(name)]
 
-    def table(problem: Problem) -> tuple[Array, Array]:
-        return _table([predict(problem, i, base.fit.z) for i in range(len(problem.pieces))], temperatures)
+    def table(experiment: Experiment) -> tuple[Array, Array]:
+        return _table([predict(experiment, i, base.z) for i in range(len(experiment.pieces))])
 
-    x, y = table(even.train)
-    x_held, y_held = table(even.holdout)
+    (x, y), (x_held, y_held) = map(table, even)
     if not len(x) or not len(x_held):
         return dict.fromkeys(ERRORS)
     step = max(1, len(x) // MOST_ROWS)
@@ -187,10 +180,11 @@ def _rms(values: Array) -> float | None:
     return rms if math.isfinite(rms) else None
 
 
-def _table(predictions: Sequence[Prediction], temperatures: Sequence[int]) -> tuple[Array, Array]:
+def _table(predictions: Sequence[Prediction]) -> tuple[Array, Array]:
     """Features and residuals of the rows that are measured in every channel."""
     features, residuals = [], []
     for one in predictions:
+        temperatures = [i for i, name in enumerate(one.piece.channels) if not is_total_loss(name)]
         inputs = one.piece.inputs[np.clip(np.arange(len(one.piece.time)), 0, len(one.piece.inputs) - 1)]
         step = float(np.median(np.diff(one.piece.time)))
         keep = [math.exp(-step / memory) for memory in MEMORIES_S]
@@ -212,7 +206,9 @@ def answers_to_files(folder: Path, gearbox: str) -> dict[str, Any]:
     train, held = (
         read_recordings(sorted(folder.glob(f"{kind}*.csv*")), definition.network()) for kind in ("train", "hold")
     )
-    return answers_to(prepare(definition, train, held), prepare(definition, train, held, even=True))
+    setup, experiment = prepare_experiment(definition, train, held)
+    on_even, even = prepare_experiment(definition, train, held, even=True)
+    return answers_to(setup, experiment, (even, held_out_experiment(on_even, even)))
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -1,7 +1,7 @@
 """From an experiment and its candidates to a posterior: scan, race, refit, second scan.
 
 The scan is linear and judges everything. A race of a few Gauss-Newton steps corrects it for the best names; the best of
-them are fitted to the end, model error in place; a second scan beside the best explanation looks for a second effect.
+them are fitted to the end, model error in place; a second scan given the best explanation looks for a second effect.
 """
 
 from __future__ import annotations
@@ -86,8 +86,8 @@ def infer(
     pairs: list[Judged] = []
     best = max(judged.values(), key=lambda one: one.log_bayes + one.log_prior, default=None)
     if best is not None and best.fit is not None and best.log_bayes > 0.0:
-        progress(f"looking beside {best.label}")
-        remainder, pairs, there = _beside(calibration, best, candidates, log_prior, len(base.z))
+        progress(f"scanning again, given {best.label}")
+        remainder, pairs, there = _given_best(calibration, best, candidates, log_prior, len(base.z))
         alone |= {label: min(alone[label], value) for label, value in there.items()}
     for index, candidate in enumerate(first.candidates):
         judged.setdefault(candidate.label, _by_scan(first, index, alone[candidate.label]))
@@ -220,10 +220,10 @@ def _by_scan(found: _Scanned, index: int, log_bayes: float) -> Judged:
     )  # fmt: skip
 
 
-def _beside(
+def _given_best(
     calibration: Calibration, best: Judged, candidates: Sequence[Hypothesis], log_prior: Array, base: int
 ) -> tuple[float, list[Judged], dict[str, float]]:
-    """Second effects beside the best explanation, fitted; and all candidates alone, seen from there.
+    """Second effects given the best explanation, fitted; and all candidates alone, seen from there.
 
     Returns
     -------

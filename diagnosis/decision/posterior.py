@@ -1,4 +1,4 @@
-r"""What the readings say about every explanation, and the one rule that turns it into an answer.
+r"""Probabilities of all explanations of the readings, and the one rule that turns them into an answer.
 
 An explanation is nothing, one effect, or two. Effects of one law (at all places, from a date on, over the hours) are
 one name. The evidence of a name is the Bayesian mean over its places, courses and shapes. Between names it is tempered,
@@ -61,7 +61,7 @@ class Judged:
 
     @property
     def kind(self) -> Kind:
-        """What sort of explanation it is."""
+        """Sort of explanation."""
         if len(self.effects) != 1:
             return "pair" if self.effects else "nothing"
         (effect,) = self.effects
@@ -104,7 +104,7 @@ class Explanation:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Expected:
-    """What an effect of the size that matters would leave in these recordings.
+    """Evidence that an effect of the size that matters would leave in these recordings.
 
     Attributes
     ----------
@@ -164,7 +164,7 @@ class Posterior:
     session_s : float
         Mean deviation between sessions that the readings support, in prior standard deviations; 0 of one session
     remainder : float
-        Log Bayes factor of the best further effect beside the best explanation, [nat]
+        Log Bayes factor of the best further effect, given the best explanation, [nat]
     expected : tuple of Expected
     """
 
@@ -183,7 +183,7 @@ class Posterior:
 
     @property
     def much_is_left(self) -> bool:
-        """True if the second scan finds much beside the best explanation: its law is not the true one."""
+        """True if the second scan finds much more, given the best explanation: its law is not the true one."""
         gain = self.explanations[0].log_bayes
         least, share = self.rule.much_left
         return self.remainder > max(least, share * gain)
@@ -218,7 +218,8 @@ class Posterior:
         values = np.array(log_bayes)
         a, b = self.rule.temper
         most = max(float(values.max(initial=0.0)), 0.0)
-        log = np.where(values >= self.rule.refuted * most, np.array(log_prior) + values / (a + b * most), -np.inf)
+        left = (values >= self.rule.refuted * most) | (most == 0.0)
+        log = np.where(left, np.array(log_prior) + values / (a + b * most), -np.inf)
         chance = self.something * np.exp(log - logsumexp(log))
         found = [
             Explanation(names=names, members=tuple(sorted(members, key=lambda one: -one.log_prior - one.log_bayes)),
@@ -250,7 +251,7 @@ class Posterior:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Answer:
-    """One effect that is reported: a name, or a set of names that these data do not tell apart.
+    """One effect that is reported: a name, or a set of names that these data do not separate.
 
     Attributes
     ----------
@@ -265,7 +266,7 @@ class Answer:
     tied : tuple of (Hypothesis, float)
         Names of a tie set with their probabilities, `effect` first; empty of a claim
     acts_like : bool
-        True if what remains, or the kind of the effect (a course over the hours), says that only law and place are
+        True if what remains, or the kind of the effect (a course over the hours), shows that only law and place are
         found
     """
 
@@ -287,8 +288,8 @@ def decide(posterior: Posterior, settings: Settings) -> tuple[Answer, ...]:
 
     A name is a claim if its probability reaches :attr:`Settings.claim_from`. Else at most three names that reach it
     together are a tie. Else names that look alike in these readings, or act on the same thing, and reach it together
-    are one answer: it "acts like" the best of them. So does what leaves much beside it, and what only has a course over
-    the hours: law and place are found, not the cause.
+    are one answer: it "acts like" the best of them. So does what leaves much unexplained, and what only has a course
+    over the hours: law and place are found, not the cause.
     """
     if not posterior.detected:
         return ()
@@ -320,16 +321,16 @@ def _answer(posterior: Posterior, best: Judged, effect: Hypothesis, enough: floa
 def _rivals(posterior: Posterior, effect: Hypothesis) -> list[Hypothesis]:
     """Best effect of every name that may stand in place of an effect, itself first, most probable first.
 
-    What explanations with the effect's own name hold beside it stands not in its place.
+    Further effects in explanations with the effect's own name do not stand in its place.
     """
     own = name_of(effect)
-    beside = {name for one in posterior.explanations if own in one.names for name in one.names if name != own}
+    further = {name for one in posterior.explanations if own in one.names for name in one.names if name != own}
     found = {own: effect}
     for judged, _ in posterior.ranked:
         if own not in judged.names:
             for one in judged.effects:
                 found.setdefault(name_of(one), one)
-    return [one for name, one in found.items() if name not in beside]
+    return [one for name, one in found.items() if name not in further]
 
 
 def _act_on_the_same(first: Hypothesis, second: Hypothesis) -> bool:

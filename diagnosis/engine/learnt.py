@@ -51,7 +51,7 @@ class Rule:
     refuted, alike : float
         Share of the best evidence; cosine, [-]
     much_left : (float, float)
-        Of the evidence beside a name, [nat] and [-]
+        Of the evidence of a second effect, [nat] and [-]
     wider : float
         Prior of a parameter outside its prior, in its own standard deviations
     """

@@ -5,7 +5,7 @@ The laws are symbolic expressions, so are their derivatives.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -126,5 +126,60 @@ def _slopes(law: sp.Expr, arguments: tuple[str, ...], names: tuple[str, ...]) ->
     whole = {one: sp.Dummy() for one in law.atoms(sp.Mod)}
     law = law.xreplace({one: one.args[0] - one.args[1] * count for one, count in whole.items()})
     counts = {count: sp.floor(one.args[0] / one.args[1]) for one, count in whole.items()}
-    slopes = [sp.diff(law, symbol(name)).xreplace(counts) for name in names]
-    return compile_function(function_source("slopes", arguments, slopes, vector=True), "slopes")
+    # Minima and maxima are computed first: derivatives through them are long, and take sympy long.
+    extremes: dict[sp.Expr, sp.Symbol] = {}
+    law = _apart(law, extremes)
+    slopes_of: dict[sp.Symbol, list[sp.Expr]] = {}
+    for extreme, own in extremes.items():
+        slopes_of[own] = _extreme_slopes(extreme, names, slopes_of)
+    slopes = [slope.xreplace(counts) for slope in _chained(law, names, slopes_of)]
+    known, steps = list(arguments), []
+    for extreme, own in extremes.items():
+        steps.append(_function(known, [extreme.xreplace(counts)]))
+        known.append(own.name)
+    last = _function(known, slopes)
+
+    def evaluated(*signals: Any) -> tuple[Any, ...]:
+        for step in steps:
+            signals = (*signals, *step(*signals))
+        return last(*signals)
+
+    return evaluated
+
+
+def _function(arguments: Sequence[str], laws: Sequence[sp.Expr]) -> Callable[..., tuple[Any, ...]]:
+    return compile_function(function_source("slopes", arguments, laws, vector=True), "slopes")
+
+
+def _apart(law: sp.Expr, extremes: dict[sp.Expr, sp.Symbol]) -> sp.Expr:
+    """The law with a symbol for every minimum and maximum; these are added to `extremes`, inner ones first."""
+    if not law.has(sp.Min, sp.Max):
+        return law
+    args = [_apart(arg, extremes) for arg in law.args]
+    if not isinstance(law, sp.Min | sp.Max):
+        return law.func(*args)
+    return extremes.setdefault(law.func(*args, evaluate=False), symbol(f"_extreme_{len(extremes)}"))
+
+
+def _extreme_slopes(
+    extreme: sp.Expr, names: Sequence[str], slopes_of: Mapping[sp.Symbol, Sequence[sp.Expr]]
+) -> list[sp.Expr]:  # fmt: skip
+    """Derivatives of a minimum or maximum: those of the argument that it is; half of each where two are equal."""
+    sign, result = (1 if isinstance(extreme, sp.Max) else -1), [sp.Integer(0)] * len(names)
+    for index, arg in enumerate(extreme.args):
+        others = extreme.args[:index] + extreme.args[index + 1 :]
+        other = others[0] if len(others) == 1 else extreme.func(*others, evaluate=False)
+        here = sp.Heaviside(sign * (arg - other), evaluate=False)
+        result = [one + here * slope for one, slope in zip(result, _chained(arg, names, slopes_of), strict=True)]
+    return result
+
+
+def _chained(
+    law: sp.Expr, names: Sequence[str], slopes_of: Mapping[sp.Symbol, Sequence[sp.Expr]]
+) -> list[sp.Expr]:  # fmt: skip
+    """Derivatives of a law of signals and of extremes whose derivatives are known."""
+    result = [sp.diff(law, symbol(name)) for name in names]
+    for own in sorted(law.free_symbols & set(slopes_of), key=lambda one: str(one.name)):
+        outer = sp.diff(law, own)
+        result = [one + outer * slope for one, slope in zip(result, slopes_of[own], strict=True)]
+    return result

@@ -1,4 +1,4 @@
-"""What many columns ask of one trajectory is computed once and kept as long as that trajectory."""
+"""Results that many columns need of one trajectory: computed once, kept as long as that trajectory."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ _known: WeakKeyDictionary[Any, dict[tuple[Any, str], Any]] = WeakKeyDictionary()
 
 
 def kept(model: object, trajectory: object, name: str, found: Callable[[], Kept]) -> Kept:
-    """What is `found` along a trajectory of a model.
+    """The result of `found`, computed at the first call with this trajectory of a model.
 
     Parameters
     ----------
     model, trajectory : object
         Compared by identity
     name : str
-        What it is
+        Of the result
     found : callable
-        Computes it; what it gives must not hold the trajectory
+        Computes the result, which must not hold the trajectory
     """
     known = _known.setdefault(trajectory, {})
     if (model, name) not in known:

@@ -410,9 +410,3 @@ def _stronger(now: Array, before: Array) -> tuple[Array, Array]:
 def _one_each(values: Array) -> list[Array | float]:
     """Parameters one by one: numbers, or columns of shape (V, 1)."""
     return list(values) if values.ndim == 1 else [values[:, index, None] for index in range(values.shape[1])]
-
-
-def named_values(network: ThermalNetwork, given: Mapping[str, float] | None = None) -> Array:
-    """Values of all parameters of a network: as delivered, or as given by name."""
-    given = given or {}
-    return np.array([given.get(p.name, p.start) for p in network.parameters])

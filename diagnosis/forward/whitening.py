@@ -49,7 +49,7 @@ class Noise:
         Uncertainty of the start temperatures, [K]
     capacity : float
         Sum of the heat capacities that `heat_sd` is given for, [J/K]: it goes with them, else the floor would decide on
-        the size of a gearbox whose recordings tell ratios only; 0 where it is fixed
+        the size of a gearbox whose recordings determine ratios only; 0 where it is fixed
     """
 
     channel_sd: Array

@@ -54,7 +54,7 @@ def correction_of(diagnosis: Diagnosis, gearbox: Gearbox) -> Correction:
 
 
 def _finding_of(term: Term, diagnosis: Diagnosis) -> Finding:
-    """A term of the model that predicts; what was found of it, or that its name is not certain enough for a finding."""
+    """A term of the predicting model: its finding, or a note that its name is not certain enough for one."""
     estimates = {p.name: (p.start, p.sd) for p in term.parameters}
     found = next((f for f in diagnosis.findings if f.term is not None and f.term.label == term.label), None)
     if found is None:

@@ -33,7 +33,7 @@ from models.quantities.quantities import is_total_loss
 from models.terms.term import Term
 
 VISIBLE_NAT = 5.0  # expected evidence below which an effect cannot be seen
-ENOUGH_VISIBLE = 0.2  # of the effects that were asked for, for a "consistent" that means something
+ENOUGH_VISIBLE = 0.1  # of the effects that were asked for, for a "consistent" that means something
 LEAST_PLACE = 0.02  # probability of a place that is told
 MOST_RANKED = 500
 STATES = ("before", "calibrated", "after")
@@ -207,7 +207,7 @@ def _verdict(posterior: Posterior, answers: Sequence[Answer], unseen: Sequence[N
     if answers and all(answer.effect.term is None for answer in answers):
         return "parameter_error"
     if not posterior.detected:
-        asked = {one.effect.name for one in posterior.expected}
+        asked = {one.effect.name for one in posterior.expected if one.effect.how == "U"}
         visible = 1.0 - len({one.mechanism for one in unseen}) / max(len(asked), 1)
         return "insufficient_data" if asked and visible < ENOUGH_VISIBLE else "consistent"
     if not answers and posterior.of("nothing") + posterior.of("parameter") > 0.5:

@@ -29,23 +29,8 @@ def ratio_notes(fit: Fit) -> tuple[str, ...]:
     ----------
     fit : Fit
     """
-    names = set(sizes(fit.experiment.machine.model.network))
-    direction = np.array([
-        along(unknown.parameter, unknown.value(z))
-        if isinstance(unknown, NetworkParameter) and unknown.parameter.name in names else 0.0
-        for unknown, z in zip(fit.experiment.unknowns, fit.z.tolist(), strict=True)
-    ])  # fmt: skip
-    return notes_along(direction, np.concatenate([part.columns for part in fit.parts]))
-
-
-def along(parameter: Parameter, value: float) -> float:
-    """Change of a size that multiplies it by e, in standard deviations of its prior: a logarithmic one moves by 1."""
-    return (1.0 if parameter.log else value) / parameter.sd
-
-
-def notes_along(direction: Array, columns: Array) -> tuple[str, ...]:
-    """One sentence if whitened `columns`, shape (M, unknowns), hardly show a step in `direction`, (unknowns,)."""
-    each = columns * direction
+    direction = scale_direction(fit)
+    each = np.concatenate([part.columns for part in fit.parts]) * direction
     together, alone = each.sum(axis=1), np.square(each).sum(axis=0)[direction != 0.0]
     if not len(alone) or float(together @ together) > LITTLE * float(alone.sum()):
         return ()
@@ -57,6 +42,27 @@ def notes_along(direction: Array, columns: Array) -> tuple[str, ...]:
         "loss, or one heat flow, to fix it"
     )
     return (text,)
+
+
+def scale_direction(fit: Fit) -> Array:
+    """Change of the unknowns that multiplies every heat, conductance and capacity by e.
+
+    Returns
+    -------
+    Array, shape (unknowns,)
+        In standard deviations of their priors
+    """
+    names = set(sizes(fit.experiment.machine.model.network))
+    return np.array([
+        _along(unknown.parameter, unknown.value(z))
+        if isinstance(unknown, NetworkParameter) and unknown.parameter.name in names else 0.0
+        for unknown, z in zip(fit.experiment.unknowns, fit.z.tolist(), strict=True)
+    ])  # fmt: skip
+
+
+def _along(parameter: Parameter, value: float) -> float:
+    """Change of a size that multiplies it by e, in standard deviations of its prior: a logarithmic one moves by 1."""
+    return (1.0 if parameter.log else value) / parameter.sd
 
 
 def sizes(network: ThermalNetwork) -> Iterator[str]:

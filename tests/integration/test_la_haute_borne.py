@@ -8,15 +8,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from diagnosis.candidates.explain import calibrated
-from diagnosis.results.identifiable import scale_direction, scale_notes
 
 from diagnosis import diagnose
+from diagnosis.engine.fit import calibrate
+from diagnosis.engine.prepare import prepare_experiment
 from diagnosis.recordings.read import read_recordings
 from diagnosis.recordings.recording import Recording
+from diagnosis.results.ratios_only import ratio_notes, scale_direction
 from diagnosis.results.result import Diagnosis
 from diagnosis.results.result_parts import PredictedRun
-from diagnosis.setup.inference_setup import prepare
 from models.assembly.gearbox import load_gearbox
 
 
@@ -46,15 +46,16 @@ def test_calibration_knows_that_it_has_no_scale(farm):
     """A week of the losses-and-conductances model: watts stay as uncertain as the definition's."""
     gearbox = load_gearbox("la_haute_borne")
     recordings = _read(farm, "R80736.csv.gz@2017-10-01..2017-10-07")
-    base = calibrated(prepare(gearbox, recordings, ()).train)
-    (note,) = scale_notes(base)
+    base = calibrate(prepare_experiment(gearbox, recordings)[1])
+    (note,) = ratio_notes(base)
     assert "only ratios are identified" in note
     direction = scale_direction(base)
     common = direction / (direction @ direction)  # the mean logarithm of all sizes, as the priors weigh them
-    posterior = float(np.sqrt(common @ base.fit.covariance @ common))
+    posterior = float(np.sqrt(common @ base.covariance @ common))
     assert posterior > 0.6 / float(np.sqrt(direction @ direction))
     # While single sizes against the others are known much better than before.
-    sd = dict(zip((i.target for i in base.fit.unknowns.items), np.sqrt(np.diag(base.fit.covariance)), strict=True))
+    names = (u.parameter.name for u in base.experiment.unknowns)
+    sd = dict(zip(names, np.sqrt(np.diag(base.covariance)), strict=True))
     assert sd["gears_no_load"] < 0.5
 
 

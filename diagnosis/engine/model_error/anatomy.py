@@ -76,10 +76,6 @@ class Anatomy:
         """Mean over the time of all pieces, along the first axis."""
         return np.asarray(np.average(values, axis=0, weights=self.steps))
 
-    def all_rows(self, of_point: Sequence[Array]) -> Array:
-        """Rows of all pieces, one after the other."""
-        return np.concatenate(of_point)
-
     @cached_property
     def temperatures(self) -> Mapping[str, Array]:
         """Temperatures of all nodes at the middles of all intervals, [degC]."""

@@ -11,11 +11,12 @@ import numpy as np
 from diagnosis.engine.fit import Experiment
 from diagnosis.engine.point import Machine
 from diagnosis.engine.unknown import NetworkParameter
-from diagnosis.forward.network_on_grid import NetworkOnGrid, named_values
+from diagnosis.forward.network_on_grid import NetworkOnGrid
 from diagnosis.forward.observation import readings
 from diagnosis.forward.trajectory import simulate
 from diagnosis.recordings.recording import Channel, Recording
 from models.base.types import Array
+from models.simulation.thermal_network import ThermalNetwork
 from models.terms.term import Term
 
 CHANNELS = ("housing_lower", "oil", "bearing_1", "P_loss")
@@ -70,3 +71,9 @@ def acting(experiment: Experiment, term: Term, values: Mapping[str, float], *, g
     trajectory = simulate(model, piece, named_values(model.network, named), experiment.starts[0], rounds=12)
     sensors = experiment.setting(0, np.zeros(len(experiment.unknowns))).sensors
     return with_measured(experiment, readings(model, trajectory, sensors))
+
+
+def named_values(network: ThermalNetwork, given: Mapping[str, float] | None = None) -> Array:
+    """Values of all parameters of a network: as delivered, or as given by name."""
+    given = given or {}
+    return np.array([given.get(p.name, p.start) for p in network.parameters])

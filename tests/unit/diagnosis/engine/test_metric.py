@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from diagnosis.engine.gram import Gram
+from diagnosis.engine.learnt import deviation_priors
 from diagnosis.engine.metric import Metric, leading_directions
-from diagnosis.engine.sessions import DEVIATIONS, over_sessions
+from diagnosis.engine.sessions import over_sessions
 
 SESSIONS = ((0, 2), (1,))
 ROWS = (30, 24, 18)
@@ -66,6 +67,6 @@ def test_deviations_between_sessions_equal_the_normal_density(columns):
         S = covariance([W[:, 1:5] for W in columns], [s * W[:, 1:4] for W in columns])
         expected = -0.5 * (r @ np.linalg.solve(S, r) + np.linalg.slogdet(S)[1] + 3.0)
         assert given.log_evidence == pytest.approx(expected, rel=1e-10)
-    weights = np.log(list(DEVIATIONS.values())) + [given.log_evidence for given in found.given]
+    weights = np.log(list(deviation_priors().values())) + [given.log_evidence for given in found.given]
     assert found.log_evidence == pytest.approx(np.logaddexp.reduce(weights))
     assert 0.0 <= found.mean <= 0.4

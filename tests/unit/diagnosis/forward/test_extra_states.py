@@ -14,7 +14,7 @@ from diagnosis.forward import trajectory
 from diagnosis.forward.extra_states import SWITCHED_PARTS, Memories, within
 from diagnosis.forward.free_running import free_running
 from diagnosis.forward.grid import Piece, pieces
-from diagnosis.forward.network_on_grid import NetworkOnGrid, named_values
+from diagnosis.forward.network_on_grid import NetworkOnGrid
 from diagnosis.forward.recurrence import lagged, recurrence
 from diagnosis.forward.trajectory import parameter_heats, settled_balance, simulate
 from diagnosis.recordings.recording import Recording
@@ -24,6 +24,7 @@ from models.files.cycle import Cycle
 from models.mechanisms import CATALOGUE, Placed, Scale
 from models.network.laws import symbol
 from models.simulation.thermal_network import ExtraState
+from tests.unit.diagnosis.inference_example import named_values
 
 INPUTS = ("speed", "torque", "T_ambient", "air_speed")
 FZG = load_gearbox("fzg")

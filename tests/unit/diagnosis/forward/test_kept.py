@@ -1,4 +1,4 @@
-"""What is kept with a trajectory."""
+"""Results kept with a trajectory."""
 
 from __future__ import annotations
 

@@ -9,7 +9,7 @@ import pytest
 
 from diagnosis.forward.grid import Piece, pieces
 from diagnosis.forward.matrix_exponential import exponential
-from diagnosis.forward.network_on_grid import SLOW_NEAR_K, SLOW_REACH_K, NetworkOnGrid, named_values
+from diagnosis.forward.network_on_grid import SLOW_NEAR_K, SLOW_REACH_K, NetworkOnGrid
 from diagnosis.forward.recurrence import lagged
 from diagnosis.forward.term_on_grid import TermOnGrid
 from diagnosis.forward.trajectory import parameter_heats, settled_balance, simulate
@@ -19,7 +19,7 @@ from models.base.types import Array
 from models.files.cycle import Cycle
 from models.mechanisms import CATALOGUE, Scale
 from models.network.laws import symbol
-from tests.unit.diagnosis.inference_example import recording_of
+from tests.unit.diagnosis.inference_example import named_values, recording_of
 
 
 @pytest.mark.parametrize("even", [True, False])

@@ -13,7 +13,7 @@ import sympy as sp
 from diagnosis.forward import trajectory
 from diagnosis.forward.free_running import free_running
 from diagnosis.forward.grid import Piece, pieces
-from diagnosis.forward.network_on_grid import NetworkOnGrid, named_values
+from diagnosis.forward.network_on_grid import NetworkOnGrid
 from diagnosis.forward.trajectory import simulate
 from diagnosis.recordings.read import read_recordings
 from models.assembly.gearbox import known_gearboxes, load_gearbox, read_gearbox
@@ -24,6 +24,7 @@ from models.mechanisms import CATALOGUE, Scale
 from models.mechanisms.forms import two_point
 from models.network.laws import symbol
 from models.simulation.thermal_network import ThermalNetwork
+from tests.unit.diagnosis.inference_example import named_values
 
 TEXT = read_text(packaged("gearboxes", "la_haute_borne"))
 REFERENCE = {"speed": 1800.0, "torque": 10900.0}

@@ -14,7 +14,7 @@ from diagnosis.engine.learnt import ErrorClass, error_classes
 from diagnosis.engine.model_error import ModelError
 from diagnosis.engine.model_error.groups import GROUPS
 from diagnosis.engine.prepare import prepare_experiment
-from diagnosis.recordings.read import read_train_and_holdout
+from diagnosis.recordings.read import read_recordings
 from models.assembly.gearbox import load_gearbox
 from tests.unit.diagnosis.inference_example import recording_of
 
@@ -25,7 +25,7 @@ FINER = ("law_deg5", "loss_own", "link_nT", "link_dT", "lag", "hours", "split_T"
 
 def real(name: str, recording: str) -> Experiment:
     gearbox = load_gearbox(name)
-    train, _ = read_train_and_holdout([f"{DATA / recording}"], [], gearbox.network())
+    train = read_recordings([f"{DATA / recording}"], gearbox.network())
     return prepare_experiment(gearbox, train, train)[1]
 
 

@@ -18,7 +18,7 @@ from diagnosis.engine.prepare import prepare_experiment
 from diagnosis.forward.network_on_grid import NetworkOnGrid
 from diagnosis.forward.observation import readings
 from diagnosis.forward.recurrence import lagged
-from diagnosis.recordings.read import read_train_and_holdout
+from diagnosis.recordings.read import read_recordings
 from models.assembly.gearbox import Gearbox, load_gearbox
 from models.base.types import Array
 from models.network.laws import symbol
@@ -82,7 +82,7 @@ def case(fzg: Gearbox) -> Case:
 def rod() -> Case:
     """The first two hours of a real recording."""
     gearbox = load_gearbox("heated_rod")
-    train, _ = read_train_and_holdout([f"{DATA / 'heated_rod.csv.gz'}@0..7200"], [], gearbox.network())
+    train = read_recordings([f"{DATA / 'heated_rod.csv.gz'}@0..7200"], gearbox.network())
     return Case(prepare_experiment(gearbox, train, train)[1])
 
 
