@@ -1,0 +1,230 @@
+"""Probabilities and answers of explanations that are made up: no simulation."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from diagnosis.candidates.hypotheses import Hypothesis
+from diagnosis.decision.posterior import KINDS, Judged, Likeness, Posterior, decide
+from diagnosis.decision.settings import Settings
+from diagnosis.engine.learnt import ErrorClass, rule
+from models.mechanisms import OPEN_FORM
+from models.network.laws import Parameter, symbol
+from models.terms.term import Kind, Term
+
+STRONG = 60.0  # nats
+WIDTH = rule().temper[0] + rule().temper[1] * STRONG  # nats that count like one, if that is the best
+ENOUGH = Settings().claim_from
+EACH = -4.0  # log prior of an effect
+
+
+def effect(
+    name: str, place: str = "oil", *, kind: Kind = "source", target: tuple[str, ...] = (), **given: Any
+) -> Hypothesis:
+    """An effect that acts on its place, or on other targets."""
+    label = f"{name}_{place}"
+    strength = Parameter(name=f"{label}_strength", unit="W", start=0.0, sd=10.0, lower=-100.0, upper=100.0, log=False)
+    term = Term(label=label, kind=kind, target=target or (place,), expression=symbol(strength.name),
+                parameters=(strength,))  # fmt: skip
+    return Hypothesis(**({"name": name, "place": place, "family": "heat", "term": term, "variants": np.ones((1, 1))}
+                         | given))  # fmt: skip
+
+
+def judged(log_bayes: float, *effects: Hypothesis, log_prior: float | None = None) -> Judged:
+    prior = EACH * len(effects) if log_prior is None else log_prior
+    return Judged(effects=effects, log_prior=prior, log_bayes=log_bayes)
+
+
+def posterior(*each: Judged, **given: Any) -> Posterior:
+    usual: dict[str, Any] = {"log_e": 100.0, "threshold": 5.0, "rule": rule()}
+    return Posterior(nothing=judged(0.0), judged=each, **(usual | given))
+
+
+def several(count: int, **given: Any) -> tuple[Judged, ...]:
+    """Names that the readings do not separate, each at its place."""
+    return tuple(judged(STRONG, effect(f"law_{i}", f"part_{i}", **given)) for i in range(count))
+
+
+def chances(found: Posterior) -> dict[str, float]:
+    return {" + ".join(one.names): one.probability for one in found.explanations}
+
+
+# ------------------------------------------------------------------ probabilities
+
+
+def test_the_evidence_of_a_name_is_the_mean_over_its_places() -> None:
+    places = [judged(STRONG, effect("everywhere", f"part_{i}")) for i in range(8)]
+    one_of_many = [judged(STRONG if i == 0 else -50.0, effect("somewhere", f"part_{i}")) for i in range(8)]
+    found = {one.names[0]: one for one in posterior(*places, *one_of_many).explanations}
+    assert found["everywhere"].log_bayes == pytest.approx(STRONG)
+    assert found["somewhere"].log_bayes == pytest.approx(STRONG - np.log(8.0))
+    ratio = found["everywhere"].probability / found["somewhere"].probability
+    assert ratio == pytest.approx(np.exp(np.log(8.0) / WIDTH))
+
+
+def test_places_weigh_in_the_mean_by_their_priors() -> None:
+    likely, unlikely = judged(STRONG, effect("law", "a")), judged(0.0, effect("law", "b"), log_prior=EACH - np.log(3.0))
+    (found,) = posterior(likely, unlikely).explanations
+    assert found.log_bayes == pytest.approx(STRONG + np.log(0.75))
+    assert found.members == (likely, unlikely)
+
+
+def test_a_law_and_its_change_at_a_date_are_one_name() -> None:
+    always, dated = effect("windage"), effect("windage_step", how="D", clock="start")
+    hours = effect("windage_over_hours", how="W", clock="start")
+    (found,) = posterior(judged(20.0, always), judged(STRONG, dated), judged(0.0, hours)).explanations
+    assert found.names == ("windage",) and found.members[0].effects == (dated,)
+
+
+def test_between_names_the_evidence_is_tempered() -> None:
+    found = chances(posterior(judged(STRONG, effect("first")), judged(STRONG - 20.0, effect("second"))))
+    assert found["first"] / found["second"] == pytest.approx(np.exp(20.0 / WIDTH))
+
+
+def test_the_prior_of_a_name_does_not_count_between_names() -> None:
+    """Only the evidence separates names; more places or a larger family make none of them more probable."""
+    found = chances(posterior(judged(STRONG, effect("first"), log_prior=2.0 * EACH), judged(STRONG, effect("second"))))
+    assert found["first"] == pytest.approx(found["second"])
+
+
+def test_names_that_explain_too_little_are_refuted() -> None:
+    least = rule().refuted * STRONG
+    found = chances(
+        posterior(judged(STRONG, effect("best")), judged(least + 0.1, effect("in")), judged(least - 0.1, effect("out")))
+    )
+    assert found["out"] == 0.0 < found["in"] < found["best"]
+
+
+def test_probabilities_sum_to_one_with_nothing() -> None:
+    parameter = effect("parameter", "h_air", term=None, unknown=0, how="P")
+    sensor = effect("sensor_bias", kind="sensor")
+    pair = judged(STRONG + 8.0, effect("first"), effect("second"))
+    every = [judged(STRONG, effect("first")), judged(STRONG, sensor), judged(50.0, parameter), pair,
+             judged(STRONG, effect("unknown_heat", family=OPEN_FORM), log_prior=0.0)]  # fmt: skip
+    found = posterior(*every, log_e=6.0)
+    of_kind = {kind: found.of(kind) for kind in KINDS}
+    assert sum(of_kind.values()) == pytest.approx(1.0)
+    assert all(p > 0.0 for p in of_kind.values())
+    assert sum(p for _, p in found.ranked) == pytest.approx(found.something)
+
+
+def test_something_is_as_probable_as_nothing_at_the_threshold() -> None:
+    at, above = (posterior(*several(1), log_e=log_e) for log_e in (5.0, 5.0 + rule().doubt))
+    assert at.of("nothing") == pytest.approx(0.5) and not at.detected
+    assert above.something == pytest.approx(1.0 / (1.0 + np.exp(-1.0))) and above.detected
+
+
+def test_the_threshold_follows_the_rate_that_is_asked_for() -> None:
+    error = ErrorClass(name="made up", prior=1.0, threshold=7.0, amplitudes={})
+    assert rule().threshold(error, rule().rate) == pytest.approx(7.0)
+    assert rule().threshold(error, 0.1) < 7.0 < rule().threshold(error, 0.001)
+
+
+@pytest.mark.parametrize("odds", [0.01, 0.5])
+def test_a_cause_outside_the_catalogue_has_the_odds_of_the_user(odds: float) -> None:
+    unknown = judged(STRONG, effect("unknown_heat", family=OPEN_FORM), log_prior=0.0)
+    found = posterior(*several(4), unknown, odds_unknown=odds)
+    assert found.of("outside") / found.of("mechanism") == pytest.approx(odds)
+
+
+# ------------------------------------------------------------------ answers
+
+
+def test_without_enough_evidence_nothing_is_answered() -> None:
+    assert decide(posterior(*several(1), log_e=4.9), Settings()) == ()
+    assert decide(posterior(*several(1)), Settings()) != ()
+
+
+def test_a_claim_begins_at_the_probability_of_the_user() -> None:
+    found = posterior(judged(STRONG, effect("first")), judged(STRONG - 10.0, effect("second", "mesh")))
+    own = found.of_names(["first"])
+    assert 0.6 < own < 0.9
+    (claim,), (tie,) = (decide(found, Settings(claim_from=own + more)) for more in (-1e-6, 1e-6))
+    assert (claim.grade, claim.tied, claim.acts_like) == ("claim", (), False)
+    assert claim.probability == pytest.approx(own)
+    assert tie.grade == "likely" and len(tie.tied) == 2
+
+
+@pytest.mark.parametrize("count", [2, 3])
+def test_up_to_three_names_are_a_tie(count: int) -> None:
+    (answer,) = decide(posterior(*several(count)), Settings())
+    assert (answer.grade, answer.acts_like, len(answer.tied)) == ("likely", False, count)
+    assert answer.tied[0][0] is answer.effect
+    assert sum(p for _, p in answer.tied) >= ENOUGH
+
+
+def test_four_names_are_no_answer() -> None:
+    assert decide(posterior(*several(4)), Settings()) == ()
+
+
+@pytest.mark.parametrize(("cosine", "answered"), [(0.95, True), (0.85, False)])
+def test_it_acts_like_names_that_look_alike(cosine: float, answered: bool) -> None:
+    names = several(4)
+    likeness = Likeness(labels=tuple(one.label for one in names), cosines=np.full((4, 4), cosine))
+    answers = decide(posterior(*names, likeness=likeness), Settings())
+    assert [(one.grade, one.acts_like, one.tied) for one in answers] == [("likely", True, ())] * answered
+
+
+@pytest.mark.parametrize(
+    ("kind", "target", "answered"),
+    [("source", ("oil",), True), ("link", ("oil", "air"), False), ("source", ("mesh",), False)],
+)
+def test_it_acts_like_names_that_act_on_the_same(kind: Kind, target: tuple[str, ...], answered: bool) -> None:
+    others = [judged(STRONG - 0.1, effect(f"law_{i}", f"part_{i}", kind=kind, target=target)) for i in range(3)]
+    answers = decide(posterior(judged(STRONG, effect("best", "oil")), *others), Settings())
+    assert [one.acts_like for one in answers] == [True] * answered
+
+
+def test_a_course_over_the_hours_is_never_a_claim() -> None:
+    (answer,) = decide(posterior(judged(STRONG, effect("windage_over_hours", how="W", clock="start"))), Settings())
+    assert answer.probability > ENOUGH and (answer.grade, answer.acts_like) == ("likely", True)
+
+
+@pytest.mark.parametrize(("gain", "limit"), [(STRONG, rule().much_left[0]), (1000.0, 1000.0 * rule().much_left[1])])
+def test_where_much_is_left_there_is_no_claim(gain: float, limit: float) -> None:
+    def graded(remainder: float) -> tuple[str, bool]:
+        (answer,) = decide(posterior(judged(gain, effect("law")), remainder=remainder), Settings())
+        return answer.grade, answer.acts_like
+
+    assert graded(limit - 0.1) == ("claim", False)
+    assert graded(limit + 0.1) == ("likely", True)
+
+
+def test_both_effects_of_a_pair_are_answered() -> None:
+    first, second = effect("first"), effect("second", "mesh")
+    found = posterior(judged(STRONG, first), judged(STRONG, second), judged(2.0 * STRONG, first, second))
+    answers = decide(found, Settings())
+    assert [one.effect for one in answers] == [first, second] and found.of("pair") > ENOUGH
+    assert [one.grade for one in answers] == ["claim", "claim"]
+
+
+def test_a_pair_has_less_prior_than_one_effect() -> None:
+    first, second = effect("first"), effect("second", "mesh")
+    found = posterior(judged(STRONG, first), judged(-50.0, second), judged(STRONG, first, second))
+    values = {one.names: one.log_bayes for one in found.explanations}
+    assert values["first", "second"] == pytest.approx(values["first",] + np.log(rule().pair / 2.0))
+
+
+def test_a_second_effect_is_no_rival_of_the_first() -> None:
+    """The first one is certain with the second and without it; the second alone is not answered."""
+    first, second = effect("first"), effect("second", "mesh")
+    found = posterior(judged(STRONG, first), judged(1.0, second), judged(STRONG + 6.0, first, second))
+    assert 0.1 < found.of("pair") < ENOUGH < found.of_names(["first"])
+    answers = decide(found, Settings())
+    assert [(one.effect.name, one.grade) for one in answers] == [("first", "claim")]
+
+
+def test_a_parameter_outside_its_prior_is_answered_by_its_name() -> None:
+    h_air, h_oil = (effect("parameter", name, term=None, unknown=i, how="P") for i, name in enumerate(("air", "oil")))
+    found = posterior(judged(STRONG, h_air), judged(0.0, h_oil))
+    (answer,) = decide(found, Settings())
+    assert answer.effect is h_air and answer.grade == "claim"
+    assert found.of("parameter") == pytest.approx(found.of_names(["air"]))
+
+
+def test_an_unknown_heat_is_never_a_claim() -> None:
+    (answer,) = decide(posterior(judged(STRONG, effect("unknown_heat", family=OPEN_FORM), log_prior=0.0)), Settings())
+    assert answer.probability > ENOUGH and (answer.grade, answer.acts_like) == ("likely", True)
