@@ -29,7 +29,6 @@ from sklearn.preprocessing import StandardScaler
 
 from benchmarks.latent_heat import latent_heat
 from diagnosis.candidates.hypotheses import Hypothesis, hypothesis_of
-from diagnosis.decision.infer import THRESHOLD
 from diagnosis.engine.candidates import scan
 from diagnosis.engine.fit import Experiment, Fit, Linearised, calibrate
 from diagnosis.engine.predict import Prediction, predict
@@ -50,6 +49,7 @@ from models.quantities.quantities import TOTAL_LOSS, is_total_loss
 METHODS: Mapping[str, str] = {"naive": "naive residual regression", "sparse": "sparse regression (pysindy)"}
 ERRORS: Mapping[str, str] = {"calibrated_K": "calibration only", "black_box_K": "black-box residual network"}
 NOT_THEIRS = ("far parameter named", "heat within 20 %", "held-out error improves")  # rules
+THRESHOLD = 5.0  # evidence from which something is named, [nat]
 SPARSE_THRESHOLD, SPARSE_RIDGE = 0.1, 0.05  # of pysindy's STLSQ on columns of unit norm: its defaults
 HIDDEN, SEED = (32, 32), 0
 MEMORIES_S = (600.0, 3600.0)  # over which the black box remembers its inputs
@@ -85,10 +85,7 @@ def answers_to(setup: InferenceSetup, experiment: Experiment, even: tuple[Experi
 
 
 def _naive(setup: InferenceSetup, base: Fit, candidates: Sequence[Hypothesis]) -> dict[str, Any]:
-    """Regress the calibrated residual on the response to each candidate, all parameters held; the best wins.
-
-    The threshold is that of the tool.
-    """
+    """Regress the calibrated residual on the response to each candidate, all parameters held; the best wins."""
     parts = [replace(part, columns=part.columns[:, :0]) for part in base.parts]
     held = Fit(experiment=replace(base.experiment, unknowns=()), z=np.zeros(0), linearised=Linearised.of(parts, None))
     scanned = scan(held, candidates)

@@ -26,6 +26,7 @@ from diagnosis.setup.plausibility import check_plausible
 from diagnosis.setup.shaft import shafts, with_shaft
 from models.assembly.gearbox import Gearbox, load_gearbox
 from models.base.errors import InputError
+from models.base.parallel import one_thread
 from models.mechanisms import CATALOGUE, Mechanism
 from models.quantities.quantities import is_total_loss
 
@@ -33,6 +34,7 @@ Source = str | Path | Recording
 SETTINGS = Settings()
 
 
+@one_thread()
 def diagnose(
     recordings: Source | Sequence[Source],
     gearbox: Gearbox | str | Path = "fzg",

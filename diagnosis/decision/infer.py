@@ -30,6 +30,7 @@ from models.base.types import Array
 RACED, PLACES, RACE_STEPS = 18, 2, 4
 NEAR_PLACE = 3.0  # nats behind the best place of its name, up to which a second place is raced
 REFITTED, SECONDS = 6, 2
+WHOLE = 0.3  # off 1, up to which two channels count as swapped
 WORTH, WORTH_SHARE = 1.0, 0.1  # nats, and share of the best, from which a candidate is worth a fit
 
 
@@ -189,6 +190,8 @@ def _judged(calibration: Calibration, one: Judged, base: int, spread: float) -> 
         at = following if effect.unknown is None else effect.unknown
         unknown = fit.experiment.unknowns[at]
         value, sd = unknown.value(float(fit.z[at])), float(np.sqrt(covariance[at, at])) * unknown.parameter.sd
+        if effect.term is not None and effect.term.form == "swapped" and abs(value - 1.0) > WHOLE:
+            log_bayes = -np.inf  # a share of a swap is no fault of an instrument
         if effect.sign:
             log_bayes += float(np.log(2.0) + log_ndtr(effect.sign * value / sd))
         values.append(value)

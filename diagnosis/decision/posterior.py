@@ -294,7 +294,7 @@ def decide(posterior: Posterior, settings: Settings) -> tuple[Answer, ...]:
     if not posterior.detected:
         return ()
     explanation = posterior.explanations[0]
-    best = explanation.members[0]
+    best = next((one for one in explanation.members if one.fit is not None), explanation.members[0])
     answers = [_answer(posterior, best, effect, settings.claim_from) for effect in best.effects]
     return tuple(one for one in answers if one is not None)
 

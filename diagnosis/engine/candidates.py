@@ -21,8 +21,6 @@ from diagnosis.engine.unknown import TERM_STEP, Group, Held, NetworkParameter, S
 from diagnosis.forward.network_on_grid import NetworkOnGrid
 from diagnosis.forward.observation import readings
 from diagnosis.forward.term_on_grid import TermOnGrid
-from models.base.errors import InputError
-from models.base.parallel import run_parallel
 from models.base.types import Array
 from models.quantities.quantities import is_total_loss
 from models.terms.term import Term
@@ -299,46 +297,3 @@ def refit(fit: Fit, candidate: Hypothesis, variant: int, strength: float, *, ite
         raise ArithmeticError(f"no simulation has a solution with {candidate.label}")
     best = min(rough, key=lambda one: one.objective)
     return experiment.fit(best.z, iterations=iterations - ROUGH, at=best.linearised)
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Reached:
-    """End of a refit, small enough to travel between processes.
-
-    Attributes
-    ----------
-    log_evidence : float
-    z : Array, shape (unknowns + further unknowns,)
-    courses : tuple of Array, shape (K + 1, parts)
-        Temperatures of every piece, [degC]
-    """
-
-    log_evidence: float
-    z: Array
-    courses: tuple[Array, ...]
-
-
-def refit_all(
-    fit: Fit, chosen: Sequence[tuple[Hypothesis, int, float]], *, jobs: int = 1, iterations: int = ITERATIONS
-) -> list[Reached | None]:
-    """Several candidates, each fitted together with everything else; None if there is no solution.
-
-    Parameters
-    ----------
-    fit : Fit
-    chosen : sequence of (Hypothesis, int, float)
-        Candidate, variant and strength, see :func:`refit`
-    jobs : int
-        Processes
-    iterations : int
-    """
-    return run_parallel(_refitted, [(fit, *one, iterations) for one in chosen], jobs=jobs, batches=jobs)
-
-
-def _refitted(fit: Fit, candidate: Hypothesis, variant: int, strength: float, iterations: int) -> Reached | None:
-    try:
-        found = refit(fit, candidate, variant, strength, iterations=iterations)
-    except (InputError, ArithmeticError, np.linalg.LinAlgError):
-        return None
-    return Reached(log_evidence=found.log_evidence, z=found.z,
-                   courses=tuple(part.point.trajectory.T for part in found.parts))  # fmt: skip

@@ -12,9 +12,10 @@ import numpy as np
 
 from diagnosis.engine.fit import PASSES, Experiment, Fit, Linear
 from diagnosis.engine.point import Setting
+from diagnosis.forward.free_running import free_running
 from diagnosis.forward.grid import Piece, stands_for
 from diagnosis.forward.observation import reading_columns
-from diagnosis.forward.trajectory import ROUNDS, Trajectory, complete_start, free_running, simulate
+from diagnosis.forward.trajectory import ROUNDS, Trajectory, complete_start, simulate
 from diagnosis.setup.inference_setup import START_S
 from models.base.types import Array
 from models.quantities.quantities import is_total_loss

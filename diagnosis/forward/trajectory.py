@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
@@ -27,11 +27,6 @@ ROUNDS = 6
 SETTLED_K = 0.02
 TEMPERATURE_STEP_K = 0.05
 STATE_STEP = 0.05  # of a state that is solved with the temperatures, mostly a temperature itself
-# Where switches run free: a switching that comes a step later moves a temperature by more, so rounds end early.
-FREE_ROUNDS, FREE_SETTLED_K = 3, 0.2
-# From a cold start, losses linearised there are no good at operating temperature: it takes further rounds until their
-# tangents have arrived.
-MOST_FREE_ROUNDS, LOSS_ARRIVED = 10, 0.01
 RUNAWAY_T = 1500.0  # degC; beyond it there is no trajectory
 # A switching that no row shows, be they means over minutes or noisy near a set-point, sends a guided trajectory astray.
 # Further off than this, switches follow the simulated temperature until it is back.
@@ -160,7 +155,7 @@ def simulate(
     found, states = None, guess.memory if isinstance(guess, Trajectory) else None
     for _ in range(rounds):
         with np.errstate(over="ignore", invalid="ignore"):
-            found = _round(model, piece, values, start, np.clip(T, LOWEST_T, HIGHEST_T), tangent, states)
+            found = linear_round(model, piece, values, start, np.clip(T, LOWEST_T, HIGHEST_T), tangent, states)
         if not np.isfinite(found.T).all():
             raise ArithmeticError(f"the temperatures of {piece.recording} run away with these parameters")
         change = float(np.max(np.abs(found.T - T)))
@@ -174,77 +169,21 @@ def simulate(
     return found
 
 
-def free_running(
-    model: NetworkOnGrid, piece: Piece, values: Array, start: Array, *, guess: Array | None = None
-) -> Trajectory:  # fmt: skip
-    """The trajectory of a long piece of a network with switches, that nothing measured guides.
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Stepped:
+    """Settled temperatures and memories of some intervals, all that is stepped at their end, and switches there."""
 
-    Whether a switch acts depends on when it acted before, so the rounds of :func:`simulate` settle from the front, one
-    switching after the other. Here every round is linearised for each position of the switches, and what is stepped
-    through is which of them holds; in finer intervals, since a switch acts in the midst of a row. At the grid points
-    stand means over as long as the rows lie apart, as rows of slow recordings are.
-
-    Parameters
-    ----------
-    model : NetworkOnGrid
-    piece : Piece
-    values : Array, shape (parameters,)
-    start : Array, shape (parts,) or (parts + coupled,)
-        As for :func:`simulate`
-    guess : Array, shape (K + 1, parts), optional
-        Where to linearise first; by default the start temperatures
-
-    Raises
-    ------
-    ArithmeticError
-        If the temperatures leave all bounds.
-    """
-    fine, at = piece.finer()
-    count = len(fine.steps)
-    T = np.broadcast_to(start[: model.n], (count + 1, model.n))
-    if guess is not None:
-        T = np.stack([np.interp(fine.time, piece.time, course) for course in guess.T], axis=-1)
-    tangent: LossTangent | None = None
-    states: Array | None = None
-    shift = np.inf  # of the mean temperatures in the last round, whatever the switches did meanwhile, K
-    for done in range(MOST_FREE_ROUNDS):
-        middle = np.clip(0.5 * (T[1:] + T[:-1]), LOWEST_T, HIGHEST_T)
-        last, tangent = tangent, model.loss_tangent(fine, middle, tangent)
-        still = shift < FREE_SETTLED_K and last is not None and _arrived(model, last, tangent, middle)
-        if done >= FREE_ROUNDS and still:
-            break
-        power = tangent.at(middle[:, model.loss_nodes])
-        held = np.clip(T, LOWEST_T, HIGHEST_T)
-        memory = model.memory(fine, held, held, values, power, states)
-        nothing = np.full_like(T, np.nan)
-        before, (T, _, states) = T, _stepped(model, fine, values, start, middle, tangent, memory, nothing)
-        if not np.isfinite(T).all():
-            raise ArithmeticError(f"the temperatures of {piece.recording} run away with these parameters")
-        shift = float(np.max(np.abs((T - before).mean(axis=0))))
-        if float(np.max(np.abs(T - before))) < FREE_SETTLED_K:
-            break
-    # What rows minutes apart show are means, over as much around every grid point; at the ends over what there is.
-    half = piece.samples.shape[1] // 2 if piece.slow else 0
-    total = np.concatenate([np.zeros((1, model.n)), np.cumsum(T, axis=0)])
-    low, high = np.maximum(at - half, 0), np.minimum(at + half, count) + 1
-    means = (total[high] - total[low]) / (high - low)[:, None]
-    assert states is not None  # noqa: S101 - rounds >= 1
-    memory = np.add.reduceat(states, at[:-1]) / np.diff(at)[:, None]
-    unguided = replace(piece, guided=False)
-    return replace(_round(model, unguided, values, start, means, None, None, given=memory), T=means)
+    T: Array
+    seen: Array
+    memory: Array
+    end: Array
+    held: dict[int, float]
 
 
-def _arrived(model: NetworkOnGrid, last: LossTangent, tangent: LossTangent, middle: Array) -> bool:
-    """True if the losses of the last round's tangents equal those at the temperatures that it gave."""
-    mine = middle[:, model.loss_nodes]
-    off = np.abs(last.at(mine) - tangent.at(mine))
-    return bool((off.mean(axis=0) <= LOSS_ARRIVED * np.abs(tangent.at(mine)).mean(axis=0)).all())
-
-
-def _stepped(
+def stepped(
     model: NetworkOnGrid, piece: Piece, values: Array, start: Array, middle: Array, tangent: LossTangent,
-    memory: Array, guide: Array,
-) -> tuple[Array, Array, Array]:  # fmt: skip
+    memory: Array, guide: Array, held: dict[int, float] | None = None,
+) -> Stepped:  # fmt: skip
     """Temperatures at the grid points where switches follow them as they come; the other memories are given.
 
     Linearised about the temperatures `middle` once for every position of the switches, and of what follows them, as a
@@ -253,10 +192,8 @@ def _stepped(
 
     Returns
     -------
-    T, seen : Array, shape (K + 1, parts)
-        Temperatures, and those that the switches followed, [degC]
-    memory : Array, shape (K, states)
-        As given, except for the values computed here
+    Stepped
+        With the temperatures that the switches followed; memories as given, except for the values computed here
     """
     switches, actuated, acting, kept = model.switches, model.actuated, model.acting, memory.copy()
     corners = list(product((0.0, 1.0), repeat=len(acting)))
@@ -274,7 +211,7 @@ def _stepped(
     n, now = model.n, complete_start(model, start)
     result, seen = np.empty((len(kept) + 1, len(now))), np.empty((len(kept) + 1, n))
     result[0] = now
-    state = {index: model.network.states[index].start for index in (*switches, *actuated)}
+    state = {index: model.network.states[index].start for index in (*switches, *actuated)} | (held or {})
     for k, (signals, h) in enumerate(zip(table, piece.steps.tolist(), strict=True)):
         near = np.abs(now[:n] - guide[k]) < ASTRAY_K  # not where nothing was measured
         seen[k] = np.where(near, guide[k], now[:n])
@@ -295,7 +232,7 @@ def _stepped(
         result[k + 1] = now
     seen[-1] = now[:n]
     kept[:, model.coupled] = 0.5 * (result[1:, n:] + result[:-1, n:])
-    return result[:, :n], seen, kept
+    return Stepped(T=result[:, :n], seen=seen, memory=kept, end=now, held=state)
 
 
 def _between(
@@ -386,7 +323,7 @@ def _with_states(
     return whole, slope - np.einsum("kij,kj->ki", whole, here)
 
 
-def _round(
+def linear_round(
     model: NetworkOnGrid, piece: Piece, values: Array, start: Array, T_ref: Array, tangent: LossTangent | None,
     states: Array | None, *, given: Array | None = None,
 ) -> Trajectory:  # fmt: skip
@@ -399,7 +336,7 @@ def _round(
     solved, result = _walked(model, piece, values, start, T, tangent, memory)
     read = model.switched_by
     if read and given is None and np.nanmax(np.abs(result[:, : model.n] - guide)[:, read], initial=0.0) > ASTRAY_K:
-        seen = _stepped(model, piece, values, start, T, tangent, memory, guide)[1]
+        seen = stepped(model, piece, values, start, T, tangent, memory, guide).seen
         memory = model.memory(piece, T_ref, seen, values, power, states)
         solved, result = _walked(model, piece, values, start, T, tangent, memory)
     n = model.n

@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from diagnosis.results.number_format import NONE, SUPERSCRIPTS
-from models.mechanisms import OPEN_FORMS
 from models.quantities.quantities import TOTAL_LOSS
 
 DAY, HOUR, MINUTE = 86_400.0, 3600.0, 60.0
@@ -16,7 +15,6 @@ RARELY, NEVER = 1e-4, 1e-12  # chances below: as a power of ten; no longer told 
 UNITS = {"1": "", "degC": "°C", "W/degC": "W/K", "N m": "N m", "N.m": "N m", "rpm": "1/min"}
 LOSS = TOTAL_LOSS
 PARAMETER = "parameter"
-OPEN_NAMES = {form.name for form in OPEN_FORMS}
 
 MOST_WINDOWS = 12  # of a recording that are told
 # Shown when hovering a term, and all together at the end of the page.
@@ -76,13 +74,9 @@ def name(identifier: str) -> str:
 
     Examples
     --------
-    >>> name("housing_lower"), name("P_loss"), name("open_speed_below_loss")
-    ('housing lower', 'total loss', 'open form (speed below, a loss)')
+    >>> name("housing_lower"), name("P_loss")
+    ('housing lower', 'total loss')
     """
-    if identifier in OPEN_NAMES:
-        form = identifier.removeprefix("open_")
-        words = form.removesuffix("_loss").replace("_", " ") + (", a loss" if form.endswith("_loss") else "")
-        return f"open form ({words})"
     return "total loss" if identifier == LOSS else identifier.replace("_", " ")
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from diagnosis.decision.posterior import KINDS, Answer, Judged, Posterior
 from diagnosis.decision.settings import Settings
+from diagnosis.engine.baselines import effects_in_baselines, notes_of_baselines, sessions_apart
 from diagnosis.engine.fit import Experiment, Fit
 from diagnosis.engine.predict import Prediction, log_score_gain, overall_rmse, predict, rmse, with_pieces_of
 from diagnosis.engine.prepare import held_out_experiment
@@ -150,7 +151,10 @@ def assemble(
             "gearbox": setup.gearbox.hash,
             "version": project_version(),
         },
-        notes=(*ratio_notes(final), *(f"{r.name}: {note}" for r in (*train, *held_out) for note in r.notes)),
+        notes=(
+            *ratio_notes(final), *_baseline_notes(experiment, posterior, answers),
+            *(f"{r.name}: {note}" for r in (*train, *held_out) for note in r.notes),
+        ),
         kinds={kind: posterior.of(kind) for kind in KINDS},
         claim_from=settings.claim_from,
         matters_K=settings.matters_K,
@@ -198,6 +202,17 @@ def _terms(answers: Sequence[Answer], final: Fit) -> tuple[Term, ...]:
         for effect in (answers[0].best.effects if answers and answers[0].best.fit is not None else ())
         if effect.term is not None
     )  # fmt: skip
+
+
+def _baseline_notes(experiment: Experiment, posterior: Posterior, answers: Sequence[Answer]) -> tuple[str, ...]:
+    """Notes on baselines in which the effect acts too, or that look like another machine."""
+    nothing = posterior.nothing.fit
+    if not experiment.healthy or nothing is None:
+        return ()
+    effects = [answer.effect for answer in answers[:1] if answer.effect.term is not None]
+    acting = effects_in_baselines(nothing, effects) if effects else [0.0]
+    best = (answers[0].best.fit if answers else None) or nothing
+    return notes_of_baselines(float(acting[0]), sessions_apart(best), effects[0].name if effects else "")
 
 
 # ---------------------------------------------------------------------- verdict

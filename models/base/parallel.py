@@ -5,7 +5,6 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
-from importlib import import_module
 from typing import Any, TypeVar
 
 from joblib import Parallel, cpu_count, delayed, parallel_config
@@ -78,16 +77,10 @@ def iterate_parallel(
 
 
 @contextmanager
-def starting_processes(jobs: int, module: str) -> Iterator[None]:
-    """Start the processes of :func:`run_parallel` and import `module` in them while the block runs."""
-    begun = (
-        Parallel(n_jobs=jobs, return_as="generator")(delayed(_load)(module) for _ in range(jobs)) if jobs > 1 else ()
-    )
-    try:
+def one_thread() -> Iterator[None]:
+    """Context, or decorator, with one BLAS thread as in the processes of :func:`run_parallel`: numbers depend on it."""
+    with threadpool_limits(1):
         yield
-    finally:
-        for _ in begun:
-            pass
 
 
 def _processes(jobs: int | None) -> int:
@@ -95,12 +88,8 @@ def _processes(jobs: int | None) -> int:
 
 
 def _call(function: Callable[..., R], item: Sequence[Any]) -> R:
-    with threadpool_limits(1):
+    with one_thread():
         return function(*item)
-
-
-def _load(module: str) -> None:
-    import_module(module)
 
 
 def _pool(jobs: int, dask: str | None, **settings: Any) -> Parallel:

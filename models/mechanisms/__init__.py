@@ -6,8 +6,7 @@ from collections.abc import Mapping
 
 from models.mechanisms import ageing, heat_paths, measurement, oil_circuit, surroundings
 from models.mechanisms import power_losses as losses
-from models.mechanisms.mechanism import Mechanism, Memory, Placed
-from models.mechanisms.open_forms import OPEN_FORM, OPEN_FORMS
+from models.mechanisms.mechanism import OPEN_FORM, Mechanism, Memory, Placed
 from models.mechanisms.scale import Scale
 from models.mechanisms.user_files import load_mechanisms
 
@@ -17,4 +16,4 @@ CATALOGUE: Mapping[str, Mechanism] = {
     for mechanism in family.MECHANISMS
 }
 
-__all__ = ["CATALOGUE", "OPEN_FORM", "OPEN_FORMS", "Mechanism", "Memory", "Placed", "Scale", "load_mechanisms"]
+__all__ = ["CATALOGUE", "OPEN_FORM", "Mechanism", "Memory", "Placed", "Scale", "load_mechanisms"]

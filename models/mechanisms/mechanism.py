@@ -24,6 +24,7 @@ from models.terms.term import Form, Kind, Term, equation
 Parameters: TypeAlias = Callable[[Scale], tuple[Parameter, ...]]
 Traced: TypeAlias = Callable[[LawLike, tuple[str, ...]], tuple[sp.Expr, NumericLaw | None]]
 STRENGTH = "strength"
+OPEN_FORM = "open form"  # family of a heat without a name
 GROUPS = ("housing", "bearings", "shafts", "gears")  # that a law may name; in a network without one it has no place
 OPTIONAL = ("T_outdoor",)  # inputs that not every network has; without one it has no place either
 ABSENT = symbol("absent")

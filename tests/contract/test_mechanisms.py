@@ -19,7 +19,7 @@ from models.assembly.gearbox import load_gearbox
 from models.base.types import Array
 from models.correction.correction import Correction, Finding, read_correction, write_correction
 from models.files.cycle import Cycle
-from models.mechanisms import CATALOGUE, OPEN_FORM, OPEN_FORMS, Mechanism, Placed, Scale
+from models.mechanisms import CATALOGUE, Mechanism, Placed, Scale
 from models.network.compiled import law_source
 from models.network.laws import compile_function, function_source, symbol
 from models.simulation.simulate import Result
@@ -36,9 +36,6 @@ def with_circulation(network: ThermalNetwork) -> ThermalNetwork:
     return replace(larger, groups={**network.groups, "returns": ("oil_inlet",)})
 
 
-# Of forms that are heat or loss alike one as a loss is enough.
-FORMS = {form.name: form for form in OPEN_FORMS if not form.is_loss or form.name == "open_constant_loss"}
-DECLARED = CATALOGUE | FORMS
 NETWORKS = {name: with_circulation(gearbox.network()) for name, gearbox in GEARBOXES.items()}
 SCALES = {
     "fzg": Scale.of(GEARBOXES["fzg"], speed=2600.0, torque=94.0, duration=DURATION),
@@ -98,7 +95,7 @@ def parts(network: ThermalNetwork, result: Result) -> Array:
 
 @cache
 def placed(name: str, gearbox: str = "fzg") -> tuple[Placed, ...]:
-    found = DECLARED[name].placed(NETWORKS[gearbox], SCALES[gearbox])
+    found = CATALOGUE[name].placed(NETWORKS[gearbox], SCALES[gearbox])
     return found if name in CATALOGUE else (found[0], found[-1])  # forms have a place in every part
 
 
@@ -132,14 +129,14 @@ def brings_heat(mechanism: Mechanism) -> bool:
     return mechanism.kind != "sensor"
 
 
-EVERY = pytest.mark.parametrize("name", DECLARED)
-PHYSICAL = pytest.mark.parametrize("name", [n for n, mechanism in DECLARED.items() if brings_heat(mechanism)])
+EVERY = pytest.mark.parametrize("name", CATALOGUE)
+PHYSICAL = pytest.mark.parametrize("name", [n for n, mechanism in CATALOGUE.items() if brings_heat(mechanism)])
 
 
 @EVERY
 class TestDeclaration:
     def test_says_what_it_is(self, name: str) -> None:
-        mechanism = DECLARED[name]
+        mechanism = CATALOGUE[name]
         assert mechanism.name == name
         assert mechanism.says.endswith(".") and mechanism.reference and mechanism.experiment and mechanism.family
         assert set(mechanism.separate_by) <= set(CATALOGUE) - {name}
@@ -245,7 +242,7 @@ class TestInANetwork:
         network = term.apply(NETWORKS["fzg"], usual(term))
         new = [source for source in network.sources if source.name.startswith(term.label)]
         assert len(new) == (len(term.target) if term.kind == "source" else 0)
-        assert all(source.is_loss == DECLARED[name].is_loss for source in new)
+        assert all(source.is_loss == CATALOGUE[name].is_loss for source in new)
 
     def test_a_group_shares_what_one_place_has(self, name: str) -> None:
         term = placed(name)[-1]
@@ -287,14 +284,14 @@ class TestInANetwork:
 def test_a_fault_of_an_instrument_is_none_of_the_gearbox(name: str) -> None:
     for term in placed(name):
         network = NETWORKS["fzg"]
-        assert (term.apply(network) is network) == DECLARED[name].of_measurement
+        assert (term.apply(network) is network) == CATALOGUE[name].of_measurement
 
 
 def test_all_at_once_in_an_fmu(build_fmu: Callable[..., Path], fzg_training: TrainingResult, tmp_path: Path) -> None:
     """Every law, memory, boundary and shifted input inside one FMU does what it does in the network."""
     network = NETWORKS["fzg"]
-    for name in (*CATALOGUE, "open_after_faster", "open_day", "open_conductance_speed"):
-        if brings_heat(DECLARED[name]):
+    for name in CATALOGUE:
+        if brings_heat(CATALOGUE[name]):
             network = placed(name)[0].apply(network, usual(placed(name)[0]), as_recorded=True)
     path = build_fmu(tmp_path / "all.fmu", network)
     assert validate_fmu(str(path)) == []
@@ -337,41 +334,3 @@ def test_no_place_in_a_network_without_the_part() -> None:
 def test_a_catalogue_to_choose_from() -> None:
     assert len(CATALOGUE) >= 32
     assert all(mechanism.placed(NETWORKS["fzg"], SCALES["fzg"]) for mechanism in CATALOGUE.values())
-
-
-def test_open_forms_are_places_enough_and_no_catalogue() -> None:
-    assert len({form.name for form in OPEN_FORMS}) == len(OPEN_FORMS) and not {f.name for f in OPEN_FORMS} & set(
-        CATALOGUE
-    )
-    network, scale = NETWORKS["fzg"], SCALES["fzg"]
-    for form in OPEN_FORMS:
-        assert form.family == OPEN_FORM and form.sign == 0
-        assert [term.place.removesuffix("_air") for term in form.placed(network, scale)] == [
-            p.name for p in network.parts
-        ]
-
-
-@pytest.mark.parametrize("form", [form for form in OPEN_FORMS if form.is_loss], ids=lambda form: form.name)
-def test_a_form_of_a_loss_ends_with_the_shafts(form: Mechanism) -> None:
-    """A gearbox that stands loses nothing, whatever it remembers."""
-    term = form.placed(NETWORKS["fzg"], SCALES["fzg"])[0]
-    values, _ = samples()
-    own = {p.name: v for p, v in zip(term.parameters, usual(term).values(), strict=True)} | {
-        s.name: 1.7 for s in term.states
-    }
-    law = compile_function(function_source("law", [*values, *own], [term.expression], vector=True), "law")
-    heat = np.broadcast_to(law(*values.values(), *own.values())[0], (300,))
-    assert (heat[values["speed"] == 0.0] == 0.0).all() and (heat != 0.0).any()
-
-
-def test_what_follows_a_change_is_forgotten() -> None:
-    term = DECLARED["open_after_faster"].placed(NETWORKS["fzg"], SCALES["fzg"])[0]
-    network = term.apply(NETWORKS["fzg"], usual(term) | {f"{term.label}_forgets": 600.0})
-    time = np.linspace(0.0, 7200.0, 721)
-    speed = SCALES["fzg"].speed * np.where(time < 3600.0, 0.5, 1.0)
-    inputs = {"speed": speed, "torque": np.full(721, 50.0)}
-    result = network.simulate(Cycle(time, inputs), losses=losses("fzg"), initial=40.0)
-    heat = result.extra_heat[term.label] / term.strength.sd
-    waits = np.array([20.0, 600.0, 1800.0])
-    at = np.searchsorted(time, 3600.0 + waits)
-    np.testing.assert_allclose(heat[at], 0.5 * np.exp(-waits / 600.0), atol=0.02)

@@ -10,7 +10,7 @@ from typing import Any
 
 from diagnosis.proof.zoo.setting import What
 from models.assembly.gearbox import Gearbox
-from models.mechanisms import CATALOGUE, OPEN_FORM, OPEN_FORMS
+from models.mechanisms import CATALOGUE, OPEN_FORM
 
 ALARMS = ("missing_physics", "sensor_fault", "unexplained")
 MOST_TIED, LEAST_TIED = 3, 0.05  # names that a tie may hold; probability from which a rival belongs to it
@@ -143,7 +143,7 @@ def _claim(finding: Mapping[str, Any], gearbox: Gearbox) -> Claim:
 
 def _what(finding: Mapping[str, Any], gearbox: Gearbox) -> What:
     kind, name = finding.get("kind") or "", finding["mechanism"]
-    known = CATALOGUE.get(name) or next((form for form in OPEN_FORMS if form.name == name), None)
+    known = CATALOGUE.get(name)
     if name == "clock_offset" or (known and known.form == "clock"):
         return "clock"
     if kind == "sensor":
@@ -159,7 +159,8 @@ def _what(finding: Mapping[str, Any], gearbox: Gearbox) -> What:
         if any(place in {s.name for s in link.conductance.free_symbols} for link in network.links):
             return "link"
         return "capacity" if place.startswith("C_") else "loss"
-    return "loss" if known and known.is_loss else "heat"
+    is_loss = known.is_loss if known else finding.get("family") == OPEN_FORM and name.endswith("_loss")
+    return "loss" if is_loss else "heat"
 
 
 def _nodes(finding: Mapping[str, Any], gearbox: Gearbox) -> frozenset[str]:

@@ -12,10 +12,11 @@ import sympy as sp
 
 from diagnosis.forward import trajectory
 from diagnosis.forward.extra_states import SWITCHED_PARTS, Memories, within
+from diagnosis.forward.free_running import free_running
 from diagnosis.forward.grid import Piece, pieces
 from diagnosis.forward.network_on_grid import NetworkOnGrid
 from diagnosis.forward.recurrence import lagged, recurrence
-from diagnosis.forward.trajectory import free_running, parameter_heats, settled_balance, simulate
+from diagnosis.forward.trajectory import parameter_heats, settled_balance, simulate
 from diagnosis.recordings.recording import Recording
 from models.assembly.gearbox import Gearbox, load_gearbox
 from models.base.types import Array

@@ -63,13 +63,13 @@ def test_what_is_nearest_to_something_without_a_name_is_told() -> None:
     ranking = tuple(
         Ranked(mechanism=name, place="mesh", family="", log_bayes=log_bayes, probability=probability)
         for name, log_bayes, probability in (
-            ("open_after_faster_loss", 190.0, 0.65), ("open_torque_loss", 170.0, 0.33), ("bearing_preload", 70.0, 0.02)
+            ("unknown_loss", 190.0, 0.65), ("unknown_heat", 170.0, 0.33), ("bearing_preload", 70.0, 0.02)
         )
     )  # fmt: skip
     nameless = replace(unexplained(), findings=(), ranking=ranking)
-    reported = "most like: open_after_faster_loss at mesh (0.65), open_torque_loss at mesh (0.33)."
+    reported = "most like: unknown_loss at mesh (0.65), unknown_heat at mesh (0.33)."
     assert reported in told(nameless, "What?")
-    assert "<b>Most like:</b> open form (after faster, a loss) at mesh (0.65)" in page(nameless)
+    assert "<b>Most like:</b> unknown loss at mesh (0.65)" in page(nameless)
     for other in (unexplained(), replace(consistent(), ranking=ranking)):
         assert other.nearest == () and "most like" not in str(other) and "<b>Most like" not in page(other)
 

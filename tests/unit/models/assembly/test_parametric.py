@@ -11,9 +11,10 @@ import pytest
 import sympy as sp
 
 from diagnosis.forward import trajectory
+from diagnosis.forward.free_running import free_running
 from diagnosis.forward.grid import Piece, pieces
 from diagnosis.forward.network_on_grid import NetworkOnGrid
-from diagnosis.forward.trajectory import free_running, simulate
+from diagnosis.forward.trajectory import simulate
 from diagnosis.recordings.read import read_recordings
 from models.assembly.gearbox import known_gearboxes, load_gearbox, read_gearbox
 from models.assembly.parametric import ParametricLosses

@@ -1,0 +1,56 @@
+"""A broken thermistor of a real recording is set apart; sound ones are not, and the parameters stay in their priors."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from diagnosis.engine.fit import Experiment, Fit, calibrate
+from diagnosis.engine.prepare import prepare_experiment
+from diagnosis.engine.set_apart import calibrate_apart, calibrate_without_error, without_channels
+from diagnosis.engine.unknown import SensorBias
+from diagnosis.recordings.read import read_recordings
+from models.assembly.gearbox import load_gearbox
+
+DATA = Path(__file__).parents[4] / "examples" / "data"
+BROKEN = "cell_6__NTC7"
+
+
+@cache
+def rod() -> tuple[Experiment, Fit]:
+    gearbox = load_gearbox("heated_rod")
+    recordings = read_recordings([f"{DATA / 'heated_rod.csv.gz'}@0..10800"], gearbox.network())
+    experiment = prepare_experiment(gearbox, recordings, recordings)[1]
+    return experiment, calibrate(experiment)
+
+
+def test_a_broken_sensor_is_set_apart_and_pulls_nothing_to_its_bounds() -> None:
+    experiment, plain = rod()
+    fit, apart = calibrate_apart(experiment, plain)
+    assert apart == (BROKEN,)
+    assert np.abs(plain.z).max() > 10.0  # what it does to a calibration with it
+    assert np.abs(fit.z).max() < 4.0
+
+
+def test_sound_sensors_are_not_set_apart() -> None:
+    experiment, _ = rod()
+    sound = without_channels(experiment, [BROKEN])
+    plain = calibrate(sound)
+    fit, apart = calibrate_apart(sound, plain)
+    assert apart == ()
+    assert fit is plain
+
+
+def test_a_fit_without_error_keeps_the_values_of_faulty_sensors() -> None:
+    experiment, plain = rod()
+    fit, apart = calibrate_apart(experiment, plain)
+    at = next(i for i, u in enumerate(experiment.unknowns) if isinstance(u, SensorBias) and u.channel == BROKEN)
+    z = fit.z.copy()
+    z[at] = 9.0
+    given = experiment.with_filters(plain.parts).fit(z, iterations=0)
+    found = calibrate_without_error(given, fit, apart)
+    assert found.z[at] == 9.0
+    assert np.delete(found.z, at) == pytest.approx(np.delete(fit.z, at), abs=0.3)
