@@ -1,1 +1,1 @@
-"""Which candidates are accepted: search, hold-out, acceptance rules."""
+"""From what the engine finds to a posterior over all explanations, and the rule that turns it into answers."""
