@@ -30,6 +30,7 @@ from models.base.types import Array
 RACED, PLACES, RACE_STEPS = 18, 2, 4
 NEAR_PLACE = 3.0  # nats behind the best place of its name, up to which a second place is raced
 REFITTED, SECONDS = 6, 2
+SETTLED_NAT, MOST_TURNS = 0.1, 5  # gain at which a fit has ended; how often it goes on at most
 WHOLE = 0.3  # off 1, up to which two channels count as swapped
 WORTH, WORTH_SHARE = 1.0, 0.1  # nats, and share of the best, from which a candidate is worth a fit
 
@@ -204,13 +205,20 @@ def _fitted_on(calibration: Calibration, one: Judged, base: int) -> Judged:
     """A raced fit continued to its end."""
     fit = one.fit
     assert fit is not None  # noqa: S101
+    reached = fit
     try:
-        reached = fit.experiment.fit(fit.z, at=fit.linearised)
+        for _ in range(MOST_TURNS):
+            further = fit.experiment.fit(reached.z, at=reached.linearised)
+            gained, reached = 0.5 * (reached.objective - further.objective), further
+            if gained < SETTLED_NAT:
+                break
     except (InputError, ArithmeticError, np.linalg.LinAlgError):
+        pass  # what was reached counts
+    if reached is fit:
         return one
     gained = fit_over_sessions(reached, base).log_evidence - fit_over_sessions(fit, base).log_evidence
-    spread = 0.0
-    return replace(_judged(calibration, replace(one, fit=reached), base, spread), log_bayes=one.log_bayes + gained)
+    final = _judged(calibration, replace(one, fit=reached), base, 0.0)
+    return replace(final, log_bayes=min(final.log_bayes, one.log_bayes + gained))
 
 
 def _by_scan(found: _Scanned, index: int, log_bayes: float) -> Judged:
@@ -249,7 +257,8 @@ def _given_best(
             continue
         both = replace(one, effects=(*best.effects, *one.effects),
                        log_prior=best.log_prior + one.log_prior)  # fmt: skip
-        pairs.append(_judged(calibration, both, base, _spread(second, int(index))))
+        both = _judged(calibration, both, base, _spread(second, int(index)))
+        pairs.append(_fitted_on(calibration, both, base))
     without = over_sessions(second.scan.gram, fit.experiment, [*range(base), *second.scan.further])
     outside = second.candidates[len(second.scan.candidates) :]
     alone = _weighed(second.scan, outside, without).tolist()

@@ -20,7 +20,7 @@ from typing import Literal, get_args
 import numpy as np
 from scipy.special import expit, logsumexp
 
-from diagnosis.candidates.dated import changed_law
+from diagnosis.candidates.dated import CHANGED, changed_law
 from diagnosis.candidates.hypotheses import Hypothesis
 from diagnosis.decision.settings import Settings
 from diagnosis.engine.fit import Fit
@@ -164,7 +164,7 @@ class Posterior:
     session_s : float
         Mean deviation between sessions that the readings support, in prior standard deviations; 0 of one session
     remainder : float
-        Log Bayes factor of the best further effect, given the best explanation, [nat]
+        Log Bayes factor of the best further effect, given the best single one, [nat]
     expected : tuple of Expected
     """
 
@@ -182,11 +182,15 @@ class Posterior:
     expected: tuple[Expected, ...] = ()
 
     @property
+    def left(self) -> float:
+        """Evidence of a further effect, given the best explanation, [nat]; 0 given two: no third is sought."""
+        return self.remainder if len(self.explanations[0].names) == 1 else 0.0
+
+    @property
     def much_is_left(self) -> bool:
         """True if the second scan finds much more, given the best explanation: its law is not the true one."""
-        gain = self.explanations[0].log_bayes
         least, share = self.rule.much_left
-        return self.remainder > max(least, share * gain)
+        return self.left > max(least, share * self.explanations[0].log_bayes)
 
     @property
     def detected(self) -> bool:
@@ -208,7 +212,8 @@ class Posterior:
             if len(one.effects) == 1 and one.kind != "outside":
                 mass[one.names[0]] = mass.get(one.names[0], 0.0) + float(np.exp(one.log_prior))
         pair = float(np.log(self.rule.pair / max(len(mass), 1)))
-        unknown = float(np.log(self.odds_unknown * max(len(mass), 1)))  # to one name of the catalogue
+        open_names = {one.names for one in self.judged if one.kind == "outside"}
+        unknown = float(np.log(self.odds_unknown * max(len(mass), 1) / max(len(open_names), 1)))  # to a known name
         log_bayes, log_prior = [], []
         for names, members in of_names.items():
             within = sum(np.log(mass.get(name, 1.0)) for name in names)
@@ -280,7 +285,10 @@ class Answer:
 
 def name_of(effect: Hypothesis) -> str:
     """Name of the law of an effect, whatever its place and course; of a parameter its own name."""
-    return effect.place if effect.unknown is not None else changed_law(effect)
+    if effect.unknown is not None:
+        return f"parameter {effect.place}"
+    law = changed_law(effect)
+    return next((law.removesuffix(ending) for ending in CHANGED if law.endswith(ending)), law)
 
 
 def decide(posterior: Posterior, settings: Settings) -> tuple[Answer, ...]:
@@ -337,8 +345,9 @@ def _act_on_the_same(first: Hypothesis, second: Hypothesis) -> bool:
     """True if two effects change the same thing: the same heats, links, channels or inputs."""
     if first.term is None or second.term is None:
         return False
-    return _sort(first.term) == _sort(second.term) and not set(first.term.target).isdisjoint(second.term.target)
+    return first.term.kind == second.term.kind and not _changed(first.term).isdisjoint(_changed(second.term))
 
 
-def _sort(term: Term) -> str:
-    return {"source": "heat", "loss_factor": "heat", "link": "link", "link_factor": "link"}.get(term.kind, term.kind)
+def _changed(term: Term) -> set[str]:
+    """Names of what a term acts on; of a link without its other end, which many share."""
+    return set(term.target[:-1] if term.kind == "link" else term.target)

@@ -8,7 +8,7 @@ import numpy as np
 
 from diagnosis.candidates.dated import CHANGED, HOURS, STEP, WHILE, changed_law
 from diagnosis.candidates.hypotheses import Hypothesis
-from diagnosis.decision.posterior import Answer, Posterior
+from diagnosis.decision.posterior import Answer, Posterior, name_of
 from diagnosis.engine.fit import Fit
 from diagnosis.recordings.recording import Recording
 from diagnosis.results.advice import separation, without_sensor
@@ -69,7 +69,9 @@ def finding_of(
         term=None if term is None else term.with_values(found),
         grade=answer.grade,
         tie_set=tuple(dict.fromkeys(name_in(catalogue, one) for one, _ in answer.tied)),
-        joint_probability=sum(p for _, p in answer.tied) if answer.tied else answer.probability,
+        joint_probability=(
+            posterior.of_names([name_of(one) for one, _ in answer.tied]) if answer.tied else answer.probability
+        ),
         acts_like=answer.acts_like,
         date=change_of(values, effect, fit.experiment, recordings),
         switching=switching_of(values, effect),

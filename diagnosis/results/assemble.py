@@ -98,7 +98,8 @@ def assemble(
         Where the data ask for much model error
     """
     faulty = () if others is None else others.channels
-    final = _final(answers, plain if others is None else others.fit, faulty)
+    best = _best(posterior, answers)
+    final = _final(best, plain if others is None else others.fit, faulty)
     findings = tuple(
         finding_of(answer, answer.best.fit or final, setup, posterior, catalogue, train) for answer in answers
     )
@@ -107,7 +108,7 @@ def assemble(
     location = _location(setup, posterior) if posterior.detected else ()
     judged = held_out_experiment(setup, experiment)
     predictions = _predictions(experiment, judged, plain, final, jobs)
-    terms = _terms(answers, final)
+    terms = _terms(best, final)
     sensors, true_inputs = sensors_and_inputs_of(
         final, findings=[term.label for term in terms], inputs=setup.gearbox.network().inputs
     )
@@ -134,7 +135,7 @@ def assemble(
         noise_K=setup.noise_K,
         floor=_floor(setup),
         misfit=_misfit(final),
-        remaining_p_value=float(min(1.0, np.exp(-max(posterior.remainder, -50.0)))),
+        remaining_p_value=float(min(1.0, np.exp(-max(posterior.left, -50.0)))),
         remaining_note=_remaining(posterior, others),
         ranking=_ranking(posterior),
         unseen=unseen,
@@ -177,9 +178,17 @@ def faulty_channels(posterior: Posterior, apart: Sequence[str]) -> tuple[str, ..
     )  # fmt: skip
 
 
-def _final(answers: Sequence[Answer], plain: Fit, faulty: Sequence[str]) -> Fit:
-    """The fit that predicts: of the best answer, without model error; else of the machine as calibrated."""
-    first = answers[0].best.fit if answers else None
+def _best(posterior: Posterior, answers: Sequence[Answer]) -> Judged | None:
+    """The explanation that predicts: of the answers, else the most probable one, which needs no name for that."""
+    if answers:
+        return answers[0].best
+    fitted = (one for one, _ in posterior.ranked if one.fit is not None and one.kind != "nothing")
+    return next(fitted, None) if posterior.detected else None
+
+
+def _final(best: Judged | None, plain: Fit, faulty: Sequence[str]) -> Fit:
+    """The fit that predicts: of the best explanation, without model error; else of the machine as calibrated."""
+    first = best.fit if best else None
     if first is None:
         return plain
     try:
@@ -188,7 +197,7 @@ def _final(answers: Sequence[Answer], plain: Fit, faulty: Sequence[str]) -> Fit:
         return first
 
 
-def _terms(answers: Sequence[Answer], final: Fit) -> tuple[Term, ...]:
+def _terms(best: Judged | None, final: Fit) -> tuple[Term, ...]:
     """Terms of the fit that predicts, with its values and standard errors."""
     found = {}
     for unknown, z, sd in zip(final.experiment.unknowns, final.z.tolist(),
@@ -199,7 +208,7 @@ def _terms(answers: Sequence[Answer], final: Fit) -> tuple[Term, ...]:
             replace(p, start=found.get(p.name, (p.start, 0.0))[0], sd=found.get(p.name, (p.start, 0.0))[1])
             for p in effect.term.parameters
         ))
-        for effect in (answers[0].best.effects if answers and answers[0].best.fit is not None else ())
+        for effect in (best.effects if best is not None and best.fit is not None else ())
         if effect.term is not None
     )  # fmt: skip
 
@@ -257,8 +266,8 @@ def _remaining(posterior: Posterior, others: Others | None) -> str:
             return (f"something else is missing too (evidence {rest.log_e:.0f} nat without {channels}): "
                     "leave that out of the recordings and diagnose again")  # fmt: skip
         return f"without {channels} nothing stands out of noise and model error (evidence {rest.log_e:.1f} nat)"
-    if posterior.remainder > posterior.threshold:
-        return f"a further effect would still help (evidence {posterior.remainder:.0f} nat)"
+    if posterior.left > posterior.threshold:
+        return f"a further effect would still help (evidence {posterior.left:.0f} nat)"
     return "nothing that stands out of noise and model error"
 
 

@@ -222,7 +222,7 @@ def test_a_parameter_outside_its_prior_is_answered_by_its_name() -> None:
     found = posterior(judged(STRONG, h_air), judged(0.0, h_oil))
     (answer,) = decide(found, Settings())
     assert answer.effect is h_air and answer.grade == "claim"
-    assert found.of("parameter") == pytest.approx(found.of_names(["air"]))
+    assert found.of("parameter") == pytest.approx(found.of_names(["parameter air"]))
 
 
 def test_an_unknown_heat_is_never_a_claim() -> None:
