@@ -13,6 +13,7 @@ from click.testing import CliRunner
 import builder.workflows.build
 import diagnosis
 from builder.commands.cli import commands
+from diagnosis.decision.settings import Settings
 from models.assembly.gearbox import Gearbox
 from models.correction.correction import Correction, Estimate, write_correction
 from models.mechanisms import CATALOGUE
@@ -53,12 +54,27 @@ def test_diagnose_passes_catalogue_rate_and_jobs_on(
     usual = ("diagnose", recording, "--output", tmp_path / "out")
     invoked(*usual)
     own = ROOT / "examples/mechanisms.toml"
-    invoked(*usual, "--without-mechanism", "windage", "--mechanisms", own, "--false-alarm-rate", 0.01, "--jobs", 1)
+    numbers = (
+        "--false-alarm-rate",
+        0.01,
+        "--matters-K",
+        2,
+        "--matters-W",
+        5,
+        "--claim-from",
+        0.8,
+        "--odds-unknown",
+        0.2,
+    )
+    invoked(*usual, "--without-mechanism", "windage", "--mechanisms", own, *numbers, "--jobs", 1)
     plain, special = asked
     assert set(plain["catalogue"]) == set(CATALOGUE)
     assert set(CATALOGUE) - set(special["catalogue"]) == {"windage"}
     assert f'name = "{min(set(special["catalogue"]) - set(CATALOGUE))}"' in own.read_text()
-    assert (plain["false_alarm_rate"], special["false_alarm_rate"], special["jobs"]) == (0.05, 0.01, 1)
+    assert (plain["settings"], special["jobs"]) == (Settings(), 1)
+    assert special["settings"] == Settings(
+        false_alarm_rate=0.01, matters_K=2.0, matters_W=5.0, claim_from=0.8, odds_unknown=0.2
+    )
 
 
 def test_build_passes_correction_preset_and_platforms_on(

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from diagnosis.forward.free_running import free_running
 from diagnosis.forward.grid import FREE_S, INTERVAL_S, LONGEST, SAMPLES, Piece, pieces, stands_for
 from diagnosis.forward.network_on_grid import NetworkOnGrid
 from diagnosis.forward.recurrence import lagged
-from diagnosis.forward.trajectory import free_running
 from diagnosis.recordings.recording import Channel, Recording
 from models.assembly.gearbox import Gearbox
 from models.base.types import Array
