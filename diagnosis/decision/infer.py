@@ -31,6 +31,7 @@ RACED, PLACES, RACE_STEPS = 18, 2, 4
 NEAR_PLACE = 3.0  # nats behind the best place of its name, up to which a second place is raced
 REFITTED, SECONDS = 6, 2
 SETTLED_NAT, MOST_TURNS = 0.1, 5  # gain at which a fit has ended; how often it goes on at most
+IMPOSSIBLE = -1e3  # nats
 WHOLE = 0.3  # off 1, up to which two channels count as swapped
 WORTH, WORTH_SHARE = 1.0, 0.1  # nats, and share of the best, from which a candidate is worth a fit
 
@@ -192,7 +193,7 @@ def _judged(calibration: Calibration, one: Judged, base: int, spread: float) -> 
         unknown = fit.experiment.unknowns[at]
         value, sd = unknown.value(float(fit.z[at])), float(np.sqrt(covariance[at, at])) * unknown.parameter.sd
         if effect.term is not None and effect.term.form == "swapped" and abs(value - 1.0) > WHOLE:
-            log_bayes = -np.inf  # a share of a swap is no fault of an instrument
+            log_bayes = IMPOSSIBLE  # a share of a swap is no fault of an instrument
         if effect.sign:
             log_bayes += float(np.log(2.0) + log_ndtr(effect.sign * value / sd))
         values.append(value)

@@ -182,15 +182,13 @@ class Posterior:
     expected: tuple[Expected, ...] = ()
 
     @property
-    def left(self) -> float:
-        """Evidence of a further effect, given the best explanation, [nat]; 0 given two: no third is sought."""
-        return self.remainder if len(self.explanations[0].names) == 1 else 0.0
-
-    @property
     def much_is_left(self) -> bool:
-        """True if the second scan finds much more, given the best explanation: its law is not the true one."""
+        """True if the second scan finds much more, given the best single explanation.
+
+        Two effects look like that, and so does one whose law is not the true one (seen on the stranger's cases).
+        """
         least, share = self.rule.much_left
-        return self.left > max(least, share * self.explanations[0].log_bayes)
+        return self.remainder > max(least, share * self.explanations[0].log_bayes)
 
     @property
     def detected(self) -> bool:

@@ -135,7 +135,7 @@ def assemble(
         noise_K=setup.noise_K,
         floor=_floor(setup),
         misfit=_misfit(final),
-        remaining_p_value=float(min(1.0, np.exp(-max(posterior.left, -50.0)))),
+        remaining_p_value=float(min(1.0, np.exp(-max(posterior.remainder, -50.0)))),
         remaining_note=_remaining(posterior, others),
         ranking=_ranking(posterior),
         unseen=unseen,
@@ -266,8 +266,8 @@ def _remaining(posterior: Posterior, others: Others | None) -> str:
             return (f"something else is missing too (evidence {rest.log_e:.0f} nat without {channels}): "
                     "leave that out of the recordings and diagnose again")  # fmt: skip
         return f"without {channels} nothing stands out of noise and model error (evidence {rest.log_e:.1f} nat)"
-    if posterior.left > posterior.threshold:
-        return f"a further effect would still help (evidence {posterior.left:.0f} nat)"
+    if posterior.remainder > posterior.threshold:
+        return f"a further effect would still help (evidence {posterior.remainder:.0f} nat)"
     return "nothing that stands out of noise and model error"
 
 
