@@ -245,11 +245,14 @@ class Posterior:
         """Probability of a kind of explanation."""
         if kind == "nothing":
             return 1.0 - self.something
-        return float(sum(p for one, p in self.ranked if one.kind == kind))
+        return min(float(sum(p for one, p in self.ranked if one.kind == kind)), 1.0)
 
     def of_names(self, names: Collection[str]) -> float:
         """Probability that any of some names is there."""
-        return float(sum(one.probability for one in self.explanations if not set(names).isdisjoint(one.names)))
+        # Sums of many shares may come out a rounding error above 1.
+        return min(
+            float(sum(one.probability for one in self.explanations if not set(names).isdisjoint(one.names))), 1.0
+        )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -228,3 +228,9 @@ def test_a_parameter_outside_its_prior_is_answered_by_its_name() -> None:
 def test_an_unknown_heat_is_never_a_claim() -> None:
     (answer,) = decide(posterior(judged(STRONG, effect("unknown_heat", family=OPEN_FORM), log_prior=0.0)), Settings())
     assert answer.probability > ENOUGH and (answer.grade, answer.acts_like) == ("likely", True)
+
+
+def test_certainty_is_never_above_one() -> None:
+    many = [judged(STRONG, effect("fan", place=str(i))) for i in range(50)]
+    found = posterior(*many)
+    assert found.of_names(["fan"]) <= 1.0 and found.of("mechanism") <= 1.0
