@@ -82,11 +82,8 @@ def infer(
     for one in ahead[:REFITTED]:
         if one.fit is not None:
             judged[one.label] = _fitted_on(calibration, one, len(base.z))
-    remainder, alone = (
-        0.0,
-        {one.label: float(value) for one, value in zip(first.candidates, first.log_bayes, strict=True)},
-    )
-    pairs: list[Judged] = []
+    alone = {one.label: float(value) for one, value in zip(first.candidates, first.log_bayes, strict=True)}
+    remainder, pairs = 0.0, list[Judged]()
     best = max(judged.values(), key=lambda one: one.log_bayes + one.log_prior, default=None)
     if best is not None and best.fit is not None and best.log_bayes > 0.0:
         progress(f"scanning again, given {best.label}")
@@ -186,20 +183,17 @@ def _judged(calibration: Calibration, one: Judged, base: int, spread: float) -> 
     fit = one.fit
     assert fit is not None  # noqa: S101
     over = fit_over_sessions(fit, base)
-    covariance, log_bayes = fit.covariance, over.log_evidence - calibration.log_evidence - spread
-    values, sds, following = [], [], base
+    log_bayes, at = over.log_evidence - calibration.log_evidence - spread, base  # where the effects' own unknowns begin
     for effect in one.effects:
-        at = following if effect.unknown is None else effect.unknown
-        unknown = fit.experiment.unknowns[at]
-        value, sd = unknown.value(float(fit.z[at])), float(np.sqrt(covariance[at, at])) * unknown.parameter.sd
-        if effect.term is not None and effect.term.form == "swapped" and abs(value - 1.0) > WHOLE:
+        if effect.term is None:
+            continue  # a parameter is not further
+        z = float(fit.z[at])
+        if effect.term.form == "swapped" and abs(fit.experiment.unknowns[at].value(z) - 1.0) > WHOLE:
             log_bayes = IMPOSSIBLE  # a share of a swap is no fault of an instrument
-        if effect.sign:
-            log_bayes += float(np.log(2.0) + log_ndtr(effect.sign * value / sd))
-        values.append(value)
-        sds.append(sd)
-        following += 0 if effect.term is None else len(effect.term.parameters)
-    return replace(one, log_bayes=log_bayes, strength=tuple(values), strength_sd=tuple(sds))
+        if effect.sign:  # only the half of the normal distribution with this sign is possible, with twice the prior
+            log_bayes += float(np.log(2.0) + log_ndtr(effect.sign * z / np.sqrt(fit.covariance[at, at])))
+        at += len(effect.term.parameters)
+    return replace(one, log_bayes=log_bayes)
 
 
 def _fitted_on(calibration: Calibration, one: Judged, base: int) -> Judged:
@@ -227,8 +221,7 @@ def _by_scan(found: _Scanned, index: int, log_bayes: float) -> Judged:
     variant = found.scan.best[index] if candidate.term is not None else 0
     return Judged(
         effects=(replace(candidate, variants=candidate.variants[[variant]]),), log_prior=float(found.log_prior[index]),
-        log_bayes=log_bayes, strength=(float(found.strengths.value[index]),),
-        strength_sd=(float(found.strengths.sd[index]),),
+        log_bayes=log_bayes,
     )  # fmt: skip
 
 
@@ -271,8 +264,7 @@ def _unknown(fit: Fit, outside: Sequence[Hypothesis]) -> list[Judged]:
     """Heats that no catalogue has, all functions of each marginalised."""
     names = Counter(one.name for one in outside)
     return [
-        Judged(effects=(one.hypothesis,), log_prior=-float(np.log(names[one.hypothesis.name])), log_bayes=one.log_bayes,
-               strength=(one.strength,), strength_sd=(0.0,))
+        Judged(effects=(one.hypothesis,), log_prior=-float(np.log(names[one.hypothesis.name])), log_bayes=one.log_bayes)
         for one in judge_outside(fit, outside)
     ]  # fmt: skip
 
@@ -288,12 +280,15 @@ def _likeness(found: _Scanned) -> Likeness:
 
 
 def _expected(found: _Scanned, settings: Settings) -> tuple[Expected, ...]:
-    """Expected evidence of every candidate at the size that matters."""
+    """Expected evidence of every candidate at the size that matters: of a temperature or a heat, whichever is less."""
     given = found.over.given[found.over.most_probable]
     at = np.array(found.scan.of_candidates) + 1
     b = np.maximum(given.matrix[at, at], 0.0)
-    size = np.where(found.scan.peak_K > 0.0, settings.matters_K / np.maximum(found.scan.peak_K, 1e-12), found.scan.sd)
-    sd = found.scan.sd
+    sd, size = found.scan.sd, np.full(len(b), np.inf)
+    for matters, peak in ((settings.matters_K, found.scan.peak_K), (settings.matters_W, found.scan.peak_W)):
+        reached = (peak > 0.0) & (matters > 0.0)
+        size[reached] = np.minimum(size[reached], matters / peak[reached])
+    size = np.where(np.isfinite(size), size, sd)
     log_bayes = 0.5 * np.square(b * size) / (b + 1.0 / np.square(sd)) - 0.5 * np.log1p(b * np.square(sd))
     return tuple(Expected(effect=one, log_bayes=float(value))
                  for one, value in zip(found.scan.candidates, log_bayes, strict=True))  # fmt: skip

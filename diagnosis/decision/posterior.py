@@ -46,8 +46,6 @@ class Judged:
         Of this effect at this place, [nat]
     log_bayes : float
         Log Bayes factor against nothing, model error and deviations between sessions marginalised, [nat]
-    strength, strength_sd : tuple of float
-        Most probable size of every effect and its standard deviation, in units of its first parameter
     fit : Fit or None
         Fitted with everything else, model error in place; None if only the scan judged it
     """
@@ -55,8 +53,6 @@ class Judged:
     effects: tuple[Hypothesis, ...]
     log_prior: float
     log_bayes: float
-    strength: tuple[float, ...] = ()
-    strength_sd: tuple[float, ...] = ()
     fit: Fit | None = None
 
     @property

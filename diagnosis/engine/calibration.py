@@ -69,8 +69,8 @@ def calibrate_with_error(experiment: Experiment, apart: Collection[str] = ()) ->
     fit = found.fit
     courses = [part.point.trajectory for part in fit.parts]
     at = experiment.linearise(fit.z, courses)
-    (chosen,) = (one for one in classes if one.name == found.chosen.name)
-    all_readings = _judged(experiment, at.parts, _columns(error, at.parts), error.amplitudes(chosen), found.session_s)
+    amplitudes = error.amplitudes(found.chosen)
+    all_readings = _judged(experiment, at.parts, _columns(error, at.parts), amplitudes, found.session_s)
     over = fit_over_sessions(all_readings.fit(fit.z, courses), len(fit.z))
     return replace(found, fit=all_readings.fit(fit.z, courses, iterations=0), log_evidence=over.log_evidence,
                    session_s=over.mean, of_others=found)  # fmt: skip

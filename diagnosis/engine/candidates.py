@@ -49,8 +49,8 @@ class Scan:
         Their places among the labels of the Gram matrix
     sd, sign : Array, shape (candidates,)
         Prior of the strengths
-    peak_K : Array, shape (candidates,)
-        Largest change of a temperature per unit of strength
+    peak_K, peak_W : Array, shape (candidates,)
+        Largest change of a temperature [K], and heat into or out of a part [W], per unit of strength
     """
 
     candidates: tuple[Hypothesis, ...]
@@ -63,6 +63,7 @@ class Scan:
     sd: Array
     sign: NDArray[np.int_]
     peak_K: Array
+    peak_W: Array
 
     def singles(self, given: Given) -> Strengths:
         """Every candidate alone, in its best shape; the sign of a clock fault is that of its variant."""
@@ -106,8 +107,8 @@ def scan(fit: Fit, candidates: Sequence[Hypothesis]) -> Scan:
     intervals = max(len(part.point.trajectory.T) for part in fit.parts)
     for chunk in chunks(candidates, max(16, min(AT_ONCE, VALUES_AT_ONCE // intervals))):
         some = placed[len(best) : len(best) + len(chunk)]
-        raw = [_columns(fit.experiment, part, some) for part in fit.parts]
-        peaks = np.max([np.abs(X[:, warm]).max(axis=(0, 1)) for X in raw], axis=0)
+        raw, heats = zip(*(_columns(fit.experiment, part, some) for part in fit.parts), strict=True)
+        peaks_K, peaks_W = np.max([np.abs(X[:, warm]).max(axis=(0, 1)) for X in raw], axis=0), np.max(heats, axis=0)
         blocks = [part.filter(X) for part, X in zip(fit.parts, raw, strict=True)]
         (a, b), first = everything.against(residuals, blocks), 0
         for c, on_grid in some:
@@ -120,16 +121,18 @@ def scan(fit: Fit, candidates: Sequence[Hypothesis]) -> Scan:
             for kept, block in zip(chosen, blocks, strict=True):
                 kept[:, len(best)] = block[:, first + at]
             best.append(at)
-            peak.append(float(peaks[first + at]))
+            peak.append((float(peaks_K[first + at]), float(peaks_W[first + at])))
             mean.append(float(np.logaddexp.reduce(found.log_bayes) - np.log(n)))
             signs.append(int(sign[at]))
             first += n
     extra = base[0].shape[1] - 1 - count
+    peak_K, peak_W = np.array(peak).reshape(-1, 2).T
     return Scan(
         candidates=tuple(candidates), best=tuple(best), log_bayes=np.array(mean),
         gram=gram_of(fit.parts, base, chosen), unknowns=known,
         further=range(count, count + extra), of_candidates=range(count + extra, count + extra + len(candidates)),
-        sd=np.array([strength.sd for strength in priors]), sign=np.array(signs, dtype=int), peak_K=np.array(peak),
+        sd=np.array([strength.sd for strength in priors]), sign=np.array(signs, dtype=int), peak_K=peak_K,
+        peak_W=peak_W,
     )  # fmt: skip
 
 
@@ -142,16 +145,23 @@ def _with_unknowns(fit: Fit) -> Metric:
     return replace(metric, shared=tuple(np.column_stack(both) for both in zip(columns, metric.shared, strict=True)))
 
 
-def _columns(experiment: Experiment, part: Linear, some: Sequence[tuple[Hypothesis, TermOnGrid]]) -> Array:
-    """Readings per unit of strength for all variants of some candidates, shape (K + 1, channels, n).
+def _columns(
+    experiment: Experiment, part: Linear, some: Sequence[tuple[Hypothesis, TermOnGrid]]
+) -> tuple[Array, Array]:
+    """Effect per unit of strength of all variants of some candidates; zero where a candidate cannot act.
 
-    They are zero where a candidate cannot act.
+    Returns
+    -------
+    readings : Array, shape (K + 1, channels, n)
+        [K] or [W]
+    heat : Array, shape (n,)
+        Largest heat into or out of a part, [W]
     """
     point, trajectory = part.point, part.point.trajectory
     count, recording = sum(len(candidate.variants) for candidate, _ in some), trajectory.piece.recording
     acting = [_acts_in(experiment, candidate, recording) for candidate, _ in some]
     if not any(acting):
-        return np.zeros((*point.read.shape, count))
+        return np.zeros((*point.read.shape, count)), np.zeros(count)
     into = np.zeros((len(trajectory.piece.steps), trajectory.decay.shape[-1], count))
     loss, shown, first = np.zeros((len(into), count)), {}, 0
     for (candidate, on_grid), acts in zip(some, acting, strict=True):
@@ -169,7 +179,7 @@ def _columns(experiment: Experiment, part: Linear, some: Sequence[tuple[Hypothes
     result = point.heated(into, loss)
     for start, columns in shown.items():
         result[:, :, start : start + columns.shape[2]] = columns
-    return result
+    return result, np.abs(into[:, : point.machine.model.n]).max(axis=(0, 1))
 
 
 def _by_clock(candidate: Hypothesis, starts_at: float | None) -> Array:
@@ -275,7 +285,7 @@ def refit(fit: Fit, candidate: Hypothesis, variant: int, strength: float, *, ite
     one = replace(candidate, variants=candidate.variants[[variant]])
     assert candidate.term is not None  # noqa: S101 - parameters out of their priors have no term
     on_grid = _on_grid(fit.experiment.machine.model, candidate.term)
-    column = [part.filter(_columns(fit.experiment, part, [(one, on_grid)])) for part in fit.parts]
+    column = [part.filter(_columns(fit.experiment, part, [(one, on_grid)])[0]) for part in fit.parts]
     both = Linearised.of([replace(part, residual=x[:, 0]) for part, x in zip(fit.parts, column, strict=True)],
                          fit.experiment.metric)  # fmt: skip
     aside = -fit.covariance @ both.products[1:, 0]  # of the other unknowns, per unit of strength

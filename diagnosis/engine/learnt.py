@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
+from typing import Any
 
 import numpy as np
 
@@ -78,30 +79,30 @@ class Rule:
 
 
 @cache
-def _document() -> Mapping[str, object]:
+def _document() -> Mapping[str, Any]:
     return parse_schema_1(read_text(files("diagnosis.engine") / FILE), file=FILE, kind="learnt numbers")
 
 
 @cache
 def error_classes() -> tuple[ErrorClass, ...]:
     """Classes of model error with their priors; the largest of the study is ``full``."""
-    return tuple(ErrorClass(**one) for one in _document()["class"])  # type: ignore[attr-defined]
+    return tuple(ErrorClass(**one) for one in _document()["class"])
 
 
 @cache
 def rule() -> Rule:
     """Numbers of the rule of decision."""
-    found = dict(_document()["decision"])  # type: ignore[call-overload]
+    found = dict(_document()["decision"])
     return Rule(**found | {name: tuple(found[name]) for name in ("temper", "much_left")})
 
 
 @cache
 def family_priors() -> Mapping[str, float]:
     """Prior of every family of candidates."""
-    return dict(_document()["prior"]["families"])  # type: ignore[index]
+    return dict(_document()["prior"]["families"])
 
 
 @cache
 def deviation_priors() -> Mapping[float, float]:
     """Prior of the deviation between sessions, in prior standard deviations of the unknowns."""
-    return {float(s): p for s, p in _document()["prior"]["deviations"].items()}  # type: ignore[index]
+    return {float(s): p for s, p in _document()["prior"]["deviations"].items()}

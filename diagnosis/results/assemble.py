@@ -73,7 +73,6 @@ def assemble(
     train: Sequence[Recording],
     held_out: Sequence[Recording],
     jobs: int = 1,
-    error_asked: Sequence[str] = (),
 ) -> Diagnosis:
     """The result of a decision.
 
@@ -94,8 +93,6 @@ def assemble(
     train, held_out : sequence of Recording
     jobs : int
         Processes
-    error_asked : sequence of str
-        Where the data ask for much model error
     """
     faulty = () if others is None else others.channels
     best = _best(posterior, answers)
@@ -162,7 +159,6 @@ def assemble(
         matters_W=settings.matters_W,
         error_class=posterior.error_class,
         error_evidence=posterior.error_evidence,
-        error_asked=tuple(error_asked),
         session_s=posterior.session_s,
         holdout_gain=log_score_gain(final, plain, without_channels(judged, faulty), courses),
     )  # fmt: skip

@@ -100,8 +100,6 @@ class Diagnosis:
         Class of model error that the evidence chose
     error_evidence : mapping of str to float
         Log evidence of every class less that of the best, [nat]
-    error_asked : tuple of str
-        Where the data ask for much model error
     session_s : float
         Deviation between sessions that the data support, in prior standard deviations
     holdout_gain : float
@@ -149,7 +147,6 @@ class Diagnosis:
     matters_W: float = 0.0
     error_class: str = ""
     error_evidence: Mapping[str, float] = field(default_factory=dict)
-    error_asked: tuple[str, ...] = ()
     session_s: float = 0.0
     holdout_gain: float = math.nan
     faulty: tuple[str, ...] = ()
@@ -193,8 +190,7 @@ class Diagnosis:
             "kinds": dict(self.kinds),
             "settings": {"false_alarm_rate": self.false_alarm_rate, "claim_from": self.claim_from,
                          "matters_K": self.matters_K, "matters_W": self.matters_W},
-            "model_error": {"class": self.error_class, "evidence": dict(self.error_evidence),
-                            "asked": list(self.error_asked)},
+            "model_error": {"class": self.error_class, "evidence": dict(self.error_evidence)},
             "sessions": {"deviation_in_sd": self.session_s},
             "remaining": {
                 "p_value": _or_none(self.remaining_p_value),
@@ -298,8 +294,7 @@ class Diagnosis:
             told = (f"{kind} {p:.2f}" for kind, p in sorted(self.kinds.items(), key=lambda kind: -kind[1]) if p >= 0.01)
             lines.append(f"Probabilities: {', '.join(told)}.")
         if self.error_class:
-            asked = f"; much of it is asked for in {', '.join(self.error_asked)}" if self.error_asked else ""
-            lines.append(f"Model error assumed: class {self.error_class}{asked}.")
+            lines.append(f"Model error assumed: class {self.error_class}.")
         if self.session_s > LITTLE_SPREAD:
             lines.append(f"Between sessions the machine differs by {self.session_s:.2f} of the priors' widths.")
         far = sorted((c for c in self.calibration if abs(c.shift_in_sd) > FAR_SD), key=lambda c: -abs(c.shift_in_sd))

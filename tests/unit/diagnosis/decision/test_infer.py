@@ -12,6 +12,7 @@ from diagnosis.decision.settings import Settings
 from diagnosis.engine.calibration import calibrate_with_error
 from diagnosis.engine.families import axis_of, changes, log_prior, parameters_outside
 from diagnosis.engine.prepare import prepare_experiment
+from diagnosis.results.effect_values import values_of
 from models.assembly.gearbox import Gearbox
 from models.mechanisms import CATALOGUE, Placed
 from tests.unit.diagnosis.inference_example import recorded
@@ -62,11 +63,10 @@ def test_its_size_is_found(concealed: Posterior) -> None:
     count = len(concealed.nothing.fit.z)
     strength, exponent = (u.value(z) for u, z in zip(best.fit.experiment.unknowns[count:], best.fit.z[count:].tolist(),
                                                      strict=True))  # fmt: skip
-    assert best.strength[0] == pytest.approx(strength)
-    term = best.effects[0].term
+    term, error = best.effects[0].term, values_of(best.fit, best.effects[0])["windage_oil_strength"][1]
     assert isinstance(term, Placed) and term.scale is not None
     at_full_speed = (AT_RPM / term.scale.speed) ** exponent
-    assert abs(strength * at_full_speed - WINDAGE_W) < 3.0 * best.strength_sd[0] * at_full_speed
+    assert abs(strength * at_full_speed - WINDAGE_W) < 3.0 * error * at_full_speed
 
 
 def test_a_change_at_a_date_competes_under_the_name_of_its_law(concealed: Posterior) -> None:

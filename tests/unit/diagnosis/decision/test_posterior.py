@@ -11,6 +11,7 @@ from diagnosis.candidates.hypotheses import Hypothesis
 from diagnosis.decision.posterior import KINDS, Judged, Likeness, Posterior, decide
 from diagnosis.decision.settings import Settings
 from diagnosis.engine.learnt import ErrorClass, rule
+from models.base.errors import InputError
 from models.mechanisms import OPEN_FORM
 from models.network.laws import Parameter, symbol
 from models.terms.term import Kind, Term
@@ -234,3 +235,9 @@ def test_certainty_is_never_above_one() -> None:
     many = [judged(STRONG, effect("fan", place=str(i))) for i in range(50)]
     found = posterior(*many)
     assert found.of_names(["fan"]) <= 1.0 and found.of("mechanism") <= 1.0
+
+
+@pytest.mark.parametrize(("name", "value"), [("false_alarm_rate", 0.0), ("claim_from", 1.0), ("odds_unknown", 20.0)])
+def test_settings_that_mean_nothing_are_refused(name: str, value: float) -> None:
+    with pytest.raises(InputError, match=f"{name} = {value:g} is not possible; .* is"):
+        Settings(**{name: value})

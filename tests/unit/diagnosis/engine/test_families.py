@@ -11,7 +11,6 @@ import sympy as sp
 from diagnosis.candidates.dated import Axis
 from diagnosis.candidates.hypotheses import Hypothesis
 from diagnosis.engine.candidates import Scan, _columns, _on_grid, refit, scan, with_candidate
-from diagnosis.engine.dates import date_of
 from diagnosis.engine.families import axis_of, candidates_of, log_prior
 from diagnosis.engine.fit import Experiment, Fit, calibrate
 from diagnosis.engine.outside import judge_outside, outside_of
@@ -113,12 +112,9 @@ def test_the_change_wins_in_the_scan(fit: Fit, found: Scan, axis: Axis) -> None:
 
 
 def test_date_and_strength_are_found(fit: Fit, air: Hypothesis, axis: Axis) -> None:
-    dated = date_of(fit, air)
-    true = on_axis(fit)
-    assert dated.low <= dated.since <= dated.high
-    assert abs(dated.since - true) < 0.5 * axis.distance
-    assert dated.high - dated.low < axis.distance
-    refitted = refit(fit, dated.hypothesis, 0, dated.strength)
+    found, true = scan(fit, [air]), on_axis(fit)
+    single = found.singles(found.gram.given(found.unknowns))
+    refitted = refit(fit, air, found.best[0], float(single.value[0]))
     added = refitted.experiment.unknowns[len(fit.z) :]
     values = {u.parameter.name: (u.value(z), sd) for u, z, sd in zip(
         added, refitted.z[len(fit.z) :], np.sqrt(np.diag(refitted.covariance))[len(fit.z) :], strict=True)}  # fmt: skip
@@ -139,7 +135,7 @@ def test_columns_are_those_of_repeated_simulation(fit: Fit, air: Hypothesis) -> 
         one = replace(air, variants=air.variants[[variant]])
         assert one.term is not None
         on_grid = _on_grid(fit.experiment.machine.model, one.term)
-        column = _columns(fit.experiment, part, [(one, on_grid)])[:, :, 0]
+        column = _columns(fit.experiment, part, [(one, on_grid)])[0][:, :, 0]
         own[0] = experiment.unknowns[len(fit.z)].z_of(size)
         there = experiment.point(index, np.concatenate([fit.z, own]), part.point.trajectory, rounds=12).read
         own[0] = experiment.unknowns[len(fit.z)].z_of(-size)
@@ -184,11 +180,13 @@ def test_a_sensor_that_steps_is_dated_and_fitted(
     _, experiment = prepare_experiment(fzg, [recordings[0], shifted(during, 8000.0), later], recordings[:1])
     calibrated = calibrate(experiment)
     step = next(h for h in candidates if h.label == "sensor_bias_step@oil")
-    dated = date_of(calibrated, step)
-    assert abs(dated.since - experiment.starts_at["during"] - 8000.0) < 300.0
-    refitted = refit(calibrated, dated.hypothesis, 0, dated.strength)
-    strength = refitted.experiment.unknowns[len(calibrated.z)]
-    assert strength.value(float(refitted.z[len(calibrated.z)])) == pytest.approx(1.0, abs=0.15)
+    found, first = scan(calibrated, [step]), len(calibrated.z)
+    single = found.singles(found.gram.given(found.unknowns))
+    refitted = refit(calibrated, step, found.best[0], float(single.value[0]))
+    strength, since = (u.value(float(z)) for u, z in zip(refitted.experiment.unknowns[first : first + 2],
+                                                         refitted.z[first : first + 2], strict=True))  # fmt: skip
+    assert strength == pytest.approx(1.0, abs=0.15)
+    assert abs(since - experiment.starts_at["during"] - 8000.0) < 300.0
     assert refitted.log_evidence > calibrated.log_evidence + 50.0
 
 
