@@ -4,19 +4,26 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from builder.native.native_fmu import build_native_fmu
 from builder.workflows.held_out_fmu import errors_of, fmu_errors, overall
 from diagnosis.diagnose_recordings import diagnose
+from diagnosis.engine.fit import calibrate
+from diagnosis.engine.predict import predict, rmse
+from diagnosis.engine.prepare import held_out_experiment, prepare_experiment
+from diagnosis.engine.set_apart import without_channels
 from diagnosis.recordings.read import read_by_role
+from diagnosis.recordings.recording import Recording
 from diagnosis.report.write import CORRECTION, write_files
 from diagnosis.results.result import Diagnosis
-from models.assembly.gearbox import load_gearbox
+from models.assembly.gearbox import Gearbox, load_gearbox
 from models.base.atomic_write import atomic_folder
 from models.base.errors import InputError
 from models.base.version import project_version
@@ -26,7 +33,8 @@ RESULT = "real.json"
 SCHEMA = 1
 DATA = Path("examples") / "data"
 STATES = ("before", "calibrated", "after")
-MOST_RATIO, MOST_FMU_K, MOST_S = 0.9, 0.02, 180.0  # after to calibrated; FMU less report; from start to end
+BY_SOUND = "calibrated by the sound channels"
+MOST_RATIO, MOST_FMU_K, MOST_S = 0.9, 0.02, 180.0  # after to calibrated by the sound channels; FMU less report; time
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -103,9 +111,25 @@ def prove_real(
         errors = {state: errors_of(found, state) for state in STATES} | {
             "fmu": fmu_errors(fmu, correction, found, held)
         }
+        progress("calibrating by the sound channels")
+        errors[BY_SOUND] = errors_by_sound(plant, gearbox, train, held)
         result = result_of(plant, found, errors, time.perf_counter() - begin)
         (stage / RESULT).write_text(json.dumps(result, indent=2, allow_nan=False) + "\n", encoding="utf-8")
     return result
+
+
+def errors_by_sound(
+    plant: RealPlant, gearbox: Gearbox, train: Sequence[Recording], held: Sequence[Recording]
+) -> dict[str, float]:
+    """Held-out error of the machine calibrated without the broken channels, by channel, [K].
+
+    A calibration with them is pulled by what is broken: to be better than that is no finding of physics.
+    """
+    setup, experiment = prepare_experiment(gearbox, train, held)
+    fit, judged = calibrate(without_channels(experiment, plant.broken)), held_out_experiment(setup, experiment)
+    found = [predict(judged, index, fit.z) for index in range(len(judged.pieces))]
+    each = rmse(np.concatenate([one.residual for one in found]), np.concatenate([one.weights for one in found]))
+    return dict(zip(setup.channels, each.tolist(), strict=True))
 
 
 def data_file(name: str) -> Path:
@@ -136,13 +160,13 @@ def result_of(
     plant : RealPlant
     found : Diagnosis
     errors : mapping of state to mapping of channel to float
-        Over the held-out recording: before, calibrated, after, and of the FMU, [K]
+        Over the held-out recording: before, calibrated, after, of the FMU, and calibrated by the sound channels, [K]
     seconds : float
         From start to end
     """
     every = {state: overall(of) for state, of in errors.items()}
     sound = {state: overall(of, plant.broken) for state, of in errors.items()}
-    ratio, off = sound["after"] / sound["calibrated"], abs(sound["fmu"] - sound["after"])
+    ratio, off = sound["after"] / sound[BY_SOUND], abs(sound["fmu"] - sound["after"])
     return {
         "schema": SCHEMA,
         "plant": plant.name,
@@ -177,7 +201,7 @@ def rows_of(result: Mapping[str, Any]) -> list[list[str]]:
         rows += [[f"held-out rmse {title}, {state}", f"{rmse[which][state]:.3f} K", "", ""] for state in rmse[which]]
     return [
         *rows,
-        ["after / calibrated, without them", f"{result['ratio']:.3f}", f"{limits['ratio']:g}", _word(kept["ratio"])],
+        [f"after / {BY_SOUND}, without them", f"{result['ratio']:.3f}", f"{limits['ratio']:g}", _word(kept["ratio"])],
         ["FMU less report, without them", f"{result['fmu_less_report_K']:.4f} K",
          f"{limits['fmu_less_report_K']:g} K", _word(kept["fmu_less_report_K"])],
         ["from start to end", f"{result['seconds']:.0f} s", f"{limits['seconds']:g} s", _word(kept["seconds"])],

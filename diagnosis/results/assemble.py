@@ -100,7 +100,8 @@ def assemble(
     findings = tuple(
         finding_of(answer, answer.best.fit or final, setup, posterior, catalogue, train) for answer in answers
     )
-    unseen = _unseen(posterior, catalogue)
+    told = {name for finding in findings for name in (finding.mechanism, *finding.tie_set)}
+    unseen = tuple(one for one in _unseen(posterior, catalogue) if one.mechanism not in told)
     verdict = _verdict(posterior, answers, unseen)
     location = _location(setup, posterior) if posterior.detected else ()
     judged = held_out_experiment(setup, experiment)

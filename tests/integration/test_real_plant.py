@@ -17,6 +17,6 @@ def test_the_broken_thermistor_is_found_and_the_fmu_predicts(run_cli: RunCli, tm
     assert result["verdict"] == "sensor_fault"
     assert all("cell_6__NTC7" in finding["title"] for finding in result["findings"])
     assert {name: kept for name, kept in result["kept"].items() if name != "seconds"} == {
-        "broken_found": True, "ratio": True, "fmu_less_report_K": True,
+        "broken_found": True, "ratio": False, "fmu_less_report_K": True,  # the sound channels leave nothing to find
     }  # fmt: skip
     assert result["rmse_K"]["without_broken"]["after"] < 0.2

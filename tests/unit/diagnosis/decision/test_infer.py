@@ -2,19 +2,27 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import cast
+
 import numpy as np
 import pytest
 
 from diagnosis.candidates.hypotheses import Hypothesis, hypothesis_of
-from diagnosis.decision.infer import NEAR_PLACE, PLACES, RACED, _raced, infer
-from diagnosis.decision.posterior import KINDS, Posterior, decide
+from diagnosis.decision import infer as infer_module
+from diagnosis.decision.infer import NEAR_PLACE, PLACES, RACED, _judged, _raced, infer
+from diagnosis.decision.posterior import KINDS, Judged, Posterior, decide
 from diagnosis.decision.settings import Settings
-from diagnosis.engine.calibration import calibrate_with_error
+from diagnosis.engine.calibration import Calibration, calibrate_with_error
 from diagnosis.engine.families import axis_of, changes, log_prior, parameters_outside
+from diagnosis.engine.fit import Fit
 from diagnosis.engine.prepare import prepare_experiment
+from diagnosis.engine.unknown import TermParameter
 from diagnosis.results.effect_values import values_of
 from models.assembly.gearbox import Gearbox
 from models.mechanisms import CATALOGUE, Placed
+from models.network.laws import Parameter, symbol
+from models.terms.term import Term
 from tests.unit.diagnosis.inference_example import recorded
 
 LOOKED_FOR = ("windage", "air_cooling_change", "sensor_bias", "hot_neighbour")
@@ -109,3 +117,21 @@ def test_names_share_the_race() -> None:
     chosen = _raced(candidates, log_bayes, np.argsort(-log_bayes))
     names = [candidates[i].name for i in chosen]
     assert len(set(names)) == RACED and names.count("one") == PLACES
+
+
+@pytest.mark.parametrize(("share", "possible"), [(0.95, True), (0.2, False)])
+def test_a_share_of_a_swap_is_refused_with_a_number(
+    share: float, possible: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    strength = Parameter(name="swap", start=0.0, sd=1.0, lower=-2.0, upper=2.0, log=False)
+    term = Term(label="swap", kind="sensor", target=("oil", "pinion"), expression=symbol("swap"), form="swapped",
+                parameters=(strength,))  # fmt: skip
+    swap = Hypothesis(name="swapped_channels", place="oil_pinion", family="measurement", term=term,
+                      variants=np.ones((1, 1)))  # fmt: skip
+    unknown = TermParameter(parameter=strength, label="swap", names=("swap",))
+    fit = SimpleNamespace(z=np.array([share]), covariance=np.eye(1), experiment=SimpleNamespace(unknowns=[unknown]))
+    monkeypatch.setattr(infer_module, "fit_over_sessions", lambda *_: SimpleNamespace(log_evidence=50.0))
+    one = Judged(effects=(swap,), log_prior=-5.0, log_bayes=40.0, fit=cast(Fit, fit))
+    found = _judged(cast(Calibration, SimpleNamespace(log_evidence=10.0)), one, 0, 0.0)
+    assert np.isfinite(found.log_bayes)
+    assert (found.log_bayes == 40.0) is possible and (found.log_bayes < -100.0) is not possible
