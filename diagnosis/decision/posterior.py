@@ -298,10 +298,22 @@ def decide(posterior: Posterior, settings: Settings) -> tuple[Answer, ...]:
     """
     if not posterior.detected:
         return ()
-    explanation = posterior.explanations[0]
-    best = next((one for one in explanation.members if one.fit is not None), explanation.members[0])
+    best = _best_fitted(posterior)
     answers = [_answer(posterior, best, effect, settings.claim_from) for effect in best.effects]
     return tuple(one for one in answers if one is not None)
+
+
+def _best_fitted(posterior: Posterior) -> Judged:
+    """The most probable explanation; if it has no fit, the one with its names whose fit has the most evidence.
+
+    Far from a straight line the refit of the best place may fail, and that of another one end without the effect.
+    """
+    explanation = posterior.explanations[0]
+    first = explanation.members[0]
+    if first.fit is not None:
+        return first
+    fitted = [one for one in posterior.judged if one.fit is not None and set(explanation.names) <= set(one.names)]
+    return max(fitted, key=lambda one: one.log_bayes + one.log_prior, default=first)
 
 
 def _answer(posterior: Posterior, best: Judged, effect: Hypothesis, enough: float) -> Answer | None:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
+from dataclasses import replace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ import pytest
 from diagnosis.candidates.hypotheses import Hypothesis
 from diagnosis.decision.posterior import KINDS, Judged, Likeness, Posterior, decide
 from diagnosis.decision.settings import Settings
+from diagnosis.engine.fit import Fit
 from diagnosis.engine.learnt import ErrorClass, rule
 from models.base.errors import InputError
 from models.mechanisms import OPEN_FORM
@@ -241,3 +243,15 @@ def test_certainty_is_never_above_one() -> None:
 def test_settings_that_mean_nothing_are_refused(name: str, value: float) -> None:
     with pytest.raises(InputError, match=f"{name} = {value:g} is not possible; .* is"):
         Settings(**{name: value})
+
+
+def test_an_answer_is_read_off_the_fit_with_most_evidence_for_its_name() -> None:
+    """The best place could not be fitted, another one lost the effect; with a second effect it is there."""
+    fit = cast(Fit, object())
+    fan, other, drag = effect("fan", "oil"), effect("fan", "air"), effect("drag", "shaft")
+    unfitted, weak = judged(80.0, fan), replace(judged(20.0, other), fit=fit)
+    pair = replace(judged(60.0, drag, fan), fit=fit)
+    answers = decide(posterior(unfitted, weak, pair), Settings())
+    assert [(one.best, one.effect) for one in answers] == [(pair, fan)]
+    fitted = replace(unfitted, fit=fit)
+    assert [one.best for one in decide(posterior(fitted, weak, pair), Settings())] == [fitted]
