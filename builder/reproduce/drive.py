@@ -7,12 +7,12 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from builder.drive.plots import PALETTE
 from builder.fmi.reference_cycle import KNOTS
 from builder.reproduce.figure import BLACK, BLUE, RED, Curve, Figure, Kind, Plot
 from builder.reproduce.report import Check, Part, Table, item
 from builder.reproduce.study import FULL, PRINTED, REDUCED, Study
 from models.base.types import Array
+from models.columns.part_colours import PALETTE
 from models.simulation.simulate import Result
 
 # Phases of the cycle [s]: the light start, constant power, high torque, and the load of the start again.

@@ -1,0 +1,154 @@
+"""Columns as curves: labels with units, one colour per part, readable in print."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+import matplotlib as mpl
+import numpy as np
+
+from models.base.errors import InputError, did_you_mean
+from models.base.types import Array
+from models.columns.part_colours import LINES, PALETTE, TOTAL, part_looks
+from models.quantities.quantities import GEARBOX_INPUTS, Input, Quantity, quantity_of_column
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from matplotlib.axes import Axes
+
+STYLE: dict[Any, Any] = {
+    "font.size": 9.0,
+    "axes.grid": True,
+    "grid.alpha": 0.3,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "legend.frameon": False,
+    "svg.hashsalt": "gearbox",
+}
+SIZE = (8.0, 4.0)  # inches of new axes
+LABELS = {"temperatures": "Temperature in °C", "losses": "Power loss in W"}
+LONG_S = 7200.0  # longer times are in hours
+Curves = dict[str, tuple[Array, tuple[str, ...]]]  # by label: values, and the columns that they are the sum of
+
+
+@contextmanager
+def axes_or_new(ax: Axes | None) -> Iterator[Axes]:
+    """Yield the axes, or new ones in the style of all plots."""
+    with mpl.rc_context(STYLE):
+        if ax is None:
+            from matplotlib import pyplot as plt  # so that a notebook shows the figure
+
+            ax = plt.subplots(figsize=SIZE, layout="constrained")[1]
+        yield ax
+
+
+def time_scale(time: Array) -> tuple[float, str]:
+    """Return factor and unit in which a time axis [s] is drawn."""
+    return (1.0 / 3600.0, "h") if len(time) and time[-1] - time[0] > LONG_S else (1.0, "s")
+
+
+def draw_columns(columns: Mapping[str, Array], what: str, *, only: Sequence[str], ax: Axes | None) -> Axes:
+    """Draw temperatures or losses; see :meth:`models.columns.columns.Columns.plot`."""
+    makers = {"temperatures": temperature_curves, "losses": loss_curves}
+    if what not in makers:
+        raise InputError(f"{what!r} cannot be drawn{did_you_mean(what, makers)}; {' and '.join(makers)} can")
+    curves = makers[what](columns, only)
+    x, label = _x_axis(columns)
+    with axes_or_new(ax) as axes:
+        draw_curves(axes, x, curves)
+        axes.set(xlabel=label, ylabel=LABELS[what])
+        if what == "losses":
+            axes.set_ylim(bottom=0.0)
+    return axes
+
+
+def draw_curves(ax: Axes, x: Array, curves: Curves) -> None:
+    """Draw curves by the looks of their parts, with a legend at the right."""
+    for label, (colour, line) in part_looks(curves).items():
+        width = 2.0 if label == TOTAL else 1.4
+        y = np.atleast_2d(curves[label][0]).T
+        marker = "o" if len(x) == 1 else ""
+        lines = ax.plot(x, y, color=colour, linestyle=line, linewidth=width, marker=marker)
+        lines[0].set_label(label.replace("_", " "))
+    ax.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
+
+
+def temperature_curves(columns: Mapping[str, Array], only: Sequence[str] = ()) -> Curves:
+    """Return the temperatures of nodes, without those of inputs.
+
+    Raises
+    ------
+    InputError
+        If there are none, or a named one is missing.
+    """
+    names = [n for n in columns if n.startswith("T_") and n.endswith("_degC")]
+    curves: Curves = {n[2:-5]: (columns[n], (n,)) for n in names if n != GEARBOX_INPUTS["T_ambient"].column}
+    return _chosen(curves, only, "temperature")
+
+
+def loss_curves(columns: Mapping[str, Array], only: Sequence[str] = ()) -> Curves:
+    """Return the losses, the total first; numbered twins (bearing_1, bearing_2 ...) make one curve.
+
+    Raises
+    ------
+    InputError
+        If there are none, or a named one is missing.
+    """
+    parts = {n.removeprefix("P_loss_").removesuffix("_W"): n for n in columns if n.startswith("P_loss_")}
+    parts.pop("W", None)  # the total
+    gathered: dict[str, tuple[str, ...]] = {TOTAL: ("P_loss_W",)} if "P_loss_W" in columns else {}
+    for component, name in parts.items():
+        stem, _, number = component.rpartition("_")
+        label = f"{stem}s" if number.isdigit() and component not in only else component
+        gathered[label] = (*gathered.get(label, ()), name)
+    curves: Curves = {
+        label: (np.sum([columns[n] for n in names], axis=0), names) for label, names in gathered.items()
+    }  # fmt: skip
+    return _chosen(curves, only, "loss")
+
+
+def _chosen(curves: Curves, only: Sequence[str], what: str) -> Curves:
+    if not curves:
+        raise InputError(f"there is no {what} to draw")
+    for name in only:
+        if name not in curves:
+            raise InputError(f"there is no {what} {name!r} to draw{did_you_mean(name, curves)}")
+    return {name: curves[name] for name in only} if only else curves
+
+
+def _x_axis(columns: Mapping[str, Array]) -> tuple[Array, str]:
+    """Return values and label: time, else the first column that changes."""
+    if "time_s" in columns:
+        scale, unit = time_scale(columns["time_s"])
+        return columns["time_s"] * scale, f"Time in {unit}"
+    name = next((n for n, values in columns.items() if np.ptp(values) > 0.0), next(iter(columns)))
+    quantity = quantity_of_column(name)
+    return np.atleast_1d(columns[name]), name if quantity is None else short_label(quantity)
+
+
+def short_label(quantity: Quantity) -> str:
+    """Return the label of an axis without the word for an input.
+
+    Examples
+    --------
+    >>> short_label(GEARBOX_INPUTS["speed"].quantity)
+    'Speed in 1/min'
+    """
+    label = quantity.label.removeprefix("Input ")
+    return label[:1].upper() + label[1:]
+
+
+def draw_inputs(ax: Axes, time: Array, columns: Mapping[str, Array], inputs: Mapping[str, Input]) -> None:
+    """Draw the first two inputs that are no temperature, the second with an axis at the right; else the first one."""
+    driving = [given for given in inputs.values() if not given.quantity.is_temperature] or list(inputs.values())
+    shown = [given for given in driving if given.column in columns][:2]
+    for place, given, colour, line in zip((ax, None), shown, PALETTE, LINES, strict=False):
+        at = place or ax.twinx()
+        at.plot(time, columns[given.column], color=colour, linestyle=line)
+        at.set_ylabel(short_label(given.quantity), color=colour)
+        if place is None:
+            at.spines["right"].set_visible(True)
+            at.grid(visible=False)
