@@ -36,9 +36,10 @@ if TYPE_CHECKING:
     from models.mechanisms import CATALOGUE as CATALOGUE
     from models.mechanisms import Mechanism as Mechanism
     from models.mechanisms import load_mechanisms as load_mechanisms
-    from models.simulation.simulate import Result as Result
+    from models.simulation.result import Result as Result
+    from models.simulation.result import SteadyState as SteadyState
     from models.simulation.simulate import simulate as simulate
-    from models.simulation.simulate import steady_state as steady_state
+    from models.simulation.steady_state import steady_state as steady_state
     from models.simulation.thermal_network import ThermalNetwork as ThermalNetwork
 
 # Where each public name is defined, and its name there.
@@ -51,7 +52,8 @@ _DEFINED_IN = {
     "InputError": "models.base.errors:InputError",
     "Mechanism": "models.mechanisms:Mechanism",
     "Recording": "diagnosis.recordings.recording:Recording",
-    "Result": "models.simulation.simulate:Result",
+    "Result": "models.simulation.result:Result",
+    "SteadyState": "models.simulation.result:SteadyState",
     "ThermalNetwork": "models.simulation.thermal_network:ThermalNetwork",
     "build_fmu": "builder.workflows.build:build",
     "corrected_network": "models.correction.correction:corrected_network",
@@ -63,7 +65,7 @@ _DEFINED_IN = {
     "read_cycle": "models.files.cycle_file:read_cycle",
     "read_recordings": "diagnosis.recordings.read:read_recordings",
     "simulate": "models.simulation.simulate:simulate",
-    "steady_state": "models.simulation.simulate:steady_state",
+    "steady_state": "models.simulation.steady_state:steady_state",
 }
 __all__ = sorted(_DEFINED_IN)
 _INSTALLED = Path(__file__).resolve().parents[1]

@@ -65,7 +65,9 @@ def plot_cycle(
         figure.suptitle(title, fontsize=11)
         scale, unit = time_scale(columns["time_s"])
         time = columns["time_s"] * scale
-        draw_inputs(driving, time, columns, inputs)
+        moving = [i.quantity for i in inputs.values() if not i.quantity.is_temperature]
+        labels = {q.column: q.label for q in moving or [i.quantity for i in inputs.values()]}
+        draw_inputs(driving, time, columns, labels)
         hidden = {node for group in groups.values() for node in group[1:-1]} | {"air", "frame"}
         shown = {node: curve for node, curve in temperature_curves(columns).items() if node not in hidden}
         drawn = [(losses, "losses", loss_curves(columns)) for losses in between]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
+What = Literal["temperatures", "losses"]
 MOST_NAMED = 4  # columns in a repr
 
 
@@ -38,6 +39,9 @@ class Columns(dict[str, Array]):
         more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
         return f"<Columns: {' x '.join(map(str, rows or (1,)))} rows of {', '.join(names[:MOST_NAMED])}{more}>"
 
+    def __or__(self, other: Mapping[str, Array]) -> Columns:  # type: ignore[override]
+        return Columns({**self, **other})
+
     def to_dataframe(self) -> pd.DataFrame:
         """Return the columns as a data frame; several variants below each other, with a first column ``variant``."""
         import pandas as pd
@@ -50,7 +54,7 @@ class Columns(dict[str, Array]):
 
     def plot(
         self,
-        what: Literal["temperatures", "losses"] = "temperatures",
+        what: What = "temperatures",
         *,
         only: Sequence[str] = (),
         ax: Axes | None = None,

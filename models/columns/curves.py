@@ -12,7 +12,7 @@ import numpy as np
 from models.base.errors import InputError, did_you_mean
 from models.base.types import Array
 from models.columns.part_colours import LINES, PALETTE, TOTAL, part_looks
-from models.quantities.quantities import GEARBOX_INPUTS, Input, Quantity, quantity_of_column
+from models.quantities.quantities import GEARBOX_INPUTS, quantity_of_column
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -125,30 +125,34 @@ def _x_axis(columns: Mapping[str, Array]) -> tuple[Array, str]:
         scale, unit = time_scale(columns["time_s"])
         return columns["time_s"] * scale, f"Time in {unit}"
     name = next((n for n, values in columns.items() if np.ptp(values) > 0.0), next(iter(columns)))
-    quantity = quantity_of_column(name)
-    return np.atleast_1d(columns[name]), name if quantity is None else short_label(quantity)
+    return np.atleast_1d(columns[name]), axis_label(name)
 
 
-def short_label(quantity: Quantity) -> str:
-    """Return the label of an axis without the word for an input.
+def axis_label(column: str) -> str:
+    """Return the label of an axis for a column; of an input that a definition names, its name.
 
     Examples
     --------
-    >>> short_label(GEARBOX_INPUTS["speed"].quantity)
-    'Speed in 1/min'
+    >>> axis_label("speed_rpm"), axis_label("heater_power")
+    ('Speed in 1/min', 'Heater power')
     """
-    label = quantity.label.removeprefix("Input ")
-    return label[:1].upper() + label[1:]
+    quantity = quantity_of_column(column)
+    return short_label(column.replace("_", " ") if quantity is None else quantity.label)
 
 
-def draw_inputs(ax: Axes, time: Array, columns: Mapping[str, Array], inputs: Mapping[str, Input]) -> None:
-    """Draw the first two inputs that are no temperature, the second with an axis at the right; else the first one."""
-    driving = [given for given in inputs.values() if not given.quantity.is_temperature] or list(inputs.values())
-    shown = [given for given in driving if given.column in columns][:2]
-    for place, given, colour, line in zip((ax, None), shown, PALETTE, LINES, strict=False):
+def short_label(label: str) -> str:
+    """Return the label of an input without that word."""
+    short = label.removeprefix("Input ")
+    return short[:1].upper() + short[1:]
+
+
+def draw_inputs(ax: Axes, time: Array, columns: Mapping[str, Array], labels: Mapping[str, str]) -> None:
+    """Draw the first two of the labelled columns that there are, the second with an axis at the right."""
+    shown = [(column, label) for column, label in labels.items() if column in columns][:2]
+    for place, (column, label), colour, line in zip((ax, None), shown, PALETTE, LINES, strict=False):
         at = place or ax.twinx()
-        at.plot(time, columns[given.column], color=colour, linestyle=line)
-        at.set_ylabel(short_label(given.quantity), color=colour)
+        at.plot(time, columns[column], color=colour, linestyle=line)
+        at.set_ylabel(short_label(label), color=colour)
         if place is None:
             at.spines["right"].set_visible(True)
             at.grid(visible=False)

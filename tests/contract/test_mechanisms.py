@@ -22,7 +22,7 @@ from models.files.cycle import Cycle
 from models.mechanisms import CATALOGUE, Mechanism, Placed, Scale
 from models.network.compiled import law_source
 from models.network.laws import compile_function, function_source, symbol
-from models.simulation.simulate import Result
+from models.simulation.result import Result
 from models.simulation.thermal_network import ThermalNetwork
 
 MOST_STARTS = 24  # combinations of shape parameters that a search can afford per place
