@@ -23,8 +23,7 @@ from diagnosis.proof.zoo.simulate import simulate
 from diagnosis.proof.zoo.structure import Programme, Variant, ZooPlant
 from models.assembly.gearbox import load_gearbox
 from models.base.types import Array
-from models.columns.curves import STYLE
-from models.columns.part_colours import PALETTE
+from models.columns.curves import PALETTE, STYLE
 from models.files.cycle import Cycle
 from models.simulation.simulate import simulate as simulate_nominal
 

@@ -12,7 +12,7 @@ from builder.reproduce.figure import BLACK, BLUE, RED, Curve, Figure, Kind, Plot
 from builder.reproduce.report import Check, Part, Table, item
 from builder.reproduce.study import FULL, PRINTED, REDUCED, Study
 from models.base.types import Array
-from models.columns.part_colours import PALETTE
+from models.columns.curves import PALETTE
 from models.simulation.result import Result
 
 # Phases of the cycle [s]: the light start, constant power, high torque, and the load of the start again.

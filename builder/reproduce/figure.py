@@ -14,8 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
 
 from models.base.types import Array
-from models.columns.curves import STYLE
-from models.columns.part_colours import PALETTE
+from models.columns.curves import PALETTE, STYLE
 
 WIDTH, HEIGHT, BAR_HEIGHT = 4.6, 3.6, 0.26  # inches per panel, and per bar
 MARKED = range(3, 13)  # number of points of a line that gets a mark at each

@@ -218,6 +218,7 @@ def read_recording(
         assumed=tuple(found.assumed),
         notes=tuple(found.notes),
         session=files[0].mapping.session or "",
+        parts=tuple(part.name for part in network.parts),
     )
 
 

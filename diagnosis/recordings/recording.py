@@ -93,6 +93,8 @@ class Recording:
         What was cleaned or assumed
     session : str
         Test session as its mapping file states it; empty if it does not
+    parts : tuple of str
+        Nodes of the machine, measured or not
     """
 
     name: str
@@ -112,6 +114,7 @@ class Recording:
     assumed: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     session: str = ""
+    parts: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         begin = "" if self.start is None else f" from {self.start:%Y-%m-%d %H:%M} UTC"
@@ -139,4 +142,6 @@ class Recording:
 
     def plot(self, what: What = "temperatures", *, only: Sequence[str] = (), ax: Axes | None = None) -> Axes:
         """Draw the measured temperatures, or the total loss, over time; see :meth:`Columns.plot`."""
-        return self.columns().plot(what, only=only, ax=ax)
+        from models.columns.curves import draw_columns  # imports matplotlib
+
+        return draw_columns(self.columns(), what, only=only, ax=ax, parts=self.parts if what == "temperatures" else ())

@@ -11,8 +11,8 @@ import numpy as np
 
 from models.base.errors import InputError, did_you_mean
 from models.base.types import Array
-from models.columns.part_colours import LINES, PALETTE, TOTAL, part_looks
-from models.quantities.quantities import GEARBOX_INPUTS, quantity_of_column
+from models.quantities.part_colours import OTHER_HUES, part_colours
+from models.quantities.quantities import GEARBOX_INPUTS, node_of_channel, quantity_of_column
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -28,6 +28,9 @@ STYLE: dict[Any, Any] = {
     "legend.frameon": False,
     "svg.hashsalt": "gearbox",
 }
+PALETTE = OTHER_HUES
+LINES = ("-", "--", "-.", ":")
+TOTAL, TOTAL_COLOUR = "total", "black"
 SIZE = (8.0, 4.0)  # inches of new axes
 LABELS = {"temperatures": "Temperature in °C", "losses": "Power loss in W"}
 LONG_S = 7200.0  # longer times are in hours
@@ -50,29 +53,34 @@ def time_scale(time: Array) -> tuple[float, str]:
     return (1.0 / 3600.0, "h") if len(time) and time[-1] - time[0] > LONG_S else (1.0, "s")
 
 
-def draw_columns(columns: Mapping[str, Array], what: str, *, only: Sequence[str], ax: Axes | None) -> Axes:
-    """Draw temperatures or losses; see :meth:`models.columns.columns.Columns.plot`."""
+def draw_columns(
+    columns: Mapping[str, Array], what: str, *, only: Sequence[str], ax: Axes | None, parts: Sequence[str] = ()
+) -> Axes:
+    """Draw temperatures or losses; see :meth:`models.columns.columns.Columns.plot`.
+
+    `parts` are all parts of the machine, on which the colours depend; by default those that have a column.
+    """
     makers = {"temperatures": temperature_curves, "losses": loss_curves}
     if what not in makers:
         raise InputError(f"{what!r} cannot be drawn{did_you_mean(what, makers)}; {' and '.join(makers)} can")
+    colours = part_colours(parts or makers[what](columns))
     curves = makers[what](columns, only)
     x, label = _x_axis(columns)
     with axes_or_new(ax) as axes:
-        draw_curves(axes, x, curves)
+        draw_curves(axes, x, curves, colours)
         axes.set(xlabel=label, ylabel=LABELS[what])
         if what == "losses":
             axes.set_ylim(bottom=0.0)
     return axes
 
 
-def draw_curves(ax: Axes, x: Array, curves: Curves) -> None:
-    """Draw curves by the looks of their parts, with a legend at the right."""
-    for label, (colour, line) in part_looks(curves).items():
-        width = 2.0 if label == TOTAL else 1.4
-        y = np.atleast_2d(curves[label][0]).T
-        marker = "o" if len(x) == 1 else ""
-        lines = ax.plot(x, y, color=colour, linestyle=line, linewidth=width, marker=marker)
-        lines[0].set_label(label.replace("_", " "))
+def draw_curves(ax: Axes, x: Array, curves: Curves, colours: Mapping[str, str]) -> None:
+    """Draw curves in the colours of their parts, with a legend at the right."""
+    for label, (values, _) in curves.items():
+        colour = TOTAL_COLOUR if label == TOTAL else colours[node_of_channel(label, colours)]
+        width, marker = 2.0 if label == TOTAL else 1.4, "o" if len(x) == 1 else ""
+        lines = ax.plot(x, np.atleast_2d(values).T, color=colour, linewidth=width, marker=marker)
+        lines[0].set_label(label.replace("__", ", ").replace("_", " "))
     ax.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
 
 
