@@ -18,10 +18,10 @@ from models.columns.curves import (
     draw_curves,
     draw_inputs,
     loss_curves,
+    members,
     temperature_curves,
     time_scale,
 )
-from models.quantities.part_colours import part_colours
 from models.quantities.quantities import GEARBOX_INPUTS, Input
 
 DOTS: dict[str, Any] = {
@@ -70,12 +70,10 @@ def plot_cycle(
         labels = {q.column: q.label for q in moving or [i.quantity for i in inputs.values()]}
         draw_inputs(driving, time, columns, labels)
         hidden = {node for group in groups.values() for node in group[1:-1]} | {"air", "frame"}
-        nodes = temperature_curves(columns)
-        shown = {node: curve for node, curve in nodes.items() if node not in hidden}
-        lost = loss_curves(columns) if between else {}
-        drawn = [(losses, "losses", lost, lost) for losses in between]
-        for axes, what, curves, of in (*drawn, (temperatures, "temperatures", shown, nodes)):
-            draw_curves(axes, time, curves, part_colours(of))
+        shown = {node: curve for node, curve in temperature_curves(columns).items() if node not in hidden}
+        drawn = [(losses, "losses", loss_curves(columns)) for losses in between]
+        for axes, what, curves in (*drawn, (temperatures, "temperatures", shown)):
+            draw_curves(axes, time, curves, members(columns, what))
             axes.set_ylabel(LABELS[what])
             if reference is not None:
                 _dots(axes, reference, curves, scale)

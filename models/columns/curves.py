@@ -63,25 +63,33 @@ def draw_columns(
     makers = {"temperatures": temperature_curves, "losses": loss_curves}
     if what not in makers:
         raise InputError(f"{what!r} cannot be drawn{did_you_mean(what, makers)}; {' and '.join(makers)} can")
-    colours = part_colours(parts or makers[what](columns))
     curves = makers[what](columns, only)
     x, label = _x_axis(columns)
     with axes_or_new(ax) as axes:
-        draw_curves(axes, x, curves, colours)
+        draw_curves(axes, x, curves, parts or members(columns, what))
         axes.set(xlabel=label, ylabel=LABELS[what])
         if what == "losses":
             axes.set_ylim(bottom=0.0)
     return axes
 
 
-def draw_curves(ax: Axes, x: Array, curves: Curves, colours: Mapping[str, str]) -> None:
-    """Draw curves in the colours of their parts, with a legend at the right."""
+def draw_curves(ax: Axes, x: Array, curves: Curves, parts: Sequence[str]) -> None:
+    """Draw curves in the colours that they have among all `parts` of the machine, with a legend at the right."""
+    colours = part_colours(parts)
     for label, (values, _) in curves.items():
-        colour = TOTAL_COLOUR if label == TOTAL else colours[node_of_channel(label, colours)]
+        part = node_of_channel(label, colours)
+        colour = TOTAL_COLOUR if label == TOTAL else colours.get(part) or part_colours([part])[part]
         width, marker = 2.0 if label == TOTAL else 1.4, "o" if len(x) == 1 else ""
         lines = ax.plot(x, np.atleast_2d(values).T, color=colour, linewidth=width, marker=marker)
         lines[0].set_label(label.replace("__", ", ").replace("_", " "))
     ax.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
+
+
+def members(columns: Mapping[str, Array], what: str) -> list[str]:
+    """Return all nodes that have a temperature, or all losses, without the total."""
+    before, after = ("T_", "_degC") if what == "temperatures" else ("P_loss_", "_W")
+    names = [n for n in columns if n.startswith(before) and n.endswith(after)]
+    return [n[len(before) : -len(after)] for n in names if n not in (GEARBOX_INPUTS["T_ambient"].column, "P_loss_W")]
 
 
 def temperature_curves(columns: Mapping[str, Array], only: Sequence[str] = ()) -> Curves:
@@ -92,8 +100,7 @@ def temperature_curves(columns: Mapping[str, Array], only: Sequence[str] = ()) -
     InputError
         If there are none, or a named one is missing.
     """
-    names = [n for n in columns if n.startswith("T_") and n.endswith("_degC")]
-    curves: Curves = {n[2:-5]: (columns[n], (n,)) for n in names if n != GEARBOX_INPUTS["T_ambient"].column}
+    curves: Curves = {n: (columns[f"T_{n}_degC"], (f"T_{n}_degC",)) for n in members(columns, "temperatures")}
     return _chosen(curves, only, "temperature")
 
 
@@ -105,13 +112,11 @@ def loss_curves(columns: Mapping[str, Array], only: Sequence[str] = ()) -> Curve
     InputError
         If there are none, or a named one is missing.
     """
-    parts = {n.removeprefix("P_loss_").removesuffix("_W"): n for n in columns if n.startswith("P_loss_")}
-    parts.pop("W", None)  # the total
     gathered: dict[str, tuple[str, ...]] = {TOTAL: ("P_loss_W",)} if "P_loss_W" in columns else {}
-    for component, name in parts.items():
+    for component in members(columns, "losses"):
         stem, _, number = component.rpartition("_")
         label = f"{stem}s" if number.isdigit() and component not in only else component
-        gathered[label] = (*gathered.get(label, ()), name)
+        gathered[label] = (*gathered.get(label, ()), f"P_loss_{component}_W")
     curves: Curves = {
         label: (np.sum([columns[n] for n in names], axis=0), names) for label, names in gathered.items()
     }  # fmt: skip
