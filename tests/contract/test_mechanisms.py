@@ -274,7 +274,7 @@ class TestInANetwork:
         finding = Finding.of(term, estimates, mechanism=name, place=term.place, says=term.says)
         correction = Correction.of(gearbox, findings=(finding,))
         write_correction(correction, tmp_path / "correction.toml")
-        read = read_correction(tmp_path / "correction.toml", base)
+        read = read_correction(tmp_path / "correction.toml", gearbox)
         again = simulate("fzg", read.apply(base, as_recorded=True))
         np.testing.assert_allclose(parts(base, again), parts(base, last_place(name)), rtol=0.0, atol=1e-6)
         assert {p.name: (p.start, p.sd) for p in read.findings[0].term.parameters} == estimates
