@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from diagnosis.results.result import Diagnosis
 
 Table = Literal["findings", "explanations", "calibration", "errors"]
-MOST_BARS = 10
+MOST_BARS, LEAST_DRAWN = 10, 0.005
 MODELS = ("before", "calibrated", "after")
 LEGEND = {"before": "as delivered", "calibrated": "calibrated", "after": "with the findings"}
 
@@ -59,18 +59,20 @@ def draw_explanations(diagnosis: Diagnosis, ax: Axes | None) -> Axes:
     """Draw the most probable explanations as bars; see :meth:`diagnosis.results.result.Diagnosis.plot`."""
     from models.columns.curves import PALETTE, axes_or_new  # imports matplotlib
 
-    shown = sorted(diagnosis.ranking, key=lambda r: -r.probability)[:MOST_BARS][::-1]
+    likely = [r for r in diagnosis.ranking if r.probability >= LEAST_DRAWN]
+    shown = sorted(likely, key=lambda r: -r.probability)[:MOST_BARS][::-1]
     with axes_or_new(ax) as axes:
-        axes.barh([named(r.mechanism, r.place).replace("_", " ") for r in shown], [r.probability for r in shown],
-                  color=PALETTE[0])  # fmt: skip
-        axes.set(xlabel="Probability", xlim=(0.0, 1.0), title=diagnosis.verdict_text)
+        names = [named(r.mechanism, r.place).replace("__", " ").replace("_", " ") for r in shown]
+        axes.barh(names, [r.probability for r in shown], color=PALETTE[0])
+        axes.set(xlabel="Probability", xlim=(0.0, 1.0))
     return axes
 
 
 def run_columns(run: PredictedRun) -> Columns:
     """Return a predicted run as columns; see :meth:`diagnosis.results.result_parts.PredictedRun.to_dataframe`."""
     columns: dict[str, Array] = {"time_s": run.time}
-    columns |= {column_of_input(name): getattr(run, name) for name in ("speed", "torque")}
+    shaft = {column_of_input(name): getattr(run, name) for name in ("speed", "torque")}
+    columns |= {column: values for column, values in shaft.items() if np.any(values)}  # zeros without a shaft
     for channel in run.measured:
         column = column_of(TOTAL_LOSS if is_total_loss(channel) else f"T_{channel}")
         columns |= {column: run.measured[channel]}
@@ -92,7 +94,7 @@ def draw_channel(run: PredictedRun, channel: str | None, ax: Axes | None) -> Axe
         axes.plot(run.time * scale, run.measured[channel], ".", markersize=2.0, color=MEASURED, label="measured")
         for model, colour in colours.items():
             axes.plot(run.time * scale, getattr(run, model)[channel], color=colour, label=LEGEND[model])
-        axes.set(title=f"{channel.replace('_', ' ')}, {run.recording}", xlabel=f"Time in {unit}",
+        axes.set(title=f"{channel.replace('__', ', ').replace('_', ' ')}; {run.recording}", xlabel=f"Time in {unit}",
                  ylabel=LABELS["losses" if is_total_loss(channel) else "temperatures"])  # fmt: skip
         axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
     return axes
@@ -101,5 +103,5 @@ def draw_channel(run: PredictedRun, channel: str | None, ax: Axes | None) -> Axe
 def _worst(run: PredictedRun) -> str:
     """Return the temperature that the model as delivered predicts worst; the loss if there is no temperature."""
     temperatures = [channel for channel in run.measured if not is_total_loss(channel)]
-    errors = {c: float(np.nanstd(run.before[c] - run.measured[c])) for c in temperatures}
+    errors = {c: float(np.sqrt(np.nanmean((run.before[c] - run.measured[c]) ** 2))) for c in temperatures}
     return max(errors, key=lambda c: errors[c]) if errors else next(iter(run.measured))
