@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING
 DOCS = Path(__file__).resolve().parent
 sys.path[:0] = [str(DOCS), str(DOCS.parent)]
 
-from _math import setup_mathml  # noqa: E402 - found through the line above
+from _generate import setup_generated  # noqa: E402 - found through the line above
+from _math import setup_mathml  # noqa: E402
 
 from models.base.version import project_version  # noqa: E402
 
@@ -72,4 +73,5 @@ def spread_notebooks(_app: Sphinx, _env: BuildEnvironment, docnames: list[str]) 
 def setup(app: Sphinx) -> None:
     """Register formulas and the order of work."""
     setup_mathml(app)
+    setup_generated(app)
     app.connect("env-before-read-docs", spread_notebooks)

@@ -1,0 +1,299 @@
+"""Pages that are made from the program when the site is built: the directive ``{generated} NAME``.
+
+Each function returns Markdown; nothing of it is kept in the repository.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Mapping
+from typing import TYPE_CHECKING, Any
+
+from sphinx.util.docutils import SphinxDirective
+
+from builder.fmi.signals import signal_table
+from diagnosis.recordings.mapping import RecordingMapping
+from models.assembly.gearbox import load_gearbox
+from models.assembly.gearbox_definition import Definition
+from models.correction.correction import Correction
+from models.definition.named_oils import known_oils, named_oil, read_oil
+from models.definition.parametric_sections import ParametricDefinition
+from models.definition.values_with_source import Annotations, strip
+from models.files.toml_file import packaged, parse, read_text
+from models.mechanisms import CATALOGUE, Mechanism, Placed, Scale
+from models.quantities.definition_units import unit_of
+
+if TYPE_CHECKING:
+    from docutils.nodes import Node
+    from pydantic import BaseModel
+    from sphinx.application import Sphinx
+
+Schema = Mapping[str, Any]
+GEARBOXES = "gearboxes"
+EXAMPLES = {Definition: "fzg", ParametricDefinition: "la_haute_borne"}  # whose values stand next to the keys
+# Machines in which the catalogue's laws are written out, the first that has a place for it.
+MACHINES = {"fzg": {"speed": 3000.0, "torque": 94.0}, "la_haute_borne": {"speed": 1500.0, "torque": 5000.0}}
+KINDS = {
+    "source": "heat into a node",
+    "link": "a heat path",
+    "loss_factor": "a change of a loss",
+    "link_factor": "a change of a heat path",
+    "signal": "an input that differs from its record",
+    "sensor": "a reading that differs from the temperature",
+}
+
+
+def _cell(text: object) -> str:
+    """Text of a table cell: on one line, and without a bar that would end it."""
+    return " ".join(str(text).split()).replace("|", r"\|")
+
+
+def _row(*cells: object) -> str:
+    return "| " + " | ".join(_cell(cell) for cell in cells) + " |"
+
+
+def _table(head: tuple[str, ...], rows: list[tuple[object, ...]]) -> Iterator[str]:
+    """Yield a Markdown table without the columns that are empty."""
+    used = [i for i in range(len(head)) if i == 0 or any(str(row[i]) for row in rows)]
+    yield _row(*(head[i] for i in used))
+    yield _row(*("---" for _ in used))
+    yield from (_row(*(row[i] for i in used)) for row in rows)
+    yield ""
+
+
+def _markdown(docstring: str) -> str:
+    """A docstring as Markdown: literals and roles as code, one paragraph per paragraph."""
+    text = re.sub(r":\w+:`~?([^`]+)`", r"`\1`", docstring)
+    text = re.sub(r"``([^`]+)``", r"`\1`", text)
+    return re.sub(r"\n +", "\n", text)
+
+
+class _Tables:
+    """Reference of one file: a heading and a table of keys for every pydantic model in it."""
+
+    def __init__(self, model: type[BaseModel], example: str | None) -> None:
+        self.schema = model.model_json_schema(by_alias=True)
+        self.definitions: Mapping[str, Schema] = self.schema.get("$defs", {})
+        self.values: Mapping[str, Any] = {}
+        self.notes = Annotations()
+        if example is not None:
+            self.values = strip(parse(read_text(packaged(GEARBOXES, example)), file=example), self.notes)
+        self.example = example
+
+    def markdown(self) -> Iterator[str]:
+        """Yield the lines."""
+        yield from self._section("", "At the top of the file", self.schema, self.values)
+        yield from self._below(self.schema, (), self.values)
+
+    def _below(self, schema: Schema, path: tuple[str, ...], values: Any) -> Iterator[str]:
+        for key, field in schema["properties"].items():
+            inner, many = self._inner(field)
+            if inner is None:
+                continue
+            named = ".NAME" if field.get("additionalProperties") else ""
+            below = values.get(key) if isinstance(values, Mapping) else None
+            first = below[0] if isinstance(below, tuple) and below else below
+            dotted = ".".join((*path, key))
+            title = f"`[[{dotted}]]`" if many else f"`[{dotted}{named}]`"
+            place = ".".join((*path, key)) + (".0" if many else "")
+            yield from self._section(place, title, inner, first)
+            yield from self._below(inner, (*path, key), first)
+
+    def _inner(self, field: Schema) -> tuple[Schema | None, bool]:
+        """Table that a key holds, and True if it may be there several times; None for a key with a value."""
+        options = field.get("anyOf", [field])
+        for option in options:
+            if "$ref" in option:
+                return self.definitions[option["$ref"].rpartition("/")[2]], False
+            if "$ref" in option.get("items", {}):
+                return self.definitions[option["items"]["$ref"].rpartition("/")[2]], True
+            named = option.get("additionalProperties")
+            if isinstance(named, Mapping) and "$ref" in named:
+                return self.definitions[named["$ref"].rpartition("/")[2]], False
+        return None, False
+
+    def _section(self, place: str, title: str, schema: Schema, values: Any) -> Iterator[str]:
+        required = schema.get("required", ())
+        yield f"### {title}"
+        yield ""
+        if place:
+            text = re.sub(r"^(Table )?(`\[[^`]*`(, )?)+:\s*", "", _markdown(schema.get("description", ""))).strip()
+            yield text[:1].upper() + text[1:]
+            yield ""
+        rows = []
+        for key, field in schema["properties"].items():
+            if self._inner(field)[0] is not None:
+                continue
+            given = values.get(key, "") if isinstance(values, Mapping) else ""
+            source = self.notes.sources.get(f"{place}.{key}", "")
+            rows.append((f"`{key}`", field.get("description", ""), _type(field), unit_of(key).symbol, _limits(field),
+                         _default(key, field, required), _value(given), source))  # fmt: skip
+        if rows:
+            head = ("key", "meaning", "value", "unit", "limits", "default", f"in `{self.example}`", "source there")
+            yield from _table(head, rows)
+
+
+def _plain(field: Schema) -> Schema:
+    """The option of a key that is not null."""
+    return next((o for o in field.get("anyOf", ()) if o.get("type") != "null"), field)
+
+
+def _type(field: Schema) -> str:
+    field = _plain(field)
+    if "enum" in field:
+        return "one of " + ", ".join(f"`{one}`" for one in field["enum"])
+    if "const" in field:
+        return f"`{field['const']}`"
+    kind = field.get("type", "")
+    if kind == "array" and "prefixItems" in field:
+        return f"{len(field['prefixItems'])} x {_type(field['prefixItems'][0])}"
+    if kind == "array":
+        return f"list of {_type(field.get('items', {})) or 'values'}"
+    names = {"number": "number", "integer": "whole number", "string": "text", "boolean": "true or false",
+             "object": "table of numbers"}  # fmt: skip
+    return names.get(kind, "text" if "anyOf" not in field else " or ".join(filter(None, map(_type, field["anyOf"]))))
+
+
+def _limits(field: Schema) -> str:
+    field = _plain(field)
+    while field.get("type") == "array":
+        field = field["prefixItems"][0] if "prefixItems" in field else field.get("items", {})
+    low = field.get("minimum", field.get("exclusiveMinimum"))
+    high = field.get("maximum", field.get("exclusiveMaximum"))
+    if low is None and high is None:
+        return ""
+    above = "above " if "exclusiveMinimum" in field else ""
+    if high is None:
+        return f"{above}{low:g} or more" if not above else f"above {low:g}"
+    return f"{above}{low:g} to {high:g}" if low is not None else f"up to {high:g}"
+
+
+def _default(key: str, field: Schema, required: Any) -> str:
+    if key in required:
+        return "needed"
+    default = field.get("default")
+    return "" if default in (None, [], {}, "") else _value(default)
+
+
+def _value(value: Any) -> str:
+    if value == "" or value is None:
+        return ""
+    if isinstance(value, bool):
+        return f"`{str(value).lower()}`"
+    if isinstance(value, Mapping):
+        return f"{len(value)} numbers"
+    if isinstance(value, tuple | list):
+        return "`[" + ", ".join(_value(one).strip("`") for one in value) + "]`"
+    return f"`{value:g}`" if isinstance(value, float) else f"`{value}`"
+
+
+def definition() -> Iterator[str]:
+    """Tables and keys of a definition with geometry."""
+    yield from _Tables(Definition, EXAMPLES[Definition]).markdown()
+
+
+def definition_without_geometry() -> Iterator[str]:
+    """Tables and keys of a definition without geometry."""
+    yield from _Tables(ParametricDefinition, EXAMPLES[ParametricDefinition]).markdown()
+
+
+def mapping() -> Iterator[str]:
+    """Tables and keys of a mapping file."""
+    yield from _Tables(RecordingMapping, None).markdown()
+
+
+def correction() -> Iterator[str]:
+    """Tables and keys of a correction."""
+    yield from _Tables(Correction, None).markdown()
+
+
+def oils() -> Iterator[str]:
+    """Oils that a definition may name."""
+    rows: list[tuple[object, ...]] = []
+    for name in known_oils():
+        oil, notes = named_oil(name), read_oil(name)[1]
+        points = "" if oil.viscosity_points is None else "; ".join(f"{nu:g} at {T:g} degC" for T, nu in oil.viscosity_points)
+        if oil.d341 is not None:
+            points = "; ".join(f"{_d341(oil.d341.m, oil.d341.n, T):.3g} at {T:g} degC" for T in (40.0, 100.0))
+        rows.append((f"`{name}`", oil.name, oil.base, points, f"{oil.density_kg_m3:g}", notes.source_of("")))
+    yield from _table(("named", "oil", "base", "viscosity in mm²/s", "density in kg/m³", "source"), rows)
+
+
+def _d341(m: float, n: float, T: float) -> float:
+    from models.formulas.oil import kinematic_viscosity_d341
+
+    return float(kinematic_viscosity_d341(T, m=m, n=n))
+
+
+def variables() -> Iterator[str]:
+    """Variables of the FMU of the FZG rig."""
+    yield signal_table(load_gearbox("fzg").network()).markdown()
+
+
+def mechanisms() -> Iterator[str]:
+    """The catalogue by family, every law as it is written for a machine that has a place for it."""
+    networks = {name: (load_gearbox(name).network(), Scale.of(load_gearbox(name), **at)) for name, at in MACHINES.items()}
+    families: dict[str, list[Mechanism]] = {}
+    for mechanism in CATALOGUE.values():
+        families.setdefault(mechanism.family, []).append(mechanism)
+    for family, members in families.items():
+        yield f"## {family.capitalize()}"
+        yield ""
+        for mechanism in members:
+            places = {name: mechanism.placed(network, scale) for name, (network, scale) in networks.items()}
+            yield from _mechanism(mechanism, places)
+
+
+def _mechanism(mechanism: Mechanism, places: Mapping[str, tuple[Placed, ...]]) -> Iterator[str]:
+    yield f"(mechanism-{mechanism.name.replace('_', '-')})="
+    yield f"### `{mechanism.name}`"
+    yield ""
+    yield mechanism.says.format(place="at its place").replace(" (at its place)", "")
+    yield ""
+    machine = next((name for name, found in places.items() if found), None)
+    if machine is not None:
+        one = places[machine][0]
+        law, *ratios = one.equation().split(r",\quad ")
+        yield f"$$\n{law}\n$$\n"
+        ratios_text = "".join(f", ${ratio}$" for ratio in ratios)
+        yield f"Written for {one.place.replace('_', ' ')} of `{machine}`{ratios_text}.\n"
+        local = [(p.name.removeprefix(f"{one.label}_"), p) for p in one.parameters]
+        yield from _table(
+            ("parameter", "meaning", "unit", "start", "usual size or deviation", "limits"),
+            [(f"`{name}`", p.description, "" if p.unit == "1" else p.unit, f"{p.start:.3g}",
+              "" if p.sd is None else f"{p.sd:.3g}" + (" (of the logarithm)" if p.log else ""),
+              f"{p.lower:.3g} to {p.upper:.3g}") for name, p in local],
+        )  # fmt: skip
+    yield f"- **Kind**: {KINDS[mechanism.kind]} (`{mechanism.kind}`), at: {', '.join(f'`{p}`' for p in mechanism.places)}"
+    yield f"- **Source**: {mechanism.reference}"
+    yield f"- **Shown best by**: {mechanism.experiment}"
+    for other, test in mechanism.separate_by.items():
+        yield f"- **Told from** {{ref}}`{other} <mechanism-{other.replace('_', '-')}>` **by**: {test}"
+    yield ""
+
+
+GENERATORS: Mapping[str, Callable[[], Iterator[str]]] = {
+    "correction": correction,
+    "definition": definition,
+    "definition_without_geometry": definition_without_geometry,
+    "mapping": mapping,
+    "mechanisms": mechanisms,
+    "oils": oils,
+    "variables": variables,
+}
+
+
+class Generated(SphinxDirective):
+    """``{generated} NAME``: the Markdown that a function of this module returns, in place."""
+
+    required_arguments = 1
+
+    def run(self) -> list[Node]:
+        """Parse the Markdown."""
+        text = "\n".join(GENERATORS[self.arguments[0]]())
+        return self.parse_text_to_nodes(text, allow_section_headings=True)
+
+
+def setup_generated(app: Sphinx) -> None:
+    """Register the directive."""
+    app.add_directive("generated", Generated)
