@@ -9,6 +9,8 @@ import re
 from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+import sympy as sp
 from sphinx.util.docutils import SphinxDirective
 
 from builder.fmi.signals import signal_table
@@ -21,6 +23,7 @@ from models.definition.parametric_sections import ParametricDefinition
 from models.definition.values_with_source import Annotations, strip
 from models.files.toml_file import packaged, parse, read_text
 from models.mechanisms import CATALOGUE, Mechanism, Placed, Scale
+from models.network.laws import symbol
 from models.quantities.definition_units import unit_of
 
 if TYPE_CHECKING:
@@ -230,6 +233,44 @@ def variables() -> Iterator[str]:
     yield signal_table(load_gearbox("fzg").network()).markdown()
 
 
+def network() -> Iterator[str]:
+    """Nodes, heat paths and time constants of the FZG rig at one operating point where it has settled."""
+    rig = load_gearbox("fzg")
+    network = rig.network()
+    speed, torque = 2165.7, 94.0
+    settled = network.steady_state(losses=rig.losses(), speed=[speed], torque=torque)
+    values = {p.name: p.start for p in network.parameters} | {name: given.default for name, given in network.inputs.items()}
+    values |= {"speed": speed, "torque": torque, "time": 0.0}
+    values |= {f"T_{name}": float(course.flat[-1]) for name, course in settled.temperatures.items()}
+    numbers = {symbol(name): value for name, value in values.items()}
+    conductance = {link.name: float(sp.N(link.conductance.xreplace(numbers))) for link in network.links}
+    capacity = {part.name: float(sp.N(sp.sympify(part.capacity).xreplace(numbers))) for part in network.parts}
+    yield f"The FZG rig at {speed:g} 1/min and {torque:g} N m (8.3 m/s), once its temperatures no longer change:"
+    yield ""
+    yield from _table(
+        ("part", "heat capacity in J/K", "settles at, in °C"),
+        [(f"`{name}`", f"{value:.3g}", f"{values[f'T_{name}']:.1f}") for name, value in capacity.items()],
+    )
+    yield from _table(
+        ("heat path", "conductance in W/K"),
+        [(f"{_code(link.nodes[0])} to {_code(link.nodes[1])}", f"{conductance[link.name]:.3g}") for link in network.links],
+    )
+    order = list(capacity)
+    matrix = np.zeros((len(order), len(order)))
+    for link in network.links:
+        for here, there in (link.nodes, link.nodes[::-1]):
+            if here in order:
+                matrix[order.index(here), order.index(here)] += conductance[link.name] / capacity[here]
+                if there in order:
+                    matrix[order.index(here), order.index(there)] -= conductance[link.name] / capacity[here]
+    constants = sorted((1.0 / rate for rate in np.linalg.eigvals(matrix).real), reverse=True)
+    yield f"Time constants in s: {', '.join(f'{one:.3g}' for one in constants)}."
+
+
+def _code(name: str) -> str:
+    return f"`{name}`"
+
+
 def mechanisms() -> Iterator[str]:
     """The catalogue by family, every law as it is written for a machine that has a place for it."""
     networks = {name: (load_gearbox(name).network(), Scale.of(load_gearbox(name), **at)) for name, at in MACHINES.items()}
@@ -278,6 +319,7 @@ GENERATORS: Mapping[str, Callable[[], Iterator[str]]] = {
     "definition_without_geometry": definition_without_geometry,
     "mapping": mapping,
     "mechanisms": mechanisms,
+    "network": network,
     "oils": oils,
     "variables": variables,
 }
