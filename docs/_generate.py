@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import sympy as sp
+from pydantic.json_schema import GenerateJsonSchema
 from sphinx.util.docutils import SphinxDirective
 
 from builder.fmi.signals import signal_table
@@ -71,11 +72,17 @@ def _markdown(docstring: str) -> str:
     return re.sub(r"\n +", "\n", text)
 
 
+class _Quiet(GenerateJsonSchema):
+    """A default that JSON does not have, such as an expression, is left out without a warning."""
+
+    ignored_warning_kinds = frozenset({"skipped-choice", "non-serializable-default"})  # type: ignore[assignment]
+
+
 class _Tables:
     """Reference of one file: a heading and a table of keys for every pydantic model in it."""
 
     def __init__(self, model: type[BaseModel], example: str | None) -> None:
-        self.schema = model.model_json_schema(by_alias=True)
+        self.schema = model.model_json_schema(by_alias=True, schema_generator=_Quiet)
         self.definitions: Mapping[str, Schema] = self.schema.get("$defs", {})
         self.values: Mapping[str, Any] = {}
         self.notes = Annotations()
@@ -215,7 +222,9 @@ def oils() -> Iterator[str]:
     rows: list[tuple[object, ...]] = []
     for name in known_oils():
         oil, notes = named_oil(name), read_oil(name)[1]
-        points = "" if oil.viscosity_points is None else "; ".join(f"{nu:g} at {T:g} degC" for T, nu in oil.viscosity_points)
+        points = (
+            "" if oil.viscosity_points is None else "; ".join(f"{nu:g} at {T:g} degC" for T, nu in oil.viscosity_points)
+        )
         if oil.d341 is not None:
             points = "; ".join(f"{_d341(oil.d341.m, oil.d341.n, T):.3g} at {T:g} degC" for T in (40.0, 100.0))
         rows.append((f"`{name}`", oil.name, oil.base, points, f"{oil.density_kg_m3:g}", notes.source_of("")))
@@ -239,7 +248,9 @@ def network() -> Iterator[str]:
     network = rig.network()
     speed, torque = 2165.7, 94.0
     settled = network.steady_state(losses=rig.losses(), speed=[speed], torque=torque)
-    values = {p.name: p.start for p in network.parameters} | {name: given.default for name, given in network.inputs.items()}
+    values = {p.name: p.start for p in network.parameters} | {
+        name: given.default for name, given in network.inputs.items()
+    }
     values |= {"speed": speed, "torque": torque, "time": 0.0}
     values |= {f"T_{name}": float(course.flat[-1]) for name, course in settled.temperatures.items()}
     numbers = {symbol(name): value for name, value in values.items()}
@@ -253,7 +264,10 @@ def network() -> Iterator[str]:
     )
     yield from _table(
         ("heat path", "conductance in W/K"),
-        [(f"{_code(link.nodes[0])} to {_code(link.nodes[1])}", f"{conductance[link.name]:.3g}") for link in network.links],
+        [
+            (f"{_code(link.nodes[0])} to {_code(link.nodes[1])}", f"{conductance[link.name]:.3g}")
+            for link in network.links
+        ],
     )
     order = list(capacity)
     matrix = np.zeros((len(order), len(order)))
@@ -273,7 +287,9 @@ def _code(name: str) -> str:
 
 def mechanisms() -> Iterator[str]:
     """The catalogue by family, every law as it is written for a machine that has a place for it."""
-    networks = {name: (load_gearbox(name).network(), Scale.of(load_gearbox(name), **at)) for name, at in MACHINES.items()}
+    networks = {
+        name: (load_gearbox(name).network(), Scale.of(load_gearbox(name), **at)) for name, at in MACHINES.items()
+    }
     families: dict[str, list[Mechanism]] = {}
     for mechanism in CATALOGUE.values():
         families.setdefault(mechanism.family, []).append(mechanism)
