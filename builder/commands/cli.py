@@ -8,6 +8,7 @@ from types import FrameType
 
 import click
 
+from builder.base.progress import LOADING, progress
 from builder.base.workers import worker_options
 from builder.commands.conceal import conceal
 from builder.commands.diagnose import diagnose
@@ -74,7 +75,8 @@ def build_fmu(
     dask: str | None,
 ) -> None:
     """Train the networks of a gearbox and build its FMU."""
-    from builder.workflows.build import build  # imports scikit-learn and onnx, which the other verbs need not wait for
+    with progress(LOADING):
+        from builder.workflows.build import build  # scikit-learn and onnx, which the other verbs need not wait for
 
     if platforms is not None and target == "python":
         raise click.UsageError("--platforms is about native FMUs; give it without --target python")
@@ -84,21 +86,12 @@ def build_fmu(
     found = None if correction is None else read_correction(correction, definition.network(), made_for=definition)
     found = found.claims_only() if found and claims_only else found
     folder = output if output is not None else Path("out") / Path(gearbox).stem
-    report = build(
-        definition,
-        folder,
-        name=Path(gearbox).stem,
-        target=target,
-        platforms=platforms or "host",
-        fmi=fmi or "2",
-        preset=preset,
-        samples=samples,
-        seed=seed,
-        jobs=jobs,
-        dask=dask,
-        correction=found,
-        couple=couple,
-    )
+    with progress("starting") as told:
+        report = build(
+            definition, folder, name=Path(gearbox).stem, target=target, platforms=platforms or "host", fmi=fmi or "2",
+            preset=preset, samples=samples, seed=seed, jobs=jobs, dask=dask, correction=found, couple=couple,
+            progress=told,
+        )  # fmt: skip
     report.show()
 
 

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 
 import click
 
 from builder.base import console
+from builder.base.progress import progress
 from builder.commands.conceal_in_zoo import conceal_in_zoo
 from builder.commands.conceal_into import conceal_into
 from models.assembly.gearbox import load_gearbox
@@ -131,11 +133,12 @@ def conceal(
     recordings, truth = output / "recordings", truth or output / "truth"
     with (
         staged_folders(recordings, truth) as (stage, truth_stage),
-        console.progress_bar("concealing") as progress,
+        progress("concealing") as told,
     ):
         names = conceal_set(
-            definition, plans, seed=seed, recordings=stage, truth=truth_stage, flat=cases is None, progress=progress
-        )
+            definition, plans, seed=seed, recordings=stage, truth=truth_stage, flat=cases is None,
+            progress=partial(told, "concealing"),
+        )  # fmt: skip
     for name in names:
         console.out.print(f"wrote {recordings / ('' if cases is None else name)}, {truth / name}.json")
 

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import json
-import time
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -13,13 +11,13 @@ import click
 from click.core import ParameterSource
 
 from builder.base import console
+from builder.base.progress import LOADING, progress
 from builder.base.workers import jobs_option
 from models.base.errors import InputError
 
 if TYPE_CHECKING:
     from diagnosis.proof.scoring.lines import Settings
 
-LINES = 20  # of progress where there is no terminal
 MADE = ("plant", "cases", "seed", "families", "removed")  # options of cases that are made
 REAL = ("rod",)  # plants with a recording in examples/data
 ONLY_NEW = (*MADE, "gearbox", "cells_every", "baselines", "answers")  # that an old file has
@@ -73,8 +71,9 @@ def prove(
             raise InputError(f"--{_dashed(typed[0])} does not go with --real, which is one recording of a real plant")
         _prove_real(real, output, jobs)
         return
-    from builder.workflows.prove import prove as run
-    from diagnosis.proof.scoring.lines import Settings, begin_lines
+    with progress(LOADING):
+        from builder.workflows.prove import prove as run
+        from diagnosis.proof.scoring.lines import Settings, begin_lines
 
     if (recordings is None) != (truth is None):
         raise InputError("--recordings and --truth go together: a folder per case, and what is concealed in them")
@@ -95,8 +94,8 @@ def prove(
                                      baselines=baselines, removed=removed)  # fmt: skip
         file = answers or output / f"{settings.seed}.jsonl"
         begin_lines(file, settings)
-    with _progress() as progress:
-        result = run(file, output, recordings=recordings, truth=truth, jobs=jobs, progress=progress)
+    with progress("starting") as told:
+        result = run(file, output, recordings=recordings, truth=truth, jobs=jobs, progress=told)
     _show(result, output)
     console.out.print(f"wrote {file}")
 
@@ -156,9 +155,10 @@ def _settings_of_made(
 
 
 def _prove_real(name: str, output: Path, jobs: int) -> None:
-    from builder.workflows.prove_real import PLANTS, RESULT, prove_real, rows_of
-
-    result = prove_real(PLANTS[name], output, jobs=jobs, progress=lambda text: console.err.print(text))
+    with progress(LOADING):
+        from builder.workflows.prove_real import PLANTS, RESULT, prove_real, rows_of
+    with progress("starting") as told:
+        result = prove_real(PLANTS[name], output, jobs=jobs, progress=told)
     for finding in result["findings"]:
         console.out.print(f"{finding['grade']}: {finding['title']} ({finding['probability']:.2f})")
     console.table(f"{name}: {result['verdict'].replace('_', ' ')}", ["", "", "limit", ""], rows_of(result))
@@ -182,21 +182,3 @@ def _show(result: Mapping[str, Any], output: Path) -> None:
         console.out.print(f"{result['failed']} diagnoses ended without an answer; they count as wrong.")
     for path in write_scores(result, output):
         console.out.print(f"wrote {path}")
-
-
-@contextmanager
-def _progress() -> Iterator[Callable[[str, int, int], None]]:
-    """Progress bar on a terminal, else a line now and then."""
-    if console.err.is_terminal:
-        with console.progress_bar("starting") as advance:
-            yield lambda _, done, of: advance(done, of)
-        return
-    begin, last = time.perf_counter(), {"": -1}
-
-    def report(what: str, done: int, of: int) -> None:
-        part = LINES * done // max(of, 1)
-        if last.get(what) != part:
-            last[what] = part
-            console.err.print(f"{what}: {done} of {of}, {(time.perf_counter() - begin) / 60.0:.0f} min")
-
-    yield report
