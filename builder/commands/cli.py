@@ -10,7 +10,9 @@ import click
 
 from builder.base.progress import LOADING, progress
 from builder.base.workers import worker_options
+from builder.commands.check import check
 from builder.commands.conceal import conceal
+from builder.commands.definition_files import new, schema
 from builder.commands.diagnose import diagnose
 from builder.commands.prove import prove, score
 from builder.commands.simulate import simulate
@@ -95,6 +97,9 @@ def build_fmu(
     report.show()
 
 
+commands.add_command(new)
+commands.add_command(check)
+commands.add_command(schema)
 commands.add_command(simulate)
 commands.add_command(diagnose)
 commands.add_command(reproduce)

@@ -62,8 +62,8 @@ TEXTS: Mapping[str, Mapping[str, KeyText]] = {
         named="Oil of the package whose values fill what is not given here: a product, or a grade such as ISO_VG_220",
         name="Name of the oil, for people",
         base="Kind of base oil",
-        viscosity_points=("Two points of temperature [degC] and kinematic viscosity [mm2/s], mostly at 40 and 100 degC",
-                          "[[40, 220], [100, 19]] is ISO VG 220"),
+        viscosity_points="Two points of temperature [degC] and kinematic viscosity [mm2/s], mostly at 40 and 100 degC; "
+                         "[[40.0, 220.0], [100.0, 19.0]] is about ISO VG 220",
         d341="Constants of the viscosity line, in place of viscosity_points",
         density_kg_m3=("Density at density_temperature_degC", "850 to 1080"),
         density_temperature_degC="Temperature of that density",
@@ -136,7 +136,7 @@ TEXTS: Mapping[str, Mapping[str, KeyText]] = {
         name="Name of the bearing, and of its thermal node",
         like="Name of an earlier bearing: take all its values that are not given here",
         shaft="Name of the shaft that it carries",
-        designation="Designation; of known ones (see python -m builder check --bearings) sizes and constants are filled",
+        designation="Designation; of known ones (check --known lists them) sizes and constants are filled in",
         type="Kind of bearing",
         bore_mm=("Bore d", "15 to 150"),
         outside_diameter_mm=("Outside diameter D", "35 to 300"),
@@ -218,8 +218,8 @@ TEXTS: Mapping[str, Mapping[str, KeyText]] = {
     ),
     "Surroundings": _texts(temperature_degC=("Temperature of the air", "10 to 40")),
     "Lubricant": _texts(
-        viscosity_points=("Two points of temperature [degC] and kinematic viscosity [mm2/s]",
-                          "[[40, 320], [100, 24]] is ISO VG 320"),
+        viscosity_points="Two points of temperature [degC] and kinematic viscosity [mm2/s]; "
+                         "[[40.0, 320.0], [100.0, 24.0]] is about ISO VG 320",
     ),
     "NamedInput": _texts(
         name="Name in laws, and of the column in files",
@@ -249,7 +249,7 @@ TEXTS: Mapping[str, Mapping[str, KeyText]] = {
     "Heat": _texts(
         name="Name of the heat",
         part="Part that it warms, or several that share it evenly",
-        heat_W="Law of inputs and temperatures, in W",
+        heat_W="Law of inputs and temperatures",
         gain=("Factor on it; with an sd it is calibrated", "1"),
     ),
     "NamedParameter": _texts(

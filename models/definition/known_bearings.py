@@ -65,12 +65,10 @@ def filled_by_designation(own: dict[str, Any], notes: Annotations, path: str) ->
     match = DESIGNATION.match(named)
     name = f"{match[1]} {match[2]}" if match else ""
     if name not in _catalogue():
-        known = known_bearings()
-        notes.faults.append((
-            f"{path}.designation",
-            f"sizes of {named!r} are not known ({known[0]} to {known[-2]} and {known[-1]} are); "
-            f"give {', '.join(missing)}",
-        ))  # fmt: skip
+        first, *_, last, other = known_bearings()
+        known = f"known are {first} to {last} and {other}"
+        text = f"sizes of {named!r} are not known; give {', '.join(missing)} ({known})"
+        notes.faults.append((f"{path}.designation", text))
         return own
     values, its_notes = _catalogue()[name]
     series = f"typical: {name}, ISO 15 and SKF friction model, series {name[:4]}"

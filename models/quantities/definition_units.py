@@ -56,6 +56,7 @@ UNITS: Mapping[str, Unit] = {
     "_W_mK": Unit("W/(m K)"),
     "_W_m2K": Unit("W/(m2 K)"),
     "_W_K": Unit("W/K"),
+    "_W": Unit("W", 1.0, {"kW": _times(1e3)}),
     "_rpm": Unit("rpm", radians(360.0) / 60.0),
     "_Nm": Unit("N m", 1.0, {"N mm": _times(1e-3)}),
     "": Unit("", 1.0, {"percent": _times(1e-2)}),
@@ -82,7 +83,7 @@ class Between(AfterValidator):
 
     limits: tuple[float, float] = (-inf, inf)
 
-    def __get_pydantic_json_schema__(self, core: Any, handler: GetJsonSchemaHandler) -> dict[str, Any]:  # noqa: PLW3201
+    def __get_pydantic_json_schema__(self, core: Any, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         """Return the JSON schema of the number with its limits."""
         low, high = self.limits
         return {**handler(core), "minimum": low, "maximum": high}
