@@ -37,7 +37,12 @@ def _show_known(context: click.Context, _: click.Parameter, asked: bool) -> None
 @click.option("--known", is_flag=True, is_eager=True, expose_value=False, callback=_show_known,
               help="Show the oils, bearings and machines that can be named.")  # fmt: skip
 def check(gearbox: str, output: Path | None) -> None:
-    """Check a definition: list every fault, or print what was understood and draw the thermal network."""
+    """Check a definition, show and draw what was understood.
+
+    Every fault is listed, with place, limit and what to do; without one: nodes, links, inputs, losses at three
+    operating points, the oil, values that are only typical, and a drawing of the thermal network. Relations between
+    tables are checked once every table is valid.
+    """
     picture = Path("out") / Path(gearbox).stem / "network.svg" if output is None else output
     if picture.suffix.lower() not in PICTURES:
         raise InputError(f"{picture}: drawings are written as {', '.join(PICTURES)}")

@@ -9,6 +9,7 @@ from pathlib import Path
 import click
 
 from builder.base import console
+from builder.base.example import example
 from builder.base.progress import progress
 from builder.commands.conceal_in_zoo import conceal_in_zoo
 from builder.commands.conceal_into import conceal_into
@@ -36,7 +37,7 @@ def _list_effects(context: click.Context, _: click.Parameter, asked: bool) -> No
         context.exit()
 
 
-@click.command("conceal")
+@click.command("conceal", epilog=example("conceal --effect windage --seed 1 --output out/concealed"))
 @click.option("--plant", type=click.Choice(["own", "zoo"]), default="own", show_default=True, is_eager=True,
               help="own: built like the model, of any gearbox; zoo: of random structure.")  # fmt: skip
 @click.option("--effect", default=None, metavar="NAME", help="Effect to conceal; --list shows the names.")
@@ -91,12 +92,12 @@ def conceal(
     date: str | None,
     control: bool,
 ) -> None:
-    """Make recordings of a gearbox that hides an effect; the truth goes into another folder.
+    """Make recordings that hide a known effect, to test a diagnosis.
 
-    The recordings come from a separate plant, not from the model: about 22 h to learn from (train_1 to train_3) and
-    6 h to hold out (hold_1, hold_2). Plants of the zoo are built of other nodes, paths and laws than the model;
-    strengths are drawn by the evidence that the recordings hold. With --into an effect is put into a recording of a
-    real machine instead.
+    The truth goes into another folder. The recordings come from a separate plant, not from the model: about 22 h to
+    learn from (train_1 to train_3) and 6 h to hold out (hold_1, hold_2). Plants of the zoo are built of other
+    nodes, paths and laws than the model; strengths are drawn by the evidence that the recordings hold. With --into
+    an effect is put into a recording of a real machine instead.
     """
     of_zoo = {"--machine": machine, "--families": families, "--group": group, "--baselines": baselines or None,
               "--session-deviation": session_deviation}  # fmt: skip

@@ -26,9 +26,10 @@ SCHEMA_FILE = "definition.schema.json"
                    "la_haute_borne.")  # fmt: skip
 @click.option("--replace", is_flag=True, help="Write over a file that exists.")
 def new(file: Path, like: str, replace: bool) -> None:
-    """Begin a definition of your own machine: a commented file that builds as it stands.
+    """Begin a commented definition of your own machine.
 
-    The schema for editors is written next to it; Even Better TOML, Taplo and others complete keys by it.
+    It has the values of a machine of the package and builds as it stands. The schema for editors is written next to it;
+    Even Better TOML, Taplo and others complete keys by it.
     """
     if file.suffix != ENDING:
         raise InputError(f"{file}: a definition ends in {ENDING}; choose such a name")
@@ -46,9 +47,10 @@ def new(file: Path, like: str, replace: bool) -> None:
 @click.option("--output", type=click.Path(path_type=Path, dir_okay=False), default=None, metavar="FILE",
               help="File to write.  [default: print it]")  # fmt: skip
 def schema(output: Path | None) -> None:
-    """Write the JSON schema of definitions: keys, units, limits and meanings, for editors.
+    """Write the JSON schema of definitions, for editors.
 
-    A definition names it in its first line, as in '#:schema definition.schema.json'.
+    It has keys, units, limits and meanings. A definition names it in its first line, as in '#:schema
+    definition.schema.json'.
     """
     if output is None:
         click.echo(_schema_text(), nl=False)

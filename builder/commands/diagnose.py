@@ -10,6 +10,7 @@ import click
 
 from builder.base import console
 from builder.base.decision_settings import settings_options
+from builder.base.example import example
 from builder.base.progress import LOADING, progress
 from builder.base.workers import worker_options
 from models.assembly.gearbox import known_gearboxes, load_gearbox
@@ -49,7 +50,12 @@ class _OptionsOfMany(click.Command):
         return super().parse_args(ctx, words)
 
 
-@click.command("diagnose", cls=_OptionsOfMany, options_metavar="")
+@click.command(
+    "diagnose",
+    cls=_OptionsOfMany,
+    options_metavar="",
+    epilog=example("diagnose examples/data/heated_rod.csv.gz@0..28800 --gearbox heated_rod"),
+)
 @click.argument("recordings", nargs=-1, required=True, metavar="RECORDING... [OPTIONS]")
 @click.option("--gearbox", default="fzg", show_default=True, metavar="NAME|FILE",
               help=f"Name ({', '.join(known_gearboxes())}) or definition file (TOML).")  # fmt: skip
@@ -88,7 +94,9 @@ def diagnose(
     fleet: bool,
     dask: str | None,
 ) -> None:
-    """Say whether recordings of a real gearbox agree with its model; if not, where, and by what physics.
+    """Say whether recordings agree with the model, and what differs.
+
+    Where they do not agree it says in which part, by what physics, and how strongly.
 
     RECORDING is a table (.csv, .csv.gz, .parquet, .mf4) with the columns of a cycle and what was measured:
     T_<node>_degC, P_loss_W. FILE+FILE joins files that follow each other in time; FILE@start..end is a part.

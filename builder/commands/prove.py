@@ -11,6 +11,7 @@ import click
 from click.core import ParameterSource
 
 from builder.base import console
+from builder.base.example import example
 from builder.base.progress import LOADING, progress
 from builder.base.workers import jobs_option
 from models.base.errors import InputError
@@ -24,7 +25,7 @@ ONLY_NEW = (*MADE, "gearbox", "cells_every", "baselines", "answers")  # that an 
 NOT_REAL = (*ONLY_NEW, "recordings", "truth", "answers", "continued")
 
 
-@click.command("prove")
+@click.command("prove", epilog=example("prove --real rod"))
 @click.option("--plant", type=click.Choice(["own", "zoo"]), default="own", show_default=True,
               help="Kind of plant that makes the cases.")  # fmt: skip
 @click.option("--cases", type=click.IntRange(min=1, max=10_000), default=None, metavar="N",
@@ -60,10 +61,11 @@ def prove(
     truth: Path | None, gearbox: str | None, families: str, cells_every: int, baselines: int, removed: bool,
     real: str | None, answers: Path | None, continued: Path | None, jobs: int, output: Path,
 ) -> None:  # fmt: skip
-    """Test the diagnosis on sealed cases: hide effects, diagnose blindly, hash the answers, open the truth, score.
+    """Test the diagnosis blindly on sealed cases, and score it.
 
-    Every diagnosis is a process that gets the recordings of one case and nothing else. Its answer is added to a file,
-    with which an interrupted proof is continued.
+    Hide effects, diagnose blindly, hash the answers, open the truth, score. Every diagnosis is a process that gets the
+    recordings of one case and nothing else. Its answer is added to a file, with which an interrupted proof is
+    continued.
     """
     typed = [name for name in NOT_REAL if context.get_parameter_source(name) == ParameterSource.COMMANDLINE]
     if real is not None:
@@ -100,7 +102,7 @@ def prove(
     console.out.print(f"wrote {file}")
 
 
-@click.command("score")
+@click.command("score", epilog=example("score out/diagnoses --truth out/concealed/truth"))
 @click.argument("results", type=click.Path(path_type=Path, file_okay=False, exists=True), metavar="RESULTS")
 @click.option("--truth", type=click.Path(path_type=Path, exists=True), required=True, metavar="FILE|DIR",
               help="Truth: one file, or <case>.json in a folder.")  # fmt: skip
@@ -110,9 +112,9 @@ def prove(
 @click.option("--output", type=click.Path(path_type=Path, file_okay=False), default=Path("out/score"),
               show_default=True, metavar="DIR", help="Folder for the scores.")  # fmt: skip
 def score(results: Path, truth: Path, gearbox: str, output: Path) -> None:
-    """Score the diagnoses of any method: RESULTS holds <case>/diagnosis.json for every case of the truth.
+    """Score the diagnoses of any method against the truth.
 
-    A case without a readable file counts as failed.
+    RESULTS holds <case>/diagnosis.json for every case of the truth. A case without a readable file counts as failed.
     """
     from diagnosis.proof.scoring.lines import Task
     from diagnosis.proof.scoring.outcome import outcome

@@ -13,6 +13,7 @@ import click
 import numpy as np
 
 from builder.base import console
+from builder.base.example import example
 from builder.base.progress import progress
 from models.assembly.gearbox import known_gearboxes, load_gearbox
 from models.base.atomic_write import atomic_file
@@ -160,7 +161,7 @@ def _simulated(model: Model, cycle: Cycle, start: Initial, *, is_recording: bool
     return columns | read_as_recorded(columns, model.correction)
 
 
-@click.command("simulate")
+@click.command("simulate", epilog=example("simulate --gearbox fzg examples/drive_cycle_600s.csv --output result.csv"))
 @click.argument("files", nargs=-1, required=True, metavar="[FMU] CYCLE", type=click.Path(path_type=Path))
 @click.option("--gearbox", default=None, metavar="NAME|FILE",
               help="Drive the full model instead. "
@@ -195,11 +196,12 @@ def simulate(
     claims_only: bool,
     plot: Path | None,
 ) -> None:
-    """Drive a CYCLE with an FMU, or with the full model of a gearbox (--gearbox).
+    """Drive a cycle with an FMU or with the full model.
 
-    CYCLE is a table (.csv, .csv.gz, .parquet) with the columns time_s, speed_rpm, torque_Nm and, where known,
-    T_ambient_degC and air_speed_m_s; or the inputs that the definition names. It may be a recording that diagnose reads
-    as well, or a part of one (FILE@start..end), or files that follow each other in time (FILE+FILE).
+    The full model is that of --gearbox. CYCLE is a table (.csv, .csv.gz, .parquet) with the columns time_s, speed_rpm,
+    torque_Nm and, where known, T_ambient_degC and air_speed_m_s; or the inputs that the definition names. It may be
+    a recording that diagnose reads as well, or a part of one (FILE@start..end), or files that follow each other in
+    time (FILE+FILE).
     """
     if len(files) > 2 or (len(files) == 2) == (gearbox is not None):
         raise InputError("simulate takes FMU CYCLE, or --gearbox NAME|FILE and CYCLE")

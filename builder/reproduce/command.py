@@ -8,11 +8,12 @@ from pathlib import Path
 import click
 
 from builder.base import console
+from builder.base.example import example
 from builder.base.progress import LOADING, progress
 from builder.base.workers import jobs_option
 
 
-@click.command("reproduce")
+@click.command("reproduce", epilog=example("reproduce --output out/paper"))
 @click.option(
     "--output",
     type=click.Path(path_type=Path, file_okay=False),
@@ -31,7 +32,10 @@ from builder.base.workers import jobs_option
 )
 @jobs_option()
 def reproduce(output: Path, seed: int, jobs: int) -> None:
-    """Recompute every table and figure of the paper and compare ours with the print, in one report."""
+    """Recompute every table and figure of the paper.
+
+    One report compares ours with the print.
+    """
     with progress(LOADING):
         from builder.reproduce.report import FIGURES, NUMBERS, PAGE, SUMMARY  # imports matplotlib, scikit-learn, onnx
         from builder.reproduce.reproduce import reproduce as run

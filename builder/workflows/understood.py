@@ -17,6 +17,7 @@ from models.simulation.thermal_network import ThermalNetwork
 SHARES = (("low", 0.1), ("mid", 0.5), ("rated", 1.0))  # of the largest speed, torque and other inputs
 WARM_degC = 60.0  # of all parts, where the definition states no other temperature
 OIL_degC = (20.0, 60.0, 100.0)
+SHOWN_WHOLE = 1000.0  # from which numbers have no decimals
 TYPICAL = "typical"  # first word of the source of a value that is no machine's own
 
 
@@ -93,7 +94,7 @@ def _nodes(gearbox: Gearbox, network: ThermalNetwork) -> Grid:
         else:
             assert node.capacity is not None  # noqa: S101 - a part has a capacity
             sources = [source.name for source in network.sources if source.node == node.name]
-            rows.append([node.name, "part", ", ".join(sources), f"{_value(node.capacity, network, values):.4g}"])
+            rows.append([node.name, "part", ", ".join(sources), _number(_value(node.capacity, network, values))])
     title = f"{len(network.nodes)} nodes; heat capacities in J/K"
     return Grid(title, ["node", "kind", "warmed by, or temperature", "J/K"], rows, 3)
 
@@ -103,7 +104,7 @@ def _links(gearbox: Gearbox, network: ThermalNetwork) -> Grid:
     rows = []
     for link in network.links:
         varies = sorted({s.name for s in link.conductance.free_symbols} - constants)
-        rows.append([" - ".join(link.nodes), ", ".join(varies) or "constant", f"{found[link.name]:.4g}"])
+        rows.append([" - ".join(link.nodes), ", ".join(varies) or "constant", _number(found[link.name])])
     title = f"{len(network.links)} links; conductances in W/K at mid operation, parts at {_warm(gearbox):g} degC"
     return Grid(title, ["between", "depends on", "W/K"], rows, 2)
 
@@ -128,7 +129,9 @@ def _heats(gearbox: Gearbox, network: ThermalNetwork) -> Grid:
     speed, torque = (np.array([share * value for _, share in SHARES]) for value in _largest(gearbox))
     temperatures = np.full((len(SHARES), len(laws.temperature_nodes)), _warm(gearbox))
     losses = np.asarray(laws.power(speed, torque, temperatures))
-    at = "; ".join(f"{name} {n:.4g} 1/min, {M:.4g} N m" for (name, _), n, M in zip(SHARES, speed, torque, strict=True))
+    at = "; ".join(
+        f"{name} {_number(n)} 1/min, {_number(M)} N m" for (name, _), n, M in zip(SHARES, speed, torque, strict=True)
+    )
     end = "[reference]" if gearbox.is_parametric else "the end of [training]"
     title = f"Losses in W, all parts at {_warm(gearbox):g} degC; rated is {end}\n({at})"
     table = _by_point(title, list(laws.components), losses)
@@ -138,20 +141,24 @@ def _heats(gearbox: Gearbox, network: ThermalNetwork) -> Grid:
 
 
 def _by_point(title: str, names: Sequence[str], watts: Array) -> Grid:
-    rows = [[name, *(f"{value:.4g}" for value in watts[:, column])] for column, name in enumerate(names)]
-    rows.append(["total", *(f"{value:.4g}" for value in watts.sum(axis=1))])
+    rows = [[name, *(_number(value) for value in watts[:, column])] for column, name in enumerate(names)]
+    rows.append(["total", *(_number(value) for value in watts.sum(axis=1))])
     return Grid(title, ["", *(name for name, _ in SHARES)], rows)
 
 
 def _oil(gearbox: Gearbox) -> Grid:
     m, n = gearbox.viscosity_constants
-    rows = [["viscosity, mm2/s", *(f"{float(kinematic_viscosity_d341(T, m, n)):.4g}" for T in OIL_degC)]]
+    rows = [["viscosity, mm2/s", *(_number(float(kinematic_viscosity_d341(T, m, n))) for T in OIL_degC)]]
     if not gearbox.is_parametric:
         oil = gearbox.lubricant()
-        rows.append(["density, kg/m3", *(f"{float(oil.density(T)):.4g}" for T in OIL_degC)])
-        rows.append(["specific heat, J/(kg K)", *(f"{float(oil.specific_heat(T)):.4g}" for T in OIL_degC)])
+        rows.append(["density, kg/m3", *(_number(float(oil.density(T))) for T in OIL_degC)])
+        rows.append(["specific heat, J/(kg K)", *(_number(float(oil.specific_heat(T))) for T in OIL_degC)])
     named = f" ({gearbox.oil.name})" if not gearbox.is_parametric else ""
     return Grid(f"Oil{named}", ["", *(f"{T:g} degC" for T in OIL_degC)], rows)
+
+
+def _number(value: float) -> str:
+    return f"{value:.4g}" if abs(value) < SHOWN_WHOLE else f"{value:.0f}"
 
 
 def _typical(gearbox: Gearbox) -> Grid:
