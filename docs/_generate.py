@@ -19,7 +19,9 @@ from diagnosis.recordings.mapping import RecordingMapping
 from models.assembly.gearbox import load_gearbox
 from models.assembly.gearbox_definition import Definition
 from models.correction.correction import Correction
-from models.definition.named_oils import known_oils, named_oil, read_oil
+from models.definition.key_texts import TEXTS, KeyText
+from models.definition.known_bearings import known_bearings
+from models.definition.named_oils import known_oils, lubricant, named_oil, read_oil
 from models.definition.parametric_sections import ParametricDefinition
 from models.definition.values_with_source import Annotations, strip
 from models.files.toml_file import packaged, parse, read_text
@@ -85,62 +87,57 @@ class _Tables:
         self.schema = model.model_json_schema(by_alias=True, schema_generator=_Quiet)
         self.definitions: Mapping[str, Schema] = self.schema.get("$defs", {})
         self.values: Mapping[str, Any] = {}
-        self.notes = Annotations()
+        self.root = model.__name__
         if example is not None:
-            self.values = strip(parse(read_text(packaged(GEARBOXES, example)), file=example), self.notes)
+            self.values = strip(parse(read_text(packaged(GEARBOXES, example)), file=example), Annotations())
         self.example = example
 
     def markdown(self) -> Iterator[str]:
         """Yield the lines."""
-        yield from self._section("", "At the top of the file", self.schema, self.values)
+        yield from self._section(self.root, "At the top of the file", self.schema, self.values)
         yield from self._below(self.schema, (), self.values)
 
     def _below(self, schema: Schema, path: tuple[str, ...], values: Any) -> Iterator[str]:
         for key, field in schema["properties"].items():
-            inner, many = self._inner(field)
-            if inner is None:
+            name = _table_in(field)
+            if not name:
                 continue
-            named = ".NAME" if field.get("additionalProperties") else ""
             below = values.get(key) if isinstance(values, Mapping) else None
             first = below[0] if isinstance(below, tuple) and below else below
-            dotted = ".".join((*path, key))
-            title = f"`[[{dotted}]]`" if many else f"`[{dotted}{named}]`"
-            place = ".".join((*path, key)) + (".0" if many else "")
-            yield from self._section(place, title, inner, first)
-            yield from self._below(inner, (*path, key), first)
+            dotted = ".".join((*path, key)) + (".NAME" if field.get("additionalProperties") else "")
+            title = f"`[[{dotted}]]`" if "items" in field else f"`[{dotted}]`"
+            yield from self._section(name, title, self.definitions[name], first)
+            yield from self._below(self.definitions[name], (*path, key), first)
 
-    def _inner(self, field: Schema) -> tuple[Schema | None, bool]:
-        """Table that a key holds, and True if it may be there several times; None for a key with a value."""
-        options = field.get("anyOf", [field])
-        for option in options:
-            if "$ref" in option:
-                return self.definitions[option["$ref"].rpartition("/")[2]], False
-            if "$ref" in option.get("items", {}):
-                return self.definitions[option["items"]["$ref"].rpartition("/")[2]], True
-            named = option.get("additionalProperties")
-            if isinstance(named, Mapping) and "$ref" in named:
-                return self.definitions[named["$ref"].rpartition("/")[2]], False
-        return None, False
-
-    def _section(self, place: str, title: str, schema: Schema, values: Any) -> Iterator[str]:
-        required = schema.get("required", ())
+    def _section(self, name: str, title: str, schema: Schema, values: Any) -> Iterator[str]:
         yield f"### {title}"
         yield ""
-        if place:
+        if name != self.root:
             text = re.sub(r"^(Table )?(`\[[^`]*`(, )?)+:\s*", "", _markdown(schema.get("description", ""))).strip()
             yield text[:1].upper() + text[1:]
             yield ""
-        rows = []
+        rows: list[tuple[object, ...]] = []
         for key, field in schema["properties"].items():
-            if self._inner(field)[0] is not None:
+            if _table_in(field):
                 continue
+            text_of = TEXTS.get(name, {}).get(key, KeyText(""))
+            unit = unit_of(key).symbol
             given = values.get(key, "") if isinstance(values, Mapping) else ""
-            source = self.notes.sources.get(f"{place}.{key}", "")
-            rows.append((f"`{key}`", field.get("description", ""), _type(field), unit_of(key).symbol, _limits(field),
-                         _default(key, field, required), _value(given), source))  # fmt: skip
+            rows.append((f"`{key}`", text_of.meaning, _type(field) + (f", {unit}" if unit else ""), text_of.typical,
+                         _limits(field), _default(key, field, schema.get("required", ())), _value(given)))  # fmt: skip
         if rows:
-            head = ("key", "meaning", "value", "unit", "limits", "default", f"in `{self.example}`", "source there")
-            yield from _table(head, rows)
+            yield from _table(
+                ("key", "meaning", "value", "typical", "accepted", "default", f"in `{self.example}`"), rows
+            )
+
+
+def _table_in(field: Schema) -> str:
+    """Class of the table, or tables, that a key holds; ``""`` for a key with a value."""
+    for option in field.get("anyOf", [field]):
+        for holder in (option, option.get("items"), option.get("additionalProperties")):
+            if isinstance(holder, Mapping) and "$ref" in holder:
+                return str(holder["$ref"]).rpartition("/")[2]
+    return ""
 
 
 def _plain(field: Schema) -> Schema:
@@ -222,19 +219,15 @@ def oils() -> Iterator[str]:
     rows: list[tuple[object, ...]] = []
     for name in known_oils():
         oil, notes = named_oil(name), read_oil(name)[1]
-        points = (
-            "" if oil.viscosity_points is None else "; ".join(f"{nu:g} at {T:g} degC" for T, nu in oil.viscosity_points)
-        )
-        if oil.d341 is not None:
-            points = "; ".join(f"{_d341(oil.d341.m, oil.d341.n, T):.3g} at {T:g} degC" for T in (40.0, 100.0))
+        viscosity = lubricant(oil).kinematic_viscosity
+        points = "; ".join(f"{float(viscosity(T)):.3g}" for T in (40.0, 100.0))
         rows.append((f"`{name}`", oil.name, oil.base, points, f"{oil.density_kg_m3:g}", notes.source_of("")))
-    yield from _table(("named", "oil", "base", "viscosity in mm²/s", "density in kg/m³", "source"), rows)
+    yield from _table(("named", "oil", "base", "mm²/s at 40; 100 °C", "kg/m³", "source"), rows)
 
 
-def _d341(m: float, n: float, T: float) -> float:
-    from models.formulas.oil import kinematic_viscosity_d341
-
-    return float(kinematic_viscosity_d341(T, m=m, n=n))
+def bearings() -> Iterator[str]:
+    """Bearings that a definition may name."""
+    yield ", ".join(f"`{name}`" for name in known_bearings())
 
 
 def variables() -> Iterator[str]:
@@ -264,10 +257,7 @@ def network() -> Iterator[str]:
     )
     yield from _table(
         ("heat path", "conductance in W/K"),
-        [
-            (f"{_code(link.nodes[0])} to {_code(link.nodes[1])}", f"{conductance[link.name]:.3g}")
-            for link in network.links
-        ],
+        [(" to ".join(f"`{node}`" for node in link.nodes), f"{conductance[link.name]:.3g}") for link in network.links],
     )
     order = list(capacity)
     matrix = np.zeros((len(order), len(order)))
@@ -279,10 +269,6 @@ def network() -> Iterator[str]:
                     matrix[order.index(here), order.index(there)] -= conductance[link.name] / capacity[here]
     constants = sorted((1.0 / rate for rate in np.linalg.eigvals(matrix).real), reverse=True)
     yield f"Time constants in s: {', '.join(f'{one:.3g}' for one in constants)}."
-
-
-def _code(name: str) -> str:
-    return f"`{name}`"
 
 
 def mechanisms() -> Iterator[str]:
@@ -321,15 +307,17 @@ def _mechanism(mechanism: Mechanism, places: Mapping[str, tuple[Placed, ...]]) -
               "" if p.sd is None else f"{p.sd:.3g}" + (" (of the logarithm)" if p.log else ""),
               f"{p.lower:.3g} to {p.upper:.3g}") for name, p in local],
         )  # fmt: skip
-    yield f"- **Kind**: {KINDS[mechanism.kind]} (`{mechanism.kind}`), at: {', '.join(f'`{p}`' for p in mechanism.places)}"
+    at = ", ".join(f"`{place}`" for place in mechanism.places)
+    yield f"- **Kind**: {KINDS[mechanism.kind]} (`{mechanism.kind}`), at: {at}"
     yield f"- **Source**: {mechanism.reference}"
     yield f"- **Shown best by**: {mechanism.experiment}"
     for other, test in mechanism.separate_by.items():
-        yield f"- **Told from** {{ref}}`{other} <mechanism-{other.replace('_', '-')}>` **by**: {test}"
+        yield f"- **Distinguished from** {{ref}}`{other} <mechanism-{other.replace('_', '-')}>` **by**: {test}"
     yield ""
 
 
 GENERATORS: Mapping[str, Callable[[], Iterator[str]]] = {
+    "bearings": bearings,
     "correction": correction,
     "definition": definition,
     "definition_without_geometry": definition_without_geometry,

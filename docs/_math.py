@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from docutils.nodes import SkipNode
 from latex2mathml.converter import convert
 
 if TYPE_CHECKING:
@@ -14,16 +15,14 @@ if TYPE_CHECKING:
 
 def _inline(translator: HTML5Translator, node: Element) -> None:
     translator.body.append(convert(node.astext(), display="inline"))
+    raise SkipNode  # the children are the source
 
 
 def _block(translator: HTML5Translator, node: Element) -> None:
     translator.body.append(f'<div class="math-block">{convert(node.astext(), display="block")}</div>')
-
-
-def _nothing(_translator: HTML5Translator, _node: Element) -> None:
-    """Leave the node: everything was written on entering it."""
+    raise SkipNode
 
 
 def setup_mathml(app: Sphinx) -> None:
     """Register ``html_math_renderer = "mathml"``."""
-    app.add_html_math_renderer("mathml", (_inline, _nothing), (_block, _nothing))
+    app.add_html_math_renderer("mathml", (_inline, None), (_block, None))
