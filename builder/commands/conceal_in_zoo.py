@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 from builder.base import console
+from builder.base.progress import progress
 
 
 def conceal_in_zoo(
@@ -38,9 +40,9 @@ def conceal_in_zoo(
     recordings, truth = output / "recordings", truth or output / "truth"
     with (
         staged_folders(recordings, truth) as (stage, truth_stage),
-        console.progress_bar("concealing") as progress,
+        progress("concealing") as told,
     ):
         made = conceal_zoo(plans, recordings=stage, truth=truth_stage, flat=cases is None, baselines=baselines,
-                           session_deviation=session_deviation, progress=progress)  # fmt: skip
+                           session_deviation=session_deviation, progress=partial(told, "concealing"))  # fmt: skip
     for name in made:
         console.out.print(f"wrote {recordings / ('' if cases is None else name)}, {truth / name}.json")

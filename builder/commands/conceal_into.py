@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 from builder.base import console
+from builder.base.progress import progress
 from models.assembly.gearbox import load_gearbox
 from models.base.errors import InputError
 
@@ -58,11 +60,11 @@ def conceal_into(
     _keep_other_files(recordings, injector.written)
     with (
         staged_folders(recordings, truth) as (stage, truth_stage),
-        console.progress_bar("injecting") as progress,
+        progress("injecting") as told,
     ):
         names = inject_set(
             injector, Wish(kind=effect, place=place, date=date, control=control), 1 if cases is None else cases,
-            seed=seed, recordings=stage, truth=truth_stage, flat=cases is None, progress=progress,
+            seed=seed, recordings=stage, truth=truth_stage, flat=cases is None, progress=partial(told, "injecting"),
         )  # fmt: skip
     for name in names:
         console.out.print(f"wrote {recordings / ('' if cases is None else name)}, {truth / name}.json")

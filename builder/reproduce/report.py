@@ -19,6 +19,7 @@ from jinja2 import Environment, StrictUndefined
 from builder.reproduce.figure import Figure
 from builder.reproduce.printed import PAPER
 from builder.reproduce.study import Study
+from models.base.progress import Progress
 from models.columns.curves import STYLE
 from models.files.output_files import write_table
 
@@ -206,7 +207,7 @@ class Report:
         lines += [f"| {' | '.join(row)} |" for row in timing.rows]
         return "\n".join(lines) + "\n"
 
-    def write(self, folder: Path, progress: Callable[[str], None]) -> None:
+    def write(self, folder: Path, progress: Progress) -> None:
         """Write ``report.html``, ``report.json``, ``summary.md`` and ``figures/*.png, *.csv`` into a folder."""
         (folder / FIGURES).mkdir(parents=True, exist_ok=True)
         images = {}
