@@ -69,6 +69,7 @@ if TYPE_CHECKING:
     from models.base.errors import InputError as InputError
     from models.columns.columns import Columns as Columns
     from models.correction.correction import Correction as Correction
+    from models.correction.correction import corrected_network as corrected_network
     from models.correction.correction import read_correction as read_correction
     from models.correction.correction import write_correction as write_correction
     from models.files.cycle import Cycle as Cycle
@@ -102,6 +103,7 @@ _DEFINED_IN = {
     "ThermalNetwork": "models.simulation.thermal_network:ThermalNetwork",
     "build_fmu": "builder.workflows.build:build",
     "conceal": "diagnosis.proof.cases.conceal:conceal",
+    "corrected_network": "models.correction.correction:corrected_network",
     "correction_of": "diagnosis.report.write:correction_of",
     "diagnose": "diagnosis.diagnose_recordings:diagnose",
     "drive_fmu": "builder.drive.driver:drive_fmu",
