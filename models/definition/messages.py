@@ -59,14 +59,20 @@ def validate_section(section: type[S], values: Any, *, file: str) -> S:
     try:
         return section.model_validate(values)
     except ValidationError as error:
-        raise input_error(error, values, file=file) from error
+        raise input_error(error, values, section=section, file=file) from error
 
 
-def input_error(error: ValidationError, values: Any, *, file: str) -> InputError:
+def input_error(error: ValidationError, values: Any, *, section: type[Section], file: str) -> InputError:
     """Return the message about a table that is not valid, for the person who wrote the file."""
     lines = []
     for detail in error.errors(include_url=False):
         place = place_in(values, detail["loc"])
+        if detail["type"] == "extra_forbidden":
+            *table, key = detail["loc"]
+            hint = did_you_mean(str(key), section.known_keys(table))
+            place = place_in(values, table)
+            lines.append(f"{place}: '{key}' is not a known key{hint}" if place else f"'{key}' is not a known key{hint}")
+            continue
         prefix = f"{place} " if detail["type"] == "missing" else f"{place}: " if place else ""
         lines += [f"{prefix}{line}" for line in _message(detail).splitlines()]
     return InputError("\n".join(f"{file}: {line}" for line in dict.fromkeys(lines)))
