@@ -47,11 +47,12 @@ class Work:
 
     @property
     def left_s(self) -> float | None:
-        """Time that the counted step still needs at its pace, [s]; None before something is counted."""
+        """Time that the counted step still needs at its pace, [s]; None before something is counted, and overdue."""
         if self.done <= self._first:
             return None
         pace = (self._at - self._counted) / (self.done - self._first)
-        return max(0.0, pace * (self.of - self.done) - (time.monotonic() - self._at))
+        left = pace * (self.of - self.done) - (time.monotonic() - self._at)
+        return left if left > 0.0 else None
 
     def __str__(self) -> str:
         count = f": {self.done} of {self.of}" if self.of else ""

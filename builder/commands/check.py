@@ -50,7 +50,7 @@ def check(gearbox: str, output: Path | None) -> None:
     definition = load_gearbox(gearbox)
     with progress(LOADING) as told:
         from builder.drive.network_picture import draw_network
-        from builder.workflows.understood import conductances, understood
+        from builder.workflows.understood import conductances, typical_values, understood
 
         told("calculating losses and conductances")
         tables, network = understood(definition), definition.network()
@@ -60,6 +60,11 @@ def check(gearbox: str, output: Path | None) -> None:
     console.out.print(f"{gearbox} is valid: {definition.name} ({kind})\n")
     for grid in tables:
         console.table(grid.title, grid.header, grid.rows, text_columns=grid.text_columns)
+    if typical := typical_values(definition):
+        console.out.print("Typical values, filled in by designation or grade; replace them where you know better:")
+        for line in typical:
+            console.out.print(f"  {line}")
+        console.out.print()
     uncertain = len(definition.priors)
     console.out.print(f"{uncertain} of {len(definition.leaves)} values have a standard deviation")
     console.out.print(f"wrote {picture}")

@@ -10,6 +10,7 @@ import sympy as sp
 
 from models.assembly.gearbox import Gearbox
 from models.base.types import Array
+from models.definition.messages import place_in
 from models.formulas.oil import kinematic_viscosity_d341
 from models.network.laws import symbol
 from models.simulation.thermal_network import ThermalNetwork
@@ -42,8 +43,7 @@ def understood(gearbox: Gearbox) -> list[Grid]:
     tables = [_nodes(gearbox, network), _links(gearbox, network), _inputs(network), _heats(gearbox, network)]
     if "oil" in {part.name for part in network.parts}:
         tables.append(_oil(gearbox))
-    typical = _typical(gearbox)
-    return [*tables, typical] if typical.rows else tables
+    return tables
 
 
 def conductances(gearbox: Gearbox, network: ThermalNetwork) -> dict[str, float]:
@@ -161,12 +161,19 @@ def _number(value: float) -> str:
     return f"{value:.4g}" if abs(value) < SHOWN_WHOLE else f"{value:.0f}"
 
 
-def _typical(gearbox: Gearbox) -> Grid:
-    """Values that are typical of a size or a grade, and none of this machine."""
-    rows = []
+def typical_values(gearbox: Gearbox) -> list[str]:
+    """Return a line for the values of every table that are typical of a size or a grade, and none of this machine.
+
+    Parameters
+    ----------
+    gearbox : Gearbox
+    """
+    found: dict[tuple[str, str], list[str]] = {}
     for path, value in gearbox.leaves.items():
         source = gearbox.source_of(path)
         if source.startswith(TYPICAL):
-            rows.append([path, f"{value}", source])
-    title = "Typical values, filled in by designation or grade; replace them where you know better"
-    return Grid(title, ["value", "is", "source"], rows, 3)
+            steps = [int(step) if step.isdecimal() else step for step in path.split(".")]
+            table = place_in(gearbox.values, steps[:2] if isinstance(steps[1], int) else steps[:1])
+            key = place_in(gearbox.values, steps).removeprefix(table).lstrip(".")
+            found.setdefault((table, source), []).append(f"{key} {value}")
+    return [f"{place}: {', '.join(values)} ({source})" for (place, source), values in found.items()]

@@ -80,7 +80,8 @@ def infer(
         one = _refitted(calibration, base, first, index, RACE_STEPS)
         judged[first.candidates[index].label] = one
     ahead = sorted(judged.values(), key=lambda one: -(one.log_bayes + one.log_prior))
-    for one in ahead[:REFITTED]:
+    for step, one in enumerate(ahead[:REFITTED]):
+        progress(f"fitting {one.label} to the end", step, len(ahead[:REFITTED]))
         if one.fit is not None:
             judged[one.label] = _fitted_on(calibration, one, len(base.z))
     alone = {one.label: float(value) for one, value in zip(first.candidates, first.log_bayes, strict=True)}

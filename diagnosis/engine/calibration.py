@@ -12,11 +12,12 @@ from diagnosis.engine.learnt import ErrorClass, error_classes
 from diagnosis.engine.metric import leading_directions
 from diagnosis.engine.model_error import ModelError
 from diagnosis.engine.products import gram_of, whitened_base
-from diagnosis.engine.sessions import fit_over_sessions, over_sessions, sessions_of, with_deviation
+from diagnosis.engine.sessions import fit_over_sessions, over_sessions, with_deviation
 from diagnosis.engine.set_apart import without_channels
 from diagnosis.forward.trajectory import Trajectory
 from models.base.types import Array
 
+TURNS = 3  # with the chosen class: point, columns of model error and deviation between sessions settle together
 WIDEST_CLASS = "full"  # the point is calibrated with it: no parameter has to stand in for what the model cannot know
 
 
@@ -88,7 +89,10 @@ def _calibrated(experiment: Experiment, error: ModelError, classes: Sequence[Err
     chosen = max(classes, key=lambda one: evidence[one.name])
     best = max(evidence.values())
     s = 0.0
-    for _ in range(2 if len(sessions_of(experiment)) > 1 else 1):
+    for turn in range(TURNS):
+        if turn:
+            parts = _linearised_at(experiment, fit)
+            columns = _columns(error, parts)
         here = _judged(experiment, parts, error, columns, error.amplitudes(chosen), s)
         fit = here.fit(fit.z, _courses(parts), iterations=FIRST_ITERATIONS)
         over = fit_over_sessions(fit, len(fit.z))

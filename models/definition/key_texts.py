@@ -162,7 +162,7 @@ TEXTS: Mapping[str, Mapping[str, KeyText]] = {
         shaft="Name of the shaft that it seals",
         diameter_mm=("Diameter of the shaft at the lip", "15 to 150"),
         model="Law of the seal friction",
-        nu_40_mm2_s=("Grade of the oil; its viscosity at 40 degC if not given", "32 to 680"),
+        nu_40_mm2_s=("Grade of the oil; its viscosity at 40 degC if not given", "32 to 460"),
         temperature_coefficient=("Coefficient of the temperature in Linke's formula", "1.6"),
     ),
     "HousingPart": _texts(
