@@ -48,7 +48,7 @@ class Clock:
         self.stages[name] = self.stages.get(name, 0.0) + now - self._since
         self._since = now
 
-    def told(self, message: str) -> None:
+    def told(self, message: str, *_: int) -> None:
         """Progress of the inference: its first word names the stage that begins."""
         if self._of:
             self.mark(self._of)

@@ -7,7 +7,7 @@ them are fitted to the end, model error in place; a second scan given the best e
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -25,6 +25,7 @@ from diagnosis.engine.outside import judge_outside
 from diagnosis.engine.sessions import OverSessions, fit_over_sessions, over_sessions
 from diagnosis.engine.unknown import Group
 from models.base.errors import InputError
+from models.base.progress import Progress, silent
 from models.base.types import Array
 
 RACED, PLACES, RACE_STEPS = 18, 2, 4
@@ -63,7 +64,7 @@ class _Scanned:
 
 def infer(
     calibration: Calibration, candidates: Sequence[Hypothesis], log_prior: Array, settings: Settings, *,
-    outside: Sequence[Hypothesis] = (), progress: Callable[[str], None] = lambda _: None,
+    outside: Sequence[Hypothesis] = (), progress: Progress = silent,
 ) -> Posterior:  # fmt: skip
     """Weigh all explanations.
 
@@ -77,23 +78,24 @@ def infer(
     outside : sequence of Hypothesis
         Unknown heats, judged where something is missing
     progress : callable
-        Told in words what is being done
+        Told what is being done
     """
     base, chosen = calibration.fit, calibration.chosen
     progress(f"scanning {len(candidates)} candidates")
     first = _scanned_in_classes(calibration, candidates, log_prior)
     order = np.argsort(-(first.log_bayes + first.log_prior))
-    chosen = _raced(first.candidates, first.log_bayes, order)
+    racing = _raced(first.candidates, first.log_bayes, order)
     judged: dict[str, Judged] = {}
     worth = max(WORTH, WORTH_SHARE * float(first.log_bayes.max(initial=0.0)))
-    chosen = [index for index in chosen if first.log_bayes[index] > worth]
-    for step, index in enumerate(chosen):
-        progress(f"fitting {first.candidates[index].label} ({step + 1} of {len(chosen)})")
+    racing = [index for index in racing if first.log_bayes[index] > worth]
+    for step, index in enumerate(racing):
+        progress(f"fitting {first.candidates[index].label}", step, len(racing))
         near = calibration.in_class(first.best[index].error_class).fit
         one = _refitted(calibration, near, first, index, RACE_STEPS)
         judged[first.candidates[index].label] = one
     ahead = sorted(judged.values(), key=lambda one: -(one.log_bayes + one.log_prior))
-    for one in ahead[:REFITTED]:
+    for step, one in enumerate(ahead[:REFITTED]):
+        progress(f"fitting {one.label} to the end", step, len(ahead[:REFITTED]))
         if one.fit is not None:
             judged[one.label] = _fitted_on(calibration, one, len(base.z))
     alone = {one.label: float(value) for one, value in zip(first.candidates, first.log_bayes, strict=True)}

@@ -66,7 +66,7 @@ class Scan:
     peak_W: Array
 
     def in_directions(self, directions: Array) -> Scan:
-        """The same with combinations, shape (further, n), in place of the further columns."""
+        """The scan with combinations, shape (further, n), in place of the further columns."""
         first, count = self.further.start, directions.shape[1]
         last = first + count
         return replace(self, gram=self.gram.combined(self.further, directions), further=range(first, last),

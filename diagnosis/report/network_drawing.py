@@ -98,11 +98,7 @@ def drawn(network: ThermalNetwork, nominal: ThermalNetwork, measured: Iterable[s
     marked : Marks
     """
     rows = _rows(network, nominal)
-    place = {
-        node: ((index + 0.5) / len(row) * UNITS, (line + 0.5) / len(rows) * UNITS)
-        for line, row in enumerate(rows)
-        for index, node in enumerate(row)
-    }
+    place = {node: (x * UNITS, y * UNITS) for node, (x, y) in _places(rows).items()}
     known, has_thermometer = (
         {link.name for link in nominal.links},
         {node_of_channel(name, network.node_names) for name in measured},
@@ -138,6 +134,19 @@ def drawn(network: ThermalNetwork, nominal: ThermalNetwork, measured: Iterable[s
         '<div class="network" style="height: {}px"><svg viewBox="0 0 {} {}" preserveAspectRatio="none" role="img"'
         ' aria-label="Thermal network: {} nodes, {} links">{}</svg>{}</div>'
     ).format(len(rows) * ROW_PX, UNITS, UNITS, len(place), len(network.links), lines, chips)
+
+
+def places(network: ThermalNetwork) -> dict[str, tuple[float, float]]:
+    """Where the nodes of a network stand: x and y from the upper left, 0 to 1."""
+    return _places(_rows(network, network))
+
+
+def _places(rows: list[list[str]]) -> dict[str, tuple[float, float]]:
+    return {
+        node: ((index + 0.5) / len(row), (line + 0.5) / len(rows))
+        for line, row in enumerate(rows)
+        for index, node in enumerate(row)
+    }
 
 
 def _targets(finding: Finding) -> tuple[str, ...]:
