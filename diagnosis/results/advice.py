@@ -28,7 +28,7 @@ def without_sensor(network: ThermalNetwork, channels: Sequence[str]) -> frozense
 
 def separation(
     own: Hypothesis, other: Hypothesis, catalogue: Mapping[str, Mechanism], network: ThermalNetwork,
-    free: Collection[str],
+    free: Collection[str], *, names: tuple[str, str],
 ) -> str:  # fmt: skip
     """The experiment, or the sensor, that distinguishes two effects.
 
@@ -39,14 +39,15 @@ def separation(
     network : ThermalNetwork
     free : collection of str
         Parts that can have a sensor, see :func:`without_sensor`
+    names : (str, str)
+        Of the two in the catalogue, whatever their course in time
     """
     if own.name == other.name:
         node = node_in(network, other)
         return f"a temperature sensor at {node.replace('_', ' ')}" if node in free else OTHER_OPERATION
-    if own.name in catalogue:
-        return catalogue[own.name].separation(other.name)
-    if other.name in catalogue:
-        return catalogue[other.name].separation(own.name)
+    for first, second in (names, names[::-1]):
+        if first in catalogue:
+            return catalogue[first].separation(second)
     return OTHER_OPERATION
 
 

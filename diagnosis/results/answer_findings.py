@@ -19,6 +19,7 @@ from diagnosis.results.result_parts import Finding, ParameterValue, Rival
 from diagnosis.setup.inference_setup import InferenceSetup, heat_over_time
 from models.mechanisms import Mechanism, Placed
 
+EITHER = "smaller or greater"  # in sentences about a factor, whose strength shows which
 ENDINGS = (STEP, WHILE, HOURS, "carried_on")
 
 
@@ -94,6 +95,8 @@ def _says(answer: Answer, found: Mapping[str, float]) -> str:
         says = f"The parameter {effect.place} is {found[names_of(effect)[0]]:.3g}, far from what the definition allows."
     else:
         says = f"{effect.name.replace('_', ' ').capitalize()} at {effect.place.replace('_', ' ')}."
+    if effect.term is not None and EITHER in says:
+        says = says.replace(EITHER, "smaller" if found[effect.term.strength.name] < 0.0 else "greater")
     if answer.acts_like:
         return f"Something acts like this, its cause was not found: {says}"
     if len(answer.tied) > 1:
@@ -124,11 +127,14 @@ def _rivals(
     own, free = answer.effect, without_sensor(setup.nominal, setup.channels)
     others = {effect.label for effect in answer.best.effects}
     odds: dict[str, float] = {}
+    alone: dict[str, float] = {}
     where: dict[str, Hypothesis] = {}
     for judged, probability in posterior.ranked:
+        with_own = key(own) in {key(effect) for effect in judged.effects}
         for other in judged.effects:
             if other.label not in others and key(other) != key(own):
                 odds[key(other)] = odds.get(key(other), 0.0) + probability
+                alone[key(other)] = alone.get(key(other), 0.0) + (0.0 if with_own else probability)
                 where.setdefault(key(other), other)
     tied: dict[str, float] = {}
     for other, probability in answer.tied:
@@ -138,7 +144,9 @@ def _rivals(
     return tuple(
         Rival(
             mechanism=name_in(catalogue, where[name]), place=where[name].place, probability=probability,
-            separate_by=separation(own, where[name], catalogue, setup.nominal, free),
+            separate_by=separation(own, where[name], catalogue, setup.nominal, free,
+                                   names=(name_in(catalogue, own), name_in(catalogue, where[name]))),
+            instead=name in tied or alone[name] >= LEAST_RIVAL,
         )
         for name, probability in sorted({**odds, **tied}.items(), key=lambda one: (one[0] not in tied, -one[1]))
         if probability >= LEAST_RIVAL

@@ -19,6 +19,7 @@ from diagnosis.results.result_parts import (
     Ranked,
     finding_dict,
     fits_dict,
+    named,
 )
 from models.correction.instruments import InputCorrection, SensorCorrection
 from models.mechanisms import OPEN_FORM
@@ -32,6 +33,7 @@ LEAST_RIVAL = 0.01  # probability of what is told as a rival
 NEAREST, MOST_NEAREST = 0.1, 3  # probability from which an explanation is told that was not reported; of how many
 MOST_UNSEEN = 6  # effects that the summary names of those that cannot be seen
 OF_DATE = ("since", "lasting")  # parameters that the date contains
+OF_SWITCH = ("set_point", "band")  # parameters that the switching temperatures contain
 LONG_S = 7200.0  # times beyond are told in hours
 LITTLE_SPREAD = 0.05  # deviation between sessions that is not worth a word, in prior standard deviations
 NO_CLAIM = ("consistent", "insufficient_data")
@@ -47,6 +49,11 @@ VERDICT_TEXT: Mapping[str, str] = {
     "insufficient_data": "These recordings are too short or too calm to decide.",
 }
 PARTLY = "Part of what is missing was found; the rest matches no physics in the catalogue."
+LIKELY_TEXT: Mapping[str, str] = {  # of the same verdicts where no name is a claim
+    "parameter_error": "A parameter of the model is probably outside what its definition allows.",
+    "missing_physics": "The gearbox probably shows physics that the model leaves out; its name is not certain.",
+    "sensor_fault": "A sensor, clock or recorded input is probably at fault; which one, or how, is not certain.",
+}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -59,7 +66,8 @@ class Diagnosis:
     gearbox : str
     log_e_value, threshold, p_value : float
         Evidence that something is missing, averaged over everything in the catalogue [nat], the level it had to reach,
-        and the bound on the probability of reaching it by chance
+        and exp(-evidence), at most 1. That would bound the chance of such evidence in a healthy machine only if the
+        model were exact, which it never is; the threshold decides
     false_alarm_rate : float
         As asked for
     location : tuple of Location
@@ -75,7 +83,7 @@ class Diagnosis:
         Mean square of the residual in the training recordings or, where something was found, in the held-out ones,
         whichever is larger, in multiples of what noise and structural floor make of it; above 1 they are not explained
     remaining_p_value : float
-        Of a further effect, if nothing more is missing; NaN where no further look was taken
+        exp(-evidence) of a further effect, at most 1, as `p_value`; NaN where no further look was taken
     remaining_note : str
     ranking : tuple of Ranked
     unseen : tuple of NotDetectable
@@ -166,7 +174,9 @@ class Diagnosis:
                 "log_e_value": self.log_e_value,
                 "threshold": self.threshold,
                 "false_alarm_rate": self.false_alarm_rate,
-                "test": "mean Bayes factor over the catalogue, all parameters marginalised (nominally an e-value)",
+                "test": "log_e_value: log of the mean Bayes factor over the catalogue, all parameters marginalised; "
+                        "something is missing if it exceeds threshold. p_value = exp(-log_e_value), at most 1: a bound "
+                        "on chance for an exact model only",
             },
             "location": [
                 {
@@ -216,7 +226,9 @@ class Diagnosis:
         """The verdict in a sentence."""
         if self.verdict == "unexplained" and any(f.family != OPEN_FORM for f in self.findings):
             return PARTLY
-        return VERDICT_TEXT[self.verdict]
+        if any(finding.grade == "claim" for finding in self.findings):
+            return VERDICT_TEXT[self.verdict]
+        return LIKELY_TEXT.get(self.verdict, VERDICT_TEXT[self.verdict])
 
     @property
     def places(self) -> tuple[Location, ...]:
@@ -253,17 +265,28 @@ class Diagnosis:
         reached = f"evidence {self.log_e_value:.1f} nat, {self.threshold:.1f} needed"
         rate = f"false-alarm rate {100.0 * self.false_alarm_rate:g} %"
         if self.log_e_value > self.threshold:
-            where = "in the measurement" if self.verdict == "sensor_fault" else "in the model"
-            return f"Yes, {where}: {reached} ({rate})."
+            return f"Yes{self._in_what()}: {reached} ({rate})."
         return f"Nothing that these data show: {reached} ({rate})."
+
+    def _in_what(self) -> str:
+        """The model or the measurement; with a word of caution where the other one has some probability too."""
+        if self.verdict == "unexplained":
+            return ""
+        measurement = self.kinds.get("measurement", 0.0)
+        fault = self.verdict == "sensor_fault"
+        sure = (measurement if fault else 1.0 - measurement) >= self.claim_from or not self.kinds
+        return f", {'' if sure else 'probably '}in the {'measurement' if fault else 'model'}"
 
     def _where(self) -> tuple[str, ...]:
         if not self.location or self.verdict in NO_CLAIM:
             return ()
-        told = ", ".join(f"{place.node} ({place.probability:.2f})" for place in self.places)
+        told = ", ".join(f"{place.node} ({_share(place.probability)})" for place in self.places)
         place = self.location[0]
-        heat = f"; {place.heat_mean_W:.3g} W on average, {place.heat_max_W:.3g} W at most" if place.heat_max_W else ""
-        return (f"{told}{heat}; {place.regime}",)
+        if not place.heat_max_W:
+            return (f"{told}: in a reading or an input; no heat",)
+        way = "taken away" if place.heat_mean_W < 0.0 else "added"
+        heat = f"{abs(place.heat_mean_W):.3g} W {way} on average, {abs(place.heat_max_W):.3g} W at most"
+        return (f"{told}; {heat}; {place.regime}",)
 
     def _what(self) -> tuple[str, ...]:
         lines: list[str] = []
@@ -285,10 +308,9 @@ class Diagnosis:
             line = line.replace("  ", " ")
             others = [r for r in finding.confusable_with
                       if r.probability >= LEAST_RIVAL and r.mechanism not in finding.tie_set]  # fmt: skip
-            if others:
-                line += "; not ruled out: " + ", ".join(
-                    f"{r.mechanism} at {r.place} ({r.probability:.2f})" for r in others[:MOST_NEAREST]
-                )
+            for words, instead in (("not ruled out instead", True), ("may act as well", False)):
+                told = [f"{named(r.mechanism, r.place)} ({r.probability:.2f})" for r in others if r.instead is instead]
+                line += f"; {words}: {', '.join(told[:MOST_NEAREST])}" if told else ""
             lines.append(line)
         if not self.findings and self.kinds:
             told = (f"{kind} {p:.2f}" for kind, p in sorted(self.kinds.items(), key=lambda kind: -kind[1]) if p >= 0.01)
@@ -299,7 +321,8 @@ class Diagnosis:
             lines.append(f"Between sessions the machine differs by {self.session_s:.2f} of the priors' widths.")
         far = sorted((c for c in self.calibration if abs(c.shift_in_sd) > FAR_SD), key=lambda c: -abs(c.shift_in_sd))
         if far:
-            told = (f"{c.parameter} = {c.value:.3g} ({abs(c.shift_in_sd):.1f} sd)" for c in far[:MOST_FAR])
+            told = (f"{c.parameter} = {c.value:.3g}{'' if c.unit == '1' else f' {c.unit}'} ({abs(c.shift_in_sd):.1f} sd)"
+                    for c in far[:MOST_FAR])  # fmt: skip
             lines.append(f"Far from what the definition expects: {', '.join(told)}.")
         if self.remaining_note:
             lines.append(f"Remaining: {self.remaining_note}")
@@ -348,7 +371,8 @@ class Diagnosis:
 
 def values_told(finding: Finding) -> str:
     """Numbers of a finding for a terminal."""
-    values = [(p.name, p.value, p.stderr, p.unit) for p in finding.parameters if p.name not in OF_DATE]
+    told_else = OF_DATE if finding.switching is None else (*OF_DATE, *OF_SWITCH)
+    values = [(p.name, p.value, p.stderr, p.unit) for p in finding.parameters if p.name not in told_else]
     if finding.heat_mean_W > 0.0:
         values.append(("mean |heat|", finding.heat_mean_W, finding.heat_stderr_W, "W"))
     told = [
