@@ -23,7 +23,7 @@ from diagnosis.report.chart import (
     menu,
     row_titles,
 )
-from diagnosis.report.wording import LOSS, name, time_scale, unit
+from diagnosis.report.wording import LOSS, name, time_scale
 from diagnosis.results.number_format import fixed
 from diagnosis.results.result import Diagnosis
 from diagnosis.results.result_parts import PredictedRun
@@ -158,7 +158,7 @@ def errors_over_time(diagnosis: Diagnosis) -> Chart | None:
             owners.append(index)
     figure.update_yaxes(matches="y", row=2, col=1)
     titles = [f"<b>{row}</b>, simulated less measured in {'W' if row == 'Total loss' else 'K'}" for row in rows]
-    looks = [{"annotations": row_titles(titles), **_x_title(one, len(rows)),
+    looks = [{"annotations": row_titles(titles), **_x_axis(one, len(rows)),
               "shapes": [*_noise(diagnosis, len(stages)), *_unscored(one, len(rows))]} for one in shown]  # fmt: skip
     buttons = [
         {"label": one.title, "method": "update", "args": [{"visible": [owner == index for owner in owners]}, look]}
@@ -276,9 +276,9 @@ def _look(
     for row, key in enumerate(rows, 1):
         axis = f"yaxis{row}" if row > 1 else "yaxis"
         if key not in channels:
-            what = " and ".join(map(name, airs)) if key == AIR else name(key)
-            symbol = "°C" if key == AIR else unit(diagnosis.network.inputs[key].quantity.unit)
-            titles.append(f"<b>{what.capitalize()}</b>, {symbol}")
+            labels = [diagnosis.network.inputs[one].quantity.label for one in (airs if key == AIR else [key])]
+            what = ", ".join(label.rpartition(" in ")[0] or label for label in labels)
+            titles.append(f"<b>{what}</b>, {labels[0].rpartition(' in ')[2]}")
             look[f"{axis}.autorange"] = True
             continue
         sizes = _errors(one, key, stages)
@@ -290,12 +290,14 @@ def _look(
         near = [getattr(one.run, state)[key] for _, state in stages[int(far) :]]
         look[f"{axis}.range"] = limits([one.run.measured[key], *near])
     shapes = _unscored(one, len(rows))
-    return {"annotations": row_titles(titles), "shapes": shapes, **_x_title(one, len(rows)), **look}
+    return {"annotations": row_titles(titles), "shapes": shapes, **_x_axis(one, len(rows)), **look}
 
 
-def _x_title(one: Shown, rows: int) -> dict[str, str]:
+def _x_axis(one: Shown, rows: int) -> dict[str, Any]:
+    scale, symbol = _time(one)
+    time = one.run.time[[0, -1]] / scale if len(one.run.time) else np.array([0.0, 1.0])
     axis = f"xaxis{rows}" if rows > 1 else "xaxis"
-    return {f"{axis}.title.text": f"Time in {_time(one)[1]}"}
+    return {f"{axis}.title.text": f"Time in {symbol}", "xaxis.range": time.tolist()}
 
 
 def _unscored(one: Shown, rows: int) -> list[dict[str, Any]]:

@@ -1,4 +1,4 @@
-"""Charts of what was found: how probable each name is, when it began, and its heat over time and over what drives it."""
+"""Charts of what was found: how probable each name is, when it began, and its heat."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 from plotly.subplots import make_subplots
 
 from diagnosis.report.chart import INK, MOST_POINTS, Chart, curve_points, dressed, row_titles, thinned
-from diagnosis.report.wording import clause, name, share, time_scale, unit
+from diagnosis.report.wording import clause, name, share, short_title, time_scale
 from diagnosis.results.result import LEAST_RIVAL, Diagnosis, date_told
 from diagnosis.results.result_parts import Finding, PredictedRun
 from models.base.types import Array
@@ -24,7 +24,7 @@ MOST_NAMES = 12
 BAR_PX, HEAT_PX, TIMELINE_PX = 30, 230, 34
 DASHES = ("solid", "dash", "dot", "dashdot")
 BINS = 12
-FOLLOWS = 0.6  # share of the variance of a heat that a signal must explain to be called what drives it
+FOLLOWS = 0.8  # share of the variance of a heat that a signal must explain to be called what drives it
 SHOWN_AGAINST = 2  # findings
 
 
@@ -43,7 +43,7 @@ def names_by_grade(diagnosis: Diagnosis) -> Chart | None:
         if own:
             figure.add_bar(
                 y=[label for label, _ in own], x=[p for _, p in own], orientation="h", name=grade,
-                marker={"color": colour, "pattern": {"shape": pattern, "fgcolor": "white", "size": 6}},
+                marker={"color": colour, "pattern": {"shape": pattern, "size": 6, "fillmode": "overlay"}},
                 text=[share(p) for _, p in own], textposition="outside", cliponaxis=False,
                 hovertemplate="%{y}: %{x:.3f}<extra></extra>",
             )  # fmt: skip
@@ -56,8 +56,8 @@ def names_by_grade(diagnosis: Diagnosis) -> Chart | None:
     told = "; ".join(f"{label.replace('<br>', ' ')} {share(p)} ({grade})" for label, grade, p in found)
     return Chart(
         name="names", title="How probable each name is", figure=figure,
-        note=f"Dashed: the limit of a claim, {diagnosis.claim_from:g}. A bar is of all explanations that hold the name, "
-             "so bars of effects that act together overlap and need not add up to 1.",
+        note=f"Dashed: the limit of a claim, {diagnosis.claim_from:g}. A bar counts all explanations that hold the "
+             "name, so bars of effects that act together overlap and need not add up to 1.",
         alt=f"Probabilities of names: {told}.",
     )  # fmt: skip
 
@@ -104,24 +104,24 @@ def dates_with_bands(diagnosis: Diagnosis) -> Chart | None:
     scale, symbol = time_scale(end)
     figure = make_subplots()
     for held_out, label, colour in ((False, "learned from", "#8FA3B8"), (True, "held out", "#CBD3DB")):
-        own = [(key, a, b) for key, (a, b, held) in spans.items() if held == held_out]
-        figure.add_bar(y=[key for key, _, _ in own], base=[a / scale for _, a, _ in own], x=[(b - a) / scale for _, a, b in own],
-                       orientation="h", name=label, marker={"color": colour}, hovertemplate="%{y}<extra></extra>")  # fmt: skip
+        own = {key: (a / scale, b / scale) for key, (a, b, held) in spans.items() if held == held_out}
+        figure.add_bar(
+            y=list(own), base=[a for a, _ in own.values()], x=[b - a for a, b in own.values()], orientation="h",
+            name=label, marker={"color": colour}, hovertemplate="%{y}<extra></extra>",
+        )  # fmt: skip
     colours = part_colours(diagnosis.network.node_names)
     for index, (finding, date) in enumerate(dated):
-        colour, label = colours.get(finding.node, INK), finding.title.replace("_", " ")
+        colour = colours.get(finding.node, INK)
         start = diagnosis.starts_at.get(date.recording, 0.0)
-        at = (start + date.from_s) / scale
+        moment = (start + date.from_s) / scale
         if date.band_s is not None:
-            figure.add_vrect(
-                x0=(start + date.band_s[0]) / scale,
-                x1=(start + date.band_s[1]) / scale,
-                fillcolor=colour,
-                opacity=0.3,
-                line_width=0,
-            )
-        figure.add_scatter(x=[at, at], y=[next(iter(spans)), list(spans)[-1]], mode="lines", line={"color": colour, "width": 2.5, "dash": DASHES[index % 4]},
-                           name=f"begin: {label}", hovertemplate=f"{date_told(finding)}<extra></extra>")  # fmt: skip
+            early, late = ((start + at) / scale for at in date.band_s)
+            figure.add_vrect(x0=early, x1=late, fillcolor=colour, opacity=0.3, line_width=0)
+        figure.add_scatter(
+            x=[moment, moment], y=[next(iter(spans)), list(spans)[-1]], mode="lines",
+            line={"color": colour, "width": 2.5, "dash": DASHES[index % len(DASHES)]},
+            name=f"begin of {short_title(finding)}", hovertemplate=f"{date_told(finding)}<extra></extra>",
+        )  # fmt: skip
         if date.to_s is not None:
             figure.add_vline(x=(start + date.to_s) / scale, line={"color": colour, "width": 1.5, "dash": "dot"})
     figure.update_yaxes(categoryorder="array", categoryarray=list(spans)[::-1], ticksuffix=" ")
@@ -131,7 +131,7 @@ def dates_with_bands(diagnosis: Diagnosis) -> Chart | None:
     return Chart(
         name="dates", title="When it began", figure=figure,
         note="Line: the most probable moment. Shaded: where it lies with 95 %. Dotted: the end.",
-        alt="; ".join(f"{clause(finding.title.replace('_', ' '))} {clause(date_told(finding))}" for finding, _ in dated) + ".",
+        alt="; ".join(f"{short_title(finding)} {clause(date_told(finding))}" for finding, _ in dated) + ".",
     )  # fmt: skip
 
 
@@ -168,7 +168,7 @@ def heat_of_findings(diagnosis: Diagnosis) -> Chart | None:
         line = {"color": colours.get(finding.node, INK), "width": 2.0, "dash": DASHES[index % len(DASHES)]}
         for number, (recording, (time, heat)) in enumerate(finding.heat.items()):
             x, y = curve_points((time + offsets[recording]) / scale, heat, MOST_POINTS)
-            figure.add_scatter(x=x, y=y, mode="lines", line=line, name=finding.title.replace("_", " "),
+            figure.add_scatter(x=x, y=y, mode="lines", line=line, name=short_title(finding),
                                legendgroup=str(index), showlegend=number == 0,
                                hovertemplate=f"{recording}: %{{y:.4g}} W<extra></extra>", row=1, col=1)  # fmt: skip
     for offset in list(offsets.values())[1:]:
@@ -185,10 +185,9 @@ def heat_of_findings(diagnosis: Diagnosis) -> Chart | None:
         titles.append(f"<b>Against the signal that it follows most</b>, W ({name(finding.mechanism)})")
     figure.update_yaxes(rangemode="tozero")
     dressed(figure, 80 + rows * (HEAT_PX + 40) + 20 * len(warm), annotations=row_titles(titles), hovermode="closest",
-            margin={"l": 10, "r": 14, "t": 50 + 20 * len(warm), "b": 10}, legend={"y": 1.0 + 24.0 / (rows * HEAT_PX)})  # fmt: skip
-    means = "; ".join(
-        f"{f.title.replace('_', ' ')}: {f.heat_mean_W:.3g} W on average, {f.heat_max_W:.3g} W at most" for f in warm
-    )
+            margin={"l": 10, "r": 14, "t": 50 + 20 * len(warm), "b": 10})  # fmt: skip
+    figure.update_layout(legend_y=1.0 + 24.0 / (rows * HEAT_PX))
+    means = "; ".join(f"{short_title(f)}: {f.heat_mean_W:.3g} W on average, {f.heat_max_W:.3g} W at most" for f in warm)
     follows = "".join(f"; {name(f.mechanism)} follows {label} most" for f, label, _, _ in drivers)
     return Chart(
         name="heat", title="Heat of the findings", figure=figure,
@@ -202,6 +201,8 @@ def driver_of(diagnosis: Diagnosis, finding: Finding) -> tuple[str, Array, Array
 
     Signals are the inputs, the temperature of the part, and its difference to the ambient temperature.
     """
+    if finding.date is not None:
+        return None  # time decides
     heats, signals = [], []
     for recording, (time, heat) in finding.heat.items():
         runs = [c for c in diagnosis.courses if c.recording == recording and not c.held_out and len(c.time)]
@@ -244,8 +245,7 @@ def _signals_at(diagnosis: Diagnosis, finding: Finding, runs: Sequence[Predicted
         return np.asarray(np.interp(time, clock, np.concatenate(values)))
 
     known = diagnosis.network.inputs
-    found = {f"{name(key).capitalize()} in {unit(known[key].quantity.unit) or '1'}": at([run.inputs[key] for run in runs])
-             for key in runs[0].inputs if key in known}  # fmt: skip
+    found = {known[key].quantity.label: at([run.inputs[key] for run in runs]) for key in runs[0].inputs if key in known}
     node = finding.node
     if all(node in run.after for run in runs):
         temperature = at([run.after[node] for run in runs])

@@ -21,6 +21,7 @@ from models.simulation.thermal_network import ThermalNetwork
 
 LIKELY = 0.1  # probability from which a place is pointed out
 ROW_PX = 100
+LACKS, MISREAD = "heat that the calibrated model cannot explain", "a reading or an input of it may be at fault"
 MARK = "#C2211A"
 SAG = 0.42  # of the distance of rows, by which a link within a row hangs
 ASIDE = 0.12  # of the width, by which a link over several rows bends
@@ -81,7 +82,7 @@ def marks(diagnosis: Diagnosis) -> Marks:
             pointed += [(link.name, said) for link in network.links if link.name.startswith(label)]
             names |= {node: node.removeprefix(f"{label}_") for node in added & set(finding.term.target)}
     if diagnosis.verdict not in NO_CLAIM:
-        pointed += [(place.node, ("heat that the calibrated model cannot explain", place.probability))
+        pointed += [(place.node, (LACKS if place.heat_max_W else MISREAD, place.probability))
                     for place in diagnosis.location if place.probability >= LIKELY]  # fmt: skip
     for target, said in pointed:
         found_nodes, found_links = _meant(network, target)
@@ -175,8 +176,8 @@ def _name_of(node: str, at: tuple[float, float], marked: Marks) -> dict[str, Any
     guilty = node in marked.nodes
     text = marked.called(node).replace(" ", "<br>", 1) if len(marked.called(node)) > SHORT else marked.called(node)
     text = f"<b>{text}<br>{share(marked.nodes[node][1])}</b>" if guilty else text
-    return {"x": at[0], "y": at[1], "text": text, "showarrow": False, "yanchor": "top", "yshift": -19 if guilty else -12,
-            "font": {"size": 12, "color": MARK if guilty else INK}, "bgcolor": "rgba(255,255,255,0.75)",
+    return {"x": at[0], "y": at[1], "text": text, "showarrow": False, "yanchor": "top",
+            "yshift": -19 if guilty else -12, "font": {"size": 12, "color": MARK if guilty else INK}, "bgcolor": "rgba(255,255,255,0.75)",
             "borderpad": 0}  # fmt: skip
 
 

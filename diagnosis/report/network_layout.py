@@ -13,7 +13,7 @@ SWEEPS = 4  # of putting nodes under their neighbours
 
 
 def rows_of(network: ThermalNetwork, nominal: ThermalNetwork) -> list[list[str]]:
-    """Return the nodes by their distance from the surroundings, farthest first, each row in the order of its neighbours."""
+    """Return the nodes by their distance from the surroundings, farthest first, near their neighbours."""
     layer = _layers(network, nominal)
     rows = [[n for n in network.node_names if layer[n] == depth] for depth in sorted(set(layer.values()), reverse=True)]
     neighbours: dict[str, set[str]] = {node: set() for node in network.node_names}

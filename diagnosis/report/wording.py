@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from diagnosis.results.number_format import NONE, SUPERSCRIPTS
+from diagnosis.results.result_parts import PARAMETER, Finding, named
 from models.quantities.quantities import TOTAL_LOSS
 
 DAY, HOUR, MINUTE = 86_400.0, 3600.0, 60.0
 WEEKS_S, LONG_S, SHORT_S = 14.0 * DAY, 2.0 * HOUR, 5.0 * MINUTE  # above: in days, in hours; below: in seconds
 UNITS = {"1": "", "degC": "°C", "W/degC": "W/K", "N m": "N m", "N.m": "N m", "rpm": "1/min"}
 LOSS = TOTAL_LOSS
-PARAMETER = "parameter"
 
+COURSES = {"step": "from a date on", "for_a_while": "for a while", "over_hours": "over the hours"}
 MOST_WINDOWS = 12  # of a recording that are told
 # Shown when hovering a term, and all together at the end of the page.
 WORDS: Mapping[str, str] = {
@@ -73,10 +75,10 @@ def name(identifier: str) -> str:
 
     Examples
     --------
-    >>> name("housing_lower"), name("P_loss")
-    ('housing lower', 'total loss')
+    >>> name("housing_lower"), name("P_loss"), name("torque_gain_step")
+    ('housing lower', 'total loss', 'torque gain from a date on')
     """
-    return "total loss" if identifier == LOSS else identifier.replace("_", " ")
+    return "total loss" if identifier == LOSS else _spelled(identifier)
 
 
 def headline(mechanism: str, place: str = "") -> str:
@@ -92,6 +94,13 @@ def headline(mechanism: str, place: str = "") -> str:
     return f"{name(mechanism)}{' ' if mechanism == PARAMETER else ' at '}{name(place)}"
 
 
+def short_title(finding: Finding) -> str:
+    """The names of a finding without their places."""
+    like = "acts like " if finding.acts_like else ""
+    one = named(finding.mechanism, finding.place) if finding.mechanism == PARAMETER else finding.mechanism
+    return like + " or ".join(map(name, finding.tie_set or (one,)))
+
+
 def plain(text: str) -> str:
     """A text of the terminal for a page: names in words, units as printed, no full stop.
 
@@ -100,7 +109,14 @@ def plain(text: str) -> str:
     >>> plain("windage at housing_lower: on at 60 degC.")
     'windage at housing lower: on at 60 °C'
     """
-    return clause(text.replace("_", " "))
+    return clause(_spelled(text))
+
+
+def _spelled(text: str) -> str:
+    """Names in words; the course of an effect in time, which is the end of its name, too."""
+    for ending, words in COURSES.items():
+        text = re.sub(rf"_{ending}\b", f" {words}", text)
+    return re.sub(r"\bT_ambient\b", "ambient temperature", text).replace("_", " ")
 
 
 def clause(text: str) -> str:

@@ -45,10 +45,13 @@ def separation(
     if own.name == other.name:
         node = node_in(network, other)
         return f"a temperature sensor at {node.replace('_', ' ')}" if node in free else OTHER_OPERATION
-    for first, second in (names, names[::-1]):
-        if first in catalogue:
-            return catalogue[first].separation(second)
-    return OTHER_OPERATION
+    known = [(catalogue[a], b) for a, b in (names, names[::-1]) if a in catalogue]
+    for mechanism, rival in known:
+        if rival in mechanism.separate_by:
+            return mechanism.separate_by[rival]
+    if other.term is not None and other.term.of_measurement:
+        known = known[::-1]  # an instrument is tested more easily than a machine
+    return known[0][0].experiment if known else OTHER_OPERATION
 
 
 def next_test(

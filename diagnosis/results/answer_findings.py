@@ -98,9 +98,11 @@ def _says(answer: Answer, found: Mapping[str, float]) -> str:
     if effect.term is not None and EITHER in says:
         says = says.replace(EITHER, "smaller" if found[effect.term.strength.name] < 0.0 else "greater")
     if answer.acts_like:
-        return f"Something acts like this, its cause was not found: {says}"
+        return f"Something acts like this, its cause was not found: {says[:1].lower()}{says[1:]}"
     if len(answer.tied) > 1:
-        return f"One of several effects that these data do not separate, the most probable: {says}"
+        return (
+            f"One of several effects that these data do not separate, the most probable: {says[:1].lower()}{says[1:]}"
+        )
     return says
 
 

@@ -102,8 +102,8 @@ def assemble(
     findings = tuple(
         finding_of(answer, answer.best.fit or final, setup, posterior, catalogue, train) for answer in answers
     )
-    told = {name for finding in findings
-            for name in (finding.mechanism, *finding.tie_set, *(rival.mechanism for rival in finding.confusable_with))}  # fmt: skip
+    told = {name for finding in findings for name in (finding.mechanism, *finding.tie_set)}
+    told |= {rival.mechanism for finding in findings for rival in finding.confusable_with}
     unseen = tuple(one for one in _unseen(posterior, catalogue) if one.mechanism not in told)
     verdict = _verdict(posterior, answers, unseen)
     location = _location(setup, posterior) if posterior.detected else ()

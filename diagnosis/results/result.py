@@ -304,8 +304,8 @@ class Diagnosis:
         lines = []
         for finding in self.findings:
             of = "that law and place are right" if finding.acts_like else "of one of these" if finding.tie_set else ""
-            line = " ".join((f"{finding.title}: {finding.grade}, probability", of, _share(finding.sureness)))
-            line = line.replace("  ", " ")
+            title = f"{finding.title}: " if len(self.findings) > 1 else ""
+            line = " ".join(filter(None, (f"{title}{finding.grade}, probability", of, _share(finding.sureness))))
             others = [r for r in finding.confusable_with
                       if r.probability >= LEAST_RIVAL and r.mechanism not in finding.tie_set]  # fmt: skip
             for words, instead in (("not ruled out instead", True), ("may act as well", False)):
@@ -321,7 +321,7 @@ class Diagnosis:
             lines.append(f"Between sessions the machine differs by {self.session_s:.2f} of the priors' widths.")
         far = sorted((c for c in self.calibration if abs(c.shift_in_sd) > FAR_SD), key=lambda c: -abs(c.shift_in_sd))
         if far:
-            told = (f"{c.parameter} = {c.value:.3g}{'' if c.unit == '1' else f' {c.unit}'} ({abs(c.shift_in_sd):.1f} sd)"
+            told = (f"{c.parameter} = {c.value:.3g}{_unit(c.unit)} ({abs(c.shift_in_sd):.1f} sd)"
                     for c in far[:MOST_FAR])  # fmt: skip
             lines.append(f"Far from what the definition expects: {', '.join(told)}.")
         if self.remaining_note:
@@ -373,11 +373,13 @@ def values_told(finding: Finding) -> str:
     """Numbers of a finding for a terminal."""
     told_else = OF_DATE if finding.switching is None else (*OF_DATE, *OF_SWITCH)
     values = [(p.name, p.value, p.stderr, p.unit) for p in finding.parameters if p.name not in told_else]
+    if finding.kind.endswith("_factor"):
+        values = [(n, 100.0 * v, 100.0 * sd, "%") if (n, u) == ("strength", "1") else (n, v, sd, u)
+                  for n, v, sd, u in values]  # fmt: skip
     if finding.heat_mean_W > 0.0:
         values.append(("mean |heat|", finding.heat_mean_W, finding.heat_stderr_W, "W"))
     told = [
-        f"{name} = {with_error(value, stderr).replace(MINUS, '-')}" + (f" {unit}" if unit != "1" else "")
-        for name, value, stderr, unit in values
+        f"{name} = {with_error(value, stderr).replace(MINUS, '-')}{_unit(unit)}" for name, value, stderr, unit in values
     ]
     if finding.switching is not None:
         told.append(f"on at {finding.switching.on_degC:.1f} degC, off at {finding.switching.off_degC:.1f} degC")
@@ -397,6 +399,11 @@ def date_told(finding: Finding) -> str:
 
 def _time(seconds: float) -> str:
     return f"{seconds / 3600.0:.2f} h" if abs(seconds) > LONG_S else f"{seconds:.0f} s"
+
+
+def _unit(symbol: str) -> str:
+    """A unit behind a number."""
+    return "" if symbol == "1" else f" {symbol}"
 
 
 def _share(probability: float) -> str:

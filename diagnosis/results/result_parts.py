@@ -154,9 +154,11 @@ class Finding:
             return f"acts like {named(self.mechanism, self.place)}"
         places = {r.mechanism: r.place for r in reversed(self.confusable_with)} | {self.mechanism: self.place}
         tied = self.tie_set or (self.mechanism,)
-        if len({places.get(name, self.place) for name in tied}) == 1:
-            return named(" or ".join(tied), self.place)
-        return " or ".join(named(name, places.get(name, self.place)) for name in tied)
+        at: dict[str, list[str]] = {}
+        for name in tied:
+            at.setdefault(places.get(name, self.place), []).append(name)
+        between = " or " if len(at) == len(tied) else ", or "
+        return between.join(named(" or ".join(names), place) for place, names in at.items())
 
     @property
     def sureness(self) -> float:
