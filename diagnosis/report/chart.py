@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from textwrap import wrap
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from models.base.types import Array
 
 INK, LINE = "#1f2328", "#dfe3e8"
 FONT_PX = 12
+LETTERS = 42  # of a line on a phone
 MOST_POINTS = 700  # of a curve
 MOST_OF_ALL = 160_000  # points of all curves of a chart: some 2 MB of the page
 GAP = 20.0  # times the usual distance of rows: a curve is interrupted
@@ -157,4 +159,9 @@ def menu(buttons: Sequence[dict[str, Any]]) -> dict[str, Any]:
     if len(buttons) < 2:
         return {}
     return {"updatemenus": [{"buttons": list(buttons), "x": 0.0, "xanchor": "left", "y": 1.0, "yanchor": "top",
-                             "pad": {"t": -84, "b": 0}, "bgcolor": "white", "font": {"size": FONT_PX}}]}  # fmt: skip
+                             "pad": {"t": -120, "b": 0}, "bgcolor": "white", "font": {"size": FONT_PX}}]}  # fmt: skip
+
+
+def wrapped(text: str) -> str:
+    """A text on lines that a phone has room for."""
+    return "<br>".join(wrap(text, LETTERS))

@@ -37,7 +37,7 @@ LINES: Mapping[str, dict[str, Any]] = {
     "calibrated": {"dash": "dash", "width": 1.6, "color": CALIBRATED},
     "after": {"width": 2.0, "color": MEASURED},
 }
-ROW_PX, INPUT_PX, ERROR_PX, EDGE_PX = 150, 84, 220, 96
+ROW_PX, INPUT_PX, ERROR_PX, EDGE_PX = 150, 84, 220, 130
 ERROR_POINTS = 240
 BAND_SD = 2.0
 FAR = 4.0  # times the calibrated model's error: the model as delivered may then leave its chart
@@ -164,7 +164,7 @@ def errors_over_time(diagnosis: Diagnosis) -> Chart | None:
         {"label": one.title, "method": "update", "args": [{"visible": [owner == index for owner in owners]}, look]}
         for index, (one, look) in enumerate(zip(shown, looks, strict=True))
     ]
-    height = sum(heights) + 34 * len(rows) + EDGE_PX + 20
+    height = sum(heights) + 34 * len(rows) + EDGE_PX
     dressed(figure, height, **menu(buttons), **_legend_above(heights))
     figure.update_layout(looks[0], overwrite=False)
     band = f" Band: ± {BAND_SD:g} standard deviations of the noise." if diagnosis.noise_K > 0.0 else ""
@@ -297,7 +297,7 @@ def _x_axis(one: Shown, rows: int) -> dict[str, Any]:
     scale, symbol = _time(one)
     time = one.run.time[[0, -1]] / scale if len(one.run.time) else np.array([0.0, 1.0])
     axis = f"xaxis{rows}" if rows > 1 else "xaxis"
-    return {f"{axis}.title.text": f"Time in {symbol}", "xaxis.range": time.tolist()}
+    return {f"{axis}.title.text": f"Time in {symbol}", f"{axis}.range": time.tolist()}
 
 
 def _unscored(one: Shown, rows: int) -> list[dict[str, Any]]:

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from plotly.subplots import make_subplots
 
-from diagnosis.report.chart import INK, MOST_POINTS, Chart, curve_points, dressed, row_titles, thinned
+from diagnosis.report.chart import INK, MOST_POINTS, Chart, curve_points, dressed, row_titles, thinned, wrapped
 from diagnosis.report.wording import clause, name, share, short_title, time_scale
 from diagnosis.results.result import LEAST_RIVAL, Diagnosis, date_told
 from diagnosis.results.result_parts import Finding, PredictedRun
@@ -21,7 +21,7 @@ GRADES: Mapping[str, tuple[str, str]] = {  # colour and pattern: apart in print 
     "nothing is missing": ("#4B8B6F", ""),
 }
 MOST_NAMES = 12
-BAR_PX, HEAT_PX, TIMELINE_PX = 30, 230, 34
+BAR_PX, HEAT_PX, TIMELINE_PX, LEGEND_PX = 30, 230, 34, 34
 DASHES = ("solid", "dash", "dot", "dashdot")
 BINS = 12
 FOLLOWS = 0.8  # share of the variance of a heat that a signal must explain to be called what drives it
@@ -120,14 +120,14 @@ def dates_with_bands(diagnosis: Diagnosis) -> Chart | None:
         figure.add_scatter(
             x=[moment, moment], y=[next(iter(spans)), list(spans)[-1]], mode="lines",
             line={"color": colour, "width": 2.5, "dash": DASHES[index % len(DASHES)]},
-            name=f"begin of {short_title(finding)}", hovertemplate=f"{date_told(finding)}<extra></extra>",
+            name=wrapped(f"begin of {short_title(finding)}"), hovertemplate=f"{date_told(finding)}<extra></extra>",
         )  # fmt: skip
         if date.to_s is not None:
             figure.add_vline(x=(start + date.to_s) / scale, line={"color": colour, "width": 1.5, "dash": "dot"})
     figure.update_yaxes(categoryorder="array", categoryarray=list(spans)[::-1], ticksuffix=" ")
     figure.update_xaxes(title=f"Time since the first row in {symbol}")
-    dressed(figure, 130 + TIMELINE_PX * len(spans) + 20 * len(dated), bargap=0.4, barmode="overlay",
-            margin={"l": 10, "r": 14, "t": 50 + 20 * len(dated), "b": 10})  # fmt: skip
+    dressed(figure, 130 + TIMELINE_PX * len(spans) + LEGEND_PX * len(dated), bargap=0.4, barmode="overlay",
+            margin={"l": 10, "r": 14, "t": 50 + LEGEND_PX * len(dated), "b": 10})  # fmt: skip
     return Chart(
         name="dates", title="When it began", figure=figure,
         note="Line: the most probable moment. Shaded: where it lies with 95 %. Dotted: the end.",
@@ -168,7 +168,7 @@ def heat_of_findings(diagnosis: Diagnosis) -> Chart | None:
         line = {"color": colours.get(finding.node, INK), "width": 2.0, "dash": DASHES[index % len(DASHES)]}
         for number, (recording, (time, heat)) in enumerate(finding.heat.items()):
             x, y = curve_points((time + offsets[recording]) / scale, heat, MOST_POINTS)
-            figure.add_scatter(x=x, y=y, mode="lines", line=line, name=short_title(finding),
+            figure.add_scatter(x=x, y=y, mode="lines", line=line, name=wrapped(short_title(finding)),
                                legendgroup=str(index), showlegend=number == 0,
                                hovertemplate=f"{recording}: %{{y:.4g}} W<extra></extra>", row=1, col=1)  # fmt: skip
     for offset in list(offsets.values())[1:]:
@@ -184,8 +184,8 @@ def heat_of_findings(diagnosis: Diagnosis) -> Chart | None:
         figure.update_xaxes(title=label, row=row, col=1)
         titles.append(f"<b>Against the signal that it follows most</b>, W ({name(finding.mechanism)})")
     figure.update_yaxes(rangemode="tozero")
-    dressed(figure, 80 + rows * (HEAT_PX + 40) + 20 * len(warm), annotations=row_titles(titles), hovermode="closest",
-            margin={"l": 10, "r": 14, "t": 50 + 20 * len(warm), "b": 10})  # fmt: skip
+    dressed(figure, 80 + rows * (HEAT_PX + 40) + LEGEND_PX * len(warm), annotations=row_titles(titles), hovermode="closest",
+            margin={"l": 10, "r": 14, "t": 50 + LEGEND_PX * len(warm), "b": 10})  # fmt: skip
     figure.update_layout(legend_y=1.0 + 24.0 / (rows * HEAT_PX))
     means = "; ".join(f"{short_title(f)}: {f.heat_mean_W:.3g} W on average, {f.heat_max_W:.3g} W at most" for f in warm)
     follows = "".join(f"; {name(f.mechanism)} follows {label} most" for f, label, _, _ in drivers)

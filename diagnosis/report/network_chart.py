@@ -176,9 +176,9 @@ def _name_of(node: str, at: tuple[float, float], marked: Marks) -> dict[str, Any
     guilty = node in marked.nodes
     text = marked.called(node).replace(" ", "<br>", 1) if len(marked.called(node)) > SHORT else marked.called(node)
     text = f"<b>{text}<br>{share(marked.nodes[node][1])}</b>" if guilty else text
-    return {"x": at[0], "y": at[1], "text": text, "showarrow": False, "yanchor": "top",
-            "yshift": -19 if guilty else -12, "font": {"size": 12, "color": MARK if guilty else INK}, "bgcolor": "rgba(255,255,255,0.75)",
-            "borderpad": 0}  # fmt: skip
+    return {"x": at[0], "y": at[1], "text": text, "showarrow": False, "yanchor": "top", "borderpad": 0,
+            "yshift": -19 if guilty else -12, "font": {"size": 12, "color": MARK if guilty else INK},
+            "bgcolor": "rgba(255,255,255,0.75)"}  # fmt: skip
 
 
 def _bent(a: tuple[float, float], b: tuple[float, float]) -> tuple[Array, Array]:

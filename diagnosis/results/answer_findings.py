@@ -97,12 +97,11 @@ def _says(answer: Answer, found: Mapping[str, float]) -> str:
         says = f"{effect.name.replace('_', ' ').capitalize()} at {effect.place.replace('_', ' ')}."
     if effect.term is not None and EITHER in says:
         says = says.replace(EITHER, "smaller" if found[effect.term.strength.name] < 0.0 else "greater")
+    inside = f"{says[:1].lower()}{says[1:]}"
     if answer.acts_like:
-        return f"Something acts like this, its cause was not found: {says[:1].lower()}{says[1:]}"
+        return f"Something acts like this, its cause was not found: {inside}"
     if len(answer.tied) > 1:
-        return (
-            f"One of several effects that these data do not separate, the most probable: {says[:1].lower()}{says[1:]}"
-        )
+        return f"One of several effects that these data do not separate, the most probable: {inside}"
     return says
 
 
