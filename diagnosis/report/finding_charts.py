@@ -73,15 +73,18 @@ def _names(diagnosis: Diagnosis) -> list[tuple[str, str, float]]:
             sums[law] = sums.get(law, 0.0) + one.probability
     for mechanism, finding in reported.items():
         sums[mechanism] = max(sums.get(mechanism, 0.0), finding.probability)
-    rows = [
-        (_label(mechanism), grades.get(mechanism, "not reported"), p)
-        for mechanism, p in sums.items()
-        if p >= LEAST_RIVAL
-    ]
+    idle = set() if diagnosis.further_helps else _companions(diagnosis)
+    rows = [(_label(law), grades.get(law, "not reported"), p) for law, p in sums.items()
+            if p >= LEAST_RIVAL and law not in idle]  # fmt: skip
     nothing = diagnosis.kinds.get("nothing", 0.0)
     if nothing >= LEAST_RIVAL:
         rows.append(("nothing", "nothing is missing", nothing))
     return sorted(rows, key=lambda row: -row[2])[:MOST_NAMES]
+
+
+def _companions(diagnosis: Diagnosis) -> set[str]:
+    """Names that explain the data only together with a finding."""
+    return {rival.mechanism for finding in diagnosis.findings for rival in finding.confusable_with if not rival.instead}
 
 
 def _label(mechanism: str) -> str:
@@ -184,7 +187,8 @@ def heat_of_findings(diagnosis: Diagnosis) -> Chart | None:
         figure.update_xaxes(title=label, row=row, col=1)
         titles.append(f"<b>Against the signal that it follows most</b>, W ({name(finding.mechanism)})")
     figure.update_yaxes(rangemode="tozero")
-    dressed(figure, 80 + rows * (HEAT_PX + 40) + LEGEND_PX * len(warm), annotations=row_titles(titles), hovermode="closest",
+    height = 80 + rows * (HEAT_PX + 40) + LEGEND_PX * len(warm)
+    dressed(figure, height, annotations=row_titles(titles), hovermode="closest",
             margin={"l": 10, "r": 14, "t": 50 + LEGEND_PX * len(warm), "b": 10})  # fmt: skip
     figure.update_layout(legend_y=1.0 + 24.0 / (rows * HEAT_PX))
     means = "; ".join(f"{short_title(f)}: {f.heat_mean_W:.3g} W on average, {f.heat_max_W:.3g} W at most" for f in warm)

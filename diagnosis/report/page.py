@@ -45,7 +45,7 @@ def page(diagnosis: Diagnosis) -> str:
         verdict_text=diagnosis.verdict_text,
         claims=diagnosis.verdict not in NO_CLAIM,
         evidence=_evidence(diagnosis),
-        findings=[_finding(finding) for finding in diagnosis.findings],
+        items=[[_finding(finding) for finding in item] for item in diagnosis.items],
         stages=course_charts.stages_of(diagnosis),
         told=network_chart.marks(diagnosis).told(network_chart.corrected(diagnosis)),
         fits=[("Held out", _rows(diagnosis.holdout)), ("Learned from", _rows(diagnosis.train))],
@@ -105,7 +105,8 @@ def _finding(finding: Finding) -> dict[str, Any]:
             (wording.name(p.name.removeprefix(prefix)), numbers.with_error(p.value, p.stderr), wording.unit(p.unit))
             for p in finding.parameters
         ],
-        "rivals": [rival for rival in finding.confusable_with if rival.probability >= LEAST_RIVAL],
+        "rivals": [one for one in finding.confusable_with if one.instead and one.probability >= LEAST_RIVAL],
+        "companions": [one for one in finding.confusable_with if not one.instead and one.probability >= LEAST_RIVAL],
     }
 
 

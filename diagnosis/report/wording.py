@@ -116,7 +116,7 @@ def _spelled(text: str) -> str:
     """Names in words; the course of an effect in time, which is the end of its name, too."""
     for ending, words in COURSES.items():
         text = re.sub(rf"_{ending}\b", f" {words}", text)
-    return re.sub(r"\bT_ambient\b", "ambient temperature", text).replace("_", " ")
+    return re.sub(r"\bT_ambient\b", "ambient temperature", text).replace("__", " ").replace("_", " ")
 
 
 def clause(text: str) -> str:

@@ -19,7 +19,8 @@ from diagnosis.results.result_parts import Finding, ParameterValue, Rival
 from diagnosis.setup.inference_setup import InferenceSetup, heat_over_time
 from models.mechanisms import Mechanism, Placed
 
-EITHER = "smaller or greater"  # in sentences about a factor, whose strength shows which
+# In sentences about a change, whose strength shows which.
+EITHER = (("smaller or greater", "smaller", "greater"), ("more or less", "less", "more"))
 ENDINGS = (STEP, WHILE, HOURS, "carried_on")
 
 
@@ -95,8 +96,10 @@ def _says(answer: Answer, found: Mapping[str, float]) -> str:
         says = f"The parameter {effect.place} is {found[names_of(effect)[0]]:.3g}, far from what the definition allows."
     else:
         says = f"{effect.name.replace('_', ' ').capitalize()} at {effect.place.replace('_', ' ')}."
-    if effect.term is not None and EITHER in says:
-        says = says.replace(EITHER, "smaller" if found[effect.term.strength.name] < 0.0 else "greater")
+    for either, less, more in EITHER:
+        if effect.term is not None and either in says:
+            says = says.replace(either, less if found[effect.term.strength.name] < 0.0 else more)
+    says = " ".join(says.split())
     inside = f"{says[:1].lower()}{says[1:]}"
     if answer.acts_like:
         return f"Something acts like this, its cause was not found: {inside}"

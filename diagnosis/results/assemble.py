@@ -268,7 +268,7 @@ def _remaining(posterior: Posterior, others: Others | None) -> str:
         return f"without {channels} nothing stands out of noise and model error (evidence {rest.log_e:.1f} nat)"
     if posterior.remainder > posterior.threshold:
         return f"a further effect would still help (evidence {posterior.remainder:.0f} nat)"
-    return "nothing that stands out of noise and model error"
+    return f"nothing stands out of noise and model error (evidence {posterior.remainder:.1f} nat of a further effect)"
 
 
 def _misfit(fit: Fit) -> float:

@@ -41,18 +41,20 @@ Verdict = Literal[
     "consistent", "parameter_error", "missing_physics", "sensor_fault", "unexplained", "insufficient_data"
 ]
 VERDICT_TEXT: Mapping[str, str] = {
-    "consistent": "The recordings agree with the model within its stated uncertainties.",
+    "consistent": "Nothing stands out: noise and model error explain the recordings.",
     "parameter_error": "A known parameter of the model is outside what its definition allows.",
-    "missing_physics": "The gearbox shows physics that the model leaves out.",
-    "sensor_fault": "A sensor, clock or recorded input is at fault, not the gearbox.",
+    "missing_physics": "The machine shows physics that the model leaves out.",
+    "sensor_fault": "A sensor, clock or recorded input is at fault, not the machine.",
     "unexplained": "Something is missing, and it matches no physics in the catalogue.",
     "insufficient_data": "These recordings are too short or too calm to decide.",
 }
+MEASUREMENT = "measurement"  # family
+LARGEST_ERROR = "full"  # class of model error
 PARTLY = "Part of what is missing was found; the rest matches no physics in the catalogue."
 LIKELY_TEXT: Mapping[str, str] = {  # of the same verdicts where no name is a claim
     "parameter_error": "A parameter of the model is probably outside what its definition allows.",
-    "missing_physics": "The gearbox probably shows physics that the model leaves out; its name is not certain.",
-    "sensor_fault": "A sensor, clock or recorded input is probably at fault; which one, or how, is not certain.",
+    "missing_physics": "The machine probably shows physics that the model leaves out; its name is not certain.",
+    "sensor_fault": "A sensor, clock or recorded input is probably at fault, not the machine.",
 }
 
 
@@ -236,6 +238,17 @@ class Diagnosis:
         return (*self.location[:1], *(place for place in self.location[1:] if place.probability >= LIKELY))
 
     @property
+    def items(self) -> tuple[tuple[Finding, ...], ...]:
+        """Findings by their titles: several laws of one name at one place, with other courses in time, are one item."""
+        titles = dict.fromkeys(finding.title for finding in self.findings)
+        return tuple(tuple(finding for finding in self.findings if finding.title == title) for title in titles)
+
+    @property
+    def further_helps(self) -> bool:
+        """True if the recordings give evidence of a further effect; without, its probability is only a prior one."""
+        return self.remaining_p_value < math.exp(-self.threshold)
+
+    @property
     def nearest(self) -> tuple[Ranked, ...]:
         """Most probable explanations if something is missing and none could be reported."""
         if self.findings or self.verdict in NO_CLAIM:
@@ -272,9 +285,9 @@ class Diagnosis:
         """The model or the measurement; with a word of caution where the other one has some probability too."""
         if self.verdict == "unexplained":
             return ""
-        measurement = self.kinds.get("measurement", 0.0)
+        measurement = sum(one.probability for one in self.ranking if one.family == MEASUREMENT)
         fault = self.verdict == "sensor_fault"
-        sure = (measurement if fault else 1.0 - measurement) >= self.claim_from or not self.kinds
+        sure = (measurement if fault else 1.0 - measurement) >= self.claim_from
         return f", {'' if sure else 'probably '}in the {'measurement' if fault else 'model'}"
 
     def _where(self) -> tuple[str, ...]:
@@ -290,9 +303,9 @@ class Diagnosis:
 
     def _what(self) -> tuple[str, ...]:
         lines: list[str] = []
-        for finding in self.findings:
-            lines.append(f"{finding.grade.capitalize()}: {finding.says} [{finding.title}]")
-            lines += [f"  {line}" for line in (values_told(finding), date_told(finding)) if line]
+        for item in self.items:
+            lines.append(f"{item[0].grade.capitalize()}: {item[0].says} [{item[0].title}]")
+            lines += [f"  {line}" for finding in item for line in (values_told(finding), date_told(finding)) if line]
         if self.nearest:
             told = ", ".join(f"{one.mechanism} at {one.place} ({one.probability:.2f})" for one in self.nearest)
             lines.append(f"No name is certain enough to be reported; most like: {told}.")
@@ -302,21 +315,27 @@ class Diagnosis:
 
     def _how_sure(self) -> tuple[str, ...]:
         lines = []
-        for finding in self.findings:
+        for finding, *_ in self.items:
             of = "that law and place are right" if finding.acts_like else "of one of these" if finding.tie_set else ""
-            title = f"{finding.title}: " if len(self.findings) > 1 else ""
+            if finding.acts_like and finding.sureness < self.claim_from:
+                of = f"of names that act alike at least {self.claim_from:g}, of this one"
+            title = f"{finding.title}: " if len(self.items) > 1 else ""
             line = " ".join(filter(None, (f"{title}{finding.grade}, probability", of, _share(finding.sureness))))
             others = [r for r in finding.confusable_with
                       if r.probability >= LEAST_RIVAL and r.mechanism not in finding.tie_set]  # fmt: skip
-            for words, instead in (("not ruled out instead", True), ("may act as well", False)):
+            roles = (("not ruled out instead", True), ("may act as well", False))
+            for words, instead in roles[: 1 + self.further_helps]:
                 told = [f"{named(r.mechanism, r.place)} ({r.probability:.2f})" for r in others if r.instead is instead]
                 line += f"; {words}: {', '.join(told[:MOST_NEAREST])}" if told else ""
             lines.append(line)
         if not self.findings and self.kinds:
-            told = (f"{kind} {p:.2f}" for kind, p in sorted(self.kinds.items(), key=lambda kind: -kind[1]) if p >= 0.01)
+            told = (
+                f"{kind} {_share(p)}" for kind, p in sorted(self.kinds.items(), key=lambda kind: -kind[1]) if p >= 0.01
+            )
             lines.append(f"Probabilities: {', '.join(told)}.")
         if self.error_class:
-            lines.append(f"Model error assumed: class {self.error_class}.")
+            hides = ", the largest: a real effect can hide in it" if self.error_class == LARGEST_ERROR else ""
+            lines.append(f"Model error assumed: class {self.error_class}{hides}.")
         if self.session_s > LITTLE_SPREAD:
             lines.append(f"Between sessions the machine differs by {self.session_s:.2f} of the priors' widths.")
         far = sorted((c for c in self.calibration if abs(c.shift_in_sd) > FAR_SD), key=lambda c: -abs(c.shift_in_sd))
@@ -373,9 +392,6 @@ def values_told(finding: Finding) -> str:
     """Numbers of a finding for a terminal."""
     told_else = OF_DATE if finding.switching is None else (*OF_DATE, *OF_SWITCH)
     values = [(p.name, p.value, p.stderr, p.unit) for p in finding.parameters if p.name not in told_else]
-    if finding.kind.endswith("_factor"):
-        values = [(n, 100.0 * v, 100.0 * sd, "%") if (n, u) == ("strength", "1") else (n, v, sd, u)
-                  for n, v, sd, u in values]  # fmt: skip
     if finding.heat_mean_W > 0.0:
         values.append(("mean |heat|", finding.heat_mean_W, finding.heat_stderr_W, "W"))
     told = [
