@@ -329,9 +329,8 @@ class Diagnosis:
                 line += f"; {words}: {', '.join(told[:MOST_NEAREST])}" if told else ""
             lines.append(line)
         if not self.findings and self.kinds:
-            told = (
-                f"{kind} {_share(p)}" for kind, p in sorted(self.kinds.items(), key=lambda kind: -kind[1]) if p >= 0.01
-            )
+            kinds = sorted(self.kinds.items(), key=lambda kind: -kind[1])
+            told = [f"{kind} {_share(p)}" for kind, p in kinds if p >= LEAST_RIVAL]
             lines.append(f"Probabilities: {', '.join(told)}.")
         if self.error_class:
             hides = ", the largest: a real effect can hide in it" if self.error_class == LARGEST_ERROR else ""

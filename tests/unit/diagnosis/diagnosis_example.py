@@ -228,7 +228,7 @@ def _ranking(*first: tuple[str, str, float]) -> tuple[Ranked, ...]:
     rest = [(name, "oil", 0.0004) for name in CATALOGUE if name not in {one[0] for one in first}]
     return tuple(
         Ranked(mechanism=name, place=place, probability=p, log_bayes=44.0 - 2.5 * rank,
-               family=CATALOGUE[name].family)
+               family=CATALOGUE[name].family, laws=(name,))
         for rank, (name, place, p) in enumerate([*first, *rest])
     )  # fmt: skip
 
