@@ -272,7 +272,8 @@ def _look(
     stages: Sequence[tuple[str, str]],
 ) -> dict[str, Any]:  # fmt: skip
     """Titles, ranges and shades of the axes for one recording."""
-    titles, look = [], {}
+    titles: list[str] = []
+    look: dict[str, Any] = {}
     for row, key in enumerate(rows, 1):
         axis = f"yaxis{row}" if row > 1 else "yaxis"
         if key not in channels:

@@ -25,7 +25,11 @@ def drawn(latex: str) -> Markup:
     latex : str
         As :meth:`models.terms.term.Term.equation` gives it
     """
+    lines = [_for_readers(line) for line in latex.split(SEPARATOR) if line.strip()]
+    return Markup("\n").join(Markup(convert(line, display="block")) for line in lines)  # noqa: S704 - escapes every sign
+
+
+def _for_readers(latex: str) -> str:
     for machine, reader in FOR_READERS:
         latex = machine.sub(reader, latex)
-    lines = [convert(line, display="block") for line in latex.split(SEPARATOR) if line.strip()]
-    return Markup("\n").join(Markup(line) for line in lines)  # noqa: S704 - the converter escapes every sign
+    return latex

@@ -1,4 +1,4 @@
-"""Charts of what was found: how probable each name is, when it began, and its heat."""
+"""Charts of the findings: how probable each name is, when it began, and its heat."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The thermal network as a chart, with what was found marked in it."""
+"""The thermal network as a chart, with the findings marked in it."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ def marks(diagnosis: Diagnosis) -> Marks:
 
 
 def network_with_places(diagnosis: Diagnosis) -> Chart:
-    """The network as corrected, with thermometers, and the places of what was found."""
+    """The network as corrected, with thermometers, and the places of the findings."""
     marked, network = marks(diagnosis), corrected(diagnosis)
     measured = {channel for course in diagnosis.courses for channel in course.measured}
     told = "; ".join(f"{part}: {said}, probability {share(p)}" for part, said, p in marked.told(network))
@@ -102,10 +102,11 @@ def network_with_places(diagnosis: Diagnosis) -> Chart:
     )
     return Chart(
         name="network", title="The network and the place", figure=drawn(network, diagnosis.network, measured, marked),
-        note="Full: has a thermometer. Ring: no thermometer. Square: surroundings. Red: pointed out, with its "
-             "probability. Dashed: not in the model as delivered. Heat is made at the top and leaves at the bottom.",
+        note="Full: has a thermometer. Ring: no thermometer. Square: surroundings. Heat is made at the top and leaves "
+             "at the bottom." + (" Red: pointed out, with its probability. Dashed: not in the model as delivered." if told
+                              else ""),
         alt=f"Thermal network of {len(network.node_names)} nodes and {len(network.links)} links; with a thermometer: "
-            f"{', '.join(thermometers)}. " + (f"Pointed out: {told}." if told else "No place is pointed out."),
+            f"{', '.join(thermometers)}. " + (f"Pointed out: {told}." if told else "No place is marked."),
     )  # fmt: skip
 
 

@@ -339,8 +339,8 @@ class Diagnosis:
             lines.append(f"Between sessions the machine differs by {self.session_s:.2f} of the priors' widths.")
         far = sorted((c for c in self.calibration if abs(c.shift_in_sd) > FAR_SD), key=lambda c: -abs(c.shift_in_sd))
         if far:
-            told = (f"{c.parameter} = {c.value:.3g}{_unit(c.unit)} ({abs(c.shift_in_sd):.1f} sd)"
-                    for c in far[:MOST_FAR])  # fmt: skip
+            told = [f"{c.parameter} = {c.value:.3g}{_unit(c.unit)} ({abs(c.shift_in_sd):.1f} sd)"
+                    for c in far[:MOST_FAR]]  # fmt: skip
             lines.append(f"Far from what the definition expects: {', '.join(told)}.")
         if self.remaining_note:
             lines.append(f"Remaining: {self.remaining_note}")

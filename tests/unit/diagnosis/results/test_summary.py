@@ -36,7 +36,7 @@ def test_a_claim_and_something_likely_stand_apart_by_words() -> None:
         "bearing_seat_contact at bearing_1_housing or pocketing at oil: likely, probability of one of these 0.93"
         in sure
     )
-    assert "not ruled out: churning_swirl at oil (0.02)" in sure  # and the tied one is not told twice
+    assert "not ruled out instead: churning_swirl at oil (0.02)" in sure  # and the tied one is not told twice
 
 
 def test_names_that_only_act_like_it_are_told_as_such() -> None:
@@ -91,5 +91,5 @@ def test_every_likely_place_is_told_with_what_the_first_one_does() -> None:
     both = replace(
         base, location=(first, replace(other, node="air", probability=0.52), replace(other, probability=0.48))
     )
-    expected = "oil (0.96), air (0.52); 21 W on average, 66 W at most; speed above 2900 1/min"
+    expected = "oil (0.96), air (0.52); 21 W added on average, 66 W at most; speed above 2900 1/min"
     assert told(both, "Where?") == expected
