@@ -22,6 +22,7 @@ from models.simulation.thermal_network import ThermalNetwork
 LIKELY = 0.1  # probability from which a place is pointed out
 ROW_PX = 100
 LACKS, MISREAD = "heat that the calibrated model cannot explain", "a reading or an input of it may be at fault"
+MARKED = " Red: pointed out, with its probability. Dashed: not in the model as delivered."
 MARK = "#C2211A"
 SAG = 0.42  # of the distance of rows, by which a link within a row hangs
 ASIDE = 0.12  # of the width, by which a link over several rows bends
@@ -103,8 +104,7 @@ def network_with_places(diagnosis: Diagnosis) -> Chart:
     return Chart(
         name="network", title="The network and the place", figure=drawn(network, diagnosis.network, measured, marked),
         note="Full: has a thermometer. Ring: no thermometer. Square: surroundings. Heat is made at the top and leaves "
-             "at the bottom." + (" Red: pointed out, with its probability. Dashed: not in the model as delivered." if told
-                              else ""),
+             "at the bottom." + (MARKED if told else ""),
         alt=f"Thermal network of {len(network.node_names)} nodes and {len(network.links)} links; with a thermometer: "
             f"{', '.join(thermometers)}. " + (f"Pointed out: {told}." if told else "No place is marked."),
     )  # fmt: skip

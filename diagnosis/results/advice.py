@@ -76,8 +76,9 @@ def next_test(
     if verdict == "unexplained" and "T_ambient" in assumed:
         return "record T_ambient_degC: a constant replaces it, and effects of the air show up elsewhere"
     for finding in findings:
-        if finding.confusable_with and finding.confusable_with[0].probability >= WORTH_ASKING:
-            return finding.confusable_with[0].separate_by
+        rivals = [rival for rival in finding.confusable_with if rival.instead]
+        if rivals and rivals[0].probability >= WORTH_ASKING:
+            return rivals[0].separate_by
     for place in location[1:]:
         if place.probability >= OTHER_PLACE and place.node in free:
             return f"a temperature sensor at {place.node.replace('_', ' ')}: it shows if the heat is there"

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from diagnosis.results.number_format import MINUS, with_error
+from diagnosis.results.number_format import MINUS, number, with_error
 from diagnosis.results.result_parts import (
     Calibrated,
     Finding,
@@ -298,7 +298,8 @@ class Diagnosis:
         if not place.heat_max_W:
             return (f"{told}: in a reading or an input; no heat",)
         way = "taken away" if place.heat_mean_W < 0.0 else "added"
-        heat = f"{abs(place.heat_mean_W):.3g} W {way} on average, {abs(place.heat_max_W):.3g} W at most"
+        mean, most = number(abs(place.heat_mean_W)), number(abs(place.heat_max_W))
+        heat = f"{mean} W {way} on average, {most} W at most"
         return (f"{told}; {heat}; {place.regime}",)
 
     def _what(self) -> tuple[str, ...]:
@@ -355,6 +356,12 @@ class Diagnosis:
                     f"RMSE {name}: {fits.before:.2f} K as delivered, {fits.calibrated:.2f} K calibrated{after} "
                     f"(noise {self.noise_K:.2f} K)"
                 )
+        if self.findings and self.holdout.after > self.holdout.calibrated:
+            lines.append("Held-out temperatures are not closer than with the calibrated model")
+        named_terms = {finding.term.label for finding in self.findings if finding.term is not None}
+        further = len([term for term in self.terms if term.label not in named_terms])
+        if self.findings and further:
+            lines.append(f"The findings' model holds {further} more effect{'s' * (further > 1)} without a certain name")
         if self.findings and math.isfinite(self.holdout_gain):
             way = "better" if self.holdout_gain >= 0.0 else "worse"
             lines.append(
