@@ -63,7 +63,8 @@ def test_opens_without_an_error_and_fits_the_screen(browser: Any, folder: Path, 
     page, screen = browser.execute_script("return [document.documentElement.scrollWidth, window.innerWidth]")
     assert page <= screen
     outside = browser.execute_script(
-        "return [...document.querySelectorAll('header *, main *')].filter((e) => !e.closest('.scroll, .js-plotly-plot') &&"
+        "return [...document.querySelectorAll('header *, main *')]"
+        ".filter((e) => !e.closest('.scroll, .js-plotly-plot') &&"
         " e.getBoundingClientRect().right > window.innerWidth + 1).map((e) => e.outerHTML.slice(0, 80))"
     )
     assert outside == []
@@ -90,7 +91,8 @@ def test_every_chart_is_drawn_as_wide_as_the_page(browser: Any, folder: Path) ->
 def test_letters_are_large_enough_everywhere(browser: Any, folder: Path) -> None:
     opened(browser, folder, "missing_physics")
     sizes = browser.execute_script(
-        "return [...document.querySelectorAll('header *, main *')].filter((e) => !e.closest('.js-plotly-plot, math') &&"
+        "return [...document.querySelectorAll('header *, main *')]"
+        ".filter((e) => !e.closest('.js-plotly-plot, math') &&"
         " [...e.childNodes].some((n) => n.nodeType === 3 && n.textContent.trim()))"
         ".map((e) => parseFloat(getComputedStyle(e).fontSize))"
     )
