@@ -26,7 +26,7 @@ from models.terms.term import Term
 from tests.unit.diagnosis.inference_example import recorded
 
 LOOKED_FOR = ("windage", "air_cooling_change", "sensor_bias", "hot_neighbour")
-WINDAGE_W, AT_RPM, HOURS = 100.0, 3300.0, 1.5
+WINDAGE_W, AT_RPM, HOURS = 150.0, 3300.0, 1.5
 
 
 def inferred(fzg: Gearbox, windage_W: float) -> Posterior:
