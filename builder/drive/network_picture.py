@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import FancyArrowPatch
 
 from builder.drive.plots import PALETTE, STYLE
-from diagnosis.report.network_drawing import places
+from diagnosis.report.network_layout import places_of
 from models.simulation.thermal_network import ThermalNetwork
 
 INCH_PER_ROW, WIDTH_INCH = 1.1, 9.0
@@ -33,8 +33,9 @@ def draw_network(path: Path, network: ThermalNetwork, conductances: Mapping[str,
         Of every link, [W/K]
     title : str
     """
-    place = {node: (x, -y) for node, (x, y) in places(network).items()}
-    rows = len({y for _, y in place.values()})
+    found = places_of(network, network)
+    rows = 1 + max(row for _, row in found.values())
+    place = {node: (x, -(row + 0.5) / rows) for node, (x, row) in found.items()}
     heated = {source.node for source in network.sources}
     parts = {part.name for part in network.parts}
     largest = max(conductances.values(), default=1.0)
