@@ -10,7 +10,7 @@ import click
 
 from builder.base import console
 from builder.base.example import example
-from builder.base.progress import progress
+from builder.base.progress import LOADING, progress
 from builder.commands.conceal_in_zoo import conceal_in_zoo
 from builder.commands.conceal_into import conceal_into
 from models.assembly.gearbox import load_gearbox
@@ -117,9 +117,10 @@ def conceal(
         return
     if control or place is not None or date is not None:
         raise InputError("--control, --place and --date go with --into")
-    from diagnosis.proof.cases.case_files import staged_folders
-    from diagnosis.proof.cases.conceal import conceal_set, random_plans  # imports scipy.signal
-    from diagnosis.proof.cases.concealed_case import Plan
+    with progress(LOADING):
+        from diagnosis.proof.cases.case_files import staged_folders
+        from diagnosis.proof.cases.conceal import conceal_set, random_plans  # imports scipy.signal
+        from diagnosis.proof.cases.concealed_case import Plan
 
     if (effect is None) == (not random):
         raise InputError("conceal takes either --effect NAME or --random")
@@ -138,7 +139,7 @@ def conceal(
     ):
         names = conceal_set(
             definition, plans, seed=seed, recordings=stage, truth=truth_stage, flat=cases is None,
-            progress=partial(told, "concealing"),
+            progress=partial(told, "simulating the recordings, percent"),
         )  # fmt: skip
     for name in names:
         console.out.print(f"wrote {recordings / ('' if cases is None else name)}, {truth / name}.json")

@@ -6,7 +6,7 @@ from functools import partial
 from pathlib import Path
 
 from builder.base import console
-from builder.base.progress import progress
+from builder.base.progress import LOADING, progress
 
 
 def conceal_in_zoo(
@@ -28,8 +28,9 @@ def conceal_in_zoo(
     InputError
         If a group or family is not known, a definition cannot be split, or a folder cannot be written to.
     """
-    from diagnosis.proof.cases.case_files import staged_folders
-    from diagnosis.proof.zoo.conceal_zoo import conceal_zoo, random_zoo_plans, zoo_plans
+    with progress(LOADING):
+        from diagnosis.proof.cases.case_files import staged_folders
+        from diagnosis.proof.zoo.conceal_zoo import conceal_zoo, random_zoo_plans, zoo_plans
 
     names = None if families is None else [name.strip() for name in families.split(",")]
     number = 1 if cases is None else cases

@@ -96,7 +96,7 @@ def diagnose(
 ) -> None:
     """Say whether recordings agree with the model, and what differs.
 
-    Where they do not agree it says in which part, by what physics, and how strongly.
+    Where they do not agree it names the part, the physics, and how strong that is.
 
     RECORDING is a table (.csv, .csv.gz, .parquet, .mf4) with the columns of a cycle and what was measured:
     T_<node>_degC, P_loss_W. FILE+FILE joins files that follow each other in time; FILE@start..end is a part.

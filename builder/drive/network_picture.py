@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import FancyArrowPatch
 
-from diagnosis.report.network_drawing import places
+from diagnosis.report.network_layout import places_of
 from models.columns.curves import PALETTE, STYLE
 from models.simulation.thermal_network import ThermalNetwork
 
@@ -33,8 +33,9 @@ def draw_network(path: Path, network: ThermalNetwork, conductances: Mapping[str,
         Of every link, [W/K]
     title : str
     """
-    place = {node: (x, -y) for node, (x, y) in places(network).items()}
-    rows = len({y for _, y in place.values()})
+    found = places_of(network, network)
+    rows = 1 + max(row for _, row in found.values())
+    place = {node: (x, -(row + 0.5) / rows) for node, (x, row) in found.items()}
     heated = {source.node for source in network.sources}
     parts = {part.name for part in network.parts}
     largest = max(conductances.values(), default=1.0)

@@ -15,6 +15,7 @@ from models.columns.curves import (
     LABELS,
     STYLE,
     Curves,
+    draw_ambient,
     draw_curves,
     draw_inputs,
     loss_curves,
@@ -77,6 +78,7 @@ def plot_cycle(
             axes.set_ylabel(LABELS[what])
             if reference is not None:
                 _dots(axes, reference, curves, scale)
+        draw_ambient(temperatures, time, columns)
         for losses in between:
             losses.set_ylim(bottom=0.0)
         temperatures.set_xlabel(f"Time in {unit}")

@@ -1,4 +1,4 @@
-"""What the program understands of a definition: nodes, links, inputs, losses, oil, and which values are typical."""
+"""A definition as the program understands it: nodes, links, inputs, losses, oil, and which values are typical."""
 
 from __future__ import annotations
 

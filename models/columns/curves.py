@@ -11,7 +11,7 @@ import numpy as np
 
 from models.base.errors import InputError, did_you_mean
 from models.base.types import Array
-from models.quantities.part_colours import OTHER_HUES, part_colours
+from models.quantities.part_colours import AMBIENT, OTHER_HUES, part_colours
 from models.quantities.quantities import GEARBOX_INPUTS, node_of_channel, quantity_of_column
 
 if TYPE_CHECKING:
@@ -67,6 +67,8 @@ def draw_columns(
     x, label = _x_axis(columns)
     with axes_or_new(ax) as axes:
         draw_curves(axes, x, curves, parts or members(columns, what))
+        if what == "temperatures" and not only and "air" not in curves:
+            draw_ambient(axes, x, columns)
         axes.set(xlabel=label, ylabel=LABELS[what])
         if what == "losses":
             axes.set_ylim(bottom=0.0)
@@ -83,6 +85,14 @@ def draw_curves(ax: Axes, x: Array, curves: Curves, parts: Sequence[str]) -> Non
         lines = ax.plot(x, np.atleast_2d(values).T, color=colour, linewidth=width, marker=marker)
         lines[0].set_label(label.replace("__", ", ").replace("_", " "))
     ax.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
+
+
+def draw_ambient(ax: Axes, x: Array, columns: Mapping[str, Array]) -> None:
+    """Draw the ambient temperature, if there is a column of it."""
+    if GEARBOX_INPUTS["T_ambient"].column in columns:
+        values = columns[GEARBOX_INPUTS["T_ambient"].column]
+        ax.plot(x, np.atleast_1d(values), color=AMBIENT, linestyle=":", linewidth=1.4, label="ambient")
+        ax.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
 
 
 def members(columns: Mapping[str, Array], what: str) -> list[str]:

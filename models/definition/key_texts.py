@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class KeyText:
-    """What a key means, and the range in which it typically lies (in its unit), or ``""``."""
+    """Meaning of a key, and the range in which it typically lies (in its unit), or ``""``."""
 
     meaning: str
     typical: str = ""
@@ -80,7 +80,7 @@ TEXTS: Mapping[str, Mapping[str, KeyText]] = {
     ),
     "Shaft": _texts(
         name="Name of the shaft, which gears, bearings and seals refer to",
-        length_mm=("Length of the cylinder that stands for the shaft", "80 to 800"),
+        length_mm=("Length of the cylinder in place of the shaft", "80 to 800"),
         diameter_mm=("Its diameter; one value for a stepped shaft", "15 to 150"),
         conductivity_W_mK=("Thermal conductivity of the steel", "40 to 50"),
         heat_capacity_J_K=("Heat capacity; from the cylinder if not given", "100 to 10000"),

@@ -29,6 +29,8 @@ HUES: Mapping[str, str] = {
     "wheel": "#F0A37A",
     "gear": "#D55E00",
     "mesh": "#8B1E1E",
+    "sliding": "#8B1E1E",
+    "rolling": "#C97064",
 }
 OTHER_HUES = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#6B6B6B")
 # Members of a large family run along a scale of even lightness.
