@@ -230,7 +230,7 @@ class PredictedRun:
         return f"<PredictedRun {self.recording!r}, {role}: {len(self.time)} rows; {', '.join(self.measured)}>"
 
     def to_dataframe(self) -> pd.DataFrame:
-        """Return time, speed, torque, and of every channel what was measured and predicted.
+        """Return time, inputs, and of every channel the measured and the predicted values.
 
         Columns are ``T_oil_degC`` for what was measured, ``T_oil_degC_before``, ``_calibrated`` and ``_after``.
         """

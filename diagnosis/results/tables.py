@@ -71,8 +71,7 @@ def draw_explanations(diagnosis: Diagnosis, ax: Axes | None) -> Axes:
 def run_columns(run: PredictedRun) -> Columns:
     """Return a predicted run as columns; see :meth:`diagnosis.results.result_parts.PredictedRun.to_dataframe`."""
     columns: dict[str, Array] = {"time_s": run.time}
-    shaft = {column_of_input(name): getattr(run, name) for name in ("speed", "torque")}
-    columns |= {column: values for column, values in shaft.items() if np.any(values)}  # zeros without a shaft
+    columns |= {column_of_input(name): values for name, values in run.inputs.items()}
     for channel in run.measured:
         column = column_of(TOTAL_LOSS if is_total_loss(channel) else f"T_{channel}")
         columns |= {column: run.measured[channel]}
