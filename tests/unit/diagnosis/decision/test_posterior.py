@@ -234,7 +234,7 @@ def test_a_fit_at_the_best_place_goes_before_others() -> None:
     pair = replace(judged(2.0 * STRONG, there, second), fit=fit)
     at_the_place = replace(judged(STRONG - 9.0, here, second), fit=fit)
     found = posterior(judged(3.0 * STRONG, here), pair, at_the_place)
-    assert [one.best for one in decide(found, Settings())][0] is at_the_place
+    assert next(one.best for one in decide(found, Settings())) is at_the_place
 
 
 def test_a_parameter_outside_its_prior_is_answered_by_its_name() -> None:
