@@ -44,6 +44,7 @@ class _InClass:
     error_class: ErrorClass
     scan: Scan
     over: OverSessions
+    ahead: float  # of the most probable class, without any candidate
     log_bayes: Array  # against nothing in the most probable class
     strengths: Strengths
 
@@ -103,7 +104,9 @@ def infer(
     best = max(judged.values(), key=lambda one: one.log_bayes + one.log_prior, default=None)
     if best is not None and best.fit is not None and best.log_bayes > 0.0:
         progress(f"scanning again, given {best.label}")
-        remainder, pairs, there = _given_best(calibration, best, candidates, log_prior, len(base.z))
+        assert best.error_class is not None  # noqa: S101 - everything judged has one
+        of_class = first.in_class(best.error_class).ahead
+        remainder, pairs, there = _given_best(calibration, best, candidates, log_prior, of_class)
         alone |= {label: min(alone[label], value) for label, value in there.items()}
     for index, candidate in enumerate(first.candidates):
         judged.setdefault(candidate.label, _by_scan(first, index, alone[candidate.label]))
@@ -155,9 +158,9 @@ def _outside(candidates: Sequence[Hypothesis]) -> list[Hypothesis]:
 def _in_class(
     error_class: ErrorClass, found: Scan, outside: Sequence[Hypothesis], over: OverSessions, ahead: float
 ) -> _InClass:
-    """Candidates in one class that is some nats ahead of the most probable one without any of them."""
+    """Candidates in one class."""
     strengths = _strengths(found, outside, over.given[over.most_probable])
-    return _InClass(error_class=error_class, scan=found, over=over,
+    return _InClass(error_class=error_class, ahead=ahead, scan=found, over=over,
                     log_bayes=_weighed(found, outside, over) + ahead, strengths=strengths)  # fmt: skip
 
 
@@ -187,7 +190,7 @@ def _weighed(found: Scan, outside: Sequence[Hypothesis], over: OverSessions) -> 
     """Log Bayes factors of all candidates, over variants and deviations between sessions."""
     each = [_strengths(found, outside, given).log_bayes for given in over.given]
     best, count = over.weighed(each), len(found.candidates)
-    best[:count] -= (each[over.most_probable][:count] - found.log_bayes).clip(min=0.0)
+    best[:count] -= found.spread
     return best
 
 
@@ -232,8 +235,7 @@ def _spread(found: _Scanned, index: int) -> float:
     """Nats that the best course over the hours is ahead of the mean over all; other shapes are fitted."""
     if found.candidates[index].how != "W":
         return 0.0
-    here = found.best[index]
-    return max(float(here.strengths.log_bayes[index] - here.scan.log_bayes[index]), 0.0)
+    return float(found.best[index].scan.spread[index])
 
 
 def _judged(calibration: Calibration, one: Judged, base: int, spread: float) -> Judged:
@@ -285,7 +287,7 @@ def _by_scan(found: _Scanned, index: int, log_bayes: float) -> Judged:
 
 
 def _given_best(
-    calibration: Calibration, best: Judged, candidates: Sequence[Hypothesis], log_prior: Array, base: int
+    calibration: Calibration, best: Judged, candidates: Sequence[Hypothesis], log_prior: Array, ahead: float
 ) -> tuple[float, list[Judged], dict[str, float]]:
     """Second effects given the best explanation, fitted; and all candidates alone, seen from there.
 
@@ -295,12 +297,12 @@ def _given_best(
         Log Bayes factor of the best second effect, [nat]
     pairs : list of Judged
     alone : mapping of label to float
-        Log Bayes factors of all others against nothing at the point of the best explanation, [nat]
+        Log Bayes factors of all others against nothing, linear at the point of the best explanation, [nat]
     """
     fit, error_class = best.fit, best.error_class
     assert fit is not None  # noqa: S101
     assert error_class is not None  # noqa: S101
-    mine = {effect.label for effect in best.effects}
+    base, mine = len(calibration.fit.z), {effect.label for effect in best.effects}
     others = np.array([one.label not in mine for one in candidates])
     left = [one for one in candidates if one.label not in mine]
     second = _scanned_given(calibration, fit, error_class, left, log_prior[others])
@@ -316,7 +318,6 @@ def _given_best(
         pairs.append(_fitted_on(calibration, both, base))
     found, outside = second.best[0].scan, second.candidates[len(second.best[0].scan.candidates) :]
     without = over_sessions(found.gram, fit.experiment, [*range(base), *found.further])
-    ahead = calibration.in_class(error_class).log_evidence - calibration.chosen.log_evidence
     alone = (_weighed(found, outside, without) + ahead).tolist()
     labels = [one.label for one in second.candidates]
     return float(second.log_bayes[order[0]]), pairs, dict(zip(labels, alone, strict=True))

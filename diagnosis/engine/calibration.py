@@ -80,12 +80,12 @@ class Calibration:
         return _directions(self.columns, self.error.amplitudes(one))
 
     def in_class(self, one: ErrorClass) -> InClass:
-        """The machine with model error of another class."""
+        """The machine with model error of another class, at the same point: a start for fits in that class."""
         if one == self.chosen.error_class:
             return self.chosen
         if one.name not in self._known:
             self._known[one.name] = _in_class(self.fit.experiment, one, self.fit, self.parts, self.error, self.columns,
-                                              self.chosen.deviation)  # fmt: skip
+                                              self.chosen.deviation, iterations=0)  # fmt: skip
         return self._known[one.name]
 
 

@@ -43,6 +43,8 @@ class Scan:
         Best variant of each
     log_bayes : Array, shape (candidates,)
         Mean over the variants, against nothing
+    spread : Array, shape (candidates,)
+        Of the best variant, less that mean; at least 0
     gram : Gram
         Of residual, unknowns, further columns, candidates: in this order
     unknowns, further, of_candidates : range
@@ -56,6 +58,7 @@ class Scan:
     candidates: tuple[Hypothesis, ...]
     best: tuple[int, ...]
     log_bayes: Array
+    spread: Array
     gram: Gram
     unknowns: range
     further: range
@@ -110,7 +113,7 @@ def scan(fit: Fit, candidates: Sequence[Hypothesis], error: Sequence[Array] = ()
     known = range(count)
     chosen = [np.empty((len(W), len(candidates)), order="F") for W in base]
     best: list[int] = []
-    mean, signs, peak = [], [], []
+    mean, spread, signs, peak = [], [], [], []
     warm = [not is_total_loss(name) for name in fit.parts[0].point.sensors.channels]
     everything, residuals = _with_unknowns(fit), [W[:, 0] for W in base]
     intervals = max(len(part.point.trajectory.T) for part in fit.parts)
@@ -132,12 +135,13 @@ def scan(fit: Fit, candidates: Sequence[Hypothesis], error: Sequence[Array] = ()
             best.append(at)
             peak.append((float(peaks_K[first + at]), float(peaks_W[first + at])))
             mean.append(float(np.logaddexp.reduce(found.log_bayes) - np.log(n)))
+            spread.append(float(found.log_bayes[at]) - mean[-1])
             signs.append(int(sign[at]))
             first += n
     extra = base[0].shape[1] - 1 - count
     peak_K, peak_W = np.array(peak).reshape(-1, 2).T
     return Scan(
-        candidates=tuple(candidates), best=tuple(best), log_bayes=np.array(mean),
+        candidates=tuple(candidates), best=tuple(best), log_bayes=np.array(mean), spread=np.array(spread),
         gram=gram_of(fit.parts, base, chosen), unknowns=known,
         further=range(count, count + extra), of_candidates=range(count + extra, count + extra + len(candidates)),
         sd=np.array([strength.sd for strength in priors]), sign=np.array(signs, dtype=int), peak_K=peak_K,
