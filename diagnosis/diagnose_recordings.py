@@ -102,7 +102,7 @@ def diagnose(
         plain = calibrate(experiment)
         others, apart = calibrate_apart(experiment, plain)
         progress("calibrating with model error")
-        calibration = calibrate_with_error(experiment, apart)
+        calibration = calibrate_with_error(experiment, others, apart)
         candidates = candidates_of(setup, experiment, catalogue)
         weights, outside = log_prior(candidates), outside_of(setup, experiment)
         posterior = infer(calibration, candidates, weights, settings, outside=outside, progress=progress)

@@ -12,8 +12,9 @@ from diagnosis.engine.learnt import ErrorClass, error_classes
 from diagnosis.engine.metric import leading_directions
 from diagnosis.engine.model_error import ModelError
 from diagnosis.engine.products import gram_of, whitened_base
-from diagnosis.engine.sessions import fit_over_sessions, sessions_of, with_deviation
+from diagnosis.engine.sessions import fit_over_sessions, over_sessions, sessions_of, with_deviation
 from diagnosis.engine.set_apart import without_channels
+from diagnosis.forward.trajectory import Trajectory
 from models.base.types import Array
 
 WIDEST_CLASS = "full"  # the point is calibrated with it: no parameter has to stand in for what the model cannot know
@@ -47,12 +48,14 @@ class Calibration:
     of_others: Calibration | None = None
 
 
-def calibrate_with_error(experiment: Experiment, apart: Collection[str] = ()) -> Calibration:
+def calibrate_with_error(experiment: Experiment, start: Fit, apart: Collection[str] = ()) -> Calibration:
     """Fit the unknowns with all model error, choose the class by evidence, fit again with that class.
 
     Parameters
     ----------
     experiment : Experiment
+    start : Fit
+        Where to start: the machine calibrated without model error, which is near the readings
     apart : collection of str
         Channels that do not count until the class and the point are found, see
         :func:`diagnosis.engine.set_apart.calibrate_apart`
@@ -60,42 +63,48 @@ def calibrate_with_error(experiment: Experiment, apart: Collection[str] = ()) ->
     Raises
     ------
     ArithmeticError
-        If the simulation has no solution with the priors' middles.
+        If the simulation has no solution at the start.
     """
     error, classes = ModelError.of(experiment), error_classes()
-    found = _calibrated(without_channels(experiment, apart) if apart else experiment, error, classes)
+    found = _calibrated(without_channels(experiment, apart) if apart else experiment, error, classes, start)
     if not apart:
         return found
-    fit = found.fit
-    courses = [part.point.trajectory for part in fit.parts]
-    at = experiment.linearise(fit.z, courses)
-    amplitudes = error.amplitudes(found.chosen)
-    all_readings = _judged(experiment, at.parts, _columns(error, at.parts), amplitudes, found.session_s)
-    over = fit_over_sessions(all_readings.fit(fit.z, courses), len(fit.z))
-    return replace(found, fit=all_readings.fit(fit.z, courses, iterations=0), log_evidence=over.log_evidence,
-                   session_s=over.mean, of_others=found)  # fmt: skip
+    parts = _linearised_at(experiment, found.fit)
+    here = _judged(experiment, parts, error, _columns(error, parts), error.amplitudes(found.chosen), found.session_s)
+    fit = here.fit(found.fit.z, _courses(parts), iterations=0)
+    over = fit_over_sessions(fit, len(fit.z))
+    return replace(found, fit=fit, log_evidence=over.log_evidence, session_s=over.mean, of_others=found)
 
 
-def _calibrated(experiment: Experiment, error: ModelError, classes: Sequence[ErrorClass]) -> Calibration:
+def _calibrated(experiment: Experiment, error: ModelError, classes: Sequence[ErrorClass], start: Fit) -> Calibration:
     (widest,) = (one for one in classes if one.name == WIDEST_CLASS)
-    z = np.zeros(len(experiment.unknowns))
-    at = experiment.linearise(z)
+    fit, parts = start, _linearised_at(experiment, start)
     for iterations in (FIRST_ITERATIONS, ITERATIONS):
-        here = _judged(experiment, at.parts, _columns(error, at.parts), error.amplitudes(widest), 0.0)
-        fit = here.fit(z, [part.point.trajectory for part in at.parts], iterations=iterations)
-        z, at = fit.z, experiment.linearise(fit.z, [part.point.trajectory for part in fit.parts])
-    columns = _columns(error, at.parts)
-    evidence = _evidence_of_classes(z, at.parts, columns, error, classes)
+        here = _judged(experiment, parts, error, _columns(error, parts), error.amplitudes(widest), 0.0)
+        fit = here.fit(fit.z, _courses(parts), iterations=iterations)
+        parts = _linearised_at(experiment, fit)
+    columns = _columns(error, parts)
+    evidence = _evidence_of_classes(experiment, fit.z, parts, columns, error, classes)
     chosen = max(classes, key=lambda one: evidence[one.name])
     best = max(evidence.values())
     s = 0.0
     for _ in range(2 if len(sessions_of(experiment)) > 1 else 1):
-        here = _judged(experiment, at.parts, columns, error.amplitudes(chosen), s)
-        fit = here.fit(z, [part.point.trajectory for part in at.parts], iterations=FIRST_ITERATIONS)
-        over = fit_over_sessions(fit, len(z))
-        z, s = fit.z, float(over.deviations[over.most_probable])
+        here = _judged(experiment, parts, error, columns, error.amplitudes(chosen), s)
+        fit = here.fit(fit.z, _courses(parts), iterations=FIRST_ITERATIONS)
+        over = fit_over_sessions(fit, len(fit.z))
+        s = float(over.deviations[over.most_probable])
     return Calibration(fit=fit, chosen=chosen, evidence={name: value - best for name, value in evidence.items()},
                        log_evidence=over.log_evidence, session_s=over.mean)  # fmt: skip
+
+
+def _linearised_at(experiment: Experiment, fit: Fit) -> list[Linear]:
+    """All pieces near the courses of a fit, with the model error assumed there; whitened by their own filters."""
+    courses = _courses(fit.parts)
+    return [experiment.linearised(i, fit.z, course, error=course.piece.error) for i, course in enumerate(courses)]
+
+
+def _courses(parts: Sequence[Linear]) -> list[Trajectory]:
+    return [part.point.trajectory for part in parts]
 
 
 def _columns(error: ModelError, parts: Sequence[Linear]) -> list[Array]:
@@ -104,22 +113,35 @@ def _columns(error: ModelError, parts: Sequence[Linear]) -> list[Array]:
 
 
 def _judged(
-    experiment: Experiment, parts: Sequence[Linear], columns: Sequence[Array], amplitudes: Array, s: float
-) -> Experiment:
+    experiment: Experiment, parts: Sequence[Linear], error: ModelError, columns: Sequence[Array], amplitudes: Array,
+    s: float,
+) -> Experiment:  # fmt: skip
     """The experiment with the filters of a linearisation and the leading directions of model error in its metric."""
-    there = amplitudes > 0.0
+    directions = _directions(columns, amplitudes)
+    return with_deviation(
+        experiment.with_filters(parts), [part.columns for part in parts], [N @ directions for N in columns], s,
+        [error.courses(part.point, directions) for part in parts],
+    )  # fmt: skip
+
+
+def _directions(columns: Sequence[Array], amplitudes: Array) -> Array:
+    """Combinations of unknowns per unit with the prior N(0, 1) each, shape (unknowns, n)."""
+    there = np.flatnonzero(amplitudes > 0.0)
     scaled = [N[:, there] * amplitudes[there] for N in columns]
-    directions = leading_directions(np.sum([N.T @ N for N in scaled], axis=0))
-    shared = [N @ directions for N in scaled]
-    return with_deviation(experiment.with_filters(parts), [part.columns for part in parts], shared, s)
+    leading = leading_directions(np.sum([N.T @ N for N in scaled], axis=0))
+    directions = np.zeros((len(amplitudes), leading.shape[1]))
+    directions[there] = amplitudes[there, None] * leading
+    return directions
 
 
 def _evidence_of_classes(
-    z: Array, parts: Sequence[Linear], columns: Sequence[Array], error: ModelError, classes: Sequence[ErrorClass]
+    experiment: Experiment, z: Array, parts: Sequence[Linear], columns: Sequence[Array], error: ModelError,
+    classes: Sequence[ErrorClass],
 ) -> dict[str, float]:  # fmt: skip
-    """Log evidence of every class at one point, prior included."""
-    gram, count = gram_of(parts, whitened_base(parts, z, columns)), len(z)
-    given = gram.given(range(count))
-    places = range(count, gram.count)
-    return {one.name: float(np.log(one.prior)) + given.given(places, error.amplitudes(one)).log_evidence
-            for one in classes}  # fmt: skip
+    """Log evidence of every class at one point, prior included, over all deviations between sessions."""
+    found = {}
+    for one in classes:
+        directions = _directions(columns, error.amplitudes(one))
+        gram = gram_of(parts, whitened_base(parts, z, [N @ directions for N in columns]))
+        found[one.name] = float(np.log(one.prior)) + over_sessions(gram, experiment, range(gram.count)).log_evidence
+    return found

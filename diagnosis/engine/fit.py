@@ -12,7 +12,7 @@ from scipy.linalg import solve_triangular
 from diagnosis.engine.metric import Metric
 from diagnosis.engine.point import Column, Machine, Point, Setting
 from diagnosis.engine.unknown import Scope, Unknown, in_scope
-from diagnosis.forward.grid import Piece
+from diagnosis.forward.grid import ErrorCourse, Piece
 from diagnosis.forward.trajectory import ROUNDS, Trajectory, simulate
 from diagnosis.forward.whitening import Noise, Whitening
 from models.base.errors import InputError
@@ -102,8 +102,20 @@ class Experiment:
                 unknown.act(setting, value)
         return setting
 
-    def point(self, index: int, z: Array, guess: Guess = None, *, rounds: int = ROUNDS) -> Point:
+    def point(
+        self, index: int, z: Array, guess: Guess = None, *, rounds: int = ROUNDS, error: ErrorCourse | None = None
+    ) -> Point:
         """Simulate a piece.
+
+        Parameters
+        ----------
+        index : int
+        z : Array, shape (unknowns,)
+        guess
+            See :func:`diagnosis.forward.trajectory.simulate`
+        rounds : int
+        error : ErrorCourse or None
+            Model error that is assumed
 
         Raises
         ------
@@ -111,10 +123,11 @@ class Experiment:
             If the temperatures leave all bounds.
         """
         setting, model = self.setting(index, z), self.machine.model
+        error = None if error is None else error.of_parts(tuple(model.parts))
         known = guess if isinstance(guess, Trajectory) else None
         follows = any(shift.follows for shift in self.machine.shifts)
         for _ in range(PASSES if follows and known is None else 1):
-            piece = setting.piece(self.pieces[index], known)
+            piece = replace(setting.piece(self.pieces[index], known), error=error)
             known = simulate(model, piece, setting.values, self.starts[index], guess=guess, rounds=rounds,
                              settled_K=0.01)  # fmt: skip
             guess = known
@@ -129,11 +142,18 @@ class Experiment:
             for unknown, value in zip(self.unknowns, z.tolist(), strict=True)
         ])  # fmt: skip
 
-    def linearised(self, index: int, z: Array, guess: Guess, *, rounds: int = 1, kept: Linear | None = None) -> Linear:
-        """Simulate a piece and whiten its residual and columns; `kept`: with the columns of that linearisation."""
-        point = self.point(index, z, guess, rounds=rounds)
+    def linearised(
+        self, index: int, z: Array, guess: Guess, *, rounds: int = 1, kept: Linear | None = None,
+        error: ErrorCourse | None = None,
+    ) -> Linear:  # fmt: skip
+        """Simulate a piece and whiten its residual and columns; `kept`: with the columns of that linearisation.
+
+        With model error that is assumed, the simulation is near the readings and everything is linearised there; the
+        residual is that without it all the same.
+        """
+        point = self.point(index, z, guess, rounds=rounds, error=error)
         if kept is not None:
-            residual = kept.filter(point.residual[:, :, None])[:, 0]
+            residual = kept.filter(point.residual_without_error[:, :, None])[:, 0]
             return Linear(point=point, filter=kept.filter, residual=residual, columns=kept.columns)
         columns = self.columns(point, z)
         if not np.isfinite(columns).all():
@@ -144,7 +164,7 @@ class Experiment:
             whiten = Whitening(self.machine.model, point.trajectory, point.sensors, self.noise[index])
         else:
             whiten = self.filters[index]
-        white = whiten(np.concatenate([point.residual[:, :, None], columns], axis=2))
+        white = whiten(np.concatenate([point.residual_without_error[:, :, None], columns], axis=2))
         return Linear(point=point, filter=whiten, residual=white[:, 0], columns=white[:, 1:])
 
     def fit(
@@ -183,7 +203,7 @@ class Experiment:
             step *= min(1.0, FARTHEST_STEP / max(longest, 1e-12))
             tried = np.clip(z + step, lower, upper)
             keep = fresh and longest < NEAR
-            trial = self._attempt(tried, _courses(at.parts), at.parts if keep else None)
+            trial = self._attempt(tried, _courses(at.parts), at.parts if keep else None, self._errors(at, tried - z))
             reached = np.inf if trial is None else trial.objective(tried)
             if trial is not None and reached <= objective + 1e-6:
                 gained, z, at, objective = objective - reached, tried, trial, reached
@@ -223,18 +243,31 @@ class Experiment:
         """Experiment that is judged by the noise filters of a linearisation."""
         return replace(self, filters=tuple(part.filter for part in parts))
 
+    def _errors(self, at: Linearised, step: Array) -> Sequence[ErrorCourse | None] | None:
+        """The most probable model error in every piece after a step of the unknowns, if the metric has any."""
+        if self.metric is None or not self.metric.courses:
+            return None
+        found = self.metric.explained([part.residual - part.columns @ step for part in at.parts])
+        return [courses.along(values) for courses, values in zip(self.metric.courses, found, strict=True)]
+
     def _attempt(
-        self, z: Array, guesses: Sequence[Guess] | None, kept: Sequence[Linear] | None = None
-    ) -> Linearised | None:
+        self, z: Array, guesses: Sequence[Guess] | None, kept: Sequence[Linear] | None = None,
+        errors: Sequence[ErrorCourse | None] | None = None,
+    ) -> Linearised | None:  # fmt: skip
         try:
             if guesses is None:
                 parts = [self.linearised(i, z, None, rounds=ROUNDS) for i in range(len(self.pieces))]
             else:  # trajectory and unknowns settle together: one round per iteration
-                parts = [self.linearised(i, z, guess, kept=None if kept is None else kept[i])
-                         for i, guess in enumerate(guesses)]  # fmt: skip
+                errors = errors or [self._assumed(guess) for guess in guesses]
+                parts = [self.linearised(i, z, guess, kept=None if kept is None else kept[i], error=error)
+                         for i, (guess, error) in enumerate(zip(guesses, errors, strict=True))]  # fmt: skip
             return Linearised.of(parts, self.metric)
         except (InputError, ArithmeticError, np.linalg.LinAlgError):
             return None
+
+    def _assumed(self, guess: Guess) -> ErrorCourse | None:
+        """Model error that a guess was simulated with, if the metric has any."""
+        return guess.piece.error if isinstance(guess, Trajectory) and self.metric is not None else None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -246,6 +279,7 @@ class Linear:
     point : Point
     filter : Whitening
     residual : Array, shape (M,)
+        Without model error
     columns : Array, shape (M, unknowns)
     """
 

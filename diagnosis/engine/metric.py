@@ -19,9 +19,33 @@ from functools import cached_property
 import numpy as np
 from scipy.linalg import eigh, solve_triangular
 
+from diagnosis.forward.grid import ErrorCourse
 from models.base.types import Array
 
 LEAST_DIRECTION, MOST_DIRECTIONS = 0.1, 300  # squared norm of a direction against the noise; how many are carried
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ErrorCourses:
+    """What n unknowns of model error do along a piece, per unit; see :class:`diagnosis.forward.grid.ErrorCourse`.
+
+    Attributes
+    ----------
+    parts : tuple of str
+    heat : Array, shape (K, parts, n)
+    loss : Array, shape (K, n)
+    reading : Array, shape (K + 1, channels, n)
+    """
+
+    parts: tuple[str, ...]
+    heat: Array
+    loss: Array
+    reading: Array
+
+    def along(self, values: Array) -> ErrorCourse:
+        """All of them together, with values of shape (n,)."""
+        return ErrorCourse(parts=self.parts, heat=self.heat @ values, loss=self.loss @ values,
+                           reading=self.reading @ values)  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -35,12 +59,18 @@ class Metric:
     shared : tuple of Array, shape (M, n) each
         Whitened columns of every piece, times their amplitudes, whose values all sessions share
     own : tuple of Array, shape (M, m) each
-        The same of the deviations of a session; m = 0 if sessions do not differ
+        The same of the deviations of a session, those of the shared columns last; m = 0 if sessions do not differ
+    deviation : float
+        Of a session, in prior standard deviations
+    courses : tuple of ErrorCourses
+        What the shared columns do along every piece, for simulations with model error; empty: none
     """
 
     sessions: tuple[tuple[int, ...], ...]
     shared: tuple[Array, ...]
     own: tuple[Array, ...]
+    deviation: float = 0.0
+    courses: tuple[ErrorCourses, ...] = ()
 
     @cached_property
     def _roots(self) -> tuple[list[Array], Array]:
@@ -101,6 +131,28 @@ class Metric:
         for each, r in zip(mine, own, strict=True):
             a, b = a - each.T @ r[:, 0], b - np.einsum("un,un->n", each, each)
         return np.asarray(a), np.asarray(b)
+
+    def explained(self, residuals: Sequence[Array]) -> list[Array]:
+        """Most probable values of the shared columns in every piece, deviations of its session included.
+
+        Parameters
+        ----------
+        residuals : sequence of Array, shape (M,) each
+
+        Returns
+        -------
+        list of Array, shape (n,) each
+        """
+        (roots, whole), (mine, along) = self._roots, self._along([r[:, None] for r in residuals])
+        shared = solve_triangular(whole.T, along[:, 0])
+        found = [shared] * len(residuals)
+        for root, across, own, pieces in zip(roots, self._across, mine, self.sessions, strict=True):
+            if not len(root):
+                continue
+            deviation = solve_triangular(root.T, own[:, 0] - across @ shared)
+            for p in pieces:
+                found[p] = shared + self.deviation * deviation[len(deviation) - len(shared) :]
+        return found
 
     def _along(self, columns: Sequence[Array]) -> tuple[list[Array], Array]:
         """Components of columns along what is marginalised: of every session, then of what all share."""

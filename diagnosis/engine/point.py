@@ -181,6 +181,16 @@ class Point:
         """Measured minus read, shape (K + 1, channels), NaN where nothing was measured."""
         return np.asarray(self.trajectory.piece.measured - self.read)
 
+    @property
+    def residual_without_error(self) -> Array:
+        """The same for a simulation without the model error that was assumed, to first order."""
+        error = self.trajectory.piece.error
+        if error is None:
+            return self.residual
+        into = np.pad(error.heat, ((0, 0), (0, len(self.machine.model.coupled))))
+        shown = self.setting.passed_on(self.trajectory, error.reading[:, :, None])
+        return np.asarray(self.residual + (self.heated(into[:, :, None], error.loss[:, None]) + shown)[:, :, 0])
+
     @cached_property
     def balance(self) -> Balance:
         """The heat balance along the trajectory."""

@@ -16,7 +16,7 @@ from scipy.special import logsumexp
 from diagnosis.engine.fit import Experiment, Fit
 from diagnosis.engine.gram import Given, Gram
 from diagnosis.engine.learnt import deviation_priors
-from diagnosis.engine.metric import Metric
+from diagnosis.engine.metric import ErrorCourses, Metric
 from diagnosis.engine.products import base_of, gram_of
 from models.base.types import Array
 
@@ -94,7 +94,10 @@ def over_sessions(
     return OverSessions(deviations=np.array(list(prior)), log_priors=np.log(list(prior.values())), given=tuple(found))
 
 
-def with_deviation(experiment: Experiment, columns: Sequence[Array], shared: Sequence[Array], s: float) -> Experiment:
+def with_deviation(
+    experiment: Experiment, columns: Sequence[Array], shared: Sequence[Array], s: float,
+    courses: Sequence[ErrorCourses] = (),
+) -> Experiment:  # fmt: skip
     """The experiment judged with a deviation between sessions.
 
     Parameters
@@ -105,11 +108,14 @@ def with_deviation(experiment: Experiment, columns: Sequence[Array], shared: Seq
         Whitened columns of unknowns, and of model error times its amplitudes
     s : float
         In prior standard deviations
+    courses : sequence of ErrorCourses
+        What the model error does, for simulations with it
     """
     own = [
         s * np.column_stack([J, N]) if s > 0.0 else np.zeros((len(J), 0)) for J, N in zip(columns, shared, strict=True)
     ]
-    metric = Metric(sessions=sessions_of(experiment), shared=tuple(shared), own=tuple(own))
+    metric = Metric(sessions=sessions_of(experiment), shared=tuple(shared), own=tuple(own), deviation=s,
+                    courses=tuple(courses))  # fmt: skip
     return replace(experiment, metric=metric)
 
 

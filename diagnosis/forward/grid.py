@@ -36,6 +36,35 @@ SLOW_S = 60.0  # rows further apart are means that hide what switches do, see :c
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class ErrorCourse:
+    """What model error is assumed to do along a piece, while that piece is simulated.
+
+    Attributes
+    ----------
+    parts : tuple of str
+    heat : Array, shape (K, parts)
+        Into every part, [W]
+    loss : Array, shape (K,)
+        Part of it that is mechanical loss, [W]
+    reading : Array, shape (K + 1, channels)
+        Change of the readings of sound sensors, [K] or [W]
+    """
+
+    parts: tuple[str, ...]
+    heat: Array
+    loss: Array
+    reading: Array
+
+    def of_parts(self, parts: tuple[str, ...]) -> ErrorCourse:
+        """The same for a machine that has more parts."""
+        if parts == self.parts:
+            return self
+        heat = np.zeros((len(self.heat), len(parts)))
+        heat[:, [parts.index(name) for name in self.parts]] = self.heat
+        return replace(self, parts=parts, heat=heat)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Piece:
     """One gap-free piece of a recording on the working grid of K intervals.
 
@@ -63,6 +92,8 @@ class Piece:
         Time constants of the sensors, [s]: switches feel what a slow sensor does not show yet
     late_s : float
         By how much the clock of the temperatures is behind that of the inputs: switches felt them so much earlier
+    error : ErrorCourse or None
+        Model error that is assumed
     """
 
     recording: str
@@ -75,6 +106,7 @@ class Piece:
     guided: bool = False
     lags: Array | None = None
     late_s: float = 0.0
+    error: ErrorCourse | None = None
 
     @cached_property
     def steps(self) -> Array:

@@ -178,6 +178,8 @@ class NetworkOnGrid:
         differences = self.differences(signals, T, shape)
         sources = self.source_heats(signals, power, shape)
         heat = sources @ self.injection + (conductances * differences) @ self.to_parts
+        if piece.error is not None:
+            heat = heat + piece.error.heat
         return Balance(heat=heat, sources=sources, conductances=conductances, differences=differences)
 
     def rates(self, piece: Piece, T: Array, values: Array, power: Array, memory: Array) -> Array:

@@ -47,7 +47,8 @@ def readings(model: NetworkOnGrid, trajectory: Trajectory, sensors: Sensors) -> 
     for index, name in enumerate(sensors.channels):
         read[:, index] = delayed_loss(trajectory, sensors.loss_delay) * sensors.loss_gain if is_total_loss(name) else (
             lagged(trajectory.T[:, model.part_index(name)], trajectory.piece.steps, sensors.lag[index]))  # fmt: skip
-    return np.asarray(read + sensors.bias)
+    error = trajectory.piece.error
+    return np.asarray(read + sensors.bias + (0.0 if error is None else error.reading))
 
 
 def reading_columns(

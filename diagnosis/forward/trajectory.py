@@ -343,6 +343,8 @@ def linear_round(
     memory[:, model.coupled] = 0.5 * (result[1:, n:] + result[:-1, n:])
     result = result[:, :n]
     loss = solved.total + np.einsum("kn,kn->k", solved.loss_slope, 0.5 * (result[1:] + result[:-1]) - T)
+    if piece.error is not None:
+        loss = loss + piece.error.loss
     return Trajectory(
         piece=piece, T=result, values=values, tangent=tangent, seen=seen, memory=memory, balance=solved.balance,
         jacobian=solved.jacobian, loss=loss, loss_slope=solved.loss_slope, decay=solved.decay, gain=solved.gain,

@@ -2,8 +2,8 @@
 
 A free-running residual wanders for hours: one forgotten watt in the oil shows in every later row. Judged row by row it
 looks like overwhelming evidence. The noise model therefore holds what a real gearbox always has besides its model: a
-random heat in every part (an Ornstein-Uhlenbeck process, the *structural floor*), unknown start temperatures, and white
-sensor noise. A Kalman filter of the linearised network gives the innovations of any signal under this noise; the same
+random heat in every part (an Ornstein-Uhlenbeck process, the *structural floor*; larger where much heat goes to the
+surroundings, whose draughts come and go), unknown start temperatures, and white sensor noise. A Kalman filter of the linearised network gives the innovations of any signal under this noise; the same
 filter applied to a derivative gives that derivative in the same, whitened units.
 
 References
@@ -47,6 +47,8 @@ class Noise:
         Its correlation time, [s]
     start_sd : Array, shape (parts,)
         Uncertainty of the start temperatures, [K]
+    wander : float
+        Random share of the heat that a part gives to its surroundings, [-]
     capacity : float
         Sum of the heat capacities that `heat_sd` is given for, [J/K]: it goes with them, else the floor would decide on
         the size of a gearbox whose recordings determine ratios only; 0 where it is fixed
@@ -58,6 +60,7 @@ class Noise:
     heat_sd: Array
     heat_time: float
     start_sd: Array
+    wander: float = 0.0
     capacity: float = 0.0
 
     def with_floor(self, times: float) -> Noise:
@@ -85,12 +88,14 @@ class Whitening:
         size, steps = n + len(shaken), piece.steps
         count = len(steps)
         rho = np.exp(-steps / noise.heat_time)
-        per_capacity = trajectory.gain[:, :, shaken] / trajectory.capacities[shaken]
+        # The states are of variance 1; how much heat they are goes with the heat that the surroundings take.
+        heat_sd = np.hypot(noise.heat_sd, noise.wander * _to_surroundings(model, trajectory))[:, shaken]
+        per_capacity = trajectory.gain[:, :, shaken] * (heat_sd / trajectory.capacities[shaken])[:, None, :]
         self._transition = np.zeros((count, size, size))
         self._transition[:, :n, :n] = trajectory.decay
         self._transition[:, :n, n:] = per_capacity
         self._transition[:, range(n, size), range(n, size)] = rho[:, None]
-        renewed = (noise.heat_sd[shaken] ** 2) * (1.0 - rho[:, None] ** 2)
+        renewed = 1.0 - rho**2
         observe = _observation(model, trajectory, sensors, size)
         self._seen = np.isfinite(piece.measured)
         variance = reading_variance(model, trajectory, sensors, noise)
@@ -102,7 +107,7 @@ class Whitening:
         covariance = np.zeros((size, size))
         covariance[range(n), range(n)] = float(noise.start_sd.max()) ** 2  # of a tank it is as little known as can be
         covariance[range(model.n), range(model.n)] = noise.start_sd**2
-        covariance[range(n, size), range(n, size)] = noise.heat_sd[shaken] ** 2
+        covariance[range(n, size), range(n, size)] = 1.0
         half = np.zeros((size, size))
         for k in range(points):
             H = observe[k]
@@ -154,6 +159,16 @@ class Whitening:
                 now, after = after, now
         result[~self._seen] = 0.0
         return result.reshape(points * m, count)
+
+
+def _to_surroundings(model: NetworkOnGrid, trajectory: Trajectory) -> Array:
+    """Heat that links to boundaries take from every part, or bring, shape (K, parts), [W]."""
+    outside = (
+        np.abs(model.to_parts.sum(axis=1)) > 0.5
+    )  # the heat of a link between parts is counted twice, with both signs
+    balance = trajectory.balance
+    flows = np.square(balance.conductances * balance.differences)[:, outside]
+    return np.asarray(np.sqrt(flows @ np.abs(model.to_parts[outside])))
 
 
 def reading_variance(model: NetworkOnGrid, trajectory: Trajectory, sensors: Sensors, noise: Noise) -> Array:

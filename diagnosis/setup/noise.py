@@ -18,6 +18,7 @@ LOWEST_SD_K, LOWEST_SD_W = 0.02, 0.5
 FEWEST_ROWS, DEFAULT_LOSS_RELATIVE = 50, 0.02
 HEAT_FRACTION = 0.005  # random heat in every part, of the typical total loss
 HEAT_TIME_S = 1200.0
+WANDER = 0.03  # of the heat to the surroundings: draughts; strangers' healthy machines ask for it (17 to 58 nats each)
 # Laws of which only the form is known miss more, in every part; a part of little heat capacity is at once where its
 # heat and conductances put it, so its floor is told as a temperature.
 PARAMETRIC_FRACTION, PARAMETRIC_K = 0.05, 0.7
@@ -116,6 +117,7 @@ def noise_of(
         heat_sd=heat_sd,
         heat_time=HEAT_TIME_S,
         start_sd=np.where(known, START_KNOWN_K, unknown),
+        wander=WANDER,
         capacity=float(capacities.sum()) if parametric else 0.0,
     )
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from diagnosis.engine.fit import Experiment, Linear
 from diagnosis.engine.learnt import ErrorClass
+from diagnosis.engine.metric import ErrorCourses
 from diagnosis.engine.model_error.anatomy import Anatomy
 from diagnosis.engine.model_error.courses import Standard, View
 from diagnosis.engine.model_error.groups import GROUPS, Change, HeatChange
@@ -131,6 +132,19 @@ class ModelError:
         for begin, end in self._chunks(part.point, 0, len(self.groups)):
             result[:, begin:end] = part.filter(self.responses(part.point, begin, end))
         return result
+
+    def courses(self, point: Point, combinations: Array) -> ErrorCourses:
+        """What combinations of the unknowns, shape (unknowns, n), do along a piece."""
+        points, channels = point.read.shape
+        parts, count = point.machine.model.parts, combinations.shape[1]
+        heat, loss = np.zeros((points - 1, len(parts), count)), np.zeros((points - 1, count))
+        reading = np.zeros((points, channels, count))
+        for begin, end in self._chunks(point, 0, len(self.groups)):
+            found, some = self.columns(point, begin, end), combinations[begin:end]
+            heat += found.into[:, : len(parts)] @ some
+            loss += found.loss @ some
+            reading += found.reading @ some
+        return ErrorCourses(parts=tuple(parts), heat=heat, loss=loss, reading=reading)
 
     def _chunks(self, point: Point, first: int, last: int) -> Iterator[tuple[int, int]]:
         """Ranges of so many unknowns as memory allows at once."""
