@@ -41,7 +41,7 @@ PHRASES = {
     r"\bin distress\b": "far outside its prior",
     r"\bof the house\b": "of this project",
 }
-# In docs/*.md these phrases and those for the start of a text are common English.
+# In pages of docs these phrases and those for the start of a text are common English.
 NOT_IN_DOCS = (r"\b(?:says|said)\b", r"\bwhat (?:was|is|were|has|had) (?:found|told|said|shown|seen|left|meant)\b")
 
 
@@ -93,7 +93,7 @@ def docs_faults(path: Path) -> Iterator[str]:
     for number, line in enumerate(text.splitlines(), 1):
         for pattern, better in patterns.items():
             if found := re.search(pattern, line):
-                yield f"docs/{path.name}:{number}: {found[0]!r}: better: {better}"
+                yield f"{path.relative_to(ROOT).as_posix()}:{number}: {found[0]!r}: better: {better}"
 
 
 def notebook_faults(path: Path) -> Iterator[str]:
@@ -122,7 +122,7 @@ def main() -> int:
                 faults.append(f"{name}: {lines} lines; split it, at most {MOST_LINES} are allowed")
             if folder in PACKAGES:
                 faults += phrase_faults(path, name)
-    for path in sorted((ROOT / "docs").glob("*.md")):
+    for path in sorted((ROOT / "docs").rglob("*.md")):
         faults += docs_faults(path)
     for path in sorted((ROOT / "docs" / "notebooks").glob("*.ipynb")):
         faults += [*docs_faults(path), *notebook_faults(path)]

@@ -105,7 +105,7 @@ def once(train: Sequence[str], holdout: Sequence[str], share: float, jobs: int) 
     catalogue = {name: CATALOGUE[name] for name in names if name in kept}
     learnt, judged, _ = read_by_role(train, holdout, (), gearbox.network())
     found = diagnose(learnt, gearbox, holdout=judged, catalogue=catalogue, jobs=jobs,
-                     progress=lambda line: marks.append((line, time.perf_counter())))  # fmt: skip
+                     progress=lambda line, *_: marks.append((line, time.perf_counter())))  # fmt: skip
     marks.append(("writing the report", time.perf_counter()))
     with tempfile.TemporaryDirectory() as folder:
         write_files(found, gearbox, [*learnt, *judged], Path(folder))

@@ -24,6 +24,7 @@ from diagnosis.decision.infer import infer
 from diagnosis.decision.settings import Settings
 from diagnosis.engine.calibration import calibrate_with_error
 from diagnosis.engine.families import candidates_of, log_prior
+from diagnosis.engine.fit import calibrate
 from diagnosis.engine.prepare import prepare_experiment
 from diagnosis.recordings.read import read_recordings
 from models.assembly.gearbox import load_gearbox
@@ -47,7 +48,7 @@ class Clock:
         self.stages[name] = self.stages.get(name, 0.0) + now - self._since
         self._since = now
 
-    def told(self, message: str) -> None:
+    def told(self, message: str, *_: int) -> None:
         """Progress of the inference: its first word names the stage that begins."""
         if self._of:
             self.mark(self._of)
@@ -64,7 +65,7 @@ def stages_of(gearbox: str, recordings: Sequence[str]) -> dict[str, float]:
     read, clock = read_recordings(recordings, machine.network()), Clock()
     setup, experiment, *_ = prepare_experiment(machine, read)
     clock.mark("preparation")
-    calibration = calibrate_with_error(experiment)
+    calibration = calibrate_with_error(experiment, calibrate(experiment))
     clock.mark("calibration")
     candidates = candidates_of(setup, experiment, CATALOGUE)
     prior = log_prior(candidates)

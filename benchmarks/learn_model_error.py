@@ -20,6 +20,7 @@ from pathlib import Path
 import numpy as np
 
 from diagnosis.engine.calibration import WIDEST_CLASS, calibrate_with_error
+from diagnosis.engine.fit import calibrate
 from diagnosis.engine.gram import Given
 from diagnosis.engine.learnt import error_classes
 from diagnosis.engine.model_error import ModelError
@@ -89,7 +90,7 @@ def keep(family: str, machine: str, seed: int, file: Path) -> None:
         paths = [str(path) for path in sorted(Path(folder).glob("train_*.csv.gz"))]
         recordings = read_recordings(paths, gearbox.network())
     _, experiment = prepare_experiment(gearbox, recordings, recordings)
-    found = calibrate_with_error(experiment)
+    found = calibrate_with_error(experiment, calibrate(experiment))
     fit, error = found.fit, ModelError.of(experiment)
     gram = gram_of(fit.parts, whitened_base(fit.parts, fit.z, [error.whitened(part) for part in fit.parts]))
     count = len(fit.z)

@@ -10,7 +10,7 @@ import sys
 import click
 
 from builder.base.console import err
-from builder.commands.cli import commands
+from builder.base.progress import progress
 from models.base.errors import InputError
 
 INTERRUPTED = 130  # what shells give for a program stopped by the keyboard
@@ -19,6 +19,9 @@ INTERRUPTED = 130  # what shells give for a program stopped by the keyboard
 def main() -> None:
     """Run one verb."""
     try:
+        with progress("loading the program"):
+            from builder.commands.cli import commands  # seconds, on a machine that has other work
+
         sys.exit(commands(standalone_mode=False) or 0)
     except InputError as error:
         err.print(str(error), style="red")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -27,6 +27,7 @@ from diagnosis.setup.shaft import shafts, with_shaft
 from models.assembly.gearbox import Gearbox, load_gearbox
 from models.base.errors import InputError
 from models.base.parallel import one_thread
+from models.base.progress import Progress, silent
 from models.mechanisms import CATALOGUE, Mechanism
 from models.quantities.quantities import is_total_loss
 
@@ -45,7 +46,7 @@ def diagnose(
     settings: Settings = SETTINGS,
     catalogue: Mapping[str, Mechanism] | None = None,
     jobs: int = 1,
-    progress: Callable[[str], None] = lambda _: None,
+    progress: Progress = silent,
 ) -> Diagnosis:
     """Say whether recordings agree with the model of a gearbox, and if not, where, by what physics, and how strongly.
 
@@ -67,7 +68,7 @@ def diagnose(
     jobs : int
         Processes
     progress : callable
-        Told in words what is being done
+        Told what is being done, as ``progress(what, done, of)``
 
     Returns
     -------

@@ -8,8 +8,12 @@ from types import FrameType
 
 import click
 
+from builder.base.example import example
+from builder.base.progress import LOADING, progress
 from builder.base.workers import worker_options
+from builder.commands.check import check
 from builder.commands.conceal import conceal
+from builder.commands.definition_files import new, schema
 from builder.commands.diagnose import diagnose
 from builder.commands.prove import prove, score
 from builder.commands.simulate import simulate
@@ -20,20 +24,37 @@ from models.correction.correction import read_correction
 
 GEARBOX_HELP = f"Name ({', '.join(known_gearboxes())}) or definition file (TOML)."
 
+LONGEST = 80  # characters of a first sentence, which the help of all verbs has in full
+GROUPS = {
+    "Your machine": ("new", "check", "schema", "build-fmu", "simulate"),
+    "Recordings of it": ("diagnose",),
+    "Trust": ("conceal", "prove", "score", "reproduce"),
+}
+
 
 def _stop(_number: int, _frame: FrameType | None) -> None:
     """Let a termination unwind like an interrupt, so that unfinished files are removed."""
     raise KeyboardInterrupt
 
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
+class _Verbs(click.Group):
+    """Verbs in the order of a user's day, each with its first sentence."""
+
+    def format_commands(self, _: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the groups of verbs."""
+        for title, names in GROUPS.items():
+            with formatter.section(title):
+                formatter.write_dl([(name, self.commands[name].get_short_help_str(LONGEST)) for name in names])
+
+
+@click.group(cls=_Verbs, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
 @click.version_option(project_version(), prog_name=DISTRIBUTION)
 def commands() -> None:
-    """Power loss and temperatures of cylindrical gearboxes: full model, surrogate and FMU."""
+    """Thermal twin of gearboxes: full model, surrogate, FMU, and diagnosis."""
     signal.signal(signal.SIGTERM, _stop)
 
 
-@commands.command("build-fmu")
+@click.command("build-fmu", epilog=example("build-fmu --gearbox conveyor --output out/conveyor"))
 @click.option("--gearbox", default="fzg", show_default=True, metavar="NAME|FILE", help=GEARBOX_HELP)
 @click.option("--target", type=click.Choice(["python", "native", "both"]), default="both", show_default=True,
               help="Kind of FMU: native (C; needs no other software), python (pythonfmu, ONNX networks in "
@@ -74,7 +95,8 @@ def build_fmu(
     dask: str | None,
 ) -> None:
     """Train the networks of a gearbox and build its FMU."""
-    from builder.workflows.build import build  # imports scikit-learn and onnx, which the other verbs need not wait for
+    with progress(LOADING):
+        from builder.workflows.build import build  # scikit-learn and onnx, which the other verbs need not wait for
 
     if platforms is not None and target == "python":
         raise click.UsageError("--platforms is about native FMUs; give it without --target python")
@@ -84,27 +106,14 @@ def build_fmu(
     found = None if correction is None else read_correction(correction, definition.network(), made_for=definition)
     found = found.claims_only() if found and claims_only else found
     folder = output if output is not None else Path("out") / Path(gearbox).stem
-    report = build(
-        definition,
-        folder,
-        name=Path(gearbox).stem,
-        target=target,
-        platforms=platforms or "host",
-        fmi=fmi or "2",
-        preset=preset,
-        samples=samples,
-        seed=seed,
-        jobs=jobs,
-        dask=dask,
-        correction=found,
-        couple=couple,
-    )
+    with progress("starting") as told:
+        report = build(
+            definition, folder, name=Path(gearbox).stem, target=target, platforms=platforms or "host", fmi=fmi or "2",
+            preset=preset, samples=samples, seed=seed, jobs=jobs, dask=dask, correction=found, couple=couple,
+            progress=told,
+        )  # fmt: skip
     report.show()
 
 
-commands.add_command(simulate)
-commands.add_command(diagnose)
-commands.add_command(reproduce)
-commands.add_command(conceal)
-commands.add_command(prove)
-commands.add_command(score)
+for verb in (new, check, schema, build_fmu, simulate, diagnose, conceal, prove, score, reproduce):
+    commands.add_command(verb)

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 
 import click
 
 from builder.base import console
+from builder.base.example import example
+from builder.base.progress import LOADING, progress
 from builder.commands.conceal_in_zoo import conceal_in_zoo
 from builder.commands.conceal_into import conceal_into
 from models.assembly.gearbox import load_gearbox
@@ -34,7 +37,7 @@ def _list_effects(context: click.Context, _: click.Parameter, asked: bool) -> No
         context.exit()
 
 
-@click.command("conceal")
+@click.command("conceal", epilog=example("conceal --effect windage --seed 1 --output out/concealed"))
 @click.option("--plant", type=click.Choice(["own", "zoo"]), default="own", show_default=True, is_eager=True,
               help="own: built like the model, of any gearbox; zoo: of random structure.")  # fmt: skip
 @click.option("--effect", default=None, metavar="NAME", help="Effect to conceal; --list shows the names.")
@@ -89,12 +92,12 @@ def conceal(
     date: str | None,
     control: bool,
 ) -> None:
-    """Make recordings of a gearbox that hides an effect; the truth goes into another folder.
+    """Make recordings that hide a known effect, to test a diagnosis.
 
-    The recordings come from a separate plant, not from the model: about 22 h to learn from (train_1 to train_3) and
-    6 h to hold out (hold_1, hold_2). Plants of the zoo are built of other nodes, paths and laws than the model;
-    strengths are drawn by the evidence that the recordings hold. With --into an effect is put into a recording of a
-    real machine instead.
+    The truth goes into another folder. The recordings come from a separate plant, not from the model: about 22 h to
+    learn from (train_1 to train_3) and 6 h to hold out (hold_1, hold_2). Plants of the zoo are built of other
+    nodes, paths and laws than the model; strengths are drawn by the evidence that the recordings hold. With --into
+    an effect is put into a recording of a real machine instead.
     """
     of_zoo = {"--machine": machine, "--families": families, "--group": group, "--baselines": baselines or None,
               "--session-deviation": session_deviation}  # fmt: skip
@@ -114,9 +117,10 @@ def conceal(
         return
     if control or place is not None or date is not None:
         raise InputError("--control, --place and --date go with --into")
-    from diagnosis.proof.cases.case_files import staged_folders
-    from diagnosis.proof.cases.conceal import conceal_set, random_plans  # imports scipy.signal
-    from diagnosis.proof.cases.concealed_case import Plan
+    with progress(LOADING):
+        from diagnosis.proof.cases.case_files import staged_folders
+        from diagnosis.proof.cases.conceal import conceal_set, random_plans  # imports scipy.signal
+        from diagnosis.proof.cases.concealed_case import Plan
 
     if (effect is None) == (not random):
         raise InputError("conceal takes either --effect NAME or --random")
@@ -131,11 +135,12 @@ def conceal(
     recordings, truth = output / "recordings", truth or output / "truth"
     with (
         staged_folders(recordings, truth) as (stage, truth_stage),
-        console.progress_bar("concealing") as progress,
+        progress("concealing") as told,
     ):
         names = conceal_set(
-            definition, plans, seed=seed, recordings=stage, truth=truth_stage, flat=cases is None, progress=progress
-        )
+            definition, plans, seed=seed, recordings=stage, truth=truth_stage, flat=cases is None,
+            progress=partial(told, "simulating the recordings, percent"),
+        )  # fmt: skip
     for name in names:
         console.out.print(f"wrote {recordings / ('' if cases is None else name)}, {truth / name}.json")
 

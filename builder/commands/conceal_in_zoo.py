@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 from builder.base import console
+from builder.base.progress import LOADING, progress
 
 
 def conceal_in_zoo(
@@ -26,8 +28,9 @@ def conceal_in_zoo(
     InputError
         If a group or family is not known, a definition cannot be split, or a folder cannot be written to.
     """
-    from diagnosis.proof.cases.case_files import staged_folders
-    from diagnosis.proof.zoo.conceal_zoo import conceal_zoo, random_zoo_plans, zoo_plans
+    with progress(LOADING):
+        from diagnosis.proof.cases.case_files import staged_folders
+        from diagnosis.proof.zoo.conceal_zoo import conceal_zoo, random_zoo_plans, zoo_plans
 
     names = None if families is None else [name.strip() for name in families.split(",")]
     number = 1 if cases is None else cases
@@ -38,9 +41,9 @@ def conceal_in_zoo(
     recordings, truth = output / "recordings", truth or output / "truth"
     with (
         staged_folders(recordings, truth) as (stage, truth_stage),
-        console.progress_bar("concealing") as progress,
+        progress("concealing") as told,
     ):
         made = conceal_zoo(plans, recordings=stage, truth=truth_stage, flat=cases is None, baselines=baselines,
-                           session_deviation=session_deviation, progress=progress)  # fmt: skip
+                           session_deviation=session_deviation, progress=partial(told, "concealing"))  # fmt: skip
     for name in made:
         console.out.print(f"wrote {recordings / ('' if cases is None else name)}, {truth / name}.json")

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 from builder.base import console
+from builder.base.progress import LOADING, progress
 from models.assembly.gearbox import load_gearbox
 from models.base.errors import InputError
 
@@ -48,21 +50,23 @@ def conceal_into(
         If the recording, the machine and the wish do not go together, or something would be overwritten or cannot be
         written.
     """
-    from diagnosis.proof.cases.case_files import staged_folders
-    from diagnosis.proof.injection.inject import Injector, Wish, inject_set  # imports scipy
+    with progress(LOADING):
+        from diagnosis.proof.cases.case_files import staged_folders
+        from diagnosis.proof.injection.inject import Injector, Wish, inject_set  # imports scipy
 
     if control and (effect is not None or place is not None or date is not None):
         raise InputError("--control injects nothing; leave out --effect, --place and --date")
-    injector = Injector(load_gearbox(gearbox), recording)
+    with progress("reading the recording"):
+        injector = Injector(load_gearbox(gearbox), recording)
     recordings, truth = output / "recordings", truth or output / "truth"
     _keep_other_files(recordings, injector.written)
     with (
         staged_folders(recordings, truth) as (stage, truth_stage),
-        console.progress_bar("injecting") as progress,
+        progress("injecting") as told,
     ):
         names = inject_set(
             injector, Wish(kind=effect, place=place, date=date, control=control), 1 if cases is None else cases,
-            seed=seed, recordings=stage, truth=truth_stage, flat=cases is None, progress=progress,
+            seed=seed, recordings=stage, truth=truth_stage, flat=cases is None, progress=partial(told, "injecting"),
         )  # fmt: skip
     for name in names:
         console.out.print(f"wrote {recordings / ('' if cases is None else name)}, {truth / name}.json")

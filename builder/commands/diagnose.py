@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,6 +10,8 @@ import click
 
 from builder.base import console
 from builder.base.decision_settings import settings_options
+from builder.base.example import example
+from builder.base.progress import LOADING, progress
 from builder.base.workers import worker_options
 from models.assembly.gearbox import known_gearboxes, load_gearbox
 from models.base.errors import InputError, did_you_mean
@@ -49,7 +50,12 @@ class _OptionsOfMany(click.Command):
         return super().parse_args(ctx, words)
 
 
-@click.command("diagnose", cls=_OptionsOfMany, options_metavar="")
+@click.command(
+    "diagnose",
+    cls=_OptionsOfMany,
+    options_metavar="",
+    epilog=example("diagnose examples/data/heated_rod.csv.gz@0..28800 --gearbox heated_rod"),
+)
 @click.argument("recordings", nargs=-1, required=True, metavar="RECORDING... [OPTIONS]")
 @click.option("--gearbox", default="fzg", show_default=True, metavar="NAME|FILE",
               help=f"Name ({', '.join(known_gearboxes())}) or definition file (TOML).")  # fmt: skip
@@ -88,19 +94,22 @@ def diagnose(
     fleet: bool,
     dask: str | None,
 ) -> None:
-    """Say whether recordings of a real gearbox agree with its model; if not, where, and by what physics.
+    """Say whether recordings agree with the model, and what differs.
+
+    Where they do not agree it names the part, the physics, and how strong that is.
 
     RECORDING is a table (.csv, .csv.gz, .parquet, .mf4) with the columns of a cycle and what was measured:
     T_<node>_degC, P_loss_W. FILE+FILE joins files that follow each other in time; FILE@start..end is a part.
 
     Of a fleet every gearbox gets its own report, and all together one table (summary.csv).
     """
-    from diagnosis import diagnose as run
-    from diagnosis.recordings.read import read_by_role
-    from diagnosis.report.write import names_of_files, write_files
-    from models.base.atomic_write import atomic_folder
-    from models.mechanisms import CATALOGUE
-    from models.mechanisms.user_files import check_placeable, load_mechanisms
+    with progress(LOADING):
+        from diagnosis import diagnose as run
+        from diagnosis.recordings.read import read_by_role
+        from diagnosis.report.write import names_of_files, write_files
+        from models.base.atomic_write import atomic_folder
+        from models.mechanisms import CATALOGUE
+        from models.mechanisms.user_files import check_placeable, load_mechanisms
 
     _check_options(recordings, (*holdout, *baseline), dask, fleet=fleet)
     definition = load_gearbox(gearbox)
@@ -119,7 +128,8 @@ def diagnose(
         _diagnose_fleet(Path(recordings[0]), definition, output, mapping=mapping, catalogue=catalogue,
                         switched_off=switched_off, settings=settings, jobs=jobs, dask=dask)  # fmt: skip
         return
-    train, held, healthy = read_by_role(recordings, holdout, baseline, definition.network(), mapping=mapping)
+    with progress("reading the recordings"):
+        train, held, healthy = read_by_role(recordings, holdout, baseline, definition.network(), mapping=mapping)
     given = [
         *(p for r in (*train, *held, *healthy) for p in r.files),
         *mechanisms,
@@ -128,7 +138,7 @@ def diagnose(
     ]
     refuse_to_replace(given, [output / name for name in names_of_files((*train, *held))])
     _print_notes((*train, *held, *healthy))
-    with atomic_folder(output) as stage, _show_step() as tell:
+    with atomic_folder(output) as stage, progress("starting") as tell:
         found = run(train, definition, holdout=held, baseline=healthy, switched_off=switched_off,
                     settings=settings, catalogue=catalogue, jobs=jobs, progress=tell)  # fmt: skip
         tell("writing the report")
@@ -182,13 +192,3 @@ def _diagnose_fleet(
             console.err.print(message, style="red")
             raise SystemExit(1)
         raise InputError(message)
-
-
-@contextmanager
-def _show_step() -> Iterator[Callable[[str], None]]:
-    """Show the current step as a changing line on a terminal, nothing in a pipe."""
-    if not console.err.is_terminal:
-        yield lambda _: None
-        return
-    with console.err.status("reading") as status:
-        yield lambda line: status.update(line)

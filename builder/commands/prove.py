@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import json
-import time
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -13,20 +11,21 @@ import click
 from click.core import ParameterSource
 
 from builder.base import console
+from builder.base.example import example
+from builder.base.progress import LOADING, progress
 from builder.base.workers import jobs_option
 from models.base.errors import InputError
 
 if TYPE_CHECKING:
     from diagnosis.proof.scoring.lines import Settings
 
-LINES = 20  # of progress where there is no terminal
 MADE = ("plant", "cases", "seed", "families", "removed")  # options of cases that are made
 REAL = ("rod",)  # plants with a recording in examples/data
 ONLY_NEW = (*MADE, "gearbox", "cells_every", "baselines", "answers")  # that an old file has
 NOT_REAL = (*ONLY_NEW, "recordings", "truth", "answers", "continued")
 
 
-@click.command("prove")
+@click.command("prove", epilog=example("prove --real rod"))
 @click.option("--plant", type=click.Choice(["own", "zoo"]), default="own", show_default=True,
               help="Kind of plant that makes the cases.")  # fmt: skip
 @click.option("--cases", type=click.IntRange(min=1, max=10_000), default=None, metavar="N",
@@ -62,10 +61,11 @@ def prove(
     truth: Path | None, gearbox: str | None, families: str, cells_every: int, baselines: int, removed: bool,
     real: str | None, answers: Path | None, continued: Path | None, jobs: int, output: Path,
 ) -> None:  # fmt: skip
-    """Test the diagnosis on sealed cases: hide effects, diagnose blindly, hash the answers, open the truth, score.
+    """Test the diagnosis blindly on sealed cases, and score it.
 
-    Every diagnosis is a process that gets the recordings of one case and nothing else. Its answer is added to a file,
-    with which an interrupted proof is continued.
+    Hide effects, diagnose blindly, hash the answers, open the truth, score. Every diagnosis is a process that gets the
+    recordings of one case and nothing else. Its answer is added to a file, with which an interrupted proof is
+    continued.
     """
     typed = [name for name in NOT_REAL if context.get_parameter_source(name) == ParameterSource.COMMANDLINE]
     if real is not None:
@@ -73,8 +73,9 @@ def prove(
             raise InputError(f"--{_dashed(typed[0])} does not go with --real, which is one recording of a real plant")
         _prove_real(real, output, jobs)
         return
-    from builder.workflows.prove import prove as run
-    from diagnosis.proof.scoring.lines import Settings, begin_lines
+    with progress(LOADING):
+        from builder.workflows.prove import prove as run
+        from diagnosis.proof.scoring.lines import Settings, begin_lines
 
     if (recordings is None) != (truth is None):
         raise InputError("--recordings and --truth go together: a folder per case, and what is concealed in them")
@@ -95,13 +96,13 @@ def prove(
                                      baselines=baselines, removed=removed)  # fmt: skip
         file = answers or output / f"{settings.seed}.jsonl"
         begin_lines(file, settings)
-    with _progress() as progress:
-        result = run(file, output, recordings=recordings, truth=truth, jobs=jobs, progress=progress)
+    with progress("starting") as told:
+        result = run(file, output, recordings=recordings, truth=truth, jobs=jobs, progress=told)
     _show(result, output)
     console.out.print(f"wrote {file}")
 
 
-@click.command("score")
+@click.command("score", epilog=example("score out/diagnoses --truth out/concealed/truth"))
 @click.argument("results", type=click.Path(path_type=Path, file_okay=False, exists=True), metavar="RESULTS")
 @click.option("--truth", type=click.Path(path_type=Path, exists=True), required=True, metavar="FILE|DIR",
               help="Truth: one file, or <case>.json in a folder.")  # fmt: skip
@@ -111,9 +112,9 @@ def prove(
 @click.option("--output", type=click.Path(path_type=Path, file_okay=False), default=Path("out/score"),
               show_default=True, metavar="DIR", help="Folder for the scores.")  # fmt: skip
 def score(results: Path, truth: Path, gearbox: str, output: Path) -> None:
-    """Score the diagnoses of any method: RESULTS holds <case>/diagnosis.json for every case of the truth.
+    """Score the diagnoses of any method against the truth.
 
-    A case without a readable file counts as failed.
+    RESULTS holds <case>/diagnosis.json for every case of the truth. A case without a readable file counts as failed.
     """
     from diagnosis.proof.scoring.lines import Task
     from diagnosis.proof.scoring.outcome import outcome
@@ -156,9 +157,10 @@ def _settings_of_made(
 
 
 def _prove_real(name: str, output: Path, jobs: int) -> None:
-    from builder.workflows.prove_real import PLANTS, RESULT, prove_real, rows_of
-
-    result = prove_real(PLANTS[name], output, jobs=jobs, progress=lambda text: console.err.print(text))
+    with progress(LOADING):
+        from builder.workflows.prove_real import PLANTS, RESULT, prove_real, rows_of
+    with progress("starting") as told:
+        result = prove_real(PLANTS[name], output, jobs=jobs, progress=told)
     for finding in result["findings"]:
         console.out.print(f"{finding['grade']}: {finding['title']} ({finding['probability']:.2f})")
     console.table(f"{name}: {result['verdict'].replace('_', ' ')}", ["", "", "limit", ""], rows_of(result))
@@ -182,21 +184,3 @@ def _show(result: Mapping[str, Any], output: Path) -> None:
         console.out.print(f"{result['failed']} diagnoses ended without an answer; they count as wrong.")
     for path in write_scores(result, output):
         console.out.print(f"wrote {path}")
-
-
-@contextmanager
-def _progress() -> Iterator[Callable[[str, int, int], None]]:
-    """Progress bar on a terminal, else a line now and then."""
-    if console.err.is_terminal:
-        with console.progress_bar("starting") as advance:
-            yield lambda _, done, of: advance(done, of)
-        return
-    begin, last = time.perf_counter(), {"": -1}
-
-    def report(what: str, done: int, of: int) -> None:
-        part = LINES * done // max(of, 1)
-        if last.get(what) != part:
-            last[what] = part
-            console.err.print(f"{what}: {done} of {of}, {(time.perf_counter() - begin) / 60.0:.0f} min")
-
-    yield report

@@ -13,6 +13,8 @@ import click
 import numpy as np
 
 from builder.base import console
+from builder.base.example import example
+from builder.base.progress import progress
 from models.assembly.gearbox import known_gearboxes, load_gearbox
 from models.base.atomic_write import atomic_file
 from models.base.errors import InputError
@@ -31,6 +33,7 @@ PLOTS = (".png", ".pdf", ".svg")
 COLD_START_K = 5.0  # that a start differs from what was recorded, and a warning says so
 
 Initial = float | Mapping[str, float] | None
+Count = Callable[[int, int], None]  # takes done, of
 
 
 @dataclass(frozen=True)
@@ -61,7 +64,7 @@ class Model:
     inputs: Mapping[str, Input]
     nodes: tuple[str, ...]
     domain: str
-    run: Callable[[Cycle, Initial, console.Report], dict[str, Array]]
+    run: Callable[[Cycle, Initial, Count], dict[str, Array]]
     groups: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     correction: Correction | None = None
 
@@ -77,10 +80,8 @@ def _full_model(name_or_file: str, correction: Path | None, mapping: Path | None
         network = found.network(gearbox)
     trained = None if gearbox.is_parametric else gearbox.training
 
-    def run(cycle: Cycle, initial: Initial, progress: console.Report) -> dict[str, Array]:
-        result = network.simulate(
-            cycle, losses=gearbox.loss_laws(), initial=initial, trained=trained, progress=progress
-        )
+    def run(cycle: Cycle, initial: Initial, told: Count) -> dict[str, Array]:
+        result = network.simulate(cycle, losses=gearbox.loss_laws(), initial=initial, trained=trained, progress=told)
         return result.columns()
 
     return Model(
@@ -121,8 +122,8 @@ def _fmu(path: Path, correction: Path | None, mapping: Path | None, *, claims_on
         except InputError as error:
             raise InputError("\n".join(f"{correction}: {line}" for line in str(error).splitlines())) from error
 
-    def run(cycle: Cycle, initial: Initial, progress: console.Report) -> dict[str, Array]:
-        return drive_fmu(path, cycle, initial=initial, progress=progress)
+    def run(cycle: Cycle, initial: Initial, told: Count) -> dict[str, Array]:
+        return drive_fmu(path, cycle, initial=initial, progress=told)
 
     return Model(
         title=path.name,
@@ -147,8 +148,8 @@ def _simulated(model: Model, cycle: Cycle, start: Initial, *, is_recording: bool
     """Simulate; with a correction, from the inputs as they were, and with readings of the recorder's sensors."""
 
     def run(driven: Cycle) -> dict[str, Array]:
-        with console.progress_bar("simulating") as progress:
-            return model.run(driven, start, progress)
+        with progress("simulating") as told:
+            return model.run(driven, start, partial(told, "simulating"))
 
     if model.correction is None:
         return run(cycle)
@@ -160,7 +161,7 @@ def _simulated(model: Model, cycle: Cycle, start: Initial, *, is_recording: bool
     return columns | read_as_recorded(columns, model.correction)
 
 
-@click.command("simulate")
+@click.command("simulate", epilog=example("simulate --gearbox fzg examples/drive_cycle_600s.csv --output result.csv"))
 @click.argument("files", nargs=-1, required=True, metavar="[FMU] CYCLE", type=click.Path(path_type=Path))
 @click.option("--gearbox", default=None, metavar="NAME|FILE",
               help="Drive the full model instead. "
@@ -195,11 +196,12 @@ def simulate(
     claims_only: bool,
     plot: Path | None,
 ) -> None:
-    """Drive a CYCLE with an FMU, or with the full model of a gearbox (--gearbox).
+    """Drive a cycle with an FMU or with the full model.
 
-    CYCLE is a table (.csv, .csv.gz, .parquet) with the columns time_s, speed_rpm, torque_Nm and, where known,
-    T_ambient_degC and air_speed_m_s; or the inputs that the definition names. It may be a recording that diagnose reads
-    as well, or a part of one (FILE@start..end), or files that follow each other in time (FILE+FILE).
+    The full model is that of --gearbox. CYCLE is a table (.csv, .csv.gz, .parquet) with the columns time_s, speed_rpm,
+    torque_Nm and, where known, T_ambient_degC and air_speed_m_s; or the inputs that the definition names. It may be
+    a recording that diagnose reads as well, or a part of one (FILE@start..end), or files that follow each other in
+    time (FILE+FILE).
     """
     if len(files) > 2 or (len(files) == 2) == (gearbox is not None):
         raise InputError("simulate takes FMU CYCLE, or --gearbox NAME|FILE and CYCLE")

@@ -11,12 +11,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from models.base.types import Array
+from models.quantities.part_colours import AMBIENT, part_colours
 from models.quantities.quantities import GEARBOX_INPUTS, Input
 
 # Okabe and Ito's palette: distinct for people with any colour vision, and in grey by order of lightness.
 PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#6B6B6B")
 LINES = ("-", "--", "-.", ":")
 TOTAL = "total"
+AMBIENT_COLUMN = "T_ambient_degC"
 DOTS: dict[str, Any] = {
     "linestyle": "none", "marker": "o", "markersize": 3.5, "markerfacecolor": "white", "markeredgecolor": "black",
     "markeredgewidth": 0.8,
@@ -69,10 +71,17 @@ def plot_cycle(
         time = columns["time_s"] * scale
         _inputs(driving, time, columns, inputs)
         for losses in between:
-            _curves(losses, time, _loss_curves(columns), reference, scale)
+            shown = _loss_curves(columns)
+            _curves(losses, time, shown, reference, scale, part_colours(shown) | {TOTAL: "black"})
             losses.set_ylabel("Power loss in W")
             losses.set_ylim(bottom=0.0)
-        _curves(temperatures, time, _temperature_curves(columns, groups), reference, scale)
+        nodes = _nodes(columns)
+        _curves(temperatures, time, _temperature_curves(columns, groups), reference, scale, part_colours(nodes))
+        if AMBIENT_COLUMN in columns:
+            temperatures.plot(
+                time, columns[AMBIENT_COLUMN], color=AMBIENT, linestyle=":", linewidth=1.4, label="ambient"
+            )
+            temperatures.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
         temperatures.set_ylabel("Temperature in °C")
         temperatures.set_xlabel(f"Time in {unit}")
         temperatures.set_xlim(time[0], time[-1])
@@ -115,12 +124,16 @@ def _loss_curves(columns: Mapping[str, Array]) -> dict[str, tuple[Array, tuple[s
     return {label: (sum(columns[n] for n in names), names) for label, names in gathered.items()}  # type: ignore[misc]
 
 
+def _nodes(columns: Mapping[str, Array]) -> list[str]:
+    """All nodes of the machine, in the order of its network."""
+    found = (name for name in columns if name.startswith("T_") and name.endswith("_degC"))
+    return [name[2:-5] for name in found if name != AMBIENT_COLUMN]
+
+
 def _temperature_curves(
     columns: Mapping[str, Array], groups: Mapping[str, tuple[str, ...]]
 ) -> dict[str, tuple[Array, tuple[str, ...]]]:
-    nodes = [
-        name[2:-5] for name in columns if name.startswith("T_") and name.endswith("_degC") and name != "T_ambient_degC"
-    ]
+    nodes = _nodes(columns)
     hidden = {node for group in groups.values() for node in group[1:-1]} | {"air", "frame"}
     shown = [node for node in nodes if node not in hidden]
     return {node: (columns[f"T_{node}_degC"], (f"T_{node}_degC",)) for node in shown}
@@ -132,13 +145,11 @@ def _curves(
     curves: Mapping[str, tuple[Array, tuple[str, ...]]],
     reference: Mapping[str, Array] | None,
     scale: float,
+    colours: Mapping[str, str],
 ) -> None:
-    for index, (label, (values, names)) in enumerate(curves.items()):
-        colour, line = PALETTE[index % len(PALETTE)], LINES[index // len(PALETTE) % len(LINES)]
-        width = 1.4
-        if label == TOTAL:
-            colour, width = "black", 2.0
-        axes.plot(time, values, color=colour, linestyle=line, linewidth=width, label=label.replace("_", " "))
+    for label, (values, names) in curves.items():
+        width = 2.0 if label == TOTAL else 1.4
+        axes.plot(time, values, color=colours[label], linewidth=width, label=label.replace("_", " "))
         if reference is not None:
             times, dots = reference["time_s"] * scale, sum(reference[name] for name in names)
             every = max(1, len(times) // 30)

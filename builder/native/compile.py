@@ -25,6 +25,7 @@ from pathlib import Path
 
 from models.base.atomic_write import atomic_file
 from models.base.errors import InputError, did_you_mean
+from models.base.progress import Progress, silent
 
 CACHE_VARIABLE = "GEARBOX_TWIN_CACHE"
 GET_ZIG = "install ziglang: python -m pip install ziglang"
@@ -216,8 +217,9 @@ def plan_for(platforms: str) -> Plan:
 
 
 def compile_libraries(
-    sources: Mapping[str, bytes], platforms: str = "host", *, name: str = "library", fmi: int = 2
-) -> Binaries:
+    sources: Mapping[str, bytes], platforms: str = "host", *, name: str = "library", fmi: int = 2,
+    progress: Progress = silent,
+) -> Binaries:  # fmt: skip
     """Compile C sources to shared libraries.
 
     Parameters
@@ -230,6 +232,8 @@ def compile_libraries(
         Of the library, without suffix
     fmi : int
         Version of FMI, 2 or 3, that the folders are for
+    progress : callable
+        Told what is being waited for
 
     Returns
     -------
@@ -247,8 +251,14 @@ def compile_libraries(
         for processor in PLATFORMS[folder].targets
         if plan.compiler.is_zig or processor == _host_processor()
     ]
+    command = "ziglang" if plan.compiler.is_zig else plan.compiler.command[0]
+    waiting = f"waiting for the C compiler ({command}), {', '.join(plan.platforms)}"
+    progress(waiting, 0, len(wanted))
     with ThreadPoolExecutor(max_workers=os.cpu_count()) as pool:
-        compiled = list(pool.map(partial(_library, sources, plan.compiler), wanted))
+        compiled = []
+        for content in pool.map(partial(_library, sources, plan.compiler), wanted):
+            compiled.append(content)
+            progress(waiting, len(compiled), len(wanted))
     found: dict[str, list[bytes]] = {}
     for library, content in zip(wanted, compiled, strict=True):
         folder = library.folder if fmi == 2 else library.processor

@@ -23,6 +23,7 @@ from builder.native.compile import compile_libraries
 from builder.native.data import model_sources, number
 from builder.surrogate.train import TrainingResult
 from models.assembly.gearbox import Gearbox
+from models.base.progress import Progress, silent
 from models.correction.correction import Correction
 from models.simulation.thermal_network import ThermalNetwork
 
@@ -112,6 +113,7 @@ def build_native_fmu(
     correction: Correction | None = None,
     platforms: str = "host",
     fmi: int = 2,
+    progress: Progress = silent,
 ) -> NativeBuild:
     """Package the thermal network of a gearbox as a native FMU.
 
@@ -123,6 +125,8 @@ def build_native_fmu(
         See :func:`builder.native.compile.compile_libraries`
     fmi : int
         Version of FMI, 2 or 3
+    progress : callable
+        Told what is being done
 
     Raises
     ------
@@ -143,6 +147,7 @@ def build_native_fmu(
         pages=parts.pages,
         platforms=platforms,
         fmi=fmi,
+        progress=progress,
     )
 
 
@@ -155,6 +160,7 @@ def build_native_archive(
     pages: Mapping[str, bytes],
     platforms: str = "host",
     fmi: int = 2,
+    progress: Progress = silent,
 ) -> NativeBuild:
     """Compile a model with the FMI layer and package it.
 
@@ -173,6 +179,8 @@ def build_native_archive(
         See :func:`builder.native.compile.compile_libraries`
     fmi : int
         Version of FMI, 2 or 3
+    progress : callable
+        Told what is being done
 
     Returns
     -------
@@ -192,7 +200,7 @@ def build_native_archive(
     xml = describe(table, identity, content=digest)
     sources["model_variables.c"] = variables_source(table, guid_of(xml))
     encoded = {name: text.encode() for name, text in sources.items()}
-    binaries = compile_libraries(encoded, platforms, name=identity.model_identifier, fmi=fmi)
+    binaries = compile_libraries(encoded, platforms, name=identity.model_identifier, fmi=fmi, progress=progress)
     inside = {f"sources/{name}": text for name, text in encoded.items()}
     if fmi == 3:
         inside["sources/buildDescription.xml"] = build_description(identity)

@@ -8,10 +8,12 @@ from pathlib import Path
 import click
 
 from builder.base import console
+from builder.base.example import example
+from builder.base.progress import LOADING, progress
 from builder.base.workers import jobs_option
 
 
-@click.command("reproduce")
+@click.command("reproduce", epilog=example("reproduce --output out/paper"))
 @click.option(
     "--output",
     type=click.Path(path_type=Path, file_okay=False),
@@ -30,18 +32,18 @@ from builder.base.workers import jobs_option
 )
 @jobs_option()
 def reproduce(output: Path, seed: int, jobs: int) -> None:
-    """Recompute every table and figure of the paper and compare ours with the print, in one report."""
-    from builder.reproduce.report import FIGURES, NUMBERS, PAGE, SUMMARY  # imports matplotlib, scikit-learn and onnx
-    from builder.reproduce.reproduce import reproduce as run
-    from builder.reproduce.study import Settings
+    """Recompute every table and figure of the paper.
+
+    One report compares ours with the print.
+    """
+    with progress(LOADING):
+        from builder.reproduce.report import FIGURES, NUMBERS, PAGE, SUMMARY  # imports matplotlib, scikit-learn, onnx
+        from builder.reproduce.reproduce import reproduce as run
+        from builder.reproduce.study import Settings
 
     begin = time.perf_counter()
-    with console.err.status("starting") as status:  # shows nothing in a pipe
-        report = run(
-            output,
-            settings=Settings(seed=seed, jobs=jobs),
-            progress=lambda line: status.update(f"{line}  ({time.perf_counter() - begin:.0f} s so far)"),
-        )
+    with progress("starting") as told:
+        report = run(output, settings=Settings(seed=seed, jobs=jobs), progress=told)
     rows = [(item.key, item.title, item.verdict.value) for item in report.items]
     console.table("The paper, reproduced", ["item", "what", "verdict"], rows, text_columns=3)
     counted = ", ".join(f"{number} {verdict.value}" for verdict, number in report.count.items())

@@ -7,12 +7,12 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from builder.drive.plots import PALETTE
 from builder.fmi.reference_cycle import KNOTS
-from builder.reproduce.figure import BLACK, BLUE, RED, Curve, Figure, Kind, Plot
+from builder.reproduce.figure import BLACK, BLUE, RED, Curve, Figure, Plot
 from builder.reproduce.report import Check, Part, Table, item
 from builder.reproduce.study import FULL, PRINTED, REDUCED, Study
 from models.base.types import Array
+from models.quantities.part_colours import part_colours
 from models.simulation.simulate import Result
 
 # Phases of the cycle [s]: the light start, constant power, high torque, and the load of the start again.
@@ -252,13 +252,12 @@ def _temperature_figures(study: Study, differences: dict[str, dict[str, Array]])
         "Shafts and bearings": (*groups["shafts"], "bearing_1", "bearing_3"),
         "Housing and oil": (*groups["housing"], "oil"),
     }
-    order = list(dict.fromkeys(node for nodes in shown.values() for node in nodes))
+    colours = part_colours(study.network.node_names)
     panels = []
     for title, nodes in shown.items():
         curves = []
         for node in nodes:
-            kind: Kind = "dashed" if order.index(node) >= len(PALETTE) else "line"
-            curves.append(Curve(node.replace("_", " "), full.time, full.temperatures[node], kind))
+            curves.append(Curve(node.replace("_", " "), full.time, full.temperatures[node], colour=colours[node]))
             x, y = reduced.time[::20], reduced.temperatures[node][::20]
             curves.append(Curve(REDUCED, x, y, "points", "#444444"))
         panels.append(Plot(title, "Time in s", "Temperature in °C", curves, from_zero=False))

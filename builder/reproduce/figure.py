@@ -15,6 +15,7 @@ from matplotlib.figure import Figure as Canvas
 
 from builder.drive.plots import PALETTE, STYLE
 from models.base.types import Array
+from models.quantities.part_colours import part_colours
 
 WIDTH, HEIGHT, BAR_HEIGHT = 4.6, 3.6, 0.26  # inches per panel, and per bar
 MARKED = range(3, 13)  # number of points of a line that gets a mark at each
@@ -174,34 +175,41 @@ class Map:
 
 @dataclass(frozen=True, eq=False)
 class Graph:
-    """Nodes as (x, y, group) by name, and links as (node, node, width from 0 to 1, value in words)."""
+    """Nodes as (x, y) by name, and links as (node, node, width from 0 to 1, value in words)."""
 
     title: str
-    nodes: Mapping[str, tuple[float, float, str]]
+    nodes: Mapping[str, tuple[float, float]]
     links: Sequence[tuple[str, str, float, str]]
 
     def labels(self) -> Iterator[tuple[str, str | None]]:
-        """Groups."""
-        return ((group, None) for _, _, group in self.nodes.values())
+        """No legend entries: every node has its name in it."""
+        return iter(())
 
-    def draw(self, ax: Axes, colours: Mapping[str, str]) -> None:
+    def draw(self, ax: Axes, _colours: Mapping[str, str]) -> None:
         """Draw into axes."""
         for a, b, width, _ in self.links:
-            (x_a, y_a, _), (x_b, y_b, _) = self.nodes[a], self.nodes[b]
+            (x_a, y_a), (x_b, y_b) = self.nodes[a], self.nodes[b]
             ax.plot(
                 [x_a, x_b], [y_a, y_b], color="#8A8A8A", linewidth=0.5 + 4.0 * width, zorder=1, solid_capstyle="round"
             )
-        for name, (x, y, group) in self.nodes.items():
-            box: dict[str, Any] = {"boxstyle": "round,pad=0.45", "facecolor": colours[group], "edgecolor": "none"}
-            text: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 8, "color": "white"}
-            ax.text(x, y, name.replace("_", " "), bbox=box, zorder=2, **text)
-            ax.plot(x, y, "s", color=colours[group], label=group, zorder=0)
+        for name, colour in part_colours(self.nodes).items():
+            box: dict[str, Any] = {"boxstyle": "round,pad=0.45", "facecolor": "white", "edgecolor": colour,
+                                   "linewidth": 2.5}  # fmt: skip
+            x, y = self.nodes[name]
+            ax.text(x, y, name.replace("_", " "), bbox=box, zorder=2, ha="center", va="center", fontsize=8)
         ax.set_axis_off()
-        ax.margins(0.1)
+        ax.set_xlim(*_around([x for x, _ in self.nodes.values()]))
+        ax.set_ylim(*_around([y for _, y in self.nodes.values()]))
 
     def rows(self) -> pd.DataFrame:
         """Every link."""
         return pd.DataFrame([{"curve": f"{a} - {b}", "point": value} for a, b, _, value in self.links])
+
+
+def _around(values: Sequence[float]) -> tuple[float, float]:
+    """A range with room for the names at its ends."""
+    apart = 0.1 * (max(values) - min(values))
+    return min(values) - apart, max(values) + apart
 
 
 @dataclass(frozen=True, eq=False)

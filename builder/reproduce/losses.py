@@ -12,6 +12,7 @@ from builder.reproduce.report import Check, Part, Table, Verdict, item
 from builder.reproduce.study import BEARING_ABOVE_OIL, GEAR_ABOVE_OIL, MIDDLE, T_OIL, Study, steady_oil
 from models.base.types import Array
 from models.portable.evaluation import RPM
+from models.quantities.part_colours import part_colours
 
 CHURNING = {"niemann": "Niemann (as in the paper)", "mauz": "Mauz", "changenet_velex": "Changenet-Velex"}
 WARM_OIL = 90.0  # degC
@@ -158,8 +159,9 @@ def breakdown_over_torque(study: Study) -> Iterator[Part]:
     parts = components(torque)
     share = 100.0 / np.sum([*parts.values()], axis=0)
     x_label = "Output torque T₂ in N m"
+    colours = part_colours(parts)
     panels = [
-        Plot(title, x_label, y_label, [Curve(n, torque, loss * scale, "area") for n, loss in parts.items()])
+        Plot(title, x_label, y_label, [Curve(n, torque, loss * scale, "area", colours[n]) for n, loss in parts.items()])
         for title, y_label, scale in (
             ("Stacked components", "Power loss in W", np.ones_like(share)),
             ("Share of the total", "Share of the total loss in %", share),

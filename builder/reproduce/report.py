@@ -20,6 +20,7 @@ from builder.drive.plots import STYLE
 from builder.reproduce.figure import Figure
 from builder.reproduce.printed import PAPER
 from builder.reproduce.study import Study
+from models.base.progress import Progress
 from models.files.output_files import write_table
 
 PAGE, NUMBERS, SUMMARY, FIGURES = "report.html", "report.json", "summary.md", "figures"
@@ -206,7 +207,7 @@ class Report:
         lines += [f"| {' | '.join(row)} |" for row in timing.rows]
         return "\n".join(lines) + "\n"
 
-    def write(self, folder: Path, progress: Callable[[str], None]) -> None:
+    def write(self, folder: Path, progress: Progress) -> None:
         """Write ``report.html``, ``report.json``, ``summary.md`` and ``figures/*.png, *.csv`` into a folder."""
         (folder / FIGURES).mkdir(parents=True, exist_ok=True)
         images = {}

@@ -4,20 +4,21 @@ from __future__ import annotations
 
 import platform
 import time
-from collections.abc import Callable
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from builder.python.python_fmu import build_python_fmu
 from builder.reproduce import drive, losses, networks, others, rig, speed, stages
-from builder.reproduce.report import Report
+from builder.reproduce.report import Item, Report
 from builder.reproduce.study import Settings, Study
 from builder.surrogate.onnx_export import export_onnx
 from builder.surrogate.train import train_surrogate
 from models.assembly.gearbox import load_gearbox
 from models.base.atomic_write import atomic_folder
+from models.base.progress import Progress, silent
 from models.base.version import project_version
 
 GEARBOX = "fzg"
@@ -51,9 +52,7 @@ ITEMS = (
 )
 
 
-def reproduce(
-    folder: Path, *, settings: Settings | None = None, progress: Callable[[str], None] = lambda _: None
-) -> Report:
+def reproduce(folder: Path, *, settings: Settings | None = None, progress: Progress = silent) -> Report:
     """Recompute the paper and write the report.
 
     Parameters
@@ -63,7 +62,7 @@ def reproduce(
         is done, files of an earlier report are replaced, others left alone
     settings : Settings or None
     progress : callable
-        Called with a line of text at every stage
+        Told what is being done
 
     Returns
     -------
@@ -78,15 +77,24 @@ def reproduce(
     settings = settings or Settings()
     gearbox = load_gearbox(GEARBOX)
     with atomic_folder(folder) as stage:
-        progress("training: networks as printed")
-        printed = train_surrogate(gearbox, preset="paper", seed=settings.seed, jobs=settings.jobs)
-        progress("training: our networks")
-        ours = train_surrogate(gearbox, seed=settings.seed, jobs=settings.jobs, samples=settings.samples)
+        printed = train_surrogate(
+            gearbox,
+            preset="paper",
+            seed=settings.seed,
+            jobs=settings.jobs,
+            progress=partial(_told, progress, "as printed"),
+        )
+        ours = train_surrogate(
+            gearbox, seed=settings.seed, jobs=settings.jobs, samples=settings.samples,
+            progress=partial(_told, progress, "ours"),
+        )  # fmt: skip
         progress("packaging the FMU")
         exported = export_onnx(ours, stage / "networks", version=project_version())
         fmu = build_python_fmu(gearbox, ours, exported, stage / f"{GEARBOX}.fmu")
-        study = Study(gearbox=gearbox, ours=ours, printed=printed, fmu=fmu, settings=settings, progress=progress)
-        items = [recompute(study) for recompute in ITEMS]
+        items: list[Item] = []
+        study = Study(gearbox=gearbox, ours=ours, printed=printed, fmu=fmu, settings=settings,
+                      progress=lambda what, *_: progress(what, len(items), len(ITEMS)))  # fmt: skip
+        items += (recompute(study) for recompute in ITEMS)
         provenance = {
             "version": project_version(),
             "definition": f"{GEARBOX}, SHA-256 {gearbox.hash[:16]}",
@@ -98,3 +106,7 @@ def reproduce(
         report = Report(items, provenance)
         report.write(stage, progress)
     return report
+
+
+def _told(progress: Progress, which: str, what: str, done: int = 0, of: int = 0, /) -> None:
+    progress(f"networks {which}: {what}", done, of)

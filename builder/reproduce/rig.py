@@ -19,22 +19,22 @@ from models.portable.evaluation import RPM
 ROUNDING = 1e-9
 NO_CONDUCTANCE = 1e-9  # W/K
 WIDEST = 100.0  # W/K, drawn as the widest line
-# Place of each node in the drawing, and its group for the colour: air on the left, mesh on the right.
+# Place of each node in the drawing: air on the left, mesh on the right.
 NODES = {
-    "air": (0.0, 2.25, "boundary"),
-    "frame": (0.0, 0.75, "boundary"),
-    "housing_upper": (1.2, 2.25, "housing"),
-    "housing_lower": (1.2, 0.75, "housing"),
-    "oil": (2.7, 1.5, "oil"),
-    "bearing_1": (2.2, 3.0, "bearings"),
-    "bearing_2": (3.2, 2.5, "bearings"),
-    "bearing_3": (2.2, 0.0, "bearings"),
-    "bearing_4": (3.2, 0.5, "bearings"),
-    "shaft_1": (4.2, 2.7, "shafts"),
-    "shaft_2": (4.2, 0.3, "shafts"),
-    "pinion": (5.4, 2.25, "gears"),
-    "wheel": (5.4, 0.75, "gears"),
-    "mesh": (6.4, 1.5, "mesh"),
+    "air": (0.0, 2.25),
+    "frame": (0.0, 0.75),
+    "housing_upper": (1.2, 2.25),
+    "housing_lower": (1.2, 0.75),
+    "oil": (2.7, 1.5),
+    "bearing_1": (2.2, 3.0),
+    "bearing_2": (3.2, 2.5),
+    "bearing_3": (2.2, 0.0),
+    "bearing_4": (3.2, 0.5),
+    "shaft_1": (4.2, 2.7),
+    "shaft_2": (4.2, 0.3),
+    "pinion": (5.4, 2.25),
+    "wheel": (5.4, 0.75),
+    "mesh": (6.4, 1.5),
 }
 
 

@@ -15,6 +15,7 @@ from models.base.parallel import run_parallel
 from models.base.types import Array
 from models.files.cycle import Cycle
 from models.portable.surrogate import SurrogateLosses
+from models.quantities.part_colours import part_colours
 from models.simulation.simulate import Result
 from models.simulation.thermal_network import ThermalNetwork
 
@@ -24,7 +25,6 @@ SETTLED = 0.95
 WAY_POINTS = 1081  # in a stage, to see when the oil has settled
 SHOWN_S = 60.0  # distance of the points drawn
 FOUNDATION = 10.0  # W/K, the most that similar rigs show
-DASHED_FROM = 7  # the palette has as many colours
 PRINTED_CURVES = "The measured and calculated curves are drawn, not printed."
 HOTTER = (  # from the cycle, the first of each pair is the hotter node
     ("mesh", "pinion"),
@@ -176,10 +176,8 @@ def _node_curves(study: Study, run: Result) -> list[Curve]:
         nodes.setdefault(f"bearings {', '.join(alike)}" if alike else part.name.replace("_", " "), part.name)
     shown = np.isin(run.time, np.arange(0.0, run.time[-1] + SHOWN_S, SHOWN_S))
     hours = run.time[shown] / 3600.0
-    return [
-        Curve(label, hours, run.temperatures[node][shown], "dashed" if i >= DASHED_FROM else "line")
-        for i, (label, node) in enumerate(nodes.items())
-    ]
+    colours = part_colours(study.network.node_names)
+    return [Curve(label, hours, run.temperatures[node][shown], colour=colours[node]) for label, node in nodes.items()]
 
 
 @item("Boundary conditions", "Which boundary conditions make the highest load plausible")

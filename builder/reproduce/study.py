@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property, partial
 from pathlib import Path
@@ -15,6 +15,7 @@ from builder.reproduce.printed import OUTPUT_TORQUE, STAGE_S, TABLE_4, TABLE_6_R
 from builder.surrogate.doe import random_points
 from builder.surrogate.train import TrainingResult
 from models.assembly.gearbox import Gearbox
+from models.base.progress import Progress
 from models.base.types import Array
 from models.files.cycle import Cycle
 from models.losses.loss_model import LossModel
@@ -82,7 +83,7 @@ class Study:
         Of our networks
     settings : Settings
     progress : callable
-        Called with a line of text at every stage
+        Told what is being done
     """
 
     gearbox: Gearbox
@@ -90,7 +91,7 @@ class Study:
     printed: TrainingResult
     fmu: Path
     settings: Settings
-    progress: Callable[[str], None]
+    progress: Progress
 
     @cached_property
     def full(self) -> LossModel:

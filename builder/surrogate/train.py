@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,6 +16,7 @@ from builder.surrogate.networks import OTHER_HIDDEN, Domain, NetworkSpec, Preset
 from builder.surrogate.pipeline import joined_network, plain_network, reduced_target, surrogate_pipeline
 from models.base.errors import InputError
 from models.base.parallel import run_parallel
+from models.base.progress import Progress, silent
 from models.base.types import Array
 from models.losses.loss_model import LossModel
 from models.portable.surrogate import Network, SurrogateLosses
@@ -116,7 +117,7 @@ def train_surrogate(
     seed: int = 0,
     jobs: int | None = 1,
     dask: str | None = None,
-    progress: Callable[[str], None] | None = None,
+    progress: Progress = silent,
 ) -> TrainingResult:
     """Train the reduced loss model of a gearbox.
 
@@ -133,8 +134,8 @@ def train_surrogate(
         Processes; None for one per core
     dask : str, optional
         Scheduler that evaluates the full model; the networks are trained here
-    progress : callable, optional
-        Called with a line of text at every stage
+    progress : callable
+        Told what is being done
 
     Returns
     -------
@@ -146,7 +147,6 @@ def train_surrogate(
         If the preset is not known, there are too few samples, or the scheduler cannot be reached.
     """
     begin = time.perf_counter()
-    report = progress or (lambda _: None)
     chosen = preset_named(preset) if isinstance(preset, str) else preset
     chosen = replace(chosen, samples=chosen.samples if samples is None else samples)
     if chosen.samples < LEAST_SAMPLES:
@@ -162,15 +162,16 @@ def train_surrogate(
     viscosity = gearbox.viscosity_constants
     specs = network_specs(model, domain)
 
-    report(f"full model: {chosen.samples} points for each of {len(specs)} networks")
     tables = []
     for number, spec in enumerate(specs):
+        progress(f"full model at {chosen.samples} points for each network", number, len(specs))
         points = _training_points(spec, chosen, viscosity, seed + number)
         tables.append((points, sample_losses(spec.losses, points, jobs=jobs, dask=dask)))
 
-    report(f"training of {', '.join(spec.name for spec in specs)}")
+    training = f"training the networks {', '.join(spec.name for spec in specs)}"
+    progress(training, 0, len(specs))
     items = [(spec, chosen, viscosity, *table, seed) for spec, table in zip(specs, tables, strict=True)]
-    trained = tuple(run_parallel(_train, items, jobs=jobs))
+    trained = tuple(run_parallel(_train, items, jobs=jobs, progress=partial(progress, training)))
     losses = SurrogateLosses(
         components=model.components,
         temperature_nodes=model.temperature_nodes,
@@ -181,7 +182,7 @@ def train_surrogate(
         temperature_bounds=domain.temperature_degC,
         torque_driven=tuple(name for term in model.terms for name in term.torque_driven),
     )
-    report(f"judging on {chosen.judged} random points")
+    progress(f"judging on {chosen.judged} random points")
     return TrainingResult(
         losses=losses,
         networks=trained,

@@ -7,6 +7,7 @@ import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,7 @@ from builder.surrogate.train import TrainingResult, train_surrogate
 from models.assembly.gearbox import Gearbox
 from models.base.atomic_write import atomic_folder
 from models.base.errors import InputError
+from models.base.progress import Progress, silent
 from models.base.types import Array
 from models.base.version import project_version
 from models.correction.correction import Correction, corrected_network
@@ -156,6 +158,7 @@ def build(
     dask: str | None = None,
     correction: Correction | None = None,
     couple: Sequence[str] = (),
+    progress: Progress = silent,
 ) -> BuildReport:
     """Build the FMUs of `gearbox` and try them on the reference cycle; with geometry, train their networks first.
 
@@ -181,6 +184,8 @@ def build(
         What a diagnosis found: the FMU and the full model it is compared with carry it
     couple : sequence of str
         Boundaries whose temperature becomes an input, ``<boundary>.T_in``
+    progress : callable
+        Told what is being done
 
     Returns
     -------
@@ -200,34 +205,38 @@ def build(
     with atomic_folder(folder) as stage:
         training, networks = None, tuple[Path, ...]()
         if not gearbox.is_parametric:
-            with _measure_time("train", seconds), _show_messages() as tell:
+            with _measure_time("train", seconds):
                 training = train_surrogate(
-                    gearbox, preset=preset, samples=samples, seed=seed, jobs=jobs, dask=dask, progress=tell
+                    gearbox, preset=preset, samples=samples, seed=seed, jobs=jobs, dask=dask, progress=progress
                 )
+            progress("exporting the networks")
             with _measure_time("export", seconds):
                 networks = export_onnx(training, stage / "networks", version=project_version())
         fmus = {kind: stage / f"{name}{SUFFIX[kind]}.fmu" for kind in kinds}
         for kind, path in fmus.items():
-            with _measure_time(f"package, {LABEL[kind]} FMU", seconds), _show_messages() as tell:
-                tell(f"packaging the {LABEL[kind]} FMU")
+            with _measure_time(f"package, {LABEL[kind]} FMU", seconds):
+                progress(f"packaging the {LABEL[kind]} FMU")
                 if kind == "python":
                     build_python_fmu(gearbox, training, networks, path, network=inside, correction=correction)
                 else:
                     build_native_fmu(
                         gearbox, training, networks, path, network=inside, platforms=platforms,
-                        fmi=3 if kind == "native_fmi3" else 2, correction=correction,
+                        fmi=3 if kind == "native_fmi3" else 2, correction=correction, progress=progress,
                     )  # fmt: skip
         cycle, losses = reference_cycle(gearbox), gearbox.loss_laws()
-        with _measure_time("reference cycle, full model", seconds), console.progress_bar("full model") as progress:
-            full = network.simulate(cycle, losses=losses, initial=COLD_START, progress=progress).columns()
+        step = "reference cycle, full model"
+        with _measure_time(step, seconds):
+            told = partial(progress, step)
+            full = network.simulate(cycle, losses=losses, initial=COLD_START, progress=told).columns()
         cycles = {}
         for kind, path in fmus.items():
             if not runs_here(path):
                 notes.append(f"the {LABEL[kind]} FMU has no binary for this machine: the reference cycle is not driven")
                 continue
-            label = f"{LABEL[kind]} FMU in FMPy"
-            with _measure_time(f"reference cycle, {label}", seconds), console.progress_bar(label) as progress:
-                driven = drive_fmu(path, cycle, initial=COLD_START, progress=progress)
+            step = f"reference cycle, {LABEL[kind]} FMU in FMPy"
+            with _measure_time(step, seconds):
+                driven = drive_fmu(path, cycle, initial=COLD_START, progress=partial(progress, step))
+            progress("drawing the plots")
             cycles[path.name] = cycle_errors(driven, full)
             write_table(stage / f"drive_cycle{SUFFIX[kind]}.csv", driven)
             title = f"{gearbox.name}\n600 s reference cycle, {LABEL[kind]} FMU and full model"
@@ -310,13 +319,3 @@ def _measure_time(step: str, seconds: dict[str, float]) -> Iterator[None]:
     begin = time.perf_counter()
     yield
     seconds[step] = time.perf_counter() - begin
-
-
-@contextmanager
-def _show_messages() -> Iterator[Any]:
-    """Stages of long work as a changing line on a terminal, nothing in a pipe."""
-    if not console.err.is_terminal:
-        yield lambda _: None
-        return
-    with console.err.status("starting") as status:
-        yield lambda line: status.update(line)

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 
 from builder.base import console
+from builder.base.progress import progress
 from diagnosis import diagnose
 from diagnosis.decision.settings import Settings
 from diagnosis.recordings.read import ByRole, read_by_role
@@ -221,12 +222,12 @@ def diagnose_fleet(
             except InputError as error:
                 outcomes[member.name] = _without_diagnosis(member.name, error)
 
-    with atomic_folder(output) as stage, console.progress_bar("diagnosing the fleet") as show:
-        show(0, len(members))
+    with atomic_folder(output) as stage, progress("diagnosing the fleet") as show:
+        show("diagnosing the fleet", 0, len(members))
         try:
             for outcome in iterate_parallel(_diagnose, readable(), jobs=min(jobs, len(members)), dask=dask):
                 outcomes[outcome.row.gearbox] = _write(outcome, output)
-                show(len(outcomes), len(members))
+                show("diagnosing the fleet", len(outcomes), len(members))
         except InputError:
             raise
         except Exception as error:  # noqa: BLE001 - a worker that dies takes only its own gearbox along

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,6 +13,7 @@ from models.assembly.gearbox import Gearbox, load_gearbox
 from models.base.atomic_write import atomic_file, atomic_folder
 from models.base.errors import InputError
 from models.base.parallel import iterate_parallel
+from models.base.progress import Progress
 
 if TYPE_CHECKING:
     from diagnosis.proof.cases.concealed_case import Plan
@@ -22,8 +23,6 @@ if TYPE_CHECKING:
 ZOO_MIX = {"control": 20, "single": 13, "date": 9, "sensor": 6, "pair": 5, "outside": 5, "messy": 2}
 
 ZOO_BASELINES = 2  # that every case of the zoo has, whether or not its diagnosis gets them
-
-Progress = Callable[[str, int, int], None]
 
 
 def keep_to_one_set(settings: Settings, file: Path) -> None:
@@ -64,6 +63,7 @@ def make_cases(settings: Settings, recordings: Path, truth: Path, jobs: int, pro
         plans = dict(zip(names, drawn, strict=True))
         baselines = max(ZOO_BASELINES, settings.baselines)
         work = [(name, plans[name], recordings, truth, baselines) for name in missing]
+        progress("making recordings", len(names) - len(missing), len(names))
         for done, _ in enumerate(iterate_parallel(make_zoo_case, work, jobs=jobs), start=1):
             progress("making recordings", len(names) - len(missing) + done, len(names))
         return {}
@@ -72,7 +72,7 @@ def make_cases(settings: Settings, recordings: Path, truth: Path, jobs: int, pro
         with atomic_folder(recordings) as stage, atomic_folder(truth) as truth_stage:
             conceal_set(
                 load_gearbox(settings.gearbox), own, seed=settings.seed, recordings=stage, truth=truth_stage,
-                progress=lambda done, of: progress("making recordings", done, of),
+                progress=partial(progress, "making recordings"),
             )  # fmt: skip
     return {name: plan.effects[0] for name, plan in zip(names, own, strict=True) if plan.group == "single"}
 
@@ -94,6 +94,7 @@ def add_evidence(settings: Settings, truth: Path, jobs: int, progress: Progress)
         for i, (file, plan) in enumerate(zip(sorted(truth.glob("case_*.json")), plans, strict=True))
         if plan.effects and "oracle" not in json.loads(file.read_text(encoding="utf-8"))["effects"][0]
     ]
+    progress("weighing the evidence", 0, len(work))
     for done, _ in enumerate(iterate_parallel(add_evidence_of_case, work, jobs=jobs), start=1):
         progress("weighing the evidence", done, len(work))
 

@@ -15,7 +15,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from builder.workflows.proof_cases import Progress, add_evidence, keep_to_one_set, make_cases
+from builder.workflows.proof_cases import add_evidence, keep_to_one_set, make_cases
 from diagnosis.proof.cases.case_files import DEFINITION
 from diagnosis.proof.scoring import lines
 from diagnosis.proof.scoring.lines import Task
@@ -23,6 +23,7 @@ from models.assembly.gearbox import load_gearbox, names_a_file
 from models.base.atomic_write import atomic_file
 from models.base.errors import InputError
 from models.base.parallel import iterate_parallel
+from models.base.progress import Progress, silent
 
 # Start of a diagnosis: an import of the plant, or of anything else of the proof, is an ImportError there.
 BLIND = "import sys; sys.modules['diagnosis.proof'] = None; from builder.__main__ import main; main()"
@@ -36,7 +37,7 @@ MESSAGE_LENGTH = 2000  # characters that are kept
 
 def prove(
     file: Path, output: Path, *, recordings: Path | None = None, truth: Path | None = None, jobs: int = 1,
-    progress: Progress = lambda *_: None,
+    progress: Progress = silent,
 ) -> dict[str, Any]:  # fmt: skip
     """Run the proof of a file of answers, or what is missing of it.
 
@@ -87,6 +88,7 @@ def prove(
             raise InputError(f"{file}: {task.case} was answered from other recordings than those in {recordings}")
     missing = [task for task in tasks if task not in records]
     work = ((task, *lines.files_of(recordings, task, settings.baselines), settings.gearbox) for task in missing)
+    progress("diagnosing", len(records), len(tasks))
     for task, record in iterate_parallel(diagnose, work, jobs=jobs):
         lines.refuse_other_code(file, code)
         lines.append_line(file, task, record)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
@@ -26,6 +26,7 @@ from diagnosis.results.result import Diagnosis
 from models.assembly.gearbox import Gearbox, load_gearbox
 from models.base.atomic_write import atomic_folder
 from models.base.errors import InputError
+from models.base.progress import Progress, silent
 from models.base.version import project_version
 from models.correction.correction import read_correction
 
@@ -67,9 +68,7 @@ PLANTS: Mapping[str, RealPlant] = {
 }  # fmt: skip
 
 
-def prove_real(
-    plant: RealPlant, output: Path, *, jobs: int = 1, progress: Callable[[str], None] = lambda _: None
-) -> dict[str, Any]:
+def prove_real(plant: RealPlant, output: Path, *, jobs: int = 1, progress: Progress = silent) -> dict[str, Any]:
     """Diagnose a real plant, build the FMU that its correction makes, and compare that with the held-out recording.
 
     Parameters
@@ -80,7 +79,7 @@ def prove_real(
     jobs : int
         Processes
     progress : callable
-        Told in words what is being done
+        Told what is being done
 
     Returns
     -------
@@ -105,7 +104,7 @@ def prove_real(
         fmu = stage / f"{plant.definition}_native.fmu"
         build_native_fmu(
             gearbox, None, (), fmu, network=gearbox.network_of_laws(correction.network(gearbox)),
-            correction=correction,
+            correction=correction, progress=progress,
         )  # fmt: skip
         progress("driving the FMU")
         errors = {state: errors_of(found, state) for state in STATES} | {

@@ -7,7 +7,7 @@ them are fitted to the end, model error in place; a second scan given the best e
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,11 +20,12 @@ from diagnosis.engine.calibration import Calibration
 from diagnosis.engine.candidates import Scan, refit, scan
 from diagnosis.engine.fit import Fit
 from diagnosis.engine.gram import Given, Strengths
-from diagnosis.engine.learnt import rule
+from diagnosis.engine.learnt import ErrorClass, error_classes, rule
 from diagnosis.engine.outside import judge_outside
 from diagnosis.engine.sessions import OverSessions, fit_over_sessions, over_sessions
 from diagnosis.engine.unknown import Group
 from models.base.errors import InputError
+from models.base.progress import Progress, silent
 from models.base.types import Array
 
 RACED, PLACES, RACE_STEPS = 18, 2, 4
@@ -37,20 +38,33 @@ WORTH, WORTH_SHARE = 1.0, 0.1  # nats, and share of the best, from which a candi
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class _Scanned:
-    """Everything judged by straight lines at one point: terms in the order of the scan, then parameters."""
+class _InClass:
+    """Everything judged by straight lines with model error of one class: terms in the order of the scan, parameters."""
 
+    error_class: ErrorClass
     scan: Scan
     over: OverSessions
-    candidates: tuple[Hypothesis, ...]
-    log_bayes: Array
-    log_prior: Array
+    log_bayes: Array  # against nothing in the most probable class
     strengths: Strengths
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Scanned:
+    """Everything judged by straight lines at one point, in the class of model error that suits each candidate best."""
+
+    candidates: tuple[Hypothesis, ...]
+    log_prior: Array
+    log_bayes: Array
+    classes: tuple[_InClass, ...]
+    best: tuple[_InClass, ...]
+
+    def in_class(self, error_class: ErrorClass) -> _InClass:
+        return next(one for one in self.classes if one.error_class == error_class)
 
 
 def infer(
     calibration: Calibration, candidates: Sequence[Hypothesis], log_prior: Array, settings: Settings, *,
-    outside: Sequence[Hypothesis] = (), progress: Callable[[str], None] = lambda _: None,
+    outside: Sequence[Hypothesis] = (), progress: Progress = silent,
 ) -> Posterior:  # fmt: skip
     """Weigh all explanations.
 
@@ -64,22 +78,24 @@ def infer(
     outside : sequence of Hypothesis
         Unknown heats, judged where something is missing
     progress : callable
-        Told in words what is being done
+        Told what is being done
     """
-    base = calibration.fit
+    base, chosen = calibration.fit, calibration.chosen
     progress(f"scanning {len(candidates)} candidates")
-    first = _scanned(base, candidates, log_prior, len(base.z))
+    first = _scanned_in_classes(calibration, candidates, log_prior)
     order = np.argsort(-(first.log_bayes + first.log_prior))
-    chosen = _raced(first.candidates, first.log_bayes, order)
+    racing = _raced(first.candidates, first.log_bayes, order)
     judged: dict[str, Judged] = {}
     worth = max(WORTH, WORTH_SHARE * float(first.log_bayes.max(initial=0.0)))
-    chosen = [index for index in chosen if first.log_bayes[index] > worth]
-    for step, index in enumerate(chosen):
-        progress(f"fitting {first.candidates[index].label} ({step + 1} of {len(chosen)})")
-        one = _refitted(calibration, base, first, index, RACE_STEPS)
+    racing = [index for index in racing if first.log_bayes[index] > worth]
+    for step, index in enumerate(racing):
+        progress(f"fitting {first.candidates[index].label}", step, len(racing))
+        near = calibration.in_class(first.best[index].error_class).fit
+        one = _refitted(calibration, near, first, index, RACE_STEPS)
         judged[first.candidates[index].label] = one
     ahead = sorted(judged.values(), key=lambda one: -(one.log_bayes + one.log_prior))
-    for one in ahead[:REFITTED]:
+    for step, one in enumerate(ahead[:REFITTED]):
+        progress(f"fitting {one.label} to the end", step, len(ahead[:REFITTED]))
         if one.fit is not None:
             judged[one.label] = _fitted_on(calibration, one, len(base.z))
     alone = {one.label: float(value) for one, value in zip(first.candidates, first.log_bayes, strict=True)}
@@ -92,29 +108,69 @@ def infer(
     for index, candidate in enumerate(first.candidates):
         judged.setdefault(candidate.label, _by_scan(first, index, alone[candidate.label]))
     log_e = float(logsumexp([one.log_prior + one.log_bayes for one in judged.values()]))
-    threshold = rule().threshold(calibration.chosen, settings.false_alarm_rate)
-    unknown = _unknown(base, outside) if log_e > threshold else []
+    error_class = chosen.error_class if best is None else best.error_class
+    assert error_class is not None  # noqa: S101 - everything judged has one
+    threshold = rule().threshold(error_class, settings.false_alarm_rate)
+    unknown = _unknown(calibration, error_class, outside) if log_e > threshold else []
     every = [*judged.values(), *pairs, *unknown]
     return Posterior(
         nothing=Judged(effects=(), log_prior=0.0, log_bayes=0.0, fit=base), judged=tuple(every), log_e=log_e,
-        threshold=threshold, rule=rule(), likeness=_likeness(first), odds_unknown=settings.odds_unknown,
-        error_class=calibration.chosen.name,
-        error_evidence=dict(calibration.evidence), session_s=calibration.session_s, remainder=remainder,
-        expected=_expected(first, settings),
+        threshold=threshold, rule=rule(), likeness=_likeness(first, error_class), odds_unknown=settings.odds_unknown,
+        error_class=chosen.error_class.name, error_evidence=dict(calibration.evidence), session_s=chosen.session_s,
+        remainder=remainder, expected=_expected(first.in_class(chosen.error_class), settings),
     )  # fmt: skip
 
 
-def _scanned(fit: Fit, candidates: Sequence[Hypothesis], log_prior: Array, base: int) -> _Scanned:
-    """Scan at a fit; the first `base` of its unknowns and model error may differ between sessions."""
-    found = scan(fit, [one for one in candidates if one.term is not None])
-    outside = [one for one in candidates if one.unknown is not None]
+def _scanned_in_classes(
+    calibration: Calibration, candidates: Sequence[Hypothesis], log_prior: Array
+) -> _Scanned:  # fmt: skip
+    """Scan at the calibrated point with model error of all classes."""
+    fit, outside, judged = calibration.fit, _outside(candidates), []
+    found = scan(fit, [one for one in candidates if one.term is not None], calibration.columns)
+    for one in error_classes():
+        here = found.in_directions(calibration.directions(one))
+        over = over_sessions(here.gram, fit.experiment, range(here.further.stop))
+        judged.append((one, here, over, float(np.log(one.prior)) + over.log_evidence))
+    nothing = next(evidence for one, _, _, evidence in judged if one == calibration.chosen.error_class)
+    return _best_of([
+        _in_class(one, here, outside, over, evidence - nothing) for one, here, over, evidence in judged
+    ], candidates, log_prior, outside)  # fmt: skip
+
+
+def _scanned_given(
+    calibration: Calibration, fit: Fit, error_class: ErrorClass, candidates: Sequence[Hypothesis], log_prior: Array
+) -> _Scanned:
+    """Scan at the fit of an explanation, against that explanation, with model error of its class."""
+    found, outside = scan(fit, [one for one in candidates if one.term is not None]), _outside(candidates)
+    base = len(calibration.fit.z)
     over = over_sessions(found.gram, fit.experiment, [*range(base), *found.further], range(base, len(fit.z)))
+    return _best_of([_in_class(error_class, found, outside, over, 0.0)], candidates, log_prior, outside)
+
+
+def _outside(candidates: Sequence[Hypothesis]) -> list[Hypothesis]:
+    """Parameters outside their priors."""
+    return [one for one in candidates if one.unknown is not None]
+
+
+def _in_class(
+    error_class: ErrorClass, found: Scan, outside: Sequence[Hypothesis], over: OverSessions, ahead: float
+) -> _InClass:
+    """Candidates in one class that is some nats ahead of the most probable one without any of them."""
+    strengths = _strengths(found, outside, over.given[over.most_probable])
+    return _InClass(error_class=error_class, scan=found, over=over,
+                    log_bayes=_weighed(found, outside, over) + ahead, strengths=strengths)  # fmt: skip
+
+
+def _best_of(
+    classes: Sequence[_InClass], candidates: Sequence[Hypothesis], log_prior: Array, outside: Sequence[Hypothesis]
+) -> _Scanned:
+    """Every candidate in the class that suits it best."""
     known = {one.label: value for one, value in zip(candidates, log_prior.tolist(), strict=True)}
-    every = (*found.candidates, *outside)
+    every = (*classes[0].scan.candidates, *outside)
+    table = np.stack([one.log_bayes for one in classes])
     return _Scanned(
-        scan=found, over=over, candidates=every, log_bayes=_weighed(found, outside, over),
-        log_prior=np.array([known[one.label] for one in every]),
-        strengths=_strengths(found, outside, over.given[over.most_probable]),
+        candidates=every, log_prior=np.array([known[one.label] for one in every]), log_bayes=table.max(axis=0),
+        classes=tuple(classes), best=tuple(classes[at] for at in table.argmax(axis=0).tolist()),
     )  # fmt: skip
 
 
@@ -150,12 +206,13 @@ def _raced(candidates: Sequence[Hypothesis], log_bayes: Array, order: Iterable[i
 def _refitted(calibration: Calibration, fit: Fit, found: _Scanned, index: int, iterations: int) -> Judged:
     """A candidate fitted together with everything else; judged by the scan if there is no solution."""
     candidate, one = found.candidates[index], _by_scan(found, index, float(found.log_bayes[index]))
+    here = found.best[index]
     try:
         if candidate.unknown is not None:
             reached = _with_wider_prior(fit, candidate.unknown, iterations)
         else:
-            strength = float(found.strengths.value[index])
-            reached = refit(fit, candidate, found.scan.best[index], strength, iterations=iterations)
+            strength = float(here.strengths.value[index])
+            reached = refit(fit, candidate, here.scan.best[index], strength, iterations=iterations)
     except (InputError, ArithmeticError, np.linalg.LinAlgError):
         return one
     return _judged(calibration, replace(one, fit=reached), len(calibration.fit.z), _spread(found, index))
@@ -175,15 +232,17 @@ def _spread(found: _Scanned, index: int) -> float:
     """Nats that the best course over the hours is ahead of the mean over all; other shapes are fitted."""
     if found.candidates[index].how != "W":
         return 0.0
-    return max(float(found.strengths.log_bayes[index] - found.scan.log_bayes[index]), 0.0)
+    here = found.best[index]
+    return max(float(here.strengths.log_bayes[index] - here.scan.log_bayes[index]), 0.0)
 
 
 def _judged(calibration: Calibration, one: Judged, base: int, spread: float) -> Judged:
     """A fitted explanation with its evidence against nothing."""
     fit = one.fit
     assert fit is not None  # noqa: S101
-    over = fit_over_sessions(fit, base)
-    log_bayes, at = over.log_evidence - calibration.log_evidence - spread, base  # where the effects' own unknowns begin
+    assert one.error_class is not None  # noqa: S101
+    log_evidence = fit_over_sessions(fit, base).log_evidence + float(np.log(one.error_class.prior))
+    log_bayes, at = log_evidence - calibration.chosen.log_evidence - spread, base  # where the effects' unknowns begin
     for effect in one.effects:
         if effect.term is None:
             continue  # a parameter is not further
@@ -218,10 +277,10 @@ def _fitted_on(calibration: Calibration, one: Judged, base: int) -> Judged:
 
 def _by_scan(found: _Scanned, index: int, log_bayes: float) -> Judged:
     candidate = found.candidates[index]
-    variant = found.scan.best[index] if candidate.term is not None else 0
+    variant = found.best[index].scan.best[index] if candidate.term is not None else 0
     return Judged(
         effects=(replace(candidate, variants=candidate.variants[[variant]]),), log_prior=float(found.log_prior[index]),
-        log_bayes=log_bayes,
+        log_bayes=log_bayes, error_class=found.best[index].error_class,
     )  # fmt: skip
 
 
@@ -238,11 +297,13 @@ def _given_best(
     alone : mapping of label to float
         Log Bayes factors of all others against nothing at the point of the best explanation, [nat]
     """
-    fit = best.fit
+    fit, error_class = best.fit, best.error_class
     assert fit is not None  # noqa: S101
+    assert error_class is not None  # noqa: S101
     mine = {effect.label for effect in best.effects}
     others = np.array([one.label not in mine for one in candidates])
-    second = _scanned(fit, [one for one in candidates if one.label not in mine], log_prior[others], base)
+    left = [one for one in candidates if one.label not in mine]
+    second = _scanned_given(calibration, fit, error_class, left, log_prior[others])
     order = np.argsort(-(second.log_bayes + second.log_prior))
     pairs = []
     for index in order[:SECONDS]:
@@ -253,42 +314,46 @@ def _given_best(
                        log_prior=best.log_prior + one.log_prior)  # fmt: skip
         both = _judged(calibration, both, base, _spread(second, int(index)))
         pairs.append(_fitted_on(calibration, both, base))
-    without = over_sessions(second.scan.gram, fit.experiment, [*range(base), *second.scan.further])
-    outside = second.candidates[len(second.scan.candidates) :]
-    alone = _weighed(second.scan, outside, without).tolist()
+    found, outside = second.best[0].scan, second.candidates[len(second.best[0].scan.candidates) :]
+    without = over_sessions(found.gram, fit.experiment, [*range(base), *found.further])
+    ahead = calibration.in_class(error_class).log_evidence - calibration.chosen.log_evidence
+    alone = (_weighed(found, outside, without) + ahead).tolist()
     labels = [one.label for one in second.candidates]
     return float(second.log_bayes[order[0]]), pairs, dict(zip(labels, alone, strict=True))
 
 
-def _unknown(fit: Fit, outside: Sequence[Hypothesis]) -> list[Judged]:
+def _unknown(calibration: Calibration, error_class: ErrorClass, outside: Sequence[Hypothesis]) -> list[Judged]:
     """Heats that no catalogue has, all functions of each marginalised."""
-    names = Counter(one.name for one in outside)
+    names, here = Counter(one.name for one in outside), calibration.in_class(error_class)
+    ahead = here.log_evidence - calibration.chosen.log_evidence
     return [
-        Judged(effects=(one.hypothesis,), log_prior=-float(np.log(names[one.hypothesis.name])), log_bayes=one.log_bayes)
-        for one in judge_outside(fit, outside)
+        Judged(effects=(one.hypothesis,), log_prior=-float(np.log(names[one.hypothesis.name])),
+               log_bayes=one.log_bayes + ahead, error_class=error_class)
+        for one in judge_outside(here.fit, outside)
     ]  # fmt: skip
 
 
-def _likeness(found: _Scanned) -> Likeness:
-    """How much alike candidates look in these readings, each in its best shape."""
-    given = found.over.given[found.over.most_probable]
+def _likeness(found: _Scanned, error_class: ErrorClass) -> Likeness:
+    """How much alike candidates look in these readings, each in its best shape, with model error of one class."""
+    here = found.in_class(error_class)
+    given = here.over.given[here.over.most_probable]
     unknown = [one.unknown for one in found.candidates if one.unknown is not None]
-    at = np.array([*found.scan.of_candidates, *unknown], dtype=int) + 1
+    at = np.array([*here.scan.of_candidates, *unknown], dtype=int) + 1
     inner = given.matrix[np.ix_(at, at)]
     norm = np.sqrt(np.maximum(np.diag(inner), 1e-12))
     return Likeness(labels=tuple(one.label for one in found.candidates), cosines=np.abs(inner / norm / norm[:, None]))
 
 
-def _expected(found: _Scanned, settings: Settings) -> tuple[Expected, ...]:
+def _expected(found: _InClass, settings: Settings) -> tuple[Expected, ...]:
     """Expected evidence of every candidate at the size that matters: of a temperature or a heat, whichever is less."""
-    given = found.over.given[found.over.most_probable]
-    at = np.array(found.scan.of_candidates) + 1
+    given, terms = found.over.given[found.over.most_probable], found.scan
+    at = np.array(terms.of_candidates) + 1
     b = np.maximum(given.matrix[at, at], 0.0)
-    sd, size = found.scan.sd, np.full(len(b), np.inf)
-    for matters, peak in ((settings.matters_K, found.scan.peak_K), (settings.matters_W, found.scan.peak_W)):
+    sd, size = terms.sd, np.full(len(b), np.inf)
+    for matters, peak in ((settings.matters_K, terms.peak_K), (settings.matters_W, terms.peak_W)):
         reached = (peak > 0.0) & (matters > 0.0)
         size[reached] = np.minimum(size[reached], matters / peak[reached])
     size = np.where(np.isfinite(size), size, sd)
     log_bayes = 0.5 * np.square(b * size) / (b + 1.0 / np.square(sd)) - 0.5 * np.log1p(b * np.square(sd))
     return tuple(Expected(effect=one, log_bayes=float(value))
-                 for one, value in zip(found.scan.candidates, log_bayes, strict=True))  # fmt: skip
+                 for one, value in zip(terms.candidates, log_bayes, strict=True))  # fmt: skip

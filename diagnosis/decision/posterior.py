@@ -24,7 +24,7 @@ from diagnosis.candidates.dated import CHANGED, changed_law
 from diagnosis.candidates.hypotheses import Hypothesis
 from diagnosis.decision.settings import Settings
 from diagnosis.engine.fit import Fit
-from diagnosis.engine.learnt import Rule
+from diagnosis.engine.learnt import ErrorClass, Rule
 from models.base.types import Array
 from models.terms.term import Term
 
@@ -48,12 +48,15 @@ class Judged:
         Log Bayes factor against nothing, model error and deviations between sessions marginalised, [nat]
     fit : Fit or None
         Fitted with everything else, model error in place; None if only the scan judged it
+    error_class : ErrorClass or None
+        Of model error in which it explains the readings best, by the scan
     """
 
     effects: tuple[Hypothesis, ...]
     log_prior: float
     log_bayes: float
     fit: Fit | None = None
+    error_class: ErrorClass | None = None
 
     @property
     def kind(self) -> Kind:

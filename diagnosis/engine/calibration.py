@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -12,12 +12,35 @@ from diagnosis.engine.learnt import ErrorClass, error_classes
 from diagnosis.engine.metric import leading_directions
 from diagnosis.engine.model_error import ModelError
 from diagnosis.engine.products import gram_of, whitened_base
-from diagnosis.engine.sessions import fit_over_sessions, over_sessions, sessions_of, with_deviation
+from diagnosis.engine.sessions import fit_over_sessions, over_sessions, with_deviation
 from diagnosis.engine.set_apart import without_channels
 from diagnosis.forward.trajectory import Trajectory
 from models.base.types import Array
 
+TURNS = 3  # with the chosen class: point, columns of model error and deviation between sessions settle together
 WIDEST_CLASS = "full"  # the point is calibrated with it: no parameter has to stand in for what the model cannot know
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class InClass:
+    """The machine without the effect that is looked for, with model error of one class.
+
+    Attributes
+    ----------
+    error_class : ErrorClass
+    fit : Fit
+        Model error in its metric, with the most probable deviation between sessions
+    log_evidence : float
+        Over all deviations between sessions, prior of the class included
+    session_s, deviation : float
+        Deviation between sessions, mean and most probable, in prior standard deviations
+    """
+
+    error_class: ErrorClass
+    fit: Fit
+    log_evidence: float
+    session_s: float
+    deviation: float
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -26,26 +49,44 @@ class Calibration:
 
     Attributes
     ----------
-    fit : Fit
-        Model error of the chosen class in its metric, with the most probable deviation between sessions; all readings
-        at the point that those without a channel set apart lead to
-    chosen : ErrorClass
+    chosen : InClass
+        The most probable class
     evidence : mapping of str to float
         Log evidence of every class, prior included, less that of the best
-    log_evidence : float
-        Over all deviations between sessions, of the most probable unknowns of all readings
-    session_s : float
-        Their mean, in prior standard deviations
+    error : ModelError
+    parts : sequence of Linear
+        Every piece near the readings
+    columns : sequence of Array, shape (M, unknowns of model error)
+        Whitened, per unit, there
     of_others : Calibration or None
         By the readings without the channels set apart alone, if there are any
     """
 
-    fit: Fit
-    chosen: ErrorClass
+    chosen: InClass
     evidence: Mapping[str, float]
-    log_evidence: float
-    session_s: float
+    error: ModelError
+    parts: Sequence[Linear]
+    columns: Sequence[Array]
     of_others: Calibration | None = None
+    _known: dict[str, InClass] = field(default_factory=dict)
+
+    @property
+    def fit(self) -> Fit:
+        """In the most probable class."""
+        return self.chosen.fit
+
+    def directions(self, one: ErrorClass) -> Array:
+        """Leading combinations of model error in a class with the prior N(0, 1) each, shape (unknowns, n)."""
+        return _directions(self.columns, self.error.amplitudes(one))
+
+    def in_class(self, one: ErrorClass) -> InClass:
+        """The machine with model error of another class."""
+        if one == self.chosen.error_class:
+            return self.chosen
+        if one.name not in self._known:
+            self._known[one.name] = _in_class(self.fit.experiment, one, self.fit, self.parts, self.error, self.columns,
+                                              self.chosen.deviation)  # fmt: skip
+        return self._known[one.name]
 
 
 def calibrate_with_error(experiment: Experiment, start: Fit, apart: Collection[str] = ()) -> Calibration:
@@ -70,31 +111,45 @@ def calibrate_with_error(experiment: Experiment, start: Fit, apart: Collection[s
     if not apart:
         return found
     parts = _linearised_at(experiment, found.fit)
-    here = _judged(experiment, parts, error, _columns(error, parts), error.amplitudes(found.chosen), found.session_s)
-    fit = here.fit(found.fit.z, _courses(parts), iterations=0)
-    over = fit_over_sessions(fit, len(fit.z))
-    return replace(found, fit=fit, log_evidence=over.log_evidence, session_s=over.mean, of_others=found)
+    columns = _columns(error, parts)
+    chosen = _in_class(experiment, found.chosen.error_class, found.fit, parts, error, columns, found.chosen.deviation,
+                       iterations=0)  # fmt: skip
+    return replace(found, chosen=chosen, parts=parts, columns=columns, of_others=found, _known={})
 
 
 def _calibrated(experiment: Experiment, error: ModelError, classes: Sequence[ErrorClass], start: Fit) -> Calibration:
     (widest,) = (one for one in classes if one.name == WIDEST_CLASS)
     fit, parts = start, _linearised_at(experiment, start)
+    columns = _columns(error, parts)
     for iterations in (FIRST_ITERATIONS, ITERATIONS):
-        here = _judged(experiment, parts, error, _columns(error, parts), error.amplitudes(widest), 0.0)
+        here = _judged(experiment, parts, error, columns, error.amplitudes(widest), 0.0)
         fit = here.fit(fit.z, _courses(parts), iterations=iterations)
         parts = _linearised_at(experiment, fit)
-    columns = _columns(error, parts)
+        columns = _columns(error, parts)
     evidence = _evidence_of_classes(experiment, fit.z, parts, columns, error, classes)
-    chosen = max(classes, key=lambda one: evidence[one.name])
-    best = max(evidence.values())
-    s = 0.0
-    for _ in range(2 if len(sessions_of(experiment)) > 1 else 1):
-        here = _judged(experiment, parts, error, columns, error.amplitudes(chosen), s)
-        fit = here.fit(fit.z, _courses(parts), iterations=FIRST_ITERATIONS)
-        over = fit_over_sessions(fit, len(fit.z))
-        s = float(over.deviations[over.most_probable])
-    return Calibration(fit=fit, chosen=chosen, evidence={name: value - best for name, value in evidence.items()},
-                       log_evidence=over.log_evidence, session_s=over.mean)  # fmt: skip
+    best = max(classes, key=lambda one: evidence[one.name])
+    chosen = _in_class(experiment, best, fit, parts, error, columns, 0.0)
+    for _ in range(TURNS - 1):
+        parts = _linearised_at(experiment, chosen.fit)
+        columns = _columns(error, parts)
+        chosen = _in_class(experiment, best, chosen.fit, parts, error, columns, chosen.deviation)
+    largest = max(evidence.values())
+    return Calibration(
+        chosen=chosen, evidence={name: value - largest for name, value in evidence.items()}, error=error, parts=parts,
+        columns=columns,
+    )  # fmt: skip
+
+
+def _in_class(
+    experiment: Experiment, one: ErrorClass, near: Fit, parts: Sequence[Linear], error: ModelError,
+    columns: Sequence[Array], deviation: float, *, iterations: int = FIRST_ITERATIONS,
+) -> InClass:  # fmt: skip
+    """Fit with model error of one class and some deviation between sessions."""
+    here = _judged(experiment, parts, error, columns, error.amplitudes(one), deviation)
+    fit = here.fit(near.z, _courses(near.parts), iterations=iterations)
+    over = fit_over_sessions(fit, len(fit.z))
+    return InClass(error_class=one, fit=fit, log_evidence=float(np.log(one.prior)) + over.log_evidence,
+                   session_s=over.mean, deviation=float(over.deviations[over.most_probable]))  # fmt: skip
 
 
 def _linearised_at(experiment: Experiment, fit: Fit) -> list[Linear]:

@@ -16,7 +16,7 @@ from diagnosis.engine.fit import Experiment, Fit, Linear, Linearised
 from diagnosis.engine.gram import Given, Gram, Strengths, strengths
 from diagnosis.engine.metric import Metric
 from diagnosis.engine.point import AT_ONCE, Machine, Point
-from diagnosis.engine.products import base_of, gram_of
+from diagnosis.engine.products import base_of, gram_of, whitened_base
 from diagnosis.engine.unknown import TERM_STEP, Group, Held, NetworkParameter, Scope, TermParameter, Unknown
 from diagnosis.forward.network_on_grid import NetworkOnGrid
 from diagnosis.forward.observation import readings
@@ -65,6 +65,13 @@ class Scan:
     peak_K: Array
     peak_W: Array
 
+    def in_directions(self, directions: Array) -> Scan:
+        """The scan with combinations, shape (further, n), in place of the further columns."""
+        first, count = self.further.start, directions.shape[1]
+        last = first + count
+        return replace(self, gram=self.gram.combined(self.further, directions), further=range(first, last),
+                       of_candidates=range(last, last + len(self.of_candidates)))  # fmt: skip
+
     def singles(self, given: Given) -> Strengths:
         """Every candidate alone, in its best shape; the sign of a clock fault is that of its variant."""
         return given.singles(self.of_candidates, self.sd, self.sign)
@@ -80,7 +87,7 @@ class Scan:
         return i, j, log_bayes
 
 
-def scan(fit: Fit, candidates: Sequence[Hypothesis]) -> Scan:
+def scan(fit: Fit, candidates: Sequence[Hypothesis], error: Sequence[Array] = ()) -> Scan:
     """Linearise everything at a fit.
 
     Parameters
@@ -89,6 +96,8 @@ def scan(fit: Fit, candidates: Sequence[Hypothesis]) -> Scan:
         Model error in its metric becomes columns of the Gram matrix
     candidates : sequence of Hypothesis
         Terms; parameters out of their priors follow from the unknowns themselves
+    error : sequence of Array, shape (M, n) each
+        Whitened columns of model error per unit, for the Gram matrix; by default those of the metric
 
     Returns
     -------
@@ -97,7 +106,7 @@ def scan(fit: Fit, candidates: Sequence[Hypothesis]) -> Scan:
     count, model = len(fit.z), fit.experiment.machine.model
     placed = [(c, _on_grid(model, c.term)) for c in candidates if c.term is not None]
     candidates, priors = [c for c, _ in placed], [on_grid.term.strength for _, on_grid in placed]
-    base = base_of(fit)
+    base = whitened_base(fit.parts, fit.z, error) if error else base_of(fit)
     known = range(count)
     chosen = [np.empty((len(W), len(candidates)), order="F") for W in base]
     best: list[int] = []

@@ -51,6 +51,17 @@ class Gram:
         """How many columns there are."""
         return len(next(iter(self.of_recording.values()))) - 1
 
+    def combined(self, unknowns: range, directions: Array) -> Gram:
+        """Products with combinations, shape (unknowns, n), in place of some neighbouring unknowns."""
+        first, last = unknowns.start + 1, unknowns.stop + 1
+
+        def moved(G: Array) -> Array:
+            G = np.concatenate([G[:first], directions.T @ G[first:last], G[last:]])
+            return np.concatenate([G[:, :first], G[:, first:last] @ directions, G[:, last:]], axis=1)
+
+        return Gram(of_recording={name: moved(G) for name, G in self.of_recording.items()},
+                    log_determinants=self.log_determinants)  # fmt: skip
+
     def given(
         self, unknowns: Index, amplitudes: Array | float = 1.0, recordings: Collection[str] | None = None
     ) -> Given:

@@ -27,7 +27,7 @@ LEAST_DIRECTION, MOST_DIRECTIONS = 0.1, 300  # squared norm of a direction again
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ErrorCourses:
-    """What n unknowns of model error do along a piece, per unit; see :class:`diagnosis.forward.grid.ErrorCourse`.
+    """Courses of n unknowns of model error along a piece, per unit; see :class:`diagnosis.forward.grid.ErrorCourse`.
 
     Attributes
     ----------

@@ -183,7 +183,7 @@ class Point:
 
     @property
     def residual_without_error(self) -> Array:
-        """The same for a simulation without the model error that was assumed, to first order."""
+        """Measured minus read without the model error that was assumed, to first order, shape (K + 1, channels)."""
         error = self.trajectory.piece.error
         if error is None:
             return self.residual

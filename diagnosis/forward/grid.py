@@ -37,7 +37,7 @@ SLOW_S = 60.0  # rows further apart are means that hide what switches do, see :c
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ErrorCourse:
-    """What model error is assumed to do along a piece, while that piece is simulated.
+    """Model error along a piece that is assumed while the piece is simulated.
 
     Attributes
     ----------
@@ -56,7 +56,7 @@ class ErrorCourse:
     reading: Array
 
     def of_parts(self, parts: tuple[str, ...]) -> ErrorCourse:
-        """The same for a machine that has more parts."""
+        """Model error of a machine that has more parts."""
         if parts == self.parts:
             return self
         heat = np.zeros((len(self.heat), len(parts)))

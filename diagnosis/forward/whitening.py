@@ -3,8 +3,9 @@
 A free-running residual wanders for hours: one forgotten watt in the oil shows in every later row. Judged row by row it
 looks like overwhelming evidence. The noise model therefore holds what a real gearbox always has besides its model: a
 random heat in every part (an Ornstein-Uhlenbeck process, the *structural floor*; larger where much heat goes to the
-surroundings, whose draughts come and go), unknown start temperatures, and white sensor noise. A Kalman filter of the linearised network gives the innovations of any signal under this noise; the same
-filter applied to a derivative gives that derivative in the same, whitened units.
+surroundings, whose draughts come and go), unknown start temperatures, and white sensor noise. A Kalman filter of the
+linearised network gives the innovations of any signal under this noise; the same filter applied to a derivative gives
+that derivative in the same, whitened units.
 
 References
 ----------
@@ -163,9 +164,7 @@ class Whitening:
 
 def _to_surroundings(model: NetworkOnGrid, trajectory: Trajectory) -> Array:
     """Heat that links to boundaries take from every part, or bring, shape (K, parts), [W]."""
-    outside = (
-        np.abs(model.to_parts.sum(axis=1)) > 0.5
-    )  # the heat of a link between parts is counted twice, with both signs
+    outside = np.abs(model.to_parts.sum(axis=1)) > 0.5  # between parts, what one loses the other gains
     balance = trajectory.balance
     flows = np.square(balance.conductances * balance.differences)[:, outside]
     return np.asarray(np.sqrt(flows @ np.abs(model.to_parts[outside])))

@@ -1,136 +1,100 @@
-"""Charts as SVG that fits any width without a script: curves stretch, lines and letters keep their size.
-
-The colours are classes of the page's style, so that a chart follows its light and dark looks.
-"""
+"""Interactive charts: a plotly figure with its title and a text for those who do not see it, in one look."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Literal
+from textwrap import wrap
+from typing import Any
 
 import numpy as np
+import plotly.graph_objects as go
 from markupsafe import Markup
-from matplotlib.ticker import MaxNLocator
 
-from diagnosis.results.number_format import MINUS
 from models.base.types import Array
 
-Kind = Literal["line", "points", "band"]
-MOST_POINTS = 800  # of a curve
-GRID = 2000  # units of the drawing across
+INK, LINE = "#1f2328", "#dfe3e8"
+FONT_PX = 12
+LETTERS = 42  # of a line on a phone
+MOST_POINTS = 700  # of a curve
+MOST_OF_ALL = 160_000  # points of all curves of a chart: some 2 MB of the page
 GAP = 20.0  # times the usual distance of rows: a curve is interrupted
-MARGIN = 0.04  # of the range, above and below the curves
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Curve:
-    """One curve of a chart.
-
-    Attributes
-    ----------
-    label : str
-    look : str
-        Class of the page's style
-    x, y : Array, shape (N,)
-        NaN where there is nothing
-    low : Array, shape (N,), or None
-        Lower edge of a band that ends at `y`
-    far : bool
-        Whether it may lie outside the chart, which then keeps to the others
-    """
-
-    label: str
-    look: str
-    x: Array
-    y: Array
-    kind: Kind = "line"
-    low: Array | None = None
-    far: bool = False
+CONFIG = {
+    "responsive": True,
+    "displaylogo": False,
+    "modeBarButtonsToRemove": ["select2d", "lasso2d", "autoScale2d"],
+}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Chart:
-    """Axes with curves.
+    """A figure of the report.
 
     Attributes
     ----------
-    title, x_label, y_label : str
-        Labels carry the unit
+    name : str
+        Of the element in the page
+    title : str
+    alt : str
+        All that the figure shows, in words
+    figure : plotly.graph_objects.Figure
     note : str
-        Text next to the title
-    curves : tuple of Curve
-    shade : tuple of (from, to)
-        Stretches of the x axis that are set back
-    x_range : (from, to) or None
-        By default what the curves cover
-    height : int
-        Of the plot, [px]
-    level : bool
-        Whether zero must be in sight
+        How to read it
     """
 
+    name: str
     title: str
-    x_label: str
-    y_label: str
-    curves: tuple[Curve, ...]
+    alt: str
+    figure: go.Figure
     note: str = ""
-    shade: tuple[tuple[float, float], ...] = ()
-    x_range: tuple[float, float] | None = None
-    height: int = 180
-    level: bool = False
+
+    @property
+    def html(self) -> Markup:
+        """The figure for a page that has plotly.js."""
+        return Markup(  # noqa: S704 - plotly escapes what could end its script
+            self.figure.to_html(full_html=False, include_plotlyjs=False, config=CONFIG, div_id=f"plot-{self.name}")
+        )
 
 
-def drawn(chart: Chart) -> Markup:
-    """The chart as HTML; a sentence where it has no numbers."""
-    x_low, x_high = chart.x_range or _range([curve.x for curve in chart.curves])
-    near = [c for c in chart.curves if not c.far] or list(chart.curves)
-    y_low, y_high = _range([values for c in near for values in (c.y, c.low) if values is not None])
-    if not np.isfinite([x_low, x_high, y_low, y_high]).all():
-        return Markup('<p class="soft">{}: nothing was recorded here.</p>').format(chart.title)
-    if chart.level:
-        y_low, y_high = min(y_low, 0.0), max(y_high, 0.0)
-    x_low, x_high = _apart(x_low, x_high)
-    y_low, y_high = _apart(y_low, y_high)
-    y_low, y_high = y_low - MARGIN * (y_high - y_low), y_high + MARGIN * (y_high - y_low)
-    scatter = any(curve.kind == "points" for curve in chart.curves) and chart.x_range is None
-    if scatter:
-        x_low, x_high = x_low - MARGIN * (x_high - x_low), x_high + MARGIN * (x_high - x_low)
-    view = _View(x_low, x_high, y_low, y_high)
-    x_ticks, y_ticks = _ticks(x_low, x_high, 7), _ticks(y_low, y_high, max(chart.height // 40, 2))
-    shapes = [Markup('<rect class="shade" x="{}" y="0" width="{}" height="{}"/>').format(
-        view.x(a), max(view.x(min(b, x_high)) - view.x(a), 0), GRID) for a, b in chart.shade if b > a]  # fmt: skip
-    grid = "".join(f"M{view.x(t)} 0v{GRID}" for t in x_ticks) + "".join(f"M0 {view.y(t)}h{GRID}" for t in y_ticks)
-    shapes.append(Markup('<path class="grid" d="{}"/>').format(grid))
-    if y_low < 0.0 < y_high:
-        shapes.append(Markup('<path class="zero" d="M0 {}h{}"/>').format(view.y(0.0), GRID))
-    shapes += [_curve(curve, view) for curve in chart.curves]
-    return Markup(
-        '<figure class="chart"><figcaption><b>{}</b>{}<span class="soft unit">{}</span></figcaption>'
-        '<div class="frame" style="height: {}px"><div class="y">{}</div>'
-        '<svg viewBox="0 0 {} {}" preserveAspectRatio="none" role="img" aria-label="{}" data-x="{:.9g} {:.9g}"'
-        ' data-y="{:.9g} {:.9g}" data-of="{}"{}>{}</svg></div>'
-        '<div class="x">{}</div><div class="soft unit right">{}</div></figure>'
-    ).format(
-        chart.title,
-        Markup(' <span class="note">{}</span>').format(chart.note) if chart.note else "",
-        chart.y_label,
-        chart.height,
-        _labels(y_ticks, y_low, y_high, "bottom"),
-        GRID,
-        GRID,
-        f"{chart.title}: {chart.y_label} over {chart.x_label}",
-        x_low,
-        x_high,
-        y_low,
-        y_high,
-        chart.x_label,
-        "" if scatter else Markup(" data-hover"),
-        Markup("").join(shapes),
-        _labels(x_ticks, x_low, x_high, "left"),
-        chart.x_label,
-    )
+def dressed(figure: go.Figure, height: int, **layout: Any) -> go.Figure:
+    """A figure in the common look.
+
+    Parameters
+    ----------
+    figure : plotly.graph_objects.Figure
+    height : int
+        [px]; the width is that of the page
+    **layout
+        Further properties of the layout
+    """
+    axis = {"gridcolor": LINE, "zerolinecolor": "#9aa1a9", "linecolor": "#9aa1a9", "showline": True,
+            "automargin": True}  # fmt: skip
+    figure.update_xaxes(**axis)
+    figure.update_yaxes(**axis)
+    usual: dict[str, Any] = {
+        "template": "none",
+        "height": height,
+        "font": {"size": FONT_PX, "color": INK},
+        "margin": {"l": 10, "r": 14, "t": 30, "b": 10},
+        "paper_bgcolor": "white",
+        "plot_bgcolor": "white",
+        "hoverlabel": {"bgcolor": "white", "font": {"size": FONT_PX}, "namelength": -1},
+        "legend": {"orientation": "h", "x": 0.0, "xanchor": "left", "y": 1.0, "yanchor": "bottom"},
+    }
+    return figure.update_layout(**(usual | layout))
+
+
+def curve_points(x: Array, y: Array, most: int = MOST_POINTS) -> tuple[Array, Array]:
+    """A curve as plotly gets it: thinned, and interrupted where rows are missing; single precision."""
+    known = np.isfinite(x) & np.isfinite(y)
+    x, y = x[known], y[known]
+    parts, share = stretches(x), most / max(len(x), 1)
+    thin = [thinned(x[s], y[s], max(2, int(share * (s.stop - s.start)))) for s in parts]
+    xs = [piece for one, _ in thin for piece in (one, one[-1:])]
+    ys = [piece for _, one in thin for piece in (one, np.full(min(len(one), 1), np.nan))]
+    joined = np.concatenate(xs[:-1] or [x]), np.concatenate(ys[:-1] or [y])
+    return joined[0].astype(np.float32), joined[1].astype(np.float32)
 
 
 def thinned(x: Array, y: Array, most: int = MOST_POINTS) -> tuple[Array, Array]:
@@ -171,68 +135,33 @@ def stretches(x: Array) -> list[slice]:
     return [slice(a, b) for a, b in pairwise(cuts)]
 
 
-class _View:
-    """From values to units of the drawing."""
-
-    def __init__(self, x_low: float, x_high: float, y_low: float, y_high: float) -> None:
-        self._x, self._y = (x_low, GRID / (x_high - x_low)), (y_high, GRID / (y_high - y_low))
-
-    def x(self, value: float) -> int:
-        return round((value - self._x[0]) * self._x[1])
-
-    def y(self, value: float) -> int:
-        return round((self._y[0] - value) * self._y[1])
-
-    def points(self, x: Array, y: Array) -> list[list[int]]:
-        units = np.column_stack([(x - self._x[0]) * self._x[1], (self._y[0] - y) * self._y[1]])
-        rounded: list[list[int]] = np.rint(units).astype(int).tolist()
-        return rounded
+def limits(curves: Sequence[Array], margin: float = 0.05) -> list[float] | None:
+    """A range around curves; None if they have no values."""
+    values = np.concatenate([c[np.isfinite(c)] for c in curves] or [np.zeros(0)])
+    if not len(values):
+        return None
+    low, high = float(values.min()), float(values.max())
+    apart = max(margin * (high - low), 1e-6 * max(abs(low), abs(high)), 1e-9)
+    return [low - apart, high + apart]
 
 
-def _curve(curve: Curve, view: _View) -> Markup:
-    known = np.isfinite(curve.x) & np.isfinite(curve.y)
-    x, y = curve.x[known], curve.y[known]
-    if curve.kind == "points":
-        # A line of no length with round ends is a dot that does not stretch.
-        path = "".join(f"M{a} {b}h0" for a, b in view.points(*thinned(x, y)))
-    elif curve.kind == "band" and curve.low is not None:
-        low = curve.low[known]
-        path = "".join(
-            "M" + "L".join(f"{a} {b}" for a, b in view.points(*thinned(x[s], y[s]))
-                           + view.points(*thinned(x[s], low[s]))[::-1]) + "Z"
-            for s in stretches(x)
-        )  # fmt: skip
-    else:
-        share = MOST_POINTS / max(len(x), 1)
-        path = "".join(
-            "M" + "L".join(f"{a} {b}" for a, b in view.points(*thinned(x[s], y[s], max(2, int(share * len(x[s]))))))
-            for s in stretches(x) if s.stop > s.start
-        )  # fmt: skip
-    return Markup('<path class="{} {}" data-label="{}" d="{}"/>').format(curve.kind, curve.look, curve.label, path)
+def row_titles(texts: Sequence[str]) -> list[dict[str, Any]]:
+    """A title over the left end of every row of axes."""
+    return [
+        {"text": text, "x": 0.0, "xref": "paper", "xanchor": "left", "y": 1.0, "yanchor": "bottom",
+         "yref": f"y{row} domain" if row > 1 else "y domain", "showarrow": False, "font": {"size": FONT_PX}}
+        for row, text in enumerate(texts, 1)
+    ]  # fmt: skip
 
 
-def _range(arrays: Sequence[Array]) -> tuple[float, float]:
-    values = np.concatenate([values[np.isfinite(values)] for values in arrays]) if arrays else np.empty(0)
-    return (float(values.min()), float(values.max())) if len(values) else (np.nan, np.nan)
+def menu(buttons: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """A list to choose from above a figure, if there is a choice."""
+    if len(buttons) < 2:
+        return {}
+    return {"updatemenus": [{"buttons": list(buttons), "x": 0.0, "xanchor": "left", "y": 1.0, "yanchor": "top",
+                             "pad": {"t": -120, "b": 0}, "bgcolor": "white", "font": {"size": FONT_PX}}]}  # fmt: skip
 
 
-def _apart(low: float, high: float) -> tuple[float, float]:
-    """A range that is not empty."""
-    least = 1e-6 * max(abs(low), abs(high), 1e-3)
-    return (low, high) if high - low > least else (low - 0.5, high + 0.5)
-
-
-def _ticks(low: float, high: float, most: int) -> list[float]:
-    ticks = MaxNLocator(nbins=most, steps=[1, 2, 2.5, 5, 10]).tick_values(low, high)
-    return [float(t) for t in ticks if low <= t <= high]
-
-
-def _labels(ticks: Sequence[float], low: float, high: float, side: str) -> Markup:
-    step = abs(ticks[1] - ticks[0]) if len(ticks) > 1 else 1.0
-    decimals = next((d for d in range(7) if abs(round(step, d) - step) < 1e-9 * max(step, 1e-9) + 1e-12), 6)
-    return Markup("").join(
-        Markup('<span style="{}: {:.2f}%">{}</span>').format(
-            side, 100.0 * (t - low) / (high - low), f"{t + 0.0:.{decimals}f}".replace("-", MINUS)
-        )
-        for t in ticks
-    )
+def wrapped(text: str) -> str:
+    """A text on lines that a phone has room for."""
+    return "<br>".join(wrap(text, LETTERS))

@@ -9,12 +9,14 @@ from typing import Any
 from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
 
-from diagnosis.report import equation, figures, network_drawing, wording
+from diagnosis.report import course_charts, equation, finding_charts, network_chart, wording
+from diagnosis.report.chart import Chart
 from diagnosis.results import number_format as numbers
 from diagnosis.results.result import LEAST_RIVAL, NO_CLAIM, Diagnosis, date_told, values_told
 from diagnosis.results.result_parts import Calibrated, Finding, Fits
 
 PACKAGE = "diagnosis.report"
+PLOTLY = "plotly-basic.min.js"  # npm: plotly.js-basic-dist-min, of the version that the plotly of Python brings
 SHOWN_RANKS, MOST_RANKS = 10, 300
 DISTRESS = 2.0  # standard deviations of a prior
 BAR_SD = 4.0  # at the end of a bar
@@ -29,27 +31,24 @@ def page(diagnosis: Diagnosis) -> str:
         number=numbers.number,
         fixed=numbers.fixed,
         share=wording.share,
-        chance=wording.chance,
         sentence=wording.sentence,
         clause=wording.clause,
         plain=wording.plain,
     )
-    marked = network_drawing.marks(diagnosis)
-    measured = {channel for course in diagnosis.courses for channel in course.measured}
     return environment.from_string(_text("report.html.j2")).render(
         d=diagnosis,
         style=Markup(_text("report.css")),  # noqa: S704 - our own file
         script=Markup(_text("report.js")),  # noqa: S704 - our own file
+        plotly=Markup(_text(PLOTLY)),  # noqa: S704 - a library
+        charts={chart.name: chart for chart in charts_of(diagnosis)},
         words=wording.WORDS,
         verdict_text=diagnosis.verdict_text,
         claims=diagnosis.verdict not in NO_CLAIM,
         evidence=_evidence(diagnosis),
-        findings=[_finding(finding) for finding in diagnosis.findings],
-        stages=figures.STAGES if diagnosis.findings else figures.STAGES[:2],
-        network=network_drawing.drawn(network_drawing.corrected(diagnosis), diagnosis.network, measured, marked),
-        told=marked.told(network_drawing.corrected(diagnosis)),
+        items=[[_finding(finding) for finding in item] for item in diagnosis.items],
+        stages=course_charts.stages_of(diagnosis),
+        told=network_chart.marks(diagnosis).told(network_chart.corrected(diagnosis)),
         fits=[("Held out", _rows(diagnosis.holdout)), ("Learned from", _rows(diagnosis.train))],
-        panels=figures.courses(diagnosis),
         has_noise=diagnosis.noise_K > 0.0,
         calibration=[_calibrated(diagnosis, one) for one in sorted(diagnosis.calibration, key=_unmoved)],
         ranking=diagnosis.ranking[:MOST_RANKS],
@@ -60,6 +59,19 @@ def page(diagnosis: Diagnosis) -> str:
         loss=wording.LOSS,
         provenance=wording.provenance(diagnosis.inputs),
     )  # fmt: skip
+
+
+def charts_of(diagnosis: Diagnosis) -> tuple[Chart, ...]:
+    """Return the charts of a diagnosis that there is something to show in, six at most."""
+    made = (
+        network_chart.network_with_places(diagnosis),
+        finding_charts.names_by_grade(diagnosis),
+        finding_charts.dates_with_bands(diagnosis),
+        finding_charts.heat_of_findings(diagnosis),
+        course_charts.errors_over_time(diagnosis),
+        course_charts.measured_and_simulated(diagnosis),
+    )
+    return tuple(chart for chart in made if chart is not None)
 
 
 def _text(file: str) -> str:
@@ -93,8 +105,8 @@ def _finding(finding: Finding) -> dict[str, Any]:
             (wording.name(p.name.removeprefix(prefix)), numbers.with_error(p.value, p.stderr), wording.unit(p.unit))
             for p in finding.parameters
         ],
-        "rivals": [rival for rival in finding.confusable_with if rival.probability >= LEAST_RIVAL],
-        "heat": figures.found_heat(finding),
+        "rivals": [one for one in finding.confusable_with if one.instead and one.probability >= LEAST_RIVAL],
+        "companions": [one for one in finding.confusable_with if not one.instead and one.probability >= LEAST_RIVAL],
     }
 
 

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from diagnosis.results.number_format import NONE, SUPERSCRIPTS
+from diagnosis.results.result_parts import PARAMETER, Finding, named
 from models.quantities.quantities import TOTAL_LOSS
 
 DAY, HOUR, MINUTE = 86_400.0, 3600.0, 60.0
 WEEKS_S, LONG_S, SHORT_S = 14.0 * DAY, 2.0 * HOUR, 5.0 * MINUTE  # above: in days, in hours; below: in seconds
-RARELY, NEVER = 1e-4, 1e-12  # chances below: as a power of ten; no longer told apart
 UNITS = {"1": "", "degC": "°C", "W/degC": "W/K", "N m": "N m", "N.m": "N m", "rpm": "1/min"}
 LOSS = TOTAL_LOSS
-PARAMETER = "parameter"
 
+COURSES = {"step": "from a date on", "for_a_while": "for a while", "over_hours": "over the hours"}
 MOST_WINDOWS = 12  # of a recording that are told
 # Shown when hovering a term, and all together at the end of the page.
 WORDS: Mapping[str, str] = {
@@ -41,8 +42,8 @@ WORDS: Mapping[str, str] = {
     "model error": "What formulas, load sharings and lumped nodes cannot know: further small unknowns with priors, in "
     "classes between which the data choose. What they can explain is not called missing physics.",
     "threshold": "Evidence that has to be reached before anything is claimed; set by the false-alarm rate asked for.",
-    "false-alarm rate": "In how many of 100 healthy cases a mismatch would be claimed at most.",
-    "p": "Nominal bound on the chance to reach this evidence although nothing is missing.",
+    "false-alarm rate": "In how many of 100 healthy cases a mismatch may be reported, as asked for. It moves the "
+    "threshold; the thresholds were set on healthy machines of simulated plants, so on a real machine it is an aim.",
     "standard error": "68 % of such estimates lie within ± this of the truth, if the form of the law is right.",
     "prior": "What the definition states about a parameter before any recording: a value, and how far off it may be.",
     "shift": "How far the calibration moved a parameter, in standard deviations of its prior. Beyond ±2 "
@@ -74,10 +75,10 @@ def name(identifier: str) -> str:
 
     Examples
     --------
-    >>> name("housing_lower"), name("P_loss")
-    ('housing lower', 'total loss')
+    >>> name("housing_lower"), name("P_loss"), name("torque_gain_step")
+    ('housing lower', 'total loss', 'torque gain from a date on')
     """
-    return "total loss" if identifier == LOSS else identifier.replace("_", " ")
+    return "total loss" if identifier == LOSS else _spelled(identifier)
 
 
 def headline(mechanism: str, place: str = "") -> str:
@@ -93,6 +94,13 @@ def headline(mechanism: str, place: str = "") -> str:
     return f"{name(mechanism)}{' ' if mechanism == PARAMETER else ' at '}{name(place)}"
 
 
+def short_title(finding: Finding) -> str:
+    """The names of a finding without their places."""
+    like = "acts like " if finding.acts_like else ""
+    one = named(finding.mechanism, finding.place) if finding.mechanism == PARAMETER else finding.mechanism
+    return like + " or ".join(map(name, finding.tie_set or (one,)))
+
+
 def plain(text: str) -> str:
     """A text of the terminal for a page: names in words, units as printed, no full stop.
 
@@ -101,7 +109,14 @@ def plain(text: str) -> str:
     >>> plain("windage at housing_lower: on at 60 degC.")
     'windage at housing lower: on at 60 °C'
     """
-    return clause(text.replace("_", " "))
+    return clause(_spelled(text))
+
+
+def _spelled(text: str) -> str:
+    """Names in words; the course of an effect in time, which is the end of its name, too."""
+    for ending, words in COURSES.items():
+        text = re.sub(rf"_{ending}\b", f" {words}", text)
+    return re.sub(r"\bT_ambient\b", "ambient temperature", text).replace("__", " ").replace("_", " ")
 
 
 def clause(text: str) -> str:
@@ -125,22 +140,6 @@ def sentence(text: str) -> str:
     """
     text = clause(text)
     return f"{text[0].upper()}{text[1:]}." if text else ""
-
-
-def chance(p: float) -> str:
-    """An upper bound on a probability of something rare.
-
-    Examples
-    --------
-    >>> chance(0.31), chance(0.0004), chance(1e-9), chance(1e-300), chance(1.0)
-    ('0.31', '0.0004', '10⁻⁹', '10⁻¹²', '1')
-    """
-    if not math.isfinite(p):
-        return NONE
-    p = max(p, NEVER)
-    if p < RARELY:
-        return f"10{str(math.ceil(math.log10(p))).translate(SUPERSCRIPTS)}"
-    return f"{p:.2g}"
 
 
 def share(probability: float) -> str:

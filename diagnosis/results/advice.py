@@ -28,7 +28,7 @@ def without_sensor(network: ThermalNetwork, channels: Sequence[str]) -> frozense
 
 def separation(
     own: Hypothesis, other: Hypothesis, catalogue: Mapping[str, Mechanism], network: ThermalNetwork,
-    free: Collection[str],
+    free: Collection[str], *, names: tuple[str, str],
 ) -> str:  # fmt: skip
     """The experiment, or the sensor, that distinguishes two effects.
 
@@ -39,15 +39,19 @@ def separation(
     network : ThermalNetwork
     free : collection of str
         Parts that can have a sensor, see :func:`without_sensor`
+    names : (str, str)
+        Of the two in the catalogue, whatever their course in time
     """
     if own.name == other.name:
         node = node_in(network, other)
         return f"a temperature sensor at {node.replace('_', ' ')}" if node in free else OTHER_OPERATION
-    if own.name in catalogue:
-        return catalogue[own.name].separation(other.name)
-    if other.name in catalogue:
-        return catalogue[other.name].separation(own.name)
-    return OTHER_OPERATION
+    known = [(catalogue[a], b) for a, b in (names, names[::-1]) if a in catalogue]
+    for mechanism, rival in known:
+        if rival in mechanism.separate_by:
+            return mechanism.separate_by[rival]
+    if other.term is not None and other.term.of_measurement:
+        known = known[::-1]  # an instrument is tested more easily than a machine
+    return known[0][0].experiment if known else OTHER_OPERATION
 
 
 def next_test(
@@ -72,8 +76,9 @@ def next_test(
     if verdict == "unexplained" and "T_ambient" in assumed:
         return "record T_ambient_degC: a constant replaces it, and effects of the air show up elsewhere"
     for finding in findings:
-        if finding.confusable_with and finding.confusable_with[0].probability >= WORTH_ASKING:
-            return finding.confusable_with[0].separate_by
+        rivals = [rival for rival in finding.confusable_with if rival.instead]
+        if rivals and rivals[0].probability >= WORTH_ASKING:
+            return rivals[0].separate_by
     for place in location[1:]:
         if place.probability >= OTHER_PLACE and place.node in free:
             return f"a temperature sensor at {place.node.replace('_', ' ')}: it shows if the heat is there"

@@ -19,6 +19,8 @@ from diagnosis.results.result_parts import Finding, ParameterValue, Rival
 from diagnosis.setup.inference_setup import InferenceSetup, heat_over_time
 from models.mechanisms import Mechanism, Placed
 
+# In sentences about a change, whose strength shows which.
+EITHER = (("smaller or greater", "smaller", "greater"), ("more or less", "less", "more"))
 ENDINGS = (STEP, WHILE, HOURS, "carried_on")
 
 
@@ -94,10 +96,15 @@ def _says(answer: Answer, found: Mapping[str, float]) -> str:
         says = f"The parameter {effect.place} is {found[names_of(effect)[0]]:.3g}, far from what the definition allows."
     else:
         says = f"{effect.name.replace('_', ' ').capitalize()} at {effect.place.replace('_', ' ')}."
+    for either, less, more in EITHER:
+        if effect.term is not None and either in says:
+            says = says.replace(either, less if found[effect.term.strength.name] < 0.0 else more)
+    says = " ".join(says.split())
+    inside = f"{says[:1].lower()}{says[1:]}"
     if answer.acts_like:
-        return f"Something acts like this, its cause was not found: {says}"
+        return f"Something acts like this, its cause was not found: {inside}"
     if len(answer.tied) > 1:
-        return f"One of several effects that these data do not separate, the most probable: {says}"
+        return f"One of several effects that these data do not separate, the most probable: {inside}"
     return says
 
 
@@ -124,11 +131,14 @@ def _rivals(
     own, free = answer.effect, without_sensor(setup.nominal, setup.channels)
     others = {effect.label for effect in answer.best.effects}
     odds: dict[str, float] = {}
+    alone: dict[str, float] = {}
     where: dict[str, Hypothesis] = {}
     for judged, probability in posterior.ranked:
+        with_own = key(own) in {key(effect) for effect in judged.effects}
         for other in judged.effects:
             if other.label not in others and key(other) != key(own):
                 odds[key(other)] = odds.get(key(other), 0.0) + probability
+                alone[key(other)] = alone.get(key(other), 0.0) + (0.0 if with_own else probability)
                 where.setdefault(key(other), other)
     tied: dict[str, float] = {}
     for other, probability in answer.tied:
@@ -138,7 +148,9 @@ def _rivals(
     return tuple(
         Rival(
             mechanism=name_in(catalogue, where[name]), place=where[name].place, probability=probability,
-            separate_by=separation(own, where[name], catalogue, setup.nominal, free),
+            separate_by=separation(own, where[name], catalogue, setup.nominal, free,
+                                   names=(name_in(catalogue, own), name_in(catalogue, where[name]))),
+            instead=name in tied or alone[name] >= LEAST_RIVAL,
         )
         for name, probability in sorted({**odds, **tied}.items(), key=lambda one: (one[0] not in tied, -one[1]))
         if probability >= LEAST_RIVAL

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from diagnosis.candidates.dated import WHILE
 from diagnosis.decision.posterior import KINDS, Answer, Judged, Posterior
 from diagnosis.decision.settings import Settings
 from diagnosis.engine.baselines import effects_in_baselines, notes_of_baselines, sessions_apart
@@ -16,14 +17,14 @@ from diagnosis.engine.prepare import held_out_experiment
 from diagnosis.engine.set_apart import calibrate_without_error, without_channels
 from diagnosis.recordings.recording import Recording
 from diagnosis.results.advice import next_test, without_sensor
-from diagnosis.results.answer_findings import finding_of
+from diagnosis.results.answer_findings import finding_of, name_in
 from diagnosis.results.effect_values import heats_of, names_of, slope
 from diagnosis.results.instruments import sensors_and_inputs_of
 from diagnosis.results.places import node_in
 from diagnosis.results.ratios_only import ratio_notes
 from diagnosis.results.regime import active, regime, windows
 from diagnosis.results.result import Diagnosis, Verdict
-from diagnosis.results.result_parts import Calibrated, Fits, Location, NotDetectable, PredictedRun, Ranked
+from diagnosis.results.result_parts import Calibrated, Fits, Location, NotDetectable, PredictedRun, Ranked, named
 from diagnosis.setup.inference_setup import InferenceSetup
 from diagnosis.setup.noise import HEAT_FRACTION, PARAMETRIC_FRACTION, PARAMETRIC_K
 from models.base.parallel import run_parallel
@@ -39,6 +40,7 @@ LEAST_PLACE = 0.02  # probability of a place that is told
 MOST_RANKED = 500
 STATES = ("before", "calibrated", "after")
 PROBABLY = 0.5
+FROM_DATE, BETWEEN = "from its date on", "between its two dates"
 Predictions = Mapping[str, Mapping[str, Sequence[Prediction]]]
 
 
@@ -101,6 +103,7 @@ def assemble(
         finding_of(answer, answer.best.fit or final, setup, posterior, catalogue, train) for answer in answers
     )
     told = {name for finding in findings for name in (finding.mechanism, *finding.tie_set)}
+    told |= {rival.mechanism for finding in findings for rival in finding.confusable_with}
     unseen = tuple(one for one in _unseen(posterior, catalogue) if one.mechanism not in told)
     verdict = _verdict(posterior, answers, unseen)
     location = _location(setup, posterior) if posterior.detected else ()
@@ -135,7 +138,7 @@ def assemble(
         misfit=_misfit(final),
         remaining_p_value=float(min(1.0, np.exp(-max(posterior.remainder, -50.0)))),
         remaining_note=_remaining(posterior, others),
-        ranking=_ranking(posterior),
+        ranking=_ranking(posterior, catalogue),
         unseen=unseen,
         next_test=next_test(
             verdict, findings, location, unseen, catalogue, assumed=assumed,
@@ -265,7 +268,7 @@ def _remaining(posterior: Posterior, others: Others | None) -> str:
         return f"without {channels} nothing stands out of noise and model error (evidence {rest.log_e:.1f} nat)"
     if posterior.remainder > posterior.threshold:
         return f"a further effect would still help (evidence {posterior.remainder:.0f} nat)"
-    return "nothing that stands out of noise and model error"
+    return f"nothing stands out of noise and model error (evidence {posterior.remainder:.1f} nat of a further effect)"
 
 
 def _misfit(fit: Fit) -> float:
@@ -325,13 +328,15 @@ def _place(
         signals[f"temperature of {node}"] = (T, "degC")
     signals["time"] = (np.concatenate([piece.middle for piece in pieces]) / 3600.0, "h")
     acting = active(together, steps)
+    here = [effect for effect in effects if nodes[effect.label] == node]
+    dated = BETWEEN if here[0].name.endswith(WHILE) else FROM_DATE if here[0].how == "D" else ""
     split = np.split(acting, np.cumsum([len(heat) for heat in heats])[:-1])
     when = [(piece.recording, a, b) for piece, acts in zip(pieces, split, strict=True)
             for a, b in windows(piece.middle, acts)]  # fmt: skip
     return Location(
         node=node, probability=min(weight, 1.0), heat_mean_W=float(np.average(together, weights=steps)),
         heat_max_W=float(together[np.argmax(np.abs(together))]), when=tuple(when),
-        regime=regime(acting, signals, steps),
+        regime=dated or regime(acting, signals, steps),
     )  # fmt: skip
 
 
@@ -393,8 +398,9 @@ def _courses(setup: InferenceSetup, predictions: Predictions) -> tuple[Predicted
             at = np.clip(np.arange(len(piece.time)), 0, len(piece.steps) - 1)
             others = {name: after.trajectory.T[:, i] for i, name in enumerate(parts)}
             result.append(PredictedRun(
-                recording=piece.recording, held_out=which == "holdout", time=piece.time, speed=piece.inputs[at, 0],
-                torque=piece.inputs[at, 1], measured=by_channel(piece.measured), before=by_channel(before.read),
+                recording=piece.recording, held_out=which == "holdout", time=piece.time,
+                inputs=dict(zip(setup.model.laws.inputs, piece.inputs[at].T, strict=True)),
+                measured=by_channel(piece.measured), before=by_channel(before.read),
                 calibrated=by_channel(calibrated.read), after=others | by_channel(after.read),
                 counts_from_s=before.counts_from,
                 start=dict(zip(parts, after.trajectory.T[0].tolist(), strict=True)),
@@ -420,7 +426,7 @@ def _calibration(final: Fit, plain: Fit, answers: Sequence[Answer]) -> tuple[Cal
     return tuple(result)
 
 
-def _ranking(posterior: Posterior) -> tuple[Ranked, ...]:
+def _ranking(posterior: Posterior, catalogue: Mapping[str, Mechanism]) -> tuple[Ranked, ...]:
     """Everything that was judged, most probable first; of a pair both names."""
     return tuple(
         Ranked(
@@ -428,6 +434,7 @@ def _ranking(posterior: Posterior) -> tuple[Ranked, ...]:
             place=" + ".join(effect.place for effect in one.effects),
             family=" + ".join(dict.fromkeys(effect.family for effect in one.effects)), log_bayes=one.log_bayes,
             probability=probability,
+            laws=tuple(named(e.name, e.place) if e.term is None else name_in(catalogue, e) for e in one.effects),
         )
         for one, probability in posterior.ranked[:MOST_RANKED]
     )  # fmt: skip

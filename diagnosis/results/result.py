@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from diagnosis.results.number_format import MINUS, with_error
+from diagnosis.results.number_format import MINUS, number, with_error
 from diagnosis.results.result_parts import (
     Calibrated,
     Finding,
@@ -19,6 +19,7 @@ from diagnosis.results.result_parts import (
     Ranked,
     finding_dict,
     fits_dict,
+    named,
 )
 from models.correction.instruments import InputCorrection, SensorCorrection
 from models.mechanisms import OPEN_FORM
@@ -32,6 +33,7 @@ LEAST_RIVAL = 0.01  # probability of what is told as a rival
 NEAREST, MOST_NEAREST = 0.1, 3  # probability from which an explanation is told that was not reported; of how many
 MOST_UNSEEN = 6  # effects that the summary names of those that cannot be seen
 OF_DATE = ("since", "lasting")  # parameters that the date contains
+OF_SWITCH = ("set_point", "band")  # parameters that the switching temperatures contain
 LONG_S = 7200.0  # times beyond are told in hours
 LITTLE_SPREAD = 0.05  # deviation between sessions that is not worth a word, in prior standard deviations
 NO_CLAIM = ("consistent", "insufficient_data")
@@ -39,14 +41,21 @@ Verdict = Literal[
     "consistent", "parameter_error", "missing_physics", "sensor_fault", "unexplained", "insufficient_data"
 ]
 VERDICT_TEXT: Mapping[str, str] = {
-    "consistent": "The recordings agree with the model within its stated uncertainties.",
+    "consistent": "Nothing stands out: noise and model error explain the recordings.",
     "parameter_error": "A known parameter of the model is outside what its definition allows.",
-    "missing_physics": "The gearbox shows physics that the model leaves out.",
-    "sensor_fault": "A sensor, clock or recorded input is at fault, not the gearbox.",
+    "missing_physics": "The machine shows physics that the model leaves out.",
+    "sensor_fault": "A sensor, clock or recorded input is at fault, not the machine.",
     "unexplained": "Something is missing, and it matches no physics in the catalogue.",
     "insufficient_data": "These recordings are too short or too calm to decide.",
 }
+MEASUREMENT = "measurement"  # family
+LARGEST_ERROR = "full"  # class of model error
 PARTLY = "Part of what is missing was found; the rest matches no physics in the catalogue."
+LIKELY_TEXT: Mapping[str, str] = {  # of the same verdicts where no name is a claim
+    "parameter_error": "A parameter of the model is probably outside what its definition allows.",
+    "missing_physics": "The machine probably shows physics that the model leaves out; its name is not certain.",
+    "sensor_fault": "A sensor, clock or recorded input is probably at fault, not the machine.",
+}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -59,7 +68,8 @@ class Diagnosis:
     gearbox : str
     log_e_value, threshold, p_value : float
         Evidence that something is missing, averaged over everything in the catalogue [nat], the level it had to reach,
-        and the bound on the probability of reaching it by chance
+        and exp(-evidence), at most 1. That would bound the chance of such evidence in a healthy machine only if the
+        model were exact, which it never is; the threshold decides
     false_alarm_rate : float
         As asked for
     location : tuple of Location
@@ -75,7 +85,7 @@ class Diagnosis:
         Mean square of the residual in the training recordings or, where something was found, in the held-out ones,
         whichever is larger, in multiples of what noise and structural floor make of it; above 1 they are not explained
     remaining_p_value : float
-        Of a further effect, if nothing more is missing; NaN where no further look was taken
+        exp(-evidence) of a further effect, at most 1, as `p_value`; NaN where no further look was taken
     remaining_note : str
     ranking : tuple of Ranked
     unseen : tuple of NotDetectable
@@ -166,7 +176,9 @@ class Diagnosis:
                 "log_e_value": self.log_e_value,
                 "threshold": self.threshold,
                 "false_alarm_rate": self.false_alarm_rate,
-                "test": "mean Bayes factor over the catalogue, all parameters marginalised (nominally an e-value)",
+                "test": "log_e_value: log of the mean Bayes factor over the catalogue, all parameters marginalised; "
+                        "something is missing if it exceeds threshold. p_value = exp(-log_e_value), at most 1: a bound "
+                        "on chance for an exact model only",
             },
             "location": [
                 {
@@ -216,12 +228,25 @@ class Diagnosis:
         """The verdict in a sentence."""
         if self.verdict == "unexplained" and any(f.family != OPEN_FORM for f in self.findings):
             return PARTLY
-        return VERDICT_TEXT[self.verdict]
+        if any(finding.grade == "claim" for finding in self.findings):
+            return VERDICT_TEXT[self.verdict]
+        return LIKELY_TEXT.get(self.verdict, VERDICT_TEXT[self.verdict])
 
     @property
     def places(self) -> tuple[Location, ...]:
         """The most probable place, and every other one that is likely: several effects have several."""
         return (*self.location[:1], *(place for place in self.location[1:] if place.probability >= LIKELY))
+
+    @property
+    def items(self) -> tuple[tuple[Finding, ...], ...]:
+        """Findings by their titles: several laws of one name at one place, with other courses in time, are one item."""
+        titles = dict.fromkeys(finding.title for finding in self.findings)
+        return tuple(tuple(finding for finding in self.findings if finding.title == title) for title in titles)
+
+    @property
+    def further_helps(self) -> bool:
+        """True if the recordings give evidence of a further effect; without, its probability is only a prior one."""
+        return self.remaining_p_value < math.exp(-self.threshold)
 
     @property
     def nearest(self) -> tuple[Ranked, ...]:
@@ -253,23 +278,35 @@ class Diagnosis:
         reached = f"evidence {self.log_e_value:.1f} nat, {self.threshold:.1f} needed"
         rate = f"false-alarm rate {100.0 * self.false_alarm_rate:g} %"
         if self.log_e_value > self.threshold:
-            where = "in the measurement" if self.verdict == "sensor_fault" else "in the model"
-            return f"Yes, {where}: {reached} ({rate})."
+            return f"Yes{self._in_what()}: {reached} ({rate})."
         return f"Nothing that these data show: {reached} ({rate})."
+
+    def _in_what(self) -> str:
+        """The model or the measurement; with a word of caution where the other one has some probability too."""
+        if self.verdict == "unexplained":
+            return ""
+        measurement = sum(one.probability for one in self.ranking if one.family == MEASUREMENT)
+        fault = self.verdict == "sensor_fault"
+        sure = (measurement if fault else 1.0 - measurement) >= self.claim_from
+        return f", {'' if sure else 'probably '}in the {'measurement' if fault else 'model'}"
 
     def _where(self) -> tuple[str, ...]:
         if not self.location or self.verdict in NO_CLAIM:
             return ()
-        told = ", ".join(f"{place.node} ({place.probability:.2f})" for place in self.places)
+        told = ", ".join(f"{place.node} ({_share(place.probability)})" for place in self.places)
         place = self.location[0]
-        heat = f"; {place.heat_mean_W:.3g} W on average, {place.heat_max_W:.3g} W at most" if place.heat_max_W else ""
-        return (f"{told}{heat}; {place.regime}",)
+        if not place.heat_max_W:
+            return (f"{told}: in a reading or an input; no heat",)
+        way = "taken away" if place.heat_mean_W < 0.0 else "added"
+        mean, most = number(abs(place.heat_mean_W)), number(abs(place.heat_max_W))
+        heat = f"{mean} W {way} on average, {most} W at most"
+        return (f"{told}; {heat}; {place.regime}",)
 
     def _what(self) -> tuple[str, ...]:
         lines: list[str] = []
-        for finding in self.findings:
-            lines.append(f"{finding.grade.capitalize()}: {finding.says} [{finding.title}]")
-            lines += [f"  {line}" for line in (values_told(finding), date_told(finding)) if line]
+        for item in self.items:
+            lines.append(f"{item[0].grade.capitalize()}: {item[0].says} [{item[0].title}]")
+            lines += [f"  {line}" for finding in item for line in (values_told(finding), date_told(finding)) if line]
         if self.nearest:
             told = ", ".join(f"{one.mechanism} at {one.place} ({one.probability:.2f})" for one in self.nearest)
             lines.append(f"No name is certain enough to be reported; most like: {told}.")
@@ -279,27 +316,32 @@ class Diagnosis:
 
     def _how_sure(self) -> tuple[str, ...]:
         lines = []
-        for finding in self.findings:
+        for finding, *_ in self.items:
             of = "that law and place are right" if finding.acts_like else "of one of these" if finding.tie_set else ""
-            line = " ".join((f"{finding.title}: {finding.grade}, probability", of, _share(finding.sureness)))
-            line = line.replace("  ", " ")
+            if finding.acts_like and finding.sureness < self.claim_from:
+                of = f"of names that act alike at least {self.claim_from:g}, of this one"
+            title = f"{finding.title}: " if len(self.items) > 1 else ""
+            line = " ".join(filter(None, (f"{title}{finding.grade}, probability", of, _share(finding.sureness))))
             others = [r for r in finding.confusable_with
                       if r.probability >= LEAST_RIVAL and r.mechanism not in finding.tie_set]  # fmt: skip
-            if others:
-                line += "; not ruled out: " + ", ".join(
-                    f"{r.mechanism} at {r.place} ({r.probability:.2f})" for r in others[:MOST_NEAREST]
-                )
+            roles = (("not ruled out instead", True), ("may act as well", False))
+            for words, instead in roles[: 1 + self.further_helps]:
+                told = [f"{named(r.mechanism, r.place)} ({r.probability:.2f})" for r in others if r.instead is instead]
+                line += f"; {words}: {', '.join(told[:MOST_NEAREST])}" if told else ""
             lines.append(line)
         if not self.findings and self.kinds:
-            told = (f"{kind} {p:.2f}" for kind, p in sorted(self.kinds.items(), key=lambda kind: -kind[1]) if p >= 0.01)
+            kinds = sorted(self.kinds.items(), key=lambda kind: -kind[1])
+            told = [f"{kind} {_share(p)}" for kind, p in kinds if p >= LEAST_RIVAL]
             lines.append(f"Probabilities: {', '.join(told)}.")
         if self.error_class:
-            lines.append(f"Model error assumed: class {self.error_class}.")
+            hides = ", the largest: a real effect can hide in it" if self.error_class == LARGEST_ERROR else ""
+            lines.append(f"Model error assumed: class {self.error_class}{hides}.")
         if self.session_s > LITTLE_SPREAD:
             lines.append(f"Between sessions the machine differs by {self.session_s:.2f} of the priors' widths.")
         far = sorted((c for c in self.calibration if abs(c.shift_in_sd) > FAR_SD), key=lambda c: -abs(c.shift_in_sd))
         if far:
-            told = (f"{c.parameter} = {c.value:.3g} ({abs(c.shift_in_sd):.1f} sd)" for c in far[:MOST_FAR])
+            told = [f"{c.parameter} = {c.value:.3g}{_unit(c.unit)} ({abs(c.shift_in_sd):.1f} sd)"
+                    for c in far[:MOST_FAR]]  # fmt: skip
             lines.append(f"Far from what the definition expects: {', '.join(told)}.")
         if self.remaining_note:
             lines.append(f"Remaining: {self.remaining_note}")
@@ -314,6 +356,12 @@ class Diagnosis:
                     f"RMSE {name}: {fits.before:.2f} K as delivered, {fits.calibrated:.2f} K calibrated{after} "
                     f"(noise {self.noise_K:.2f} K)"
                 )
+        if self.findings and self.holdout.after > self.holdout.calibrated:
+            lines.append("Held-out temperatures are not closer than with the calibrated model")
+        named_terms = {finding.term.label for finding in self.findings if finding.term is not None}
+        further = len([term for term in self.terms if term.label not in named_terms])
+        if self.findings and further:
+            lines.append(f"The findings' model holds {further} more effect{'s' * (further > 1)} without a certain name")
         if self.findings and math.isfinite(self.holdout_gain):
             way = "better" if self.holdout_gain >= 0.0 else "worse"
             lines.append(
@@ -348,12 +396,12 @@ class Diagnosis:
 
 def values_told(finding: Finding) -> str:
     """Numbers of a finding for a terminal."""
-    values = [(p.name, p.value, p.stderr, p.unit) for p in finding.parameters if p.name not in OF_DATE]
+    told_else = OF_DATE if finding.switching is None else (*OF_DATE, *OF_SWITCH)
+    values = [(p.name, p.value, p.stderr, p.unit) for p in finding.parameters if p.name not in told_else]
     if finding.heat_mean_W > 0.0:
         values.append(("mean |heat|", finding.heat_mean_W, finding.heat_stderr_W, "W"))
     told = [
-        f"{name} = {with_error(value, stderr).replace(MINUS, '-')}" + (f" {unit}" if unit != "1" else "")
-        for name, value, stderr, unit in values
+        f"{name} = {with_error(value, stderr).replace(MINUS, '-')}{_unit(unit)}" for name, value, stderr, unit in values
     ]
     if finding.switching is not None:
         told.append(f"on at {finding.switching.on_degC:.1f} degC, off at {finding.switching.off_degC:.1f} degC")
@@ -373,6 +421,11 @@ def date_told(finding: Finding) -> str:
 
 def _time(seconds: float) -> str:
     return f"{seconds / 3600.0:.2f} h" if abs(seconds) > LONG_S else f"{seconds:.0f} s"
+
+
+def _unit(symbol: str) -> str:
+    """A unit behind a number."""
+    return "" if symbol == "1" else f" {symbol}"
 
 
 def _share(probability: float) -> str:

@@ -34,12 +34,15 @@ class Rival:
     probability : float
     separate_by : str
         The experiment or sensor that would separate the two
+    instead : bool
+        True if it explains the data in place of the effect; False if it does so only together with it
     """
 
     mechanism: str
     place: str
     probability: float
     separate_by: str
+    instead: bool = True
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -151,9 +154,11 @@ class Finding:
             return f"acts like {named(self.mechanism, self.place)}"
         places = {r.mechanism: r.place for r in reversed(self.confusable_with)} | {self.mechanism: self.place}
         tied = self.tie_set or (self.mechanism,)
-        if len({places.get(name, self.place) for name in tied}) == 1:
-            return named(" or ".join(tied), self.place)
-        return " or ".join(named(name, places.get(name, self.place)) for name in tied)
+        at: dict[str, list[str]] = {}
+        for name in tied:
+            at.setdefault(places.get(name, self.place), []).append(name)
+        between = " or " if len(at) == len(tied) else ", or "
+        return between.join(named(" or ".join(names), place) for place, names in at.items())
 
     @property
     def sureness(self) -> float:
@@ -194,8 +199,8 @@ class PredictedRun:
     held_out : bool
     time : Array, shape (rows,)
         [s]
-    speed, torque : Array, shape (rows,)
-        [1/min], [N m]
+    inputs : mapping of str to Array, shape (rows,)
+        By name in the network: speed [1/min], torque [N m], temperatures of the surroundings [degC] and others
     measured, before, calibrated, after : mapping of channel to Array, shape (rows,)
         [degC], or [W] for ``P_loss``; before: the model as delivered; calibrated: its parameters tuned inside their
         priors; after: with the findings
@@ -208,8 +213,7 @@ class PredictedRun:
     recording: str
     held_out: bool
     time: Array
-    speed: Array
-    torque: Array
+    inputs: Mapping[str, Array]
     measured: Mapping[str, Array]
     before: Mapping[str, Array]
     calibrated: Mapping[str, Array]
@@ -250,13 +254,23 @@ class Calibrated:
 
 @dataclass(frozen=True, kw_only=True)
 class Ranked:
-    """One line of the ranking: every explanation that was scored."""
+    """One line of the ranking: every explanation that was scored.
+
+    Attributes
+    ----------
+    mechanism, place, family : str
+        Of a pair both, joined by ``" + "``
+    log_bayes, probability : float
+    laws : tuple of str
+        Names of its effects, whatever their course in time
+    """
 
     mechanism: str
     place: str
     family: str
     log_bayes: float
     probability: float
+    laws: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -318,7 +332,8 @@ def finding_dict(finding: Finding) -> dict[str, Any]:
             {"name": p.name, "value": p.value, "stderr": p.stderr, "unit": p.unit} for p in finding.parameters
         ],
         "confusable_with": [
-            {"mechanism": r.mechanism, "place": r.place, "probability": r.probability, "separate_by": r.separate_by}
+            {"mechanism": r.mechanism, "place": r.place, "probability": r.probability, "separate_by": r.separate_by,
+             "instead": r.instead}
             for r in finding.confusable_with
         ],
     }  # fmt: skip

@@ -25,7 +25,7 @@ from models.assembly.parametric import (
     with_losses_as_laws,
 )
 from models.base.errors import InputError, did_you_mean
-from models.definition.definition_file import read_values, refuse
+from models.definition.definition_file import fault_lines, placed, read_values, refuse
 from models.definition.messages import validate_section
 from models.definition.parametric_sections import KEY, ParametricDefinition
 from models.definition.sections import Ambient, Bearing, Housing, Node, Oil, Seal, Shaft, Stage, Training
@@ -342,7 +342,14 @@ def read_gearbox(text: str, *, file: str) -> Gearbox:
         With the faults of the text, one per line.
     """
     values, notes = read_values(text, file=file)
-    definition = _validate(values, file=file)
+    try:
+        definition = _validate(values, file=file)
+    except InputError as error:
+        # What follows from a fault in the same table, such as all keys of a `like` that is not there, is left out.
+        tables = [f"{file}: {place.rpartition('.')[0] or place}" for place, _ in placed(notes.faults, values) if place]
+        others = [line for line in str(error).splitlines() if not line.startswith(tuple(tables))]
+        raise InputError("\n".join([*fault_lines(notes.faults, values, file=file), *others])) from error
+    refuse(notes.faults, values, file=file)
     gearbox = Gearbox(definition, notes, frozenset(path for path, _ in _leaves(values)), file)
     whole = [path for path in notes.priors if isinstance(gearbox.leaves[path], int)]
     refuse(((path, "is a whole number and cannot have an sd") for path in whole), values, file=file)

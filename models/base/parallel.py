@@ -18,7 +18,7 @@ R = TypeVar("R")
 
 def run_parallel(
     function: Callable[..., R], items: Iterable[Sequence[Any]], *, jobs: int | None = 1, dask: str | None = None,
-    batches: int | None = None,
+    batches: int | None = None, progress: Callable[[int, int], None] | None = None,
 ) -> list[R]:  # fmt: skip
     """Results of ``function(*item)`` for every item, in order.
 
@@ -36,6 +36,8 @@ def run_parallel(
     batches : int, optional
         Number of batches that the items are sent in; objects that calls of a batch have in common are sent once. By
         default every item is sent alone, which suits few large ones of unequal size
+    progress : callable, optional
+        Told how many of how many results there are
 
     Raises
     ------
@@ -50,13 +52,27 @@ def run_parallel(
     items = list(items)
     jobs = _processes(jobs)
     if dask is None and (jobs < 2 or len(items) < 2):
-        return [_call(function, item) for item in items]
+        return _collected((_numbered(function, *numbered) for numbered in enumerate(items)), len(items), progress)
     size = -(-len(items) // batches) if batches and items else 1
-    calls = (delayed(_call)(function, item) for item in items)
+    calls = (delayed(_numbered)(function, *numbered) for numbered in enumerate(items))
     with _backend(dask), warnings.catch_warnings():
         # joblib replaces a worker whose memory has grown between two calls; no result is lost.
         warnings.filterwarnings("ignore", "A worker stopped while some jobs were given to the executor")
-        return list(_pool(jobs, dask, batch_size=size, pre_dispatch=2 * jobs * size)(calls))
+        pool = _pool(jobs, dask, batch_size=size, pre_dispatch=2 * jobs * size, return_as="generator_unordered")
+        return _collected(pool(calls), len(items), progress)
+
+
+def _collected(results: Iterable[tuple[int, R]], number: int, progress: Callable[[int, int], None] | None) -> list[R]:
+    found: dict[int, R] = {}
+    for index, result in results:
+        found[index] = result
+        if progress is not None:
+            progress(len(found), number)
+    return [found[index] for index in range(number)]
+
+
+def _numbered(function: Callable[..., R], index: int, item: Sequence[Any]) -> tuple[int, R]:
+    return index, _call(function, item)
 
 
 def iterate_parallel(

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, TypeVar
 
 from models.base.errors import InputError, did_you_mean, shown
+from models.definition.known_bearings import filled_by_designation
 from models.definition.messages import place_in
 from models.definition.named_oils import read_oil
 from models.definition.values_with_source import Annotations, strip
@@ -24,13 +25,14 @@ def read_values(text: str, *, file: str) -> tuple[dict[str, Any], Annotations]:
     Returns
     -------
     dict
-        Plain values: tables as dict, lists as tuples, ``like`` and named oil filled in; not validated yet
+        Plain values: tables as dict, lists as tuples, ``like``, known bearings and named oil filled in; not validated
     Annotations
+        With faults where there is no source, or an annotation, ``like``, designation or named oil cannot be used
 
     Raises
     ------
     InputError
-        If it is not TOML, of another schema, has no source, or an annotation, ``like`` or named oil cannot be used.
+        If it is not TOML, or of another schema.
     """
     document = parse_schema_1(text, file=file, kind="gearbox definitions")
     notes = Annotations()
@@ -42,7 +44,12 @@ def read_values(text: str, *, file: str) -> tuple[dict[str, Any], Annotations]:
         notes.faults.append(("", "source is missing; name where the values come from"))
     if isinstance(values.get("oil"), dict) and "named" in values["oil"]:
         values["oil"] = _filled_from_named_oil(values["oil"], notes)
-    refuse(notes.faults, values, file=file)
+    bearings = values.get("bearing")
+    if isinstance(bearings, tuple):
+        values["bearing"] = tuple(
+            filled_by_designation(own, notes, f"bearing.{index}") if isinstance(own, dict) else own
+            for index, own in enumerate(bearings)
+        )
     return values, notes
 
 
@@ -54,12 +61,20 @@ def refuse(faults: Iterable[tuple[str, str]], values: Any, *, file: str) -> None
     InputError
         If there is any.
     """
-    lines = []
-    for path, text in faults:
-        place = place_in(values, [int(step) if step.isdecimal() else step for step in path.split(".")])
-        lines.append(f"{file}: {place}: {text}" if place else f"{file}: {text}")
+    lines = fault_lines(faults, values, file=file)
     if lines:
         raise InputError("\n".join(lines))
+
+
+def fault_lines(faults: Iterable[tuple[str, str]], values: Any, *, file: str) -> list[str]:
+    """Return a line per fault, given by dotted path and text."""
+    return [f"{file}: {place}: {text}" if place else f"{file}: {text}" for place, text in placed(faults, values)]
+
+
+def placed(faults: Iterable[tuple[str, str]], values: Any) -> list[tuple[str, str]]:
+    """Return faults by dotted path with the place that a message names."""
+    steps = (([int(step) if step.isdecimal() else step for step in path.split(".")], text) for path, text in faults)
+    return [(place_in(values, path), text) for path, text in steps]
 
 
 def _filled_from_earlier(tables: Any, key: str, notes: Annotations) -> Any:

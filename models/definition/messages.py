@@ -7,6 +7,7 @@ as its file does: ``bearing 'bearing_1'.mass_kg``, without a name ``finding #1.l
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from difflib import get_close_matches
 from typing import Any, TypeVar
 
 from pydantic import ValidationError
@@ -59,17 +60,33 @@ def validate_section(section: type[S], values: Any, *, file: str) -> S:
     try:
         return section.model_validate(values)
     except ValidationError as error:
-        raise input_error(error, values, file=file) from error
+        raise input_error(error, values, section=section, file=file) from error
 
 
-def input_error(error: ValidationError, values: Any, *, file: str) -> InputError:
+def input_error(error: ValidationError, values: Any, *, section: type[Section], file: str) -> InputError:
     """Return the message about a table that is not valid, for the person who wrote the file."""
-    lines = []
-    for detail in error.errors(include_url=False):
+    lines, details = [], error.errors(include_url=False)
+    misspelt = {place for detail in details if detail["type"] == "extra_forbidden"
+                for place in _meant(detail["loc"], section)}  # fmt: skip
+    for detail in details:
         place = place_in(values, detail["loc"])
+        if detail["type"] == "missing" and detail["loc"] in misspelt:
+            continue  # the misspelt key is named
+        if detail["type"] == "extra_forbidden":
+            *table, key = detail["loc"]
+            hint = did_you_mean(str(key), section.known_keys(table))
+            place = place_in(values, table)
+            lines.append(f"{place}: '{key}' is not a known key{hint}" if place else f"'{key}' is not a known key{hint}")
+            continue
         prefix = f"{place} " if detail["type"] == "missing" else f"{place}: " if place else ""
         lines += [f"{prefix}{line}" for line in _message(detail).splitlines()]
     return InputError("\n".join(f"{file}: {line}" for line in dict.fromkeys(lines)))
+
+
+def _meant(path: Sequence[int | str], section: type[Section]) -> list[tuple[int | str, ...]]:
+    """Paths of the key that an unknown one may have been meant for; none or one."""
+    *table, key = path
+    return [(*table, near) for near in get_close_matches(str(key), section.known_keys(table), n=1)]
 
 
 def _message(detail: Any) -> str:

@@ -6,16 +6,22 @@ Attributes are the keys of the file, in the units that end their names; the same
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Annotated, Any, Literal, Self, TypeVar
+from collections.abc import Sequence
+from typing import Annotated, Any, Literal, Self, TypeVar, get_args
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StringConstraints, model_validator
 
-from models.base.errors import did_you_mean
 from models.formulas.geometry import GearPair, gear_pair
 from models.quantities.definition_units import InSI, between, in_si, optional_pair_in_si, pair_in_si
 
 T = TypeVar("T")
+
+
+def _section_in(annotation: Any) -> type[Section] | None:
+    """The class of the table in a type such as ``tuple[Stage, ...]`` or ``D341 | None``."""
+    if isinstance(annotation, type) and issubclass(annotation, Section):
+        return annotation
+    return next(filter(None, map(_section_in, get_args(annotation))), None)
 
 
 def _at_least_one(entries: tuple[T, ...]) -> tuple[T, ...]:
@@ -52,14 +58,13 @@ class Section(BaseModel):
         ignored_types=(InSI,),
     )
 
-    @model_validator(mode="before")
     @classmethod
-    def _known_keys_only(cls, values: Any) -> Any:
-        known = [field.alias or key for key, field in cls.model_fields.items()]
-        unknown = [key for key in values if key not in known] if isinstance(values, Mapping) else []
-        if unknown:
-            raise ValueError("\n".join(f"'{key}' is not a known key{did_you_mean(key, known)}" for key in unknown))
-        return values
+    def known_keys(cls, path: Sequence[int | str]) -> tuple[str, ...]:
+        """Return the keys that the table at a path below this one may have."""
+        keys = {field.alias or key: field.annotation for key, field in cls.model_fields.items()}
+        names = [step for step in path if isinstance(step, str)]
+        below = _section_in(keys.get(names[0])) if names else None
+        return below.known_keys(path[path.index(names[0]) + 1 :]) if below else tuple(keys)
 
 
 class Ambient(Section):

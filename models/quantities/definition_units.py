@@ -9,10 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from math import degrees, pi, radians
+from math import degrees, inf, pi, radians
 from typing import Any, Generic, TypeVar, cast, overload
 
-from pydantic import AfterValidator, ValidationInfo
+from pydantic import AfterValidator, GetJsonSchemaHandler, ValidationInfo
 
 T = TypeVar("T")
 
@@ -56,6 +56,7 @@ UNITS: Mapping[str, Unit] = {
     "_W_mK": Unit("W/(m K)"),
     "_W_m2K": Unit("W/(m2 K)"),
     "_W_K": Unit("W/K"),
+    "_W": Unit("W", 1.0, {"kW": _times(1e3)}),
     "_rpm": Unit("rpm", radians(360.0) / 60.0),
     "_Nm": Unit("N m", 1.0, {"N mm": _times(1e-3)}),
     "": Unit("", 1.0, {"percent": _times(1e-2)}),
@@ -76,7 +77,19 @@ def unit_of(key: str) -> Unit:
     return UNITS[max((ending for ending in UNITS if key.endswith(ending)), key=len)]
 
 
-def between(low: float, high: float, *, unit: str | None = None) -> AfterValidator:
+@dataclass(frozen=True, slots=True)
+class Between(AfterValidator):
+    """The validator that :func:`between` returns; it also puts its limits into a JSON schema."""
+
+    limits: tuple[float, float] = (-inf, inf)
+
+    def __get_pydantic_json_schema__(self, core: Any, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        """Return the JSON schema of the number with its limits."""
+        low, high = self.limits
+        return {**handler(core), "minimum": low, "maximum": high}
+
+
+def between(low: float, high: float, *, unit: str | None = None) -> Between:
     """Return a pydantic validator that refuses numbers outside ``[low, high]`` as unphysical or a slip of the unit.
 
     Parameters
@@ -105,7 +118,7 @@ def between(low: float, high: float, *, unit: str | None = None) -> AfterValidat
             f"{value:g}{symbol} is {side} {limit:g}{symbol} (plausible: {low:g} to {high:g}{symbol}){hint}"
         )
 
-    return AfterValidator(check)
+    return Between(check, (low, high))
 
 
 class InSI(Generic[T]):

@@ -128,11 +128,28 @@ WRONG = {
         "--effect windage --random --seed 1": "either --effect NAME or --random",
         "--effect windage --seed 1 --truth out/recordings": "the truth must not lie among the recordings",
     },
+    "new": {
+        "box.toml": "box.toml: exists already; choose another name, or give --replace",
+        "box.txt": "box.txt: a definition ends in .toml",
+        "file/box.toml": "file/box.toml: cannot be written",
+        "mine.toml --like fgz": "'fgz' is not one of",
+    },
+    "check": {
+        "missing.toml": f"missing.toml: cannot be read ({FAR})",
+        "fgz": "no gearbox named 'fgz'; did you mean 'fzg'?",
+        "box.toml": "box.toml: source is missing",
+        "bytes.toml": "bytes.toml: is not UTF-8 text",
+        "fzg --output net.txt": "net.txt: drawings are written as .svg, .png, .pdf",
+        "fzg --output folder.csv": "folder.csv: drawings are written as",
+        "fzg --output file/net.svg": "file/net.svg: cannot be written",
+    },
+    "schema": {"--output file/s.json": "file/s.json: cannot be written"},
     "reproduce": {"--output file/out": "file/out: cannot be written"},
 }
+OUTPUT = {"simulate": " --output r.csv", "new": "", "check": " --output net.svg"}
 CASES = [
     (
-        f"{verb} {line}" + ("" if "--output" in line else " --output " + ("r.csv" if "simulate" in verb else "out")),
+        f"{verb} {line}" + ("" if "--output" in line else OUTPUT.get(verb.split()[0], " --output out")),
         message,
     )
     for verb, lines in WRONG.items()

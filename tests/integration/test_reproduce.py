@@ -17,6 +17,7 @@ from builder.reproduce.speed import measure
 from builder.reproduce.study import Settings, Study
 from models.assembly.gearbox import load_gearbox
 from models.base.errors import InputError
+from models.base.progress import silent
 
 QUICK = Settings(
     jobs=1, samples=400, test_points=100, runs=1, longest_s=1.0, step_s=600.0, fine_step_s=300.0, trajectories=2
@@ -157,13 +158,13 @@ def test_an_output_that_cannot_be_made_is_refused_before_the_work(tmp_path: Path
     (tmp_path / "file").write_text("")
     lines: list[str] = []
     with pytest.raises(InputError, match="cannot be written"):
-        reproduce(tmp_path / "file/inside", settings=QUICK, progress=lines.append)
+        reproduce(tmp_path / "file/inside", settings=QUICK, progress=lambda what, *_: lines.append(what))
     assert lines == []
 
 
 def test_a_definition_that_departs_from_the_print_differs() -> None:
     other = load_gearbox("fzg").with_values({"stage.0.face_width_mm": 14.01})
-    study = Study(gearbox=other, ours=None, printed=None, fmu=Path(), settings=QUICK, progress=lambda _: None)  # type: ignore[arg-type]
+    study = Study(gearbox=other, ours=None, printed=None, fmu=Path(), settings=QUICK, progress=silent)  # type: ignore[arg-type]
     found = characteristics(study)
     assert found.verdict == Verdict.DIFFERS
     assert found.checks[0].numbers == {"printed": 17, "equal": 16}

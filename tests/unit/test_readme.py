@@ -1,4 +1,4 @@
-"""README and docs agree with the code: variables, commands, options, links."""
+"""README and docs agree with the code: commands, options, files. Sphinx checks the links of the docs."""
 
 from __future__ import annotations
 
@@ -7,18 +7,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from builder.commands.cli import commands
-from builder.fmi.signals import signal_table
-from builder.surrogate.train import TrainingResult
-from models.assembly.gearbox import Gearbox
 
 ROOT = Path(__file__).parents[2]
-PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
-TEXT = "\n".join(page.read_text(encoding="utf-8") for page in PAGES)
-
-
-def test_the_nomenclature_is_the_signal_table(fzg: Gearbox, fzg_training: TrainingResult) -> None:
-    table = signal_table(fzg.network(), fzg_training.losses)
-    assert table.markdown().strip() in (ROOT / "docs" / "fmu.md").read_text(encoding="utf-8")
+PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md")))
+TEXT = "\n".join(page.read_text(encoding="utf-8") for page in PAGES).replace("\\\n", "")
 
 
 def test_every_verb_exists() -> None:
@@ -56,7 +48,7 @@ def broken_links(page: Path) -> Iterator[str]:
 
 
 def test_every_link_resolves() -> None:
-    assert [link for page in PAGES for link in broken_links(page)] == []
+    assert [link for name in ("README.md", "CHANGELOG.md") for link in broken_links(ROOT / name)] == []
 
 
 def test_a_broken_link_is_found(tmp_path: Path) -> None:

@@ -134,7 +134,7 @@ class ModelError:
         return result
 
     def courses(self, point: Point, combinations: Array) -> ErrorCourses:
-        """What combinations of the unknowns, shape (unknowns, n), do along a piece."""
+        """Courses of combinations of the unknowns, shape (unknowns, n), along a piece."""
         points, channels = point.read.shape
         parts, count = point.machine.model.parts, combinations.shape[1]
         heat, loss = np.zeros((points - 1, len(parts), count)), np.zeros((points - 1, count))

@@ -138,7 +138,7 @@ def read_truths(path: Path) -> dict[str, Truth]:
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror})") from error
     except (ValueError, KeyError, TypeError, AttributeError) as error:
-        raise InputError(f"{path}: is no truth of a set of cases ({error!r}); see docs/benchmark.md") from error
+        raise InputError(f"{path}: is no truth of a set of cases ({error!r}); see docs/how_to/benchmark.md") from error
 
 
 def truth_of(raw: Mapping[str, Any], oracle: Mapping[str, Any]) -> Truth:

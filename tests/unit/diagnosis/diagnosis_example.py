@@ -228,7 +228,7 @@ def _ranking(*first: tuple[str, str, float]) -> tuple[Ranked, ...]:
     rest = [(name, "oil", 0.0004) for name in CATALOGUE if name not in {one[0] for one in first}]
     return tuple(
         Ranked(mechanism=name, place=place, probability=p, log_bayes=44.0 - 2.5 * rank,
-               family=CATALOGUE[name].family)
+               family=CATALOGUE[name].family, laws=(name,))
         for rank, (name, place, p) in enumerate([*first, *rest])
     )  # fmt: skip
 
@@ -271,8 +271,7 @@ def _course(name: str, *, lacking: float, duration: float | None = None, held_ou
         recording=name,
         held_out=usual_role if held_out is None else held_out,
         time=time,
-        speed=speed,
-        torque=torque,
+        inputs={"speed": speed, "torque": torque, "T_ambient": np.full(len(time), 25.0)},
         measured=measured,
         before=before,
         calibrated=calibrated,

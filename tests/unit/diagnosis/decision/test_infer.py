@@ -15,7 +15,7 @@ from diagnosis.decision.posterior import KINDS, Judged, Posterior, decide
 from diagnosis.decision.settings import Settings
 from diagnosis.engine.calibration import Calibration, calibrate_with_error
 from diagnosis.engine.families import axis_of, changes, log_prior, parameters_outside
-from diagnosis.engine.fit import Fit
+from diagnosis.engine.fit import Fit, calibrate
 from diagnosis.engine.prepare import prepare_experiment
 from diagnosis.engine.unknown import TermParameter
 from diagnosis.results.effect_values import values_of
@@ -26,7 +26,7 @@ from models.terms.term import Term
 from tests.unit.diagnosis.inference_example import recorded
 
 LOOKED_FOR = ("windage", "air_cooling_change", "sensor_bias", "hot_neighbour")
-WINDAGE_W, AT_RPM, HOURS = 100.0, 3300.0, 1.5
+WINDAGE_W, AT_RPM, HOURS = 150.0, 3300.0, 1.5
 
 
 def inferred(fzg: Gearbox, windage_W: float) -> Posterior:
@@ -38,7 +38,7 @@ def inferred(fzg: Gearbox, windage_W: float) -> Posterior:
     windage = [one for one in placed if one.label == "windage_oil"]
     candidates = [*(hypothesis_of(one) for one in placed), *changes([], windage, axis_of(experiment), {}),
                   *parameters_outside(experiment)]  # fmt: skip
-    return infer(calibrate_with_error(experiment), candidates, log_prior(candidates), Settings())
+    return infer(calibrate_with_error(experiment, calibrate(experiment)), candidates, log_prior(candidates), Settings())
 
 
 @pytest.fixture(scope="module")

@@ -9,6 +9,7 @@ import pytest
 
 from diagnosis.candidates.hypotheses import Hypothesis, hypothesis_of
 from diagnosis.engine.baselines import effects_in_baselines, notes_of_baselines, sessions_apart
+from diagnosis.engine.calibration import calibrate_with_error
 from diagnosis.engine.candidates import refit, scan
 from diagnosis.engine.fit import Experiment, Fit, calibrate
 from diagnosis.engine.prepare import prepare_experiment
@@ -99,9 +100,10 @@ def test_another_machine_is_told_apart(fzg: Gearbox) -> None:
     found = {}
     for name, factors in {
         "same": {},
-        "other": {"C_oil": 1.8, "C_housing_lower": 2.0, "h_air": 2.0, "h_oil_housing": 0.4, "mesh": 1.4},
+        "other": {"C_oil": 2.5, "C_housing_lower": 2.5, "h_air": 3.0, "h_oil_housing": 0.3, "mesh": 1.8},
     }.items():
         healthy = recorded(fzg, "april", seed=2, factors=factors)
-        found[name] = sessions_apart(calibrated(fzg, train, healthy))["april"]
+        _, experiment = prepare_experiment(fzg, [train], [train], [healthy])
+        found[name] = sessions_apart(calibrate_with_error(experiment, calibrate(experiment)).fit)["april"]
     assert found["same"] < -5.0 and found["other"] > 10.0, found
     assert len(notes_of_baselines(0.0, {"april": found["other"]})) == 1

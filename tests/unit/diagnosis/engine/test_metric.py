@@ -47,6 +47,26 @@ def test_inner_products_equal_those_of_the_covariance(columns, own_columns):
     np.testing.assert_allclose(b, np.diag(expected), rtol=1e-9)
 
 
+@pytest.mark.parametrize("s", [0.0, 0.3])
+def test_explained_are_the_most_probable_values_and_deviations(columns, s):
+    shared, J = [W[:, 1:4] for W in columns], [W[:, 4:6] for W in columns]
+    own = [s * np.column_stack([j, B]) if s else np.zeros((len(B), 0)) for j, B in zip(J, shared, strict=True)]
+    metric = Metric(sessions=SESSIONS, shared=tuple(shared), own=tuple(own), deviation=s)
+    found = metric.explained([W[:, 0] for W in columns])
+    # The same by ridge regression on all columns: shared, then those of both sessions.
+    r, count = np.concatenate([W[:, 0] for W in columns]), own[0].shape[1]
+    X = np.zeros((len(r), 3 + 2 * count))
+    starts = np.cumsum([0, *ROWS])
+    for p, session in enumerate((0, 1, 0)):
+        rows = slice(starts[p], starts[p + 1])
+        X[rows, :3] = shared[p]
+        X[rows, 3 + session * count : 3 + (session + 1) * count] = own[p]
+    best = np.linalg.solve(np.eye(X.shape[1]) + X.T @ X, X.T @ r)
+    for p, session in enumerate((0, 1, 0)):
+        deviation = best[3 + (session + 1) * count - 3 : 3 + (session + 1) * count] if s else 0.0
+        np.testing.assert_allclose(found[p], best[:3] + s * deviation, rtol=1e-9)
+
+
 def test_leading_directions_keep_what_columns_do():
     rng = np.random.default_rng(1)
     N = rng.standard_normal((60, 4)) @ rng.standard_normal((4, 25))

@@ -34,6 +34,7 @@ def test_is_computed_once_for_each_model_trajectory_and_name() -> None:
 
 def test_goes_with_its_trajectory() -> None:
     trajectory = Thing()
+    gc.collect()
     before = len(module._known)
     kept(Thing(), trajectory, "a", lambda: 1)
     assert len(module._known) == before + 1

@@ -168,11 +168,11 @@ def test_scorers_read_the_numbers(claimed: Diagnosis, fzg: Gearbox) -> None:
 def test_the_summary_answers_in_order(claimed: Diagnosis) -> None:
     lines = claimed.summary()
     told = [next(i for i, line in enumerate(lines) if line.startswith(q)) for q in
-            ("Is something missing? Yes", "Where? oil", "What? Claim:", "How sure? windage at oil: claim",
+            ("Is something missing? Yes", "Where? oil", "What? Claim:", "How sure? claim",
              "How much better? RMSE held-out", "What next?")]  # fmt: skip
     assert told == sorted(told) and told[0] == 1
     text = "\n".join(lines)
-    assert "not ruled out: hot_neighbour at housing_lower" in text
+    assert "not ruled out instead: hot_neighbour at housing_lower" in text
     assert "class no-load losses" in text
     assert "Between sessions the machine differs by 0.20" in text
 

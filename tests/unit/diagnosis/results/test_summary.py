@@ -36,7 +36,7 @@ def test_a_claim_and_something_likely_stand_apart_by_words() -> None:
         "bearing_seat_contact at bearing_1_housing or pocketing at oil: likely, probability of one of these 0.93"
         in sure
     )
-    assert "not ruled out: churning_swirl at oil (0.02)" in sure  # and the tied one is not told twice
+    assert "not ruled out instead: churning_swirl at oil (0.02)" in sure  # and the tied one is not told twice
 
 
 def test_names_that_only_act_like_it_are_told_as_such() -> None:
@@ -91,5 +91,26 @@ def test_every_likely_place_is_told_with_what_the_first_one_does() -> None:
     both = replace(
         base, location=(first, replace(other, node="air", probability=0.52), replace(other, probability=0.48))
     )
-    expected = "oil (0.96), air (0.52); 21 W on average, 66 W at most; speed above 2900 1/min"
+    expected = "oil (0.96), air (0.52); 21.0 W added on average, 66.0 W at most; speed above 2900 1/min"
     assert told(both, "Where?") == expected
+
+
+def test_a_larger_held_out_error_is_not_called_better() -> None:
+    base = missing_physics()
+    worse = replace(base, holdout=replace(base.holdout, after=4.0), holdout_gain=93.0)
+    assert "not closer than with the calibrated model" in told(worse, "How much better?")
+    assert "not closer" not in told(replace(base, holdout_gain=93.0), "How much better?")
+
+
+def test_laws_of_one_name_at_one_place_are_one_item() -> None:
+    (finding,) = missing_physics().findings
+    twice = replace(missing_physics(), findings=(finding, replace(finding, parameters=())))
+    assert len(twice.items) == 1
+    assert told(twice, "What?").count("Claim:") == 1
+    assert told(twice, "How sure?").count("probability") == 1
+
+
+def test_without_a_claim_the_verdict_is_only_probable() -> None:
+    (finding,) = missing_physics().findings
+    likely = replace(missing_physics(), findings=(replace(finding, grade="likely"),))
+    assert "probably" in likely.verdict_text and "probably" not in missing_physics().verdict_text

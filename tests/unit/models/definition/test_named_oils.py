@@ -33,8 +33,41 @@ ARANA = {
 }
 
 
+GRADES = (100, 150, 220, 320, 460)  # ISO 3448: the middle of the viscosity at 40 degC, [mm2/s]
+# ASTM D2270: L = a Y^2 + b Y + c and H = d Y^2 + e Y + f, for a viscosity Y at 100 degC from the first number on.
+D2270 = (
+    (7.7, 0.41858, 16.1558, -56.040, 0.05794, 10.5156, -28.240),
+    (9.0, 0.88779, 7.5527, -16.600, 0.26665, 6.7015, -10.810),
+    (12.0, 0.76720, 10.7972, -38.180, 0.20073, 8.4658, -22.490),
+    (15.0, 0.97305, 5.3135, -2.200, 0.28889, 5.9741, -4.930),
+    (18.0, 0.97256, 5.2500, -0.980, 0.24504, 7.4160, -16.730),
+    (22.0, 0.91413, 7.4759, -21.820, 0.20323, 9.1267, -34.230),
+    (28.0, 0.87031, 9.7157, -50.770, 0.18411, 10.1015, -46.750),
+)
+
+
+def viscosity_index(nu_40: float, nu_100: float) -> float:
+    """Index up to 100 after ASTM D2270."""
+    a, b, c, d, e, f = next(row[1:] for row in reversed(D2270) if nu_100 >= row[0])
+    low, high = a * nu_100**2 + b * nu_100 + c, d * nu_100**2 + e * nu_100 + f
+    return 100.0 * (low - nu_40) / (low - high)
+
+
+def test_the_viscosity_index_is_that_of_the_standard() -> None:
+    assert viscosity_index(73.30, 8.86) == pytest.approx(92.0, abs=0.5)  # the example of ASTM D2270
+
+
+@pytest.mark.parametrize("grade", GRADES)
+def test_a_grade_has_its_middle_viscosity_and_a_typical_index(grade: int) -> None:
+    oil = lubricant(named_oil(f"ISO_VG_{grade}"))
+    nu_40, nu_100 = (float(oil.kinematic_viscosity(T)) for T in (40.0, 100.0))
+    assert nu_40 == pytest.approx(grade)
+    assert viscosity_index(nu_40, nu_100) == pytest.approx(95.0, abs=0.2)
+    assert all(source.startswith("typical") for source in read_oil(f"ISO_VG_{grade}")[1].sources.values())
+
+
 def test_every_source_table_has_its_oils() -> None:
-    assert set(NAMES) == {*FEUP_VISCOSITY, *ARANA, "FZG_mineral_32"}
+    assert set(NAMES) == {*FEUP_VISCOSITY, *ARANA, *(f"ISO_VG_{grade}" for grade in GRADES), "FZG_mineral_32"}
 
 
 @pytest.mark.parametrize("name", NAMES)

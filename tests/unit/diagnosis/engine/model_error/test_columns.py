@@ -61,6 +61,18 @@ class Case:
         self.check(label, self.changed(change, step) - self.changed(change, -step), 2.0 * step)
 
 
+def test_a_simulation_with_model_error_agrees_with_the_columns(case: Case) -> None:
+    values = 1e-3 * np.random.default_rng(4).standard_normal((len(case.error.labels), 1))  # small: to first order
+    error = case.error.courses(case.point, values).along(np.ones(1))
+    point = case.experiment.point(0, np.zeros(len(case.experiment.unknowns)), rounds=12, error=error)
+    expected = (case.columns @ values)[:, :, 0]
+    largest = float(np.abs(expected).max())
+    assert largest > 0.1
+    np.testing.assert_allclose(point.read - case.point.read, expected, atol=0.02 * largest)
+    there, here = point.residual_without_error, case.point.residual
+    np.testing.assert_allclose(there, here, atol=0.02 * largest)
+
+
 @pytest.fixture(scope="module")
 def case(fzg: Gearbox) -> Case:
     """Three hours with a standstill."""

@@ -1,0 +1,179 @@
+"""A definition as the program understands it: nodes, links, inputs, losses, oil, and which values are typical."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import sympy as sp
+
+from models.assembly.gearbox import Gearbox
+from models.base.types import Array
+from models.definition.messages import place_in
+from models.formulas.oil import kinematic_viscosity_d341
+from models.network.laws import symbol
+from models.simulation.thermal_network import ThermalNetwork
+
+SHARES = (("low", 0.1), ("mid", 0.5), ("rated", 1.0))  # of the largest speed, torque and other inputs
+WARM_degC = 60.0  # of all parts, where the definition states no other temperature
+OIL_degC = (20.0, 60.0, 100.0)
+SHOWN_WHOLE = 1000.0  # from which numbers have no decimals
+TYPICAL = "typical"  # first word of the source of a value that is no machine's own
+
+
+@dataclass(frozen=True)
+class Grid:
+    """A table for people: title, header, rows, and how many of its columns are text."""
+
+    title: str
+    header: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    text_columns: int = 1
+
+
+def understood(gearbox: Gearbox) -> list[Grid]:
+    """Return the tables that ``check`` prints.
+
+    Parameters
+    ----------
+    gearbox : Gearbox
+    """
+    network = gearbox.network()
+    tables = [_nodes(gearbox, network), _links(gearbox, network), _inputs(network), _heats(gearbox, network)]
+    if "oil" in {part.name for part in network.parts}:
+        tables.append(_oil(gearbox))
+    return tables
+
+
+def conductances(gearbox: Gearbox, network: ThermalNetwork) -> dict[str, float]:
+    """Conductance of every link at the middle operating point with warm parts, [W/K]."""
+    values = _signals(gearbox, network, dict(SHARES)["mid"])
+    return {link.name: _value(link.conductance, network, values) for link in network.links}
+
+
+def _warm(gearbox: Gearbox) -> float:
+    return WARM_degC if not gearbox.is_parametric else gearbox.definition.operation.temperature_degC  # type: ignore[union-attr]
+
+
+def _largest(gearbox: Gearbox) -> tuple[float, float]:
+    """Speed [1/min] and torque [N m] that count as rated."""
+    if gearbox.is_parametric:
+        return gearbox.typical_operation
+    return gearbox.training.speed_rpm[1], gearbox.training.torque_Nm[1]
+
+
+def _signals(gearbox: Gearbox, network: ThermalNetwork, share: float) -> dict[str, float]:
+    """Time, inputs, temperatures of parts and parameters by name, at a share of what is rated."""
+    speed, torque = (share * value for value in _largest(gearbox))
+    values = {"time": 0.0, **{p.name: p.start for p in network.parameters}}
+    for name, known in network.inputs.items():
+        low, high = known.quantity.low, known.quantity.high
+        driven = not known.quantity.is_temperature and np.isfinite(high) and name != "air_speed"
+        values[name] = low + share * (high - low) if driven else known.default
+    values |= {name: value for name, value in (("speed", speed), ("torque", torque)) if name in network.inputs}
+    return values | {f"T_{part.name}": _warm(gearbox) for part in network.parts}
+
+
+def _value(law: sp.Expr, network: ThermalNetwork, values: Mapping[str, float]) -> float:
+    """A law at known signals; temperatures of boundaries follow from their own laws."""
+    laws = {symbol(name): derived for name, derived in network.derived.items()}
+    laws |= {symbol(f"T_{n.name}"): n.temperature for n in network.nodes if n.temperature is not None}
+    numbers = {symbol(name): sp.Float(value) for name, value in values.items()}
+    return float(law.xreplace(laws).xreplace(laws).xreplace(numbers))
+
+
+def _nodes(gearbox: Gearbox, network: ThermalNetwork) -> Grid:
+    values = _signals(gearbox, network, 0.5)
+    rows = []
+    for node in network.nodes:
+        if node.temperature is not None:
+            law = str(node.temperature)
+            at = f"{_value(node.temperature, network, values):.4g} degC"
+            rows.append([node.name, "surroundings", f"{law}, {at}", ""])
+        else:
+            assert node.capacity is not None  # noqa: S101 - a part has a capacity
+            sources = [source.name for source in network.sources if source.node == node.name]
+            rows.append([node.name, "part", ", ".join(sources), _number(_value(node.capacity, network, values))])
+    title = f"{len(network.nodes)} nodes; heat capacities in J/K"
+    return Grid(title, ["node", "kind", "warmed by, or temperature", "J/K"], rows, 3)
+
+
+def _links(gearbox: Gearbox, network: ThermalNetwork) -> Grid:
+    found, constants = conductances(gearbox, network), {p.name for p in network.parameters}
+    rows = []
+    for link in network.links:
+        varies = sorted({s.name for s in link.conductance.free_symbols} - constants)
+        rows.append([" - ".join(link.nodes), ", ".join(varies) or "constant", _number(found[link.name])])
+    title = f"{len(network.links)} links; conductances in W/K at mid operation, parts at {_warm(gearbox):g} degC"
+    return Grid(title, ["between", "depends on", "W/K"], rows, 2)
+
+
+def _inputs(network: ThermalNetwork) -> Grid:
+    rows = [
+        [name, known.column, f"{known.quantity.low:g} to {known.quantity.high:g} {known.quantity.unit}",
+         "needed" if known.required else f"{known.default:g} where not given"]
+        for name, known in network.inputs.items()
+    ]  # fmt: skip
+    return Grid("Inputs of cycles, recordings and the FMU", ["input", "column", "plausible", "default"], rows, 4)
+
+
+def _heats(gearbox: Gearbox, network: ThermalNetwork) -> Grid:
+    """Losses by component at three operating points; of a machine without losses its heats."""
+    points = [_signals(gearbox, network, share) for _, share in SHARES]
+    laws = gearbox.loss_laws()
+    if not laws.components:
+        heats = [[_value(source.heat, network, values) for source in network.sources] for values in points]
+        names = [f"{source.name} in {source.node}" for source in network.sources]
+        return _by_point("Heats in W, inputs at 10, 50 and 100 % of their range", names, np.array(heats))
+    speed, torque = (np.array([share * value for _, share in SHARES]) for value in _largest(gearbox))
+    temperatures = np.full((len(SHARES), len(laws.temperature_nodes)), _warm(gearbox))
+    losses = np.asarray(laws.power(speed, torque, temperatures))
+    at = "; ".join(
+        f"{name} {_number(n)} 1/min, {_number(M)} N m" for (name, _), n, M in zip(SHARES, speed, torque, strict=True)
+    )
+    end = "[reference]" if gearbox.is_parametric else "the end of [training]"
+    title = f"Losses in W, all parts at {_warm(gearbox):g} degC; rated is {end}\n({at})"
+    table = _by_point(title, list(laws.components), losses)
+    power = speed * np.pi / 30.0 * torque
+    share = [f"{100.0 * value:.3g} %" for value in losses.sum(axis=1) / power]
+    return Grid(title, table.header, [*table.rows, ["share of the power", *share]])
+
+
+def _by_point(title: str, names: Sequence[str], watts: Array) -> Grid:
+    rows = [[name, *(_number(value) for value in watts[:, column])] for column, name in enumerate(names)]
+    rows.append(["total", *(_number(value) for value in watts.sum(axis=1))])
+    return Grid(title, ["", *(name for name, _ in SHARES)], rows)
+
+
+def _oil(gearbox: Gearbox) -> Grid:
+    m, n = gearbox.viscosity_constants
+    rows = [["viscosity, mm2/s", *(_number(float(kinematic_viscosity_d341(T, m, n))) for T in OIL_degC)]]
+    if not gearbox.is_parametric:
+        oil = gearbox.lubricant()
+        rows.append(["density, kg/m3", *(_number(float(oil.density(T))) for T in OIL_degC)])
+        rows.append(["specific heat, J/(kg K)", *(_number(float(oil.specific_heat(T))) for T in OIL_degC)])
+    named = f" ({gearbox.oil.name})" if not gearbox.is_parametric else ""
+    return Grid(f"Oil{named}", ["", *(f"{T:g} degC" for T in OIL_degC)], rows)
+
+
+def _number(value: float) -> str:
+    return f"{value:.4g}" if abs(value) < SHOWN_WHOLE else f"{value:.0f}"
+
+
+def typical_values(gearbox: Gearbox) -> list[str]:
+    """Return a line for the values of every table that are typical of a size or a grade, and none of this machine.
+
+    Parameters
+    ----------
+    gearbox : Gearbox
+    """
+    found: dict[tuple[str, str], list[str]] = {}
+    for path, value in gearbox.leaves.items():
+        source = gearbox.source_of(path)
+        if source.startswith(TYPICAL):
+            steps = [int(step) if step.isdecimal() else step for step in path.split(".")]
+            table = place_in(gearbox.values, steps[:2] if isinstance(steps[1], int) else steps[:1])
+            key = place_in(gearbox.values, steps).removeprefix(table).lstrip(".")
+            found.setdefault((table, source), []).append(f"{key} {value}")
+    return [f"{place}: {', '.join(values)} ({source})" for (place, source), values in found.items()]

@@ -1,0 +1,85 @@
+"""Settings of the documentation site: ``python -m sphinx -W -j 2 -d out/doctrees docs out/site``.
+
+``DOCS_NOTEBOOKS=off`` leaves the notebooks unexecuted, which takes a build from minutes to seconds.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+DOCS = Path(__file__).resolve().parent
+sys.path[:0] = [str(DOCS), str(DOCS.parent)]
+
+from _generate import setup_generated  # noqa: E402 - found through the line above
+from _math import setup_mathml  # noqa: E402
+
+from models.base.version import project_version  # noqa: E402
+
+if TYPE_CHECKING:
+    from sphinx.application import Sphinx
+    from sphinx.environment import BuildEnvironment
+
+project = "Gearbox thermal twin"
+author = "the authors of the gearbox thermal twin"
+copyright = f"{author}, MIT licence"  # noqa: A001 - the name that Sphinx reads
+version = release = project_version()
+
+extensions = [
+    "myst_nb",
+    "numpydoc",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.autosummary",
+    "sphinx_click",
+    "sphinx_copybutton",
+    "sphinx_design",
+]
+exclude_patterns = ["_*"]
+nitpicky = True
+# Public names are checked; docstrings also name what is inside, which has no page.
+nitpick_ignore_regex = [("py:.*", r"(?!gearbox_twin\.).*")]
+autodoc_typehints = "none"  # the docstrings have types with shapes and units
+numpydoc_show_class_members = False  # autodoc lists them
+
+# Markdown and notebooks. A notebook is committed without outputs and executed where it lies, see `spread_notebooks`.
+myst_enable_extensions = ["attrs_inline", "colon_fence", "deflist", "dollarmath", "fieldlist"]
+myst_heading_anchors = 3
+UNEXECUTED = os.environ.get("DOCS_NOTEBOOKS") == "off"
+nb_execution_mode = "off" if UNEXECUTED else "auto"
+suppress_warnings = ["misc.highlighting_failure"] if UNEXECUTED else []  # the kernel states the language of "!" lines
+nb_execution_timeout = 240
+nb_execution_raise_on_error = True
+
+# Formulas become MathML: browsers draw it without a script and without a network.
+html_math_renderer = "mathml"
+
+html_theme = "pydata_sphinx_theme"
+html_title = project
+html_static_path = ["_static"]
+html_css_files = ["site.css"]
+html_theme_options = {
+    "navigation_with_keys": False,
+    "show_prev_next": True,
+    "secondary_sidebar_items": ["page-toc"],
+    "header_links_before_dropdown": 6,
+    "navbar_persistent": ["search-button"],  # the field does not fit next to the links
+    "show_toc_level": 2,
+}
+html_show_sourcelink = False
+html_copy_source = False
+
+
+def spread_notebooks(_app: Sphinx, _env: BuildEnvironment, docnames: list[str]) -> None:
+    """Put half of the notebooks first and half last: Sphinx gives neighbours to one process, and these take longest."""
+    notebooks = [name for name in docnames if name.startswith("notebooks/") and name != "notebooks/index"]
+    pages = [name for name in docnames if name not in notebooks]
+    docnames[:] = [*notebooks[::2], *pages, *notebooks[1::2]]
+
+
+def setup(app: Sphinx) -> None:
+    """Register formulas and the order of work."""
+    setup_mathml(app)
+    setup_generated(app)
+    app.connect("env-before-read-docs", spread_notebooks)

@@ -1,0 +1,191 @@
+"""The JSON schema of a definition file, for editors that complete and check TOML; made from the classes that read it.
+
+It knows what the reading does before validation: a value may be ``{ value = ..., sd = ..., source = "..." }``, every
+table may have a ``source``, and ``like``, ``named`` and ``designation`` fill in what a table leaves out. Relations
+between tables are left to the program.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from models.assembly.gearbox_definition import FACTORS, Definition
+from models.definition.definition_file import LIKE_KEYS
+from models.definition.key_texts import TEXTS
+from models.definition.known_bearings import LAW, NEEDED, known_bearings
+from models.definition.named_oils import known_oils
+from models.definition.parametric_sections import KEY, ParametricDefinition
+from models.definition.sections import Bearing, Oil
+from models.definition.values_with_source import join
+from models.quantities.definition_units import unit_of
+
+Schema = dict[str, Any]
+DRAFT = "http://json-schema.org/draft-07/schema#"  # what TOML editors know
+TITLE = "Definition of a machine for the gearbox thermal twin"
+SOURCE = {"type": "string", "minLength": 1, "description": "Where the values come from"}
+SD = {
+    "description": "Standard deviation of what is uncertain: a number in the same unit, or a share as in '20 %'",
+    "anyOf": [{"type": ["number", "string"]}, {"type": "array", "items": {}}],
+}
+SHARED = {"source": SOURCE, "sd": SD}
+ROOTS = (Definition, ParametricDefinition)
+
+
+def definition_schema() -> Schema:
+    """Return the JSON schema of a definition, with geometry or without.
+
+    Examples
+    --------
+    >>> schema = definition_schema()
+    >>> schema["definitions"]["Stage"]["properties"]["face_width_mm"]["description"]
+    'Common face width [mm]. Typically 10 to 200; 1 to 1000 is accepted.'
+    """
+    tables: dict[str, Schema] = {}
+    for root in ROOTS:
+        schema = root.model_json_schema(by_alias=True, ref_template="#/definitions/{model}")
+        tables |= schema.pop("$defs")
+        tables[root.__name__] = schema
+    geometry = Definition.__name__
+    return {
+        "$schema": DRAFT,
+        "title": TITLE,
+        "type": "object",
+        "if": {"required": [KEY]},
+        "then": {"$ref": f"#/definitions/{ParametricDefinition.__name__}"},
+        "else": {"$ref": f"#/definitions/{geometry}"},
+        "definitions": SHARED | {name: _table(name, table) for name, table in tables.items()},
+    }
+
+
+def table_classes(root: type[Definition] | type[ParametricDefinition]) -> dict[str, str]:
+    """Return the class of every table of a file by its dotted path; ``""`` is the file itself.
+
+    Examples
+    --------
+    >>> table_classes(Definition)["stage.material"]
+    'Material'
+    """
+    schema = root.model_json_schema(by_alias=True, ref_template="{model}")
+    classes = {"": root.__name__}
+    pending = [("", schema)]
+    while pending:
+        path, table = pending.pop()
+        for key, item in table["properties"].items():
+            if name := _class_of(item):
+                classes[join(path, key)] = name
+                pending.append((join(path, key), schema["$defs"][name]))
+    return classes
+
+
+def _class_of(schema: Any) -> str | None:
+    if isinstance(schema, Mapping):
+        return schema.get("$ref") or next(filter(None, map(_class_of, schema.values())), None)
+    return next(filter(None, map(_class_of, schema)), None) if isinstance(schema, list) else None
+
+
+def key_line(table: str, key: str, limits: tuple[float, float] | None) -> str:
+    """Return what a key means, with unit, typical and accepted range, in one line.
+
+    Parameters
+    ----------
+    table : str
+        Class of the table
+    key : str
+    limits : (float, float) or None
+        That it is checked against
+    """
+    text, symbol = TEXTS[table][key], unit_of(key).symbol
+    unit = f" [{symbol}]" if symbol else ""
+    typical = f"Typically {text.typical}" if text.typical else ""
+    accepted = f"{limits[0]:g} to {limits[1]:g} is accepted" if limits else ""
+    ranges = "; ".join(filter(None, (typical, accepted)))
+    return f"{text.meaning}{unit}." + (f" {ranges[0].upper()}{ranges[1:]}." if ranges else "")
+
+
+def limits_of(schema: Any) -> tuple[float, float] | None:
+    """Return the limits of the numbers in the schema of a key, if all have the same."""
+    found = set(_limits(schema))
+    return found.pop() if len(found) == 1 else None
+
+
+def _limits(schema: Any) -> list[tuple[float, float]]:
+    if isinstance(schema, Mapping):
+        own = [(schema["minimum"], schema["maximum"])] if {"minimum", "maximum"} <= set(schema) else []
+        return own + [limits for value in schema.values() for limits in _limits(value)]
+    return [limits for value in schema for limits in _limits(value)] if isinstance(schema, list) else []
+
+
+def _table(name: str, table: Schema) -> Schema:
+    """One table as a file may hold it."""
+    keys = {key: _key(name, key, schema) for key, schema in table["properties"].items()}
+    required = list(table.get("required", ()))
+    made: Schema = {"type": "object", "additionalProperties": False, "description": table.get("description", "")}
+    made["properties"] = keys | {"source": _ref("source")}
+    if name in {root.__name__ for root in ROOTS}:
+        return made | {"title": TITLE, "required": [*required, "source"]}
+    if name.lower() in LIKE_KEYS:
+        keys = keys | {"like": {"type": "string", "description": TEXTS[name]["like"].meaning}}
+        made["properties"] = keys | {"source": _ref("source")}
+    return made | {"title": f"[{name}]"} | _requirement(name, required)
+
+
+def _requirement(name: str, required: list[str]) -> Schema:
+    """Keys that a table needs, and what may stand in their place."""
+    if name == Oil.__name__:
+        own = [key for key in ("level_below_axis_mm", "volume_l") if key in required]
+        return {"required": own, "anyOf": [{"required": ["named"]}, {"required": required}]}
+    if name == Bearing.__name__:
+        known = [key for key in required if key not in (*NEEDED, *LAW)]
+        return {"anyOf": [{"required": ["name", "like"]}, {"required": known}]}
+    if name.lower() in LIKE_KEYS:
+        return {"anyOf": [{"required": ["name", "like"]}, {"required": required}]}
+    return {"required": required}
+
+
+def _key(table: str, key: str, schema: Schema) -> Schema:
+    """One key: its plain value, or that with its standard deviation and source."""
+    plain: Schema = _draft_7({name: item for name, item in schema.items() if name not in ("title", "default")})
+    told: Schema = {"title": key, "description": key_line(table, key, limits_of(schema))}
+    if schema.get("default") is not None:
+        told["default"] = schema["default"]
+    if table == Oil.__name__ and key == "named":
+        plain = {"enum": list(known_oils())}
+    if table == Bearing.__name__ and key == "designation":
+        told["examples"] = list(known_bearings())
+    if key != "factors" and (_is_table(schema) or key in ("schema", "recording")):
+        return told | plain
+    if key == "factors":
+        factor = _annotated(plain["additionalProperties"])
+        names = dict.fromkeys(FACTORS, factor)
+        return told | {"type": "object", "additionalProperties": factor,
+                       "properties": names | {"source": _ref("source")}}  # fmt: skip
+    return told | _annotated(plain)
+
+
+def _annotated(plain: Schema) -> Schema:
+    """A value, or a table of it with its standard deviation and source."""
+    parts = {"value": plain, "sd": _ref("sd"), "source": _ref("source")}
+    table = {"type": "object", "properties": parts, "required": ["value"], "additionalProperties": False}
+    return {"anyOf": [plain, table]}
+
+
+def _ref(name: str) -> Schema:
+    return {"$ref": f"#/definitions/{name}"}
+
+
+def _is_table(schema: Any) -> bool:
+    if isinstance(schema, Mapping):
+        return "$ref" in schema or schema.get("type") == "object" or any(_is_table(item) for item in schema.values())
+    return isinstance(schema, list) and any(_is_table(item) for item in schema)
+
+
+def _draft_7(schema: Any) -> Any:
+    """A schema without ``null``, which TOML has not, and with lists as draft 7 writes them."""
+    if isinstance(schema, list):
+        return [_draft_7(item) for item in schema if item != {"type": "null"}]
+    if not isinstance(schema, Mapping):
+        return schema
+    if len(kinds := [item for item in schema.get("anyOf", ()) if item != {"type": "null"}]) == 1:
+        return _draft_7({name: item for name, item in schema.items() if name != "anyOf"} | kinds[0])
+    return {"items" if name == "prefixItems" else name: _draft_7(item) for name, item in schema.items()}

@@ -1,0 +1,80 @@
+"""The JSON schema of definitions accepts what the program reads, refuses what it refuses, and explains every key."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import pytest
+
+from models.assembly.commented_definition import commented_definition
+from models.assembly.definition_schema import ROOTS, definition_schema, table_classes
+from models.assembly.gearbox import known_gearboxes, load_gearbox, read_gearbox
+from models.definition.key_texts import TEXTS
+from models.files.toml_file import packaged, read_text
+
+ROOT = Path(__file__).parents[4]
+VALIDATOR = jsonschema.Draft7Validator(definition_schema())
+
+
+def faults(text: str) -> list[str]:
+    return [".".join(map(str, fault.absolute_path)) for fault in VALIDATOR.iter_errors(tomllib.loads(text))]
+
+
+@pytest.mark.parametrize("name", known_gearboxes())
+def test_the_machines_of_the_package_fit(name: str) -> None:
+    VALIDATOR.check_schema(VALIDATOR.schema)
+    assert faults(read_text(packaged("gearboxes", name))) == []
+
+
+def test_an_example_fits() -> None:
+    assert faults((ROOT / "examples/room.toml").read_text(encoding="utf-8")) == []
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "place"),
+    [
+        ("face_width_mm = 14.0", "face_width_mm = 0.014", "stage.0.face_width_mm"),
+        ("face_width_mm = 14.0", "facewidth_mm = 14.0", "stage.0"),
+        ("module_mm = 4.5", "", "stage.0"),
+        ('model = "arana"', 'model = "aranna"', "stage.0.friction.model"),
+        ('like = "bearing_1"', "", "bearing.1"),
+        ('designation = "NU 406"', "", "bearing.0"),
+        ('named = "FZG_mineral_32"', "", "oil"),
+        ('source = "the paper, Tables 1, 2, 4 and 5"', "", ""),
+        ("mesh = { value = 1.0, sd", "mesh = { value = 1e4, sd", "factors.mesh"),
+    ],
+)
+def test_a_fault_is_found_where_it_is(old: str, new: str, place: str) -> None:
+    text = read_text(packaged("gearboxes", "fzg"))
+    assert old in text
+    assert place in faults(text.replace(old, new, 1))
+
+
+def test_every_key_is_explained() -> None:
+    """A key without a meaning would stand in the schema, the commented files and the reference without one."""
+    tables: dict[str, Any] = definition_schema()["definitions"]
+    for root in ROOTS:
+        for name in table_classes(root).values():
+            keys = set(tables[name]["properties"]) - {"source"}
+            assert keys == set(TEXTS[name]), name
+            assert all(tables[name]["properties"][key].get("description") for key in keys)
+
+
+@pytest.mark.parametrize("like", known_gearboxes())
+def test_a_commented_definition_is_the_machine_that_it_began_from(like: str) -> None:
+    text = commented_definition(like, name="mine", file="mine.toml", schema="definition.schema.json")
+    own, begun_from = read_gearbox(text, file="mine.toml"), load_gearbox(like)
+    assert own.name == "mine"
+    assert own.values | {"name": ""} == begun_from.values | {"name": ""}
+    assert own.priors == begun_from.priors
+    assert faults(text) == []
+    assert text.startswith("#:schema definition.schema.json\n")
+
+
+def test_a_default_that_a_comment_shows_can_be_uncommented() -> None:
+    text = commented_definition("conveyor", name="mine", file="mine.toml", schema="x.json")
+    assert "\n# K_Z = 5.1\n" in text
+    assert read_gearbox(text.replace("\n# K_Z = 5.1\n", "\nK_Z = 5.3\n"), file="mine.toml").bearing[0].K_Z == 5.3

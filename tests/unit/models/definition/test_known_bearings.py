@@ -1,0 +1,59 @@
+"""Bearings by designation: a table that names one is complete, and says what is typical."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from models.assembly.gearbox import load_gearbox, read_gearbox
+from models.base.errors import InputError
+from models.definition.known_bearings import NEEDED, filled_by_designation, known_bearings
+from models.definition.values_with_source import Annotations
+from models.files.toml_file import packaged, read_text
+
+FZG = read_text(packaged("gearboxes", "fzg"))
+OWN = ("bore_mm", "outside_diameter_mm", "width_mm", "mass_kg", "R1", "S2", "type", "model")
+
+
+def without_sizes(text: str) -> str:
+    """A definition whose bearings leave out what their designation tells."""
+    before, bearings = text.split("[[bearing]]", 1)
+    kept = [line for line in bearings.split("[[seal]]")[0].splitlines() if line.partition(" =")[0] not in OWN]
+    return before + "[[bearing]]" + "\n".join(kept) + "\n\n[[seal]]" + bearings.split("[[seal]]", 1)[1]
+
+
+def test_a_bearing_is_filled_by_its_designation() -> None:
+    filled, full = read_gearbox(without_sizes(FZG), file="own.toml"), load_gearbox("fzg")
+    assert filled.hash == full.hash  # the numbers of the FZG rig are those of the catalogue
+    assert filled.source_of("bearing.0.bore_mm").startswith("typical: NU 406")
+    assert filled.priors["bearing.3.R1"] == pytest.approx(0.1 * full.bearing[3].R1)
+
+
+@pytest.mark.parametrize("name", known_bearings())
+def test_sizes_are_those_of_the_dimension_series(name: str) -> None:
+    """ISO 15: bore of a two-digit number is five times it, and a solid ring of that size is heavier by a third."""
+    values = filled_by_designation({"designation": name}, Annotations(), "bearing.0")
+    d, D, B = values["bore_mm"], values["outside_diameter_mm"], values["width_mm"]
+    assert d == 5.0 * int(name[-2:])
+    solid_kg = 7830.0 * 3.141593 / 4.0 * (D**2 - d**2) * B * 1e-9
+    assert 0.62 < values["mass_kg"] / solid_kg < 0.82
+
+
+def test_what_a_file_gives_is_kept() -> None:
+    notes = Annotations()
+    own = {"designation": "NU 207 ECP", **dict.fromkeys(NEEDED, 1.0)}
+    assert filled_by_designation(own, notes, "bearing.0") == own
+    assert filled_by_designation({**own, "designation": "my own"}, notes, "bearing.0")["designation"] == "my own"
+    assert not notes.sources and not notes.faults
+
+
+def test_an_unknown_designation_is_one_fault_that_says_what_to_give(tmp_path: Path) -> None:
+    file = tmp_path / "own.toml"
+    file.write_text(without_sizes(FZG).replace('designation = "NU 406"', 'designation = "NU 999"'), encoding="utf-8")
+    with pytest.raises(InputError) as caught:
+        load_gearbox(file)
+    lines = str(caught.value).splitlines()
+    assert len(lines) == 4  # one per bearing, and no line for every key that follows from it
+    assert "bearing 'bearing_1'.designation: sizes of 'NU 999' are not known; give bore_mm" in lines[0]
+    assert "known are NU 204 to NU 220 and NU 406" in lines[0]
