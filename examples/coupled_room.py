@@ -21,9 +21,7 @@ from fmpy.ssp import simulation
 from fmpy.ssp.ssd import Parameter, ParameterSet
 from vehicle_fmus import write_system
 
-from builder.native.native_fmu import build_native_fmu
-from builder.workflows.build import build
-from models.assembly.gearbox import Gearbox, load_gearbox
+from gearbox_twin import Gearbox, build_fmu, load_gearbox
 
 HERE = Path(__file__).parent
 STOP_S, STEP_S = 4.0 * 3600.0, 10.0
@@ -31,10 +29,9 @@ OPERATION = {"gearbox.speed": 200.0, "gearbox.torque": 250.0}  # rad/s and N m, 
 START_K = 283.15
 
 
-def build_room(path: Path) -> Path:
+def build_room(folder: Path) -> Path:
     """Build the FMU of the room for this machine."""
-    room = load_gearbox(HERE / "room.toml")
-    return build_native_fmu(room, None, (), path, network=room.network_of_laws(room.network()), platforms="host").path
+    return build_fmu(HERE / "room.toml", folder, target="native").fmus[0]
 
 
 def gearbox_on_feet() -> Gearbox:
@@ -44,8 +41,7 @@ def gearbox_on_feet() -> Gearbox:
 
 def build_gearbox(folder: Path) -> Path:
     """Build the FMU of the gearbox with its frame as a heat port."""
-    build(gearbox_on_feet(), folder, name="fzg", target="native", couple=("frame",))
-    return folder / "fzg_native.fmu"
+    return build_fmu(gearbox_on_feet(), folder, target="native", couple=("frame",)).fmus[0]
 
 
 @contextmanager
@@ -85,7 +81,7 @@ def main() -> None:
     given = parser.parse_args()
     folder: Path = given.output
     folder.mkdir(parents=True, exist_ok=True)
-    fmus = {"gearbox": given.gearbox_fmu or build_gearbox(folder / "gearbox"), "room": build_room(folder / "room.fmu")}
+    fmus = {"gearbox": given.gearbox_fmu or build_gearbox(folder / "gearbox"), "room": build_room(folder / "room")}
     rows = run(write_system(folder / "room.ssp", HERE / "room.ssd", fmus))
     print("time/h  oil/degC  room/degC  floor/degC  to air/W  to floor/W")
     for row in rows[359::360]:

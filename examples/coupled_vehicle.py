@@ -20,11 +20,7 @@ import pandas as pd
 from fmpy.ssp.simulation import simulate_ssp
 from vehicle_fmus import build_cycle_fmu, build_vehicle_fmu, write_system
 
-from builder.native.native_fmu import build_native_fmu
-from builder.surrogate.onnx_export import export_onnx
-from builder.surrogate.train import train_surrogate
-from models.assembly.gearbox import load_gearbox
-from models.base.version import project_version
+from gearbox_twin import build_fmu
 
 HERE = Path(__file__).parent
 STOP_S, STEP_S = 1200.0, 0.1
@@ -52,10 +48,7 @@ def build_system(folder: Path, gearbox_fmu: Path) -> Path:
 
 def build_gearbox(folder: Path) -> Path:
     """Train the FZG rig's networks and build its native FMU for this machine."""
-    gearbox = load_gearbox("fzg")
-    training = train_surrogate(gearbox, jobs=2)
-    networks = export_onnx(training, folder / "networks", version=project_version())
-    return build_native_fmu(gearbox, training, networks, folder / "gearbox.fmu", platforms="host").path
+    return build_fmu("fzg", folder / "gearbox", target="native", jobs=2).fmus[0]
 
 
 def run_fmpy(ssp: Path, stop: float = STOP_S, step: float = STEP_S) -> Run:

@@ -7,11 +7,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from models.assembly.gearbox import load_gearbox
-from models.files.cycle_file import read_cycle
+from gearbox_twin import load_gearbox, read_cycle
 
 gearbox = load_gearbox("fzg")
-losses = gearbox.losses()
 nominal = gearbox.network()
 extended = nominal.with_source("oil", lambda s: 8.0 * (s.speed / 3000.0) ** 3, name="extra", is_loss=True).with_link(
     "housing", "frame", lambda s: 3.0, name="foot"
@@ -19,5 +17,5 @@ extended = nominal.with_source("oil", lambda s: 8.0 * (s.speed / 3000.0) ** 3, n
 
 cycle = read_cycle(Path(__file__).with_name("drive_cycle_600s.csv"))
 for name, network in (("nominal", nominal), ("extended", extended)):
-    result = network.simulate(cycle, losses=losses, initial=20.0)
+    result = gearbox.simulate(cycle, initial=20.0, network=network)
     print(f"{name:9s} oil {result.temperatures['oil'][-1]:.2f} degC, loss {result.loss[-1]:.1f} W")

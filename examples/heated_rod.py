@@ -16,12 +16,12 @@ EVERY = 30  # rows
 
 machine = load_gearbox("heated_rod")
 nominal = machine.network()
-corrected = read_correction(HERE / "heated_rod_correction.toml", nominal).network(machine)
-(recording,) = read_recordings([RECORDING], nominal)
+corrected = read_correction(HERE / "heated_rod_correction.toml", machine).network(machine)
+(recording,) = read_recordings(RECORDING, machine)
 cycle = Cycle(recording.time[::EVERY], {name: values[::EVERY] for name, values in recording.inputs.items()})
 channels = {c.name.partition("__")[0]: c for c in recording.channels if not c.name.endswith("NTC7")}
 start = {name: float(channel.values[0]) for name, channel in channels.items()}
-results = [network.simulate(cycle, losses=machine.loss_laws(), initial=start) for network in (nominal, corrected)]
+results = [machine.simulate(cycle, initial=start, network=network) for network in (nominal, corrected)]
 
 figure = Figure(figsize=(8.0, 5.0), layout="constrained")
 axes = figure.add_subplot()

@@ -103,7 +103,7 @@ def build_fmu(
     if fmi is not None and target == "python":
         raise click.UsageError("--fmi is about native FMUs, the Python FMU is FMI 2.0; give it without --target python")
     definition = load_gearbox(gearbox)
-    found = None if correction is None else read_correction(correction, definition.network(), made_for=definition)
+    found = None if correction is None else read_correction(correction, definition)
     found = found.claims_only() if found and claims_only else found
     folder = output if output is not None else Path("out") / Path(gearbox).stem
     with progress("starting") as told:

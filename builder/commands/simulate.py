@@ -75,7 +75,7 @@ def _full_model(name_or_file: str, correction: Path | None, mapping: Path | None
     gearbox = load_gearbox(name_or_file)
     network, found = gearbox.network(), None
     if correction is not None:
-        found = read_correction(correction, network, made_for=gearbox)
+        found = read_correction(correction, gearbox)
         found = found.claims_only() if claims_only else found
         network = found.network(gearbox)
     trained = None if gearbox.is_parametric else gearbox.training

@@ -25,6 +25,7 @@ import numpy as np
 from fmpy import fmi2
 from fmpy.fmi1 import FMICallException
 from fmpy.fmi3 import FMU3Slave
+from numpy.typing import ArrayLike
 
 from builder.fmi.recorded import recorded_columns
 from builder.fmi.signals import input_name, result_column
@@ -32,6 +33,7 @@ from builder.native.compile import host_platform
 from diagnosis.recordings.machine import DescribedMachine, Part
 from models.base.errors import InputError, did_you_mean
 from models.base.types import Array
+from models.columns.columns import Columns
 from models.correction.correction import Correction
 from models.files.cycle import Cycle
 from models.quantities.quantities import GEARBOX_INPUTS, INPUT_KINDS, Input, column_of_input, named_input
@@ -51,20 +53,20 @@ _environments = itertools.count(1)
 
 
 def drive_fmu(
-    path: Path,
-    cycle: Cycle,
+    path: str | Path,
+    cycle: Cycle | Mapping[str, ArrayLike],
     *,
     initial: float | Mapping[str, float] | None = None,
     parameters: Mapping[str, float] | None = None,
     progress: Callable[[int, int], None] | None = None,
-) -> dict[str, Array]:
+) -> Columns:
     """Drive an FMU through a cycle.
 
     Parameters
     ----------
-    path : Path
+    path : str or Path
         An FMU of this project, of any kind
-    cycle : Cycle
+    cycle : Cycle, mapping of column name to ArrayLike of shape (N,), or data frame
         Inputs in the units of file columns; straight lines between the rows
     initial : float, mapping of node name to float, or None
         Temperatures at the first row, [degC]; by default the first ambient temperature, or that of the FMU's first
@@ -76,8 +78,8 @@ def drive_fmu(
 
     Returns
     -------
-    dict of column name to Array, shape (N,)
-        The columns of :meth:`models.simulation.simulate.Result.columns`. The FMU's warnings go to the log of this
+    Columns of shape (N,)
+        Those of :meth:`models.simulation.result.Result.columns`. The FMU's warnings go to the log of this
         module.
 
     Raises
@@ -85,10 +87,13 @@ def drive_fmu(
     InputError
         If the file is not such an FMU or damaged, it has no binary for this machine, or it refuses a value or a step.
     """
+    path = Path(path)
+    if not isinstance(cycle, Cycle):
+        cycle = Cycle.from_columns(cycle, inputs=fmu_machine(path).inputs)
     with loaded(path) as fmu:
         table = _input_table(fmu, cycle)
         fmu.set_parameters(parameters or {})
-        return _simulate_table(fmu, cycle.time, table, initial, progress)
+        return Columns(_simulate_table(fmu, cycle.time, table, initial, progress))
 
 
 def runs_here(path: Path) -> bool:

@@ -10,8 +10,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import FancyArrowPatch
 
-from builder.drive.plots import PALETTE, STYLE
 from diagnosis.report.network_layout import places_of
+from models.columns.curves import PALETTE, STYLE
 from models.simulation.thermal_network import ThermalNetwork
 
 INCH_PER_ROW, WIDTH_INCH = 1.1, 9.0

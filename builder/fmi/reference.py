@@ -14,7 +14,8 @@ from models.base.types import Array
 from models.portable import solver
 from models.portable.evaluation import NoLosses
 from models.portable.surrogate import KELVIN, SurrogateLosses
-from models.simulation.simulate import Result, evaluate, initial_states, input_table, network_system
+from models.simulation.result import Result
+from models.simulation.simulate import evaluate, initial_states, input_table, network_system
 from models.simulation.thermal_network import ThermalNetwork
 
 STEP_S = 10.0

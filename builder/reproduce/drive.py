@@ -13,7 +13,7 @@ from builder.reproduce.report import Check, Part, Table, item
 from builder.reproduce.study import FULL, PRINTED, REDUCED, Study
 from models.base.types import Array
 from models.quantities.part_colours import part_colours
-from models.simulation.simulate import Result
+from models.simulation.result import Result
 
 # Phases of the cycle [s]: the light start, constant power, high torque, and the load of the start again.
 START, CONSTANT, HEAVY, END = (0.0, 60.0), (90.0, 300.0), (330.0, 450.0), (480.0, 600.0)

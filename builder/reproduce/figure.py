@@ -13,8 +13,8 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
 
-from builder.drive.plots import PALETTE, STYLE
 from models.base.types import Array
+from models.columns.curves import PALETTE, STYLE
 from models.quantities.part_colours import part_colours
 
 WIDTH, HEIGHT, BAR_HEIGHT = 4.6, 3.6, 0.26  # inches per panel, and per bar

@@ -34,7 +34,7 @@ def losses_over_speed(study: Study) -> Iterator[Part]:
         model = study.gearbox.with_values({"stage.0.churning.model": churning}).losses()
         n, T2 = np.meshgrid(np.interp(velocity, PITCH_VELOCITY, study.pinion_speed), OUTPUT_TORQUE)
         temperatures = study.stated_temperatures(T2, T_oil=T_oil)
-        return model.breakdown(speed=n, torque=T2 / study.ratio, temperatures=temperatures)["total"]
+        return np.asarray(model.breakdown(speed=n, torque=T2 / study.ratio, temperatures=temperatures)["total"])
 
     niemann, mauz, changenet = (total(name, PITCH_VELOCITY) for name in CHURNING)
     yield ASSUMED

@@ -16,11 +16,11 @@ from typing import Any
 import matplotlib as mpl
 from jinja2 import Environment, StrictUndefined
 
-from builder.drive.plots import STYLE
 from builder.reproduce.figure import Figure
 from builder.reproduce.printed import PAPER
 from builder.reproduce.study import Study
 from models.base.progress import Progress
+from models.columns.curves import STYLE
 from models.files.output_files import write_table
 
 PAGE, NUMBERS, SUMMARY, FIGURES = "report.html", "report.json", "summary.md", "figures"

@@ -158,7 +158,7 @@ def thermal_network(study: Study) -> Iterator[Part]:
     network = study.network
     speed, torque = float(study.pinion_speed[MIDDLE]), float(study.pinion_torque[MEDIUM])
     steady = network.steady_state(losses=study.full, speed=speed, torque=torque)
-    signals = {f"T_{name}": float(T[0, 0]) for name, T in steady.temperatures.items()}
+    signals = {f"T_{name}": float(T) for name, T in steady.temperatures.items()}
     signals |= {"time": 0.0, **{name: given.default for name, given in network.inputs.items()}}
     signals |= {"speed": speed, "torque": torque}
     signals |= {parameter.name: parameter.start for parameter in network.parameters}
@@ -180,7 +180,7 @@ def thermal_network(study: Study) -> Iterator[Part]:
         [Graph("Wider lines conduct more", {node.name: NODES[node.name] for node in network.nodes}, links)],
     )
     heat = {n: ", ".join(s.name.replace("_", " ") for s in network.sources if s.node == n) for n in NODES}
-    rows = [(n.replace("_", " "), f"{steady.temperatures[n][0, 0]:.1f}", heat[n]) for n in steady.temperatures]
+    rows = [(n.replace("_", " "), f"{steady.temperatures[n]:.1f}", heat[n]) for n in steady.temperatures]
     yield Table("Nodes in steady state", ("node", "°C", "heated by"), rows, texts=True)
     yield Table("Conductances", ("link", "W/K"), [(" - ".join(nodes), f"{G:.2f}") for nodes, G in conductance.items()])
 

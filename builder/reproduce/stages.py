@@ -16,7 +16,7 @@ from models.base.types import Array
 from models.files.cycle import Cycle
 from models.portable.surrogate import SurrogateLosses
 from models.quantities.part_colours import part_colours
-from models.simulation.simulate import Result
+from models.simulation.result import Result
 from models.simulation.thermal_network import ThermalNetwork
 
 STEP_ERROR_K = 0.1

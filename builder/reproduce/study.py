@@ -16,11 +16,12 @@ from builder.surrogate.doe import random_points
 from builder.surrogate.train import TrainingResult
 from models.assembly.gearbox import Gearbox
 from models.base.progress import Progress
-from models.base.types import Array
+from models.base.types import Array, Numeric
 from models.files.cycle import Cycle
 from models.losses.loss_model import LossModel
 from models.portable.surrogate import SurrogateLosses
-from models.simulation.simulate import Result, steady_state
+from models.simulation.result import Result
+from models.simulation.steady_state import steady_state
 from models.simulation.thermal_network import Losses, ThermalNetwork
 
 FULL, REDUCED, PRINTED = "F-PL", "ROM-PL", "ROM-PL, networks as printed"
@@ -130,14 +131,14 @@ class Study:
         bearings = np.full_like(gears, T_oil + BEARING_ABOVE_OIL)
         return {node: others.get(node, bearings) for node in self.full.temperature_nodes}
 
-    def by_kind(self, losses: Mapping[str, Array]) -> dict[str, Array]:
+    def by_kind(self, losses: Mapping[str, Numeric]) -> dict[str, Array]:
         """Losses of components added up by kind, [W]."""
         return {
-            "sliding": losses["mesh_sliding"],
-            "rolling": losses["mesh_rolling"],
-            "churning": losses["churning"],
-            "seals": np.sum([losses[seal.name] for seal in self.gearbox.seal], axis=0),
-            "bearings": np.sum([losses[bearing.name] for bearing in self.gearbox.bearing], axis=0),
+            "sliding": np.asarray(losses["mesh_sliding"]),
+            "rolling": np.asarray(losses["mesh_rolling"]),
+            "churning": np.asarray(losses["churning"]),
+            "seals": np.sum([np.asarray(losses[seal.name]) for seal in self.gearbox.seal], axis=0),
+            "bearings": np.sum([np.asarray(losses[bearing.name]) for bearing in self.gearbox.bearing], axis=0),
         }
 
     def staircase(self, output_torque: float, *, step_s: float) -> Cycle:
@@ -210,7 +211,7 @@ def steady_oil(
     speed, torque : Array, shape (N,)
         Of the input shaft, [1/min] and [N m]
     **given
-        `inputs` and `parameters` of :func:`models.simulation.simulate.steady_state`
+        `inputs` and `parameters` of :func:`models.simulation.steady_state.steady_state`
     """
     result = steady_state(network, losses=losses, speed=speed, torque=torque, **given)
-    return result.temperatures["oil"][..., -1].ravel(), result.loss[..., -1].ravel()
+    return np.asarray(result.temperatures["oil"]), np.asarray(result.loss)

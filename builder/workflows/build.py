@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -22,7 +22,7 @@ from builder.native.native_fmu import build_native_fmu
 from builder.python.python_fmu import build_python_fmu
 from builder.surrogate.onnx_export import export_onnx
 from builder.surrogate.train import TrainingResult, train_surrogate
-from models.assembly.gearbox import Gearbox
+from models.assembly.gearbox import Gearbox, load_gearbox
 from models.base.atomic_write import atomic_folder
 from models.base.errors import InputError
 from models.base.progress import Progress, silent
@@ -30,6 +30,9 @@ from models.base.types import Array
 from models.base.version import project_version
 from models.correction.correction import Correction, corrected_network
 from models.files.output_files import write_table
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 SUFFIX = {"python": "", "native": "_native", "native_fmi3": "_native_fmi3"}  # of the files' names
 LABEL = {"python": "python", "native": "native", "native_fmi3": "native FMI 3.0"}  # of the kinds, for people
@@ -54,7 +57,7 @@ class CycleErrors:
     loss_worst: float | None
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class BuildReport:
     """Result of a build: its files and their accuracy.
 
@@ -82,6 +85,20 @@ class BuildReport:
     purpose: str
     notes: tuple[str, ...] = ()
     correction: Mapping[str, Any] | None = None
+
+    def __repr__(self) -> str:
+        return f"<BuildReport of {self.gearbox!r}: {', '.join(path.name for path in self.fmus)}>"
+
+    @property
+    def fmus(self) -> tuple[Path, ...]:
+        """The FMUs among the files."""
+        return tuple(path for path in self.files if path.suffix == ".fmu")
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return the largest difference of every node's temperature [K] to the full model, one column per FMU."""
+        import pandas as pd
+
+        return pd.DataFrame({f"{Path(name).stem}_K": dict(cycle.temperature_K) for name, cycle in self.cycles.items()})
 
     def as_dict(self) -> dict[str, Any]:
         """The report without timings, so that the same build gives the same file."""
@@ -144,10 +161,10 @@ class BuildReport:
 
 
 def build(
-    gearbox: Gearbox,
-    folder: Path,
+    gearbox: Gearbox | str | Path,
+    folder: str | Path,
     *,
-    name: str,
+    name: str | None = None,
     target: str = "both",
     platforms: str = "host",
     fmi: str = "2",
@@ -164,14 +181,14 @@ def build(
 
     Parameters
     ----------
-    gearbox : Gearbox
-    folder : Path
+    gearbox : Gearbox, name or path
+    folder : str or Path
         Where the files go: ``<name>.fmu`` (python), ``<name>_native.fmu``, ``<name>_native_fmi3.fmu``,
         ``networks/*.onnx``, ``drive_cycle.csv``,
         ``.png`` (``drive_cycle_native`` of the native FMU), ``report.json``. They appear together when all is done;
         files of an earlier build are replaced, others left alone
-    name : str
-        Name of the FMU's file
+    name : str or None
+        Name of the FMU's file; by default that of the definition's
     target : str
         Kind of FMU: ``python``, ``native`` or ``both``; without a compiler, ``both`` is the Python FMU alone
     platforms : str
@@ -195,7 +212,22 @@ def build(
     ------
     InputError
         If the folder cannot be written to or the options are at fault.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as out:
+    ...     report = build("heated_rod", out, target="native")
+    ...     driven = drive_fmu(report.fmus[0], {"time_s": [0.0, 600.0], "heater_power": [10.0, 10.0]}, initial=20.0)
+    >>> report
+    <BuildReport of 'heated rod of three blocks': heated_rod_native.fmu>
+    >>> driven.to_dataframe()[["time_s", "T_cell_1_degC"]].round(1)
+       time_s  T_cell_1_degC
+    0     0.0           20.0
+    1   600.0           24.0
     """
+    gearbox, folder = gearbox if isinstance(gearbox, Gearbox) else load_gearbox(gearbox), Path(folder)
+    name = name or Path(gearbox.file).stem
     kinds, built_for, notes = _planned(target, platforms, fmi)
     network = corrected_network(gearbox, correction)
     for boundary in couple:

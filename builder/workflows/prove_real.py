@@ -99,7 +99,7 @@ def prove_real(plant: RealPlant, output: Path, *, jobs: int = 1, progress: Progr
         found = diagnose(train, gearbox, holdout=held, jobs=jobs, progress=progress)
         progress("writing the report")
         write_files(found, gearbox, [*train, *held], stage)
-        correction = read_correction(stage / CORRECTION, network, made_for=gearbox)
+        correction = read_correction(stage / CORRECTION, gearbox)
         progress("building the FMU")
         fmu = stage / f"{plant.definition}_native.fmu"
         build_native_fmu(

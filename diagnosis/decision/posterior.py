@@ -187,7 +187,8 @@ class Posterior:
         Two effects look like that, and so does one whose law is not the true one (seen on the stranger's cases).
         """
         least, share = self.rule.much_left
-        return self.remainder > max(least, share * self.explanations[0].log_bayes)
+        most = max((one.log_bayes for one in self.judged if len(one.effects) == 1), default=0.0)
+        return self.remainder > max(least, share * most)
 
     @property
     def detected(self) -> bool:
@@ -221,6 +222,8 @@ class Posterior:
         a, b = self.rule.temper
         most = max(float(values.max(initial=0.0)), 0.0)
         left = (values >= self.rule.refuted * most) | (most == 0.0)
+        if self.remainder <= self.threshold:  # a second effect needs evidence of its own
+            left &= np.array([len(names) == 1 for names in of_names], dtype=bool)
         log = np.where(left, np.array(log_prior) + values / (a + b * most), -np.inf)
         chance = self.something * np.exp(log - logsumexp(log))
         found = [
@@ -309,14 +312,17 @@ def decide(posterior: Posterior, settings: Settings) -> tuple[Answer, ...]:
 def _best_fitted(posterior: Posterior) -> Judged:
     """The most probable explanation; if it has no fit, the one with its names whose fit has the most evidence.
 
-    Far from a straight line the refit of the best place may fail, and that of another one end without the effect.
+    Far from a straight line the refit of the best place may fail, and that of another one end without the effect. A fit
+    at the same place goes before others.
     """
     explanation = posterior.explanations[0]
     first = explanation.members[0]
     if first.fit is not None:
         return first
     fitted = [one for one in posterior.judged if one.fit is not None and set(explanation.names) <= set(one.names)]
-    return max(fitted, key=lambda one: one.log_bayes + one.log_prior, default=first)
+    labels = {effect.label for effect in first.effects}
+    there = [one for one in fitted if labels <= {effect.label for effect in one.effects}]
+    return max(there or fitted, key=lambda one: one.log_bayes + one.log_prior, default=first)
 
 
 def _answer(posterior: Posterior, best: Judged, effect: Hypothesis, enough: float) -> Answer | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 from models.quantities.quantities import Input
 
@@ -34,6 +34,14 @@ class RecordedMachine(Protocol):
     @property
     def recording(self) -> Mapping[str, Any]:
         """Usual mapping of recordings."""
+
+
+@runtime_checkable
+class MachineDefinition(Protocol):
+    """A definition of such a machine, as a gearbox."""
+
+    def network(self) -> RecordedMachine:
+        """Return the machine."""
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,7 @@ from diagnosis.recordings.cleaning import (
 )
 from diagnosis.recordings.columns import quantities_of
 from diagnosis.recordings.file import open_recording, set_to_one_clock, sha256_of, stem_of
-from diagnosis.recordings.machine import RecordedMachine
+from diagnosis.recordings.machine import MachineDefinition, RecordedMachine
 from diagnosis.recordings.mapping import RecordingMapping, mapping_of_definition
 from diagnosis.recordings.recording import Channel, Recording
 from diagnosis.recordings.rows import RecordedRows, joined, read_rows
@@ -38,21 +38,21 @@ ByRole: TypeAlias = tuple[tuple[Recording, ...], tuple[Recording, ...], tuple[Re
 
 
 def read_recordings(
-    paths: Sequence[str | Path],
-    network: RecordedMachine,
+    paths: str | Path | Sequence[str | Path],
+    machine: RecordedMachine | MachineDefinition,
     *,
     mapping: Path | None = None,
     max_gap_s: float | None = None,
 ) -> tuple[Recording, ...]:
-    """Read recordings of one gearbox.
+    r"""Read recordings of one gearbox.
 
     Parameters
     ----------
-    paths : sequence of str or Path
+    paths : str, Path, or sequence of them
         One entry per recording: a file (.csv, .csv.gz, .parquet, .mf4); several files of one recording, joined in the
         order of time, ``FILE+FILE``; or a part of either, ``FILE@start..end`` (see
         :class:`diagnosis.recordings.time_axis.Part`)
-    network : RecordedMachine
+    machine : Gearbox, ThermalNetwork or other RecordedMachine
         Defines which nodes and inputs there are
     mapping : Path or None
         Mapping file for all of them (see :mod:`diagnosis.recordings.mapping`); by default ``<stem>.toml`` or
@@ -69,7 +69,25 @@ def read_recordings(
     ------
     InputError
         With all problems of all files, each with file, column and rows.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> from models.assembly.gearbox import load_gearbox
+    >>> table = "time_s,speed_rpm,torque_Nm,T_oil_degC\n0,1500,94,20.0\n60,1500,94,21.5\n120,1500,94,22.8\n"
+    >>> with TemporaryDirectory() as folder:
+    ...     _ = Path(folder, "run.csv").write_text(table)
+    ...     (run,) = read_recordings(Path(folder, "run.csv"), load_gearbox("fzg"))
+    >>> run
+    <Recording 'run': 3 rows over 0.0 h; oil>
+    >>> run.to_dataframe()[["time_s", "speed_rpm", "T_oil_degC"]]
+       time_s  speed_rpm  T_oil_degC
+    0     0.0     1500.0        20.0
+    1    60.0     1500.0        21.5
+    2   120.0     1500.0        22.8
     """
+    network = machine.network() if isinstance(machine, MachineDefinition) else machine
+    paths = [paths] if isinstance(paths, str | Path) else paths
     recordings: list[Recording] = []
     problems: list[str] = []
     for path, name in zip(paths, _names(paths), strict=True):
@@ -200,6 +218,7 @@ def read_recording(
         assumed=tuple(found.assumed),
         notes=tuple(found.notes),
         session=files[0].mapping.session or "",
+        parts=tuple(part.name for part in network.parts),
     )
 
 

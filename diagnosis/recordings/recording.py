@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.recordings.time_axis import Clock
 from models.base.types import Array
+from models.columns.columns import Columns, What
+from models.files.cycle import Cycle
+from models.quantities.quantities import TOTAL_LOSS, column_of, is_total_loss
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -48,7 +56,7 @@ class Channel:
     column: str = ""
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Recording:
     """Inputs and measurements of one gearbox over time.
 
@@ -85,6 +93,8 @@ class Recording:
         What was cleaned or assumed
     session : str
         Test session as its mapping file states it; empty if it does not
+    parts : tuple of str
+        Nodes of the machine, measured or not
     """
 
     name: str
@@ -104,3 +114,34 @@ class Recording:
     assumed: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     session: str = ""
+    parts: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        begin = "" if self.start is None else f" from {self.start:%Y-%m-%d %H:%M} UTC"
+        rows = f"{len(self.time)} rows over {self.time[-1] / 3600.0:.1f} h{begin}"
+        return f"<Recording {self.name!r}: {rows}; {', '.join(c.name for c in self.channels)}>"
+
+    @property
+    def cycle(self) -> Cycle:
+        """The inputs, to simulate with."""
+        return Cycle(self.time, self.inputs)
+
+    def columns(self) -> Columns:
+        """Return inputs and measurements by the names of columns in files; NaN where missing."""
+        names = {c.name: TOTAL_LOSS if is_total_loss(c.name) else f"T_{c.name}" for c in self.channels}
+        return self.cycle.columns() | {column_of(names[c.name]): c.values for c in self.channels}
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return :meth:`columns` as a data frame; its index is the time (UTC) if the file has dates."""
+        table = self.columns().to_dataframe()
+        if self.start is not None:
+            import pandas as pd
+
+            table.index = pd.DatetimeIndex(self.start + pd.to_timedelta(self.time, unit="s"), name="time")
+        return table
+
+    def plot(self, what: What = "temperatures", *, only: Sequence[str] = (), ax: Axes | None = None) -> Axes:
+        """Draw the measured temperatures, or the total loss, over time; see :meth:`Columns.plot`."""
+        from models.columns.curves import draw_columns  # imports matplotlib
+
+        return draw_columns(self.columns(), what, only=only, ax=ax, parts=self.parts if what == "temperatures" else ())

@@ -80,9 +80,9 @@ def prediction_table(diagnosis: Diagnosis, recording: Recording) -> pd.DataFrame
 
 
 def write_files(
-    diagnosis: Diagnosis, gearbox: Gearbox, recordings: Sequence[Recording], folder: Path
+    diagnosis: Diagnosis, gearbox: Gearbox, recordings: Sequence[Recording], folder: str | Path
 ) -> tuple[Path, ...]:
-    """Write everything into an existing folder.
+    """Write report, numbers, correction, and the prediction of every recording into a folder.
 
     Returns
     -------
@@ -91,6 +91,8 @@ def write_files(
     """
     from diagnosis.report import write_report
 
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
     report, numbers, correction, *predictions = (folder / name for name in names_of_files(recordings))
     write_report(diagnosis, report)
     numbers.write_text(json.dumps(diagnosis.to_dict(), indent=2, allow_nan=False) + "\n", encoding="utf-8")

@@ -6,7 +6,7 @@ import html
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from diagnosis.results.number_format import MINUS, number, with_error
 from diagnosis.results.result_parts import (
@@ -21,10 +21,15 @@ from diagnosis.results.result_parts import (
     fits_dict,
     named,
 )
+from diagnosis.results.tables import Table, draw_explanations, table_of
 from models.correction.instruments import InputCorrection, SensorCorrection
 from models.mechanisms import OPEN_FORM
 from models.simulation.thermal_network import ThermalNetwork
 from models.terms.term import Term
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
 
 SCHEMA = 1
 FAR_SD, MOST_FAR = 3.0, 3  # standard deviations of a prior, beyond which the summary tells of a parameter; how many
@@ -58,7 +63,7 @@ LIKELY_TEXT: Mapping[str, str] = {  # of the same verdicts where no name is a cl
 }
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Diagnosis:
     """The result of :func:`diagnosis.diagnose`.
 
@@ -387,6 +392,40 @@ class Diagnosis:
 
     def __str__(self) -> str:
         return "\n".join(self.summary())
+
+    def __repr__(self) -> str:
+        found = "; ".join(f"{f.grade}: {f.title}" for f in self.findings) or "no findings"
+        return f"<Diagnosis of {self.gearbox!r}: {self.verdict.replace('_', ' ')}; {found}>"
+
+    def to_dataframe(self, what: Table = "findings") -> pd.DataFrame:
+        """Return a table.
+
+        Parameters
+        ----------
+        what : str
+            ``findings``: their numbers with errors and units; ``explanations``: all that were compared, with
+            probabilities; ``calibration``: parameters of the model; ``errors``: of every channel, [K] or [W]
+
+        Raises
+        ------
+        InputError
+            If there is no such table.
+        """
+        return table_of(self, what)
+
+    def plot(self, *, ax: Axes | None = None) -> Axes:
+        """Draw the most probable explanations; predictions over time are drawn by :meth:`PredictedRun.plot`.
+
+        Parameters
+        ----------
+        ax : Axes or None
+            By default new ones
+
+        Returns
+        -------
+        Axes
+        """
+        return draw_explanations(self, ax)
 
     def _repr_html_(self) -> str:
         head, *rest = self.summary()

@@ -5,10 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from models.base.types import Array
 from models.terms.term import Term
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
 
 Grade = Literal["claim", "likely"]
 PARAMETER = "parameter"
@@ -189,7 +193,7 @@ class Location:
     regime: str
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class PredictedRun:
     """One recording as measured and as simulated, free-running.
 
@@ -220,6 +224,38 @@ class PredictedRun:
     after: Mapping[str, Array]
     counts_from_s: float
     start: Mapping[str, float] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        role = "held out" if self.held_out else "learnt from"
+        return f"<PredictedRun {self.recording!r}, {role}: {len(self.time)} rows; {', '.join(self.measured)}>"
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return time, inputs, and of every channel the measured and the predicted values.
+
+        Columns are ``T_oil_degC`` for what was measured, ``T_oil_degC_before``, ``_calibrated`` and ``_after``.
+        """
+        from diagnosis.results.tables import run_columns
+
+        return run_columns(self).to_dataframe()
+
+    def plot(self, channel: str | None = None, *, ax: Axes | None = None) -> Axes:
+        """Draw one channel as measured and as predicted.
+
+        Parameters
+        ----------
+        channel : str or None
+            By default the temperature that the model as delivered predicts worst
+        ax : Axes or None
+            By default new ones
+
+        Raises
+        ------
+        InputError
+            If it was not measured.
+        """
+        from diagnosis.results.tables import draw_channel
+
+        return draw_channel(self, channel, ax)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
+from numpy.typing import ArrayLike
 
 from models.assembly.gearbox_definition import Definition
 from models.assembly.gearbox_network import build_network
@@ -27,21 +27,28 @@ from models.assembly.parametric import (
 from models.base.errors import InputError, did_you_mean
 from models.definition.definition_file import fault_lines, placed, read_values, refuse
 from models.definition.messages import validate_section
+from models.definition.nested_values import leaves_of, plain, with_value
 from models.definition.parametric_sections import KEY, ParametricDefinition
 from models.definition.sections import Ambient, Bearing, Housing, Node, Oil, Seal, Shaft, Stage, Training
-from models.definition.values_with_source import Annotations, join
+from models.definition.values_with_source import Annotations
+from models.files.cycle import Cycle
 from models.files.toml_file import known_names, packaged, read_text
 from models.formulas.oil import Oil as Lubricant
+from models.losses.breakdown import Breakdown, break_down
 from models.losses.loss_model import LossModel
 from models.portable.evaluation import NoLosses
+from models.simulation.result import Result, SteadyState
 from models.simulation.thermal_network import Losses, ThermalNetwork
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 FOLDER = "gearboxes"
 DEFAULT_SOURCE = "default of schema 1"
 CHANGED_SOURCE = "changed after reading (with_values)"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Gearbox:
     """A validated gearbox definition; :func:`load_gearbox` makes one.
 
@@ -58,12 +65,20 @@ class Gearbox:
         Paths that the file (or its named oil) gives; the others are defaults
     file : str
         Name of the file, for messages
+
+    Examples
+    --------
+    >>> load_gearbox("fzg")
+    <Gearbox 'FZG efficiency rig, type C spur gears, b = 14 mm' from fzg.toml>
     """
 
     definition: Definition | ParametricDefinition
     notes: Annotations
     given: frozenset[str]
     file: str
+
+    def __repr__(self) -> str:
+        return f"<Gearbox {self.name!r} from {self.file}>"
 
     @property
     def name(self) -> str:
@@ -172,7 +187,7 @@ class Gearbox:
         >>> load_gearbox("fzg").leaves["stage.0.z.1"]
         24
         """
-        return dict(_leaves(self.values))
+        return dict(leaves_of(self.values))
 
     @cached_property
     def hash(self) -> str:
@@ -226,14 +241,14 @@ class Gearbox:
         values: Any = self.values
         for path, value in changes.items():
             try:
-                values = _replace_value(values, path.split("."), _plain(value))
+                values = with_value(values, path.split("."), plain(value))
             except LookupError:
                 hint = did_you_mean(path, self.leaves)
                 raise InputError(f"{self.file}: {path} is not a value of this gearbox{hint}") from None
         definition = _validate(values, file=self.file)
         changed = dict.fromkeys(changes, CHANGED_SOURCE)
         notes = Annotations(sources={**self.sources, **changed}, priors=dict(self.priors))
-        given = {leaf for leaf, _ in _leaves(values) if any(f"{leaf}.".startswith(f"{path}.") for path in changes)}
+        given = {leaf for leaf, _ in leaves_of(values) if any(f"{leaf}.".startswith(f"{path}.") for path in changes)}
         return Gearbox(definition, notes, self.given | given, self.file)
 
     @property
@@ -278,6 +293,112 @@ class Gearbox:
         if isinstance(self.definition, ParametricDefinition):
             return build_parametric_network(self.definition, self.priors)
         return build_network(self.definition, self.priors)
+
+    def simulate(
+        self,
+        cycle: Cycle | Mapping[str, ArrayLike],
+        *,
+        initial: float | Mapping[str, float] | None = None,
+        network: ThermalNetwork | None = None,
+    ) -> Result:
+        """Simulate a cycle with the full model.
+
+        Parameters
+        ----------
+        cycle : Cycle, mapping of column name to ArrayLike of shape (N,), or data frame
+            ``time_s``, ``speed_rpm``, ``torque_Nm`` ...; straight lines between the rows
+        initial : float, mapping of node name to float, or None
+            Temperatures at the first row, [degC]; by default the first ambient temperature
+        network : ThermalNetwork or None
+            An extended or corrected one; by default :meth:`network`
+
+        Raises
+        ------
+        InputError
+            For a faulty cycle or initial temperatures.
+
+        Examples
+        --------
+        >>> cycle = {"time_s": [0.0, 600.0], "speed_rpm": [1500.0, 1500.0], "torque_Nm": [100.0, 100.0]}
+        >>> result = load_gearbox("fzg").simulate(cycle, initial=20.0)
+        >>> result.temperatures["oil"].round(1)
+        array([20. , 30.1])
+        """
+        return (network or self.network()).simulate(
+            cycle, losses=self.loss_laws(), initial=initial, trained=None if self.is_parametric else self.training
+        )
+
+    def losses_at(
+        self, *, speed: ArrayLike, torque: ArrayLike, temperatures: Mapping[str, ArrayLike] | ArrayLike
+    ) -> Breakdown:
+        """Return the loss of every component at operating points; see :func:`models.losses.breakdown.break_down`.
+
+        Examples
+        --------
+        >>> losses = load_gearbox("fzg").losses_at(speed=2165.7, torque=302.0, temperatures=85.0)
+        >>> losses
+        <Breakdown: 920.7 W in 9 losses; largest: mesh_sliding 789.2 W, seal_2 30.4 W, bearing_1 26.3 W>
+        >>> round(losses["churning"], 1), round(losses["total"], 1)
+        (7.7, 920.7)
+        >>> points = load_gearbox("fzg").losses_at(speed=[500.0, 1500.0], torque=94.0, temperatures=60.0)
+        >>> points.to_dataframe()[["speed_rpm", "P_loss_W", "P_loss_churning_W"]].round(1)
+           speed_rpm  P_loss_W  P_loss_churning_W
+        0      500.0      87.1                0.9
+        1     1500.0     239.3                4.4
+        """
+        return break_down(self.loss_laws(), speed=speed, torque=torque, temperatures=temperatures)
+
+    def steady_state(
+        self,
+        *,
+        speed: ArrayLike = 0.0,
+        torque: ArrayLike = 0.0,
+        inputs: Mapping[str, ArrayLike] | None = None,
+        network: ThermalNetwork | None = None,
+    ) -> SteadyState:
+        """Return temperatures and losses at which nothing changes any more, with the full model.
+
+        Parameters
+        ----------
+        speed, torque : ArrayLike, shape () or (B,)
+            Of the input shaft, [1/min] and [N m]
+        inputs : mapping of input name to ArrayLike, shape () or (B,), or None
+            Further inputs, e.g. ``T_ambient`` [degC]
+        network : ThermalNetwork or None
+            An extended or corrected one; by default :meth:`network`
+
+        Raises
+        ------
+        InputError
+            If an input is unknown.
+        ArithmeticError
+            If there is no steady state.
+
+        Examples
+        --------
+        >>> steady = load_gearbox("fzg").steady_state(speed=1500.0, torque=94.0, inputs={"T_ambient": 30.0})
+        >>> round(steady.temperatures["oil"], 1), round(steady.efficiency, 4)
+        (66.5, 0.9837)
+        """
+        return (network or self.network()).steady_state(
+            losses=self.loss_laws(), speed=speed, torque=torque, inputs=inputs
+        )
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return every value by its path: ``value``, its standard deviation ``sd`` where one is given, ``source``.
+
+        Examples
+        --------
+        >>> table = load_gearbox("fzg").to_dataframe()
+        >>> table.loc[["stage.0.z.0", "stage.0.face_width_mm"], ["value", "source"]]
+                              value                source
+        stage.0.z.0              16  Table 1 of the paper
+        stage.0.face_width_mm  14.0  Table 1 of the paper
+        """
+        import pandas as pd
+
+        rows = [(value, self.priors.get(path), self.source_of(path)) for path, value in self.leaves.items()]
+        return pd.DataFrame(rows, index=list(self.leaves), columns=["value", "sd", "source"])
 
 
 def known_gearboxes() -> tuple[str, ...]:
@@ -350,7 +471,7 @@ def read_gearbox(text: str, *, file: str) -> Gearbox:
         others = [line for line in str(error).splitlines() if not line.startswith(tuple(tables))]
         raise InputError("\n".join([*fault_lines(notes.faults, values, file=file), *others])) from error
     refuse(notes.faults, values, file=file)
-    gearbox = Gearbox(definition, notes, frozenset(path for path, _ in _leaves(values)), file)
+    gearbox = Gearbox(definition, notes, frozenset(path for path, _ in leaves_of(values)), file)
     whole = [path for path in notes.priors if isinstance(gearbox.leaves[path], int)]
     refuse(((path, "is a whole number and cannot have an sd") for path in whole), values, file=file)
     return gearbox
@@ -362,41 +483,3 @@ def _validate(values: Mapping[str, Any], *, file: str) -> Definition | Parametri
         refuse(law_faults(definition), values, file=file)
         return definition
     return validate_section(Definition, values, file=file)
-
-
-def _leaves(values: Any, path: str = "") -> Iterator[tuple[str, Any]]:
-    """Yield every single value of nested tables and lists with its dotted path."""
-    if isinstance(values, Mapping):
-        for key, item in values.items():
-            yield from _leaves(item, join(path, key))
-    elif isinstance(values, tuple):
-        for index, item in enumerate(values):
-            yield from _leaves(item, join(path, index))
-    else:
-        yield path, values
-
-
-def _replace_value(values: Any, keys: Sequence[str], new: Any) -> Any:
-    """Return nested tables and lists with one value exchanged, or with one more key in an existing table.
-
-    Raises
-    ------
-    LookupError
-        If there is no such place.
-    """
-    if not keys:
-        return new
-    key, *below = keys
-    if isinstance(values, Mapping) and (key in values or not below):
-        return {**values, key: _replace_value(values.get(key), below, new)}
-    if isinstance(values, tuple) and key.isdecimal() and int(key) < len(values):
-        index = int(key)
-        return (*values[:index], _replace_value(values[index], below, new), *values[index + 1 :])
-    raise LookupError(key)
-
-
-def _plain(value: Any) -> Any:
-    """Return a value as a TOML reader gives it: numpy scalars as numbers, arrays and lists as tuples."""
-    if isinstance(value, np.generic | np.ndarray):
-        value = value.tolist()
-    return tuple(_plain(item) for item in value) if isinstance(value, list | tuple) else value

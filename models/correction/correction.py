@@ -10,7 +10,7 @@ import hashlib
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 import tomli_w
 from pydantic import Field, StringConstraints, model_validator
@@ -27,6 +27,9 @@ from models.network.laws import Parameter
 from models.simulation.thermal_network import ExtraState, ThermalNetwork
 from models.terms.law_file import LawParameter, LawState, LawTable
 from models.terms.term import FACTORS, Term
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 HEADER = "# Found by a diagnosis: the same gearbox definition plus this file is the corrected model.\n"
 BOUND_TOLERANCE = 1e-9  # a fit that ends at a bound may exceed it by rounding
@@ -203,6 +206,19 @@ class Correction(Section):
             raise ValueError("; ".join(faults))
         return self
 
+    def __repr__(self) -> str:
+        of = "" if self.gearbox is None else f" of {self.gearbox.name!r}"
+        names = ", ".join(self.summary()["findings"]) or "no findings"
+        return f"<Correction{of}: {names}; {len(self.calibration)} calibrated>"
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return every estimated number: ``what`` it belongs to, ``name``, ``value``, ``stderr``, ``unit``."""
+        import pandas as pd
+
+        rows = [("calibrated", e.name, e.value, e.stderr, e.unit) for e in self.calibration]
+        rows += [(f.label, p.name, p.value, p.stderr, p.unit) for f in self.findings for p in f.parameter]
+        return pd.DataFrame(rows, columns=["what", "name", "value", "stderr", "unit"])
+
     @classmethod
     def of(
         cls,
@@ -355,27 +371,34 @@ def parse_correction(path: str | Path) -> Correction:
     return validate_section(Correction, parse_schema_1(read_text(Path(path)), file=file, kind="corrections"), file=file)
 
 
-def read_correction(path: str | Path, network: ThermalNetwork, *, made_for: Gearbox | None = None) -> Correction:
-    """Read a correction.
-
-    Parameters
-    ----------
-    path : str or Path
-    network : ThermalNetwork
-        The nominal network of the gearbox, to which it is applied once to find its faults
-    made_for : Gearbox or None
-        Refuse a correction that was made for another one
+def read_correction(path: str | Path, gearbox: Gearbox) -> Correction:
+    """Read a correction of a gearbox; it is applied once to find its faults.
 
     Raises
     ------
     InputError
-        If the file cannot be read, is not a correction, was made for another gearbox, or cannot be applied to the
+        If the file cannot be read, is not a correction, was made for another gearbox, or cannot be applied to its
         network; with file, key and reason.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> from models.assembly.gearbox import load_gearbox
+    >>> fzg = load_gearbox("fzg")
+    >>> with TemporaryDirectory() as folder:
+    ...     made = Correction.of(fzg, calibration=[Estimate(name="h_air", value=0.93, stderr=0.04, prior=1.0)])
+    ...     write_correction(made, Path(folder, "correction.toml"))
+    ...     correction = read_correction(Path(folder, "correction.toml"), fzg)
+    >>> correction
+    <Correction of 'FZG efficiency rig, type C spur gears, b = 14 mm': no findings; 1 calibrated>
+    >>> correction.to_dataframe()
+             what   name  value  stderr unit
+    0  calibrated  h_air   0.93    0.04    1
+    >>> corrected = correction.network(fzg)
     """
-    correction = parse_correction(path)
+    correction, network = parse_correction(path), gearbox.network()
     try:
-        if made_for is not None:
-            correction.check_made_for(made_for)
+        correction.check_made_for(gearbox)
         correction.apply(network, as_recorded=True)
         correction.check_instruments(network.node_names, network.inputs)
     except InputError as error:

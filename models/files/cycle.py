@@ -4,15 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import cast
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from models.base.errors import InputError, Problems
 from models.base.types import Array
+from models.columns.columns import Columns
 from models.quantities.column_names import meant
-from models.quantities.quantities import GEARBOX_INPUTS, Input
+from models.quantities.quantities import GEARBOX_INPUTS, Input, column_of_input
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
 
 MOST_ROWS = 5_000_000  # of a refined cycle, as of a table that is read
 SHORTEST_INTERVAL_S = 1e-5  # times in files have six decimals
@@ -20,7 +25,7 @@ SHORTEST_INTERVAL_S = 1e-5  # times in files have six decimals
 NEAR, NEAR_STEM = 0.9, 0.8
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Cycle:
     """Inputs over time, taken as straight lines between the rows.
 
@@ -34,6 +39,51 @@ class Cycle:
 
     time: Array
     inputs: Mapping[str, Array]
+
+    def __repr__(self) -> str:
+        rows = f"{len(self)} rows from {self.time[0]:g} to {self.time[-1]:g} s"
+        return f"<Cycle: {rows} of {', '.join(self.inputs)}>"
+
+    def columns(self) -> Columns:
+        """Return the columns of a file."""
+        return Columns(time_s=self.time) | {column_of_input(name): values for name, values in self.inputs.items()}
+
+    def to_dataframe(self) -> pd.DataFrame:
+        """Return :meth:`columns` as a data frame.
+
+        Examples
+        --------
+        >>> cycle = Cycle.from_columns({"time_s": [0, 5], "speed_rpm": [0, 100], "torque_Nm": [3, 3]})
+        >>> cycle
+        <Cycle: 2 rows from 0 to 5 s of speed, torque>
+        >>> cycle.to_dataframe()
+           time_s  speed_rpm  torque_Nm
+        0     0.0        0.0        3.0
+        1     5.0      100.0        3.0
+        """
+        return self.columns().to_dataframe()
+
+    def plot(self, *, ax: Axes | None = None) -> Axes:
+        """Draw the first two inputs that are no temperature; the second has an axis at the right.
+
+        Parameters
+        ----------
+        ax : Axes or None
+            By default new ones
+
+        Returns
+        -------
+        Axes
+        """
+        from models.columns.curves import axes_or_new, axis_label, draw_inputs, time_scale  # imports matplotlib
+
+        scale, unit = time_scale(self.time)
+        with axes_or_new(ax) as axes:
+            names = [name for name in self.inputs if not name.startswith("T_")] or list(self.inputs)
+            labels = {column_of_input(name): axis_label(column_of_input(name)) for name in names}
+            draw_inputs(axes, self.time * scale, self.columns(), labels)
+            axes.set_xlabel(f"Time in {unit}")
+        return axes
 
     @classmethod
     def from_columns(

@@ -78,9 +78,9 @@ class RecordedStart:
         return {name: known.get(name, mean) for name in nodes}
 
 
-def read_cycle(path: Path, inputs: Mapping[str, Input] = GEARBOX_INPUTS) -> Cycle:
+def read_cycle(path: str | Path, inputs: Mapping[str, Input] = GEARBOX_INPUTS) -> Cycle:
     """Read a cycle; see :meth:`models.files.cycle.Cycle.from_columns`."""
-    return read_cycle_and_start(path, inputs)[0]
+    return read_cycle_and_start(Path(path), inputs)[0]
 
 
 def read_cycle_and_start(path: Path, inputs: Mapping[str, Input] = GEARBOX_INPUTS) -> tuple[Cycle, RecordedStart]:

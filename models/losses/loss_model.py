@@ -18,9 +18,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from models.base.errors import InputError, did_you_mean
+from models.base.errors import InputError
 from models.base.types import Array
 from models.losses.bearing import BEARING
+from models.losses.breakdown import Breakdown, break_down
 from models.losses.churning import CHURNING
 from models.losses.friction import MESH
 from models.losses.loss_term import OIL, GearboxData, LossTerm, power_of
@@ -145,46 +146,10 @@ class LossModel:
         return {term.name: [self.components.index(name) for name in term.components] for term in self.terms}
 
     def breakdown(
-        self, *, speed: ArrayLike, torque: ArrayLike, temperatures: Mapping[str, ArrayLike] | float
-    ) -> dict[str, Array]:
-        """Loss of every component by name, and the ``total``.
-
-        Parameters
-        ----------
-        speed, torque : ArrayLike, shape (...)
-            Of the input shaft, [1/min] and [N m], signed
-        temperatures : mapping of node name to ArrayLike, shape (...), or float
-            [degC]; one number serves all nodes
-
-        Returns
-        -------
-        dict of str to Array, shape (...)
-            [W]
-
-        Raises
-        ------
-        InputError
-            If a node is missing or unknown, or a value unphysical.
-
-        Examples
-        --------
-        >>> from models.assembly.gearbox import load_gearbox
-        >>> loss = load_gearbox("fzg").losses().breakdown(speed=2165.7, torque=302.0, temperatures=85.0)
-        >>> bool(780.0 < loss["mesh_sliding"] < 860.0)
-        True
-        """
-        if not isinstance(temperatures, Mapping):
-            temperatures = dict.fromkeys(self.temperature_nodes, temperatures)
-        unknown = [name for name in temperatures if name not in self.temperature_nodes]
-        if unknown:
-            hint = did_you_mean(unknown[0], self.temperature_nodes)
-            raise InputError(f"{unknown[0]!r} is not a temperature of the loss model{hint}")
-        missing = [name for name in self.temperature_nodes if name not in temperatures]
-        if missing:
-            raise InputError(f"the temperatures of {', '.join(missing)} are missing; give them in degC")
-        columns = np.broadcast_arrays(*(np.asarray(temperatures[name], dtype=float) for name in self.temperature_nodes))
-        power = self.power(speed, torque, np.stack(columns, axis=-1))
-        return {name: power[..., i] for i, name in enumerate(self.components)} | {"total": power.sum(axis=-1)}
+        self, *, speed: ArrayLike, torque: ArrayLike, temperatures: Mapping[str, ArrayLike] | ArrayLike
+    ) -> Breakdown:
+        """Return the loss of every component by name, and the ``total``; see :func:`break_down`."""
+        return break_down(self, speed=speed, torque=torque, temperatures=temperatures)
 
     def domain_distance(self, speed: ArrayLike, torque: ArrayLike, temperatures: ArrayLike) -> Array:
         """Zero: the full model has no training domain. Parameters as :meth:`power`; shape (...)."""

@@ -23,15 +23,28 @@ from models.files.cycle import Cycle
 from models.network.laws import LawLike, NumericLaw, Parameter, symbol, trace
 from models.network.structure import BASE_SIGNALS, ExtraState, Link, Losses, Network, Node, Source
 from models.quantities.quantities import INPUT_KINDS, named_input
-from models.simulation.simulate import Result, simulate, steady_state
+from models.simulation.result import Result, SteadyState
+from models.simulation.simulate import simulate
+from models.simulation.steady_state import steady_state
 
 LOWEST_BOUNDARY, HIGHEST_BOUNDARY, USUAL_BOUNDARY = -90.0, 250.0, 20.0  # degC, of a coupled boundary
 __all__ = ["BASE_SIGNALS", "ExtraState", "Link", "Losses", "Node", "Source", "ThermalNetwork"]
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class ThermalNetwork(Network):
-    """A network that can be extended, one term at a time, and simulated."""
+    """A network that can be extended, one term at a time, and simulated.
+
+    Examples
+    --------
+    >>> from models.assembly.gearbox import load_gearbox
+    >>> load_gearbox("heated_rod").network()
+    <ThermalNetwork: 13 nodes, 23 links, 5 sources, 17 parameters>
+    """
+
+    def __repr__(self) -> str:
+        shape = f"{len(self.nodes)} nodes, {len(self.links)} links, {len(self.sources)} sources"
+        return f"<ThermalNetwork: {shape}, {len(self.parameters)} parameters>"
 
     # ------------------------------------------------------------------ extension
 
@@ -386,8 +399,8 @@ class ThermalNetwork(Network):
         torque: ArrayLike = 0.0,
         inputs: Mapping[str, ArrayLike] | None = None,
         parameters: Mapping[str, ArrayLike] | None = None,
-    ) -> Result:
-        """Temperatures and losses at rest with constant inputs; see :func:`models.simulation.simulate.steady_state`."""
+    ) -> SteadyState:
+        """Temperatures and losses at rest; see :func:`models.simulation.steady_state.steady_state`."""
         return steady_state(self, losses=losses, speed=speed, torque=torque, inputs=inputs, parameters=parameters)
 
     # ------------------------------------------------------------------ checks

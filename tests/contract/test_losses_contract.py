@@ -148,7 +148,7 @@ def outputs(gearbox: Gearbox) -> np.ndarray:
 
 def steady_temperature(network: Any, losses: Any, n: float, torque: float) -> np.ndarray:
     result = network.steady_state(losses=losses, speed=n, torque=torque)
-    return np.array([values[0, 0] for values in result.temperatures.values()])
+    return np.array([*result.temperatures.values()])
 
 
 def network_capacities(network: Any) -> list[Any]:

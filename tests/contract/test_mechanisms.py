@@ -22,7 +22,7 @@ from models.files.cycle import Cycle
 from models.mechanisms import CATALOGUE, Mechanism, Placed, Scale
 from models.network.compiled import law_source
 from models.network.laws import compile_function, function_source, symbol
-from models.simulation.simulate import Result
+from models.simulation.result import Result
 from models.simulation.thermal_network import ThermalNetwork
 
 MOST_STARTS = 24  # combinations of shape parameters that a search can afford per place
@@ -274,7 +274,7 @@ class TestInANetwork:
         finding = Finding.of(term, estimates, mechanism=name, place=term.place, says=term.says)
         correction = Correction.of(gearbox, findings=(finding,))
         write_correction(correction, tmp_path / "correction.toml")
-        read = read_correction(tmp_path / "correction.toml", base)
+        read = read_correction(tmp_path / "correction.toml", gearbox)
         again = simulate("fzg", read.apply(base, as_recorded=True))
         np.testing.assert_allclose(parts(base, again), parts(base, last_place(name)), rtol=0.0, atol=1e-6)
         assert {p.name: (p.start, p.sd) for p in read.findings[0].term.parameters} == estimates

@@ -51,7 +51,7 @@ def test_heat_goes_from_the_gearbox_into_the_room(
         "gearbox": build_native_fmu(
             gearbox, fzg_training, fzg_networks, tmp_path / "gearbox.fmu", network=network, platforms="host"
         ).path,
-        "room": coupled_room.build_room(tmp_path / "room.fmu"),
+        "room": coupled_room.build_room(tmp_path / "room"),
     }
     rows = coupled_room.run(write_system(tmp_path / "room.ssp", EXAMPLES / "room.ssd", fmus), stop=3600.0)
     given = [rows[f"gearbox.{boundary}.heat"] for boundary in ("air", "frame")]

@@ -84,7 +84,7 @@ def test_corrected_model_and_rebuilt_fmus_follow_the_held_out_recording(
     result = tmp_path / "result.csv"
     options = ("--correction", out / "correction.toml", "--initial", 24, "--output", result)
     assert run_cli("simulate", "--gearbox", "fzg", folder / "hold.csv", *options) == 0
-    correction = read_correction(out / "correction.toml", fzg.network())
+    correction = read_correction(out / "correction.toml", fzg)
     cycle = read_cycle(folder / "hold.csv")
     python, native = tmp_path / "corrected.fmu", tmp_path / "native.fmu"
     build_python_fmu(fzg, fzg_training, fzg_networks, python, correction=correction)

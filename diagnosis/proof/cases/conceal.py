@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from diagnosis.proof.cases.case_files import keep_apart, write_case
+from diagnosis.proof.cases.case_files import keep_apart, staged_folders, write_case
 from diagnosis.proof.cases.concealed_case import CONTROLS, FAULTS, ConcealedCase, Plan
 from diagnosis.proof.cases.truth import truth_of
 from diagnosis.proof.plant.cycles import Programme, ambient, ornstein_uhlenbeck, programmes
@@ -24,7 +24,7 @@ from diagnosis.proof.plant.effects_outside import OUTSIDE_EFFECTS
 from diagnosis.proof.plant.instruments import SENSOR_EFFECTS, Instruments, default_channels, record
 from diagnosis.proof.plant.plant import READINGS, Plant
 from diagnosis.proof.plant.plant_run import EXPONENTS, ORDINARY_SPREAD, Individual, Outcome, Run, factor_sd, run_plant
-from models.assembly.gearbox import Gearbox
+from models.assembly.gearbox import Gearbox, load_gearbox
 from models.base.errors import InputError, did_you_mean
 from models.base.types import Array
 
@@ -123,6 +123,46 @@ def _in_turn(group: str, names: Sequence[str], rng: np.random.Generator) -> Call
 def _messy(rng: np.random.Generator) -> Plan:
     """One dominant effect and six minor ones."""
     return Plan(group="messy", effects=(str(rng.choice(DOMINANT)), *map(str, rng.choice(MINOR, 6, replace=False))))
+
+
+def conceal(
+    effect: str,
+    folder: str | Path,
+    *,
+    gearbox: Gearbox | str | Path = "fzg",
+    strength: float | None = None,
+    seed: int = 0,
+) -> tuple[Path, ...]:
+    """Make recordings of a plant that hides one effect.
+
+    Parameters
+    ----------
+    effect : str
+        Key of :data:`EFFECTS`
+    folder : str or Path
+        Its folder ``recordings`` gets the recordings, ``truth`` the concealed effect
+    gearbox : Gearbox, name or path
+    strength : float or None
+        Relative to the usual one; by default drawn
+    seed : int
+        The same seed gives the same bytes
+
+    Returns
+    -------
+    tuple of Path
+        Recordings: ``hold_*`` to judge by, ``train_*`` to learn from
+
+    Raises
+    ------
+    InputError
+        If the effect is not known, files of another case would be lost, or the folder cannot be written to.
+    """
+    gearbox = gearbox if isinstance(gearbox, Gearbox) else load_gearbox(gearbox)
+    recordings, truth = Path(folder, "recordings"), Path(folder, "truth")
+    plan = Plan(group="single", effects=(effect,), strength=strength)
+    with staged_folders(recordings, truth) as (stage, truth_stage):
+        conceal_set(gearbox, [plan], seed=seed, recordings=stage, truth=truth_stage, flat=True)
+    return tuple(sorted(recordings.glob("*.csv.gz")))
 
 
 def conceal_set(

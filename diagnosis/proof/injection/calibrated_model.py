@@ -24,7 +24,8 @@ from models.base.types import Array
 from models.files.cycle import Cycle
 from models.network.laws import Parameter, symbol
 from models.quantities.quantities import TOTAL_LOSS, is_total_loss, node_of_channel
-from models.simulation.simulate import Result, simulate
+from models.simulation.result import Result
+from models.simulation.simulate import simulate
 from models.simulation.thermal_network import Losses, ThermalNetwork
 
 AMPLITUDE, COURSE, SEEN = "injected_size", "injected_course", "injected_seen"

@@ -99,7 +99,7 @@ def test_kinds_of_dependencies_are_those_of_the_laws() -> None:
     found = {}
     for version in (model_description, model_description3):
         root = parsed(version(signal_table(network), IDENTITY))
-        names = [v.get("name") for v in root.find("ModelVariables") or ()]
+        names = [v.get("name") for v in root.iterfind("ModelVariables/*")]
         unknowns = [*root.iterfind("ModelStructure/Outputs/Unknown"), *root.iterfind("ModelStructure/Output")]
         kinds = {
             names[int(u.get("index", 0)) - 1 if u.get("index") else int(u.get("valueReference", ""))]:

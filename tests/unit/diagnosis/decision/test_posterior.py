@@ -107,7 +107,7 @@ def test_probabilities_sum_to_one_with_nothing() -> None:
     pair = judged(STRONG + 8.0, effect("first"), effect("second"))
     every = [judged(STRONG, effect("first")), judged(STRONG, sensor), judged(50.0, parameter), pair,
              judged(STRONG, effect("unknown_heat", family=OPEN_FORM), log_prior=0.0)]  # fmt: skip
-    found = posterior(*every, log_e=6.0)
+    found = posterior(*every, log_e=6.0, remainder=10.0)
     of_kind = {kind: found.of(kind) for kind in KINDS}
     assert sum(of_kind.values()) == pytest.approx(1.0)
     assert all(p > 0.0 for p in of_kind.values())
@@ -198,7 +198,8 @@ def test_where_much_is_left_there_is_no_claim(gain: float, limit: float) -> None
 
 def test_both_effects_of_a_pair_are_answered() -> None:
     first, second = effect("first"), effect("second", "mesh")
-    found = posterior(judged(STRONG, first), judged(STRONG, second), judged(2.0 * STRONG, first, second))
+    found = posterior(judged(STRONG, first), judged(STRONG, second), judged(2.0 * STRONG, first, second),
+                      remainder=10.0)  # fmt: skip
     answers = decide(found, Settings())
     assert [one.effect for one in answers] == [first, second] and found.of("pair") > ENOUGH
     assert [one.grade for one in answers] == ["claim", "claim"]
@@ -214,10 +215,26 @@ def test_a_pair_has_less_prior_than_one_effect() -> None:
 def test_a_second_effect_is_no_rival_of_the_first() -> None:
     """The first one is certain with the second and without it; the second alone is not answered."""
     first, second = effect("first"), effect("second", "mesh")
-    found = posterior(judged(STRONG, first), judged(1.0, second), judged(STRONG + 6.0, first, second))
+    found = posterior(judged(STRONG, first), judged(1.0, second), judged(STRONG + 6.0, first, second),
+                      remainder=10.0)  # fmt: skip
     assert 0.1 < found.of("pair") < ENOUGH < found.of_names(["first"])
     answers = decide(found, Settings())
     assert [(one.effect.name, one.grade) for one in answers] == [("first", "claim")]
+
+
+def test_a_second_effect_without_evidence_of_its_own_does_not_compete() -> None:
+    first, second = effect("first"), effect("second", "mesh")
+    every = judged(STRONG, first), judged(1.0, second), judged(STRONG + 6.0, first, second)
+    assert posterior(*every, remainder=4.0).of("pair") == 0.0 < posterior(*every, remainder=6.0).of("pair")
+
+
+def test_a_fit_at_the_best_place_goes_before_others() -> None:
+    here, there, second = effect("first", "oil"), effect("first", "mesh"), effect("second")
+    fit = cast(Fit, object())
+    pair = replace(judged(2.0 * STRONG, there, second), fit=fit)
+    at_the_place = replace(judged(STRONG - 9.0, here, second), fit=fit)
+    found = posterior(judged(3.0 * STRONG, here), pair, at_the_place)
+    assert next(one.best for one in decide(found, Settings())) is at_the_place
 
 
 def test_a_parameter_outside_its_prior_is_answered_by_its_name() -> None:

@@ -339,7 +339,7 @@ def test_correction_keeps_grades(claimed: Diagnosis, fzg: Gearbox, tmp_path: Any
     correction = correction_of(likely, fzg)
     path = tmp_path / "correction.toml"
     write_correction(correction, path)
-    read = read_correction(path, fzg.network(), made_for=fzg)
+    read = read_correction(path, fzg)
     assert [f.grade for f in read.findings if f.mechanism == "windage"] == ["likely"]
     assert {f.grade for f in read.findings if f.mechanism == "shape"} == {"learnt"}
     left = read.claims_only()

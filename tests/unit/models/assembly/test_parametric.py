@@ -135,8 +135,8 @@ def test_the_network_rests_where_its_losses_and_conductances_put_it(gearbox):
         if {"air", "outdoor"} & set(link.nodes):
             inner, outer = sorted(link.nodes, key=lambda node: node in ("air", "outdoor"))
             start = {symbol(p.name): p.start for p in network.parameters} | {symbol("speed"): 1800.0}
-            out += float(link.conductance.xreplace(start)) * (T[inner].item() - {"air": 20.0, "outdoor": 10.0}[outer])
-    assert out == pytest.approx(float(np.ravel(rest.columns()["P_loss_W"])[0]), rel=1e-6)
+            out += float(link.conductance.xreplace(start)) * (T[inner] - {"air": 20.0, "outdoor": 10.0}[outer])
+    assert out == pytest.approx(rest.loss, rel=1e-6)
 
 
 def test_all_sizes_times_one_factor_change_no_temperature(gearbox):

@@ -111,7 +111,7 @@ def file(tmp_path: Path) -> Path:
 
 
 def test_the_file_holds_everything(file: Path) -> None:
-    read = read_correction(file, NETWORK, made_for=RIG)
+    read = read_correction(file, RIG)
     assert read == CORRECTION
     assert correction_text(read) == file.read_text(encoding="utf-8")
 
@@ -137,7 +137,7 @@ def test_any_text_and_number_survives_the_file(
 def test_files_of_version_0_1_0_are_read(tmp_path: Path) -> None:
     path = tmp_path / "old.toml"
     path.write_text(OLD, encoding="utf-8")
-    read = read_correction(path, NETWORK, made_for=RIG)
+    read = read_correction(path, RIG)
     assert read.calibration == CORRECTION.calibration
     term = read.findings[0].term
     assert (term.strength.start, term.strength.sd, term.strength.upper, term.is_loss) == (9.5, 0.5, 100.0, True)
@@ -145,7 +145,7 @@ def test_files_of_version_0_1_0_are_read(tmp_path: Path) -> None:
 
 
 def test_corrected_network(file: Path) -> None:
-    network = read_correction(file, NETWORK).network(RIG)
+    network = read_correction(file, RIG).network(RIG)
     parameters = {p.name: p for p in network.parameters}
     assert parameters["h_air"].start == 0.9312345678901234
     assert parameters["h_oil_gear"] == next(p for p in NETWORK.parameters if p.name == "h_oil_gear")
@@ -156,7 +156,7 @@ def test_corrected_network(file: Path) -> None:
 
 
 def test_a_twin_gets_true_torque_and_a_recording_the_recorded_one(file: Path) -> None:
-    read = read_correction(file, NETWORK)
+    read = read_correction(file, RIG)
     assert read.network(RIG).operating == {}
     seen = read.network(RIG, as_recorded=True).operating["torque"]
     assert seen.subs({symbol("torque"): 100.0, symbol("torque_gain_torque_strength"): 0.02}) == pytest.approx(102.0)
@@ -165,9 +165,9 @@ def test_a_twin_gets_true_torque_and_a_recording_the_recorded_one(file: Path) ->
 def test_another_definition_is_refused(file: Path) -> None:
     other = RIG.with_values({"oil.volume_l": 1.0})
     with pytest.raises(InputError, match="made for .*use the definition it was made for, or diagnose again"):
-        read_correction(file, NETWORK).network(other)
+        read_correction(file, RIG).network(other)
     with pytest.raises(InputError, match=r"correction\.toml: the correction was made for"):
-        read_correction(file, NETWORK, made_for=other)
+        read_correction(file, other)
 
 
 def test_estimates_must_be_complete() -> None:
@@ -209,13 +209,13 @@ def test_faults_of_the_file(file: Path, old: str, new: str, says: str) -> None:
     assert old in text
     file.write_text(text.replace(old, new, 1), encoding="utf-8")
     with pytest.raises(InputError, match=says) as caught:
-        read_correction(file, NETWORK)
+        read_correction(file, RIG)
     assert all(line.startswith(f"{file}: ") for line in str(caught.value).splitlines())
 
 
 def test_a_file_that_is_not_there(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"none\.toml: cannot be read"):
-        read_correction(tmp_path / "none.toml", NETWORK)
+        read_correction(tmp_path / "none.toml", RIG)
     (tmp_path / "file").write_text("")
     with pytest.raises(InputError, match=r"c\.toml: cannot be written"):
         write_correction(CORRECTION, tmp_path / "file" / "c.toml")
@@ -269,7 +269,7 @@ def test_an_open_form_is_a_finding_like_any_other(tmp_path: Path) -> None:
     found = Finding.of(term, {"found_a": (1.5, 0.2)}, mechanism="open form")
     path = tmp_path / "c.toml"
     write_correction(Correction.of(RIG, findings=[found]), path)
-    network = read_correction(path, NETWORK).network(RIG)
+    network = read_correction(path, RIG).network(RIG)
     assert network.links[-1].conductance == term.expression
     assert network.nodes[-1].temperature == term.boundary_temperature
     assert network.states[-1].rate == -held / 3600

@@ -27,7 +27,7 @@ INPUTS = (
 def test_the_file_holds_every_number(fzg: Gearbox, tmp_path: Path) -> None:
     correction, path = Correction.of(fzg, sensors=SENSORS, inputs=INPUTS), tmp_path / "correction.toml"
     write_correction(correction, path)
-    assert read_correction(path, fzg.network(), made_for=fzg) == correction
+    assert read_correction(path, fzg) == correction
     tables = tomllib.loads(path.read_text(encoding="utf-8"))
     assert [table["channel"] for table in tables["sensor"]] == ["oil", "pinion__probe", "P_loss"]
     assert tables["input"][1] == {"name": "torque", "gain": 1.01, "gain_stderr": 0.01, "clock": 12.0}
@@ -54,7 +54,7 @@ def test_faults_are_named_with_their_file(text: str, message: str, fzg: Gearbox,
     path = tmp_path / "correction.toml"
     path.write_text(f"schema = 1\n{text}\n", encoding="utf-8")
     with pytest.raises(InputError) as caught:
-        read_correction(path, fzg.network())
+        read_correction(path, fzg)
     assert message in str(caught.value) and str(path) in str(caught.value)
 
 

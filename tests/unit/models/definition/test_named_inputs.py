@@ -110,7 +110,7 @@ def test_laws_boundaries_and_parameters_use_them() -> None:
         inputs = {"heater": 2.0, "oil_flow": flow, "T_coolant": coolant}
         result = network.steady_state(losses=machine.loss_laws(), inputs=inputs, parameters={"leak": leak})
         expected = (2000.0 + leak * 20.0 + 3.0 * flow * coolant) / (leak + 3.0 * flow)
-        assert result.temperatures["body"][-1] == pytest.approx(expected, rel=1e-9)
+        assert result.temperatures["body"] == pytest.approx(expected, rel=1e-9)
     assert "P_loss_W" not in result.columns() and "efficiency" not in result.columns()
 
 

@@ -17,7 +17,7 @@ def test_every_convection_law_settles_and_balances(convection: str, torque: floa
     gearbox = load_gearbox("fzg").with_values({"housing.convection": convection})
     network, losses = gearbox.network(), gearbox.losses()
     steady = network.steady_state(losses=losses, speed=SPEEDS, torque=torque)
-    initial = {node: float(T[-1, 0]) for node, T in steady.temperatures.items()}
+    initial = {node: T[-1] for node, T in steady.temperatures.items()}
     hold = {"time_s": [0.0, 600.0], "speed_rpm": [SPEEDS[-1]] * 2, "torque_Nm": [torque] * 2}
     result = network.simulate(hold, losses=losses, initial=initial)
     for node, T in result.temperatures.items():
