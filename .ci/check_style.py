@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import ast
+import json
 import re
 import sys
 from collections.abc import Iterator
@@ -86,10 +87,28 @@ def phrase_faults(path: Path, name: str) -> Iterator[str]:
 def docs_faults(path: Path) -> Iterator[str]:
     """Phrases of the list in one page of docs."""
     patterns = {p: better for p, better in PHRASES.items() if not p.startswith("^") and p not in NOT_IN_DOCS}
-    for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
+    text = path.read_text(encoding="utf-8")
+    if path.suffix == ".ipynb":
+        text = "\n".join("".join(c["source"]) for c in json.loads(text)["cells"] if c["cell_type"] == "markdown")
+    for number, line in enumerate(text.splitlines(), 1):
         for pattern, better in patterns.items():
             if found := re.search(pattern, line):
                 yield f"{path.relative_to(ROOT).as_posix()}:{number}: {found[0]!r}: better: {better}"
+
+
+def notebook_faults(path: Path) -> Iterator[str]:
+    """Outputs in a notebook, figures without a text for people who do not see them, claims that nothing checks."""
+    cells = json.loads(path.read_text(encoding="utf-8"))["cells"]
+    codes = [cell for cell in cells if cell["cell_type"] == "code"]
+    for cell in codes:
+        where, source = f"{path.relative_to(ROOT).as_posix()}, cell {cell['id']}", "".join(cell["source"])
+        if cell["outputs"] or cell["execution_count"]:
+            yield f"{where}: has outputs; commit notebooks without: jupyter nbconvert --clear-output --inplace FILE"
+        draws = "subplots(" in source or "SVG(" in source
+        if draws and not cell["metadata"].get("mystnb", {}).get("image", {}).get("alt"):
+            yield f"{where}: a figure needs a text: metadata mystnb.image.alt"
+    if not codes or "assert " not in "".join(codes[-1]["source"]):
+        yield f"{path.relative_to(ROOT).as_posix()}: the last cell must assert what the page claims"
 
 
 def main() -> int:
@@ -105,6 +124,8 @@ def main() -> int:
                 faults += phrase_faults(path, name)
     for path in sorted((ROOT / "docs").rglob("*.md")):
         faults += docs_faults(path)
+    for path in sorted((ROOT / "docs" / "notebooks").glob("*.ipynb")):
+        faults += [*docs_faults(path), *notebook_faults(path)]
     print("\n".join(faults) or "style: no faults")
     return 1 if faults else 0
 
