@@ -20,7 +20,7 @@ from diagnosis.engine.calibration import Calibration
 from diagnosis.engine.candidates import Scan, refit, scan
 from diagnosis.engine.fit import Fit
 from diagnosis.engine.gram import Given, Strengths
-from diagnosis.engine.learnt import ErrorClass, error_classes, rule
+from diagnosis.engine.learnt import ErrorClass, rule
 from diagnosis.engine.outside import judge_outside
 from diagnosis.engine.sessions import OverSessions, fit_over_sessions, over_sessions
 from diagnosis.engine.unknown import Group
@@ -130,7 +130,7 @@ def _scanned_in_classes(
     """Scan at the calibrated point with model error of all classes."""
     fit, outside, judged = calibration.fit, _outside(candidates), []
     found = scan(fit, [one for one in candidates if one.term is not None], calibration.columns)
-    for one in error_classes():
+    for one in calibration.classes:
         here = found.in_directions(calibration.directions(one))
         over = over_sessions(here.gram, fit.experiment, range(here.further.stop))
         judged.append((one, here, over, float(np.log(one.prior)) + over.log_evidence))

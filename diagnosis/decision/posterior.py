@@ -305,8 +305,13 @@ def decide(posterior: Posterior, settings: Settings) -> tuple[Answer, ...]:
     if not posterior.detected:
         return ()
     best = _best_fitted(posterior)
-    answers = [_answer(posterior, best, effect, settings.claim_from) for effect in best.effects]
-    return tuple(one for one in answers if one is not None)
+    found: list[Answer] = []
+    for effect in best.effects:
+        answer = _answer(posterior, best, effect, settings.claim_from)
+        # Two that act like something at one place are one answer.
+        if answer and not (answer.acts_like and any(_act_on_the_same(effect, one.effect) for one in found)):
+            found.append(answer)
+    return tuple(found)
 
 
 def _best_fitted(posterior: Posterior) -> Judged:
@@ -332,31 +337,29 @@ def _answer(posterior: Posterior, best: Judged, effect: Hypothesis, enough: floa
     own = posterior.of_names([name])
     if own >= enough:
         return Answer(best=best, effect=effect, grade="likely" if vague else "claim", probability=own, acts_like=vague)
-    rivals = _rivals(posterior, effect)
+    names = _best_of_names(posterior, effect)
+    # Further effects in explanations with the effect's own name do not stand in its place.
+    further = {one for each in posterior.explanations if name in each.names for one in each.names if one != name}
+    rivals = [one for other, one in names.items() if other not in further]
     for count in range(2, MOST_TIED + 1):
         if posterior.of_names([name_of(one) for one in rivals[:count]]) >= enough:
             tied = tuple((one, posterior.of_names([name_of(one)])) for one in rivals[:count])
             return Answer(best=best, effect=effect, grade="likely", probability=own, tied=tied, acts_like=vague)
     least, likeness = posterior.rule.alike, posterior.likeness
-    alike = [name_of(one) for one in rivals if likeness.of(effect, one) >= least or _act_on_the_same(effect, one)]
+    alike = [name_of(one) for one in rivals if likeness.of(effect, one) >= least]
+    alike += [other for other, one in names.items() if _act_on_the_same(effect, one)]
     if posterior.of_names([name, *alike]) >= enough:
         return Answer(best=best, effect=effect, grade="likely", probability=own, acts_like=True)
     return None
 
 
-def _rivals(posterior: Posterior, effect: Hypothesis) -> list[Hypothesis]:
-    """Best effect of every name that may stand in place of an effect, itself first, most probable first.
-
-    Further effects in explanations with the effect's own name do not stand in its place.
-    """
-    own = name_of(effect)
-    further = {name for one in posterior.explanations if own in one.names for name in one.names if name != own}
-    found = {own: effect}
+def _best_of_names(posterior: Posterior, effect: Hypothesis) -> dict[str, Hypothesis]:
+    """Best effect of every name, that of one effect's own name first, then the most probable first."""
+    found = {name_of(effect): effect}
     for judged, _ in posterior.ranked:
-        if own not in judged.names:
-            for one in judged.effects:
-                found.setdefault(name_of(one), one)
-    return [one for name, one in found.items() if name not in further]
+        for one in judged.effects:
+            found.setdefault(name_of(one), one)
+    return found
 
 
 def _act_on_the_same(first: Hypothesis, second: Hypothesis) -> bool:

@@ -75,6 +75,14 @@ class Calibration:
         """In the most probable class."""
         return self.chosen.fit
 
+    @property
+    def classes(self) -> tuple[ErrorClass, ...]:
+        """Classes that candidates are judged in: all, or that of the sound channels where others were set apart.
+
+        No model error is to stand in for a broken sensor.
+        """
+        return error_classes() if self.of_others is None else (self.chosen.error_class,)
+
     def directions(self, one: ErrorClass) -> Array:
         """Leading combinations of model error in a class with the prior N(0, 1) each, shape (unknowns, n)."""
         return _directions(self.columns, self.error.amplitudes(one))
