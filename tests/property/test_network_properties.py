@@ -107,7 +107,7 @@ def test_steady_sources_flow_to_the_air() -> None:
     result = NETWORK.steady_state(losses=LOSSES, **point)
     system = network_system(NETWORK, LOSSES, vector=True)
     inputs = np.column_stack([point["speed"], [94.0] * 2, [27.0] * 2, [2.0] * 2])
-    balance = system.balance(0.0, inputs, stack(result)[:, 0, :])
+    balance = system.balance(0.0, inputs, stack(result))
     assert balance.heat_out.sum(axis=-1) == pytest.approx(result.loss, rel=1e-6)
     assert np.abs(balance.derivative).max() < 1e-5
 

@@ -16,6 +16,7 @@ from diagnosis.decision.settings import Settings
 from diagnosis.engine.calibration import Calibration, calibrate_with_error
 from diagnosis.engine.families import axis_of, changes, log_prior, parameters_outside
 from diagnosis.engine.fit import Fit, calibrate
+from diagnosis.engine.learnt import ErrorClass
 from diagnosis.engine.prepare import prepare_experiment
 from diagnosis.engine.unknown import TermParameter
 from diagnosis.results.effect_values import values_of
@@ -131,7 +132,9 @@ def test_a_share_of_a_swap_is_refused_with_a_number(
     unknown = TermParameter(parameter=strength, label="swap", names=("swap",))
     fit = SimpleNamespace(z=np.array([share]), covariance=np.eye(1), experiment=SimpleNamespace(unknowns=[unknown]))
     monkeypatch.setattr(infer_module, "fit_over_sessions", lambda *_: SimpleNamespace(log_evidence=50.0))
-    one = Judged(effects=(swap,), log_prior=-5.0, log_bayes=40.0, fit=cast(Fit, fit))
-    found = _judged(cast(Calibration, SimpleNamespace(log_evidence=10.0)), one, 0, 0.0)
+    sure = ErrorClass(name="sure", prior=1.0, threshold=5.0, amplitudes={})
+    one = Judged(effects=(swap,), log_prior=-5.0, log_bayes=40.0, fit=cast(Fit, fit), error_class=sure)
+    calibration = SimpleNamespace(chosen=SimpleNamespace(log_evidence=10.0))
+    found = _judged(cast(Calibration, calibration), one, 0, 0.0)
     assert np.isfinite(found.log_bayes)
     assert (found.log_bayes == 40.0) is possible and (found.log_bayes < -100.0) is not possible
