@@ -104,7 +104,6 @@ def infer(
     best = max(judged.values(), key=lambda one: one.log_bayes + one.log_prior, default=None)
     if best is not None and best.fit is not None and best.log_bayes > 0.0:
         progress(f"scanning again, given {best.label}")
-        assert best.error_class is not None  # noqa: S101 - everything judged has one
         of_class = first.in_class(best.error_class).ahead
         remainder, pairs, there = _given_best(calibration, best, candidates, log_prior, of_class)
         alone |= {label: min(alone[label], value) for label, value in there.items()}
@@ -112,26 +111,25 @@ def infer(
         judged.setdefault(candidate.label, _by_scan(first, index, alone[candidate.label]))
     log_e = float(logsumexp([one.log_prior + one.log_bayes for one in judged.values()]))
     error_class = chosen.error_class if best is None else best.error_class
-    assert error_class is not None  # noqa: S101 - everything judged has one
     threshold = rule().threshold(error_class, settings.false_alarm_rate)
-    unknown = _unknown(calibration, error_class, outside) if log_e > threshold else []
-    every = [*judged.values(), *pairs, *unknown]
+    missing = log_e > threshold
+    unknown = _unknown(calibration, error_class, outside) if missing else []
+    nothing = Judged(effects=(), log_prior=0.0, log_bayes=0.0, error_class=chosen.error_class, fit=base)
     return Posterior(
-        nothing=Judged(effects=(), log_prior=0.0, log_bayes=0.0, fit=base), judged=tuple(every), log_e=log_e,
-        threshold=threshold, rule=rule(), likeness=_likeness(first, error_class), odds_unknown=settings.odds_unknown,
-        error_class=chosen.error_class.name, error_evidence=dict(calibration.evidence), session_s=chosen.session_s,
-        remainder=remainder, expected=_expected(first.in_class(chosen.error_class), settings),
+        nothing=nothing, judged=(*judged.values(), *pairs, *unknown), log_e=log_e, threshold=threshold, rule=rule(),
+        likeness=_likeness(first, error_class), odds_unknown=settings.odds_unknown,
+        error_class=(error_class if missing else chosen.error_class).name, error_evidence=dict(calibration.evidence),
+        session_s=chosen.session_s, remainder=remainder,
+        expected=_expected(first.in_class(chosen.error_class), settings),
     )  # fmt: skip
 
 
-def _scanned_in_classes(
-    calibration: Calibration, candidates: Sequence[Hypothesis], log_prior: Array
-) -> _Scanned:  # fmt: skip
+def _scanned_in_classes(calibration: Calibration, candidates: Sequence[Hypothesis], log_prior: Array) -> _Scanned:
     """Scan at the calibrated point with model error of all classes."""
     fit, outside, judged = calibration.fit, _outside(candidates), []
-    found = scan(fit, [one for one in candidates if one.term is not None], calibration.columns)
+    found = scan(fit, [one for one in candidates if one.term is not None], calibration.near.columns)
     for one in calibration.classes:
-        here = found.in_directions(calibration.directions(one))
+        here = found.in_directions(calibration.near.directions(one))
         over = over_sessions(here.gram, fit.experiment, range(here.further.stop))
         judged.append((one, here, over, float(np.log(one.prior)) + over.log_evidence))
     nothing = next(evidence for one, _, _, evidence in judged if one == calibration.chosen.error_class)
@@ -242,7 +240,6 @@ def _judged(calibration: Calibration, one: Judged, base: int, spread: float) -> 
     """A fitted explanation with its evidence against nothing."""
     fit = one.fit
     assert fit is not None  # noqa: S101
-    assert one.error_class is not None  # noqa: S101
     log_evidence = fit_over_sessions(fit, base).log_evidence + float(np.log(one.error_class.prior))
     log_bayes, at = log_evidence - calibration.chosen.log_evidence - spread, base  # where the effects' unknowns begin
     for effect in one.effects:
@@ -301,7 +298,6 @@ def _given_best(
     """
     fit, error_class = best.fit, best.error_class
     assert fit is not None  # noqa: S101
-    assert error_class is not None  # noqa: S101
     base, mine = len(calibration.fit.z), {effect.label for effect in best.effects}
     others = np.array([one.label not in mine for one in candidates])
     left = [one for one in candidates if one.label not in mine]

@@ -46,17 +46,17 @@ class Judged:
         Of this effect at this place, [nat]
     log_bayes : float
         Log Bayes factor against nothing, model error and deviations between sessions marginalised, [nat]
+    error_class : ErrorClass
+        Of model error: the one in which the scan gives it the largest evidence
     fit : Fit or None
         Fitted with everything else, model error in place; None if only the scan judged it
-    error_class : ErrorClass or None
-        Of model error in which it explains the readings best, by the scan
     """
 
     effects: tuple[Hypothesis, ...]
     log_prior: float
     log_bayes: float
+    error_class: ErrorClass
     fit: Fit | None = None
-    error_class: ErrorClass | None = None
 
     @property
     def kind(self) -> Kind:
@@ -157,9 +157,9 @@ class Posterior:
     odds_unknown : float
         Prior odds of a cause that is in no catalogue, see :class:`~diagnosis.decision.settings.Settings`
     error_class : str
-        Class of model error that the evidence chose
+        Class of model error of the best explanation; of nothing where nothing is missing
     error_evidence : mapping of str to float
-        Log evidence of every class, prior included, less that of the best
+        Log evidence of every class without any effect, prior included, less that of the best
     session_s : float
         Mean deviation between sessions that the readings support, in prior standard deviations; 0 of one session
     remainder : float

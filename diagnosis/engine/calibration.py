@@ -44,6 +44,75 @@ class InClass:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class Near:
+    """All pieces linearised near the readings, and what model error does there.
+
+    Attributes
+    ----------
+    experiment : Experiment
+        With the noise filters of this linearisation
+    parts : tuple of Linear
+    error : ModelError
+    columns : tuple of Array, shape (M, unknowns of model error)
+        Whitened, per unit, of every piece
+    """
+
+    experiment: Experiment
+    parts: tuple[Linear, ...]
+    error: ModelError
+    columns: tuple[Array, ...]
+
+    @classmethod
+    def of(cls, experiment: Experiment, error: ModelError, fit: Fit) -> Near:
+        """Linearise about the courses of a fit, with the model error assumed there and new noise filters."""
+        free = replace(experiment, filters=None)
+        parts = tuple(free.linearised(i, fit.z, course, error=course.piece.error)
+                      for i, course in enumerate(_courses(fit.parts)))  # fmt: skip
+        return cls(experiment=free.with_filters(parts), parts=parts, error=error,
+                   columns=tuple(error.whitened(part) for part in parts))  # fmt: skip
+
+    def directions(self, one: ErrorClass) -> Array:
+        """Leading combinations of model error in a class with the prior N(0, 1) each, shape (unknowns, n)."""
+        amplitudes = self.error.amplitudes(one)
+        there = np.flatnonzero(amplitudes > 0.0)
+        scaled = [N[:, there] * amplitudes[there] for N in self.columns]
+        leading = leading_directions(np.sum([N.T @ N for N in scaled], axis=0))
+        directions = np.zeros((len(amplitudes), leading.shape[1]))
+        directions[there] = amplitudes[there, None] * leading
+        return directions
+
+    def log_evidence(self, one: ErrorClass, z: Array) -> float:
+        """Log evidence of a class where the unknowns are `z`, its prior included, all deviations weighed."""
+        directions = self.directions(one)
+        gram = gram_of(self.parts, whitened_base(self.parts, z, [N @ directions for N in self.columns]))
+        return float(np.log(one.prior)) + over_sessions(gram, self.experiment, range(gram.count)).log_evidence
+
+    def fitted(
+        self, one: ErrorClass, start: Fit, deviation: float = 0.0, *, iterations: int = FIRST_ITERATIONS
+    ) -> InClass:
+        """Fit with model error of one class and some deviation between sessions.
+
+        Parameters
+        ----------
+        one : ErrorClass
+        start : Fit
+        deviation : float
+            In prior standard deviations
+        iterations : int
+            At most
+        """
+        directions = self.directions(one)
+        here = with_deviation(
+            self.experiment, [part.columns for part in self.parts], [N @ directions for N in self.columns], deviation,
+            [self.error.courses(part.point, directions) for part in self.parts],
+        )  # fmt: skip
+        fit = here.fit(start.z, _courses(start.parts), iterations=iterations)
+        over = fit_over_sessions(fit, len(fit.z))
+        return InClass(error_class=one, fit=fit, log_evidence=float(np.log(one.prior)) + over.log_evidence,
+                       session_s=over.mean, deviation=float(over.deviations[over.most_probable]))  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Calibration:
     """The machine without the effect that is looked for.
 
@@ -53,22 +122,17 @@ class Calibration:
         The most probable class
     evidence : mapping of str to float
         Log evidence of every class, prior included, less that of the best
-    error : ModelError
-    parts : sequence of Linear
-        Every piece near the readings
-    columns : sequence of Array, shape (M, unknowns of model error)
-        Whitened, per unit, there
+    near : Near
+        Where it is linearised
     of_others : Calibration or None
         By the readings without the channels set apart alone, if there are any
     """
 
     chosen: InClass
     evidence: Mapping[str, float]
-    error: ModelError
-    parts: Sequence[Linear]
-    columns: Sequence[Array]
+    near: Near
     of_others: Calibration | None = None
-    _known: dict[str, InClass] = field(default_factory=dict)
+    _known: dict[str, InClass] = field(default_factory=dict, init=False)
 
     @property
     def fit(self) -> Fit:
@@ -83,17 +147,12 @@ class Calibration:
         """
         return error_classes() if self.of_others is None else (self.chosen.error_class,)
 
-    def directions(self, one: ErrorClass) -> Array:
-        """Leading combinations of model error in a class with the prior N(0, 1) each, shape (unknowns, n)."""
-        return _directions(self.columns, self.error.amplitudes(one))
-
     def in_class(self, one: ErrorClass) -> InClass:
         """The machine with model error of another class, at the same point: a start for fits in that class."""
         if one == self.chosen.error_class:
             return self.chosen
         if one.name not in self._known:
-            self._known[one.name] = _in_class(self.fit.experiment, one, self.fit, self.parts, self.error, self.columns,
-                                              self.chosen.deviation, iterations=0)  # fmt: skip
+            self._known[one.name] = self.near.fitted(one, self.fit, self.chosen.deviation, iterations=0)
         return self._known[one.name]
 
 
@@ -114,97 +173,31 @@ def calibrate_with_error(experiment: Experiment, start: Fit, apart: Collection[s
     ArithmeticError
         If the simulation has no solution at the start.
     """
-    error, classes = ModelError.of(experiment), error_classes()
-    found = _calibrated(without_channels(experiment, apart) if apart else experiment, error, classes, start)
+    error = ModelError.of(experiment)
+    found = _calibrated(without_channels(experiment, apart) if apart else experiment, error, start)
     if not apart:
         return found
-    parts = _linearised_at(experiment, found.fit)
-    columns = _columns(error, parts)
-    chosen = _in_class(experiment, found.chosen.error_class, found.fit, parts, error, columns, found.chosen.deviation,
-                       iterations=0)  # fmt: skip
-    return replace(found, chosen=chosen, parts=parts, columns=columns, of_others=found, _known={})
+    near, others = Near.of(experiment, error, found.fit), found.chosen
+    chosen = near.fitted(others.error_class, found.fit, others.deviation, iterations=0)
+    return replace(found, chosen=chosen, near=near, of_others=found)
 
 
-def _calibrated(experiment: Experiment, error: ModelError, classes: Sequence[ErrorClass], start: Fit) -> Calibration:
+def _calibrated(experiment: Experiment, error: ModelError, start: Fit) -> Calibration:
+    classes = error_classes()
     (widest,) = (one for one in classes if one.name == WIDEST_CLASS)
-    fit, parts = start, _linearised_at(experiment, start)
-    columns = _columns(error, parts)
+    fit, near = start, Near.of(experiment, error, start)
     for iterations in (FIRST_ITERATIONS, ITERATIONS):
-        here = _judged(experiment, parts, error, columns, error.amplitudes(widest), 0.0)
-        fit = here.fit(fit.z, _courses(parts), iterations=iterations)
-        parts = _linearised_at(experiment, fit)
-        columns = _columns(error, parts)
-    evidence = _evidence_of_classes(experiment, fit.z, parts, columns, error, classes)
+        fit = near.fitted(widest, fit, iterations=iterations).fit
+        near = Near.of(experiment, error, fit)
+    evidence = {one.name: near.log_evidence(one, fit.z) for one in classes}
     best = max(classes, key=lambda one: evidence[one.name])
-    chosen = _in_class(experiment, best, fit, parts, error, columns, 0.0)
+    chosen = near.fitted(best, fit)
     for _ in range(TURNS - 1):
-        parts = _linearised_at(experiment, chosen.fit)
-        columns = _columns(error, parts)
-        chosen = _in_class(experiment, best, chosen.fit, parts, error, columns, chosen.deviation)
+        near = Near.of(experiment, error, chosen.fit)
+        chosen = near.fitted(best, chosen.fit, chosen.deviation)
     largest = max(evidence.values())
-    return Calibration(
-        chosen=chosen, evidence={name: value - largest for name, value in evidence.items()}, error=error, parts=parts,
-        columns=columns,
-    )  # fmt: skip
-
-
-def _in_class(
-    experiment: Experiment, one: ErrorClass, near: Fit, parts: Sequence[Linear], error: ModelError,
-    columns: Sequence[Array], deviation: float, *, iterations: int = FIRST_ITERATIONS,
-) -> InClass:  # fmt: skip
-    """Fit with model error of one class and some deviation between sessions."""
-    here = _judged(experiment, parts, error, columns, error.amplitudes(one), deviation)
-    fit = here.fit(near.z, _courses(near.parts), iterations=iterations)
-    over = fit_over_sessions(fit, len(fit.z))
-    return InClass(error_class=one, fit=fit, log_evidence=float(np.log(one.prior)) + over.log_evidence,
-                   session_s=over.mean, deviation=float(over.deviations[over.most_probable]))  # fmt: skip
-
-
-def _linearised_at(experiment: Experiment, fit: Fit) -> list[Linear]:
-    """All pieces near the courses of a fit, with the model error assumed there; whitened by their own filters."""
-    courses = _courses(fit.parts)
-    return [experiment.linearised(i, fit.z, course, error=course.piece.error) for i, course in enumerate(courses)]
+    return Calibration(chosen=chosen, evidence={name: value - largest for name, value in evidence.items()}, near=near)
 
 
 def _courses(parts: Sequence[Linear]) -> list[Trajectory]:
     return [part.point.trajectory for part in parts]
-
-
-def _columns(error: ModelError, parts: Sequence[Linear]) -> list[Array]:
-    """Whitened columns of all model error, per unit, of every piece, shape (M, n)."""
-    return [error.whitened(part) for part in parts]
-
-
-def _judged(
-    experiment: Experiment, parts: Sequence[Linear], error: ModelError, columns: Sequence[Array], amplitudes: Array,
-    s: float,
-) -> Experiment:  # fmt: skip
-    """The experiment with the filters of a linearisation and the leading directions of model error in its metric."""
-    directions = _directions(columns, amplitudes)
-    return with_deviation(
-        experiment.with_filters(parts), [part.columns for part in parts], [N @ directions for N in columns], s,
-        [error.courses(part.point, directions) for part in parts],
-    )  # fmt: skip
-
-
-def _directions(columns: Sequence[Array], amplitudes: Array) -> Array:
-    """Combinations of unknowns per unit with the prior N(0, 1) each, shape (unknowns, n)."""
-    there = np.flatnonzero(amplitudes > 0.0)
-    scaled = [N[:, there] * amplitudes[there] for N in columns]
-    leading = leading_directions(np.sum([N.T @ N for N in scaled], axis=0))
-    directions = np.zeros((len(amplitudes), leading.shape[1]))
-    directions[there] = amplitudes[there, None] * leading
-    return directions
-
-
-def _evidence_of_classes(
-    experiment: Experiment, z: Array, parts: Sequence[Linear], columns: Sequence[Array], error: ModelError,
-    classes: Sequence[ErrorClass],
-) -> dict[str, float]:  # fmt: skip
-    """Log evidence of every class at one point, prior included, over all deviations between sessions."""
-    found = {}
-    for one in classes:
-        directions = _directions(columns, error.amplitudes(one))
-        gram = gram_of(parts, whitened_base(parts, z, [N @ directions for N in columns]))
-        found[one.name] = float(np.log(one.prior)) + over_sessions(gram, experiment, range(gram.count)).log_evidence
-    return found

@@ -123,7 +123,6 @@ class Experiment:
             If the temperatures leave all bounds.
         """
         setting, model = self.setting(index, z), self.machine.model
-        error = None if error is None else error.of_parts(tuple(model.parts))
         known = guess if isinstance(guess, Trajectory) else None
         follows = any(shift.follows for shift in self.machine.shifts)
         for _ in range(PASSES if follows and known is None else 1):

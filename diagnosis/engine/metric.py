@@ -31,21 +31,18 @@ class ErrorCourses:
 
     Attributes
     ----------
-    parts : tuple of str
     heat : Array, shape (K, parts, n)
     loss : Array, shape (K, n)
     reading : Array, shape (K + 1, channels, n)
     """
 
-    parts: tuple[str, ...]
     heat: Array
     loss: Array
     reading: Array
 
     def along(self, values: Array) -> ErrorCourse:
         """All of them together, with values of shape (n,)."""
-        return ErrorCourse(parts=self.parts, heat=self.heat @ values, loss=self.loss @ values,
-                           reading=self.reading @ values)  # fmt: skip
+        return ErrorCourse(heat=self.heat @ values, loss=self.loss @ values, reading=self.reading @ values)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -41,7 +41,6 @@ class ErrorCourse:
 
     Attributes
     ----------
-    parts : tuple of str
     heat : Array, shape (K, parts)
         Into every part, [W]
     loss : Array, shape (K,)
@@ -50,18 +49,9 @@ class ErrorCourse:
         Change of the readings of sound sensors, [K] or [W]
     """
 
-    parts: tuple[str, ...]
     heat: Array
     loss: Array
     reading: Array
-
-    def of_parts(self, parts: tuple[str, ...]) -> ErrorCourse:
-        """Model error of a machine that has more parts."""
-        if parts == self.parts:
-            return self
-        heat = np.zeros((len(self.heat), len(parts)))
-        heat[:, [parts.index(name) for name in self.parts]] = self.heat
-        return replace(self, parts=parts, heat=heat)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

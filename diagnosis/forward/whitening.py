@@ -66,7 +66,7 @@ class Noise:
 
     def with_floor(self, times: float) -> Noise:
         """Noise with its random heats multiplied."""
-        return replace(self, heat_sd=self.heat_sd * times)
+        return replace(self, heat_sd=self.heat_sd * times, wander=self.wander * times)
 
 
 class Whitening:

@@ -112,9 +112,9 @@ class Diagnosis:
     matters_K, matters_W : float
         Size from which an effect matters, as asked for
     error_class : str
-        Class of model error that the evidence chose
+        Class of model error of the best explanation; of nothing where nothing is missing
     error_evidence : mapping of str to float
-        Log evidence of every class less that of the best, [nat]
+        Log evidence of every class without any effect, less that of the best, [nat]
     session_s : float
         Deviation between sessions that the data support, in prior standard deviations
     holdout_gain : float

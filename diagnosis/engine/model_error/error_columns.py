@@ -136,15 +136,15 @@ class ModelError:
     def courses(self, point: Point, combinations: Array) -> ErrorCourses:
         """Courses of combinations of the unknowns, shape (unknowns, n), along a piece."""
         points, channels = point.read.shape
-        parts, count = point.machine.model.parts, combinations.shape[1]
-        heat, loss = np.zeros((points - 1, len(parts), count)), np.zeros((points - 1, count))
+        n, count = point.machine.model.n, combinations.shape[1]
+        heat, loss = np.zeros((points - 1, n, count)), np.zeros((points - 1, count))
         reading = np.zeros((points, channels, count))
         for begin, end in self._chunks(point, 0, len(self.groups)):
             found, some = self.columns(point, begin, end), combinations[begin:end]
-            heat += found.into[:, : len(parts)] @ some
+            heat += found.into[:, :n] @ some
             loss += found.loss @ some
             reading += found.reading @ some
-        return ErrorCourses(parts=tuple(parts), heat=heat, loss=loss, reading=reading)
+        return ErrorCourses(heat=heat, loss=loss, reading=reading)
 
     def _chunks(self, point: Point, first: int, last: int) -> Iterator[tuple[int, int]]:
         """Ranges of so many unknowns as memory allows at once."""

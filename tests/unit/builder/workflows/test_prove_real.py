@@ -15,7 +15,7 @@ from builder.workflows.prove_real import BY_SOUND, PLANTS, data_file, prove_real
 from diagnosis.decision.posterior import Judged, Posterior
 from diagnosis.decision.settings import Settings
 from diagnosis.engine.fit import calibrate
-from diagnosis.engine.learnt import rule
+from diagnosis.engine.learnt import error_classes, rule
 from diagnosis.engine.prepare import prepare_experiment
 from diagnosis.engine.set_apart import calibrate_apart
 from diagnosis.results.assemble import Others, assemble
@@ -31,7 +31,7 @@ def calibrated(train: Any, gearbox: Any, *, holdout: Any, **_: object) -> Diagno
     setup, experiment = prepare_experiment(gearbox, train, holdout)
     plain = calibrate(experiment)
     fit, apart = calibrate_apart(experiment, plain)
-    nothing = Judged(effects=(), log_prior=0.0, log_bayes=0.0, fit=fit)
+    nothing = Judged(effects=(), log_prior=0.0, log_bayes=0.0, fit=fit, error_class=error_classes()[0])
     posterior = Posterior(nothing=nothing, judged=(), log_e=-1.0, threshold=5.0, rule=rule())
     return assemble(
         setup, experiment, posterior, (), plain=plain, others=Others(fit=fit, posterior=posterior, channels=apart),

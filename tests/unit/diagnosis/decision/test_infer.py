@@ -10,7 +10,7 @@ import pytest
 
 from diagnosis.candidates.hypotheses import Hypothesis, hypothesis_of
 from diagnosis.decision import infer as infer_module
-from diagnosis.decision.infer import NEAR_PLACE, PLACES, RACED, _judged, _raced, infer
+from diagnosis.decision.infer import NEAR_PLACE, PLACES, RACED, _best_of, _InClass, _judged, _raced, infer
 from diagnosis.decision.posterior import KINDS, Judged, Posterior, decide
 from diagnosis.decision.settings import Settings
 from diagnosis.engine.calibration import Calibration, calibrate_with_error
@@ -118,6 +118,20 @@ def test_names_share_the_race() -> None:
     chosen = _raced(candidates, log_bayes, np.argsort(-log_bayes))
     names = [candidates[i].name for i in chosen]
     assert len(set(names)) == RACED and names.count("one") == PLACES
+
+
+def test_every_candidate_is_judged_in_the_class_that_suits_it() -> None:
+    """A small class is far behind without an effect; the effect that explains the readings brings it to the front."""
+    candidates = [Hypothesis(name=name, place="oil", family="heat", variants=np.ones((1, 1))) for name in "ab"]
+    scanned = SimpleNamespace(candidates=tuple(candidates))
+
+    def in_class(name: str, log_bayes: list[float]) -> _InClass:
+        error = ErrorClass(name=name, prior=0.5, threshold=5.0, amplitudes={})
+        return cast(_InClass, SimpleNamespace(error_class=error, scan=scanned, log_bayes=np.array(log_bayes)))
+
+    found = _best_of([in_class("full", [18.0, 4.0]), in_class("small", [78.0, -500.0])], candidates, np.zeros(2), [])
+    assert [one.error_class.name for one in found.best] == ["small", "full"]
+    np.testing.assert_array_equal(found.log_bayes, [78.0, 4.0])
 
 
 @pytest.mark.parametrize(("share", "possible"), [(0.95, True), (0.2, False)])

@@ -12,7 +12,7 @@ from diagnosis.candidates.hypotheses import Hypothesis
 from diagnosis.decision.posterior import KINDS, Judged, Likeness, Posterior, decide
 from diagnosis.decision.settings import Settings
 from diagnosis.engine.fit import Fit
-from diagnosis.engine.learnt import ErrorClass, rule
+from diagnosis.engine.learnt import ErrorClass, error_classes, rule
 from models.base.errors import InputError
 from models.mechanisms import OPEN_FORM
 from models.network.laws import Parameter, symbol
@@ -38,7 +38,7 @@ def effect(
 
 def judged(log_bayes: float, *effects: Hypothesis, log_prior: float | None = None) -> Judged:
     prior = EACH * len(effects) if log_prior is None else log_prior
-    return Judged(effects=effects, log_prior=prior, log_bayes=log_bayes)
+    return Judged(effects=effects, log_prior=prior, log_bayes=log_bayes, error_class=error_classes()[0])
 
 
 def posterior(*each: Judged, **given: Any) -> Posterior:
@@ -226,6 +226,16 @@ def test_a_second_effect_without_evidence_of_its_own_does_not_compete() -> None:
     first, second = effect("first"), effect("second", "mesh")
     every = judged(STRONG, first), judged(1.0, second), judged(STRONG + 6.0, first, second)
     assert posterior(*every, remainder=4.0).of("pair") == 0.0 < posterior(*every, remainder=6.0).of("pair")
+
+
+def test_two_faults_of_one_sensor_are_one_answer() -> None:
+    """Neither name is certain, and the pair is the most probable: together they are, at this sensor."""
+    bias, gain = (effect(name, "oil", kind="sensor") for name in ("sensor_bias", "sensor_gain"))
+    found = posterior(judged(STRONG, bias), judged(STRONG, gain), judged(STRONG + 2.0 * WIDTH, bias, gain),
+                      remainder=10.0)  # fmt: skip
+    assert found.of_names(["sensor_bias"]) < ENOUGH and found.of_names(["sensor_gain"]) < ENOUGH
+    (answer,) = decide(found, Settings())
+    assert answer.effect.place == "oil" and (answer.grade, answer.acts_like) == ("likely", True)
 
 
 def test_a_fit_at_the_best_place_goes_before_others() -> None:

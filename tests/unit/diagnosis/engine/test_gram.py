@@ -36,6 +36,16 @@ def log_density(W: Array, which: list[int], sd: Array | float = 1.0) -> float:
     return float(multivariate_normal(cov=covariance).logpdf(W[:, 0])) + 0.5 * len(W) * np.log(2.0 * np.pi)
 
 
+def test_combinations_take_the_place_of_columns(gram: Gram, columns: dict[str, Array]) -> None:
+    directions = np.random.default_rng(2).standard_normal((FURTHER, 2))
+    found = gram.combined(range(UNKNOWNS, UNKNOWNS + FURTHER), directions)
+    for name, W in columns.items():
+        first, last = 1 + UNKNOWNS, 1 + UNKNOWNS + FURTHER
+        combined = np.column_stack([W[:, :first], W[:, first:last] @ directions, W[:, last:]])
+        np.testing.assert_allclose(found.of_recording[name], combined.T @ combined, atol=1e-12)
+    assert found.count == gram.count - 1 and found.log_determinants == gram.log_determinants
+
+
 def test_evidence_is_the_normal_density(gram: Gram, columns: dict[str, Array]) -> None:
     both, sd = np.concatenate(list(columns.values())), np.array([0.5, 2.0, 1.0, 0.3])
     given = gram.given(range(4), sd)

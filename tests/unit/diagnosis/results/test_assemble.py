@@ -17,7 +17,7 @@ from diagnosis.decision.settings import Settings
 from diagnosis.engine.candidates import refit, with_candidate
 from diagnosis.engine.families import candidates_of
 from diagnosis.engine.fit import Experiment, Fit, calibrate
-from diagnosis.engine.learnt import rule
+from diagnosis.engine.learnt import error_classes, rule
 from diagnosis.engine.prepare import held_out_experiment, prepare_experiment
 from diagnosis.engine.unknown import NetworkParameter
 from diagnosis.proof.scoring.answers import read_answer
@@ -82,17 +82,19 @@ def windage(prepared: Prepared) -> Judged:
     setup, _, plain = prepared
     effect = effect_of(setup, plain, "windage", "oil")
     fit = refit(plain, effect, 0, 50.0)
-    return Judged(effects=(effect,), log_prior=-5.0, log_bayes=90.0, fit=fit)
+    return Judged(effects=(effect,), log_prior=-5.0, log_bayes=90.0, fit=fit, error_class=error_classes()[0])
 
 
 def judged_of(prepared: Prepared, name: str, place: str, log_bayes: float) -> Judged:
     setup, _, plain = prepared
-    return Judged(effects=(effect_of(setup, plain, name, place),), log_prior=-5.0, log_bayes=log_bayes)
+    return Judged(effects=(effect_of(setup, plain, name, place),), log_prior=-5.0, log_bayes=log_bayes,
+                  error_class=error_classes()[0])  # fmt: skip
 
 
 def posterior_of(nothing: Fit, *judged: Judged, log_e: float = 80.0, **given: Any) -> Posterior:
     return Posterior(
-        nothing=Judged(effects=(), log_prior=0.0, log_bayes=0.0, fit=nothing), judged=judged, log_e=log_e,
+        nothing=Judged(effects=(), log_prior=0.0, log_bayes=0.0, fit=nothing, error_class=error_classes()[0]),
+        judged=judged, log_e=log_e,
         threshold=4.0, rule=replace(rule(), temper=(3.0, 0.0)), **given,
     )  # fmt: skip
 
@@ -223,7 +225,7 @@ def test_a_link_that_changes_at_a_date_acts_like(
     effect = replace(effect, variants=variant)
     changed, z = with_candidate(replace(plain, experiment=replace(plain.experiment, starts_at=starts)), effect, 0)
     fit = changed.fit(np.concatenate([plain.z, z]), [part.point.trajectory for part in plain.parts], iterations=0)
-    judged = Judged(effects=(effect,), log_prior=-5.0, log_bayes=60.0, fit=fit)
+    judged = Judged(effects=(effect,), log_prior=-5.0, log_bayes=60.0, fit=fit, error_class=error_classes()[0])
     answer = Answer(best=judged, effect=effect, grade="likely", probability=0.97, acts_like=True)
     found = assembled(posterior_of(plain, judged), [answer], experiment=own)
     (finding,) = found.findings
@@ -289,7 +291,7 @@ def test_a_parameter(assembled: Assemble, prepared: Prepared) -> None:
     effect = Hypothesis(
         name="parameter", place=name, family="parameter", unknown=index, variants=np.ones((1, 1)), how="P"
     )
-    judged = Judged(effects=(effect,), log_prior=-3.0, log_bayes=40.0, fit=fit)
+    judged = Judged(effects=(effect,), log_prior=-3.0, log_bayes=40.0, fit=fit, error_class=error_classes()[0])
     answer = Answer(best=judged, effect=effect, grade="claim", probability=0.95)
     found = assembled(posterior_of(plain, judged, log_e=1.0), [answer])
     assert found.verdict == "parameter_error"  # known parameters raise no alarm
@@ -307,7 +309,7 @@ def test_a_sensor_fault(assembled: Assemble, prepared: Prepared, fzg: Gearbox) -
     effect = effect_of(setup, plain, "sensor_bias", "oil")
     assert effect.term is not None
     fit = _fit_with(plain, effect, {effect.term.strength.name: 3.0})
-    judged = Judged(effects=(effect,), log_prior=-3.0, log_bayes=70.0, fit=fit)
+    judged = Judged(effects=(effect,), log_prior=-3.0, log_bayes=70.0, fit=fit, error_class=error_classes()[0])
     found = assembled(
         posterior_of(plain, judged), [Answer(best=judged, effect=effect, grade="claim", probability=0.98)]
     )
