@@ -163,7 +163,7 @@ def calibrate_with_error(experiment: Experiment, start: Fit, apart: Collection[s
     ----------
     experiment : Experiment
     start : Fit
-        Where to start: the machine calibrated without model error, which is near the readings
+        Where to start, besides the middles of the priors: the machine calibrated without model error
     apart : collection of str
         Channels that do not count until the class and the point are found, see
         :func:`diagnosis.engine.set_apart.calibrate_apart`
@@ -171,7 +171,7 @@ def calibrate_with_error(experiment: Experiment, start: Fit, apart: Collection[s
     Raises
     ------
     ArithmeticError
-        If the simulation has no solution at the start.
+        If the simulation has no solution at the starts.
     """
     error = ModelError.of(experiment)
     found = _calibrated(without_channels(experiment, apart) if apart else experiment, error, start)
@@ -185,10 +185,12 @@ def calibrate_with_error(experiment: Experiment, start: Fit, apart: Collection[s
 def _calibrated(experiment: Experiment, error: ModelError, start: Fit) -> Calibration:
     classes = error_classes()
     (widest,) = (one for one in classes if one.name == WIDEST_CLASS)
-    fit, near = start, Near.of(experiment, error, start)
-    for iterations in (FIRST_ITERATIONS, ITERATIONS):
-        fit = near.fitted(widest, fit, iterations=iterations).fit
-        near = Near.of(experiment, error, fit)
+    # There may be several basins: without model error, parameters may have gone far to stand in for it.
+    middles = experiment.fit(np.zeros(len(experiment.unknowns)), iterations=0)
+    first = [Near.of(experiment, error, one).fitted(widest, one) for one in (start, middles)]
+    fit = max(first, key=lambda one: one.log_evidence).fit
+    fit = Near.of(experiment, error, fit).fitted(widest, fit, iterations=ITERATIONS).fit
+    near = Near.of(experiment, error, fit)
     evidence = {one.name: near.log_evidence(one, fit.z) for one in classes}
     best = max(classes, key=lambda one: evidence[one.name])
     chosen = near.fitted(best, fit)
