@@ -13,7 +13,7 @@ learnt on plants of the zoo and of a stranger, see ``diagnosis/engine/learnt.tom
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Literal, get_args
 
@@ -271,17 +271,20 @@ class Answer:
         ``claim`` or ``likely``
     probability : float
         Of the name, whatever its place and shape
+    joint : float
+        Of all names that it may be: of a tie set, of those that look alike or act on the same thing; else `probability`
     tied : tuple of (Hypothesis, float)
         Names of a tie set with their probabilities, `effect` first; empty of a claim
     acts_like : bool
-        True if what remains, or the kind of the effect (a course over the hours), shows that only law and place are
-        found
+        True if what remains, or the kind of the effect (a course over the hours), shows that this is only the nearest
+        name
     """
 
     best: Judged
     effect: Hypothesis
     grade: Grade
     probability: float
+    joint: float
     tied: tuple[tuple[Hypothesis, float], ...] = ()
     acts_like: bool = False
 
@@ -300,7 +303,8 @@ def decide(posterior: Posterior, settings: Settings) -> tuple[Answer, ...]:
     A name is a claim if its probability reaches :attr:`Settings.claim_from`. Else at most three names that reach it
     together are a tie. Else names that look alike in these readings, or act on the same thing, and reach it together
     are one answer: it "acts like" the best of them. So does what leaves much unexplained, and what only has a course
-    over the hours: law and place are found, not the cause.
+    over the hours: the nearest name is found, not the cause. Where much is left, what is stated of it is only the
+    share :attr:`Rule.nearest` of its probability, because most names that were nearest turned out wrong.
     """
     if not posterior.detected:
         return ()
@@ -334,23 +338,25 @@ def _answer(posterior: Posterior, best: Judged, effect: Hypothesis, enough: floa
     """The narrowest set of names that holds enough probability."""
     name = name_of(effect)
     vague = effect.how == "W" or effect.is_open or posterior.much_is_left
+    sure = posterior.rule.nearest if posterior.much_is_left else 1.0
     own = posterior.of_names([name])
+    answer = Answer(best=best, effect=effect, grade="likely", probability=sure * own, joint=sure * own, acts_like=vague)
     if own >= enough:
-        return Answer(best=best, effect=effect, grade="likely" if vague else "claim", probability=own, acts_like=vague)
+        return answer if vague else replace(answer, grade="claim")
     names = _best_of_names(posterior, effect)
     # Further effects in explanations with the effect's own name do not stand in its place.
     further = {one for each in posterior.explanations if name in each.names for one in each.names if one != name}
     rivals = [one for other, one in names.items() if other not in further]
     for count in range(2, MOST_TIED + 1):
-        if posterior.of_names([name_of(one) for one in rivals[:count]]) >= enough:
-            tied = tuple((one, posterior.of_names([name_of(one)])) for one in rivals[:count])
-            return Answer(best=best, effect=effect, grade="likely", probability=own, tied=tied, acts_like=vague)
+        joint = posterior.of_names([name_of(one) for one in rivals[:count]])
+        if joint >= enough:
+            tied = tuple((one, sure * posterior.of_names([name_of(one)])) for one in rivals[:count])
+            return replace(answer, tied=tied, joint=sure * joint)
     least, likeness = posterior.rule.alike, posterior.likeness
     alike = [name_of(one) for one in rivals if likeness.of(effect, one) >= least]
     alike += [other for other, one in names.items() if _act_on_the_same(effect, one)]
-    if posterior.of_names([name, *alike]) >= enough:
-        return Answer(best=best, effect=effect, grade="likely", probability=own, acts_like=True)
-    return None
+    joint = posterior.of_names([name, *alike])
+    return replace(answer, joint=sure * joint, acts_like=True) if joint >= enough else None
 
 
 def _best_of_names(posterior: Posterior, effect: Hypothesis) -> dict[str, Hypothesis]:

@@ -260,7 +260,8 @@ class Experiment:
                 errors = errors or [self._assumed(guess) for guess in guesses]
                 parts = [self.linearised(i, z, guess, kept=None if kept is None else kept[i], error=error)
                          for i, (guess, error) in enumerate(zip(guesses, errors, strict=True))]  # fmt: skip
-            return Linearised.of(parts, self.metric)
+            with np.errstate(over="raise"):  # a trial that overflows has no solution
+                return Linearised.of(parts, self.metric)
         except (InputError, ArithmeticError, np.linalg.LinAlgError):
             return None
 

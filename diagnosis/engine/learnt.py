@@ -53,6 +53,8 @@ class Rule:
         Share of the best evidence; cosine, [-]
     much_left : (float, float)
         Of the evidence of a second effect, [nat] and [-]
+    nearest : float
+        How often a name was right, or its law at its place, where that much was left, [-]
     wider : float
         Prior of a parameter outside its prior, in its own standard deviations
     """
@@ -64,6 +66,7 @@ class Rule:
     refuted: float
     alike: float
     much_left: tuple[float, float]
+    nearest: float
     wider: float
 
     def threshold(self, error: ErrorClass, rate: float) -> float:

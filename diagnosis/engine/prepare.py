@@ -9,6 +9,7 @@ from diagnosis.engine.fit import Experiment
 from diagnosis.engine.point import Machine
 from diagnosis.engine.unknown import (
     CALIBRATION,
+    ClockOffset,
     Group,
     InputGain,
     InputOffset,
@@ -32,7 +33,7 @@ from models.quantities.quantities import TOTAL_LOSS, is_total_loss
 from models.simulation.thermal_network import ThermalNetwork
 
 BIAS_SD_K, LOSS_OFFSET_SD_W, LOSS_GAIN_SD = 0.3, 2.0, 0.02
-LOSS_DELAY_ROWS = 0.5  # a row may be the mean of the time before its stamp, of that after it, or a moment
+ROWS_LATE = 0.5  # a row may be the mean of the time before its stamp, of that after it, or a moment
 LAG_S, LAG_SD = 15.0, 0.8  # of its logarithm: a sensor's lag is that of its seat, not of its data sheet
 SHORTEST_LAG_S = 3.0
 TORQUE_GAIN_SD, AMBIENT_SD_K = 0.01, 0.3
@@ -139,7 +140,7 @@ def usual_unknowns(
             found += [LossGain(parameter=gain, group=group),
                       SensorBias(parameter=zero, group=group, channel=TOTAL_LOSS)]  # fmt: skip
             if not slow:
-                delay = _normal("delay_P_loss", "s", LOSS_DELAY_ROWS * interval)
+                delay = _normal("delay_P_loss", "s", ROWS_LATE * interval)
                 found.append(LossDelay(parameter=delay, group=group))
             continue
         sensor = stated.get(name)
@@ -152,6 +153,8 @@ def usual_unknowns(
             lag = Parameter(name=f"lag_{name}", unit="s", start=start, sd=sd, lower=0.01, upper=1e4, log=True,
                             description=f"time constant of the sensor at {name}")  # fmt: skip
             found.append(SensorLag(parameter=lag, group=group, channel=name))
+    if slow:
+        found.append(ClockOffset(parameter=_normal("clock_offset", "s", ROWS_LATE * interval), group=group))
     if network.components:
         torque = Parameter(name="torque_gain", start=1.0, sd=TORQUE_GAIN_SD, lower=0.5, upper=2.0, log=False,
                            description="true over recorded torque")  # fmt: skip

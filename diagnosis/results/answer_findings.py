@@ -8,7 +8,7 @@ import numpy as np
 
 from diagnosis.candidates.dated import CHANGED, HOURS, STEP, WHILE, changed_law
 from diagnosis.candidates.hypotheses import Hypothesis
-from diagnosis.decision.posterior import Answer, Posterior, name_of
+from diagnosis.decision.posterior import Answer, Posterior
 from diagnosis.engine.fit import Fit
 from diagnosis.recordings.recording import Recording
 from diagnosis.results.advice import separation, without_sensor
@@ -71,9 +71,7 @@ def finding_of(
         term=None if term is None else term.with_values(found),
         grade=answer.grade,
         tie_set=tuple(dict.fromkeys(name_in(catalogue, one) for one, _ in answer.tied)),
-        joint_probability=(
-            posterior.of_names([name_of(one) for one, _ in answer.tied]) if answer.tied else answer.probability
-        ),
+        joint_probability=answer.joint,
         acts_like=answer.acts_like,
         date=change_of(values, effect, fit.experiment, recordings),
         switching=switching_of(values, effect),

@@ -322,9 +322,9 @@ class Diagnosis:
     def _how_sure(self) -> tuple[str, ...]:
         lines = []
         for finding, *_ in self.items:
-            of = "that law and place are right" if finding.acts_like else "of one of these" if finding.tie_set else ""
-            if finding.acts_like and finding.sureness < self.claim_from:
-                of = f"of names that act alike at least {self.claim_from:g}, of this one"
+            of = "of this name, the nearest one," if finding.acts_like else "of one of these" if finding.tie_set else ""
+            if finding.acts_like and finding.sureness > finding.probability:
+                of = f"of this name {_share(finding.probability)}, of all that act alike"
             title = f"{finding.title}: " if len(self.items) > 1 else ""
             line = " ".join(filter(None, (f"{title}{finding.grade}, probability", of, _share(finding.sureness))))
             others = [r for r in finding.confusable_with

@@ -113,13 +113,13 @@ class Finding:
     term : Term or None
         With the found values as its parameters' start
     grade : str
-        ``claim``: the name is certain enough; ``likely``: one of a few names, or only law and place are known
+        ``claim``: the name is certain enough; ``likely``: one of a few names, or the nearest one
     tie_set : tuple of str
         Names that these data do not separate, the most probable first; empty of a claim
     joint_probability : float
-        Of all names of the tie set, else `probability`
+        Of all names that it may be: of the tie set, of those that act alike; else `probability`
     acts_like : bool
-        True if the law and the place were found but not the cause: `mechanism` is the nearest name
+        True if the cause was not found: `mechanism` is the nearest name
     date : Change or None
         When it begins, if not with the first recording
     switching : Switching or None
@@ -167,7 +167,7 @@ class Finding:
     @property
     def sureness(self) -> float:
         """Probability that the title is right."""
-        return self.joint_probability if self.tie_set and self.joint_probability > 0.0 else self.probability
+        return self.probability if math.isnan(self.joint_probability) else self.joint_probability
 
 
 @dataclass(frozen=True, kw_only=True)

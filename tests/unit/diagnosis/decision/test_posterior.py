@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from diagnosis.candidates.hypotheses import Hypothesis
-from diagnosis.decision.posterior import KINDS, Judged, Likeness, Posterior, decide
+from diagnosis.decision.posterior import KINDS, Answer, Judged, Likeness, Posterior, decide
 from diagnosis.decision.settings import Settings
 from diagnosis.engine.fit import Fit
 from diagnosis.engine.learnt import ErrorClass, error_classes, rule
@@ -188,12 +188,23 @@ def test_a_course_over_the_hours_is_never_a_claim() -> None:
 
 @pytest.mark.parametrize(("gain", "limit"), [(STRONG, rule().much_left[0]), (1000.0, 1000.0 * rule().much_left[1])])
 def test_where_much_is_left_there_is_no_claim(gain: float, limit: float) -> None:
-    def graded(remainder: float) -> tuple[str, bool]:
-        (answer,) = decide(posterior(judged(gain, effect("law")), remainder=remainder), Settings())
-        return answer.grade, answer.acts_like
+    """And of the name only the share is stated that turned out right in such cases."""
 
-    assert graded(limit - 0.1) == ("claim", False)
-    assert graded(limit + 0.1) == ("likely", True)
+    def answered(remainder: float) -> Answer:
+        (answer,) = decide(posterior(judged(gain, effect("law")), remainder=remainder), Settings())
+        return answer
+
+    little, much = answered(limit - 0.1), answered(limit + 0.1)
+    assert (little.grade, little.acts_like) == ("claim", False)
+    assert (much.grade, much.acts_like) == ("likely", True)
+    assert much.probability == pytest.approx(rule().nearest * little.probability)
+
+
+def test_of_names_that_act_on_one_thing_the_joint_probability_is_told() -> None:
+    bias, gain = (effect(name, "oil", kind="sensor") for name in ("sensor_bias", "sensor_gain"))
+    drift, lag = (effect(name, "oil", kind="sensor") for name in ("sensor_drift", "sensor_lag"))
+    (answer,) = decide(posterior(*(judged(STRONG, one) for one in (bias, gain, drift, lag))), Settings())
+    assert answer.acts_like and answer.probability < 0.3 < ENOUGH < answer.joint
 
 
 def test_both_effects_of_a_pair_are_answered() -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from diagnosis.engine.prepare import CAPACITY_SD, usual_unknowns
-from diagnosis.engine.unknown import LossDelay, SensorLag
+from diagnosis.engine.unknown import ClockOffset, LossDelay, SensorLag
 from diagnosis.forward.network_on_grid import NetworkOnGrid
 from diagnosis.recordings.recording import Recording
 from tests.unit.diagnosis.inference_example import CHANNELS
@@ -23,11 +23,11 @@ def test_air_that_nobody_recorded_is_less_certain(model: NetworkOnGrid, recorded
 
 
 def test_rows_that_are_minutes_apart_are_means(model: NetworkOnGrid, recorded: Recording) -> None:
-    """They show neither lags nor which end of the row is stamped."""
+    """They show neither lags nor which end of the row is stamped; temperatures and inputs may have another one."""
     slow = replace(recorded, time=60.0 * recorded.time)
     fast, means = (usual_unknowns(model.network, [one], CHANNELS, interval=10.0) for one in (recorded, slow))
-    for kind, count in ((LossDelay, 1), (SensorLag, 3)):
-        assert [sum(isinstance(u, kind) for u in found) for found in (fast, means)] == [count, 0]
+    for kind, count in ((LossDelay, (1, 0)), (SensorLag, (3, 0)), (ClockOffset, (0, 1))):
+        assert [sum(isinstance(u, kind) for u in found) for found in (fast, means)] == [*count]
 
 
 def test_a_temperature_represents_a_body_that_has_many(model: NetworkOnGrid, recorded: Recording) -> None:

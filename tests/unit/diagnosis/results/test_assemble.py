@@ -123,8 +123,9 @@ def claimed(assembled: Assemble, prepared: Prepared, windage: Judged) -> Diagnos
     probability = float(posterior.ranked[0][1])
     assert 0.9 < probability < 0.97
     return assembled(
-        posterior, [Answer(best=windage, effect=windage.effects[0], grade="claim", probability=probability)],
-    )  # fmt: skip
+        posterior,
+        [Answer(best=windage, effect=windage.effects[0], grade="claim", probability=probability, joint=probability)],
+    )
 
 
 def test_a_claim(claimed: Diagnosis, fzg: Gearbox) -> None:
@@ -184,7 +185,7 @@ def test_a_tie_is_one_item_and_only_likely(assembled: Assemble, prepared: Prepar
     posterior = posterior_of(prepared[2], windage, far)
     (_, p), (_, q) = posterior.ranked
     answer = Answer(
-        best=windage, effect=windage.effects[0], grade="likely", probability=p,
+        best=windage, effect=windage.effects[0], grade="likely", probability=p, joint=p + q,
         tied=((windage.effects[0], p), (far.effects[0], q)),
     )  # fmt: skip
     found = assembled(posterior, [answer])
@@ -226,7 +227,7 @@ def test_a_link_that_changes_at_a_date_acts_like(
     changed, z = with_candidate(replace(plain, experiment=replace(plain.experiment, starts_at=starts)), effect, 0)
     fit = changed.fit(np.concatenate([plain.z, z]), [part.point.trajectory for part in plain.parts], iterations=0)
     judged = Judged(effects=(effect,), log_prior=-5.0, log_bayes=60.0, fit=fit, error_class=error_classes()[0])
-    answer = Answer(best=judged, effect=effect, grade="likely", probability=0.97, acts_like=True)
+    answer = Answer(best=judged, effect=effect, grade="likely", probability=0.97, joint=0.97, acts_like=True)
     found = assembled(posterior_of(plain, judged), [answer], experiment=own)
     (finding,) = found.findings
     date = finding.date
@@ -292,7 +293,7 @@ def test_a_parameter(assembled: Assemble, prepared: Prepared) -> None:
         name="parameter", place=name, family="parameter", unknown=index, variants=np.ones((1, 1)), how="P"
     )
     judged = Judged(effects=(effect,), log_prior=-3.0, log_bayes=40.0, fit=fit, error_class=error_classes()[0])
-    answer = Answer(best=judged, effect=effect, grade="claim", probability=0.95)
+    answer = Answer(best=judged, effect=effect, grade="claim", probability=0.95, joint=0.95)
     found = assembled(posterior_of(plain, judged, log_e=1.0), [answer])
     assert found.verdict == "parameter_error"  # known parameters raise no alarm
     (finding,) = found.findings
@@ -311,7 +312,7 @@ def test_a_sensor_fault(assembled: Assemble, prepared: Prepared, fzg: Gearbox) -
     fit = _fit_with(plain, effect, {effect.term.strength.name: 3.0})
     judged = Judged(effects=(effect,), log_prior=-3.0, log_bayes=70.0, fit=fit, error_class=error_classes()[0])
     found = assembled(
-        posterior_of(plain, judged), [Answer(best=judged, effect=effect, grade="claim", probability=0.98)]
+        posterior_of(plain, judged), [Answer(best=judged, effect=effect, grade="claim", probability=0.98, joint=0.98)]
     )
     (finding,) = found.findings
     assert (found.verdict, finding.kind, finding.node, finding.heat_mean_W) == ("sensor_fault", "sensor", "oil", 0.0)

@@ -43,7 +43,7 @@ def test_names_that_only_act_like_it_are_told_as_such() -> None:
     (finding,) = missing_physics().findings
     found = replace(missing_physics(), findings=(replace(finding, grade="likely", acts_like=True),))
     assert "[acts like windage at oil]" in told(found, "What?")
-    assert "likely, probability that law and place are right 0.91" in told(found, "How sure?")
+    assert "likely, probability of this name, the nearest one, 0.91" in told(found, "How sure?")
 
 
 def test_dates_and_switches() -> None:
