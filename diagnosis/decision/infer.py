@@ -14,7 +14,7 @@ import numpy as np
 from scipy.special import log_ndtr, logsumexp
 
 from diagnosis.candidates.hypotheses import Hypothesis
-from diagnosis.decision.posterior import Expected, Judged, Likeness, Posterior
+from diagnosis.decision.posterior import Expected, Judged, Likeness, Posterior, ScaledError
 from diagnosis.decision.settings import Settings
 from diagnosis.engine.calibration import Calibration
 from diagnosis.engine.candidates import Scan, refit, scan
@@ -34,6 +34,7 @@ REFITTED, SECONDS = 6, 2
 SETTLED_NAT, MOST_TURNS = 0.1, 5  # gain at which a fit has ended; how often it goes on at most
 IMPOSSIBLE = -1e3  # nats
 WHOLE = 0.3  # off 1, up to which two channels count as swapped
+SCALED = (0.5, 1.0, 2.0)  # of the amplitudes of model error: what the scan says with each
 WORTH, WORTH_SHARE = 1.0, 0.1  # nats, and share of the best, from which a candidate is worth a fit
 
 
@@ -83,7 +84,8 @@ def infer(
     """
     base, chosen = calibration.fit, calibration.chosen
     progress(f"scanning {len(candidates)} candidates")
-    first = _scanned_in_classes(calibration, candidates, log_prior)
+    found = scan(base, [one for one in candidates if one.term is not None], calibration.near.columns)
+    first = _scanned_in_classes(calibration, found, candidates, log_prior)
     order = np.argsort(-(first.log_bayes + first.log_prior))
     racing = _raced(first.candidates, first.log_bayes, order)
     judged: dict[str, Judged] = {}
@@ -120,19 +122,41 @@ def infer(
         likeness=_likeness(first, error_class), odds_unknown=settings.odds_unknown,
         error_class=(error_class if missing else chosen.error_class).name, error_evidence=dict(calibration.evidence),
         session_s=chosen.session_s, remainder=remainder,
+        scaled=tuple(
+            _with_scaled_error(calibration, found, candidates, log_prior, factor, settings.false_alarm_rate)
+            for factor in SCALED
+        ),
         expected=_expected(first.in_class(chosen.error_class), settings),
     )  # fmt: skip
 
 
-def _scanned_in_classes(calibration: Calibration, candidates: Sequence[Hypothesis], log_prior: Array) -> _Scanned:
-    """Scan at the calibrated point with model error of all classes."""
+def _with_scaled_error(
+    calibration: Calibration,
+    found: Scan,
+    candidates: Sequence[Hypothesis],
+    log_prior: Array,
+    factor: float,
+    rate: float,
+) -> ScaledError:
+    """Evidence of the scan if all model error were larger or smaller than assumed."""
+    there = _scanned_in_classes(calibration, found, candidates, log_prior, factor)
+    log = there.log_prior + there.log_bayes - max(one.ahead for one in there.classes)
+    best = int(np.argmax(log))
+    threshold = rule().threshold(there.best[best].error_class, rate)
+    return ScaledError(factor=factor, log_e=float(logsumexp(log)), threshold=threshold, best=there.candidates[best])
+
+
+def _scanned_in_classes(
+    calibration: Calibration, found: Scan, candidates: Sequence[Hypothesis], log_prior: Array, factor: float = 1.0
+) -> _Scanned:
+    """The scan at the calibrated point with model error of all classes, their amplitudes scaled."""
     fit, outside, judged = calibration.fit, _outside(candidates), []
-    found = scan(fit, [one for one in candidates if one.term is not None], calibration.near.columns)
     for one in calibration.classes:
-        here = found.in_directions(calibration.near.directions(one))
+        scaled = one.scaled(factor)
+        here = found.in_directions(calibration.near.directions(scaled))
         over = over_sessions(here.gram, fit.experiment, range(here.further.stop))
-        judged.append((one, here, over, float(np.log(one.prior)) + over.log_evidence))
-    nothing = next(evidence for one, _, _, evidence in judged if one == calibration.chosen.error_class)
+        judged.append((scaled, here, over, float(np.log(one.prior)) + over.log_evidence))
+    nothing = next(evidence for one, _, _, evidence in judged if one.name == calibration.chosen.error_class.name)
     return _best_of([
         _in_class(one, here, outside, over, evidence - nothing) for one, here, over, evidence in judged
     ], candidates, log_prior, outside)  # fmt: skip

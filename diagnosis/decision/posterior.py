@@ -117,6 +117,26 @@ class Expected:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class ScaledError:
+    """Evidence of the scan if all amplitudes of model error are larger or smaller than assumed.
+
+    Attributes
+    ----------
+    factor : float
+        On the amplitudes; 1: as assumed
+    log_e, threshold : float
+        Evidence that something is missing, and what it has to reach, [nat]
+    best : Hypothesis
+        The candidate ahead
+    """
+
+    factor: float
+    log_e: float
+    threshold: float
+    best: Hypothesis
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Likeness:
     """How much alike effects look in these readings, with everything unknown marginalised.
 
@@ -164,6 +184,7 @@ class Posterior:
         Mean deviation between sessions that the readings support, in prior standard deviations; 0 of one session
     remainder : float
         Log Bayes factor of the best further effect, given the best single one, [nat]
+    scaled : tuple of ScaledError
     expected : tuple of Expected
     """
 
@@ -178,6 +199,7 @@ class Posterior:
     error_evidence: dict[str, float] = field(default_factory=dict)
     session_s: float = 0.0
     remainder: float = 0.0
+    scaled: tuple[ScaledError, ...] = ()
     expected: tuple[Expected, ...] = ()
 
     @property

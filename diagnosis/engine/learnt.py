@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib.resources import files
 from typing import Any
@@ -33,6 +33,10 @@ class ErrorClass:
     prior: float
     threshold: float
     amplitudes: Mapping[str, float]
+
+    def scaled(self, factor: float) -> ErrorClass:
+        """The class with all amplitudes larger or smaller by a factor."""
+        return replace(self, amplitudes={group: factor * value for group, value in self.amplitudes.items()})
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -24,7 +24,16 @@ from diagnosis.results.places import node_in
 from diagnosis.results.ratios_only import ratio_notes
 from diagnosis.results.regime import active, regime, windows
 from diagnosis.results.result import Diagnosis, Verdict
-from diagnosis.results.result_parts import Calibrated, Fits, Location, NotDetectable, PredictedRun, Ranked, named
+from diagnosis.results.result_parts import (
+    Calibrated,
+    Fits,
+    Location,
+    NotDetectable,
+    PredictedRun,
+    Ranked,
+    ScaledError,
+    named,
+)
 from diagnosis.setup.inference_setup import InferenceSetup
 from diagnosis.setup.noise import HEAT_FRACTION, PARAMETRIC_FRACTION, PARAMETRIC_K
 from models.base.parallel import run_parallel
@@ -163,6 +172,11 @@ def assemble(
         matters_W=settings.matters_W,
         error_class=posterior.error_class,
         error_evidence=posterior.error_evidence,
+        scaled_error=tuple(
+            ScaledError(factor=one.factor, log_e_value=one.log_e, threshold=one.threshold,
+                        mechanism=name_in(catalogue, one.best), place=one.best.place)
+            for one in posterior.scaled
+        ),
         session_s=posterior.session_s,
         holdout_gain=log_score_gain(final, plain, without_channels(judged, faulty), courses),
     )  # fmt: skip

@@ -17,9 +17,11 @@ from diagnosis.results.result_parts import (
     NotDetectable,
     PredictedRun,
     Ranked,
+    ScaledError,
     finding_dict,
     fits_dict,
     named,
+    robustness_told,
 )
 from diagnosis.results.tables import Table, draw_explanations, table_of
 from models.correction.instruments import InputCorrection, SensorCorrection
@@ -115,6 +117,7 @@ class Diagnosis:
         Class of model error of the best explanation; of nothing where nothing is missing
     error_evidence : mapping of str to float
         Log evidence of every class without any effect, less that of the best, [nat]
+    scaled_error : tuple of ScaledError
     session_s : float
         Deviation between sessions that the data support, in prior standard deviations
     holdout_gain : float
@@ -162,6 +165,7 @@ class Diagnosis:
     matters_W: float = 0.0
     error_class: str = ""
     error_evidence: Mapping[str, float] = field(default_factory=dict)
+    scaled_error: tuple[ScaledError, ...] = ()
     session_s: float = 0.0
     holdout_gain: float = math.nan
     faulty: tuple[str, ...] = ()
@@ -207,7 +211,8 @@ class Diagnosis:
             "kinds": dict(self.kinds),
             "settings": {"false_alarm_rate": self.false_alarm_rate, "claim_from": self.claim_from,
                          "matters_K": self.matters_K, "matters_W": self.matters_W},
-            "model_error": {"class": self.error_class, "evidence": dict(self.error_evidence)},
+            "model_error": {"class": self.error_class, "evidence": dict(self.error_evidence),
+                            "scaled": [vars(one) for one in self.scaled_error]},
             "sessions": {"deviation_in_sd": self.session_s},
             "remaining": {
                 "p_value": _or_none(self.remaining_p_value),
@@ -341,6 +346,8 @@ class Diagnosis:
         if self.error_class:
             hides = ", the largest: a real effect can hide in it" if self.error_class == LARGEST_ERROR else ""
             lines.append(f"Model error assumed: class {self.error_class}{hides}.")
+        if self.scaled_error and self.log_e_value > self.threshold:
+            lines.append(robustness_told(self.scaled_error))
         if self.session_s > LITTLE_SPREAD:
             lines.append(f"Between sessions the machine differs by {self.session_s:.2f} of the priors' widths.")
         far = sorted((c for c in self.calibration if abs(c.shift_in_sd) > FAR_SD), key=lambda c: -abs(c.shift_in_sd))

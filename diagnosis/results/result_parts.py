@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 Grade = Literal["claim", "likely"]
 PARAMETER = "parameter"
+SIZES = {0.5: "half as large", 1.0: "as assumed", 2.0: "twice as large"}  # of model error, by factor
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -168,6 +169,55 @@ class Finding:
     def sureness(self) -> float:
         """Probability that the title is right."""
         return self.probability if math.isnan(self.joint_probability) else self.joint_probability
+
+
+@dataclass(frozen=True, kw_only=True)
+class ScaledError:
+    """Evidence of the scan of all candidates with larger or smaller model error; nothing is fitted for it.
+
+    Attributes
+    ----------
+    factor : float
+        On all amplitudes of model error; 1: as assumed
+    log_e_value, threshold : float
+        Evidence that something is missing, and what it has to reach, [nat]
+    mechanism, place : str
+        The candidate ahead
+    """
+
+    factor: float
+    log_e_value: float
+    threshold: float
+    mechanism: str
+    place: str
+
+    @property
+    def size(self) -> str:
+        """Size of the model error, in words."""
+        return SIZES[self.factor]
+
+    @property
+    def ahead(self) -> str:
+        """The candidate ahead, or that nothing stands out."""
+        return named(self.mechanism, self.place) if self.log_e_value > self.threshold else "nothing"
+
+
+def robustness_told(every: Sequence[ScaledError]) -> str:
+    """Sentence on the evidence that the scan gives with model error of all sizes.
+
+    Examples
+    --------
+    >>> from dataclasses import replace
+    >>> one = ScaledError(factor=0.5, log_e_value=40.2, threshold=5.0, mechanism="windage", place="oil")
+    >>> robustness_told([one, replace(one, factor=2.0, log_e_value=31.0)])
+    'Evidence before fits with model error half as large 40 nat, twice as large 31 nat: windage at oil ahead.'
+    >>> robustness_told([one, replace(one, factor=2.0, log_e_value=3.0)])
+    'Evidence before fits with model error half as large 40 nat (windage at oil), twice as large 3 nat (nothing).'
+    """
+    ahead = {one.ahead for one in every}
+    told = [f"{one.size} {one.log_e_value:.0f} nat{f' ({one.ahead})' if len(ahead) > 1 else ''}" for one in every]
+    together = f": {ahead.pop()} ahead" if len(ahead) == 1 else ""
+    return f"Evidence before fits with model error {', '.join(told)}{together}."
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -66,6 +66,14 @@ def test_a_concealed_effect_is_detected_and_first(concealed: Posterior) -> None:
     assert [one.effect.label for one in answers] == ["windage@oil"]
 
 
+def test_the_scan_is_told_for_less_and_more_model_error(concealed: Posterior, healthy: Posterior) -> None:
+    half, assumed, twice = concealed.scaled
+    assert (half.factor, assumed.factor, twice.factor) == (0.5, 1.0, 2.0)
+    assert {one.best.label for one in concealed.scaled} == {"windage@oil"}
+    assert all(one.log_e > one.threshold for one in concealed.scaled)
+    assert all(one.log_e < one.threshold for one in healthy.scaled)
+
+
 def test_its_size_is_found(concealed: Posterior) -> None:
     best = concealed.explanations[0].members[0]
     assert best.fit is not None and concealed.nothing.fit is not None

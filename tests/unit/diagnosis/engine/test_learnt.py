@@ -38,6 +38,13 @@ def test_priors_sum_to_one() -> None:
     assert all(p > 0.0 for p in (*family_priors().values(), *deviation_priors().values()))
 
 
+def test_a_class_may_be_scaled() -> None:
+    splits = next(one for one in error_classes() if one.name == "splits")
+    twice = splits.scaled(2.0)
+    assert twice.amplitudes == {group: 2.0 * value for group, value in splits.amplitudes.items()}
+    assert (twice.name, twice.prior, splits.scaled(1.0)) == (splits.name, splits.prior, splits)
+
+
 def test_every_family_of_candidates_has_a_prior() -> None:
     assert set(family_priors()) == set(get_args(How))
 
