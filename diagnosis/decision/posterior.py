@@ -331,13 +331,8 @@ def decide(posterior: Posterior, settings: Settings) -> tuple[Answer, ...]:
     if not posterior.detected:
         return ()
     best = _best_fitted(posterior)
-    found: list[Answer] = []
-    for effect in best.effects:
-        answer = _answer(posterior, best, effect, settings.claim_from)
-        # Two that act like something at one place are one answer.
-        if answer and not (answer.acts_like and any(_act_on_the_same(effect, one.effect) for one in found)):
-            found.append(answer)
-    return tuple(found)
+    answers = (_answer(posterior, best, effect, settings.claim_from) for effect in best.effects)
+    return tuple(answer for answer in answers if answer is not None)
 
 
 def _best_fitted(posterior: Posterior) -> Judged:
@@ -376,7 +371,7 @@ def _answer(posterior: Posterior, best: Judged, effect: Hypothesis, enough: floa
             return replace(answer, tied=tied, joint=sure * joint)
     least, likeness = posterior.rule.alike, posterior.likeness
     alike = [name_of(one) for one in rivals if likeness.of(effect, one) >= least]
-    alike += [other for other, one in names.items() if _act_on_the_same(effect, one)]
+    alike += [other for other, one in names.items() if act_on_the_same(effect, one)]
     joint = posterior.of_names([name, *alike])
     return replace(answer, joint=sure * joint, acts_like=True) if joint >= enough else None
 
@@ -390,7 +385,7 @@ def _best_of_names(posterior: Posterior, effect: Hypothesis) -> dict[str, Hypoth
     return found
 
 
-def _act_on_the_same(first: Hypothesis, second: Hypothesis) -> bool:
+def act_on_the_same(first: Hypothesis, second: Hypothesis) -> bool:
     """True if two effects change the same thing: the same heats, links, channels or inputs."""
     if first.term is None or second.term is None:
         return False

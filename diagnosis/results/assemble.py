@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from diagnosis.candidates.dated import WHILE
-from diagnosis.decision.posterior import KINDS, Answer, Judged, Posterior
+from diagnosis.decision.posterior import KINDS, Answer, Judged, Posterior, act_on_the_same
 from diagnosis.decision.settings import Settings
 from diagnosis.engine.baselines import effects_in_baselines, notes_of_baselines, sessions_apart
 from diagnosis.engine.fit import Experiment, Fit
@@ -26,6 +26,7 @@ from diagnosis.results.regime import active, regime, windows
 from diagnosis.results.result import Diagnosis, Verdict
 from diagnosis.results.result_parts import (
     Calibrated,
+    Finding,
     Fits,
     Location,
     NotDetectable,
@@ -108,9 +109,10 @@ def assemble(
     faulty = () if others is None else others.channels
     best = _best(posterior, answers)
     final = _final(best, plain if others is None else others.fit, faulty)
-    findings = tuple(
-        finding_of(answer, answer.best.fit or final, setup, posterior, catalogue, train) for answer in answers
-    )
+    findings = _distinct([
+        (answer, finding_of(answer, answer.best.fit or final, setup, posterior, catalogue, train))
+        for answer in answers
+    ])  # fmt: skip
     told = {name for finding in findings for name in (finding.mechanism, *finding.tie_set)}
     told |= {rival.mechanism for finding in findings for rival in finding.confusable_with}
     unseen = tuple(one for one in _unseen(posterior, catalogue) if one.mechanism not in told)
@@ -236,6 +238,15 @@ def _baseline_notes(experiment: Experiment, posterior: Posterior, answers: Seque
     acting = effects_in_baselines(nothing, effects) if effects else [0.0]
     best = (answers[0].best.fit if answers else None) or nothing
     return notes_of_baselines(float(acting[0]), sessions_apart(best), effects[0].name if effects else "")
+
+
+def _distinct(found: Sequence[tuple[Answer, Finding]]) -> tuple[Finding, ...]:
+    """Without names that only act like something where another one acts on the same thing with more heat."""
+    kept: list[Answer] = []
+    for answer, _ in sorted(found, key=lambda one: (one[0].acts_like, -abs(one[1].heat_mean_W))):
+        if not (answer.acts_like and any(act_on_the_same(answer.effect, one.effect) for one in kept)):
+            kept.append(answer)
+    return tuple(finding for answer, finding in found if any(answer is one for one in kept))
 
 
 # ---------------------------------------------------------------------- verdict

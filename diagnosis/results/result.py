@@ -369,7 +369,7 @@ class Diagnosis:
                     f"(noise {self.noise_K:.2f} K)"
                 )
         if self.findings and self.holdout.after > self.holdout.calibrated:
-            lines.append("Held-out temperatures are not closer than with the calibrated model")
+            lines.append("Held-out temperatures are not closer than with the calibrated model: predict with that one")
         named_terms = {finding.term.label for finding in self.findings if finding.term is not None}
         further = len([term for term in self.terms if term.label not in named_terms])
         if self.findings and further:

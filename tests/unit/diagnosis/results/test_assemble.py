@@ -24,7 +24,7 @@ from diagnosis.proof.scoring.answers import read_answer
 from diagnosis.recordings.recording import Recording
 from diagnosis.report import page
 from diagnosis.report.write import correction_of
-from diagnosis.results.assemble import assemble
+from diagnosis.results.assemble import _distinct, assemble
 from diagnosis.results.result import Diagnosis
 from diagnosis.setup.inference_setup import InferenceSetup
 from models.assembly.gearbox import Gearbox
@@ -247,6 +247,25 @@ def test_a_link_that_changes_at_a_date_acts_like(
     assert read_answer(found.to_dict(), fzg).claims[0].what == "link"
     assert correction_of(found, fzg).findings[0].term.label == effect.term.label
     assert "strength" not in finding.equation and "since" not in finding.equation
+
+
+def test_of_two_that_act_like_something_on_one_thing_the_larger_is_reported(
+    prepared: Prepared, windage: Judged, claimed: Diagnosis
+) -> None:
+    def answer(name: str, place: str, **given: Any) -> Answer:
+        effect = effect_of(prepared[0], prepared[2], name, place)
+        usual: dict[str, Any] = {"grade": "likely", "probability": 0.95, "joint": 0.95, "acts_like": True}
+        return Answer(best=windage, effect=effect, **usual | given)
+
+    def reported(*found: tuple[Answer, float]) -> list[float]:
+        (finding,) = claimed.findings
+        return [one.heat_mean_W for one in _distinct([(a, replace(finding, heat_mean_W=heat)) for a, heat in found])]
+
+    windy, pumped, foggy = (answer(name, place) for name, place in (
+        ("windage", "oil"), ("pump_heat", "oil"), ("hot_neighbour", "housing_lower")))  # fmt: skip
+    assert reported((windy, 13.0), (foggy, 5.0), (pumped, -108.0)) == [5.0, -108.0]
+    assert reported((windy, 0.0), (pumped, 0.0)) == [0.0]
+    assert reported((windy, 20.0), (answer("pump_heat", "oil", grade="claim", acts_like=False), 10.0)) == [10.0]
 
 
 def test_nothing(assembled: Assemble, prepared: Prepared, windage: Judged) -> None:
