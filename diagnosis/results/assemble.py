@@ -148,7 +148,7 @@ def assemble(
         floor=_floor(setup),
         misfit=_misfit(final),
         remaining_p_value=float(min(1.0, np.exp(-max(posterior.remainder, -50.0)))),
-        remaining_note=_remaining(posterior, others),
+        remaining_note=_remaining(posterior, others, best),
         ranking=_ranking(posterior, catalogue),
         unseen=unseen,
         next_test=next_test(
@@ -282,7 +282,7 @@ def _unseen(posterior: Posterior, catalogue: Mapping[str, Mechanism]) -> tuple[N
     )  # fmt: skip
 
 
-def _remaining(posterior: Posterior, others: Others | None) -> str:
+def _remaining(posterior: Posterior, others: Others | None, best: Judged | None) -> str:
     if not posterior.detected:
         return ""
     if others is not None:
@@ -291,6 +291,10 @@ def _remaining(posterior: Posterior, others: Others | None) -> str:
             return (f"something else is missing too (evidence {rest.log_e:.0f} nat without {channels}): "
                     "leave that out of the recordings and diagnose again")  # fmt: skip
         return f"without {channels} nothing stands out of noise and model error (evidence {rest.log_e:.1f} nat)"
+    if best is not None and best.kind == "pair":
+        return (
+            f"two effects were fitted (evidence {posterior.remainder:.0f} nat of the second), no third was looked for"
+        )
     if posterior.remainder > posterior.threshold:
         return f"a further effect would still help (evidence {posterior.remainder:.0f} nat)"
     return f"nothing stands out of noise and model error (evidence {posterior.remainder:.1f} nat of a further effect)"

@@ -24,7 +24,7 @@ from diagnosis.proof.scoring.answers import read_answer
 from diagnosis.recordings.recording import Recording
 from diagnosis.report import page
 from diagnosis.report.write import correction_of
-from diagnosis.results.assemble import _distinct, assemble
+from diagnosis.results.assemble import _distinct, _remaining, assemble
 from diagnosis.results.result import Diagnosis
 from diagnosis.setup.inference_setup import InferenceSetup
 from models.assembly.gearbox import Gearbox
@@ -247,6 +247,13 @@ def test_a_link_that_changes_at_a_date_acts_like(
     assert read_answer(found.to_dict(), fzg).claims[0].what == "link"
     assert correction_of(found, fzg).findings[0].term.label == effect.term.label
     assert "strength" not in finding.equation and "since" not in finding.equation
+
+
+def test_what_remains_beside_one_effect_is_known_and_beside_two_it_is_not(prepared: Prepared, windage: Judged) -> None:
+    pair = replace(windage, effects=(*windage.effects, effect_of(prepared[0], prepared[2], "pump_heat", "oil")))
+    posterior = posterior_of(prepared[2], windage, pair, remainder=25.0)
+    assert _remaining(posterior, None, windage) == "a further effect would still help (evidence 25 nat)"
+    assert "25 nat of the second" in _remaining(posterior, None, pair)
 
 
 def test_of_two_that_act_like_something_on_one_thing_the_larger_is_reported(
