@@ -85,6 +85,11 @@ def _markdown(docstring: str) -> str:
     return re.sub(r"\n +", "\n", text)
 
 
+def _placeholders(text: str) -> str:
+    """Names with a placeholder, such as T_<node>, as code; bare they would be read as HTML."""
+    return re.sub(r"(?<![`\w])\w*<\w+>\w*", r"`\g<0>`", text)
+
+
 class _Quiet(GenerateJsonSchema):
     """A default that JSON does not have, such as an expression, is left out without a warning."""
 
@@ -134,7 +139,8 @@ class _Tables:
             text_of = TEXTS.get(name, {}).get(key, KeyText(""))
             unit = unit_of(key).symbol
             given = values.get(key, "") if isinstance(values, Mapping) else ""
-            rows.append((f"`{key}`", text_of.meaning, _type(field) + (f", {unit}" if unit else ""), text_of.typical,
+            kind, meaning = _type(field) + (f", {unit}" if unit else ""), _placeholders(text_of.meaning)
+            rows.append((f"`{key}`", meaning, kind, text_of.typical,
                          _limits(field), _default(key, field, schema.get("required", ())), _value(given)))  # fmt: skip
         if rows:
             yield from _table(
@@ -310,6 +316,7 @@ def _mechanism(mechanism: Mechanism, places: Mapping[str, tuple[Placed, ...]]) -
         law, *others = one.equation().split(r",\quad ")
         states = [other for other in others if r"\leftarrow" in other or r"/\mathrm{d}t" in other]
         for equation in (law, *states):
+            equation = equation.replace(r"\mathrm{d}\mathrm", r"\mathrm{d}\,\mathrm")
             yield "$$\n" + PRODUCT.sub(r" \\, ", RATIO_IN_BRACKETS.sub(r"(\1)", equation)) + "\n$$\n"
         ratios = [other for other in others if other not in states]
         plain = (re.sub(r"\d[\d.]*e[+-]\d+", lambda found: _number(float(found[0])), ratio) for ratio in ratios)

@@ -15,7 +15,9 @@ if TYPE_CHECKING:
 
 
 # What the converter leaves out: the space between a function and an argument without brackets, an upright letter.
-FUNCTION = re.compile(r"(\\(?:ln|lg|exp|sin|cos|tanh|max|min)(?![A-Za-z])|\\mathrm\{asinh\})\s*(?=[A-Za-z]|\\(?!left))")
+FUNCTION = re.compile(
+    r"(\\(?:ln|lg|exp|sin|cos|tan|tanh|max|min)(?![A-Za-z])|\\mathrm\{asinh\})\s*(?=[A-Za-z]|\\(?!left))"
+)
 LETTER = re.compile(r"\\mathrm\{([A-Za-z])\}")
 
 

@@ -97,11 +97,14 @@ UNITS = "%|°C|degC|K|W|J|s|h|min|m|mm|N|V|nats?|[mu]s|[kMG]B|k[JW]|MW|m/s|rad/s
 SPACE_BEFORE_UNIT = re.compile(rf"(?<=\d) (?=(?:{UNITS})(?!\w))|(?<=\d N) (?=m\b)")
 
 
-def keep_units(_app: Sphinx, doctree: nodes.document, _docname: str) -> None:
-    """Keep a number and its unit on one line."""
+REFERENCE = re.compile(r"\bR[0-9a-f]{12}-(?=\d)")  # what numpydoc puts before the number of a reference
+
+
+def set_texts(_app: Sphinx, doctree: nodes.document, _docname: str) -> None:
+    """Keep a number and its unit on one line, and number references as the docstring does."""
     for text in list(doctree.findall(nodes.Text)):
         if not isinstance(text.parent, nodes.literal | nodes.literal_block | nodes.math | nodes.math_block):
-            kept = SPACE_BEFORE_UNIT.sub("\N{NO-BREAK SPACE}", text.astext())
+            kept = REFERENCE.sub("", SPACE_BEFORE_UNIT.sub("\N{NO-BREAK SPACE}", text.astext()))
             if kept != text.astext():
                 text.parent.replace(text, nodes.Text(kept))
 
@@ -111,6 +114,6 @@ def setup(app: Sphinx) -> None:
     setup_mathml(app)
     setup_generated(app)
     app.connect("env-before-read-docs", spread_notebooks)
-    app.connect("doctree-resolved", keep_units)
+    app.connect("doctree-resolved", set_texts)
     for part in ("description", "options", "arguments", "epilog"):
         app.connect(f"sphinx-click-process-{part}", mark_literals)
