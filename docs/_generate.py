@@ -39,6 +39,11 @@ GEARBOXES = "gearboxes"
 EXAMPLES = {Definition: "fzg", ParametricDefinition: "la_haute_borne"}  # whose values stand next to the keys
 # Machines in which the catalogue's laws are written out, the first that has a place for it.
 MACHINES = {"fzg": {"speed": 3000.0, "torque": 94.0}, "la_haute_borne": {"speed": 1500.0, "torque": 5000.0}}
+# The space of a product in a law: between the end of one factor and the beginning of the next.
+PRODUCT = re.compile(
+    r"((?<=[}\d*)])|(?<=[ =(][A-Za-z])) (?=\\(mathrm|left\(|frac|max|min|tanh|sin|nu)|e\^|[A-Za-z](?![A-Za-z]))"
+)
+RATIO_IN_BRACKETS = re.compile(r"\\left\(((?:n|M|\\nu)\^\*)\\right\)")  # brackets need not grow with the asterisk
 KINDS = {
     "source": "heat into a node",
     "link": "a heat path",
@@ -52,6 +57,12 @@ KINDS = {
 def _cell(text: object) -> str:
     """Text of a table cell: on one line, and without a bar that would end it."""
     return " ".join(str(text).split()).replace("|", r"\|")
+
+
+def _number(value: float) -> str:
+    """Three digits, and a power of ten only where the number would need many zeros."""
+    text = f"{value:.3g}"
+    return f"{float(text):.0f}" if "e" in text and abs(value) < 1e6 and abs(value) >= 1.0 else text
 
 
 def _row(*cells: object) -> str:
@@ -72,6 +83,11 @@ def _markdown(docstring: str) -> str:
     text = re.sub(r":\w+:`~?([^`]+)`", r"`\1`", docstring)
     text = re.sub(r"``([^`]+)``", r"`\1`", text)
     return re.sub(r"\n +", "\n", text)
+
+
+def _placeholders(text: str) -> str:
+    """Names with a placeholder, such as T_<node>, as code; bare they would be read as HTML."""
+    return re.sub(r"(?<![`\w])\w*<\w+>\w*", r"`\g<0>`", text)
 
 
 class _Quiet(GenerateJsonSchema):
@@ -123,7 +139,8 @@ class _Tables:
             text_of = TEXTS.get(name, {}).get(key, KeyText(""))
             unit = unit_of(key).symbol
             given = values.get(key, "") if isinstance(values, Mapping) else ""
-            rows.append((f"`{key}`", text_of.meaning, _type(field) + (f", {unit}" if unit else ""), text_of.typical,
+            kind, meaning = _type(field) + (f", {unit}" if unit else ""), _placeholders(text_of.meaning)
+            rows.append((f"`{key}`", meaning, kind, text_of.typical,
                          _limits(field), _default(key, field, schema.get("required", ())), _value(given)))  # fmt: skip
         if rows:
             yield from _table(
@@ -253,11 +270,11 @@ def network() -> Iterator[str]:
     yield ""
     yield from _table(
         ("part", "heat capacity in J/K", "settles at, in °C"),
-        [(f"`{name}`", f"{value:.3g}", f"{values[f'T_{name}']:.1f}") for name, value in capacity.items()],
+        [(f"`{name}`", _number(value), f"{values[f'T_{name}']:.1f}") for name, value in capacity.items()],
     )
     yield from _table(
         ("heat path", "conductance in W/K"),
-        [(" to ".join(f"`{node}`" for node in link.nodes), f"{conductance[link.name]:.3g}") for link in network.links],
+        [(" to ".join(f"`{node}`" for node in link.nodes), _number(conductance[link.name])) for link in network.links],
     )
     order = list(capacity)
     matrix = np.zeros((len(order), len(order)))
@@ -268,7 +285,7 @@ def network() -> Iterator[str]:
                 if there in order:
                     matrix[order.index(here), order.index(there)] -= conductance[link.name] / capacity[here]
     constants = sorted((1.0 / rate for rate in np.linalg.eigvals(matrix).real), reverse=True)
-    yield f"Time constants in s: {', '.join(f'{one:.3g}' for one in constants)}."
+    yield f"Time constants in s: {', '.join(map(_number, constants))}."
 
 
 def mechanisms() -> Iterator[str]:
@@ -296,16 +313,21 @@ def _mechanism(mechanism: Mechanism, places: Mapping[str, tuple[Placed, ...]]) -
     machine = next((name for name, found in places.items() if found), None)
     if machine is not None:
         one = places[machine][0]
-        law, *ratios = one.equation().split(r",\quad ")
-        yield f"$$\n{law}\n$$\n"
-        ratios_text = "".join(f", ${ratio}$" for ratio in ratios)
-        yield f"Written for {one.place.replace('_', ' ')} of `{machine}`{ratios_text}.\n"
+        law, *others = one.equation().split(r",\quad ")
+        states = [other for other in others if r"\leftarrow" in other or r"/\mathrm{d}t" in other]
+        for equation in (law, *states):
+            equation = equation.replace(r"\mathrm{d}\mathrm", r"\mathrm{d}\,\mathrm")
+            yield "$$\n" + PRODUCT.sub(r" \\, ", RATIO_IN_BRACKETS.sub(r"(\1)", equation)) + "\n$$\n"
+        ratios = [other for other in others if other not in states]
+        plain = (re.sub(r"\d[\d.]*e[+-]\d+", lambda found: _number(float(found[0])), ratio) for ratio in ratios)
+        ratios_text = "".join(f", ${ratio}$" for ratio in plain)
+        yield f"Written for `{one.place}` of `{machine}`{ratios_text}.\n"
         local = [(p.name.removeprefix(f"{one.label}_"), p) for p in one.parameters]
         yield from _table(
             ("parameter", "meaning", "unit", "start", "usual size or deviation", "limits"),
-            [(f"`{name}`", p.description, "" if p.unit == "1" else p.unit, f"{p.start:.3g}",
-              "" if p.sd is None else f"{p.sd:.3g}" + (" (of the logarithm)" if p.log else ""),
-              f"{p.lower:.3g} to {p.upper:.3g}") for name, p in local],
+            [(f"`{name}`", p.description, "" if p.unit == "1" else p.unit, _number(p.start),
+              "" if p.sd is None else _number(p.sd) + (" (of the logarithm)" if p.log else ""),
+              f"{_number(p.lower)} to {_number(p.upper)}") for name, p in local],
         )  # fmt: skip
     at = ", ".join(f"`{place}`" for place in mechanism.places)
     yield f"- **Kind**: {KINDS[mechanism.kind]} (`{mechanism.kind}`), at: {at}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING
 
 from docutils.nodes import SkipNode
@@ -13,13 +14,25 @@ if TYPE_CHECKING:
     from sphinx.writers.html5 import HTML5Translator
 
 
+# What the converter leaves out: the space between a function and an argument without brackets, an upright letter.
+FUNCTION = re.compile(
+    r"(\\(?:ln|lg|exp|sin|cos|tan|tanh|max|min)(?![A-Za-z])|\\mathrm\{asinh\})\s*(?=[A-Za-z]|\\(?!left))"
+)
+LETTER = re.compile(r"\\mathrm\{([A-Za-z])\}")
+
+
+def mathml(tex: str, display: str) -> str:
+    """LaTeX as MathML."""
+    return convert(LETTER.sub(r"\\text{\1}", FUNCTION.sub(r"\1\\, ", tex)), display=display)
+
+
 def _inline(translator: HTML5Translator, node: Element) -> None:
-    translator.body.append(convert(node.astext(), display="inline"))
+    translator.body.append(mathml(node.astext(), "inline"))
     raise SkipNode  # the children are the source
 
 
 def _block(translator: HTML5Translator, node: Element) -> None:
-    translator.body.append(f'<div class="math-block">{convert(node.astext(), display="block")}</div>')
+    translator.body.append(f'<div class="math-block">{mathml(node.astext(), "block")}</div>')
     raise SkipNode
 
 

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import os
+import re
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,6 +16,7 @@ sys.path[:0] = [str(DOCS), str(DOCS.parent)]
 
 from _generate import setup_generated  # noqa: E402 - found through the line above
 from _math import setup_mathml  # noqa: E402
+from docutils import nodes  # noqa: E402
 
 from models.base.version import project_version  # noqa: E402
 
@@ -38,6 +40,8 @@ extensions = [
 ]
 exclude_patterns = ["_*"]
 nitpicky = True
+smartquotes_action = "qe"  # quotation marks and dots; -- begins an option
+add_module_names = False  # they do not fit on narrow screens; the pages name the modules
 # Public names are checked; docstrings also name what is inside, which has no page.
 nitpick_ignore_regex = [("py:.*", r"(?!gearbox_twin\.).*")]
 autodoc_typehints = "none"  # the docstrings have types with shapes and units
@@ -59,6 +63,9 @@ html_theme = "pydata_sphinx_theme"
 html_title = project
 html_static_path = ["_static"]
 html_css_files = ["site.css"]
+html_sidebars = dict.fromkeys(
+    ("install", "contributing", "development", "changelog", "genindex", "search"), ()
+)  # no pages below
 html_theme_options = {
     "navigation_with_keys": False,
     "show_prev_next": True,
@@ -78,8 +85,35 @@ def spread_notebooks(_app: Sphinx, _env: BuildEnvironment, docnames: list[str]) 
     docnames[:] = [*notebooks[::2], *pages, *notebooks[1::2]]
 
 
+def mark_literals(_app: Sphinx, _context: object, lines: list[str]) -> None:
+    """Set commands, options and addresses in the help of a command as literals."""
+    for i, line in enumerate(lines):
+        if not line.lstrip().startswith(".. "):
+            literal = r"(python -m builder .*|(?<![\w`-])--[a-z][a-zA-Z-]*|tcp://[\w.:]*\w)"
+            lines[i] = re.sub(literal, r"``\1``", line)
+
+
+UNITS = "%|°C|degC|K|W|J|s|h|min|m|mm|N|V|nats?|[mu]s|[kMG]B|k[JW]|MW|m/s|rad/s|1/min|[WJ]/K"
+SPACE_BEFORE_UNIT = re.compile(rf"(?<=\d) (?=(?:{UNITS})(?!\w))|(?<=\d N) (?=m\b)")
+
+
+REFERENCE = re.compile(r"\bR[0-9a-f]{12}-(?=\d)")  # what numpydoc puts before the number of a reference
+
+
+def set_texts(_app: Sphinx, doctree: nodes.document, _docname: str) -> None:
+    """Keep a number and its unit on one line, and number references as the docstring does."""
+    for text in list(doctree.findall(nodes.Text)):
+        if not isinstance(text.parent, nodes.literal | nodes.literal_block | nodes.math | nodes.math_block):
+            kept = REFERENCE.sub("", SPACE_BEFORE_UNIT.sub("\N{NO-BREAK SPACE}", text.astext()))
+            if kept != text.astext():
+                text.parent.replace(text, nodes.Text(kept))
+
+
 def setup(app: Sphinx) -> None:
-    """Register formulas and the order of work."""
+    """Register formulas, the order of work, units and literals in the help of commands."""
     setup_mathml(app)
     setup_generated(app)
     app.connect("env-before-read-docs", spread_notebooks)
+    app.connect("doctree-resolved", set_texts)
+    for part in ("description", "options", "arguments", "epilog"):
+        app.connect(f"sphinx-click-process-{part}", mark_literals)

@@ -103,7 +103,7 @@ def tooth_compliance(roll_C: Numeric, *, psi_b: float, r_b: float, r_f: float, b
 
     References
     ----------
-    .. [1] D. C. H. Yang, J. Y. Lin, J. Mech. Trans. Automation 109 (1987) 189-196.
+    .. [1] Yang, Lin, J. Mech. Trans. Automation 109 (1987) 189-196.
     .. [2] X. Tian, "Dynamic simulation for system response of gearbox including localized gear faults", University of
        Alberta, 2004 (shear). Both from memory; verified in the tests against an independent quadrature in y and
        against the closed form of a straight cantilever.
