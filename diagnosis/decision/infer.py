@@ -237,7 +237,8 @@ def _refitted(calibration: Calibration, fit: Fit, found: _Scanned, index: int, i
             reached = _with_wider_prior(fit, candidate.unknown, iterations)
         else:
             strength = float(here.strengths.value[index])
-            reached = refit(fit, candidate, here.scan.best[index], strength, iterations=iterations)
+            reached = refit(fit, candidate, here.scan.best[index], strength, further=here.scan.starts[index],
+                            iterations=iterations)  # fmt: skip
     except (InputError, ArithmeticError, np.linalg.LinAlgError):
         return one
     return _judged(calibration, replace(one, fit=reached), len(calibration.fit.z), _spread(found, index))

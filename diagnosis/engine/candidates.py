@@ -28,6 +28,8 @@ from models.terms.term import Term
 START_SHARES = (1.0, 0.3, 0.03)  # of the strength that the scan promises
 ROUGH, ITERATIONS = 3, 10
 CANDIDATE = Group(name="candidate")
+SHAPES_TRIED = 3  # of what has a memory: its set-points may have several optima
+Starts = tuple[tuple[int, float], ...]  # variants and strengths
 DATE_STEP_S = 10.0
 VALUES_AT_ONCE = 800_000  # of heats that are held together, per part: bounds the memory of long recordings
 
@@ -53,6 +55,8 @@ class Scan:
         Prior of the strengths
     peak_K, peak_W : Array, shape (candidates,)
         Largest change of a temperature [K], and heat into or out of a part [W], per unit of strength
+    starts : tuple of tuple of (int, float)
+        Further variants and strengths of each to fit from, where the best one may lead to another optimum
     """
 
     candidates: tuple[Hypothesis, ...]
@@ -67,6 +71,7 @@ class Scan:
     sign: NDArray[np.int_]
     peak_K: Array
     peak_W: Array
+    starts: tuple[Starts, ...]
 
     def in_directions(self, directions: Array) -> Scan:
         """The scan with combinations, shape (further, n), in place of the further columns."""
@@ -113,7 +118,7 @@ def scan(fit: Fit, candidates: Sequence[Hypothesis], error: Sequence[Array] = ()
     known = range(count)
     chosen = [np.empty((len(W), len(candidates)), order="F") for W in base]
     best: list[int] = []
-    mean, spread, signs, peak = [], [], [], []
+    mean, spread, signs, peak, starts = [], [], [], [], []
     warm = [not is_total_loss(name) for name in fit.parts[0].point.sensors.channels]
     everything, residuals = _with_unknowns(fit), [W[:, 0] for W in base]
     intervals = max(len(part.point.trajectory.T) for part in fit.parts)
@@ -137,6 +142,7 @@ def scan(fit: Fit, candidates: Sequence[Hypothesis], error: Sequence[Array] = ()
             mean.append(float(np.logaddexp.reduce(found.log_bayes) - np.log(n)))
             spread.append(float(found.log_bayes[at]) - mean[-1])
             signs.append(int(sign[at]))
+            starts.append(_further_starts(c, found, at))
             first += n
     extra = base[0].shape[1] - 1 - count
     peak_K, peak_W = np.array(peak).reshape(-1, 2).T
@@ -145,8 +151,21 @@ def scan(fit: Fit, candidates: Sequence[Hypothesis], error: Sequence[Array] = ()
         gram=gram_of(fit.parts, base, chosen), unknowns=known,
         further=range(count, count + extra), of_candidates=range(count + extra, count + extra + len(candidates)),
         sd=np.array([strength.sd for strength in priors]), sign=np.array(signs, dtype=int), peak_K=peak_K,
-        peak_W=peak_W,
+        peak_W=peak_W, starts=tuple(starts),
     )  # fmt: skip
+
+
+def _further_starts(candidate: Hypothesis, found: Strengths, best: int) -> Starts:
+    """Every size with the promised sign of a clock's fault; the next best shapes of what has a memory."""
+    assert candidate.term is not None  # noqa: S101 - parameters out of their priors have no term
+    sizes = candidate.variants[:, 0]
+    if len(np.unique(np.abs(sizes))) > 1:  # none looks like another one, scaled
+        sd = candidate.term.strength.sd
+        return tuple((int(i), float(sizes[i] * sd)) for i in np.flatnonzero(sizes * found.value[best] > 0.0))
+    if not candidate.term.states:
+        return ()
+    next_best = np.argsort(-found.log_bayes)[:SHAPES_TRIED]
+    return tuple((int(i), float(found.value[i])) for i in next_best if i != best)
 
 
 def _with_unknowns(fit: Fit) -> Metric:
@@ -283,18 +302,36 @@ def _scope(experiment: Experiment, candidate: Hypothesis) -> Scope:
     return experiment.scope_of(candidate.name, dated=candidate.clock is not None)
 
 
-def refit(fit: Fit, candidate: Hypothesis, variant: int, strength: float, *, iterations: int = ITERATIONS) -> Fit:
+def refit(
+    fit: Fit, candidate: Hypothesis, variant: int, strength: float, *, further: Starts = (),
+    iterations: int = ITERATIONS,
+) -> Fit:  # fmt: skip
     """A candidate fitted together with everything else, judged by the noise filters of a fit without it.
 
     The other unknowns start where the straight line puts them with the candidate there. What it does may be far from
     a straight line; so smaller shares of the promised strength are tried until a rough fit agrees better with the
-    readings than without the candidate.
+    readings than without the candidate, and all further starts. The best rough fit goes on.
 
     Raises
     ------
     ArithmeticError
         If there is no solution at any of the starts.
     """
+    rough: list[Fit] = []
+    for share in START_SHARES:
+        rough += _rough_fit(fit, candidate, variant, share * strength)
+        if rough and rough[-1].objective < fit.objective:
+            break
+    for other, size in further:
+        rough += _rough_fit(fit, candidate, other, size)
+    if not rough:
+        raise ArithmeticError(f"no simulation has a solution with {candidate.label}")
+    best = min(rough, key=lambda one: one.objective)
+    return best.experiment.fit(best.z, iterations=iterations - ROUGH, at=best.linearised)
+
+
+def _rough_fit(fit: Fit, candidate: Hypothesis, variant: int, strength: float) -> list[Fit]:
+    """A few steps from one start; empty if it has no solution."""
     one = replace(candidate, variants=candidate.variants[[variant]])
     assert candidate.term is not None  # noqa: S101 - parameters out of their priors have no term
     on_grid = _on_grid(fit.experiment.machine.model, candidate.term)
@@ -302,21 +339,10 @@ def refit(fit: Fit, candidate: Hypothesis, variant: int, strength: float, *, ite
     both = Linearised.of([replace(part, residual=x[:, 0]) for part, x in zip(fit.parts, column, strict=True)],
                          fit.experiment.metric)  # fmt: skip
     aside = -fit.covariance @ both.products[1:, 0]  # of the other unknowns, per unit of strength
-    guesses = [part.point.trajectory for part in fit.parts]
     experiment, own = with_candidate(fit, candidate, variant)
-    lower, upper = experiment.bounds
-    added = experiment.unknowns[len(fit.z)]
-    rough: list[Fit] = []
-    for share in START_SHARES:
-        own[0] = added.z_of(share * strength)
-        z = np.clip(np.concatenate([fit.z + share * strength * aside, own]), lower, upper)
-        try:
-            rough.append(experiment.fit(z, guesses, iterations=ROUGH))
-        except ArithmeticError:
-            continue
-        if rough[-1].objective < fit.objective:
-            break
-    if not rough:
-        raise ArithmeticError(f"no simulation has a solution with {candidate.label}")
-    best = min(rough, key=lambda one: one.objective)
-    return experiment.fit(best.z, iterations=iterations - ROUGH, at=best.linearised)
+    own[0] = experiment.unknowns[len(fit.z)].z_of(strength)
+    try:
+        return [experiment.fit(np.concatenate([fit.z + strength * aside, own]),
+                               [part.point.trajectory for part in fit.parts], iterations=ROUGH)]  # fmt: skip
+    except ArithmeticError:
+        return []

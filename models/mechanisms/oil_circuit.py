@@ -209,11 +209,13 @@ heater_thermostat = Mechanism(
             grid=[share_between(scale, share) for share in (0.1, 0.2, 0.3, 0.4, 0.5, 0.7)],
         ),
         _band(),
+        plain("running", 0.5, sd=0.5, lower=0.0, upper=1.0, grid=(0.0, 1.0)),
     ),
     states=(two_point("heating", above=0.0),),
-    law=lambda s: s.strength * s.heating * sp.exp(-((STANDING * s.n) ** 2)),
-    says="An electric heater keeps the oil warm while the gearbox stands.",
-    reference="two-point control",
+    # Heaters of turbines and drives often are interlocked with the motor; those of test rigs heat while it turns.
+    law=lambda s: s.strength * s.heating * (s.running + (1.0 - s.running) * sp.exp(-((STANDING * s.n) ** 2))),
+    says="An electric heater keeps the oil warm.",
+    reference="two-point control; running: share of its power while the gearbox turns",
     experiment="let it stand until it would be cold: the oil stays at the heater's temperature",
     separate_by={"hot_neighbour": "let it stand: a heater makes the oil the warmest part, a neighbour another one"},
 )

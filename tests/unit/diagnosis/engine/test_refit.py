@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from diagnosis.candidates.hypotheses import hypothesis_of
-from diagnosis.engine.candidates import Scan, refit, scan
+from diagnosis.engine.candidates import SHAPES_TRIED, Scan, refit, scan
 from diagnosis.engine.fit import Experiment, Fit, calibrate
 from models.assembly.gearbox import Gearbox
 from models.mechanisms import CATALOGUE, Placed, Scale
@@ -89,3 +89,30 @@ def test_a_set_point_is_found(experiment: Experiment, scale: Scale) -> None:
     edge = value_of(found, f"{placed.label}_set_point") + 0.5 * value_of(found, f"{placed.label}_band")
     assert edge == pytest.approx(true + 1.0, abs=1.5)
     assert found.log_evidence > base.log_evidence + 20.0
+
+
+def test_what_may_have_several_optima_is_fitted_from_several_starts(experiment: Experiment, scale: Scale) -> None:
+    network = experiment.machine.model.network
+    names = ("clock_offset", "fan_thermostat", "windage")
+    placed = [CATALOGUE[name].placed(network, scale, CHANNELS)[0] for name in names]
+    clock, fan, windage = scan(calibrate(experiment), [hypothesis_of(one) for one in placed]).starts
+    sizes = [size for _, size in clock]
+    assert len(sizes) == 3 and len(set(sizes)) == 3 and len({np.sign(size) for size in sizes}) == 1
+    assert len(fan) == SHAPES_TRIED - 1 and len({variant for variant, _ in fan}) == len(fan)
+    assert windage == ()
+
+
+def test_the_best_start_goes_on(experiment: Experiment, scale: Scale) -> None:
+    """A clock that is two minutes late, from a few seconds: a straight line does not lead there."""
+    placed, *_ = CATALOGUE["clock_offset"].placed(experiment.machine.model.network, scale, CHANNELS)
+    piece, late_s, one = experiment.pieces[0], 120.0, hypothesis_of(placed)
+    measured = np.array(piece.measured)
+    for index, name in enumerate(CHANNELS):
+        if name != "P_loss":
+            measured[:, index] = np.interp(piece.time - late_s, piece.time, piece.measured[:, index])
+    base = calibrate(with_measured(experiment, measured))
+    small = int(np.flatnonzero(one.variants[:, 0] > 0.0)[0])
+    alone = refit(base, one, small, 5.0, iterations=4)
+    several = refit(base, one, small, 5.0, further=((small, 60.0), (small, 120.0)), iterations=4)
+    assert value_of(several, placed.strength.name) == pytest.approx(late_s, abs=20.0)
+    assert several.objective < alone.objective

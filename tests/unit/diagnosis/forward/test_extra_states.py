@@ -194,13 +194,16 @@ def test_derivatives_taken_a_few_at_a_time_are_the_same(fzg: Gearbox, monkeypatc
         np.testing.assert_allclose(one, other, rtol=1e-9, atol=1e-9)
 
 
-@pytest.mark.parametrize(("speed_rpm", "least", "most"), [(0.0, 1.0, 1.0), (10.0, 0.98, 1.0), (260.0, 0.0, 0.01)])
-def test_a_heater_is_off_as_soon_as_the_gearbox_turns(
-    fzg: Gearbox, speed_rpm: float, least: float, most: float
+@pytest.mark.parametrize(
+    ("speed_rpm", "running", "least", "most"),
+    [(0.0, 0.0, 1.0, 1.0), (10.0, 0.0, 0.98, 1.0), (260.0, 0.0, 0.0, 0.01), (260.0, 1.0, 1.0, 1.0)],
+)
+def test_a_heater_with_an_interlock_is_off_as_soon_as_the_gearbox_turns(
+    fzg: Gearbox, speed_rpm: float, running: float, least: float, most: float
 ) -> None:
-    """Its interlock is sharp: at a tenth of the reference speed of 2600 1/min next to nothing of its power is left."""
+    """The interlock is sharp: at a tenth of the reference speed of 2600 1/min next to nothing of the power is left."""
     placed = placed_on(fzg, "heater_thermostat")
     (state,) = placed.states
-    given = {placed.strength.name: 80.0, state.name: 1.0, "speed": speed_rpm}
+    given = {placed.strength.name: 80.0, state.name: 1.0, "speed": speed_rpm, f"{placed.label}_running": running}
     power = placed.expression.subs({s: given[s.name] for s in placed.expression.free_symbols})
     assert least <= float(power) / 80.0 <= most
