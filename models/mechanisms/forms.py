@@ -18,6 +18,41 @@ RUNNING = 20.0  # sharpness of what begins with the shafts: from about a tenth o
 ONCE = 6.0  # durations of a recording, after which what happened once would come again
 SOFT_K = 0.3  # width of a switch that is seen in means over minutes
 EDGE_S = 120.0  # half of the time that damage or an oil change takes to come
+# Of shapes by name and unit. Speeds, torques and viscosities in the laws are relative to those of reference.
+MEANINGS = {
+    ("above", "K"): "air at the gearbox above the outdoor air",
+    ("band", "K"): "between switching on and off, or from closed to open",
+    ("colder", "K"): "water below the air",
+    ("coolant", "degC"): "temperature of the coolant",
+    ("delay", "s"): "time constant of the valve",
+    ("drying", "s"): "time constant of drying",
+    ("every", "s"): "time after which it comes again",
+    ("exponent", "1"): "exponent of the speed, or of the law's other driver",
+    ("fade", "1"): "relative speed times viscosity at which half of it is left",
+    ("film", "1"): "how fast it falls with the speed, which makes the film",
+    ("lag", "s"): "time constant",
+    ("leak", "1"): "heat flow of the tank to the air over that of the oil",
+    ("length", "s"): "how long it lasts",
+    ("life", "s"): "time constant of the change",
+    ("load_share", "1"): "share that grows with the torque",
+    ("moment", "s"): "time since the start of the recording",
+    ("neighbour", "degC"): "temperature of the neighbour",
+    ("noon", "s"): "time of the most sun, since the start of the recording",
+    ("onset", "1"): "relative speed at which it begins",
+    ("onset", "s"): "time of the first one, since the start of the recording",
+    ("period", "s"): "duration of one swing",
+    ("phase", "rad"): "phase at the start of the recording",
+    ("rise", "K"): "rise of the motor above the air at the reference torque",
+    ("running", "1"): "share of its power while the gearbox turns",
+    ("set_point", "degC"): "middle of the band",
+    ("speed_exponent", "1"): "exponent of the speed",
+    ("standstill", "1"): "share of the flow at standstill",
+    ("still", "1"): "conductance at standstill, in that at the reference speed",
+    ("supply", "degC"): "temperature of the injected oil",
+    ("switch", "1"): "relative speed, or speed over viscosity, at which half of it is there",
+    ("threshold", "K"): "shaft above housing from which the clearance is used up",
+    ("water", "degC"): "temperature of the water",
+}
 
 
 def strength(sd: float, unit: str = "1", description: str = "") -> Parameter:
@@ -32,15 +67,19 @@ def strength(sd: float, unit: str = "1", description: str = "") -> Parameter:
 def positive(name: str, start: float, *, sd: float, unit: str = "1", grid: Sequence[float] = ()) -> Parameter:
     """A positive shape parameter; `sd` of its logarithm."""
     return Parameter(
-        name=name, unit=unit, start=start, lower=start / 50.0, upper=start * 50.0, sd=sd, log=True, grid=tuple(grid)
-    )
+        name=name, unit=unit, start=start, lower=start / 50.0, upper=start * 50.0, sd=sd, log=True, grid=tuple(grid),
+        description=MEANINGS.get((name, unit), ""),
+    )  # fmt: skip
 
 
 def plain(
     name: str, start: float, *, sd: float, lower: float, upper: float, unit: str = "1", grid: Sequence[float] = ()
 ) -> Parameter:
     """A shape parameter that is no factor: an exponent, a temperature."""
-    return Parameter(name=name, unit=unit, start=start, lower=lower, upper=upper, sd=sd, log=False, grid=tuple(grid))
+    return Parameter(
+        name=name, unit=unit, start=start, lower=lower, upper=upper, sd=sd, log=False, grid=tuple(grid),
+        description=MEANINGS.get((name, unit), ""),
+    )  # fmt: skip
 
 
 def temperature(
@@ -68,7 +107,7 @@ def period(scale: Scale) -> Parameter:
     d = scale.duration
     return Parameter(
         name="every", unit="s", start=ONCE * d, lower=0.05 * d, upper=2.0 * ONCE * d, sd=1.5, log=True,
-        sweep=(0.12 * d, 0.6 * d),
+        sweep=(0.12 * d, 0.6 * d), description=MEANINGS["every", "s"],
     )  # fmt: skip
 
 
