@@ -161,7 +161,7 @@ def _further_starts(candidate: Hypothesis, found: Strengths, best: int) -> Start
     sizes = candidate.variants[:, 0]
     if len(np.unique(np.abs(sizes))) > 1:  # none looks like another one, scaled
         sd = candidate.term.strength.sd
-        return tuple((int(i), float(sizes[i] * sd)) for i in np.flatnonzero(sizes * found.value[best] > 0.0))
+        return tuple((best, float(size * sd)) for size in sizes[sizes * found.value[best] > 0.0])
     if not candidate.term.states:
         return ()
     next_best = np.argsort(-found.log_bayes)[:SHAPES_TRIED]
