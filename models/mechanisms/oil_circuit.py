@@ -206,10 +206,10 @@ heater_thermostat = Mechanism(
             "set_point",
             share_between(scale, 0.3),
             sd=12.0,
-            grid=[share_between(scale, share) for share in (0.1, 0.2, 0.3, 0.4, 0.5, 0.7)],
+            grid=[share_between(scale, share) for share in (0.4, 0.1, 0.2, 0.3, 0.5, 0.7)],
         ),
         _band(),
-        plain("running", 0.5, sd=0.5, lower=0.0, upper=1.0, grid=(0.0, 1.0)),
+        plain("running", 0.5, sd=0.5, lower=0.0, upper=1.0, grid=(1.0, 0.0)),
     ),
     states=(two_point("heating", above=0.0),),
     # Heaters of turbines and drives often are interlocked with the motor; those of test rigs heat while it turns.
