@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cache, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -317,32 +317,36 @@ def refit(
     ArithmeticError
         If there is no solution at any of the starts.
     """
+    line = cache(lambda one: _straight_line(fit, candidate, one))
+
+    def rough_fit(which: int, size: float) -> list[Fit]:
+        """A few steps from one start; empty if it has no solution."""
+        aside, experiment, shape = line(which)
+        z = np.concatenate([fit.z + size * aside, [experiment.unknowns[len(fit.z)].z_of(size)], shape[1:]])
+        try:
+            return [experiment.fit(z, [part.point.trajectory for part in fit.parts], iterations=ROUGH)]
+        except ArithmeticError:
+            return []
+
     rough: list[Fit] = []
     for share in START_SHARES:
-        rough += _rough_fit(fit, candidate, variant, share * strength)
+        rough += rough_fit(variant, share * strength)
         if rough and rough[-1].objective < fit.objective:
             break
     for other, size in further:
-        rough += _rough_fit(fit, candidate, other, size)
+        rough += rough_fit(other, size)
     if not rough:
         raise ArithmeticError(f"no simulation has a solution with {candidate.label}")
     best = min(rough, key=lambda one: one.objective)
     return best.experiment.fit(best.z, iterations=iterations - ROUGH, at=best.linearised)
 
 
-def _rough_fit(fit: Fit, candidate: Hypothesis, variant: int, strength: float) -> list[Fit]:
-    """A few steps from one start; empty if it has no solution."""
+def _straight_line(fit: Fit, candidate: Hypothesis, variant: int) -> tuple[Array, Experiment, Array]:
+    """Change of the other unknowns per unit of strength, and the experiment with one variant and its ``z``."""
     one = replace(candidate, variants=candidate.variants[[variant]])
     assert candidate.term is not None  # noqa: S101 - parameters out of their priors have no term
     on_grid = _on_grid(fit.experiment.machine.model, candidate.term)
     column = [part.filter(_columns(fit.experiment, part, [(one, on_grid)])[0]) for part in fit.parts]
     both = Linearised.of([replace(part, residual=x[:, 0]) for part, x in zip(fit.parts, column, strict=True)],
                          fit.experiment.metric)  # fmt: skip
-    aside = -fit.covariance @ both.products[1:, 0]  # of the other unknowns, per unit of strength
-    experiment, own = with_candidate(fit, candidate, variant)
-    own[0] = experiment.unknowns[len(fit.z)].z_of(strength)
-    try:
-        return [experiment.fit(np.concatenate([fit.z + strength * aside, own]),
-                               [part.point.trajectory for part in fit.parts], iterations=ROUGH)]  # fmt: skip
-    except ArithmeticError:
-        return []
+    return (-fit.covariance @ both.products[1:, 0], *with_candidate(fit, candidate, variant))

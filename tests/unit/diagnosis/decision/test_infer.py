@@ -10,10 +10,21 @@ import pytest
 
 from diagnosis.candidates.hypotheses import Hypothesis, hypothesis_of
 from diagnosis.decision import infer as infer_module
-from diagnosis.decision.infer import NEAR_PLACE, PLACES, RACED, _best_of, _InClass, _judged, _raced, infer
+from diagnosis.decision.infer import (
+    NEAR_PLACE,
+    PLACES,
+    RACED,
+    _best_of,
+    _InClass,
+    _judged,
+    _raced,
+    _scanned_in_classes,
+    infer,
+)
 from diagnosis.decision.posterior import KINDS, Judged, Posterior, decide
 from diagnosis.decision.settings import Settings
 from diagnosis.engine.calibration import Calibration, calibrate_with_error
+from diagnosis.engine.candidates import scan
 from diagnosis.engine.families import axis_of, changes, log_prior, parameters_outside
 from diagnosis.engine.fit import Fit, calibrate
 from diagnosis.engine.learnt import ErrorClass
@@ -72,6 +83,25 @@ def test_the_scan_is_told_for_less_and_more_model_error(concealed: Posterior, he
     assert {one.best.label for one in concealed.scaled} == {"windage@oil"}
     assert all(one.log_e > one.threshold for one in concealed.scaled)
     assert all(one.log_e < one.threshold for one in healthy.scaled)
+
+
+def test_scaled_model_error_is_that_of_a_class_with_such_amplitudes(fzg: Gearbox) -> None:
+    """Half of "splits" is "half splits", but for the priors of the two classes."""
+    train = recorded(fzg, "train", windage_W=WINDAGE_W, hours=HOURS)
+    setup, experiment = prepare_experiment(fzg, [train], [train])
+    calibration = calibrate_with_error(experiment, calibrate(experiment))
+    placed = CATALOGUE["windage"].placed(experiment.machine.model.network, setup.scale, setup.channels)
+    candidates = [hypothesis_of(one) for one in placed]
+    found = scan(calibration.fit, candidates, calibration.near.columns)
+
+    def scanned(name: str, factor: float) -> tuple[float, float]:
+        every = _scanned_in_classes(calibration, found, candidates, np.zeros(len(candidates)), factor).classes
+        none, one = (next(each for each in every if each.error_class.name == which) for which in ("none", name))
+        return one.ahead - none.ahead - float(np.log(one.error_class.prior)), float(one.log_bayes[0] - one.ahead)
+
+    assert scanned("splits", 0.5) == pytest.approx(scanned("half splits", 1.0), abs=1e-6)
+    assert scanned("half splits", 2.0) == pytest.approx(scanned("splits", 1.0), abs=1e-6)
+    assert abs(scanned("splits", 0.5)[0] - scanned("splits", 1.0)[0]) > 0.5
 
 
 def test_its_size_is_found(concealed: Posterior) -> None:
