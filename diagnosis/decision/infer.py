@@ -111,11 +111,16 @@ def infer(
         alone |= {label: min(alone[label], value) for label, value in there.items()}
     for index, candidate in enumerate(first.candidates):
         judged.setdefault(candidate.label, _by_scan(first, index, alone[candidate.label]))
-    log_e = float(logsumexp([one.log_prior + one.log_bayes for one in judged.values()]))
     error_class = chosen.error_class if best is None else best.error_class
     threshold = rule().threshold(error_class, settings.false_alarm_rate)
+    log_e = _log_e(judged.values())
+    if best is not None and best.fit is not None and log_e > threshold:
+        progress("fitting nothing from there")
+        gained = _nothing_gains(calibration, best)
+        judged, pairs = {name: _less(one, gained) for name, one in judged.items()}, [_less(one, gained) for one in pairs]
+        log_e = _log_e(judged.values())
     missing = log_e > threshold
-    unknown = _unknown(calibration, error_class, outside) if missing else []
+    unknown = [_less(one, gained) for one in _unknown(calibration, error_class, outside)] if missing else []
     nothing = Judged(effects=(), log_prior=0.0, log_bayes=0.0, error_class=chosen.error_class, fit=base)
     return Posterior(
         nothing=nothing, judged=(*judged.values(), *pairs, *unknown), log_e=log_e, threshold=threshold, rule=rule(),
@@ -342,6 +347,33 @@ def _given_best(
     alone = (_weighed(found, outside, without) + ahead).tolist()
     labels = [one.label for one in second.candidates]
     return float(second.log_bayes[order[0]]), pairs, dict(zip(labels, alone, strict=True))
+
+
+def _log_e(judged: Iterable[Judged]) -> float:
+    """Log of the mean Bayes factor over all single explanations."""
+    return float(logsumexp([one.log_prior + one.log_bayes for one in judged]))
+
+
+def _nothing_gains(calibration: Calibration, best: Judged) -> float:
+    """Nats by which nothing does better from the point and in the class of the best explanation, at least 0.
+
+    The calibration may have ended in another basin, and its classes are compared by straight lines.
+    """
+    assert best.fit is not None  # noqa: S101
+    fit, known = best.fit, calibration.in_class(best.error_class)
+    found = [calibration.chosen.log_evidence, known.log_evidence]
+    try:
+        count = len(calibration.fit.z)
+        alone = known.fit.experiment.fit(fit.z[:count], [part.point.trajectory for part in fit.parts])
+        found.append(fit_over_sessions(alone, count).log_evidence + float(np.log(best.error_class.prior)))
+    except (InputError, ArithmeticError, np.linalg.LinAlgError):
+        pass  # what is known counts
+    return max(found) - calibration.chosen.log_evidence
+
+
+def _less(one: Judged, gained: float) -> Judged:
+    """An explanation against a nothing that has more evidence."""
+    return replace(one, log_bayes=one.log_bayes - gained)
 
 
 def _unknown(calibration: Calibration, error_class: ErrorClass, outside: Sequence[Hypothesis]) -> list[Judged]:
