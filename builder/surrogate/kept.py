@@ -104,7 +104,7 @@ def _key(gearbox: Gearbox, preset: Preset, seed: int) -> str:
             if one["user_api"] == "blas"
         ),
     }
-    return hashlib.sha256(json.dumps(made_of, sort_keys=True).encode()).hexdigest()
+    return hashlib.sha256(json.dumps(made_of, sort_keys=True).encode()).hexdigest()[:32]
 
 
 @cache
