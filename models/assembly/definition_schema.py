@@ -73,7 +73,7 @@ def _open_table(table: Schema) -> Schema:
 
 
 def _kind(root: Schema, keys: Iterable[str], differing: Iterable[str]) -> Schema:
-    """What one kind of definition needs, what it must not have, and its tables that the other kind has otherwise."""
+    """Keys that one kind of definition needs and must not have, and its tables that the other kind has otherwise."""
     own = root["properties"]
     return {
         "required": root["required"],
