@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import os
+import shutil
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from builder.__main__ import main
+from builder.base.cache import CACHE_VARIABLE
 from builder.native.native_fmu import build_native_fmu
 from builder.python.python_fmu import build_python_fmu
 from builder.surrogate.networks import PRESETS
@@ -20,6 +22,21 @@ from models.assembly.gearbox import Gearbox, load_gearbox
 from models.simulation.thermal_network import ThermalNetwork
 
 QUICK = replace(PRESETS["default"], samples=400, max_iter=60, starts=1, judged=200)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def cache_of_this_run(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """Compiled libraries are shared by the tests of a run; nothing comes from the user's cache or goes there."""
+    folder = tmp_path_factory.getbasetemp() / "cache"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv(CACHE_VARIABLE, str(folder))
+        yield folder
+
+
+@pytest.fixture(autouse=True)
+def no_networks_of_other_tests(cache_of_this_run: Path) -> None:
+    """A test that builds an FMU trains its networks."""
+    shutil.rmtree(cache_of_this_run / "networks", ignore_errors=True)
 
 
 @pytest.fixture(scope="session")

@@ -78,6 +78,7 @@ def commands() -> None:
               help="Training points per network.  [default: by preset]")  # fmt: skip
 @click.option("--seed", type=click.IntRange(min=0, max=2**32 - 1), default=0, show_default=True, metavar="N",
               help="Seed of samples and starts.")  # fmt: skip
+@click.option("--retrain", is_flag=True, help="Train the networks even if an earlier build has trained the same.")
 @worker_options(jobs_help="Processes on this machine; the result does not depend on it.")
 def build_fmu(
     gearbox: str,
@@ -91,6 +92,7 @@ def build_fmu(
     preset: str,
     samples: int | None,
     seed: int,
+    retrain: bool,
     jobs: int,
     dask: str | None,
 ) -> None:
@@ -110,7 +112,7 @@ def build_fmu(
         report = build(
             definition, folder, name=Path(gearbox).stem, target=target, platforms=platforms or "host", fmi=fmi or "2",
             preset=preset, samples=samples, seed=seed, jobs=jobs, dask=dask, correction=found, couple=couple,
-            progress=told,
+            retrain=retrain, progress=told,
         )  # fmt: skip
     report.show()
 

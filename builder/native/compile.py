@@ -1,7 +1,7 @@
 """C sources to shared libraries: for all platforms with ziglang, which cross-compiles, or for this machine alone.
 
-Libraries are kept in a cache (``GEARBOX_TWIN_CACHE``, by default the user's cache folder; ``off`` for none), keyed by
-all that makes them: the same sources, options and compiler are not compiled twice.
+Libraries are kept (:mod:`builder.base.cache`), keyed by all that makes them: the same sources, options and compiler are
+not compiled twice.
 """
 
 from __future__ import annotations
@@ -23,11 +23,10 @@ from functools import cache, partial
 from importlib.resources import files
 from pathlib import Path
 
-from models.base.atomic_write import atomic_file
+from builder.base.cache import cached_path, keep, recall
 from models.base.errors import InputError, did_you_mean
 from models.base.progress import Progress, silent
 
-CACHE_VARIABLE = "GEARBOX_TWIN_CACHE"
 GET_ZIG = "install ziglang: python -m pip install ziglang"
 INCLUDES_STANDARD_HEADERS = {"one.c": b"#include <math.h>\n#include <stdio.h>\nint one(void) { return 1; }\n"}
 # NaN and infinity keep their meaning: no -ffast-math. Nobody reads errno or floating-point exceptions.
@@ -330,39 +329,16 @@ def _library(sources: Mapping[str, bytes], compiler: Compiler, wanted: Library) 
     if compiler.is_zig and wanted.is_windows:
         runtime = (files("fmu_src") / "native" / WINDOWS_RUNTIME).read_bytes()
         sources = {**sources, WINDOWS_RUNTIME: runtime}
-    folder = _cache_folder()
-    if folder is None:
-        return _compile(sources, compiler, wanted)
     # zig is the same in every virtual environment, and another compiler's own options are part of its command.
     command = compiler.command[1:] if compiler.is_zig else compiler.command
     made_of = (compiler.version, command, _commands(["*.c"], compiler, wanted), sorted(sources.items()))
     digest = hashlib.sha256(repr(made_of).encode()).hexdigest()
-    kept = folder / f"{digest}-{wanted.file}"
-    try:
-        return kept.read_bytes()
-    except OSError:
+    path = cached_path(f"{digest}-{wanted.file}")
+    library = recall(path)
+    if library is None:
         library = _compile(sources, compiler, wanted)
-    try:
-        with atomic_file(kept) as file:
-            file.write_bytes(library)
-    except (InputError, OSError):
-        pass  # without a cache it is only slower
+        keep(path, library)
     return library
-
-
-def _cache_folder() -> Path | None:
-    named = os.environ.get(CACHE_VARIABLE)
-    if named == "off":
-        return None
-    if named:
-        return Path(named)
-    if sys.platform == "win32":
-        base = os.environ.get("LOCALAPPDATA") or Path.home() / "AppData/Local"
-    elif sys.platform == "darwin":
-        base = Path.home() / "Library/Caches"
-    else:
-        base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    return Path(base) / "gearbox-thermal-twin"
 
 
 def _compile(sources: Mapping[str, bytes], compiler: Compiler, library: Library) -> bytes:

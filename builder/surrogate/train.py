@@ -67,7 +67,22 @@ class TrainedNetwork:
 
 @dataclass(frozen=True, kw_only=True)
 class TrainingResult:
-    """A trained surrogate and how good it is."""
+    """A trained surrogate and how good it is.
+
+    Attributes
+    ----------
+    losses : SurrogateLosses
+    networks : tuple of TrainedNetwork
+        Empty if it was trained in an earlier build
+    report : tuple of ErrorReport
+    preset : Preset
+    seed : int
+    definition_hash, gearbox : str
+    seconds : float
+        That the training took, [s]
+    origin : str
+        In words, where the networks are from
+    """
 
     losses: SurrogateLosses
     networks: tuple[TrainedNetwork, ...]
@@ -77,6 +92,7 @@ class TrainingResult:
     definition_hash: str
     gearbox: str
     seconds: float
+    origin: str = "trained now"
 
     def report_of(self, network: str) -> tuple[ErrorReport, ...]:
         """Return the errors of the components that one network serves."""
@@ -147,10 +163,7 @@ def train_surrogate(
         If the preset is not known, there are too few samples, or the scheduler cannot be reached.
     """
     begin = time.perf_counter()
-    chosen = preset_named(preset) if isinstance(preset, str) else preset
-    chosen = replace(chosen, samples=chosen.samples if samples is None else samples)
-    if chosen.samples < LEAST_SAMPLES:
-        raise InputError(f"{chosen.samples} samples per network are too few; give at least {LEAST_SAMPLES}")
+    chosen = chosen_preset(preset, samples)
     bounds = gearbox.training
     domain = (
         chosen.domain
@@ -193,6 +206,21 @@ def train_surrogate(
         gearbox=gearbox.name,
         seconds=time.perf_counter() - begin,
     )
+
+
+def chosen_preset(preset: str | Preset, samples: int | None = None) -> Preset:
+    """Return a preset, by its name or as it is, with another number of samples if one is given.
+
+    Raises
+    ------
+    InputError
+        If the preset is not known or there are too few samples.
+    """
+    chosen = preset_named(preset) if isinstance(preset, str) else preset
+    chosen = chosen if samples is None else replace(chosen, samples=samples)
+    if chosen.samples < LEAST_SAMPLES:
+        raise InputError(f"{chosen.samples} samples per network are too few; give at least {LEAST_SAMPLES}")
+    return chosen
 
 
 def judge(surrogate: SurrogateLosses, model: LossModel, *, count: int, seed: int) -> tuple[ErrorReport, ...]:

@@ -20,8 +20,9 @@ from builder.fmi.reference_cycle import COLD_START, reference_cycle
 from builder.native.compile import NoCompilerError, plan_for
 from builder.native.native_fmu import build_native_fmu
 from builder.python.python_fmu import build_python_fmu
+from builder.surrogate.kept import kept_or_trained
 from builder.surrogate.onnx_export import export_onnx
-from builder.surrogate.train import TrainingResult, train_surrogate
+from builder.surrogate.train import TrainingResult
 from models.assembly.gearbox import Gearbox, load_gearbox
 from models.base.atomic_write import atomic_folder
 from models.base.errors import InputError
@@ -141,6 +142,7 @@ class BuildReport:
             ["loss", "R²", "median %", "p95 %", "corner median %", "corner p95 %"],
             rows,
         )
+        console.out.print(f"networks: {training.origin}\n")
 
     def _show_cycles(self) -> None:
         worst = [max(cycle.temperature_K.items(), key=lambda item: item[1]) for cycle in self.cycles.values()]
@@ -175,9 +177,12 @@ def build(
     dask: str | None = None,
     correction: Correction | None = None,
     couple: Sequence[str] = (),
+    retrain: bool = False,
     progress: Progress = silent,
 ) -> BuildReport:
     """Build the FMUs of `gearbox` and try them on the reference cycle; with geometry, train their networks first.
+
+    Networks that an earlier build trained for the same definition and settings are used again.
 
     Parameters
     ----------
@@ -201,6 +206,8 @@ def build(
         What a diagnosis found: the FMU and the full model it is compared with carry it
     couple : sequence of str
         Boundaries whose temperature becomes an input, ``<boundary>.T_in``
+    retrain : bool
+        Train networks even if an earlier build has trained the same
     progress : callable
         Told what is being done
 
@@ -237,10 +244,11 @@ def build(
     with atomic_folder(folder) as stage:
         training, networks = None, tuple[Path, ...]()
         if not gearbox.is_parametric:
-            with _measure_time("train", seconds):
-                training = train_surrogate(
-                    gearbox, preset=preset, samples=samples, seed=seed, jobs=jobs, dask=dask, progress=progress
-                )
+            with _measure_time("networks", seconds):
+                training = kept_or_trained(
+                    gearbox, preset=preset, samples=samples, seed=seed, jobs=jobs, dask=dask, retrain=retrain,
+                    progress=progress,
+                )  # fmt: skip
             progress("exporting the networks")
             with _measure_time("export", seconds):
                 networks = export_onnx(training, stage / "networks", version=project_version())

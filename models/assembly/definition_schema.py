@@ -7,7 +7,7 @@ between tables are left to the program.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from models.assembly.gearbox_definition import FACTORS, Definition
@@ -46,15 +46,40 @@ def definition_schema() -> Schema:
         schema = root.model_json_schema(by_alias=True, ref_template="#/definitions/{model}")
         tables |= schema.pop("$defs")
         tables[root.__name__] = schema
-    geometry = Definition.__name__
+    tables = {name: _table(name, table) for name, table in tables.items()}
+    geometry, parametric = (tables[root.__name__] for root in ROOTS)
+    keys = geometry["properties"] | parametric["properties"]
+    differing = {
+        key: _open_table(tables[geometry["properties"][key]["$ref"].rpartition("/")[2]])
+        for key in geometry["properties"].keys() & parametric["properties"].keys()
+        if geometry["properties"][key] != parametric["properties"][key]
+    }
     return {
         "$schema": DRAFT,
         "title": TITLE,
         "type": "object",
-        "if": {"required": [KEY]},
-        "then": {"$ref": f"#/definitions/{ParametricDefinition.__name__}"},
-        "else": {"$ref": f"#/definitions/{geometry}"},
-        "definitions": SHARED | {name: _table(name, table) for name, table in tables.items()},
+        "additionalProperties": False,
+        "properties": keys | differing,  # not below "then" alone, where Even Better TOML completes nothing
+        "if": {"required": [KEY], "additionalProperties": True},
+        "then": _kind(parametric, keys, differing),
+        "else": _kind(geometry, keys, differing),
+        "definitions": SHARED | tables,
+    }
+
+
+def _open_table(table: Schema) -> Schema:
+    """A table for completion alone, of which the kind of definition decides what is needed."""
+    return {"type": "object", "description": table["description"], "properties": table["properties"]}
+
+
+def _kind(root: Schema, keys: Iterable[str], differing: Iterable[str]) -> Schema:
+    """Keys that one kind of definition needs and must not have, and its tables that the other kind has otherwise."""
+    own = root["properties"]
+    return {
+        "required": root["required"],
+        "additionalProperties": True,
+        "properties": {key: {"not": {}} for key in keys if key not in own}
+        | {key: own[key] for key in sorted(differing)},
     }
 
 

@@ -20,6 +20,7 @@ import pytest
 from fmpy import read_model_description
 from fmpy.fmi1 import FMICallException
 
+from builder.base.cache import CACHE_VARIABLE
 from builder.drive.driver import drive_fmu
 from builder.fmi.reference_cycle import reference_cycle
 from builder.native import compile as native_compile
@@ -315,7 +316,7 @@ def test_only_fmi_functions_are_exported_and_only_libc_is_needed(fzg_native: Pat
 def test_same_content_gives_the_same_bytes_with_and_without_cache(
     build_native: Build, fzg_native: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setenv(native_compile.CACHE_VARIABLE, "off")
+    monkeypatch.setenv(CACHE_VARIABLE, "off")
     again = build_native(tmp_path / "fzg.fmu")
     with zipfile.ZipFile(again) as one, zipfile.ZipFile(fzg_native) as other:
         assert one.namelist() == other.namelist()
@@ -327,7 +328,7 @@ def test_same_content_gives_the_same_bytes_with_and_without_cache(
 
 
 def test_the_cache_follows_the_sources_and_can_be_done_without(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv(native_compile.CACHE_VARIABLE, str(tmp_path / "cache"))
+    monkeypatch.setenv(CACHE_VARIABLE, str(tmp_path / "cache"))
     first = compile_libraries(SOURCE, "host")
     (kept,) = (tmp_path / "cache").iterdir()
     kept.write_bytes(b"from the cache")
@@ -335,7 +336,7 @@ def test_the_cache_follows_the_sources_and_can_be_done_without(tmp_path: Path, m
     compile_libraries({"one.c": SOURCE["one.c"].replace(b"return 1", b"return 2")}, "host")
     assert len(list((tmp_path / "cache").iterdir())) == 2
     (tmp_path / "file").write_text("")
-    monkeypatch.setenv(native_compile.CACHE_VARIABLE, str(tmp_path / "file" / "cache"))
+    monkeypatch.setenv(CACHE_VARIABLE, str(tmp_path / "file" / "cache"))
     assert compile_libraries(SOURCE, "host") == first
 
 
@@ -359,7 +360,7 @@ def test_all_platforms_are_built_and_the_bytes_are_reproducible(
     fzg: Gearbox, fzg_training: TrainingResult, fzg_networks: tuple[Path, ...], tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # fmt: skip
-    monkeypatch.setenv(native_compile.CACHE_VARIABLE, "off")
+    monkeypatch.setenv(CACHE_VARIABLE, "off")
     builds = [
         build_native_fmu(fzg, fzg_training, fzg_networks, tmp_path / folder / "fzg.fmu", platforms="all")
         for folder in ("a", "b")

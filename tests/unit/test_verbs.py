@@ -87,10 +87,10 @@ def test_build_passes_correction_preset_and_platforms_on(
     usual = ("build-fmu", "--output", tmp_path / "out")
     invoked(*usual)
     invoked(*usual, "--correction", tmp_path / "correction.toml", "--preset", "paper", "--target", "native",
-            "--platforms", "win64", "--samples", 300, "--seed", 4)  # fmt: skip
+            "--platforms", "win64", "--samples", 300, "--seed", 4, "--retrain")  # fmt: skip
     plain, special = asked
-    names = ("target", "platforms", "preset", "samples", "seed")
-    assert tuple(plain[name] for name in names) == ("both", "host", "default", None, 0)
-    assert tuple(special[name] for name in names) == ("native", "win64", "paper", 300, 4)
+    names = ("target", "platforms", "preset", "samples", "seed", "retrain")
+    assert tuple(plain[name] for name in names) == ("both", "host", "default", None, 0, False)
+    assert tuple(special[name] for name in names) == ("native", "win64", "paper", 300, 4, True)
     assert plain["correction"] is None
     assert [(c.name, c.value) for c in special["correction"].calibration] == [("mesh", 1.07)]

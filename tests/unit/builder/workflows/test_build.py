@@ -4,20 +4,23 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from typing import Any
 from zipfile import ZipFile
 
 import numpy as np
 import pytest
 from fmpy import read_model_description, simulate_fmu
 
+from builder.base.cache import CACHE_VARIABLE
 from builder.drive import driver as fmu_drive
 from builder.drive.driver import runs_here
 from builder.native import compile as native_compile
-from builder.native.compile import CACHE_VARIABLE, NoCompilerError, host_platform
+from builder.native.compile import NoCompilerError, host_platform
 from builder.surrogate.train import TrainingResult
 from builder.workflows import build as builder_build
 from builder.workflows.build import build, cycle_errors
 from models.assembly.gearbox import Gearbox, load_gearbox
+from models.correction.correction import Correction, Estimate
 
 
 def test_errors_over_a_cycle_are_those_of_the_fmu_against_the_model() -> None:
@@ -40,7 +43,7 @@ def test_an_fmu_that_cannot_run_here_is_built_and_that_is_told(
         there = {name.split("/")[1] for name in archive.namelist() if name.startswith("binaries/")}
     assert runs_here(fzg_fmu) == (host_platform() in there)
     monkeypatch.setattr(fmu_drive, "host_platform", lambda: "darwin64")
-    monkeypatch.setattr(builder_build, "train_surrogate", lambda *_, **__: fzg_training)
+    monkeypatch.setattr(builder_build, "kept_or_trained", lambda *_, **__: fzg_training)
     report = build(fzg, tmp_path, name="fzg", target="python")
     report.show()
     shown = capsys.readouterr()
@@ -52,6 +55,26 @@ def test_an_fmu_that_cannot_run_here_is_built_and_that_is_told(
     assert [note for note in again.notes if "earlier" in note] == [
         f"{tmp_path / 'fzg.fmu'} is of an earlier build: report.json and networks/ no longer describe it"
     ]
+
+
+def test_a_corrected_fmu_of_kept_networks_has_the_bytes_of_a_trained_one(
+    fzg: Gearbox, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    correction = Correction.of(fzg, calibration=[Estimate(name="mesh", value=1.07, stderr=0.02)])
+    quick: dict[str, Any] = {"name": "fzg", "preset": "paper", "samples": 60}
+    build(fzg, tmp_path / "nominal", **quick).show()
+    assert "networks: trained now, kept in " in capsys.readouterr().out
+    taken = build(fzg, tmp_path / "corrected", correction=correction, **quick)
+    taken.show()
+    assert "networks: taken from " in capsys.readouterr().out
+    assert taken.seconds["networks"] < 0.5
+    monkeypatch.setenv(CACHE_VARIABLE, "off")
+    trained = build(fzg, tmp_path / "trained", correction=correction, **quick)
+    assert trained.training and trained.training.origin == "trained now"
+    assert [path.name for path in trained.files] == [path.name for path in taken.files]
+    assert {path.suffix for path in trained.files} == {".fmu", ".onnx", ".json", ".csv", ".png"}
+    for here, there in zip(taken.files, trained.files, strict=True):
+        assert here.read_bytes() == there.read_bytes(), here.name
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="a script as compiler")
@@ -69,7 +92,7 @@ def test_without_a_compiler_the_python_fmu_is_built_and_one_line_says_how_to_get
     monkeypatch.setenv(CACHE_VARIABLE, "off")
     monkeypatch.delenv("CC", raising=False)
     monkeypatch.setattr(native_compile, "_zig", lambda: None)
-    monkeypatch.setattr(builder_build, "train_surrogate", lambda *_, **__: fzg_training)
+    monkeypatch.setattr(builder_build, "kept_or_trained", lambda *_, **__: fzg_training)
     report = build(fzg, tmp_path / "out", name="fzg")
     assert [path.name for path in report.files if path.suffix == ".fmu"] == ["fzg.fmu"]
     assert report.purpose == "fzg.fmu runs on Python with numpy and onnxruntime"

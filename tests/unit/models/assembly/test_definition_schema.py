@@ -53,6 +53,29 @@ def test_a_fault_is_found_where_it_is(old: str, new: str, place: str) -> None:
     assert place in faults(text.replace(old, new, 1))
 
 
+@pytest.mark.parametrize(
+    ("name", "more", "place"),
+    [
+        ("fzg", '[[heat]]\nname = "x"\npart = "oil"\nheat_W = "1"', "heat"),
+        ("heated_rod", "[housing]\nheight_m = 0.2", "housing"),
+        ("la_haute_borne", "[oil.gold]\ns = 1.0", "oil"),
+        ("fzg", "[[stages]]\nz = [1, 2]", ""),
+    ],
+)
+def test_a_table_of_the_other_kind_of_definition_is_a_fault(name: str, more: str, place: str) -> None:
+    assert place in faults(f"{read_text(packaged('gearboxes', name))}\n{more}\n")
+
+
+def test_editors_find_every_table_without_a_condition() -> None:
+    """Even Better TOML completes and explains nothing that stands below "then" or "else" alone."""
+    schema: dict[str, Any] = definition_schema()
+    for root in ROOTS:
+        assert set(schema["definitions"][root.__name__]["properties"]) <= set(schema["properties"])
+    for table in schema["properties"].values():
+        assert {"$ref", "type", "anyOf", "const"} & set(table)
+    assert set(schema["properties"]["oil"]["properties"]) == set(schema["definitions"]["Oil"]["properties"])
+
+
 def test_every_key_is_explained() -> None:
     """A key without a meaning would stand in the schema, the commented files and the reference without one."""
     tables: dict[str, Any] = definition_schema()["definitions"]
