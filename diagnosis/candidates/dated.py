@@ -148,8 +148,6 @@ def changing(placed: Placed, course: Course, axis: Axis, *, sd: float | None = N
     ----------
     placed : Placed
         Its shape parameters start from the middles of their grids
-    course : Course
-    axis : Axis
     sd : float, optional
         Prior of the strength; by default that of the law
 
@@ -186,7 +184,6 @@ def carried_on(placed: Placed, axis: Axis) -> Hypothesis:
     ----------
     placed : Placed
         Without memories
-    axis : Axis
     """
     label = f"{placed.label}_carried_on"
     term, clock, base = _renamed(placed, label), _clock(label, axis), hypothesis_of(placed)

@@ -56,9 +56,6 @@ def match_columns(
     ----------
     present : sequence of str
         Columns of the file
-    time_column : str
-    mapping : RecordingMapping
-    network : RecordedMachine
     problems : Problems
         Receives columns that are missing, unknown, named twice or misspelt
     notes : list of str
@@ -191,13 +188,10 @@ def quantity_values(
         Of the column
     column : Column
         What the mapping states of it
-    quantity : Quantity
     unit_of_file : str or None
         Unit that the file itself names
     outside : array of bool, shape (rows,)
         Rows that the mapping leaves out
-    problems : Problems
-    notes : list of str
 
     Returns
     -------
@@ -249,13 +243,10 @@ def _possible(
     ----------
     values : Array, shape (rows,)
         In the unit inside; NaN where missing
-    quantity : Quantity
     name : str
         Its column
     rows : array of int, shape (rows,)
         Numbers of the rows, for messages
-    problems : Problems
-    notes : list of str
     """
     infinite = np.flatnonzero(np.isinf(values))
     if len(infinite):

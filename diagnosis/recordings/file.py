@@ -27,7 +27,6 @@ class RecordingFile:
 
     Attributes
     ----------
-    mapping : RecordingMapping
     chunks : iterator of DataFrame
     clock : Clock or None
         None, and a problem, if there is none
@@ -94,7 +93,6 @@ def open_recording(path: Path, mapping: Path | None, usual: RecordingMapping) ->
 
     Parameters
     ----------
-    path : Path
     mapping : Path or None
         Mapping file; by default the one next to the file
     usual : RecordingMapping

@@ -35,7 +35,6 @@ class RecordedRows:
     auxiliary : dict of column to Array, shape (rows,)
     names, roles : dict of quantity to str, Column
         Its column, and what the mapping states of it
-    assumed, notes : list of str
     """
 
     path: Path

@@ -132,7 +132,6 @@ class Clock:
 
     Attributes
     ----------
-    column : str
     unit : str
         Of numbers; ``iso8601`` for texts and for the time stamps of a Parquet file
     """
@@ -247,8 +246,6 @@ def check_time(values: pd.Series, seconds: Array, clock: Clock, problems: Proble
         Cells of the time column; the index counts the rows of the file from 0
     seconds : Array, shape (rows,)
         The same in [s]
-    clock : Clock
-    problems : Problems
     """
     name, rows = clock.column, np.asarray(values.index) + 1
     wrong = np.flatnonzero(~np.isfinite(seconds))

@@ -35,10 +35,8 @@ class Chart:
     ----------
     name : str
         Of the element in the page
-    title : str
     alt : str
         All that the figure shows, in words
-    figure : plotly.graph_objects.Figure
     note : str
         How to read it
     """
@@ -62,7 +60,6 @@ def dressed(figure: go.Figure, height: int, **layout: Any) -> go.Figure:
 
     Parameters
     ----------
-    figure : plotly.graph_objects.Figure
     height : int
         [px]; the width is that of the page
     **layout

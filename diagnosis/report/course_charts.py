@@ -51,8 +51,6 @@ class Shown:
 
     Attributes
     ----------
-    title : str
-    run : PredictedRun
     unscored : sequence of (from, to)
         Stretches that served to find start temperatures, [s]
     """

@@ -121,7 +121,6 @@ def drawn(network: ThermalNetwork, nominal: ThermalNetwork, measured: Iterable[s
         As delivered; nodes and links that it lacks are drawn as new
     measured : iterable of str
         Channels: nodes with a thermometer, or with one of several
-    marked : Marks
     """
     place = {node: (x, -float(row)) for node, (x, row) in places_of(network, nominal).items()}
     rows = 1.0 - min(y for _, y in place.values())

@@ -32,12 +32,8 @@ def finding_of(
 
     Parameters
     ----------
-    answer : Answer
     fit : Fit
         With the effect of the answer among its unknowns
-    setup : InferenceSetup
-    posterior : Posterior
-    catalogue : mapping of str to Mechanism
     recordings : sequence of Recording
         Learnt from
     """

@@ -62,7 +62,6 @@ class Others:
     ----------
     fit : Fit
         The nominal machine calibrated by them, without model error
-    posterior : Posterior
     channels : tuple of str
         The faulty ones
     """
@@ -90,19 +89,14 @@ def assemble(
 
     Parameters
     ----------
-    setup : InferenceSetup
     experiment : Experiment
         Of the nominal machine
-    posterior : Posterior
     answers : sequence of Answer
         Most important first
     plain : Fit
         The nominal machine calibrated without model error
     others : Others or None
         What all but faulty channels say, if there are any
-    settings : Settings
-    catalogue : mapping of str to Mechanism
-    train, held_out : sequence of Recording
     jobs : int
         Processes
     """

@@ -67,7 +67,6 @@ def sensors_and_inputs_of(
 
     Parameters
     ----------
-    fit : Fit
     findings : collection of str
         Labels of terms that the correction has as ``[[finding]]``; they are left out here, because both are applied
     mixes : mapping of channel to sequence of Mix, optional

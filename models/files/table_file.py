@@ -123,7 +123,6 @@ def read_table(path: Path, form: TextForm = PLAIN) -> pd.DataFrame:
 
     Parameters
     ----------
-    path : Path
     form : TextForm
         Of a CSV file
 

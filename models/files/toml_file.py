@@ -66,7 +66,6 @@ def parse_schema_1(text: str, *, file: str, kind: str) -> dict[str, Any]:
 
     Parameters
     ----------
-    text : str
     file : str
         Name of the file, for the message
     kind : str

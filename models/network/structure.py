@@ -48,7 +48,6 @@ class Node:
 
     Attributes
     ----------
-    name : str
     capacity : sympy.Expr or None
         Heat capacity, [J/K]; None for a boundary
     temperature : sympy.Expr or None
@@ -85,8 +84,6 @@ class ExtraState:
 
     Attributes
     ----------
-    name : str
-    start : float
     rate : sympy.Expr
         Time derivative, [1/s]; 0 for a state that only switches
     update : sympy.Expr or None
@@ -111,8 +108,6 @@ class Network:
 
     Attributes
     ----------
-    nodes, links, sources : tuple
-    parameters : tuple of Parameter
     components : tuple of str
         Losses that the sources may use as the signal ``P_<component>``
     inputs : mapping of str to Input
@@ -121,7 +116,6 @@ class Network:
         Signals that follow from inputs and parameters, as a torque from an electrical power
     groups : mapping of str to tuple of str
         Names for several nodes together, e.g. ``housing``
-    states : tuple of ExtraState
     numeric_laws : mapping of str to NumericLaw
         Laws that could not be traced, by the symbol in their place
     operating : mapping of str to sympy.Expr

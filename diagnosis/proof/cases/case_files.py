@@ -58,10 +58,6 @@ def keep_other_cases(made: Path, output: Path) -> None:
 def staged_folders(recordings: Path, truth: Path) -> Iterator[tuple[Path, Path]]:
     """Folders to write cases into; both replace those named when all is done, or nothing changes.
 
-    Parameters
-    ----------
-    recordings, truth : Path
-
     Yields
     ------
     recordings, truth : Path
@@ -95,7 +91,6 @@ def write_case(
     truth_file : Path or None
         Outside `folder`; see :func:`keep_apart`. None: the truth is not written
     recordings : mapping of name to columns
-    truth : mapping
     stated : mapping of key to float, or None
         Data sheet of every temperature sensor, by the keys of a mapping file; it may be wrong
 

@@ -84,7 +84,6 @@ def mixed_plans(seed: int, counts: Mapping[str, int]) -> list[Plan]:
 
     Parameters
     ----------
-    seed : int
     counts : mapping of group to int
         How many of each group; singles take every mechanism of the catalogue in turn before one comes twice
 
@@ -179,9 +178,6 @@ def conceal_set(
 
     Parameters
     ----------
-    gearbox : Gearbox
-    plans : sequence of Plan
-    seed : int
     recordings : Path
         Folder that gets one folder per case
     truth : Path or None

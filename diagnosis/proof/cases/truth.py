@@ -30,8 +30,6 @@ def truth_of(plant: Plant, case: ConcealedCase, by_twin: Sequence[Sequence[Outco
 
     Parameters
     ----------
-    plant : Plant
-    case : ConcealedCase
     by_twin : sequence of sequences of Outcome
         Per twin (see :func:`diagnosis.proof.cases.conceal.twins`) the outcome of every recording
 

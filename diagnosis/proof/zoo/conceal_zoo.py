@@ -33,7 +33,6 @@ class ZooPlan:
         One of :data:`~diagnosis.proof.zoo.case.GROUPS`
     kind : str or None
         Of a control, one of :data:`~diagnosis.proof.zoo.case.CONTROLS`
-    family, machine : str
     seed : int
         Of this case
     """
@@ -52,7 +51,6 @@ def zoo_plans(
 
     Parameters
     ----------
-    seed : int
     counts : mapping of group to int
         How many of each group
     families : sequence of str or None
@@ -115,7 +113,6 @@ def conceal_zoo(
 
     Parameters
     ----------
-    plans : sequence of ZooPlan
     recordings : Path
         Folder that gets one folder per case
     truth : Path or None
@@ -126,7 +123,6 @@ def conceal_zoo(
         Healthy recordings of every plant, ``baseline_1.csv.gz`` ...
     session_deviation : float or None
         Standard deviation of the logarithm of every parameter between sessions; drawn if None
-    oracle : callable
     progress : callable or None
         Called with the cases done and in all
 

@@ -58,12 +58,6 @@ def design_of(plant: ZooPlant, programmes: Sequence[Programme], measurement: Mea
     ----------
     plant : ZooPlant
         Healthy
-    programmes : sequence of Programme
-    measurement : Measurement
-
-    Returns
-    -------
-    Design
     """
     runs = [Linearised(plant, one, at=Variant()) for one in programmes if one.name.startswith("train")]
     parameters = [ParameterDirection(name=n, step=sd * plant.parameters[n]) for n, sd in plant.spread.items()]

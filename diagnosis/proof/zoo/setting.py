@@ -30,7 +30,6 @@ class Changed:
 
     Attributes
     ----------
-    what : str
     of : str
         Loss, link, node, channel or input; of a further link its two ends joined by ``-``
     nodes : tuple of str
@@ -54,7 +53,6 @@ class Parts:
 
     Attributes
     ----------
-    bodies, boundaries, paths : tuple
     like : mapping of str to str
         Body whose temperature at the first row each of the bodies has; empty: the air's
     """
@@ -107,8 +105,6 @@ class Setting:
 
     Parameters
     ----------
-    plant : ZooPlant
-    programmes : sequence of Programme
     healthy : Outcome
         Of one training recording without any effect, one run
     groups : mapping of str to tuple of str

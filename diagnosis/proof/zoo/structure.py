@@ -49,7 +49,6 @@ class Body:
 
     Attributes
     ----------
-    name : str
     capacity : Law
         [J/K]
     part_of : str
@@ -67,7 +66,6 @@ class Boundary:
 
     Attributes
     ----------
-    name : str
     temperature : Law
         [degC]
     part_of : str
@@ -85,7 +83,6 @@ class Path:
 
     Attributes
     ----------
-    name : str
     ends : (str, str)
     conductance : Law
         [W/K]
@@ -106,7 +103,6 @@ class Source:
 
     Attributes
     ----------
-    name : str
     power : Law
         [W]
     spread : mapping of str to float
@@ -150,12 +146,10 @@ class ZooPlant:
 
     Attributes
     ----------
-    family : str
     gearbox : str
         Name or file of the nominal definition that a diagnosis gets
     inputs : tuple of str
         Names of the inputs that its laws read
-    bodies, boundaries, paths, sources, probes : tuple
     parameters : mapping of str to float
         Of this machine
     spread : mapping of str to float
@@ -243,7 +237,6 @@ class Variant:
     ----------
     parameters : mapping of str to float
         Values in place of the plant's own
-    changes : tuple of Change
     quiet : bool
         True to leave out the random heats
     """
