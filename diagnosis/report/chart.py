@@ -19,6 +19,7 @@ FONT_PX = 12
 LETTERS = 42  # of a line on a phone
 MOST_POINTS = 700  # of a curve
 MOST_OF_ALL = 160_000  # points of all curves of a chart: some 2 MB of the page
+MARGIN = 0.05  # of the range of curves
 GAP = 20.0  # times the usual distance of rows: a curve is interrupted
 CONFIG = {
     "responsive": True,
@@ -132,13 +133,13 @@ def stretches(x: Array) -> list[slice]:
     return [slice(a, b) for a, b in pairwise(cuts)]
 
 
-def limits(curves: Sequence[Array], margin: float = 0.05) -> list[float] | None:
+def limits(curves: Sequence[Array]) -> list[float] | None:
     """A range around curves; None if they have no values."""
     values = np.concatenate([c[np.isfinite(c)] for c in curves] or [np.zeros(0)])
     if not len(values):
         return None
     low, high = float(values.min()), float(values.max())
-    apart = max(margin * (high - low), 1e-6 * max(abs(low), abs(high)), 1e-9)
+    apart = max(MARGIN * (high - low), 1e-6 * max(abs(low), abs(high)), 1e-9)
     return [low - apart, high + apart]
 
 

@@ -11,7 +11,7 @@ import plotly.graph_objects as go
 
 from diagnosis.report.chart import INK, Chart, dressed
 from diagnosis.report.network_layout import places_of
-from diagnosis.report.wording import headline, name, share
+from diagnosis.report.wording import name, share
 from diagnosis.results.result import NO_CLAIM, Diagnosis
 from diagnosis.results.result_parts import Finding
 from models.base.types import Array
@@ -75,8 +75,8 @@ def marks(diagnosis: Diagnosis) -> Marks:
     names: dict[str, str] = {}
     pointed: list[tuple[str, tuple[str, float]]] = []
     for finding in diagnosis.findings:
-        title = " or ".join(headline(one) for one in finding.tie_set or (finding.mechanism,))
-        said = (f"acts like {headline(finding.mechanism)}" if finding.acts_like else title, finding.sureness)
+        title = " or ".join(map(name, finding.tie_set or (finding.mechanism,)))
+        said = (f"acts like {name(finding.mechanism)}" if finding.acts_like else title, finding.sureness)
         pointed += [(target, said) for target in _targets(finding)]
         if finding.term is not None and finding.term.kind == "link":
             label = finding.term.label

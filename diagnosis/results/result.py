@@ -5,7 +5,7 @@ from __future__ import annotations
 import html
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
 from diagnosis.results.number_format import MINUS, number, with_error
@@ -18,9 +18,8 @@ from diagnosis.results.result_parts import (
     PredictedRun,
     Ranked,
     ScaledError,
-    finding_dict,
-    fits_dict,
     named,
+    or_none,
     robustness_told,
 )
 from diagnosis.results.tables import Table, draw_explanations, table_of
@@ -199,35 +198,28 @@ class Diagnosis:
                 }
                 for place in self.location
             ],
-            "findings": [finding_dict(finding) for finding in self.findings],
-            "calibration": [
-                {"parameter": c.parameter, "prior": c.prior, "value": c.value, "stderr": c.stderr,
-                 "shift_in_sd": c.shift_in_sd, "unit": c.unit}
-                for c in self.calibration
-            ],
-            "fit": {"train": fits_dict(self.train),
-                    "holdout": fits_dict(self.holdout) | {"log_score_gain": _or_none(self.holdout_gain)},
+            "findings": [finding.to_dict() for finding in self.findings],
+            "calibration": [asdict(one) for one in self.calibration],
+            "fit": {"train": self.train.to_dict(),
+                    "holdout": self.holdout.to_dict() | {"log_score_gain": or_none(self.holdout_gain)},
                     "faulty_channels": list(self.faulty), "noise_K": self.noise_K, "floor": self.floor},
             "kinds": dict(self.kinds),
             "settings": {"false_alarm_rate": self.false_alarm_rate, "claim_from": self.claim_from,
                          "matters_K": self.matters_K, "matters_W": self.matters_W},
             "model_error": {"class": self.error_class, "evidence": dict(self.error_evidence),
-                            "scaled": [vars(one) for one in self.scaled_error]},
+                            "scaled": [asdict(one) for one in self.scaled_error]},
             "sessions": {"deviation_in_sd": self.session_s},
             "remaining": {
-                "p_value": _or_none(self.remaining_p_value),
+                "p_value": or_none(self.remaining_p_value),
                 "note": self.remaining_note,
-                "misfit": _or_none(self.misfit),
+                "misfit": or_none(self.misfit),
             },
             "ranking": [
                 {"mechanism": r.mechanism, "place": r.place, "family": r.family, "log_bayes": r.log_bayes,
                  "probability": r.probability}
                 for r in self.ranking
             ],
-            "not_visible": [
-                {"mechanism": u.mechanism, "place": u.place, "needed": u.needed, "expected": _or_none(u.expected)}
-                for u in self.unseen
-            ],
+            "not_visible": [asdict(one) | {"expected": or_none(one.expected)} for one in self.unseen],
             "next_test": self.next_test,
             "notes": list(self.notes),
             "inputs": dict(self.inputs),
@@ -477,7 +469,3 @@ def _unit(symbol: str) -> str:
 def _share(probability: float) -> str:
     """A probability; never rounded to certainty."""
     return f"{probability:.2f}" if probability < 0.995 else "> 0.99"
-
-
-def _or_none(value: float) -> float | None:
-    return value if math.isfinite(value) else None
