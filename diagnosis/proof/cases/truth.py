@@ -141,6 +141,17 @@ def size_of(values: Array) -> dict[str, float]:
     }
 
 
+def size_of_heat(watts: Array) -> dict[str, float]:
+    """Mean and greatest heat, and for how long it acts, rounded for the truth."""
+    active = np.abs(watts) > ACTIVE_SHARE * float(np.abs(watts).max(initial=0.0))
+    return {
+        "mean": round(float(watts.mean()), 3),
+        "mean_active": round(float(watts[active].mean()) if active.any() else 0.0, 3),
+        "active_share": round(float(active.mean()), 4),
+        "max": round(float(watts[np.abs(watts).argmax()]), 3),
+    }
+
+
 def _kelvin(
     plant: Plant, case: ConcealedCase, with_it: Sequence[Outcome], without: Sequence[Outcome]
 ) -> dict[str, Any]:
@@ -169,15 +180,7 @@ def _heat(case: ConcealedCase, heat: Sequence[Mapping[str, Array]]) -> dict[str,
     for kind, members in _sets(case).items():
         found[kind] = {}
         for place in places:
-            watts = np.concatenate([heat[i][place] for i in members])
-            largest = float(np.abs(watts).max(initial=0.0))
-            active = np.abs(watts) > ACTIVE_SHARE * largest
-            found[kind][place] = {
-                "mean": round(float(watts.mean()), 3),
-                "mean_active": round(float(watts[active].mean()) if active.any() else 0.0, 3),
-                "active_share": round(float(active.mean()), 4),
-                "max": round(float(watts[np.abs(watts).argmax()]), 3),
-            }
+            found[kind][place] = size_of_heat(np.concatenate([heat[i][place] for i in members]))
     total = [np.sum([np.abs(part[place]) for place in places], axis=0, initial=0.0) for part in heat]
     top = max((float(values.max(initial=0.0)) for values in total), default=0.0)
     acting = {
