@@ -12,8 +12,8 @@ import plotly.graph_objects as go
 from diagnosis.report.chart import INK, Chart, dressed
 from diagnosis.report.network_layout import places_of
 from diagnosis.report.wording import name, share
-from diagnosis.results.result import NO_CLAIM, Diagnosis
-from diagnosis.results.result_parts import Finding
+from diagnosis.results.result import Diagnosis
+from diagnosis.results.result_parts import NO_CLAIM, Finding
 from models.base.types import Array
 from models.quantities.part_colours import AMBIENT, part_colours
 from models.quantities.quantities import node_of_channel

@@ -12,8 +12,9 @@ from markupsafe import Markup
 from diagnosis.report import course_charts, equation, finding_charts, network_chart, wording
 from diagnosis.report.chart import Chart
 from diagnosis.results import number_format as numbers
-from diagnosis.results.result import LEAST_RIVAL, NO_CLAIM, Diagnosis, date_told, values_told
-from diagnosis.results.result_parts import Calibrated, Finding, Fits
+from diagnosis.results.first_screen import date_told, values_told
+from diagnosis.results.result import Diagnosis
+from diagnosis.results.result_parts import LEAST_RIVAL, NO_CLAIM, Calibrated, Finding, Fits
 
 PACKAGE = "diagnosis.report"
 PLOTLY = "plotly-basic.min.js"  # npm: plotly.js-basic-dist-min, of the version that the plotly of Python brings

@@ -18,8 +18,7 @@ from diagnosis.forward.term_on_grid import TermOnGrid
 from diagnosis.recordings.recording import Recording
 from diagnosis.results.advice import separation, without_sensor
 from diagnosis.results.places import node_in
-from diagnosis.results.result import LEAST_RIVAL
-from diagnosis.results.result_parts import Change, Finding, ParameterValue, Rival, Switching
+from diagnosis.results.result_parts import LEAST_RIVAL, Change, Finding, ParameterValue, Rival, Switching
 from diagnosis.setup.inference_setup import InferenceSetup, heat_over_time
 from models.base.types import Array
 from models.mechanisms import Mechanism, Placed

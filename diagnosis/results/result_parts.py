@@ -16,6 +16,9 @@ if TYPE_CHECKING:
 
 Grade = Literal["claim", "likely"]
 PARAMETER = "parameter"
+NO_CLAIM = ("consistent", "insufficient_data")  # verdicts
+LEAST_RIVAL = 0.01  # probability of what is told as a rival
+MOST_NEAREST = 3  # names that are told of those that were not reported
 SIZES = {0.5: "half as large", 1.0: "as assumed", 2.0: "twice as large"}  # of model error, by factor
 
 
