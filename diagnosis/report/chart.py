@@ -66,10 +66,10 @@ def dressed(figure: go.Figure, height: int, **layout: Any) -> go.Figure:
     **layout
         Further properties of the layout
     """
-    axis = {"gridcolor": LINE, "zerolinecolor": "#9aa1a9", "linecolor": "#9aa1a9", "showline": True,
+    frame = {"gridcolor": LINE, "zerolinecolor": "#9aa1a9", "linecolor": "#9aa1a9", "showline": True,
             "automargin": True}  # fmt: skip
-    figure.update_xaxes(**axis)
-    figure.update_yaxes(**axis)
+    figure.update_xaxes(**frame)
+    figure.update_yaxes(**frame)
     usual: dict[str, Any] = {
         "template": "none",
         "height": height,
@@ -143,11 +143,16 @@ def limits(curves: Sequence[Array]) -> list[float] | None:
     return [low - apart, high + apart]
 
 
+def axis(letter: str, row: int) -> str:
+    """Name of an axis of a row of axes, counted from 1: ``x``, ``x2``, ``yaxis3``."""
+    return f"{letter}{row}" if row > 1 else letter
+
+
 def row_titles(texts: Sequence[str]) -> list[dict[str, Any]]:
     """A title over the left end of every row of axes."""
     return [
         {"text": text, "x": 0.0, "xref": "paper", "xanchor": "left", "y": 1.0, "yanchor": "bottom",
-         "yref": f"y{row} domain" if row > 1 else "y domain", "showarrow": False, "font": {"size": FONT_PX}}
+         "yref": f"{axis('y', row)} domain", "showarrow": False, "font": {"size": FONT_PX}}
         for row, text in enumerate(texts, 1)
     ]  # fmt: skip
 
