@@ -155,12 +155,8 @@ def with_losses_as_laws(network: ThermalNetwork, definition: ParametricDefinitio
         components=(),
         operating={},
         sources=tuple(replace(source, heat=source.heat.xreplace(laws)) for source in network.sources),
-        states=tuple(
-            replace(state, rate=state.rate.xreplace(laws),
-                    update=None if state.update is None else state.update.xreplace(laws))
-            for state in network.states
-        ),
-    )  # fmt: skip
+        states=tuple(state.with_laws(lambda law: law.xreplace(laws)) for state in network.states),
+    )
 
 
 class _Builder:

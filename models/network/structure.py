@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Protocol
 
@@ -97,6 +97,11 @@ class ExtraState:
     rate: sp.Expr
     update: sp.Expr | None
     averaged_update: sp.Expr | None = None
+
+    def with_laws(self, changed: Callable[[sp.Expr], sp.Expr]) -> ExtraState:
+        """The state with each of its laws changed."""
+        update, averaged = (None if law is None else changed(law) for law in (self.update, self.averaged_update))
+        return replace(self, rate=changed(self.rate), update=update, averaged_update=averaged)
 
 
 BASE_SIGNALS = ("time",)
