@@ -209,13 +209,7 @@ def read_mapping(path: Path) -> RecordingMapping:
     values = toml_file.parse(toml_file.read_text(path), file=str(path))
     if "schema" not in values:
         raise InputError(f"{path}: has no 'schema = {SCHEMA}', so it is not known to be a mapping file of this version")
-    return validate_section(RecordingMapping, _with_tuples(values), file=str(path))
-
-
-def _with_tuples(node: Any) -> Any:
-    if isinstance(node, list):
-        return tuple(_with_tuples(item) for item in node)
-    return {key: _with_tuples(item) for key, item in node.items()} if isinstance(node, dict) else node
+    return validate_section(RecordingMapping, values, file=str(path))
 
 
 def mapping_beside(recording: Path, stem: str) -> RecordingMapping | None:
@@ -247,7 +241,8 @@ def mapping_of_definition(values: Mapping[str, Any]) -> RecordingMapping:
     """
     if not values:
         return RecordingMapping()
-    return validate_section(RecordingMapping, _with_tuples(dict(values)), file="[recording] of the gearbox definition")
+    table = toml_file.with_tuples(dict(values))
+    return validate_section(RecordingMapping, table, file="[recording] of the gearbox definition")
 
 
 def reduced_to(mapping: RecordingMapping, columns: Iterable[str]) -> RecordingMapping:
