@@ -211,6 +211,13 @@ def _felt(with_it: Sequence[Outcome], without: Sequence[Outcome], effect: Concea
     return {"input_shift": {name: size_of(values) for name, values in shift.items() if np.any(values != 0.0)}}
 
 
+def facts_of_fault(shifts: Mapping[str, Mapping[str, Any]], channels: Sequence[str]) -> dict[str, Any]:
+    """Facts of a fault of measurement, from the sizes of its changes by column, of each set of recordings."""
+    nothing = {"rms": 0.0, "max": 0.0}
+    K = {kind: {place: found.get(f"T_{place}_degC", nothing) for place in channels} for kind, found in shifts.items()}
+    return {"K": K, "column_shift": shifts, "heat_W": {}, "acting_s": {}}
+
+
 def _measured(plant: Plant, case: ConcealedCase, outcomes: Sequence[Outcome], effect: Concealed) -> dict[str, Any]:
     """Changes of the columns by a fault of measurement, without noise."""
     shifts: dict[str, dict[str, Any]] = {"train": {}, "hold": {}}
@@ -221,8 +228,4 @@ def _measured(plant: Plant, case: ConcealedCase, outcomes: Sequence[Outcome], ef
             change = np.concatenate([f[column] - s[column] for f, s in zip(faulty, sound, strict=True)])
             if np.any(change != 0.0):
                 shifts[kind][column] = size_of(change)
-    K = {
-        kind: {place: found.get(f"T_{place}_degC", {"rms": 0.0, "max": 0.0}) for place in case.instruments.channels}
-        for kind, found in shifts.items()
-    }
-    return {"K": K, "column_shift": shifts, "heat_W": {}, "acting_s": {}}
+    return facts_of_fault(shifts, case.instruments.channels)

@@ -10,6 +10,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
+import numpy as np
+
 from models.base.types import Array
 
 
@@ -270,3 +272,13 @@ class Outcome:
     P_loss: Array
     inputs: Mapping[str, Array]
     heat: Sequence[Mapping[int, Array]]
+
+
+def constant(value: float) -> Law:
+    """A law that has one value at all times."""
+    return lambda m: np.full_like(m.hours, value)
+
+
+def times(factor: float, law: Law) -> Law:
+    """A law times a number."""
+    return lambda m: np.asarray(factor * law(m))

@@ -7,7 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from diagnosis.proof.cases.truth import ACTIVE_SHARE, SCHEMA, practical_of, size_of, size_of_heat, spans_of
+from diagnosis.proof.cases.truth import (
+    ACTIVE_SHARE,
+    SCHEMA,
+    facts_of_fault,
+    practical_of,
+    size_of,
+    size_of_heat,
+    spans_of,
+)
 from diagnosis.proof.zoo.case import HOLD, TRAIN, ZooCase, with_reading_faults
 from diagnosis.proof.zoo.effects import ZooEffect
 from diagnosis.proof.zoo.faults import recorded_minus_true
@@ -251,9 +259,4 @@ def _measured(case: ZooCase, effect: ZooEffect, columns: Mapping[str, str]) -> d
             values = np.concatenate(parts)
             if np.any(values != 0.0):
                 shifts[kind][column] = size_of(values)
-    nothing = {"rms": 0.0, "max": 0.0}
-    K = {
-        kind: {name: found.get(f"T_{name}_degC", nothing) for name in case.instruments.channels}
-        for kind, found in shifts.items()
-    }
-    return {"K": K, "column_shift": shifts, "heat_W": {}, "acting_s": {}}
+    return facts_of_fault(shifts, case.instruments.channels)
