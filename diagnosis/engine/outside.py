@@ -13,6 +13,7 @@ from diagnosis.engine.candidates import scan
 from diagnosis.engine.families import axis_of
 from diagnosis.engine.fit import Experiment, Fit
 from diagnosis.engine.gram import Given, Index
+from diagnosis.engine.sessions import over_sessions
 from diagnosis.setup.inference_setup import InferenceSetup
 from models.base.types import Array
 from models.quantities.quantities import TOTAL_LOSS
@@ -51,19 +52,21 @@ def judge_outside(fit: Fit, hypotheses: Sequence[Hypothesis]) -> list[Outside]:
     Parameters
     ----------
     fit : Fit
-        Its unknowns and the model error in its metric are marginalised too
+        Its unknowns and the model error in its metric are marginalised too, over deviations between sessions
     hypotheses : sequence of Hypothesis
         See :func:`outside_of`
     """
     functions = [replace(one, variants=row[None, :]) for one in hypotheses for row in one.variants]
     found = scan(fit, functions)
-    given = found.gram.given([*found.unknowns, *found.further])
+    over = over_sessions(found.gram, fit.experiment, [*found.unknowns, *found.further])
     judged, first = [], found.of_candidates.start
     for one in hypotheses:
         assert one.term is not None  # noqa: S101 - it is a heat
         columns = range(first, first + len(one.variants))
-        log_bayes, weights = judged_together(given, columns, one.term.strength.sd)
-        judged.append(Outside(hypothesis=shaped(one, weights), log_bayes=log_bayes,
+        each = [judged_together(given, columns, one.term.strength.sd) for given in over.given]
+        log_bayes = over.weighed([np.array([value]) for value, _ in each])
+        weights = each[over.most_probable][1]
+        judged.append(Outside(hypothesis=shaped(one, weights), log_bayes=float(log_bayes[0]),
                               strength=float(np.linalg.norm(weights))))  # fmt: skip
         first = columns.stop
     return judged

@@ -158,19 +158,18 @@ class TermOnGrid:
         def share(weight: float) -> Array:
             return np.asarray(weight * law / (1.0 + weight * within))
 
-        if self.term.kind == "loss_factor":
-            sources = [source.name for source in model.network.sources]
-            for name, weight in self.term.weighted:
+        sources = [source.name for source in model.network.sources]
+        links = [link.name for link in model.network.links]
+        for name, weight in self.term.weighted:
+            if name in links:
+                index = links.index(name)
+                flow = (balance.conductances[:, index] * balance.differences[:, index])[:, None] * share(weight)
+                heat += model.to_parts[index][:, None] * flow[:, None, :]
+            else:
                 index = sources.index(name)
                 extra = share(weight) * balance.sources[:, index, None]
                 heat[:, model.parts.index(model.network.sources[index].node)] += extra
                 loss += extra
-        else:
-            links = [link.name for link in model.network.links]
-            for name, weight in self.term.weighted:
-                index = links.index(name)
-                flow = (balance.conductances[:, index] * balance.differences[:, index])[:, None] * share(weight)
-                heat += model.to_parts[index][:, None] * flow[:, None, :]
         return loss
 
     def _link_heat(self, trajectory: Trajectory, conductance: Array, other: Array, heat: Array) -> None:

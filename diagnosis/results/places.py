@@ -12,8 +12,9 @@ def node_in(network: ThermalNetwork, h: Hypothesis) -> str:
     if term is None:
         return _node_of_parameter(network, h.place)
     if term.kind == "loss_factor":
-        most, _ = max(term.weighted, key=lambda pair: abs(pair[1]))
-        return next(s.node for s in network.sources if s.name == most)
+        nodes = {source.name: source.node for source in network.sources}
+        most = max((one for one in term.weighted if one[0] in nodes), key=lambda one: abs(one[1]))[0]
+        return nodes[most]
     if term.kind == "link_factor":
         parts = {p.name for p in network.parts}
         ends = next(k.nodes for k in network.links if k.name == term.target[0])

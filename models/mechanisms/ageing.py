@@ -83,12 +83,14 @@ oil_loss = Mechanism(
     name="oil_loss",
     family=FAMILY,
     kind="loss_factor",
-    places=("churning",),
+    places=("churning", "churning+oil-gears"),
     sign=-1,
     parameters=lambda scale: (strength(0.3, description="relative change in the end"), _life(scale)),
     law=lambda s: s.strength * (1.0 - sp.exp(-s.time / s.life)),
-    says="Oil leaks or is carried away: the gears dip less and less deep and churn less.",
-    reference="1 mm/h on the FZG rig; churning grows with the immersion depth",
+    says="Oil leaks or is carried away: the gears dip less and less deep. They churn less, and the oil wets "
+    "less of their surface ({place}).",
+    reference="1 mm/h on the FZG rig; churning grows with the immersion depth; that the conductance between gears and "
+    "oil falls by the same share, or not at all, is a hypothesis",
     experiment="read the level before and after, at the same temperature",
 )
 

@@ -6,7 +6,8 @@ A pattern is a name, a group (its members together), or ``each`` and a group (on
   ends, ``each bearings-returns``, the other one a boundary or a group of one
 - loss_factor: sources. ``losses``, all that are mechanical; ``mesh_sliding``; the losses in a group of nodes,
   ``each bearings``; those in the nodes of a group that hang on one member of another, ``each shafts>bearings``; those
-  that a factor of the network multiplies, ``factor seal``; several together, ``mesh_sliding+mesh_rolling``
+  that a factor of the network multiplies, ``factor seal``; several together, ``mesh_sliding+mesh_rolling``; with
+  links that change with them, ``churning+oil-gears``
 - link_factor: links by their ends. ``oil-housing``, ``each bearings-housing``, ``oil-gears+oil-housing``
 - signal: an input. ``torque``
 - sensor: measured channels. ``each sensor`` (temperatures and total loss), ``each thermometer``, ``clock``, ``pair``
@@ -115,7 +116,8 @@ def _sources(network: ThermalNetwork, pattern: str) -> Iterator[Placement]:
     if each and carries:
         yield from _held(network, holder, held)
         return
-    wanted = rest.split("+")
+    wanted = [name for name in rest.split("+") if "-" not in name]
+    wet = [link for ends in rest.split("+") if "-" in ends for place in _links(network, ends) for link in place.target]
     chosen = [
         source
         for source in network.sources
@@ -130,9 +132,9 @@ def _sources(network: ThermalNetwork, pattern: str) -> Iterator[Placement]:
     if each:
         yield from (Placement(name=source.name, target=(source.name,), here=(source.node,)) for source in chosen)
     elif chosen:
-        name = "_".join(name.removeprefix(FACTOR) for name in wanted)
+        name = "_".join(identifier(name.removeprefix(FACTOR)) for name in rest.split("+"))
         nodes = tuple(dict.fromkeys(source.node for source in chosen))
-        yield Placement(name=name, target=tuple(source.name for source in chosen), here=nodes)
+        yield Placement(name=name, target=(*(source.name for source in chosen), *wet), here=nodes)
 
 
 def _held(network: ThermalNetwork, holder: str, held: str) -> Iterator[Placement]:

@@ -40,7 +40,8 @@ class Term:
     kind : str
         ``source``: `expression` is a heat [W], shared evenly by the nodes of `target`.
         ``link``: a conductance [W/K], shared evenly by the nodes of `target` but the last, which is the other end.
-        ``loss_factor``, ``link_factor``: the relative change of every source or link in `target`, [-].
+        ``loss_factor``, ``link_factor``: the relative change of every source or link in `target`, [-]; a loss_factor
+        may have links as well.
         ``signal``: what the input `target` really is more than the recorded one, in its unit.
         ``sensor``: a fault of the measured channels in `target`, which the network does not feel; see `form`
     target : tuple of str
@@ -145,13 +146,15 @@ class Term:
             for node, name in self._named(sides):
                 network = network.with_link(node, end, self.expression / len(sides), name=name)
             return network
-        change = {
-            "loss_factor": ThermalNetwork.with_loss_factor,
-            "link_factor": ThermalNetwork.with_link_factor,
-            "signal": ThermalNetwork.with_signal_shift,
-        }[self.kind]
+        links = {link.name for link in network.links}
         for name, weight in self.weighted:
-            network = change(network, name, self.expression if weight == 1.0 else weight * self.expression)
+            change = self.expression if weight == 1.0 else weight * self.expression
+            if self.kind == "signal":
+                network = network.with_signal_shift(name, change)
+            elif name in links:
+                network = network.with_link_factor(name, change)
+            else:
+                network = network.with_loss_factor(name, change)
         return network
 
     @property

@@ -12,7 +12,9 @@ from diagnosis.engine.baselines import effects_in_baselines, notes_of_baselines,
 from diagnosis.engine.calibration import calibrate_with_error
 from diagnosis.engine.candidates import refit, scan
 from diagnosis.engine.fit import Experiment, Fit, calibrate
+from diagnosis.engine.outside import SIZES, judge_outside, outside_of
 from diagnosis.engine.prepare import prepare_experiment
+from diagnosis.engine.sessions import over_sessions
 from diagnosis.recordings.recording import Recording
 from diagnosis.setup.inference_setup import InferenceSetup
 from models.assembly.gearbox import Gearbox
@@ -72,6 +74,23 @@ def test_an_effect_is_scanned_and_fitted_where_it_may_act(prepared: tuple[Infere
     assert abs(unknown.value(z) - WINDAGE_W) < 3.0 * sd
     columns = {p.point.setting.recording: p.columns for p in reached.parts}
     assert not columns["april"][:, len(fit.z) :].any() and columns["train"][:, len(fit.z)].any()
+
+
+def test_an_unknown_heat_is_judged_over_deviations_between_sessions(
+    prepared: tuple[InferenceSetup, Experiment],
+) -> None:
+    """One function of a heat has the evidence that the same column has among the candidates."""
+    setup, experiment = prepared
+    fit = calibrate(experiment)
+    whole = next(one for one in outside_of(setup, experiment) if one.place == "oil")
+    function = replace(whole, variants=whole.variants[1:2])
+    assert function.term is not None
+    found = scan(fit, [function])
+    over = over_sessions(found.gram, experiment, found.unknowns)
+    sizes = [over.weighed([given.singles(found.of_candidates, size * function.term.strength.sd).log_bayes
+                           for given in over.given]) for size in SIZES]  # fmt: skip
+    (judged,) = judge_outside(fit, [function])
+    assert judged.log_bayes == pytest.approx(float(np.log(np.mean(np.exp(sizes)))), rel=1e-9)
 
 
 def test_without_held_out_recordings_baselines_are_whole(fzg: Gearbox) -> None:
