@@ -148,8 +148,6 @@ def changing(placed: Placed, course: Course, axis: Axis, *, sd: float | None = N
     ----------
     placed : Placed
         Its shape parameters start from the middles of their grids
-    course : Course
-    axis : Axis
     sd : float, optional
         Prior of the strength; by default that of the law
 
@@ -186,7 +184,6 @@ def carried_on(placed: Placed, axis: Axis) -> Hypothesis:
     ----------
     placed : Placed
         Without memories
-    axis : Axis
     """
     label = f"{placed.label}_carried_on"
     term, clock, base = _renamed(placed, label), _clock(label, axis), hypothesis_of(placed)
@@ -231,10 +228,7 @@ def _renamed(placed: Placed, label: str) -> Placed:
         boundary_temperature=None if other is None else renamed(other, names),
         parameters=tuple(replace(p, name=names[p.name]) for p in placed.parameters),
         states=tuple(
-            replace(s, name=names[s.name], rate=renamed(s.rate, names),
-                    update=None if s.update is None else renamed(s.update, names),
-                    averaged_update=None if s.averaged_update is None else renamed(s.averaged_update, names))
-            for s in placed.states
+            replace(s.with_laws(lambda law: renamed(law, names)), name=names[s.name]) for s in placed.states
         ),
     )  # fmt: skip
 

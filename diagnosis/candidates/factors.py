@@ -27,8 +27,6 @@ def factors_of(network: ThermalNetwork, scale: Scale, channels: Sequence[str]) -
 
     Parameters
     ----------
-    network : ThermalNetwork
-    scale : Scale
     channels : sequence of str
         Measured nodes, or ``P_loss``
     """

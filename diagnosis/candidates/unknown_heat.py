@@ -25,9 +25,6 @@ def unknown_heats(network: ThermalNetwork, scale: Scale, axis: Axis, *, losses: 
 
     Parameters
     ----------
-    network : ThermalNetwork
-    scale : Scale
-    axis : Axis
     losses : bool
         True if the total loss is measured: it then shows a loss and not a heat
 
@@ -46,7 +43,6 @@ def shaped(hypothesis: Hypothesis, weights: Array) -> Hypothesis:
 
     Parameters
     ----------
-    hypothesis : Hypothesis
     weights : Array, shape (functions,)
         Of its functions, [W]
 

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from diagnosis.recordings.cleaning import rows_text
 from diagnosis.recordings.machine import RecordedMachine
-from diagnosis.recordings.mapping import Column, RecordingMapping
-from diagnosis.recordings.quantities import AUXILIARY, IGNORE, looks_like_kelvin
+from diagnosis.recordings.mapping import AUXILIARY, IGNORE, Column, RecordingMapping, looks_like_kelvin
 from models.base.errors import Problems, did_you_mean
 from models.base.types import Array
 from models.quantities.column_names import meant
@@ -37,11 +36,6 @@ def quantities_of(network: RecordedMachine) -> dict[str, Quantity]:
     return known | {name: given.quantity for name, given in network.inputs.items()}
 
 
-def standard_names(network: RecordedMachine) -> dict[str, str]:
-    """Return the column of every quantity without a mapping file."""
-    return {name: quantity.column for name, quantity in quantities_of(network).items()}
-
-
 def match_columns(
     present: Sequence[str],
     time_column: str,
@@ -56,9 +50,6 @@ def match_columns(
     ----------
     present : sequence of str
         Columns of the file
-    time_column : str
-    mapping : RecordingMapping
-    network : RecordedMachine
     problems : Problems
         Receives columns that are missing, unknown, named twice or misspelt
     notes : list of str
@@ -67,7 +58,8 @@ def match_columns(
     roles = _mapped_columns(present, mapping, network, problems)
     taken = {column.quantity for column in mapping.columns.values()}
     lacking = []
-    for quantity, name in standard_names(network).items():
+    for quantity, known in quantities_of(network).items():
+        name = known.column
         if name in mapping.columns or quantity in taken:
             continue
         if quantity in mapping.constants:
@@ -191,13 +183,10 @@ def quantity_values(
         Of the column
     column : Column
         What the mapping states of it
-    quantity : Quantity
     unit_of_file : str or None
         Unit that the file itself names
     outside : array of bool, shape (rows,)
         Rows that the mapping leaves out
-    problems : Problems
-    notes : list of str
 
     Returns
     -------
@@ -249,13 +238,10 @@ def _possible(
     ----------
     values : Array, shape (rows,)
         In the unit inside; NaN where missing
-    quantity : Quantity
     name : str
         Its column
     rows : array of int, shape (rows,)
         Numbers of the rows, for messages
-    problems : Problems
-    notes : list of str
     """
     infinite = np.flatnonzero(np.isinf(values))
     if len(infinite):

@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 
 from diagnosis.recordings.mapping import Column, RecordingMapping, mapping_beside, read_mapping, reduced_to
 from diagnosis.recordings.mdf import read_mdf
-from diagnosis.recordings.quantities import ISO
-from diagnosis.recordings.time_axis import RECORDING_KINDS, Clock, Part, clock_of, inside, part_of
+from diagnosis.recordings.time_axis import ISO, RECORDING_KINDS, Clock, Part, clock_of, inside, part_of
 from models.base.errors import InputError, Problems, did_you_mean
 from models.base.types import Array
 from models.files.table_file import check_file, kind_of, read_chunks, together
@@ -27,7 +26,6 @@ class RecordingFile:
 
     Attributes
     ----------
-    mapping : RecordingMapping
     chunks : iterator of DataFrame
     clock : Clock or None
         None, and a problem, if there is none
@@ -94,7 +92,6 @@ def open_recording(path: Path, mapping: Path | None, usual: RecordingMapping) ->
 
     Parameters
     ----------
-    path : Path
     mapping : Path or None
         Mapping file; by default the one next to the file
     usual : RecordingMapping

@@ -33,18 +33,19 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
-from diagnosis.recordings.quantities import AUXILIARY, IGNORE, looks_like_kelvin
 from models.base.errors import InputError, did_you_mean
 from models.definition.messages import validate_section
 from models.definition.sections import Name, Section, Text
 from models.files import toml_file
 from models.files.table_file import TextForm
-from models.quantities.quantities import SENSOR, quantity_of
+from models.quantities.quantities import SENSOR, Quantity, quantity_of
 from models.quantities.units import units_in_files
 
 SCHEMA = 1
 FOLDER_FILE = "mapping.toml"
 DEFINITION_KEYS = ("stage", "part")  # of a gearbox definition, which is TOML as well
+AUXILIARY, IGNORE = "auxiliary", "ignore"  # roles of columns that are no quantity
+KELVIN = (200.0, 600.0)  # no gearbox has such temperatures in degC all the time
 
 Positive = Annotated[float, Field(gt=0.0, le=1e9)]
 NotNegative = Annotated[float, Field(ge=0.0, le=1e9)]
@@ -174,6 +175,18 @@ class RecordingMapping(Section):
         return TextForm(separator=self.csv.separator, decimal=self.csv.decimal, missing=self.missing, by_mapping=True)
 
 
+def looks_like_kelvin(quantity: Quantity, lowest: float, highest: float) -> bool:
+    """Return True if values from `lowest` to `highest` in degC are a temperature in kelvin.
+
+    Examples
+    --------
+    >>> from models.quantities.quantities import quantity_of
+    >>> looks_like_kelvin(quantity_of("T_oil"), 293.0, 361.0), looks_like_kelvin(quantity_of("T_oil"), 20.0, 90.0)
+    (True, False)
+    """
+    return quantity.is_temperature and quantity.unit == "degC" and KELVIN[0] < lowest <= highest < KELVIN[1]
+
+
 def _constant_faults(name: str, value: float) -> Iterator[str]:
     possible = quantity_of(name)
     if possible is None:
@@ -196,13 +209,7 @@ def read_mapping(path: Path) -> RecordingMapping:
     values = toml_file.parse(toml_file.read_text(path), file=str(path))
     if "schema" not in values:
         raise InputError(f"{path}: has no 'schema = {SCHEMA}', so it is not known to be a mapping file of this version")
-    return validate_section(RecordingMapping, _with_tuples(values), file=str(path))
-
-
-def _with_tuples(node: Any) -> Any:
-    if isinstance(node, list):
-        return tuple(_with_tuples(item) for item in node)
-    return {key: _with_tuples(item) for key, item in node.items()} if isinstance(node, dict) else node
+    return validate_section(RecordingMapping, values, file=str(path))
 
 
 def mapping_beside(recording: Path, stem: str) -> RecordingMapping | None:
@@ -234,7 +241,8 @@ def mapping_of_definition(values: Mapping[str, Any]) -> RecordingMapping:
     """
     if not values:
         return RecordingMapping()
-    return validate_section(RecordingMapping, _with_tuples(dict(values)), file="[recording] of the gearbox definition")
+    table = toml_file.with_tuples(dict(values))
+    return validate_section(RecordingMapping, table, file="[recording] of the gearbox definition")
 
 
 def reduced_to(mapping: RecordingMapping, columns: Iterable[str]) -> RecordingMapping:

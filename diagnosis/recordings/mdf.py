@@ -39,7 +39,6 @@ def read_mdf(path: Path, *, base: str) -> MdfTable:
 
     Parameters
     ----------
-    path : Path
     base : str
         Channel whose times become the rows; a sample of another channel goes to the nearest row, several to their mean
 

@@ -152,10 +152,6 @@ def read_recording(
     ----------
     text : str or Path
         ``FILE``, ``FILE+FILE``, ``FILE@start..end``
-    network : RecordedMachine
-    name : str
-    mapping : Path or None
-    max_gap_s : float or None
     to_compare : bool
         True if a measured temperature is required
 

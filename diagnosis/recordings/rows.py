@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 from diagnosis.recordings.columns import auxiliary_numbers, is_measurable, match_columns, quantities_of, quantity_values
 from diagnosis.recordings.file import RecordingFile
 from diagnosis.recordings.machine import RecordedMachine
-from diagnosis.recordings.mapping import Column
-from diagnosis.recordings.quantities import AUXILIARY, IGNORE
+from diagnosis.recordings.mapping import AUXILIARY, IGNORE, Column
 from diagnosis.recordings.time_axis import Clock, Part, check_time, moment_text
 from models.base.errors import InputError
 from models.base.types import Array
@@ -35,7 +34,6 @@ class RecordedRows:
     auxiliary : dict of column to Array, shape (rows,)
     names, roles : dict of quantity to str, Column
         Its column, and what the mapping states of it
-    assumed, notes : list of str
     """
 
     path: Path

@@ -21,10 +21,6 @@ def check_shared_rows(
 ) -> None:
     """Refuse recordings that share rows.
 
-    Parameters
-    ----------
-    train, holdout, baseline : sequence of Recording
-
     Raises
     ------
     InputError

@@ -13,7 +13,6 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from diagnosis.recordings.quantities import ISO
 from models.base.errors import InputError, Problems
 from models.base.types import Array
 from models.files.table_file import KINDS, is_file
@@ -21,6 +20,7 @@ from models.quantities.units import units_in_files
 
 RECORDING_KINDS = (*KINDS, ".mf4", ".mdf")
 STANDARD = "time_s"
+ISO = "iso8601"
 ISO_NAMES = ("time", "time_utc", "timestamp", "datetime")
 _DATE = r"\d{4}-\d{2}-\d{2}"
 _ISO = re.compile(
@@ -132,7 +132,6 @@ class Clock:
 
     Attributes
     ----------
-    column : str
     unit : str
         Of numbers; ``iso8601`` for texts and for the time stamps of a Parquet file
     """
@@ -247,8 +246,6 @@ def check_time(values: pd.Series, seconds: Array, clock: Clock, problems: Proble
         Cells of the time column; the index counts the rows of the file from 0
     seconds : Array, shape (rows,)
         The same in [s]
-    clock : Clock
-    problems : Problems
     """
     name, rows = clock.column, np.asarray(values.index) + 1
     wrong = np.flatnonzero(~np.isfinite(seconds))

@@ -16,7 +16,6 @@ def write_report(diagnosis: Diagnosis, path: str | Path) -> None:
 
     Parameters
     ----------
-    diagnosis : Diagnosis
     path : str or Path
         The file appears whole or not at all
 

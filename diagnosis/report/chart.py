@@ -19,6 +19,7 @@ FONT_PX = 12
 LETTERS = 42  # of a line on a phone
 MOST_POINTS = 700  # of a curve
 MOST_OF_ALL = 160_000  # points of all curves of a chart: some 2 MB of the page
+MARGIN = 0.05  # of the range of curves
 GAP = 20.0  # times the usual distance of rows: a curve is interrupted
 CONFIG = {
     "responsive": True,
@@ -35,10 +36,8 @@ class Chart:
     ----------
     name : str
         Of the element in the page
-    title : str
     alt : str
         All that the figure shows, in words
-    figure : plotly.graph_objects.Figure
     note : str
         How to read it
     """
@@ -62,16 +61,15 @@ def dressed(figure: go.Figure, height: int, **layout: Any) -> go.Figure:
 
     Parameters
     ----------
-    figure : plotly.graph_objects.Figure
     height : int
         [px]; the width is that of the page
     **layout
         Further properties of the layout
     """
-    axis = {"gridcolor": LINE, "zerolinecolor": "#9aa1a9", "linecolor": "#9aa1a9", "showline": True,
+    frame = {"gridcolor": LINE, "zerolinecolor": "#9aa1a9", "linecolor": "#9aa1a9", "showline": True,
             "automargin": True}  # fmt: skip
-    figure.update_xaxes(**axis)
-    figure.update_yaxes(**axis)
+    figure.update_xaxes(**frame)
+    figure.update_yaxes(**frame)
     usual: dict[str, Any] = {
         "template": "none",
         "height": height,
@@ -135,21 +133,26 @@ def stretches(x: Array) -> list[slice]:
     return [slice(a, b) for a, b in pairwise(cuts)]
 
 
-def limits(curves: Sequence[Array], margin: float = 0.05) -> list[float] | None:
+def limits(curves: Sequence[Array]) -> list[float] | None:
     """A range around curves; None if they have no values."""
     values = np.concatenate([c[np.isfinite(c)] for c in curves] or [np.zeros(0)])
     if not len(values):
         return None
     low, high = float(values.min()), float(values.max())
-    apart = max(margin * (high - low), 1e-6 * max(abs(low), abs(high)), 1e-9)
+    apart = max(MARGIN * (high - low), 1e-6 * max(abs(low), abs(high)), 1e-9)
     return [low - apart, high + apart]
+
+
+def axis(letter: str, row: int) -> str:
+    """Name of an axis of a row of axes, counted from 1: ``x``, ``x2``, ``yaxis3``."""
+    return f"{letter}{row}" if row > 1 else letter
 
 
 def row_titles(texts: Sequence[str]) -> list[dict[str, Any]]:
     """A title over the left end of every row of axes."""
     return [
         {"text": text, "x": 0.0, "xref": "paper", "xanchor": "left", "y": 1.0, "yanchor": "bottom",
-         "yref": f"y{row} domain" if row > 1 else "y domain", "showarrow": False, "font": {"size": FONT_PX}}
+         "yref": f"{axis('y', row)} domain", "showarrow": False, "font": {"size": FONT_PX}}
         for row, text in enumerate(texts, 1)
     ]  # fmt: skip
 

@@ -17,6 +17,7 @@ from diagnosis.report.chart import (
     MOST_POINTS,
     Chart,
     averaged,
+    axis,
     curve_points,
     dressed,
     limits,
@@ -37,7 +38,8 @@ LINES: Mapping[str, dict[str, Any]] = {
     "calibrated": {"dash": "dash", "width": 1.6, "color": CALIBRATED},
     "after": {"width": 2.0, "color": MEASURED},
 }
-ROW_PX, INPUT_PX, ERROR_PX, EDGE_PX = 150, 84, 220, 130
+ROW_PX, INPUT_PX, ERROR_PX, EDGE_PX, BETWEEN_PX = 150, 84, 220, 130, 34
+SHADE: Mapping[str, Any] = {"type": "rect", "fillcolor": "#9aa1a9", "line": {"width": 0}, "layer": "below"}
 ERROR_POINTS = 240
 BAND_SD = 2.0
 FAR = 4.0  # times the calibrated model's error: the model as delivered may then leave its chart
@@ -51,8 +53,6 @@ class Shown:
 
     Attributes
     ----------
-    title : str
-    run : PredictedRun
     unscored : sequence of (from, to)
         Stretches that served to find start temperatures, [s]
     """
@@ -60,6 +60,11 @@ class Shown:
     title: str
     run: PredictedRun
     unscored: Sequence[tuple[float, float]]
+
+    @property
+    def scale(self) -> tuple[float, str]:
+        """Seconds of the unit of its time axis, and that unit."""
+        return time_scale(float(self.run.time[-1]) if len(self.run.time) else 0.0)
 
     def counted(self) -> Array:
         """True for rows that count."""
@@ -113,13 +118,7 @@ def measured_and_simulated(diagnosis: Diagnosis) -> Chart | None:
                 figure.add_trace(trace.update(visible=index == 0, showlegend=False), row=row, col=1)
                 owners.append(index)
     looks = [_look(diagnosis, one, rows, channels, airs, stages) for one in shown]
-    buttons = [
-        {"label": one.title, "method": "update",
-         "args": [{"visible": [True] * always + [owner == index for owner in owners]}, look]}
-        for index, (one, look) in enumerate(zip(shown, looks, strict=True))
-    ]  # fmt: skip
-    dressed(figure, sum(heights) + 34 * len(rows) + EDGE_PX, **menu(buttons), **_legend_above(heights))
-    figure.update_layout(looks[0], overwrite=False)
+    _one_at_a_time(figure, heights, [one.title for one in shown], looks, owners, always=always)
     order = " → ".join(stage for stage, _ in stages)
     return Chart(
         name="courses", title="Measured and simulated", figure=figure,
@@ -160,13 +159,7 @@ def errors_over_time(diagnosis: Diagnosis) -> Chart | None:
     titles = [f"<b>{row}</b>, simulated less measured in {'W' if row == 'Total loss' else 'K'}" for row in rows]
     looks = [{"annotations": row_titles(titles), **_x_axis(one, len(rows)),
               "shapes": [*_noise(diagnosis, len(stages)), *_unscored(one, len(rows))]} for one in shown]  # fmt: skip
-    buttons = [
-        {"label": one.title, "method": "update", "args": [{"visible": [owner == index for owner in owners]}, look]}
-        for index, (one, look) in enumerate(zip(shown, looks, strict=True))
-    ]
-    height = sum(heights) + 34 * len(rows) + EDGE_PX
-    dressed(figure, height, **menu(buttons), **_legend_above(heights))
-    figure.update_layout(looks[0], overwrite=False)
+    _one_at_a_time(figure, heights, [one.title for one in shown], looks, owners)
     band = f" Band: ± {BAND_SD:g} standard deviations of the noise." if diagnosis.noise_K > 0.0 else ""
     return Chart(
         name="errors", title="Errors over time", figure=figure,
@@ -217,15 +210,42 @@ def _driving(diagnosis: Diagnosis, shown: Sequence[Shown]) -> list[str]:
 def _grid(heights: Sequence[int]) -> go.Figure:
     return make_subplots(
         rows=len(heights), cols=1, shared_xaxes=True, row_heights=[float(height) for height in heights],
-        vertical_spacing=34.0 / (sum(heights) + 34.0 * len(heights)),
+        vertical_spacing=BETWEEN_PX / _height(heights),
     )  # fmt: skip
+
+
+def _height(heights: Sequence[int]) -> int:
+    return sum(heights) + BETWEEN_PX * len(heights)
+
+
+def _one_at_a_time(
+    figure: go.Figure, heights: Sequence[int], titles: Sequence[str], looks: Sequence[dict[str, Any]],
+    owners: Sequence[int], *, always: int = 0,
+) -> None:  # fmt: skip
+    """Show the first recording, and a menu to choose another one.
+
+    Parameters
+    ----------
+    looks : sequence of dict
+        Layout for each recording
+    owners : sequence of int
+        Recording of each trace behind the first `always`
+    """
+    buttons = [
+        {"label": title, "method": "update",
+         "args": [{"visible": [True] * always + [owner == index for owner in owners]}, look]}
+        for index, (title, look) in enumerate(zip(titles, looks, strict=True))
+    ]  # fmt: skip
+    legend = {"orientation": "h", "x": 0.0, "xanchor": "left", "y": 1.0 + 22.0 / _height(heights), "yanchor": "bottom"}
+    dressed(figure, _height(heights) + EDGE_PX, **menu(buttons), margin={"l": 10, "r": 14, "t": EDGE_PX, "b": 10},
+            legend=legend, hovermode="x unified")  # fmt: skip
+    figure.update_layout(looks[0], overwrite=False)
 
 
 def _channel(
     one: Shown, channel: str, stages: Sequence[tuple[str, str]], colour: str, most: int
 ) -> list[go.Scatter]:  # fmt: skip
-    scale, _ = _time(one)
-    x, y = curve_points(one.run.time / scale, one.run.measured[channel], most)
+    x, y = curve_points(one.run.time / one.scale[0], one.run.measured[channel], most)
     dots = go.Scatter(x=x, y=y, mode="markers", marker={"color": MEASURED, "size": 3, "opacity": 0.55},
                       name="measured", legendgroup="measured")  # fmt: skip
     lines = []
@@ -246,15 +266,11 @@ def _surroundings(one: Shown, airs: Sequence[str]) -> list[go.Scatter]:
 def _line(
     one: Shown, values: Array, label: str, line: Mapping[str, Any], most: int, *, mean: bool = False
 ) -> go.Scatter:  # fmt: skip
-    x = one.run.time / _time(one)[0]
+    x = one.run.time / one.scale[0]
     if mean:
         x, values = averaged(x, values, most)
     x, y = curve_points(x, values, most)
     return go.Scatter(x=x, y=y, mode="lines", line=dict(line), name=label, hovertemplate="%{y:.4g}")
-
-
-def _time(one: Shown) -> tuple[float, str]:
-    return time_scale(float(one.run.time[-1]) if len(one.run.time) else 0.0)
 
 
 def _errors(one: Shown, channel: str, stages: Sequence[tuple[str, str]]) -> list[float]:
@@ -275,12 +291,11 @@ def _look(
     titles: list[str] = []
     look: dict[str, Any] = {}
     for row, key in enumerate(rows, 1):
-        axis = f"yaxis{row}" if row > 1 else "yaxis"
         if key not in channels:
             labels = [diagnosis.network.inputs[one].quantity.label for one in (airs if key == AIR else [key])]
             what = ", ".join(label.rpartition(" in ")[0] or label for label in labels)
             titles.append(f"<b>{what}</b>, {labels[0].rpartition(' in ')[2]}")
-            look[f"{axis}.autorange"] = True
+            look[f"{axis('yaxis', row)}.autorange"] = True
             continue
         sizes = _errors(one, key, stages)
         symbol = "W" if key == LOSS else "K"
@@ -289,24 +304,23 @@ def _look(
                       f"{' → '.join(fixed(size) for size in sizes)} {symbol}{faulty}")  # fmt: skip
         far = len(sizes) > 1 and sizes[0] > FAR * sizes[1]
         near = [getattr(one.run, state)[key] for _, state in stages[int(far) :]]
-        look[f"{axis}.range"] = limits([one.run.measured[key], *near])
+        look[f"{axis('yaxis', row)}.range"] = limits([one.run.measured[key], *near])
     shapes = _unscored(one, len(rows))
     return {"annotations": row_titles(titles), "shapes": shapes, **_x_axis(one, len(rows)), **look}
 
 
 def _x_axis(one: Shown, rows: int) -> dict[str, Any]:
-    scale, symbol = _time(one)
+    scale, symbol = one.scale
     time = one.run.time[[0, -1]] / scale if len(one.run.time) else np.array([0.0, 1.0])
-    axis = f"xaxis{rows}" if rows > 1 else "xaxis"
-    return {f"{axis}.title.text": f"Time in {symbol}", f"{axis}.range": time.tolist()}
+    lowest = axis("xaxis", rows)
+    return {f"{lowest}.title.text": f"Time in {symbol}", f"{lowest}.range": time.tolist()}
 
 
 def _unscored(one: Shown, rows: int) -> list[dict[str, Any]]:
-    scale, _ = _time(one)
+    scale, _ = one.scale
     return [
-        {"type": "rect", "xref": f"x{row}" if row > 1 else "x", "yref": f"y{row} domain" if row > 1 else "y domain",
-         "x0": a / scale, "x1": b / scale, "y0": 0, "y1": 1, "fillcolor": "#9aa1a9", "opacity": 0.18,
-         "line": {"width": 0}, "layer": "below"}
+        {**SHADE, "xref": axis("x", row), "yref": f"{axis('y', row)} domain", "x0": a / scale, "x1": b / scale,
+         "y0": 0, "y1": 1, "opacity": 0.18}
         for row in range(1, rows + 1) for a, b in one.unscored
     ]  # fmt: skip
 
@@ -314,20 +328,10 @@ def _unscored(one: Shown, rows: int) -> list[dict[str, Any]]:
 def _noise(diagnosis: Diagnosis, rows: int) -> list[dict[str, Any]]:
     edge = BAND_SD * diagnosis.noise_K
     return [
-        {"type": "rect", "xref": f"x{row} domain" if row > 1 else "x domain", "yref": f"y{row}" if row > 1 else "y",
-         "x0": 0, "x1": 1, "y0": -edge, "y1": edge, "fillcolor": "#9aa1a9", "opacity": 0.25, "line": {"width": 0},
-         "layer": "below"}
+        {**SHADE, "xref": f"{axis('x', row)} domain", "yref": axis("y", row), "x0": 0, "x1": 1, "y0": -edge,
+         "y1": edge, "opacity": 0.25}
         for row in range(1, rows + 1) if edge > 0.0
     ]  # fmt: skip
-
-
-def _legend_above(heights: Sequence[int]) -> dict[str, Any]:
-    total = sum(heights) + 34.0 * len(heights)
-    return {
-        "margin": {"l": 10, "r": 14, "t": EDGE_PX, "b": 10},
-        "legend": {"orientation": "h", "x": 0.0, "xanchor": "left", "y": 1.0 + 22.0 / total, "yanchor": "bottom"},
-        "hovermode": "x unified",
-    }
 
 
 def _sizes_told(one: Shown, stages: Sequence[tuple[str, str]]) -> str:

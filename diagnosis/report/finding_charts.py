@@ -9,8 +9,9 @@ from plotly.subplots import make_subplots
 
 from diagnosis.report.chart import INK, MOST_POINTS, Chart, curve_points, dressed, row_titles, thinned, wrapped
 from diagnosis.report.wording import clause, name, share, short_title, time_scale
-from diagnosis.results.result import LEAST_RIVAL, Diagnosis, date_told
-from diagnosis.results.result_parts import Finding, PredictedRun
+from diagnosis.results.first_screen import date_told
+from diagnosis.results.result import Diagnosis
+from diagnosis.results.result_parts import LEAST_RIVAL, Finding, PredictedRun
 from models.base.types import Array
 from models.quantities.part_colours import AMBIENT, part_colours
 

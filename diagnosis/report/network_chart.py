@@ -11,9 +11,9 @@ import plotly.graph_objects as go
 
 from diagnosis.report.chart import INK, Chart, dressed
 from diagnosis.report.network_layout import places_of
-from diagnosis.report.wording import headline, name, share
-from diagnosis.results.result import NO_CLAIM, Diagnosis
-from diagnosis.results.result_parts import Finding
+from diagnosis.report.wording import name, share
+from diagnosis.results.result import Diagnosis
+from diagnosis.results.result_parts import NO_CLAIM, Finding
 from models.base.types import Array
 from models.quantities.part_colours import AMBIENT, part_colours
 from models.quantities.quantities import node_of_channel
@@ -75,8 +75,8 @@ def marks(diagnosis: Diagnosis) -> Marks:
     names: dict[str, str] = {}
     pointed: list[tuple[str, tuple[str, float]]] = []
     for finding in diagnosis.findings:
-        title = " or ".join(headline(one) for one in finding.tie_set or (finding.mechanism,))
-        said = (f"acts like {headline(finding.mechanism)}" if finding.acts_like else title, finding.sureness)
+        title = " or ".join(map(name, finding.tie_set or (finding.mechanism,)))
+        said = (f"acts like {name(finding.mechanism)}" if finding.acts_like else title, finding.sureness)
         pointed += [(target, said) for target in _targets(finding)]
         if finding.term is not None and finding.term.kind == "link":
             label = finding.term.label
@@ -121,7 +121,6 @@ def drawn(network: ThermalNetwork, nominal: ThermalNetwork, measured: Iterable[s
         As delivered; nodes and links that it lacks are drawn as new
     measured : iterable of str
         Channels: nodes with a thermometer, or with one of several
-    marked : Marks
     """
     place = {node: (x, -float(row)) for node, (x, row) in places_of(network, nominal).items()}
     rows = 1.0 - min(y for _, y in place.values())

@@ -17,7 +17,6 @@ def places_of(network: ThermalNetwork, nominal: ThermalNetwork) -> dict[str, tup
 
     Parameters
     ----------
-    network : ThermalNetwork
     nominal : ThermalNetwork
         The same as delivered
     """

@@ -12,8 +12,9 @@ from markupsafe import Markup
 from diagnosis.report import course_charts, equation, finding_charts, network_chart, wording
 from diagnosis.report.chart import Chart
 from diagnosis.results import number_format as numbers
-from diagnosis.results.result import LEAST_RIVAL, NO_CLAIM, Diagnosis, date_told, values_told
-from diagnosis.results.result_parts import Calibrated, Finding, Fits
+from diagnosis.results.first_screen import date_told, values_told
+from diagnosis.results.result import Diagnosis
+from diagnosis.results.result_parts import LEAST_RIVAL, NO_CLAIM, Calibrated, Finding, Fits
 
 PACKAGE = "diagnosis.report"
 PLOTLY = "plotly-basic.min.js"  # npm: plotly.js-basic-dist-min, of the version that the plotly of Python brings
@@ -35,6 +36,7 @@ def page(diagnosis: Diagnosis) -> str:
         clause=wording.clause,
         plain=wording.plain,
     )
+    farthest_first = sorted(diagnosis.calibration, key=lambda one: -abs(one.shift_in_sd))
     return environment.from_string(_text("report.html.j2")).render(
         d=diagnosis,
         style=Markup(_text("report.css")),  # noqa: S704 - our own file
@@ -50,7 +52,7 @@ def page(diagnosis: Diagnosis) -> str:
         told=network_chart.marks(diagnosis).told(network_chart.corrected(diagnosis)),
         fits=[("Held out", _rows(diagnosis.holdout)), ("Learned from", _rows(diagnosis.train))],
         has_noise=diagnosis.noise_K > 0.0,
-        calibration=[_calibrated(diagnosis, one) for one in sorted(diagnosis.calibration, key=_unmoved)],
+        calibration=[_calibrated(diagnosis, one) for one in farthest_first],
         ranking=diagnosis.ranking[:MOST_RANKS],
         shown_ranks=SHOWN_RANKS,
         windows=wording.windows,
@@ -116,10 +118,6 @@ def _rows(fits: Fits) -> list[tuple[str, str, tuple[float, float, float]]]:
         return []
     total = ("all temperatures", "K", (fits.before, fits.calibrated, fits.after))
     return [total, *((c, "W" if c == wording.LOSS else "K", errors) for c, errors in fits.sensors.items())]
-
-
-def _unmoved(one: Calibrated) -> float:
-    return -abs(one.shift_in_sd)
 
 
 def _calibrated(diagnosis: Diagnosis, one: Calibrated) -> dict[str, Any]:

@@ -81,7 +81,7 @@ def name(identifier: str) -> str:
     return "total loss" if identifier == LOSS else _spelled(identifier)
 
 
-def headline(mechanism: str, place: str = "") -> str:
+def headline(mechanism: str, place: str) -> str:
     """An explanation and its place.
 
     Examples
@@ -89,8 +89,6 @@ def headline(mechanism: str, place: str = "") -> str:
     >>> headline("pump_heat", "oil"), headline("parameter", "h_air")
     ('pump heat at oil', 'parameter h air')
     """
-    if not place:
-        return name(mechanism)
     return f"{name(mechanism)}{' ' if mechanism == PARAMETER else ' at '}{name(place)}"
 
 

@@ -34,9 +34,6 @@ def separation(
 
     Parameters
     ----------
-    own, other : Hypothesis
-    catalogue : mapping of str to Mechanism
-    network : ThermalNetwork
     free : collection of str
         Parts that can have a sensor, see :func:`without_sensor`
     names : (str, str)
@@ -62,12 +59,8 @@ def next_test(
 
     Parameters
     ----------
-    verdict : str
-    findings : sequence of Finding
     location : sequence of Location
         Most probable first
-    unseen : sequence of NotDetectable
-    catalogue : mapping of str to Mechanism
     assumed : collection of str
         Inputs that were not recorded
     free : collection of str

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from diagnosis.candidates.dated import WHILE
 from diagnosis.decision.posterior import KINDS, Answer, Judged, Posterior, act_on_the_same
 from diagnosis.decision.settings import Settings
 from diagnosis.engine.baselines import effects_in_baselines, notes_of_baselines, sessions_apart
@@ -17,18 +16,15 @@ from diagnosis.engine.prepare import held_out_experiment
 from diagnosis.engine.set_apart import calibrate_without_error, without_channels
 from diagnosis.recordings.recording import Recording
 from diagnosis.results.advice import next_test, without_sensor
-from diagnosis.results.answer_findings import finding_of, name_in
-from diagnosis.results.effect_values import heats_of, names_of, slope
+from diagnosis.results.findings import estimates_of, finding_of, name_in, names_of
 from diagnosis.results.instruments import sensors_and_inputs_of
-from diagnosis.results.places import node_in
+from diagnosis.results.locations import locations_of
 from diagnosis.results.ratios_only import ratio_notes
-from diagnosis.results.regime import active, regime, windows
 from diagnosis.results.result import Diagnosis, Verdict
 from diagnosis.results.result_parts import (
     Calibrated,
     Finding,
     Fits,
-    Location,
     NotDetectable,
     PredictedRun,
     Ranked,
@@ -41,16 +37,15 @@ from models.base.parallel import run_parallel
 from models.base.types import Array
 from models.base.version import project_version
 from models.mechanisms import Mechanism
+from models.network.laws import Parameter
 from models.quantities.quantities import is_total_loss
 from models.terms.term import Term
 
 VISIBLE_NAT = 5.0  # expected evidence below which an effect cannot be seen
 ENOUGH_VISIBLE = 0.1  # of the effects that were asked for, for a "consistent" that means something
-LEAST_PLACE = 0.02  # probability of a place that is told
 MOST_RANKED = 500
 STATES = ("before", "calibrated", "after")
 PROBABLY = 0.5
-FROM_DATE, BETWEEN = "from its date on", "between its two dates"
 Predictions = Mapping[str, Mapping[str, Sequence[Prediction]]]
 
 
@@ -62,7 +57,6 @@ class Others:
     ----------
     fit : Fit
         The nominal machine calibrated by them, without model error
-    posterior : Posterior
     channels : tuple of str
         The faulty ones
     """
@@ -90,19 +84,14 @@ def assemble(
 
     Parameters
     ----------
-    setup : InferenceSetup
     experiment : Experiment
         Of the nominal machine
-    posterior : Posterior
     answers : sequence of Answer
         Most important first
     plain : Fit
         The nominal machine calibrated without model error
     others : Others or None
         What all but faulty channels say, if there are any
-    settings : Settings
-    catalogue : mapping of str to Mechanism
-    train, held_out : sequence of Recording
     jobs : int
         Processes
     """
@@ -117,7 +106,7 @@ def assemble(
     told |= {rival.mechanism for finding in findings for rival in finding.confusable_with}
     unseen = tuple(one for one in _unseen(posterior, catalogue) if one.mechanism not in told)
     verdict = _verdict(posterior, answers, unseen)
-    location = _location(setup, posterior) if posterior.detected else ()
+    location = locations_of(setup, posterior) if posterior.detected else ()
     judged = held_out_experiment(setup, experiment)
     predictions = _predictions(experiment, judged, plain, final, jobs)
     terms = _terms(best, final)
@@ -132,7 +121,7 @@ def assemble(
         gearbox=setup.gearbox.name,
         log_e_value=posterior.log_e,
         threshold=posterior.threshold,
-        p_value=float(min(1.0, np.exp(-max(posterior.log_e, -50.0)))),
+        p_value=_bound_on_chance(posterior.log_e),
         false_alarm_rate=settings.false_alarm_rate,
         location=location,
         findings=findings,
@@ -147,7 +136,7 @@ def assemble(
         noise_K=setup.noise_K,
         floor=_floor(setup),
         misfit=_misfit(final),
-        remaining_p_value=float(min(1.0, np.exp(-max(posterior.remainder, -50.0)))),
+        remaining_p_value=_bound_on_chance(posterior.remainder),
         remaining_note=_remaining(posterior, others, best),
         ranking=_ranking(posterior, catalogue),
         unseen=unseen,
@@ -184,6 +173,11 @@ def assemble(
     )  # fmt: skip
 
 
+def _bound_on_chance(nats: float) -> float:
+    """Bound on the chance of such evidence if the model were exact."""
+    return float(min(1.0, np.exp(-max(nats, -50.0))))
+
+
 def faulty_channels(posterior: Posterior, apart: Sequence[str]) -> tuple[str, ...]:
     """Channels at odds with all others whose sensors are more probably at fault than not."""
     return tuple(
@@ -215,18 +209,16 @@ def _final(best: Judged | None, plain: Fit, faulty: Sequence[str]) -> Fit:
 
 def _terms(best: Judged | None, final: Fit) -> tuple[Term, ...]:
     """Terms of the fit that predicts, with its values and standard errors."""
-    found = {}
-    for unknown, z, sd in zip(final.experiment.unknowns, final.z.tolist(),
-                              np.sqrt(np.diag(final.covariance)).tolist(), strict=True):  # fmt: skip
-        found[unknown.parameter.name] = (unknown.value(z), slope(unknown, z) * sd)
-    return tuple(
-        replace(effect.term, parameters=tuple(
-            replace(p, start=found.get(p.name, (p.start, 0.0))[0], sd=found.get(p.name, (p.start, 0.0))[1])
-            for p in effect.term.parameters
-        ))
-        for effect in (best.effects if best is not None and best.fit is not None else ())
-        if effect.term is not None
-    )  # fmt: skip
+    if best is None or best.fit is None:
+        return ()
+    found = estimates_of(final)
+
+    def as_found(p: Parameter) -> Parameter:
+        value, error = found.get(p.name, (p.start, 0.0))
+        return replace(p, start=value, sd=error)
+
+    terms = [effect.term for effect in best.effects if effect.term is not None]
+    return tuple(replace(term, parameters=tuple(map(as_found, term.parameters))) for term in terms)
 
 
 def _baseline_notes(experiment: Experiment, posterior: Posterior, answers: Sequence[Answer]) -> tuple[str, ...]:
@@ -315,80 +307,23 @@ def _floor(setup: InferenceSetup) -> str:
     return f"random heat of {100.0 * share:.1f} % {text}"
 
 
-# ---------------------------------------------------------------------- where
-
-
-def _location(setup: InferenceSetup, posterior: Posterior) -> tuple[Location, ...]:
-    """Places by probability, over everything that was judged; what acts there as the best fit with it has it."""
-    weights: dict[str, float] = {}
-    best: dict[str, Judged] = {}
-    nodes: dict[str, str] = {}
-    for judged, probability in posterior.ranked:
-        for effect in judged.effects:
-            nodes.setdefault(effect.label, node_in(setup.nominal, effect))
-        for node in {nodes[effect.label] for effect in judged.effects}:
-            weights[node] = weights.get(node, 0.0) + probability
-            if judged.fit is not None:
-                best.setdefault(node, judged)
-    told = sorted(((n, w) for n, w in weights.items() if w >= LEAST_PLACE), key=lambda item: -item[1])
-    return tuple(_place(setup, node, weight, best.get(node), nodes) for node, weight in told)
-
-
-def _place(
-    setup: InferenceSetup, node: str, weight: float, judged: Judged | None, nodes: Mapping[str, str]
-) -> Location:
-    fit = None if judged is None else judged.fit
-    effects = () if judged is None else judged.effects
-    laws = [] if fit is None else [
-        heats for effect in effects if nodes[effect.label] == node and (heats := heats_of(fit, effect))
-    ]  # fmt: skip
-    if fit is None or not laws:
-        return Location(node=node, probability=min(weight, 1.0), heat_mean_W=0.0, heat_max_W=0.0, when=(),
-                        regime="always")  # fmt: skip
-    heats = [np.sum(values, axis=0) for values in zip(*laws, strict=True)]
-    trajectories = [part.point.trajectory for part in fit.parts]
-    pieces = [trajectory.piece for trajectory in trajectories]
-    together, steps = np.concatenate(heats), np.concatenate([piece.steps for piece in pieces])
-    inputs = np.concatenate([piece.inputs for piece in pieces])
-    signals = {"speed": (np.abs(inputs[:, 0]), "1/min"), "torque": (np.abs(inputs[:, 1]), "N m")}
-    parts = [part.name for part in setup.nominal.parts]
-    if node in parts:
-        T = np.concatenate([trajectory.middle[:, parts.index(node)] for trajectory in trajectories])
-        signals[f"temperature of {node}"] = (T, "degC")
-    signals["time"] = (np.concatenate([piece.middle for piece in pieces]) / 3600.0, "h")
-    acting = active(together, steps)
-    here = [effect for effect in effects if nodes[effect.label] == node]
-    dated = BETWEEN if here[0].name.endswith(WHILE) else FROM_DATE if here[0].how == "D" else ""
-    split = np.split(acting, np.cumsum([len(heat) for heat in heats])[:-1])
-    when = [(piece.recording, a, b) for piece, acts in zip(pieces, split, strict=True)
-            for a, b in windows(piece.middle, acts)]  # fmt: skip
-    return Location(
-        node=node, probability=min(weight, 1.0), heat_mean_W=float(np.average(together, weights=steps)),
-        heat_max_W=float(together[np.argmax(np.abs(together))]), when=tuple(when),
-        regime=dated or regime(acting, signals, steps),
-    )  # fmt: skip
-
-
 # ---------------------------------------------------------------------- fits and courses
 
 
 def _predictions(experiment: Experiment, held_out: Experiment, plain: Fit, final: Fit, jobs: int) -> Predictions:
     """Free-running predictions of the training and the held-out pieces: as delivered, calibrated and after."""
-    places: list[tuple[str, int, Array | None]] = [
-        ("train", i, part.point.trajectory.T) for i, part in enumerate(final.parts)
-    ]
-    places += [("holdout", i, None) for i in range(len(held_out.pieces))]
-    of = {"train": experiment, "holdout": held_out}
-    work = []
-    for name, index, near in places:
-        own = (with_pieces_of(fit.experiment, of[name]) for fit in (plain, final))
-        work.append((*(replace(one, filters=None) for one in own), plain.z, final.z, index, near))
-    three = run_parallel(_predicted, work, jobs=jobs)
-    return {
-        name: {state: [them[which] for (one, *_), them in zip(places, three, strict=True) if one == name]
-               for which, state in enumerate(STATES)}
-        for name in of
-    }  # fmt: skip
+    work: list[tuple[Experiment, Experiment, Array, Array, int, Array | None]] = []
+    near_train = [part.point.trajectory.T for part in final.parts]
+    for pieces_of, near in ((experiment, near_train), (held_out, [None] * len(held_out.pieces))):
+        one, other = (replace(with_pieces_of(fit.experiment, pieces_of), filters=None) for fit in (plain, final))
+        work += [(one, other, plain.z, final.z, index, T) for index, T in enumerate(near)]
+    found = run_parallel(_predicted, work, jobs=jobs)
+
+    def by_state(of: Sequence[tuple[Prediction, ...]]) -> dict[str, list[Prediction]]:
+        return {state: [three[which] for three in of] for which, state in enumerate(STATES)}
+
+    train = len(final.parts)
+    return {"train": by_state(found[:train]), "holdout": by_state(found[train:])}
 
 
 def _predicted(
@@ -442,17 +377,14 @@ def _calibration(final: Fit, plain: Fit, answers: Sequence[Answer]) -> tuple[Cal
     stated = {unknown.parameter.name: unknown for unknown in plain.experiment.unknowns}
     found = {name for answer in answers for effect in answer.best.effects if effect.term is not None
              for name in names_of(effect)}  # fmt: skip
-    sd, result = np.sqrt(np.diag(final.covariance)), []
-    for unknown, z, own in zip(final.experiment.unknowns, final.z.tolist(), sd.tolist(), strict=True):
-        p = unknown.parameter
-        if p.name in found or p.name not in stated:
-            continue
-        value = unknown.value(z)
-        result.append(Calibrated(
-            parameter=p.name, prior=p.start, value=value, stderr=slope(unknown, z) * own,
-            shift_in_sd=stated[p.name].z_of(value), unit=p.unit,
-        ))  # fmt: skip
-    return tuple(result)
+    estimates = estimates_of(final)
+    usual = (unknown.parameter for unknown in final.experiment.unknowns)
+    return tuple(
+        Calibrated(parameter=p.name, prior=p.start, value=value, stderr=stderr,
+                   shift_in_sd=stated[p.name].z_of(value), unit=p.unit)
+        for p in usual if p.name in stated and p.name not in found
+        for value, stderr in [estimates[p.name]]
+    )  # fmt: skip
 
 
 def _ranking(posterior: Posterior, catalogue: Mapping[str, Mechanism]) -> tuple[Ranked, ...]:

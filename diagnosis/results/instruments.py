@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -21,7 +22,7 @@ from diagnosis.engine.unknown import (
     in_scope,
 )
 from diagnosis.setup.shaft import EFFICIENCY
-from models.correction.instruments import InputCorrection, Mix, SensorCorrection
+from models.correction.instruments import InputCorrection, SensorCorrection
 from models.network.laws import symbol
 from models.quantities.quantities import TOTAL_LOSS
 from models.terms.term import Term
@@ -59,23 +60,16 @@ def sensors_and_inputs_of(
     fit: Fit,
     *,
     findings: Collection[str] = (),
-    mixes: Mapping[str, Sequence[Mix]] | None = None,
     inputs: Collection[str] | None = None,
-    recording: str | None = None,
 ) -> tuple[tuple[SensorCorrection, ...], tuple[InputCorrection, ...]]:
-    """How the columns of the recorder differ from the machine by a fit.
+    """How the columns of the recorder differ from the machine by a fit, in the first recording that is no baseline.
 
     Parameters
     ----------
-    fit : Fit
     findings : collection of str
         Labels of terms that the correction has as ``[[finding]]``; they are left out here, because both are applied
-    mixes : mapping of channel to sequence of Mix, optional
-        Shares of other nodes in the readings, of model error
     inputs : collection of str, optional
         Of the definition, where the fit has a speed or a torque that the definition lacks
-    recording : str, optional
-        As it was in this one; by default in the first that is no baseline
 
     Returns
     -------
@@ -85,7 +79,7 @@ def sensors_and_inputs_of(
     """
     experiment = fit.experiment
     names = [piece.recording for piece in experiment.pieces]
-    recording = recording or next((name for name in names if name not in experiment.healthy), names[0])
+    recording = next((name for name in names if name not in experiment.healthy), names[0])
     collected, terms = _Collected(), {term.label: term for term in experiment.machine.terms}
     errors = np.sqrt(np.diag(fit.covariance)).tolist()
     after: list[tuple[Term, Estimate]] = []
@@ -100,15 +94,14 @@ def sensors_and_inputs_of(
     for term, estimate in after:  # the engine shifts inputs after gains and offsets
         _collect_term(collected, term, estimate)
     _collect_clock(collected, experiment.machine.inputs, has_loss=TOTAL_LOSS in experiment.pieces[0].channels)
-    mixed = mixes or {}
-    channels = [c for c in experiment.pieces[0].channels if c in collected.sensors or c in mixed]
     return (
         tuple(
-            SensorCorrection(channel=c, mix=tuple(mixed.get(c, ())), **dict(_keys(collected.sensors.get(c, {}))))
-            for c in channels
+            SensorCorrection(channel=channel, **_table(collected.sensors[channel]))
+            for channel in experiment.pieces[0].channels
+            if channel in collected.sensors
         ),
         tuple(
-            InputCorrection(name=name, **dict(_keys(collected.inputs[name])))
+            InputCorrection(name=name, **_table(collected.inputs[name]))
             for name in experiment.machine.inputs
             if name in collected.inputs and (inputs is None or name in inputs)
         ),
@@ -167,7 +160,7 @@ def _is_constant(term: Term) -> bool:
     return bool(term.expression == symbol(term.strength.name))
 
 
-def _keys(estimates: Mapping[str, Estimate]) -> Iterator[tuple[str, float]]:
-    for key, (value, stderr) in estimates.items():
-        yield key, value
-        yield f"{key}_stderr", stderr
+def _table(estimates: Mapping[str, Estimate]) -> dict[str, Any]:
+    """Keys of a table: numbers, and their standard errors."""
+    values = {key: value for key, (value, _) in estimates.items()}
+    return values | {f"{key}_stderr": stderr for key, (_, stderr) in estimates.items()}

@@ -23,12 +23,7 @@ LITTLE = 0.01  # of what the recordings know about the sizes one by one: a small
 
 
 def ratio_notes(fit: Fit) -> tuple[str, ...]:
-    """One sentence if the recordings identify ratios only; nothing if they identify sizes.
-
-    Parameters
-    ----------
-    fit : Fit
-    """
+    """One sentence if the recordings identify ratios only; nothing if they identify sizes."""
     direction = scale_direction(fit)
     each = np.concatenate([part.columns for part in fit.parts]) * direction
     together, alone = each.sum(axis=1), np.square(each).sum(axis=0)[direction != 0.0]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
 from models.base.types import Array
@@ -16,6 +16,9 @@ if TYPE_CHECKING:
 
 Grade = Literal["claim", "likely"]
 PARAMETER = "parameter"
+NO_CLAIM = ("consistent", "insufficient_data")  # verdicts
+LEAST_RIVAL = 0.01  # probability of what is told as a rival
+MOST_NEAREST = 3  # names that are told of those that were not reported
 SIZES = {0.5: "half as large", 1.0: "as assumed", 2.0: "twice as large"}  # of model error, by factor
 
 
@@ -60,19 +63,19 @@ class Change:
         In which it begins
     from_s : float
         Since the first row of that recording, [s]
-    band_s : (float, float) or None
-        95 % band of `from_s`, [s]; None if unknown
     to_s : float or None
         End, since the first row of the same recording, [s]; None: it stays
     utc : str or None
         Begin by the clock, ISO 8601; None for a recording without dates
+    band_s : (float, float) or None
+        95 % band of `from_s`, [s]; None if unknown
     """
 
     recording: str
     from_s: float
-    band_s: tuple[float, float] | None = None
     to_s: float | None = None
     utc: str | None = None
+    band_s: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -169,6 +172,25 @@ class Finding:
     def sureness(self) -> float:
         """Probability that the title is right."""
         return self.probability if math.isnan(self.joint_probability) else self.joint_probability
+
+    def to_dict(self) -> dict[str, Any]:
+        """The finding as it is in ``diagnosis.json``."""
+        date, alike = self.date, ("mechanism", "family", "place", "node", "kind", "grade", "acts_like")
+        return {
+            **{key: getattr(self, key) for key in alike},
+            "tie_set": list(self.tie_set),
+            "joint_probability": self.sureness,
+            "says": self.says,
+            "equation": self.equation,
+            "reference": self.reference,
+            "probability": self.probability,
+            "log_bayes": self.log_bayes,
+            "heat_W": {"mean": self.heat_mean_W, "stderr": self.heat_stderr_W, "max": self.heat_max_W},
+            "date": date and asdict(date) | {"band_s": date.band_s and list(date.band_s)},
+            "switching": self.switching and asdict(self.switching),
+            "parameters": [asdict(one) for one in self.parameters],
+            "confusable_with": [asdict(one) for one in self.confusable_with],
+        }
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -325,6 +347,18 @@ class Fits:
     after: float
     sensors: Mapping[str, tuple[float, float, float]]
 
+    def to_dict(self) -> dict[str, Any]:
+        """The errors as they are in ``diagnosis.json``."""
+        return {
+            "rmse_before_K": or_none(self.before),
+            "rmse_calibrated_K": or_none(self.calibrated),
+            "rmse_after_K": or_none(self.after),
+            "sensors": {
+                name: dict(zip(("before", "calibrated", "after"), map(or_none, errors), strict=True))
+                for name, errors in self.sensors.items()
+            },
+        }
+
 
 @dataclass(frozen=True, kw_only=True)
 class Calibrated:
@@ -390,53 +424,6 @@ def named(mechanism: str, place: str) -> str:
     return f"{mechanism} {place}" if mechanism == PARAMETER else f"{mechanism} at {place}"
 
 
-def finding_dict(finding: Finding) -> dict[str, Any]:
-    """A finding as it stands in ``diagnosis.json``."""
-    date, switching = finding.date, finding.switching
-    return {
-        "mechanism": finding.mechanism,
-        "family": finding.family,
-        "place": finding.place,
-        "node": finding.node,
-        "kind": finding.kind,
-        "grade": finding.grade,
-        "acts_like": finding.acts_like,
-        "tie_set": list(finding.tie_set),
-        "joint_probability": finding.sureness,
-        "says": finding.says,
-        "equation": finding.equation,
-        "reference": finding.reference,
-        "probability": finding.probability,
-        "log_bayes": finding.log_bayes,
-        "heat_W": {"mean": finding.heat_mean_W, "stderr": finding.heat_stderr_W, "max": finding.heat_max_W},
-        "date": None if date is None else {
-            "recording": date.recording, "from_s": date.from_s, "to_s": date.to_s, "utc": date.utc,
-            "band_s": None if date.band_s is None else list(date.band_s),
-        },
-        "switching": None if switching is None else {"on_degC": switching.on_degC, "off_degC": switching.off_degC},
-        "parameters": [
-            {"name": p.name, "value": p.value, "stderr": p.stderr, "unit": p.unit} for p in finding.parameters
-        ],
-        "confusable_with": [
-            {"mechanism": r.mechanism, "place": r.place, "probability": r.probability, "separate_by": r.separate_by,
-             "instead": r.instead}
-            for r in finding.confusable_with
-        ],
-    }  # fmt: skip
-
-
-def fits_dict(fits: Fits) -> dict[str, Any]:
-    """Errors as they stand in ``diagnosis.json``."""
-
-    def number(value: float) -> float | None:
-        return value if value == value else None
-
-    return {
-        "rmse_before_K": number(fits.before),
-        "rmse_calibrated_K": number(fits.calibrated),
-        "rmse_after_K": number(fits.after),
-        "sensors": {
-            name: {"before": number(b), "calibrated": number(c), "after": number(a)}
-            for name, (b, c, a) in fits.sensors.items()
-        },
-    }
+def or_none(value: float) -> float | None:
+    """A number as JSON has it: null for NaN and infinity."""
+    return value if math.isfinite(value) else None

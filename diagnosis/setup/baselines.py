@@ -19,10 +19,6 @@ def session_by_recording(
     All that is learnt from and held out is one session, called ``""``; every file of baselines is another, called like
     its first recording. Parts of one file belong together. What a mapping states comes first.
 
-    Parameters
-    ----------
-    train, holdout, baseline : sequence of Recording
-
     Returns
     -------
     dict of recording to session
@@ -46,7 +42,6 @@ def check_baselines(
 
     Parameters
     ----------
-    train, baseline : sequence of Recording
     switched_off : collection of str
         Mechanisms that are known to be off in the baselines
     catalogue : collection of str

@@ -32,17 +32,14 @@ class InferenceSetup:
 
     Attributes
     ----------
-    gearbox : Gearbox
     nominal : ThermalNetwork
         As the definition has it
-    losses : Losses
     model : NetworkOnGrid
         The nominal network with the tilts of its laws
     shapes : tuple of Term
         Tilts of the laws, which the nominal network lacks
     scale : Scale
         Typical sizes in these recordings
-    channels : tuple of str
     learnt, held_out : tuple of Piece
         To learn from and to judge by
     loss_W : float
@@ -98,7 +95,6 @@ def prepare(
 
     Parameters
     ----------
-    gearbox : Gearbox
     recordings, holdout : sequence of Recording
         To learn from, and to judge by
     baseline : sequence of Recording

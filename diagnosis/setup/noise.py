@@ -88,8 +88,6 @@ def noise_of(
 
     Parameters
     ----------
-    model : NetworkOnGrid
-    piece : Piece
     white : mapping of channel to float
         White noise of one row
     loss_W : float

@@ -36,9 +36,6 @@ def check_plausible(
 
     Parameters
     ----------
-    recordings : sequence of Recording
-    network : ThermalNetwork
-    losses : Losses
     judge_temperatures : bool
         False if the model is too uncertain for that (a definition without geometry)
 

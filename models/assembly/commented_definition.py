@@ -45,10 +45,6 @@ def commented_definition(like: str, *, name: str, file: str, schema: str) -> str
     schema : str
         File of the JSON schema, as editors find it from the file
 
-    Returns
-    -------
-    str
-
     Examples
     --------
     >>> text = commented_definition("fzg", name="mine", file="mine.toml", schema="definition.schema.json")

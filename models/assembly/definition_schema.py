@@ -116,7 +116,6 @@ def key_line(table: str, key: str, limits: tuple[float, float] | None) -> str:
     ----------
     table : str
         Class of the table
-    key : str
     limits : (float, float) or None
         That it is checked against
     """

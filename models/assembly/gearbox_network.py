@@ -56,7 +56,6 @@ def build_network(gearbox: Definition, priors: Mapping[str, float]) -> ThermalNe
 
     Parameters
     ----------
-    gearbox : Definition
     priors : mapping of str to float
         Standard deviations by dotted path
 

@@ -101,7 +101,6 @@ def build_parametric_network(definition: ParametricDefinition, priors: Mapping[s
 
     Parameters
     ----------
-    definition : ParametricDefinition
     priors : mapping of str to float
         Standard deviations by dotted path
     """
@@ -137,7 +136,6 @@ def with_losses_as_laws(network: ThermalNetwork, definition: ParametricDefinitio
     ----------
     network : ThermalNetwork
         With the signals ``P_<loss>`` of :class:`ParametricLosses`
-    definition : ParametricDefinition
     """
     operation, constants = definition.operation, definition.viscosity_constants
     n, m = sp.Abs(symbol("speed")) / operation.speed_rpm, sp.Abs(symbol("torque")) / operation.torque_Nm
@@ -157,12 +155,8 @@ def with_losses_as_laws(network: ThermalNetwork, definition: ParametricDefinitio
         components=(),
         operating={},
         sources=tuple(replace(source, heat=source.heat.xreplace(laws)) for source in network.sources),
-        states=tuple(
-            replace(state, rate=state.rate.xreplace(laws),
-                    update=None if state.update is None else state.update.xreplace(laws))
-            for state in network.states
-        ),
-    )  # fmt: skip
+        states=tuple(state.with_laws(lambda law: law.xreplace(laws)) for state in network.states),
+    )
 
 
 class _Builder:

@@ -18,7 +18,7 @@ R = TypeVar("R")
 
 def run_parallel(
     function: Callable[..., R], items: Iterable[Sequence[Any]], *, jobs: int | None = 1, dask: str | None = None,
-    batches: int | None = None, progress: Callable[[int, int], None] | None = None,
+    progress: Callable[[int, int], None] | None = None,
 ) -> list[R]:  # fmt: skip
     """Results of ``function(*item)`` for every item, in order.
 
@@ -33,9 +33,6 @@ def run_parallel(
         process
     dask : str, optional
         Address of a Dask scheduler (``"tcp://host:8786"``) that does the work instead
-    batches : int, optional
-        Number of batches that the items are sent in; objects that calls of a batch have in common are sent once. By
-        default every item is sent alone, which suits few large ones of unequal size
     progress : callable, optional
         Told how many of how many results there are
 
@@ -53,13 +50,11 @@ def run_parallel(
     jobs = _processes(jobs)
     if dask is None and (jobs < 2 or len(items) < 2):
         return _collected((_numbered(function, *numbered) for numbered in enumerate(items)), len(items), progress)
-    size = -(-len(items) // batches) if batches and items else 1
     calls = (delayed(_numbered)(function, *numbered) for numbered in enumerate(items))
     with _backend(dask), warnings.catch_warnings():
         # joblib replaces a worker whose memory has grown between two calls; no result is lost.
         warnings.filterwarnings("ignore", "A worker stopped while some jobs were given to the executor")
-        pool = _pool(jobs, dask, batch_size=size, pre_dispatch=2 * jobs * size, return_as="generator_unordered")
-        return _collected(pool(calls), len(items), progress)
+        return _collected(_pool(jobs, dask)(calls), len(items), progress)
 
 
 def _collected(results: Iterable[tuple[int, R]], number: int, progress: Callable[[int, int], None] | None) -> list[R]:
@@ -88,8 +83,7 @@ def iterate_parallel(
     [8, 9]
     """
     with _backend(dask):
-        pool = _pool(_processes(jobs), dask, batch_size=1, return_as="generator_unordered")
-        yield from pool(delayed(_call)(function, item) for item in items)
+        yield from _pool(_processes(jobs), dask)(delayed(_call)(function, item) for item in items)
 
 
 @contextmanager
@@ -108,8 +102,9 @@ def _call(function: Callable[..., R], item: Sequence[Any]) -> R:
         return function(*item)
 
 
-def _pool(jobs: int, dask: str | None, **settings: Any) -> Parallel:
-    return Parallel(n_jobs=jobs if dask is None else None, **settings)
+def _pool(jobs: int, dask: str | None) -> Parallel:
+    """Every item is sent alone, which suits few large ones of unequal size."""
+    return Parallel(n_jobs=jobs if dask is None else None, batch_size=1, return_as="generator_unordered")
 
 
 def _backend(dask: str | None) -> AbstractContextManager[None]:

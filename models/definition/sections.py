@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal, Self, TypeVar, get_args
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StringConstraints, model_validator
 
 from models.formulas.geometry import GearPair, gear_pair
-from models.quantities.definition_units import InSI, between, in_si, optional_pair_in_si, pair_in_si
+from models.quantities.definition_units import InSI, between, in_si
 
 T = TypeVar("T")
 
@@ -270,8 +270,8 @@ class Stage(Section):
     pressure_angle = in_si("pressure_angle_deg")
     face_width = in_si("face_width_mm")
     center_distance = in_si("center_distance_mm")
-    tip_diameter = optional_pair_in_si("tip_diameter_mm")
-    roughness_Ra = pair_in_si("roughness_Ra_um")
+    tip_diameter = InSI[tuple[float, float] | None]("tip_diameter_mm")
+    roughness_Ra = InSI[tuple[float, float]]("roughness_Ra_um")
 
     @property
     def bore_radius(self) -> tuple[float, float]:

@@ -118,14 +118,8 @@ def column_names(path: Path, separator: str = PLAIN.separator) -> tuple[str, ...
         return ()
 
 
-def read_table(path: Path, form: TextForm = PLAIN) -> pd.DataFrame:
+def read_table(path: Path) -> pd.DataFrame:
     """Read a CSV, CSV.gz or Parquet file.
-
-    Parameters
-    ----------
-    path : Path
-    form : TextForm
-        Of a CSV file
 
     Returns
     -------
@@ -137,7 +131,7 @@ def read_table(path: Path, form: TextForm = PLAIN) -> pd.DataFrame:
     InputError
         If the file is missing, empty, too long, of another kind, or its content cannot be read.
     """
-    return together(path, read_chunks(path, form))
+    return together(path, read_chunks(path, PLAIN))
 
 
 def together(path: Path, chunks: Iterable[pd.DataFrame]) -> pd.DataFrame:
@@ -159,8 +153,8 @@ def together(path: Path, chunks: Iterable[pd.DataFrame]) -> pd.DataFrame:
     return pd.concat(filled) if len(filled) > 1 else filled[0]
 
 
-def read_chunks(path: Path, form: TextForm = PLAIN) -> Iterator[pd.DataFrame]:
-    """Read a file in chunks of rows, at least one; see :func:`read_table`."""
+def read_chunks(path: Path, form: TextForm) -> Iterator[pd.DataFrame]:
+    """Read a file, of a CSV file in the given form, in chunks of rows, at least one; see :func:`read_table`."""
     kind = kind_of(path)
     check_file(path)
     try:

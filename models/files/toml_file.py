@@ -49,16 +49,17 @@ def parse(text: str, *, file: str) -> dict[str, Any]:
         If it is not TOML; the message names line and column.
     """
     try:
-        document: dict[str, Any] = _with_tuples(tomllib.loads(text))
+        document: dict[str, Any] = with_tuples(tomllib.loads(text))
         return document
     except (ValueError, RecursionError) as error:
         raise InputError(f"{file}: is not valid TOML: {error}") from error
 
 
-def _with_tuples(node: Any) -> Any:
+def with_tuples(node: Any) -> Any:
+    """Return nested tables with their lists as tuples."""
     if isinstance(node, dict):
-        return {key: _with_tuples(item) for key, item in node.items()}
-    return tuple(map(_with_tuples, node)) if isinstance(node, list) else node
+        return {key: with_tuples(item) for key, item in node.items()}
+    return tuple(map(with_tuples, node)) if isinstance(node, list) else node
 
 
 def parse_schema_1(text: str, *, file: str, kind: str) -> dict[str, Any]:
@@ -66,7 +67,6 @@ def parse_schema_1(text: str, *, file: str, kind: str) -> dict[str, Any]:
 
     Parameters
     ----------
-    text : str
     file : str
         Name of the file, for the message
     kind : str

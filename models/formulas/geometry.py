@@ -300,7 +300,7 @@ class GearPair:
 
 
 def _basic_faults(
-    *, z: tuple[int, int], m_n: float, alpha_n: float, b: float, a: float, x: tuple[float, float], beta: float
+    *, z: tuple[int, int], m_n: float, alpha_n: float, b: float, a: float, x: tuple[float, float]
 ) -> list[str]:
     """Faults of single values, each with the limit that it breaks."""
     faults = []
@@ -316,8 +316,6 @@ def _basic_faults(
             faults.append(f"gear {gear}: number of teeth {teeth} must be a whole number of at least 5")
     if not all(math.isfinite(shift) for shift in x):
         faults.append(f"profile shifts {x[0]:g}, {x[1]:g} must be finite")
-    if beta != 0.0:
-        faults.append(f"helix angle {math.degrees(beta):g} degrees: helical gears are not supported yet; use 0")
     return faults
 
 
@@ -388,7 +386,6 @@ def gear_pair(
     x: tuple[float, float],
     tip_shortening: bool = True,
     r_a: tuple[float, float] | None = None,
-    beta: float = 0.0,
 ) -> GearPair:
     r"""Check a spur gear pair and compute its geometry (DIN 3960 / ISO 21771).
 
@@ -415,8 +412,6 @@ def gear_pair(
         at 0 or below
     r_a : tuple of float, optional
         Tip radii, [m]; they override tip_shortening
-    beta : float
-        Helix angle, [rad]; only 0 is supported
 
     Returns
     -------
@@ -437,7 +432,7 @@ def gear_pair(
     >>> round(pair.epsilon_alpha, 5), round(2e3 * pair.r_a[0], 3), round(2e3 * pair.r_a[1], 3)
     (1.43716, 82.452, 118.362)
     """
-    _refuse(_basic_faults(z=z, m_n=m_n, alpha_n=alpha_n, b=b, a=a, x=x, beta=beta))
+    _refuse(_basic_faults(z=z, m_n=m_n, alpha_n=alpha_n, b=b, a=a, x=x))
 
     r = (0.5 * m_n * z[0], 0.5 * m_n * z[1])
     r_b = (r[0] * math.cos(alpha_n), r[1] * math.cos(alpha_n))

@@ -7,9 +7,8 @@ axial compression of the tooth and of the turn of its foundation; the two teeth 
 
 Validity. The tooth is an involute down to the base circle and a radial flank from there to the root circle (the fillet
 is left out: the tooth is a little too soft). The foundation's polynomials were fitted for 1.4 <= r_f / r_bore <= 7 and
-0.01 <= theta_f <= 0.12 rad; :func:`foundation_notes` reports where a pair leaves this range. Nothing is clipped. The
-Hertzian part is linear, so the stiffness does not depend on the load. No tip relief, no coupling between
-neighbouring teeth through the gear body.
+0.01 <= theta_f <= 0.12 rad; outside they are extrapolated. The Hertzian part is linear, so the stiffness does not
+depend on the load. No tip relief, no coupling between neighbouring teeth through the gear body.
 """
 
 from __future__ import annotations
@@ -23,8 +22,6 @@ from models.base.types import Array, Numeric
 from models.formulas.geometry import GearPair
 
 SHEAR_FACTOR = 1.2  # rectangular section
-FOUNDATION_RATIO = (1.4, 7.0)  # fitted range of h = r_f / r_bore
-FOUNDATION_ANGLE = (0.01, 0.12)  # fitted range of theta_f, rad
 # Coefficients A ... F of X(h, theta) = A/theta^2 + B h^2 + C h/theta + D/theta + E h + F, for X = L*, M*, P*, Q*.
 SAINSOT = np.array(
     [
@@ -221,36 +218,6 @@ def root_half_angle(*, psi_b: float, r_b: float, r_f: float) -> float:
 def default_bore(pair: GearPair) -> tuple[float, float]:
     """Bore radii for a pair whose bores are not known: a third of the root radii, amid the fitted range, [m]."""
     return pair.r_f[0] / 3.0, pair.r_f[1] / 3.0
-
-
-def foundation_notes(pair: GearPair, r_bore: tuple[float, float] | None = None) -> list[str]:
-    """Say where a pair leaves the range in which the foundation's polynomials were fitted.
-
-    Parameters
-    ----------
-    pair : GearPair
-        The gears
-    r_bore : tuple of float, optional
-        Bore radii, [m]; default :func:`default_bore`
-
-    Returns
-    -------
-    list of str
-        One sentence per excess; empty inside the fitted range
-    """
-    notes = []
-    for i, bore in enumerate(r_bore or default_bore(pair)):
-        theta_f = root_half_angle(psi_b=pair.base_half_angle(i), r_b=pair.r_b[i], r_f=pair.r_f[i])
-        for name, value, (low, high) in (
-            ("root radius over bore radius", pair.r_f[i] / bore, FOUNDATION_RATIO),
-            ("half tooth angle at the root in rad", theta_f, FOUNDATION_ANGLE),
-        ):
-            if not low <= value <= high:
-                notes.append(
-                    f"gear {i + 1}: {name} = {value:.4f} is outside {low:g} to {high:g}, the range of the foundation "
-                    "stiffness of Sainsot et al. (2004)"
-                )
-    return notes
 
 
 def tooth_pair_stiffness(

@@ -30,7 +30,6 @@ class Parameter:
 
     Attributes
     ----------
-    name : str
     unit : str
         "1" for a factor
     start, lower, upper : float
@@ -39,7 +38,6 @@ class Parameter:
         Standard deviation of the prior: of the natural logarithm where `log`, else of the value
     log : bool
         Whether the prior is log-normal
-    description : str
     grid : tuple of float
         Values from which a search for it starts, where one start may miss the best; empty: `start` alone
     sweep : (float, float) or None
@@ -71,7 +69,6 @@ def renamed(law: sp.Expr, names: Mapping[str, str]) -> sp.Expr:
 
     Parameters
     ----------
-    law : sympy.Expr
     names : mapping of str to str
         New name by old one; no two of the new law's names become one
     """
@@ -264,10 +261,6 @@ def function_source(name: str, arguments: Sequence[str], expressions: Sequence[s
         What it returns, as a tuple
     vector : bool
         numpy code for arrays, or plain ``math`` code for single numbers (40 times faster on those)
-
-    Returns
-    -------
-    str
     """
     return _function_source(name, tuple(arguments), tuple(expressions), vector)
 
@@ -385,15 +378,10 @@ def c_function_source(name: str, arguments: Mapping[str, str], expressions: Sequ
 
     Parameters
     ----------
-    name : str
     arguments : mapping of str to str
         C expression for every signal or parameter
     expressions : sequence of sympy.Expr
         What goes to ``y``, in order
-
-    Returns
-    -------
-    str
 
     Examples
     --------

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Protocol
 
@@ -48,7 +48,6 @@ class Node:
 
     Attributes
     ----------
-    name : str
     capacity : sympy.Expr or None
         Heat capacity, [J/K]; None for a boundary
     temperature : sympy.Expr or None
@@ -85,8 +84,6 @@ class ExtraState:
 
     Attributes
     ----------
-    name : str
-    start : float
     rate : sympy.Expr
         Time derivative, [1/s]; 0 for a state that only switches
     update : sympy.Expr or None
@@ -101,6 +98,11 @@ class ExtraState:
     update: sp.Expr | None
     averaged_update: sp.Expr | None = None
 
+    def with_laws(self, changed: Callable[[sp.Expr], sp.Expr]) -> ExtraState:
+        """The state with each of its laws changed."""
+        update, averaged = (None if law is None else changed(law) for law in (self.update, self.averaged_update))
+        return replace(self, rate=changed(self.rate), update=update, averaged_update=averaged)
+
 
 BASE_SIGNALS = ("time",)
 
@@ -111,8 +113,6 @@ class Network:
 
     Attributes
     ----------
-    nodes, links, sources : tuple
-    parameters : tuple of Parameter
     components : tuple of str
         Losses that the sources may use as the signal ``P_<component>``
     inputs : mapping of str to Input
@@ -121,7 +121,6 @@ class Network:
         Signals that follow from inputs and parameters, as a torque from an electrical power
     groups : mapping of str to tuple of str
         Names for several nodes together, e.g. ``housing``
-    states : tuple of ExtraState
     numeric_laws : mapping of str to NumericLaw
         Laws that could not be traced, by the symbol in their place
     operating : mapping of str to sympy.Expr

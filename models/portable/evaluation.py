@@ -114,8 +114,6 @@ class NetworkSystem:
 
     Parameters
     ----------
-    laws : Laws
-    losses : LossSource
     parameters : sequence of float or Array
         Values of ``laws.parameters``, in order; arrays evaluate several variants at once
     vector : bool

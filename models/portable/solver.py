@@ -163,15 +163,9 @@ def advance(system: System, state: State, time: float, duration: float, inputs: 
 
     Parameters
     ----------
-    system : System
-    state : State
     time, duration : float
         Start and length of the step, [s]
     inputs, inputs_end : Array, shape (n_inputs,)
-
-    Returns
-    -------
-    State
 
     Raises
     ------

@@ -112,7 +112,6 @@ class Network:
 
     Attributes
     ----------
-    name : str
     inputs, outputs : tuple of str
         Names with units (``"speed_rpm"``, ``"mesh_sliding_W"``)
     lower, upper : tuple of float
@@ -124,7 +123,6 @@ class Network:
     weights : three Arrays, shape (features, H1), (H1, H2), (H2, outputs)
     biases : three Arrays, shape (H1,), (H2,), (outputs,)
     passed : Array, shape (features, outputs)
-    log_output : bool
     """
 
     name: str
@@ -270,8 +268,6 @@ class SurrogateLosses:
     ----------
     components, temperature_nodes : tuple of str
         As in the full model
-    networks : tuple of Network
-    uses : tuple of Use
     speed_bounds, torque_bounds, temperature_bounds : (float, float)
         Range of training of the input shaft's speed [1/min] and torque [N m], and of all temperatures [degC]
     torque_driven : tuple of str

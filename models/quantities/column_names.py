@@ -19,7 +19,6 @@ def meant(name: str, lacking: Iterable[str], *, near: float, near_stem: float = 
 
     Parameters
     ----------
-    name : str
     lacking : iterable of str
         Columns that are required and not there
     near, near_stem : float

@@ -148,13 +148,3 @@ class InSI(Generic[T]):
 def in_si(key: str) -> InSI[float]:
     """Return the SI attribute of a key that holds one number."""
     return InSI[float](key)
-
-
-def pair_in_si(key: str) -> InSI[tuple[float, float]]:
-    """Return the SI attribute of a key that holds two numbers (pinion, wheel)."""
-    return InSI[tuple[float, float]](key)
-
-
-def optional_pair_in_si(key: str) -> InSI[tuple[float, float] | None]:
-    """Return the SI attribute of a key that holds two numbers or is absent."""
-    return InSI[tuple[float, float] | None](key)

@@ -147,7 +147,6 @@ class Input:
         Value where a cycle or a recording does not give it, in the unit inside
     required : bool
         True if a cycle must give it
-    description : str
     """
 
     quantity: Quantity
@@ -184,7 +183,6 @@ def named_input(
         In that unit
     required : bool
         True if a cycle must give it
-    description : str
 
     Examples
     --------

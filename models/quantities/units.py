@@ -59,16 +59,6 @@ class Unit:
         to = next(unit for unit in TABLE if unit.dimension == self.dimension and inside in (unit.symbol, *unit.aliases))
         return inside, *conversion(self, to)
 
-    def to_column(self, value: float) -> float:
-        """Convert a value to the unit of file columns.
-
-        Examples
-        --------
-        >>> UNITS["K"].to_column(293.15)
-        20.0
-        """
-        return value * self.column[1] + self.column[2]
-
     def from_column(self, value: float) -> float:
         """Convert a value of a file column to this unit, to 12 digits.
 

@@ -27,8 +27,6 @@ def network_system(
 
     Parameters
     ----------
-    network : Network
-    losses : Losses
     parameters : mapping of str to ArrayLike, shape () or (B,), or None
         Values of parameters that differ from their start; arrays run B variants at once
     vector : bool

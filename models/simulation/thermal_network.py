@@ -364,12 +364,7 @@ class ThermalNetwork(Network):
                         for n in self.nodes),
             links=tuple(replace(link, conductance=link.conductance.xreplace(seen)) for link in self.links),
             sources=tuple(replace(source, heat=source.heat.xreplace(seen)) for source in self.sources),
-            states=tuple(
-                replace(state, rate=state.rate.xreplace(seen),
-                        update=None if state.update is None else state.update.xreplace(seen),
-                        averaged_update=None if state.averaged_update is None else state.averaged_update.xreplace(seen))
-                for state in self.states
-            ),
+            states=tuple(state.with_laws(lambda law: law.xreplace(seen)) for state in self.states),
             operating=operating,
             derived={key: law.xreplace(seen) for key, law in self.derived.items()},
         )  # fmt: skip

@@ -107,7 +107,6 @@ class Term:
 
         Parameters
         ----------
-        network : ThermalNetwork
         values : mapping of str to float or None
             Values of parameters where they differ from their start
         as_recorded : bool
@@ -190,7 +189,6 @@ def equation(term: Term, laws: Mapping[str, sp.Expr], values: Mapping[str, float
 
     Parameters
     ----------
-    term : Term
     laws : mapping of str to sympy.Expr
         As :attr:`Term.laws`, in whatever symbols are good to read
     values : mapping of str to float

@@ -33,6 +33,20 @@ def keep_apart(recordings: Path, truth: Path) -> None:
         raise InputError(f"{truth}: the truth must not lie among the recordings in {recordings}; name another folder")
 
 
+def check_layout(cases: int, recordings: Path, truth: Path | None, *, flat: bool) -> None:
+    """Refuse a truth among the recordings, and several cases in one folder.
+
+    Raises
+    ------
+    InputError
+        If it is so.
+    """
+    if flat and cases != 1:
+        raise InputError(f"{cases} cases cannot share one folder; only a single case is written flat")
+    if truth is not None:
+        keep_apart(recordings, truth)
+
+
 def keep_other_cases(made: Path, output: Path) -> None:
     """Refuse to replace files of another case; the same case may be made again.
 
@@ -57,10 +71,6 @@ def keep_other_cases(made: Path, output: Path) -> None:
 @contextmanager
 def staged_folders(recordings: Path, truth: Path) -> Iterator[tuple[Path, Path]]:
     """Folders to write cases into; both replace those named when all is done, or nothing changes.
-
-    Parameters
-    ----------
-    recordings, truth : Path
 
     Yields
     ------
@@ -95,7 +105,6 @@ def write_case(
     truth_file : Path or None
         Outside `folder`; see :func:`keep_apart`. None: the truth is not written
     recordings : mapping of name to columns
-    truth : mapping
     stated : mapping of key to float, or None
         Data sheet of every temperature sensor, by the keys of a mapping file; it may be wrong
 

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from diagnosis.proof.cases.case_files import keep_apart, staged_folders, write_case
+from diagnosis.proof.cases.case_files import check_layout, staged_folders, write_case
 from diagnosis.proof.cases.concealed_case import CONTROLS, FAULTS, ConcealedCase, Plan
 from diagnosis.proof.cases.truth import truth_of
 from diagnosis.proof.plant.cycles import Programme, ambient, ornstein_uhlenbeck, programmes
@@ -84,7 +84,6 @@ def mixed_plans(seed: int, counts: Mapping[str, int]) -> list[Plan]:
 
     Parameters
     ----------
-    seed : int
     counts : mapping of group to int
         How many of each group; singles take every mechanism of the catalogue in turn before one comes twice
 
@@ -179,9 +178,6 @@ def conceal_set(
 
     Parameters
     ----------
-    gearbox : Gearbox
-    plans : sequence of Plan
-    seed : int
     recordings : Path
         Folder that gets one folder per case
     truth : Path or None
@@ -202,10 +198,7 @@ def conceal_set(
         If an effect is not known, the truth is to lie among the recordings, several cases are to share a folder, or a
         folder cannot be written to.
     """
-    if flat and len(plans) != 1:
-        raise InputError(f"{len(plans)} cases cannot share one folder; only a single case is written flat")
-    if truth is not None:
-        keep_apart(recordings, truth)
+    check_layout(len(plans), recordings, truth, flat=flat)
     plant = Plant(gearbox)
     digits = max(3, len(str(len(plans))))
     cases = [draw_case(plant, plan, seed=(seed, i), name=f"case_{i + 1:0{digits}d}") for i, plan in enumerate(plans)]

@@ -30,8 +30,6 @@ def truth_of(plant: Plant, case: ConcealedCase, by_twin: Sequence[Sequence[Outco
 
     Parameters
     ----------
-    plant : Plant
-    case : ConcealedCase
     by_twin : sequence of sequences of Outcome
         Per twin (see :func:`diagnosis.proof.cases.conceal.twins`) the outcome of every recording
 
@@ -143,6 +141,17 @@ def size_of(values: Array) -> dict[str, float]:
     }
 
 
+def size_of_heat(watts: Array) -> dict[str, float]:
+    """Mean and greatest heat, and for how long it acts, rounded for the truth."""
+    active = np.abs(watts) > ACTIVE_SHARE * float(np.abs(watts).max(initial=0.0))
+    return {
+        "mean": round(float(watts.mean()), 3),
+        "mean_active": round(float(watts[active].mean()) if active.any() else 0.0, 3),
+        "active_share": round(float(active.mean()), 4),
+        "max": round(float(watts[np.abs(watts).argmax()]), 3),
+    }
+
+
 def _kelvin(
     plant: Plant, case: ConcealedCase, with_it: Sequence[Outcome], without: Sequence[Outcome]
 ) -> dict[str, Any]:
@@ -171,15 +180,7 @@ def _heat(case: ConcealedCase, heat: Sequence[Mapping[str, Array]]) -> dict[str,
     for kind, members in _sets(case).items():
         found[kind] = {}
         for place in places:
-            watts = np.concatenate([heat[i][place] for i in members])
-            largest = float(np.abs(watts).max(initial=0.0))
-            active = np.abs(watts) > ACTIVE_SHARE * largest
-            found[kind][place] = {
-                "mean": round(float(watts.mean()), 3),
-                "mean_active": round(float(watts[active].mean()) if active.any() else 0.0, 3),
-                "active_share": round(float(active.mean()), 4),
-                "max": round(float(watts[np.abs(watts).argmax()]), 3),
-            }
+            found[kind][place] = size_of_heat(np.concatenate([heat[i][place] for i in members]))
     total = [np.sum([np.abs(part[place]) for place in places], axis=0, initial=0.0) for part in heat]
     top = max((float(values.max(initial=0.0)) for values in total), default=0.0)
     acting = {
@@ -210,6 +211,13 @@ def _felt(with_it: Sequence[Outcome], without: Sequence[Outcome], effect: Concea
     return {"input_shift": {name: size_of(values) for name, values in shift.items() if np.any(values != 0.0)}}
 
 
+def facts_of_fault(shifts: Mapping[str, Mapping[str, Any]], channels: Sequence[str]) -> dict[str, Any]:
+    """Facts of a fault of measurement, from the sizes of its changes by column, of each set of recordings."""
+    nothing = {"rms": 0.0, "max": 0.0}
+    K = {kind: {place: found.get(f"T_{place}_degC", nothing) for place in channels} for kind, found in shifts.items()}
+    return {"K": K, "column_shift": shifts, "heat_W": {}, "acting_s": {}}
+
+
 def _measured(plant: Plant, case: ConcealedCase, outcomes: Sequence[Outcome], effect: Concealed) -> dict[str, Any]:
     """Changes of the columns by a fault of measurement, without noise."""
     shifts: dict[str, dict[str, Any]] = {"train": {}, "hold": {}}
@@ -220,8 +228,4 @@ def _measured(plant: Plant, case: ConcealedCase, outcomes: Sequence[Outcome], ef
             change = np.concatenate([f[column] - s[column] for f, s in zip(faulty, sound, strict=True)])
             if np.any(change != 0.0):
                 shifts[kind][column] = size_of(change)
-    K = {
-        kind: {place: found.get(f"T_{place}_degC", {"rms": 0.0, "max": 0.0}) for place in case.instruments.channels}
-        for kind, found in shifts.items()
-    }
-    return {"K": K, "column_shift": shifts, "heat_W": {}, "acting_s": {}}
+    return facts_of_fault(shifts, case.instruments.channels)

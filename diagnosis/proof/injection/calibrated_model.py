@@ -69,13 +69,10 @@ class CalibratedModel:
 
     Attributes
     ----------
-    real : RealRecording
     nominal : ThermalNetwork
         Links, sources and nodes as the definition has them
     network : ThermalNetwork
         With the tilts of its laws; see :mod:`diagnosis.setup.shapes`
-    losses : Losses
-    parameters : mapping of str to float
     start : mapping of node to float
         [degC]
     cycle : Cycle

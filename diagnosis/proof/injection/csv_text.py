@@ -32,7 +32,6 @@ class CsvText:
         Columns
     lines : tuple of str
         Lines with rows, as they are
-    form : TextForm
     """
 
     head: tuple[str, ...]

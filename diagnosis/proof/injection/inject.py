@@ -69,7 +69,6 @@ class Wish:
     ----------
     kind : str or None
         One of :data:`KINDS`
-    place : str or None
     date : str or None
         When it begins: a date, or seconds as in the name of a part
     control : bool
@@ -87,7 +86,6 @@ class Injector:
 
     Parameters
     ----------
-    gearbox : Gearbox
     recording : str
         ``FILE`` or ``FILE@start..end``
 
@@ -207,15 +205,12 @@ def inject_set(
 
     Parameters
     ----------
-    injector : Injector
     wish : Wish
         Of every case
     number : int
         Cases
-    seed : int
     recordings, truth : Path
         Folders; with `flat` the recording lies in the first itself, else in a folder per case
-    flat : bool
     progress : callable or None
         Called with (cases done, cases in all)
 

@@ -41,11 +41,11 @@ def loss_factor(model: CalibratedModel, name: str, course: Course, rng: np.rando
     """Loss or heat source times ``1 + size``."""
     source = next(s for s in model.nominal.sources if s.name == name)
     changed = model.prepared().with_loss_factor(name, model.size_and_course)
-    sizes, d = _run(model, changed, ladder(*FACTOR, rng), course)
+    d = _run(model, changed, ladder(*FACTOR, rng), course)
     heat = _source(d, name) * _share(model, d, course)
     return _trial(
-        model, d, kind="loss_factor", what="loss" if source.is_loss else "heat", of=name, nodes=(source.node,),
-        course=course, sizes=sizes, unit="1", heat={source.node: heat},
+        model, d, course, kind="loss_factor", what="loss" if source.is_loss else "heat", of=name,
+        nodes=(source.node,), unit="1", heat={source.node: heat},
     )  # fmt: skip
 
 
@@ -53,9 +53,9 @@ def link_factor(model: CalibratedModel, name: str, course: Course, rng: np.rando
     """Conductance times ``1 + size``."""
     link = next(k for k in model.nominal.links if k.name == name)
     changed = model.prepared().with_link_factor(name, model.size_and_course)
-    sizes, d = _run(model, changed, ladder(*FACTOR, rng), course)
+    d = _run(model, changed, ladder(*FACTOR, rng), course)
     return _trial(
-        model, d, kind="link_factor", what="link", of=name, nodes=link.nodes, course=course, sizes=sizes, unit="1",
+        model, d, course, kind="link_factor", what="link", of=name, nodes=link.nodes, unit="1",
         heat=_flow(model, d, name, _share(model, d, course)),
     )  # fmt: skip
 
@@ -66,9 +66,9 @@ def new_link(model: CalibratedModel, name: str, course: Course, rng: np.random.G
     changed = model.prepared().with_link(a, b, model.size_and_course, name="injected")
     difference = np.mean(model.base.temperatures[a] - model.base.temperatures[b])
     cap = PATH_SHARE * model.heat_W / max(abs(float(difference)), LEAST_DIFFERENCE_K)
-    sizes, d = _run(model, changed, ladder(0.0, cap, rng), course)
+    d = _run(model, changed, ladder(0.0, cap, rng), course)
     return _trial(
-        model, d, kind="new_link", what="link", of=name, nodes=(a, b), course=course, sizes=sizes, unit="W/K",
+        model, d, course, kind="new_link", what="link", of=name, nodes=(a, b), unit="W/K",
         heat=_flow(model, d, "injected", 1.0),
     )  # fmt: skip
 
@@ -86,14 +86,11 @@ def thermostat(model: CalibratedModel, name: str, course: Course, rng: np.random
     changed = network.with_link(node, boundary, model.size_and_course * opening, name="injected")
     difference = abs(float(np.mean(T - model.base.temperatures[boundary])))
     cap = 2.0 * PATH_SHARE * model.heat_W / max(difference, LEAST_DIFFERENCE_K)
-    sizes, d = _run(model, changed, ladder(0.0, cap, rng), course, {SEEN: seen})
-    trial = _trial(
-        model, d, kind="thermostat", what="link", of=name, nodes=(node, boundary), course=course, sizes=sizes,
-        unit="W/K", heat=_flow(model, d, "injected", 1.0),
-    )  # fmt: skip
-    return replace(
-        trial, approximate=trial.approximate + BY_VALVE,
-        facts={**trial.facts, "opens_degC": round(opens, 2), "open_degC": round(opens + VALVE_OPENS_K, 2)},
+    d = _run(model, changed, ladder(0.0, cap, rng), course, {SEEN: seen})
+    return _trial(
+        model, d, course, kind="thermostat", what="link", of=name, nodes=(node, boundary), unit="W/K",
+        heat=_flow(model, d, "injected", 1.0), further_reason=BY_VALVE,
+        facts={"opens_degC": round(opens, 2), "open_degC": round(opens + VALVE_OPENS_K, 2)},
     )  # fmt: skip
 
 
@@ -105,12 +102,12 @@ def heat(model: CalibratedModel, name: str, course: Course, rng: np.random.Gener
     law = model.size_and_course * (sp.Abs(symbol("speed")) / full if with_speed else 1.0)
     changed = model.prepared().with_source(name, law, name="injected")
     sizes = ladder(HEAT_SHARE[0] * model.heat_W, HEAT_SHARE[1] * model.heat_W, rng)
-    sizes, d = _run(model, changed, sizes, course)
-    trial = _trial(
-        model, d, kind="heat", what="heat", of=name, nodes=(name,), course=course, sizes=sizes, unit="W",
+    d = _run(model, changed, sizes, course)
+    return _trial(
+        model, d, course, kind="heat", what="heat", of=name, nodes=(name,), unit="W",
         heat={name: d.result.extra_heat["injected"][1:]},
+        facts={"law": f"size * |speed| / {full:.5g}" if with_speed else "size"},
     )  # fmt: skip
-    return replace(trial, facts={**trial.facts, "law": f"size * |speed| / {full:.5g}" if with_speed else "size"})
 
 
 def capacity(model: CalibratedModel, name: str, course: Course, rng: np.random.Generator) -> Trial:
@@ -121,11 +118,8 @@ def capacity(model: CalibratedModel, name: str, course: Course, rng: np.random.G
         replace(n, capacity=n.capacity * factor) if n.name == name and n.capacity is not None else n
         for n in network.nodes
     )
-    sizes, d = _run(model, replace(network, nodes=nodes), ladder(*CAPACITY, rng), course)
-    return _trial(
-        model, d, kind="capacity", what="capacity", of=name, nodes=(name,), course=course, sizes=sizes, unit="1",
-        heat={},
-    )  # fmt: skip
+    d = _run(model, replace(network, nodes=nodes), ladder(*CAPACITY, rng), course)
+    return _trial(model, d, course, kind="capacity", what="capacity", of=name, nodes=(name,), unit="1", heat={})
 
 
 def input_shift(
@@ -133,8 +127,7 @@ def input_shift(
 ) -> Mapping[str, Array]:  # fmt: skip
     """Return the change of the model's temperatures if an input were `law` times size more, (B, rows), [K]."""
     changed = model.prepared().with_signal_shift(name, model.size_and_course * law)
-    _, d = _run(model, changed, sizes, course)
-    return {quantity[2:]: values for quantity, values in d.readings.items() if quantity.startswith("T_")}
+    return _temperatures(_run(model, changed, sizes, course))
 
 
 MACHINE_CHANGES: Mapping[str, Maker] = {
@@ -167,13 +160,19 @@ def places(kind: str, network: ThermalNetwork) -> list[str]:
 def _run(
     model: CalibratedModel, changed: ThermalNetwork, sizes: Array, course: Course,
     extra: Mapping[str, Array] | None = None,
-) -> tuple[Array, Differences]:  # fmt: skip
-    return sizes, model.differences(changed, sizes, course(model.cycle.time), extra)
+) -> Differences:  # fmt: skip
+    return model.differences(changed, sizes, course(model.cycle.time), extra)
 
 
-def _trial(model: CalibratedModel, d: Differences, **given: object) -> Trial:
-    K = {quantity[2:]: values for quantity, values in d.readings.items() if quantity.startswith("T_")}
-    facts: dict[str, object] = {
+def _temperatures(d: Differences) -> dict[str, Array]:
+    return {quantity[2:]: values for quantity, values in d.readings.items() if quantity.startswith("T_")}
+
+
+def _trial(
+    model: CalibratedModel, d: Differences, course: Course, *, kind: str, what: str, of: str, nodes: tuple[str, ...],
+    unit: str, heat: Mapping[str, Array], facts: Mapping[str, object] | None = None, further_reason: str = "",
+) -> Trial:  # fmt: skip
+    known: dict[str, object] = {
         "calibration": {
             "misfit_K": {name: round(size, 3) for name, size in model.misfit_K.items()},
             "sensors_left_out": list(model.left_out),
@@ -184,13 +183,16 @@ def _trial(model: CalibratedModel, d: Differences, **given: object) -> Trial:
         reason += NO_CONTROL
     else:
         reason += CONTROLLED.format(**vars(control))
-        facts["control"] = {
+        known["control"] = {
             "sensor": control.channel,
             "acts_at": control.acts_at,
             "levels_degC": [round(control.low, 2), round(control.high, 2)],
             "active_share": round(float(control.active.mean()), 3),
         }
-    return Trial(columns=d.readings, K=K, approximate=reason, facts=facts, **given)  # type: ignore[arg-type]
+    return Trial(
+        kind=kind, what=what, of=of, nodes=nodes, course=course, sizes=d.sizes[1:], unit=unit, columns=d.readings,
+        K=_temperatures(d), heat=heat, approximate=reason + further_reason, facts={**known, **(facts or {})},
+    )  # fmt: skip
 
 
 def _share(model: CalibratedModel, d: Differences, course: Course) -> Array:

@@ -34,7 +34,6 @@ class RealRecording:
 
     Attributes
     ----------
-    path : Path
     stem : str
         Its name without ending
     part : str
@@ -144,7 +143,6 @@ def read_real_recording(text: str, gearbox: Gearbox) -> RealRecording:
     ----------
     text : str
         ``FILE`` or ``FILE@start..end``; CSV or CSV.gz
-    gearbox : Gearbox
 
     Raises
     ------

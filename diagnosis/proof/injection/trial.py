@@ -50,7 +50,6 @@ def draw_course(
     ----------
     duration_s : float
         Length of the recording
-    rng : Generator
     forms : sequence of str
         To choose from
     date_s : float or None
@@ -73,15 +72,11 @@ class Trial:
 
     Attributes
     ----------
-    kind : str
     what : str
         ``loss``, ``link``, ``capacity``, ``heat``, ``sensor``, ``input`` or ``clock``
     of : str
         Loss, link, node, channel or input
-    nodes : tuple of str
-    course : Course
     sizes : Array, shape (B,)
-    unit : str
     columns : mapping of quantity to Array, shape (B, rows)
         Added to the columns, in the unit inside
     K : mapping of channel to Array, shape (B, rows)
@@ -134,7 +129,6 @@ def choose_size(largest: Array, bounds: tuple[float, float], rng: np.random.Gene
         Largest change of a temperature per size, [K]
     bounds : (float, float)
         [K]
-    rng : Generator
     """
     share, reach = rng.uniform(), float(largest.max())
     low, high = bounds

@@ -54,12 +54,7 @@ class Path:
 
 
 class Anatomy:
-    """Nodes, capacities and paths of one gearbox.
-
-    Parameters
-    ----------
-    gearbox : Gearbox
-    """
+    """Nodes, capacities and paths of one gearbox."""
 
     def __init__(self, gearbox: Gearbox) -> None:
         self.gearbox = gearbox

@@ -31,7 +31,6 @@ class Programme:
 
     Attributes
     ----------
-    name : str
     speed, torque : Array, shape (rows,)
         Of the input shaft, [1/min] and [N m]
     unrecorded : int
@@ -59,11 +58,6 @@ def reference_torque(gearbox: Gearbox) -> float:
 
 def programmes(gearbox: Gearbox, rng: np.random.Generator) -> tuple[Programme, ...]:
     """The five recordings of one case: about 22 h to learn from, 6 h held out at other torques and speeds.
-
-    Parameters
-    ----------
-    gearbox : Gearbox
-    rng : numpy.random.Generator
 
     Returns
     -------

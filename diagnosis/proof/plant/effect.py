@@ -22,10 +22,8 @@ class Effect:
 
     Attributes
     ----------
-    name : str
     catalogue : bool
         Whether the diagnosis has a mechanism of this name
-    family, kind : str
     places : callable
         Of the plant and a random generator: places of one specimen, the main one first
     draw : callable
@@ -67,7 +65,6 @@ class Grip:
 
     Parameters
     ----------
-    plant : Plant
     members : Array of int, shape (m,)
         Which runs of the batch
     specimens : sequence of Concealed

@@ -34,7 +34,6 @@ class Instruments:
         Error of the ambient probe
     torque_gain, loss_gain : float
         Relative errors of the recorded torque and of the measured loss, [-]
-    loss_offset_W : float
     loss_noise : (float, float)
         White noise of the measured loss: relative [-] and absolute [W]
     dropouts : int
@@ -68,11 +67,8 @@ def record(
 
     Parameters
     ----------
-    plant : Plant
-    run : Run
     outcome : Outcome
         What the plant did in it
-    instruments : Instruments
     faults : sequence of Concealed
         Faults of measurement, of :data:`SENSOR_EFFECTS`
     rng : numpy.random.Generator or None

@@ -20,7 +20,6 @@ class Laws:
 
     Parameters
     ----------
-    plant : Plant
     factors : mapping of str to Array, shape (B,)
         Multipliers by the names of the definition's tunable factors; 1 where a name is missing
     reading : Array of int, shape (B,)

@@ -54,12 +54,7 @@ class Moment:
 
 
 class Plant:
-    """All gearboxes of one definition.
-
-    Parameters
-    ----------
-    gearbox : Gearbox
-    """
+    """All gearboxes of one definition."""
 
     def __init__(self, gearbox: Gearbox) -> None:
         self.gearbox = gearbox

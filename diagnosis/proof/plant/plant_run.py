@@ -56,15 +56,12 @@ class Run:
 
     Attributes
     ----------
-    individual : Individual
-    programme : Programme
     air, air_speed : Array, shape (rows,)
         True ambient temperature [degC] and air speed [m/s]
     start : float
         Temperature of all nodes at the start, [degC]
     random_heat : mapping of place to Array, shape (rows,)
         Heat that no law describes, [W]
-    effects : tuple of Concealed
     """
 
     individual: Individual
@@ -124,8 +121,6 @@ def run_plant(plant: Plant, runs: Sequence[Run], progress: Callable[[int], None]
 
     Parameters
     ----------
-    plant : Plant
-    runs : sequence of Run
     progress : callable or None
         Called after every few steps with the number of rows done since the last call
 

@@ -24,8 +24,6 @@ class Claim:
 
     Attributes
     ----------
-    mechanism, place : str
-    probability : float
     odds : mapping of (mechanism, parameter or empty) to float
         Probability of the finding and of its rivals, summed over the places of each mechanism
     tied : tuple of str
@@ -38,7 +36,6 @@ class Claim:
         Nodes, channels or input of it, both ends of a link
     sign : int
         1: more, -1: less, 0: not given
-    heat_W : float
     """
 
     mechanism: str
@@ -67,7 +64,6 @@ class Answer:
     ----------
     verdict : str
         ``refused`` if the recordings were not accepted, ``failed`` if there is no answer
-    claims : tuple of Claim
     node : str
         Most probable place, or empty
     holdout_K : (float, float)
@@ -95,7 +91,6 @@ def read_answer(result: Mapping[str, Any] | None, gearbox: Gearbox, *, otherwise
 
     Parameters
     ----------
-    result : mapping or None
     gearbox : Gearbox
         Definition that the diagnosis was given
     otherwise : str

@@ -68,7 +68,6 @@ class Task:
 
     Attributes
     ----------
-    case : str
     sensors, data : str
         Of :data:`SENSORS` and :data:`DATA`
     removed : str
@@ -96,8 +95,6 @@ def tasks_of(settings: Settings, cases: Sequence[str], alone: Mapping[str, str])
 
     Parameters
     ----------
-    settings : Settings
-    cases : sequence of str
     alone : mapping of case to str
         The only mechanism of a case, of those that have one
     """
@@ -118,7 +115,6 @@ def files_of(recordings: Path, task: Task, baselines: int = 0) -> tuple[dict[str
     ----------
     recordings : Path
         Folder with one folder per case: ``train_*`` to learn from, ``hold_*`` held out, ``baseline_*``
-    task : Task
     baselines : int
         How many of the baselines, in the order of their names, unless recordings are cut short
 

@@ -40,7 +40,6 @@ def outcome(
         ``status``, ``seconds`` and ``answer`` of each diagnosis
     gearbox : Gearbox
         Nominal definition of cases whose truth names no other
-    settings : Settings, optional
     code : str
         Hash of the code that decided
 

@@ -20,10 +20,6 @@ class Item:
 
     Attributes
     ----------
-    case : str
-    truth : Truth
-    effect : TrueEffect or None
-    answer : Answer
     near : mapping of node to frozenset of str
         The node and those that share a heat path with it
     first : bool
@@ -78,7 +74,6 @@ class Rule:
 
     Attributes
     ----------
-    name, meaning : str
     when : callable
         True if the rule counts the item
     right : callable
@@ -121,7 +116,6 @@ def is_right(claim: tuple[str, str], odds_of: Claim, truth: Truth) -> bool:
         Mechanism, and the parameter if it is one
     odds_of : Claim
         The finding that states it
-    truth : Truth
     """
     mechanism, parameter = claim
     if mechanism == PARAMETER:

@@ -18,7 +18,6 @@ def role_of(plant: str, seed: int) -> str:
     ----------
     plant : str
         ``own`` or ``zoo``; given recordings are open, so they are ``development``
-    seed : int
 
     Examples
     --------

@@ -42,7 +42,6 @@ class TrueEffect:
         Name for people
     name : str
         Mechanism of the catalogue, or empty
-    changed : tuple of Changed
     heat_W : float
         Mean magnitude over the training recordings; NaN if unknown
     course : str

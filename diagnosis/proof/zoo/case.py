@@ -30,18 +30,14 @@ class ZooCase:
 
     Attributes
     ----------
-    name : str
-    seed : int
     group, kind : str
         One of :data:`GROUPS`; of a control one of :data:`CONTROLS`, else ``effects``
-    family, machine : str
     plant : ZooPlant
         With the parts that effects bring along
     programmes : tuple of Programme
         Training, held-out and baseline recordings
     effects : tuple of ZooEffect
         At their strengths, the dominant one first
-    instruments : ZooInstruments
     session_deviation : float
         Standard deviation of the logarithm of every parameter between sessions
     sessions : mapping of str to mapping of str to float
@@ -115,7 +111,6 @@ def run_case(case: ZooCase, *kinds: str) -> CaseRuns:
 
     Parameters
     ----------
-    case : ZooCase
     kinds : str
         ``train``, ``hold``, ``baseline``
     """

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from diagnosis.proof.cases.case_files import DEFINITION, keep_apart, write_case
+from diagnosis.proof.cases.case_files import DEFINITION, check_layout, write_case
 from diagnosis.proof.zoo.case import BASELINE, CONTROLS, GROUPS, Oracle, ZooCase
 from diagnosis.proof.zoo.draw import draw_case, oracle_of
 from diagnosis.proof.zoo.families import FAMILIES, find_family
@@ -33,7 +33,6 @@ class ZooPlan:
         One of :data:`~diagnosis.proof.zoo.case.GROUPS`
     kind : str or None
         Of a control, one of :data:`~diagnosis.proof.zoo.case.CONTROLS`
-    family, machine : str
     seed : int
         Of this case
     """
@@ -52,7 +51,6 @@ def zoo_plans(
 
     Parameters
     ----------
-    seed : int
     counts : mapping of group to int
         How many of each group
     families : sequence of str or None
@@ -115,7 +113,6 @@ def conceal_zoo(
 
     Parameters
     ----------
-    plans : sequence of ZooPlan
     recordings : Path
         Folder that gets one folder per case
     truth : Path or None
@@ -126,7 +123,6 @@ def conceal_zoo(
         Healthy recordings of every plant, ``baseline_1.csv.gz`` ...
     session_deviation : float or None
         Standard deviation of the logarithm of every parameter between sessions; drawn if None
-    oracle : callable
     progress : callable or None
         Called with the cases done and in all
 
@@ -141,10 +137,7 @@ def conceal_zoo(
         If the truth is to lie among the recordings, several cases are to share a folder, a definition cannot be split,
         or a folder cannot be written to.
     """
-    if flat and len(plans) != 1:
-        raise InputError(f"{len(plans)} cases cannot share one folder; only a single case is written flat")
-    if truth is not None:
-        keep_apart(recordings, truth)
+    check_layout(len(plans), recordings, truth, flat=flat)
     digits, names = max(3, len(str(len(plans)))), []
     for i, plan in enumerate(plans):
         case = draw_case(

@@ -46,9 +46,6 @@ class Drawn:
 
     Attributes
     ----------
-    plant : ZooPlant
-    programmes : tuple of Programme
-    distance_K : float
     rejected : int
         Plants drawn before it
     """
@@ -64,16 +61,10 @@ def draw_plant(family: Family, machine: str, seed: int, *, baselines: int = 0) -
 
     Parameters
     ----------
-    family : Family
     machine : str
         Name or file of the nominal definition
-    seed : int
     baselines : int
         Healthy recordings before the session
-
-    Returns
-    -------
-    Drawn
 
     Raises
     ------

@@ -82,7 +82,6 @@ def draw_case(
         See :func:`~diagnosis.proof.zoo.families.find_family`
     machine : str
         Name or file of the nominal definition
-    seed : int
     group : str
         One of :data:`~diagnosis.proof.zoo.case.GROUPS`
     name : str
@@ -95,10 +94,6 @@ def draw_case(
         Standard deviation of the logarithm of every parameter between sessions; drawn if None
     oracle : callable
         Evidence for a difference of readings, by which strengths are drawn
-
-    Returns
-    -------
-    ZooCase
 
     Raises
     ------

@@ -65,19 +65,14 @@ class ZooEffect:
 
     Attributes
     ----------
-    name : str
     catalogue : str or None
         Mechanism of the catalogue that it is a form of
-    family, kind, law, unit : str
     act : Act
         At a strength of 1, without its course in time
     fault : Fault or None
         Of measurement, at its strength
-    parameters : mapping of str to float
     least, cap : float
         Range of strengths that are physical, and stand out of ordinary errors of instruments
-    strength : float
-    course : Course
     """
 
     name: str

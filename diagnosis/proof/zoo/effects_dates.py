@@ -8,7 +8,7 @@ import numpy as np
 
 from diagnosis.proof.zoo.effects import Draft, Maker
 from diagnosis.proof.zoo.setting import Setting, UnfitError, either
-from diagnosis.proof.zoo.structure import Law
+from diagnosis.proof.zoo.structure import constant
 from diagnosis.proof.zoo.time_course import Course
 
 DATED_FAMILY = "change at a date"
@@ -43,13 +43,13 @@ def capacity_changes(s: Setting, rng: np.random.Generator) -> Draft:
 def heat_appears(s: Setting, rng: np.random.Generator) -> Draft:
     """A constant heat into one node."""
     node = s.nodes[int(rng.integers(len(s.nodes)))]
-    return Draft(act=s.heat(node, lambda m: np.ones_like(m.hours)), law=f"a into {node}", unit="W", cap=0.3 * s.loss)
+    return Draft(act=s.heat(node, constant(1.0)), law=f"a into {node}", unit="W", cap=0.3 * s.loss)
 
 
 def link_appears(s: Setting, rng: np.random.Generator) -> Draft:
     """A further way from one node to the air."""
     node = s.nodes[int(rng.integers(len(s.nodes)))]
-    act = s.bridge(node, s.air(), lambda m: np.ones_like(m.hours), called="air")
+    act = s.bridge(node, s.air(), constant(1.0), called="air")
     return Draft(act=act, law=f"a between {node} and air", unit="W/K", cap=0.4 * s.shed)
 
 
@@ -65,7 +65,7 @@ def set_point_changes(s: Setting, rng: np.random.Generator) -> Draft:
 
 def _relative(s: Setting, rng: np.random.Generator, what: str, names: tuple[str, ...]) -> Draft:
     name, sign = names[int(rng.integers(len(names)))], either(rng)
-    law: Law = lambda m: np.full_like(m.hours, sign)  # noqa: E731
+    law = constant(float(sign))
     if what == "link":
         act = s.link_factor((name,), law, sign=sign)
     elif what == "capacity":

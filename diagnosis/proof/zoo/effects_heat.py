@@ -8,7 +8,7 @@ import numpy as np
 
 from diagnosis.proof.zoo.effects import Draft, Maker
 from diagnosis.proof.zoo.setting import Act, Parts, Setting, soft
-from diagnosis.proof.zoo.structure import Law, Moment
+from diagnosis.proof.zoo.structure import Law, Moment, constant
 from models.base.types import Array
 from models.formulas.heat_transfer import KELVIN
 
@@ -62,7 +62,7 @@ def air_cooling_change(s: Setting, rng: np.random.Generator) -> Draft:
     walls = s.group("housing")
     wall = walls[int(rng.integers(len(walls)))]
     names = s.link_between((wall,), (AIR,))
-    act = s.link_factor(names, lambda m: -np.ones_like(m.hours), sign=-1)
+    act = s.link_factor(names, constant(-1.0), sign=-1)
     return Draft(act=act, law="conductance of one wall to air (1 - a)", unit="1", cap=0.8)
 
 
@@ -81,7 +81,7 @@ def foundation_conduction(s: Setting, rng: np.random.Generator) -> Draft:
     """The lowest part stands on a plinth that stores heat."""
     part = s.group("housing")[0]
     mass = float(rng.uniform(3.0, 15.0)) * _capacity(s, part)
-    act = s.bridge(part, "plinth", _one, called="frame", parts=s.reservoir("plinth", mass, 2.0 * s.shed))
+    act = s.bridge(part, "plinth", constant(1.0), called="frame", parts=s.reservoir("plinth", mass, 2.0 * s.shed))
     return Draft(act=act, law="a to a plinth that stores heat", unit="W/K", cap=0.8 * s.shed,
                  parameters={"capacity_J_K": mass})  # fmt: skip
 
@@ -91,7 +91,7 @@ def hot_neighbour(s: Setting, rng: np.random.Generator) -> Draft:
     node = s.group("shafts" if s.groups.get("shafts") else "housing")[-1]
     rise = float(rng.uniform(0.5, 1.3)) * s.rise
     around = s.boundary("neighbour", lambda m: m.inputs["T_ambient"] + rise)
-    act = s.bridge(node, "neighbour", _one, parts=around)
+    act = s.bridge(node, "neighbour", constant(1.0), parts=around)
     return Draft(act=act, law="a to a neighbour warmer than the air by dT", unit="W/K", cap=0.4 * s.shed,
                  parameters={"dT": rise})  # fmt: skip
 
@@ -101,7 +101,7 @@ def motor_flange(s: Setting, rng: np.random.Generator) -> Draft:
     node = s.group("shafts" if s.groups.get("shafts") else "housing")[0]
     x, y, rise = s.speed(), s.load(), float(rng.uniform(0.6, 1.2)) * s.rise
     warm: Law = lambda m: m.inputs["T_ambient"] + 0.3 * rise + rise * np.sqrt(x(m) * y(m))  # noqa: E731
-    act = s.bridge(node, "motor", _one, parts=s.boundary("motor", warm))
+    act = s.bridge(node, "motor", constant(1.0), parts=s.boundary("motor", warm))
     return Draft(act=act, law="a to a motor warmer than the air by dT (0.3 + (x y)^0.5)", unit="W/K", cap=0.4 * s.shed,
                  parameters={"dT": rise})  # fmt: skip
 
@@ -121,7 +121,7 @@ def water_jacket(s: Setting, rng: np.random.Generator) -> Draft:
     """Water whose flow falls off as it warms the valve."""
     part, cold = s.group("housing")[0], _below_air(s, rng)
     T, T0 = s.temperature(part), s.quantile(part, 0.5)
-    act = s.bridge(part, WATER, lambda m: 0.5 + soft((T(m) - T0) / 5.0), parts=s.boundary(WATER, _fixed(cold)))
+    act = s.bridge(part, WATER, lambda m: 0.5 + soft((T(m) - T0) / 5.0), parts=s.boundary(WATER, constant(cold)))
     return Draft(act=act, law="a (0.5 + s((T - T0) / 5 K)) to water", unit="W/K", cap=0.6 * s.shed,
                  parameters={"T_water": cold, "T0": T0})  # fmt: skip
 
@@ -158,7 +158,7 @@ def _cooler(s: Setting, rng: np.random.Generator, *, width: float, power: float,
         return np.asarray(soft((m.T["valve feeler"] - T_on) / width) ** power)
 
     if water:
-        act = s.bridge("oil", COOLANT, opening, parts=s.boundary(COOLANT, _fixed(cold))) + _with(parts)
+        act = s.bridge("oil", COOLANT, opening, parts=s.boundary(COOLANT, constant(cold))) + _with(parts)
     else:
         act = s.bridge("oil", s.air(), opening, called=AIR, parts=parts)
     return Draft(act=act, law=f"a s((T_feeler - T_on) / {width:g} K)^{power:g} to the coolant", unit="W/K",
@@ -169,7 +169,7 @@ def cooler_constant(s: Setting, rng: np.random.Generator) -> Draft:
     """A water cooler that always runs, a little better with thin oil."""
     T, T0, cold = s.temperature("oil"), s.quantile("oil", 0.5), _below_air(s, rng)
     law: Law = lambda m: np.exp((T(m) - T0) / 80.0)  # noqa: E731
-    act = s.bridge("oil", COOLANT, law, parts=s.boundary(COOLANT, _fixed(cold)))
+    act = s.bridge("oil", COOLANT, law, parts=s.boundary(COOLANT, constant(cold)))
     return Draft(act=act, law="a exp((T_oil - T0) / 80 K) to water", unit="W/K", cap=0.6 * s.shed,
                  parameters={"T0": T0, "T_water": cold})  # fmt: skip
 
@@ -184,7 +184,7 @@ def cooler_shaft_driven(s: Setting, rng: np.random.Generator) -> Draft:
 def oil_jet(s: Setting, rng: np.random.Generator) -> Draft:
     """Oil of fixed temperature is injected as long as the shaft turns."""
     x, T = s.speed(), s.air_mean + float(rng.uniform(0.2, 0.6)) * s.rise
-    act = s.bridge("oil", "jet", lambda m: np.tanh(x(m) / 0.05), parts=s.boundary("jet", _fixed(T)))
+    act = s.bridge("oil", "jet", lambda m: np.tanh(x(m) / 0.05), parts=s.boundary("jet", constant(T)))
     return Draft(act=act, law="a tanh(x / 0.05) to oil of T_jet", unit="W/K", cap=1.0 * s.shed, parameters={"T_jet": T})
 
 
@@ -258,14 +258,6 @@ def ambient_drift(s: Setting, rng: np.random.Generator) -> Draft:
     return Draft(
         act=act, law="air at the machine + a (1 - exp(-t / tau))", unit="K", cap=6.0, parameters={"tau_h": tau}
     )
-
-
-def _one(m: Moment) -> Array:
-    return np.ones_like(m.hours)
-
-
-def _fixed(value: float) -> Law:
-    return lambda m: np.full_like(m.hours, value)
 
 
 def _with(parts: Parts) -> Act:

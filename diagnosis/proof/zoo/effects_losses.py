@@ -8,7 +8,7 @@ import numpy as np
 
 from diagnosis.proof.zoo.effects import Draft, Maker
 from diagnosis.proof.zoo.setting import Setting, UnfitError, soft
-from diagnosis.proof.zoo.structure import Law
+from diagnosis.proof.zoo.structure import Law, constant
 
 SLIDING, CHURNING = ("mesh_sliding", "gears_load"), ("churning", "gears_no_load")
 
@@ -64,7 +64,7 @@ def misalignment(s: Setting, _: np.random.Generator) -> Draft:
     """Teeth wind straight under load: less at high torque; a bearing of the input shaft feels half of it."""
     y = s.load()
     act = s.loss_factor(s.losses(*SLIDING), lambda m: 1.0 / (0.5 + y(m)))
-    act = act + s.loss_factor(s.losses(s.group("bearings")[0]), lambda m: np.full_like(m.hours, 0.5))
+    act = act + s.loss_factor(s.losses(s.group("bearings")[0]), constant(0.5))
     return Draft(act=act, law="mesh sliding (1 + a / (0.5 + y)), first bearing (1 + a / 2)", unit="1", cap=0.5)
 
 

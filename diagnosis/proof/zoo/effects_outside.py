@@ -8,7 +8,7 @@ import numpy as np
 
 from diagnosis.proof.zoo.effects import Draft, Maker
 from diagnosis.proof.zoo.setting import Setting, soft
-from diagnosis.proof.zoo.structure import Law, Moment
+from diagnosis.proof.zoo.structure import Law, Moment, constant
 from models.base.types import Array
 
 OUTSIDE_FAMILY = "outside the catalogue"
@@ -90,7 +90,7 @@ def timed_neighbour(s: Setting, rng: np.random.Generator) -> Draft:
     node, on = _outer(s, rng), _timer(rng)
     rise = 1.5 * s.rise
     warm: Law = lambda m: m.inputs["T_ambient"] + rise * on(m)  # noqa: E731
-    act = s.bridge(node, "timed neighbour", lambda m: np.ones_like(m.hours), parts=s.boundary("timed neighbour", warm))
+    act = s.bridge(node, "timed neighbour", constant(1.0), parts=s.boundary("timed neighbour", warm))
     return Draft(act=act, law="a to a neighbour that runs by a timer", unit="W/K", cap=0.4 * s.shed,
                  parameters={"rise_K": rise, **on.parameters})  # fmt: skip
 
@@ -139,7 +139,7 @@ def wet_floor(s: Setting, rng: np.random.Generator) -> Draft:
     """The lowest part stands on a floor that swings between day and night."""
     node, phase, T0 = s.nodes[0], float(rng.uniform(0.0, 1.0)), s.air_mean - float(rng.uniform(2.0, 8.0))
     floor: Law = lambda m: T0 + 5.0 * np.sin(2.0 * np.pi * (m.hours / 24.0 + phase))  # noqa: E731
-    act = s.bridge(node, "floor", lambda m: np.ones_like(m.hours), parts=s.boundary("floor", floor))
+    act = s.bridge(node, "floor", constant(1.0), parts=s.boundary("floor", floor))
     return Draft(act=act, law="a to T0 + 5 sin(2 pi (t / 24 h + phase))", unit="W/K", cap=0.4 * s.shed,
                  parameters={"T0": T0, "phase": phase})  # fmt: skip
 

@@ -61,7 +61,6 @@ class Fault:
         Of ``heated``: channel of the warm neighbour
     strength : float
         >= 0, in the unit of its kind
-    sign : int
     course : Course
         Of ``stuck`` only its start counts
     """
@@ -99,11 +98,9 @@ class FaultMaker:
         Kind of the :class:`Fault`
     catalogue : str or None
         Mechanism of the catalogue
-    unit : str
     cap, least : float
         Greatest strength that happens, and the least that stands out of ordinary errors of instruments; of a torque's
         offset in units of the highest torque
-    law : str
     signed : bool
         True if it may go either way
     """

@@ -53,7 +53,6 @@ class Laws:
 
     Parameters
     ----------
-    plant : ZooPlant
     bridges : sequence of Change
         Changes that add a path
     """

@@ -52,7 +52,6 @@ class RecordingColumns:
         Temperatures, and :data:`LOSS` if the loss is measured
     rows : int
         Of the recording
-    rows_per_mean : int
     step_s : float
         Interval of the means, [s]
     white : Array, shape (channels, means)
@@ -98,10 +97,6 @@ class Design:
         x : sequence of mappings of channel to Array, shape (rows,)
             By training recording: readings with the effect minus those without it, noise-free, [K] and [W]; a channel
             that is not given does not change
-
-        Returns
-        -------
-        OracleNats
         """
         squared, cross = 0.0, np.zeros(len(self._gram))
         for part, readings in zip(self._parts, x, strict=True):

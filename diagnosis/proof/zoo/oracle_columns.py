@@ -18,7 +18,7 @@ import numpy as np
 from diagnosis.proof.zoo.oracle import LOSS, MEAN_S, Design, RecordingColumns, averaged
 from diagnosis.proof.zoo.run import follow, read_probes
 from diagnosis.proof.zoo.simulate import Direction, Linearised, ParameterDirection, StartDirection
-from diagnosis.proof.zoo.structure import Change, Law, Moment, Probe, Programme, Variant, ZooPlant
+from diagnosis.proof.zoo.structure import Change, Law, Moment, Probe, Programme, Variant, ZooPlant, constant, times
 from models.base.types import Array
 
 SMOOTH_SD, LUMPED_SD, MIXING_SD, SENSOR_K = 0.04, 0.1, 0.04, 0.1
@@ -58,12 +58,6 @@ def design_of(plant: ZooPlant, programmes: Sequence[Programme], measurement: Mea
     ----------
     plant : ZooPlant
         Healthy
-    programmes : sequence of Programme
-    measurement : Measurement
-
-    Returns
-    -------
-    Design
     """
     runs = [Linearised(plant, one, at=Variant()) for one in programmes if one.name.startswith("train")]
     parameters = [ParameterDirection(name=n, step=sd * plant.parameters[n]) for n, sd in plant.spread.items()]
@@ -218,14 +212,6 @@ class _Smooth:
         return self.held[-1][1]
 
 
-def _always(value: float) -> Law:
-    return lambda m: np.full(m.hours.shape, value)
-
-
-def _times(factor: float, law: Law) -> Law:
-    return lambda m: np.asarray(factor * law(m))
-
-
 def _input(name: str) -> Law:
     return lambda m: m.inputs[name]
 
@@ -236,9 +222,9 @@ def _errors_of_laws(plant: ZooPlant, smooth: _Smooth) -> Iterator[Change]:
         yield from (Change(kind="source", target=source.name, law=law) for law in laws)
     for path in plant.paths:
         yield from (Change(kind="path", target=path.name, law=law) for law in laws)
-        yield Change(kind="path", target=path.name, law=_always(LUMPED_SD))
+        yield Change(kind="path", target=path.name, law=constant(LUMPED_SD))
     for body in plant.bodies:
-        yield Change(kind="capacity", target=body.name, law=_always(LUMPED_SD))
+        yield Change(kind="capacity", target=body.name, law=constant(LUMPED_SD))
 
 
 def _errors_of_splits(plant: ZooPlant) -> Iterator[Change]:
@@ -247,16 +233,16 @@ def _errors_of_splits(plant: ZooPlant) -> Iterator[Change]:
         main = max(source.spread, key=lambda name: source.spread[name])
         for target in dict.fromkeys([*source.spread, *_bodies_next_to(plant, main)]):
             if target != main:
-                yield Change(kind="heat", target=target, other=main, law=_times(LUMPED_SD, source.power))
+                yield Change(kind="heat", target=target, other=main, law=times(LUMPED_SD, source.power))
 
 
 def _errors_of_inputs(plant: ZooPlant) -> Iterator[Change]:
     for name in plant.inputs:
         if name.startswith("T_"):
-            yield Change(kind="input", target=name, law=_always(INPUT_K))
+            yield Change(kind="input", target=name, law=constant(INPUT_K))
         else:
             gain = INPUT_GAIN.get(name, ORDINARY_GAIN)
-            yield Change(kind="input", target=name, law=_times(gain, _input(name)))
+            yield Change(kind="input", target=name, law=times(gain, _input(name)))
 
 
 def _errors_of_probe(

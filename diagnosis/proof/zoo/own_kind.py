@@ -35,15 +35,8 @@ def design_of_own_kind(plant: Plant, individual: Individual, runs: Sequence[Run]
 
     Parameters
     ----------
-    plant : Plant
-    individual : Individual
     runs : sequence of Run
         All recordings; those whose name starts with ``train`` count
-    instruments : Instruments
-
-    Returns
-    -------
-    Design
     """
     measurement = Measurement(
         channels=instruments.channels,
@@ -61,13 +54,6 @@ def effect_on_readings(
     """Noise-free readings with effects minus those without any, of the training recordings.
 
     A fault of a recorded input counts by what the plant would do under the recorded input, less what it does.
-
-    Parameters
-    ----------
-    plant : Plant
-    runs : sequence of Run
-    instruments : Instruments
-    effects : sequence of Concealed
 
     Returns
     -------
@@ -127,12 +113,6 @@ def as_programme(plant: Plant, run: Run) -> Programme:
 
 def as_zoo(plant: Plant, individual: Individual, instruments: Instruments) -> ZooPlant:
     """One gearbox of the own kind as a plant of the zoo, with the same laws.
-
-    Parameters
-    ----------
-    plant : Plant
-    individual : Individual
-    instruments : Instruments
 
     Returns
     -------

@@ -22,8 +22,6 @@ def programmes(plant: ZooPlant, rng: np.random.Generator, *, baselines: int = 0)
 
     Parameters
     ----------
-    plant : ZooPlant
-    rng : numpy.random.Generator
     baselines : int
         How many baselines; each is a session before this one, with its clock at 0
 

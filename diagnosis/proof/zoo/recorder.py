@@ -35,7 +35,6 @@ class ZooInstruments:
         Temperatures are stamped late by so much, [s]
     loss_noise : (float, float) or None
         White noise of the measured loss, relative [-] and absolute [W]; None: it is not measured
-    loss_gain : float
     loss_offset_W : float
         While there is a loss
     dropouts : int
@@ -112,11 +111,8 @@ def record(
     ----------
     measured : Measured
         What perfect instruments would record
-    instruments : ZooInstruments
-    faults : sequence of Fault
     columns : mapping of str to str
         Column of every input
-    rng : numpy.random.Generator
 
     Returns
     -------

@@ -50,7 +50,6 @@ class Run:
         [degC]
     made : list of Array, shape (rows, B)
         Heat of every different change in the step after a row, [W]
-    balance : HeatBalance
     """
 
     T: Array
@@ -60,13 +59,7 @@ class Run:
 
 
 class Clock:
-    """Steps of a programme and its inputs between them.
-
-    Parameters
-    ----------
-    plant : ZooPlant
-    programme : Programme
-    """
+    """Steps of a programme and its inputs between them."""
 
     def __init__(self, plant: ZooPlant, programme: Programme) -> None:
         self.plant, self.programme = plant, programme

@@ -13,7 +13,19 @@ from typing import Literal
 
 import numpy as np
 
-from diagnosis.proof.zoo.structure import Body, Boundary, Change, Law, Moment, Outcome, Path, Programme, ZooPlant
+from diagnosis.proof.zoo.structure import (
+    Body,
+    Boundary,
+    Change,
+    Law,
+    Moment,
+    Outcome,
+    Path,
+    Programme,
+    ZooPlant,
+    constant,
+    times,
+)
 from models.base.types import Array
 
 What = Literal["loss", "link", "capacity", "heat", "sensor", "input", "clock"]
@@ -30,7 +42,6 @@ class Changed:
 
     Attributes
     ----------
-    what : str
     of : str
         Loss, link, node, channel or input; of a further link its two ends joined by ``-``
     nodes : tuple of str
@@ -54,7 +65,6 @@ class Parts:
 
     Attributes
     ----------
-    bodies, boundaries, paths : tuple
     like : mapping of str to str
         Body whose temperature at the first row each of the bodies has; empty: the air's
     """
@@ -107,8 +117,6 @@ class Setting:
 
     Parameters
     ----------
-    plant : ZooPlant
-    programmes : sequence of Programme
     healthy : Outcome
         Of one training recording without any effect, one run
     groups : mapping of str to tuple of str
@@ -258,7 +266,7 @@ class Setting:
     def heat(self, node: str, law: Law, *, sign: int = 1, is_loss: bool = False) -> Act:
         """Heat `law` [W] into a node; `sign` is what it mostly does."""
         changes = tuple(
-            Change(kind="heat", target=body, law=_times(share, law), is_loss=is_loss)
+            Change(kind="heat", target=body, law=times(share, law), is_loss=is_loss)
             for body, share in self.bodies(node).items()
         )
         return Act(changes=changes, changed=(Changed(what="heat", of=node, nodes=(node,), sign=sign, is_loss=is_loss),))
@@ -304,7 +312,7 @@ class Setting:
     def bridge(self, node: str, other: str, law: Law, *, called: str = "", parts: Parts | None = None) -> Act:
         """A further way for heat of `law` [W/K] between a node and a body or boundary, called `called` in the truth."""
         changes = tuple(
-            Change(kind="bridge", target=body, other=other, law=_times(share, law))
+            Change(kind="bridge", target=body, other=other, law=times(share, law))
             for body, share in self.bodies(node).items()
         )
         changed = Changed(what="link", of=f"{node}-{called or other}", nodes=(node,), sign=1)
@@ -351,8 +359,8 @@ class Setting:
         size = next(float(b.capacity(self.typical)[0]) for b in self.plant.bodies if b.name == body)
         small = 1e-4 * size
         return Parts(
-            bodies=(Body(name=name, capacity=_constant(small), part_of=""),),
-            paths=(Path(name=f"{name}-{body}", ends=(name, body), conductance=_constant(small / tau_s), part_of=""),),
+            bodies=(Body(name=name, capacity=constant(small), part_of=""),),
+            paths=(Path(name=f"{name}-{body}", ends=(name, body), conductance=constant(small / tau_s), part_of=""),),
             like={name: body},
         )
 
@@ -360,22 +368,14 @@ class Setting:
         """A body that only sheds heat to the air [W/K], until an effect connects it."""
         air = self.air()
         return Parts(
-            bodies=(Body(name=name, capacity=_constant(capacity), part_of=""),),
-            paths=(Path(name=f"{name}-{air}", ends=(name, air), conductance=_constant(to_air), part_of=""),),
+            bodies=(Body(name=name, capacity=constant(capacity), part_of=""),),
+            paths=(Path(name=f"{name}-{air}", ends=(name, air), conductance=constant(to_air), part_of=""),),
             like={name: ""},
         )
 
     def lag(self, rng: np.random.Generator, low_s: float, high_s: float) -> float:
         """Time constant, drawn evenly; at least a row, [s]."""
         return max(float(rng.uniform(low_s, high_s)), self.plant.row_s)
-
-
-def _times(factor: float, law: Law) -> Law:
-    return lambda m: factor * law(m)
-
-
-def _constant(value: float) -> Law:
-    return lambda m: np.full_like(m.hours, value)
 
 
 def either(rng: np.random.Generator) -> int:

@@ -24,7 +24,6 @@ class ParameterDirection:
 
     Attributes
     ----------
-    name : str
     step : float
         In the unit of the parameter; its value times the logarithm's standard deviation for one standard deviation
     """
@@ -108,8 +107,6 @@ def tangents(
 
     Parameters
     ----------
-    plant : ZooPlant
-    programme : Programme
     changes : sequence of Change, ParameterDirection or StartDirection
         Directions; a change enters as amplitude times its law
     at : Variant
@@ -155,8 +152,6 @@ class Linearised:
 
     Parameters
     ----------
-    plant : ZooPlant
-    programme : Programme
     at : Variant
         The run about which is linearised
     further : sequence of Change

@@ -10,6 +10,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
+import numpy as np
+
 from models.base.types import Array
 
 
@@ -49,7 +51,6 @@ class Body:
 
     Attributes
     ----------
-    name : str
     capacity : Law
         [J/K]
     part_of : str
@@ -67,7 +68,6 @@ class Boundary:
 
     Attributes
     ----------
-    name : str
     temperature : Law
         [degC]
     part_of : str
@@ -85,7 +85,6 @@ class Path:
 
     Attributes
     ----------
-    name : str
     ends : (str, str)
     conductance : Law
         [W/K]
@@ -106,7 +105,6 @@ class Source:
 
     Attributes
     ----------
-    name : str
     power : Law
         [W]
     spread : mapping of str to float
@@ -150,12 +148,10 @@ class ZooPlant:
 
     Attributes
     ----------
-    family : str
     gearbox : str
         Name or file of the nominal definition that a diagnosis gets
     inputs : tuple of str
         Names of the inputs that its laws read
-    bodies, boundaries, paths, sources, probes : tuple
     parameters : mapping of str to float
         Of this machine
     spread : mapping of str to float
@@ -243,7 +239,6 @@ class Variant:
     ----------
     parameters : mapping of str to float
         Values in place of the plant's own
-    changes : tuple of Change
     quiet : bool
         True to leave out the random heats
     """
@@ -277,3 +272,13 @@ class Outcome:
     P_loss: Array
     inputs: Mapping[str, Array]
     heat: Sequence[Mapping[int, Array]]
+
+
+def constant(value: float) -> Law:
+    """A law that has one value at all times."""
+    return lambda m: np.full_like(m.hours, value)
+
+
+def times(factor: float, law: Law) -> Law:
+    """A law times a number."""
+    return lambda m: np.asarray(factor * law(m))

@@ -7,7 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from diagnosis.proof.cases.truth import ACTIVE_SHARE, SCHEMA, practical_of, size_of, spans_of
+from diagnosis.proof.cases.truth import (
+    ACTIVE_SHARE,
+    SCHEMA,
+    facts_of_fault,
+    practical_of,
+    size_of,
+    size_of_heat,
+    spans_of,
+)
 from diagnosis.proof.zoo.case import HOLD, TRAIN, ZooCase, with_reading_faults
 from diagnosis.proof.zoo.effects import ZooEffect
 from diagnosis.proof.zoo.faults import recorded_minus_true
@@ -192,7 +200,7 @@ def _heat(case: ZooCase, run: int) -> dict[str, Any]:
     for kind in SETS:
         names = [p.name for p in case.recordings(kind)]
         found[kind] = {
-            n: _of_heat(np.concatenate([by_recording[r].get(n, 0.0 * total[r]) for r in names])) for n in nodes
+            n: size_of_heat(np.concatenate([by_recording[r].get(n, 0.0 * total[r]) for r in names])) for n in nodes
         }
     top = max(float(values.max(initial=0.0)) for values in total.values())
     magnitude = {
@@ -231,17 +239,6 @@ def _heat_of(plant: ZooPlant, outcome: Outcome, run: int, none: int, changes: Se
     return found
 
 
-def _of_heat(watts: Array) -> dict[str, float]:
-    largest = float(np.abs(watts).max(initial=0.0))
-    active = np.abs(watts) > ACTIVE_SHARE * largest
-    return {
-        "mean": round(float(watts.mean()), 3),
-        "mean_active": round(float(watts[active].mean()) if active.any() else 0.0, 3),
-        "active_share": round(float(active.mean()), 4),
-        "max": round(float(watts[np.abs(watts).argmax()]), 3),
-    }
-
-
 def _measured(case: ZooCase, effect: ZooEffect, columns: Mapping[str, str]) -> dict[str, Any]:
     """Changes of the columns by a fault of measurement, without noise."""
     fault = effect.fault
@@ -262,9 +259,4 @@ def _measured(case: ZooCase, effect: ZooEffect, columns: Mapping[str, str]) -> d
             values = np.concatenate(parts)
             if np.any(values != 0.0):
                 shifts[kind][column] = size_of(values)
-    nothing = {"rms": 0.0, "max": 0.0}
-    K = {
-        kind: {name: found.get(f"T_{name}_degC", nothing) for name in case.instruments.channels}
-        for kind, found in shifts.items()
-    }
-    return {"K": K, "column_shift": shifts, "heat_W": {}, "acting_s": {}}
+    return facts_of_fault(shifts, case.instruments.channels)

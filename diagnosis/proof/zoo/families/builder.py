@@ -23,7 +23,6 @@ class Builder:
         Inputs of the nominal network that laws read
     links : collection of str
         Links of the nominal network by name, ``a-b``
-    rng : numpy.random.Generator
     """
 
     def __init__(
@@ -170,7 +169,6 @@ def wander(rng: np.random.Generator, *, sd: float, tau_h: float, span_h: float) 
 
     Parameters
     ----------
-    rng : numpy.random.Generator
     sd : float
         Of the logarithm
     tau_h, span_h : float

@@ -17,7 +17,6 @@ class Family:
 
     Attributes
     ----------
-    name, description : str
     machines : tuple of str
         Nominal definitions of the package that it can be drawn for
     draw : Callable

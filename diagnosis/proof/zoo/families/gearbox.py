@@ -15,7 +15,7 @@ from diagnosis.proof.zoo.families.builder import Builder, wander
 from diagnosis.proof.zoo.families.design import Design
 from diagnosis.proof.zoo.families.losses import RPM
 from diagnosis.proof.zoo.families.sizes import T_SERVICE, Sizes
-from diagnosis.proof.zoo.structure import Law, Moment, ZooPlant
+from diagnosis.proof.zoo.structure import Law, Moment, ZooPlant, constant
 from models.assembly.gearbox import Gearbox
 from models.base.types import Array
 
@@ -71,7 +71,7 @@ class _Gearbox:
         self.still: Law = (
             wander(b.rng, sd=self.design.draught, tau_h=b.uniform(0.3, 1.5), span_h=SPAN_H)
             if self.design.draught
-            else lambda m: np.ones_like(m.hours)
+            else constant(1.0)
         )
 
     def _housing(self) -> None:

@@ -142,7 +142,6 @@ class Dip:
     ----------
     h, r, b, m : float
         Immersion of the pitch circle, pitch radius, face width, module, [m]
-    z : int
     tooth_height : float
         [m]
     alpha : float

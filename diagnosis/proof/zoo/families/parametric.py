@@ -15,7 +15,7 @@ import sympy as sp
 
 from diagnosis.proof.zoo.families.builder import Builder, wander
 from diagnosis.proof.zoo.families.family import Family
-from diagnosis.proof.zoo.structure import Law, Moment, ZooPlant
+from diagnosis.proof.zoo.structure import Law, Moment, ZooPlant, constant, times
 from models.assembly.gearbox import Gearbox
 from models.base.errors import InputError
 from models.base.types import Array
@@ -191,7 +191,7 @@ class _Machine:
     def _surroundings(self) -> None:
         """Where paths to surroundings end: at a boundary, or at the air that the machine has warmed."""
         self.outside = {name: name for name in self.input_of}
-        self.still: Law = lambda m: np.ones_like(m.hours)
+        self.still: Law = constant(1.0)
         if self.design.draught:
             span = SPAN_H if sum(self.capacity.values()) > HEAVY_J_K else 80.0
             self.still = wander(self.b.rng, sd=self.design.draught, tau_h=span / 200.0, span_h=span)
@@ -235,13 +235,13 @@ class _Machine:
     def _inward(self, a: str, c: str, G: float) -> Law:
         growth, rise = self.design.contact, self.rise
         if not growth:
-            return lambda m: np.full_like(m.hours, G)
+            return constant(G)
         return lambda m: G * np.clip(1.0 + growth * (0.5 * (m.T[a] + m.T[c]) - 20.0 - 0.5 * rise), 0.3, 3.0)
 
     def _awake(self, link: Path) -> Law:
         """Share of a conductance that is left when the shaft stands, rising to 1 with speed."""
         if link.standstill_share >= 1.0:
-            return lambda m: np.ones_like(m.hours)
+            return constant(1.0)
         share, running = link.standstill_share, self.definition.operation.running_rpm
         power = 1.0 if self.design.smooth_standstill else 2.0
         return lambda m: share + (1.0 - share) * np.minimum(np.abs(m.inputs["speed"]) / running, 1.0) ** power
@@ -305,7 +305,7 @@ class _Machine:
         ):
             scaled = watts * self.loss_scale
             name = f"{loss.name}_{kind}"
-            self.b.source(name, name, _times(scaled, shape), self._spread(loss.part), 0.25)
+            self.b.source(name, name, times(scaled, shape), self._spread(loss.part), 0.25)
 
     def _spread(self, part: str) -> dict[str, float]:
         """Mostly into the core of a part, by chance some into its skin or a neighbour."""
@@ -331,12 +331,12 @@ class _Machine:
             for part, weight in zip(heat.parts, weights, strict=True):
                 into[self.skin[part]] = into.get(self.skin[part], 0.0) + float(weight)
             own = heat.name if len(heat.parts) == 1 else "+".join(f"{heat.name}_{part}" for part in heat.parts)
-            self.b.source(heat.name, own, _times(heat.gain, law), into, 0.02, is_loss=False)
+            self.b.source(heat.name, own, times(heat.gain, law), into, 0.02, is_loss=False)
 
     def _factor(self, text: str | None) -> Law:
         """A law that a definition gives as text, of inputs, parameters at their start and temperatures of parts."""
         if text is None:
-            return lambda m: np.ones_like(m.hours)
+            return constant(1.0)
         expression = parse_expression(text)
         values = {sp.Symbol(p.name, real=True): p.start for p in self.definition.parameter}
         known = {str(symbol): value for symbol, value in values.items()}
@@ -367,10 +367,6 @@ class _Machine:
             if self.b.chance(0.5):
                 mix[air] = self.b.uniform(0.0, 0.03) * sum(mix.values())
             self.b.probe(part, mix)
-
-
-def _times(scale: float, law: Law) -> Law:
-    return lambda m: scale * law(m)
 
 
 PARAMETRIC_FAMILIES = (

@@ -30,7 +30,7 @@ from diagnosis.engine.fit import Fit, calibrate
 from diagnosis.engine.learnt import ErrorClass
 from diagnosis.engine.prepare import prepare_experiment
 from diagnosis.engine.unknown import TermParameter
-from diagnosis.results.effect_values import values_of
+from diagnosis.results.findings import values_of
 from models.assembly.gearbox import Gearbox
 from models.mechanisms import CATALOGUE, Placed
 from models.network.laws import Parameter, symbol

@@ -24,8 +24,9 @@ from diagnosis.report.finding_charts import dates_with_bands, driver_of, heat_of
 from diagnosis.report.network_layout import WIDEST_ROW, places_of
 from diagnosis.report.page import PLOTLY, charts_of
 from diagnosis.report.wording import WORDS
+from diagnosis.results.first_screen import VERDICT_TEXT
 from diagnosis.results.number_format import NONE, fixed
-from diagnosis.results.result import VERDICT_TEXT, Diagnosis
+from diagnosis.results.result import Diagnosis
 from diagnosis.results.result_parts import Change
 from models.base.errors import InputError
 from models.quantities.part_colours import part_colours

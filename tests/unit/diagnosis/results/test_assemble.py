@@ -351,7 +351,7 @@ def test_a_sensor_fault(assembled: Assemble, prepared: Prepared, fzg: Gearbox) -
 
 
 def test_switch_temperatures_are_on_and_off(prepared: Prepared) -> None:
-    from diagnosis.results.effect_values import switching_of
+    from diagnosis.results.findings import switching_of
 
     setup, _, plain = prepared
     for name, on, off in (("cooler_thermostat", 73.0, 67.0), ("heater_thermostat", 67.0, 73.0)):

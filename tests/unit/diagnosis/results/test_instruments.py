@@ -17,7 +17,7 @@ from diagnosis.results.instruments import sensors_and_inputs_of
 from models.assembly.gearbox import Gearbox
 from models.base.types import Array
 from models.correction.correction import Correction
-from models.correction.instruments import InputCorrection, Mix, SensorCorrection
+from models.correction.instruments import InputCorrection, SensorCorrection
 from models.files.cycle import Cycle
 from models.mechanisms import CATALOGUE, Scale
 from models.network.laws import Parameter
@@ -46,10 +46,10 @@ def fitted(experiment: Experiment, values: dict[str, float]) -> Fit:
 
 def test_numbers_of_a_fit(experiment: Experiment) -> None:
     fit = fitted(experiment, VALUES)
-    sensors, inputs = sensors_and_inputs_of(fit, mixes={"oil": (Mix(node="pinion", share=0.02),)})
+    sensors, inputs = sensors_and_inputs_of(fit)
     assert [s.channel for s in sensors] == ["oil", "pinion", "P_loss"]
     oil, loss = sensors[0], sensors[2]
-    assert (oil.bias, oil.lag, oil.mix[0].share) == pytest.approx((1.3, 60.0, 0.02))
+    assert (oil.bias, oil.lag) == pytest.approx((1.3, 60.0))
     assert (loss.gain, loss.bias, loss.delay) == pytest.approx((1.03, 4.0, 6.0))
     assert {i.name: (round(i.gain, 6), round(i.offset, 6)) for i in inputs} == {
         "torque": (1.04, 0.0), "T_ambient": (1.0, -2.0),

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 from diagnosis.report import page
-from diagnosis.results.result import VERDICT_TEXT, Diagnosis
+from diagnosis.results.first_screen import VERDICT_TEXT
+from diagnosis.results.result import Diagnosis
 from diagnosis.results.result_parts import Change, Ranked, Switching
 from tests.unit.diagnosis.diagnosis_example import consistent, missing_physics, two_effects, unexplained
 

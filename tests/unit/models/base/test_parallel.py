@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from uuid import uuid4
 
 import pytest
 from threadpoolctl import threadpool_info
@@ -29,9 +28,9 @@ def scheduler() -> Iterator[str]:
         yield cluster.scheduler_address
 
 
-@pytest.mark.parametrize(("jobs", "batches"), [(1, None), (1, 3), (2, None), (2, 1), (2, 3), (2, 50), (None, None)])
-def test_results_come_in_order(jobs: int | None, batches: int | None) -> None:
-    found = run_parallel(_worked, ITEMS, jobs=jobs, batches=batches)
+@pytest.mark.parametrize("jobs", [1, 2, None])
+def test_results_come_in_order(jobs: int | None) -> None:
+    found = run_parallel(_worked, ITEMS, jobs=jobs)
     assert [result for result, _ in found] == [number**2 for number in range(7)]
     if jobs is not None:
         assert (os.getpid() not in {process for _, process in found}) == (jobs > 1)
@@ -80,28 +79,6 @@ def _threads() -> int:
 def test_every_call_has_one_blas_thread(jobs: int) -> None:
     assert run_parallel(_threads, [(), ()], jobs=jobs) == [1, 1]
     assert one_thread()(_threads)() == 1
-
-
-class _Shared:
-    """Something that knows whether it was sent."""
-
-    def __init__(self) -> None:
-        self.arrived = "never"
-
-    def __setstate__(self, state: dict[str, str]) -> None:
-        self.__dict__.update(state)
-        self.arrived = uuid4().hex
-
-
-def _arrived(shared: _Shared) -> str:
-    return shared.arrived
-
-
-@pytest.mark.parametrize("batches", [None, 2])
-def test_what_a_batch_has_in_common_is_sent_once(batches: int | None) -> None:
-    shared = _Shared()
-    arrivals = set(run_parallel(_arrived, [(shared,) for _ in range(24)], jobs=2, batches=batches))
-    assert len(arrivals) == (batches or 24)
 
 
 def test_a_scheduler_that_does_not_answer_and_a_missing_dask_are_input_errors(monkeypatch: pytest.MonkeyPatch) -> None:

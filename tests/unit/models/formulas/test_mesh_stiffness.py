@@ -14,7 +14,6 @@ from models.base.errors import InputError
 from models.formulas.geometry import GearPair, gear_pair, half_tooth_angle
 from models.formulas.mesh_stiffness import (
     foundation_compliance,
-    foundation_notes,
     hertz_compliance,
     tooth_compliance,
     tooth_pair_stiffness,
@@ -152,15 +151,6 @@ def test_foundation_against_a_value_worked_by_hand() -> None:
     r_b = r_f * 1.1  # so that u_f = 0.1 r_f and s_f = 0.2 r_f; the flank below the base circle is radial
     ours = foundation_compliance(0.1, psi_b=0.1, r_b=r_b, r_f=r_f, r_bore=25e-3, b=10e-3, E=2e11)
     assert float(ours) == pytest.approx((0.25 * L + 0.5 * M + P) / (2e11 * 10e-3), rel=1e-9)
-
-
-def test_foundation_notes_name_what_lies_outside_the_fit(pair: GearPair) -> None:
-    notes = foundation_notes(pair, (15e-3, 5e-3))
-    assert len(notes) == 2
-    assert "gear 1: half tooth angle" in notes[0]  # 0.1214 rad: 16 teeth stand just outside 0.12
-    assert "gear 2: root radius over bore radius = 9.8298" in notes[1]
-    fine = gear_pair(z=(20, 30), m_n=4.5e-3, alpha_n=math.radians(20.0), b=14e-3, a=112.5e-3, x=(0.0, 0.0))
-    assert foundation_notes(fine) == []
 
 
 def test_default_bore_is_a_third_of_the_root_radius(pair: GearPair) -> None:

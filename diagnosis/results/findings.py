@@ -1,4 +1,4 @@
-"""Numbers of an effect in a fit: its parameters, its heat, when it begins, and when it switches."""
+"""Findings: answers of the decision with their sentences, grades, rivals, and numbers of a fit."""
 
 from __future__ import annotations
 
@@ -9,16 +9,25 @@ from datetime import UTC, timedelta
 import numpy as np
 import sympy as sp
 
+from diagnosis.candidates.dated import CHANGED, HOURS, STEP, WHILE, changed_law
 from diagnosis.candidates.hypotheses import Hypothesis
+from diagnosis.decision.posterior import Answer, Posterior
 from diagnosis.engine.fit import Experiment, Fit
 from diagnosis.engine.unknown import SensorBias, Unknown
 from diagnosis.forward.term_on_grid import TermOnGrid
 from diagnosis.recordings.recording import Recording
-from diagnosis.results.result_parts import Change, Switching
+from diagnosis.results.advice import separation, without_sensor
+from diagnosis.results.places import node_in
+from diagnosis.results.result_parts import LEAST_RIVAL, Change, Finding, ParameterValue, Rival, Switching
+from diagnosis.setup.inference_setup import InferenceSetup, heat_over_time
 from models.base.types import Array
+from models.mechanisms import Mechanism, Placed
 from models.network.laws import symbol
 from models.terms.term import Term
 
+# In sentences about a change, whose strength shows which.
+EITHER = (("smaller or greater", "smaller", "greater"), ("more or less", "less", "more"))
+ENDINGS = (STEP, WHILE, HOURS, "carried_on")
 FORM_ERROR = 0.1  # of a strength and its heat: laws of the literature are hardly known better
 SLOPE_STEP = 1e-4  # of a prior standard deviation
 BAND_SD = 2.0  # 95 %
@@ -27,10 +36,149 @@ HOT_DEGC = 1e6
 Values = Mapping[str, tuple[float, float]]
 
 
+def finding_of(
+    answer: Answer, fit: Fit, setup: InferenceSetup, posterior: Posterior, catalogue: Mapping[str, Mechanism],
+    recordings: Sequence[Recording],
+) -> Finding:  # fmt: skip
+    """An answer with the numbers of a fit.
+
+    Parameters
+    ----------
+    fit : Fit
+        With the effect of the answer among its unknowns
+    recordings : sequence of Recording
+        Learnt from
+    """
+    effect, term = answer.effect, answer.effect.term
+    values, heats = values_of(fit, effect), heats_of(fit, effect)
+    pieces = [part.point.trajectory.piece for part in fit.parts]
+    mean, stderr = mean_heat_of(fit, effect)
+    found = {name: value for name, (value, _) in values.items()}
+    units = {p.name: p.unit for p in (setup.nominal.parameters if term is None else term.parameters)}
+    prefix = "" if term is None else f"{term.label}_"
+    return Finding(
+        mechanism=name_in(catalogue, effect),
+        family=effect.family,
+        place=effect.place,
+        node=node_in(setup.nominal, effect),
+        kind="parameter" if term is None else "sensor" if term.of_measurement else term.kind,
+        says=_says(answer, found),
+        reference=term.mechanism.reference if isinstance(term, Placed) else "",
+        equation=_equation(effect, found),
+        probability=answer.probability,
+        log_bayes=answer.best.log_bayes,
+        parameters=tuple(
+            ParameterValue(name=name.removeprefix(prefix), value=value, stderr=sd, unit=units.get(name, "1"))
+            for name, (value, sd) in values.items() if name != effect.clock
+        ),
+        confusable_with=_rivals(answer, setup, posterior, catalogue),
+        heat_mean_W=mean,
+        heat_stderr_W=stderr,
+        heat_max_W=max((float(np.abs(heat).max()) for heat in heats), default=0.0),
+        heat=heat_over_time(pieces, heats) if heats else {},
+        term=None if term is None else term.with_values(found),
+        grade=answer.grade,
+        tie_set=tuple(dict.fromkeys(name_in(catalogue, one) for one, _ in answer.tied)),
+        joint_probability=answer.joint,
+        acts_like=answer.acts_like,
+        date=change_of(values, effect, fit.experiment, recordings),
+        switching=switching_of(values, effect),
+    )  # fmt: skip
+
+
+def name_in(catalogue: Mapping[str, Mechanism], effect: Hypothesis) -> str:
+    """Name of the law in the catalogue, for one with a date or a course too; else the name of the effect."""
+    law = changed_law(effect)
+    return next((name for name in (law, *(law + ending for ending in CHANGED)) if name in catalogue), effect.name)
+
+
+def _says(answer: Answer, found: Mapping[str, float]) -> str:
+    effect = answer.effect
+    if effect.is_open:
+        says = f"A heat at {effect.place.replace('_', ' ')} that is like no law of the catalogue."
+    elif isinstance(effect.term, Placed):
+        says = effect.term.says
+    elif effect.term is None:
+        says = f"The parameter {effect.place} is {found[names_of(effect)[0]]:.3g}, far from what the definition allows."
+    else:
+        says = f"{effect.name.replace('_', ' ').capitalize()} at {effect.place.replace('_', ' ')}."
+    for either, less, more in EITHER:
+        if effect.term is not None and either in says:
+            says = says.replace(either, less if found[effect.term.strength.name] < 0.0 else more)
+    says = " ".join(says.split())
+    inside = f"{says[:1].lower()}{says[1:]}"
+    if answer.acts_like:
+        return f"Something acts like this, its cause was not found: {inside}"
+    if len(answer.tied) > 1:
+        return f"One of several effects that these data do not separate, the most probable: {inside}"
+    return says
+
+
+def _equation(effect: Hypothesis, found: Mapping[str, float]) -> str:
+    """The law with its numbers as LaTeX; the time of one with a date is that of the first recording."""
+    term = effect.term
+    if term is None:
+        return ""
+    local = {name.removeprefix(f"{term.label}_"): 0.0 if name == effect.clock else value
+             for name, value in found.items()}  # fmt: skip
+    before = next((term.label.removesuffix(f"_{end}") for end in ENDINGS if term.label.endswith(f"_{end}")), term.label)
+    known = {**found, **local, **{f"{before}_{name}": value for name, value in local.items()}}
+    return term.with_values(found).equation(known)
+
+
+def _rivals(
+    answer: Answer, setup: InferenceSetup, posterior: Posterior, catalogue: Mapping[str, Mechanism]
+) -> tuple[Rival, ...]:
+    """Other names at their most probable places: those of the tie set with its probabilities, then everything else."""
+
+    def key(effect: Hypothesis) -> str:
+        return effect.label if effect.term is None else name_in(catalogue, effect)
+
+    own, free = answer.effect, without_sensor(setup.nominal, setup.channels)
+    others = {effect.label for effect in answer.best.effects}
+    odds: dict[str, float] = {}
+    alone: dict[str, float] = {}
+    where: dict[str, Hypothesis] = {}
+    for judged, probability in posterior.ranked:
+        with_own = key(own) in {key(effect) for effect in judged.effects}
+        for other in judged.effects:
+            if other.label not in others and key(other) != key(own):
+                odds[key(other)] = odds.get(key(other), 0.0) + probability
+                alone[key(other)] = alone.get(key(other), 0.0) + (0.0 if with_own else probability)
+                where.setdefault(key(other), other)
+    tied: dict[str, float] = {}
+    for other, probability in answer.tied:
+        if key(other) != key(own):
+            tied[key(other)] = tied.get(key(other), 0.0) + probability
+            where[key(other)] = other
+    return tuple(
+        Rival(
+            mechanism=name_in(catalogue, where[name]), place=where[name].place, probability=probability,
+            separate_by=separation(own, where[name], catalogue, setup.nominal, free,
+                                   names=(name_in(catalogue, own), name_in(catalogue, where[name]))),
+            instead=name in tied or alone[name] >= LEAST_RIVAL,
+        )
+        for name, probability in sorted({**odds, **tied}.items(), key=lambda one: (one[0] not in tied, -one[1]))
+        if probability >= LEAST_RIVAL
+    )  # fmt: skip
+
+
+# ---------------------------------------------------------------------- parameters
+
+
 def slope(unknown: Unknown, z: float) -> float:
     """Magnitude of the change of a value with `z`; at a bound that to the inside."""
     here = unknown.value(z)
     return max(abs(unknown.value(z + way) - here) for way in (SLOPE_STEP, -SLOPE_STEP)) / SLOPE_STEP
+
+
+def estimates_of(fit: Fit) -> Values:
+    """Value and standard error of every unknown, by the name of its parameter."""
+    sd = np.sqrt(np.diag(fit.covariance))
+    return {
+        unknown.parameter.name: (unknown.value(z), slope(unknown, z) * error)
+        for unknown, z, error in zip(fit.experiment.unknowns, fit.z.tolist(), sd.tolist(), strict=True)
+    }
 
 
 def names_of(effect: Hypothesis) -> tuple[str, ...]:
@@ -43,11 +191,8 @@ def values_of(fit: Fit, effect: Hypothesis) -> Values:
 
     A law's strength includes the error of its form; the constant bias of a sensor includes what was calibrated of it.
     """
-    sd, unknowns = np.sqrt(np.diag(fit.covariance)), fit.experiment.unknowns
     found = {} if effect.term is None else {p.name: (p.start, 0.0) for p in effect.term.parameters}
-    for index in _places_of(fit, names_of(effect)):
-        unknown, z = unknowns[index], float(fit.z[index])
-        found[unknown.parameter.name] = unknown.value(z), slope(unknown, z) * float(sd[index])
+    found |= {name: known for name, known in estimates_of(fit).items() if name in names_of(effect)}
     if effect.term is None:
         return found
     name = effect.term.strength.name

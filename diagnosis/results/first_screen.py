@@ -1,0 +1,213 @@
+"""The first screen of a diagnosis in plain words: a reader's questions with their answers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from diagnosis.results.number_format import MINUS, number, with_error
+from diagnosis.results.result_parts import LEAST_RIVAL, MOST_NEAREST, NO_CLAIM, Finding, named, robustness_told
+from models.mechanisms import OPEN_FORM
+from models.mechanisms.measurement import FAMILY as MEASUREMENT
+
+if TYPE_CHECKING:
+    from diagnosis.results.result import Diagnosis
+
+VERDICT_TEXT: Mapping[str, str] = {
+    "consistent": "Nothing stands out: noise and model error explain the recordings.",
+    "parameter_error": "A known parameter of the model is outside what its definition allows.",
+    "missing_physics": "The machine shows physics that the model leaves out.",
+    "sensor_fault": "A sensor, clock or recorded input is at fault, not the machine.",
+    "unexplained": "Something is missing, and it matches no physics in the catalogue.",
+    "insufficient_data": "These recordings are too short or too calm to decide.",
+}
+PARTLY = "Part of what is missing was found; the rest matches no physics in the catalogue."
+LIKELY_TEXT: Mapping[str, str] = {  # of the same verdicts where no name is a claim
+    "parameter_error": "A parameter of the model is probably outside what its definition allows.",
+    "missing_physics": "The machine probably shows physics that the model leaves out; its name is not certain.",
+    "sensor_fault": "A sensor, clock or recorded input is probably at fault, not the machine.",
+}
+LARGEST_ERROR = "full"  # class of model error
+FAR_SD, MOST_FAR = 3.0, 3  # standard deviations of a prior, beyond which the summary tells of a parameter; how many
+MOST_UNSEEN = 6  # effects that the summary names of those that cannot be seen
+OF_DATE = ("since", "lasting")  # parameters that the date contains
+OF_SWITCH = ("set_point", "band")  # parameters that the switching temperatures contain
+LONG_S = 7200.0  # times beyond are told in hours
+LITTLE_SPREAD = 0.05  # deviation between sessions that is not worth a word, in prior standard deviations
+
+
+def verdict_text_of(d: Diagnosis) -> str:
+    """The verdict in a sentence."""
+    if d.verdict == "unexplained" and any(f.family != OPEN_FORM for f in d.findings):
+        return PARTLY
+    if any(finding.grade == "claim" for finding in d.findings):
+        return VERDICT_TEXT[d.verdict]
+    return LIKELY_TEXT.get(d.verdict, VERDICT_TEXT[d.verdict])
+
+
+def first_screen_of(d: Diagnosis) -> tuple[tuple[str, tuple[str, ...]], ...]:
+    """Questions with their answers; those without an answer are left out."""
+    asked = (
+        ("Is something missing?", (_missing(d),)),
+        ("Where?", _where(d)),
+        ("What?", _what(d)),
+        ("How sure?", _how_sure(d)),
+        ("How much better?", _how_much_better(d)),
+        ("What next?", (d.next_test,) if d.next_test else ()),
+        ("What cannot be seen in these data?", _cannot_be_seen(d)),
+    )
+    return tuple((question, answers) for question, answers in asked if answers)
+
+
+def _missing(d: Diagnosis) -> str:
+    if d.verdict == "insufficient_data":
+        return "These data cannot decide it."
+    reached = f"evidence {d.log_e_value:.1f} nat, {d.threshold:.1f} needed"
+    rate = f"false-alarm rate {100.0 * d.false_alarm_rate:g} %"
+    if d.log_e_value > d.threshold:
+        return f"Yes{_in_what(d)}: {reached} ({rate})."
+    return f"Nothing that these data show: {reached} ({rate})."
+
+
+def _in_what(d: Diagnosis) -> str:
+    """The model or the measurement; with a word of caution where the other one has some probability too."""
+    if d.verdict == "unexplained":
+        return ""
+    measurement = sum(one.probability for one in d.ranking if one.family == MEASUREMENT)
+    fault = d.verdict == "sensor_fault"
+    sure = (measurement if fault else 1.0 - measurement) >= d.claim_from
+    return f", {'' if sure else 'probably '}in the {'measurement' if fault else 'model'}"
+
+
+def _where(d: Diagnosis) -> tuple[str, ...]:
+    if not d.location or d.verdict in NO_CLAIM:
+        return ()
+    told = ", ".join(f"{place.node} ({_share(place.probability)})" for place in d.places)
+    place = d.location[0]
+    if not place.heat_max_W:
+        return (f"{told}: in a reading or an input; no heat",)
+    way = "taken away" if place.heat_mean_W < 0.0 else "added"
+    mean, most = number(abs(place.heat_mean_W)), number(abs(place.heat_max_W))
+    heat = f"{mean} W {way} on average, {most} W at most"
+    return (f"{told}; {heat}; {place.regime}",)
+
+
+def _what(d: Diagnosis) -> tuple[str, ...]:
+    lines: list[str] = []
+    for item in d.items:
+        lines.append(f"{item[0].grade.capitalize()}: {item[0].says} [{item[0].title}]")
+        lines += [f"  {line}" for finding in item for line in (values_told(finding), date_told(finding)) if line]
+    if d.nearest:
+        told = ", ".join(f"{one.mechanism} at {one.place} ({one.probability:.2f})" for one in d.nearest)
+        lines.append(f"No name is certain enough to be reported; most like: {told}.")
+    elif not d.findings and d.verdict not in NO_CLAIM:
+        lines.append("Nothing in the catalogue is like it.")
+    return tuple(lines)
+
+
+def _how_sure(d: Diagnosis) -> tuple[str, ...]:
+    lines = []
+    for finding, *_ in d.items:
+        of = "of this name, the nearest one," if finding.acts_like else "of one of these" if finding.tie_set else ""
+        if finding.acts_like and finding.sureness > finding.probability:
+            of = f"of this name {_share(finding.probability)}, of all that act alike"
+        title = f"{finding.title}: " if len(d.items) > 1 else ""
+        line = " ".join(filter(None, (f"{title}{finding.grade}, probability", of, _share(finding.sureness))))
+        others = [r for r in finding.confusable_with
+                  if r.probability >= LEAST_RIVAL and r.mechanism not in finding.tie_set]  # fmt: skip
+        roles = (("not ruled out instead", True), ("may act as well", False))
+        for words, instead in roles[: 1 + d.further_helps]:
+            told = [f"{named(r.mechanism, r.place)} ({r.probability:.2f})" for r in others if r.instead is instead]
+            line += f"; {words}: {', '.join(told[:MOST_NEAREST])}" if told else ""
+        lines.append(line)
+    if not d.findings and d.kinds:
+        kinds = sorted(d.kinds.items(), key=lambda kind: -kind[1])
+        told = [f"{kind} {_share(p)}" for kind, p in kinds if p >= LEAST_RIVAL]
+        lines.append(f"Probabilities: {', '.join(told)}.")
+    if d.error_class:
+        hides = ", the largest: a real effect can hide in it" if d.error_class == LARGEST_ERROR else ""
+        lines.append(f"Model error assumed: class {d.error_class}{hides}.")
+    if d.scaled_error and d.log_e_value > d.threshold:
+        lines.append(robustness_told(d.scaled_error))
+    if d.session_s > LITTLE_SPREAD:
+        lines.append(f"Between sessions the machine differs by {d.session_s:.2f} of the priors' widths.")
+    far = sorted((c for c in d.calibration if abs(c.shift_in_sd) > FAR_SD), key=lambda c: -abs(c.shift_in_sd))
+    if far:
+        told = [f"{c.parameter} = {c.value:.3g}{_unit(c.unit)} ({abs(c.shift_in_sd):.1f} sd)"
+                for c in far[:MOST_FAR]]  # fmt: skip
+        lines.append(f"Far from what the definition expects: {', '.join(told)}.")
+    if d.remaining_note:
+        lines.append(f"Remaining: {d.remaining_note}")
+    return tuple(lines)
+
+
+def _how_much_better(d: Diagnosis) -> tuple[str, ...]:
+    lines = []
+    for name, fits in (("held-out", d.holdout), ("training", d.train)):
+        if fits.before == fits.before:
+            after = f", {fits.after:.2f} K with the findings" if d.findings else ""
+            lines.append(
+                f"RMSE {name}: {fits.before:.2f} K as delivered, {fits.calibrated:.2f} K calibrated{after} "
+                f"(noise {d.noise_K:.2f} K)"
+            )
+    if d.findings and d.holdout.after > d.holdout.calibrated:
+        lines.append("Held-out temperatures are not closer than with the calibrated model: predict with that one")
+    named_terms = {finding.term.label for finding in d.findings if finding.term is not None}
+    further = len([term for term in d.terms if term.label not in named_terms])
+    if d.findings and further:
+        lines.append(f"The findings' model holds {further} more effect{'s' * (further > 1)} without a certain name")
+    if d.findings and math.isfinite(d.holdout_gain):
+        way = "better" if d.holdout_gain >= 0.0 else "worse"
+        lines.append(
+            f"Held-out readings are predicted {way} than by the calibrated model, by "
+            f"{abs(d.holdout_gain):.0f} nat of log score"
+        )
+    return tuple(lines)
+
+
+def _cannot_be_seen(d: Diagnosis) -> tuple[str, ...]:
+    if not d.unseen:
+        return ()
+    names = list(dict.fromkeys(one.mechanism for one in d.unseen))
+    more = f" and {len(names) - MOST_UNSEEN} more" if len(names) > MOST_UNSEEN else ""
+    return (f"{', '.join(names[:MOST_UNSEEN])}{more}: silence about them means nothing.",)
+
+
+def values_told(finding: Finding) -> str:
+    """Numbers of a finding for a terminal."""
+    told_else = OF_DATE if finding.switching is None else (*OF_DATE, *OF_SWITCH)
+    values = [(p.name, p.value, p.stderr, p.unit) for p in finding.parameters if p.name not in told_else]
+    if finding.heat_mean_W > 0.0:
+        values.append(("mean |heat|", finding.heat_mean_W, finding.heat_stderr_W, "W"))
+    told = [
+        f"{name} = {with_error(value, stderr).replace(MINUS, '-')}{_unit(unit)}" for name, value, stderr, unit in values
+    ]
+    if finding.switching is not None:
+        told.append(f"on at {finding.switching.on_degC:.1f} degC, off at {finding.switching.off_degC:.1f} degC")
+    return ", ".join(told)
+
+
+def date_told(finding: Finding) -> str:
+    """Date of a finding for a terminal."""
+    date = finding.date
+    if date is None:
+        return ""
+    band = "" if date.band_s is None else f" ({_time(date.band_s[0])} to {_time(date.band_s[1])})"
+    end = "" if date.to_s is None else f", until {_time(date.to_s)}"
+    utc = "" if date.utc is None else f", {date.utc[:16].replace('T', ' ')} UTC"
+    return f"from {_time(date.from_s)} of {date.recording} on{band}{utc}{end}"
+
+
+def _time(seconds: float) -> str:
+    return f"{seconds / 3600.0:.2f} h" if abs(seconds) > LONG_S else f"{seconds:.0f} s"
+
+
+def _unit(symbol: str) -> str:
+    """A unit behind a number."""
+    return "" if symbol == "1" else f" {symbol}"
+
+
+def _share(probability: float) -> str:
+    """A probability; never rounded to certainty."""
+    return f"{probability:.2f}" if probability < 0.995 else "> 0.99"
