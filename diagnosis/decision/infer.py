@@ -102,28 +102,26 @@ def infer(
         if one.fit is not None:
             judged[one.label] = _fitted_on(calibration, one, len(base.z))
     alone = {one.label: float(value) for one, value in zip(first.candidates, first.log_bayes, strict=True)}
-    remainder, pairs = 0.0, list[Judged]()
+    remainder, gained, pairs = 0.0, 0.0, list[Judged]()
     best = max(judged.values(), key=lambda one: one.log_bayes + one.log_prior, default=None)
     if best is not None and best.fit is not None and best.log_bayes > 0.0:
         progress(f"scanning again, given {best.label}")
         of_class = first.in_class(best.error_class).ahead
         remainder, pairs, there = _given_best(calibration, best, candidates, log_prior, of_class)
         alone |= {label: min(alone[label], value) for label, value in there.items()}
+        progress("fitting nothing from there")
+        gained = _nothing_gains(calibration, best)
     for index, candidate in enumerate(first.candidates):
         judged.setdefault(candidate.label, _by_scan(first, index, alone[candidate.label]))
     error_class = chosen.error_class if best is None else best.error_class
     threshold = rule().threshold(error_class, settings.false_alarm_rate)
-    log_e = _log_e(judged.values())
-    if best is not None and best.fit is not None and log_e > threshold:
-        progress("fitting nothing from there")
-        gained = _nothing_gains(calibration, best)
-        judged, pairs = {name: _less(one, gained) for name, one in judged.items()}, [_less(one, gained) for one in pairs]
-        log_e = _log_e(judged.values())
+    log_e = float(logsumexp([one.log_prior + one.log_bayes for one in judged.values()])) - gained
     missing = log_e > threshold
-    unknown = [_less(one, gained) for one in _unknown(calibration, error_class, outside)] if missing else []
+    unknown = _unknown(calibration, error_class, outside) if missing else []
     nothing = Judged(effects=(), log_prior=0.0, log_bayes=0.0, error_class=chosen.error_class, fit=base)
     return Posterior(
-        nothing=nothing, judged=(*judged.values(), *pairs, *unknown), log_e=log_e, threshold=threshold, rule=rule(),
+        nothing=nothing, log_e=log_e, threshold=threshold, rule=rule(),
+        judged=tuple(replace(one, log_bayes=one.log_bayes - gained) for one in (*judged.values(), *pairs, *unknown)),
         likeness=_likeness(first, error_class), odds_unknown=settings.odds_unknown,
         error_class=(error_class if missing else chosen.error_class).name, error_evidence=dict(calibration.evidence),
         session_s=chosen.session_s, remainder=remainder,
@@ -349,11 +347,6 @@ def _given_best(
     return float(second.log_bayes[order[0]]), pairs, dict(zip(labels, alone, strict=True))
 
 
-def _log_e(judged: Iterable[Judged]) -> float:
-    """Log of the mean Bayes factor over all single explanations."""
-    return float(logsumexp([one.log_prior + one.log_bayes for one in judged]))
-
-
 def _nothing_gains(calibration: Calibration, best: Judged) -> float:
     """Nats by which nothing does better from the point and in the class of the best explanation, at least 0.
 
@@ -369,11 +362,6 @@ def _nothing_gains(calibration: Calibration, best: Judged) -> float:
     except (InputError, ArithmeticError, np.linalg.LinAlgError):
         pass  # what is known counts
     return max(found) - calibration.chosen.log_evidence
-
-
-def _less(one: Judged, gained: float) -> Judged:
-    """An explanation against a nothing that has more evidence."""
-    return replace(one, log_bayes=one.log_bayes - gained)
 
 
 def _unknown(calibration: Calibration, error_class: ErrorClass, outside: Sequence[Hypothesis]) -> list[Judged]:
