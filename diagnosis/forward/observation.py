@@ -35,11 +35,6 @@ class Sensors:
     loss_gain: float = 1.0
     loss_delay: float = 0.0
 
-    def ideal(self) -> Sensors:
-        """These channels with ideal sensors: no lag, bias, gain or delay."""
-        nothing = np.zeros(len(self.channels))
-        return Sensors(channels=self.channels, lag=nothing, bias=nothing)
-
 
 def readings(model: NetworkOnGrid, trajectory: Trajectory, sensors: Sensors) -> Array:
     """Readings of the sensors along a trajectory, shape (K + 1, channels), [degC] or [W]."""

@@ -50,8 +50,6 @@ class Trajectory:
         Temperatures that the memories followed, [degC]
     memory : Array, shape (K, states)
     balance : Balance
-    jacobian : Array, shape (K, parts, parts)
-        Derivative of the net heats with respect to the temperatures, losses included, [W/K]
     loss : Array, shape (K,)
         Total mechanical loss, [W]
     loss_slope : Array, shape (K, parts)
@@ -69,7 +67,6 @@ class Trajectory:
     seen: Array
     memory: Array
     balance: Balance
-    jacobian: Array
     loss: Array
     loss_slope: Array
     decay: Array
@@ -260,7 +257,6 @@ class _Solved:
     """The heat balance linearised about temperatures at the middles, and its exact solution over every interval."""
 
     balance: Balance
-    jacobian: Array
     loss_slope: Array
     total: Array
     capacities: Array
@@ -286,8 +282,8 @@ def _linearised(
         matrix, constant = _with_states(model, piece, values, T, tangent, memory, balance, matrix, capacities)
     decay, gain = exponential(matrix, piece.steps)
     return _Solved(
-        balance=balance, jacobian=jacobian, loss_slope=loss_slope, total=total, capacities=capacities, decay=decay,
-        gain=gain, driven=np.einsum("kij,kj->ki", gain, constant),
+        balance=balance, loss_slope=loss_slope, total=total, capacities=capacities, decay=decay, gain=gain,
+        driven=np.einsum("kij,kj->ki", gain, constant),
     )  # fmt: skip
 
 
@@ -347,8 +343,7 @@ def linear_round(
         loss = loss + piece.error.loss
     return Trajectory(
         piece=piece, T=result, values=values, tangent=tangent, seen=seen, memory=memory, balance=solved.balance,
-        jacobian=solved.jacobian, loss=loss, loss_slope=solved.loss_slope, decay=solved.decay, gain=solved.gain,
-        capacities=solved.capacities,
+        loss=loss, loss_slope=solved.loss_slope, decay=solved.decay, gain=solved.gain, capacities=solved.capacities,
     )  # fmt: skip
 
 
