@@ -162,14 +162,13 @@ class Metric:
         return mine, solve_triangular(whole, along, lower=True)
 
 
-def leading_directions(products: Array, most: int = MOST_DIRECTIONS) -> Array:
+def leading_directions(products: Array) -> Array:
     """Combinations of columns that carry nearly all of what the columns can do.
 
     Parameters
     ----------
     products : Array, shape (n, n)
         Inner products of whitened columns with prior N(0, 1) each
-    most : int
 
     Returns
     -------
@@ -177,7 +176,7 @@ def leading_directions(products: Array, most: int = MOST_DIRECTIONS) -> Array:
         Columns times this have the prior N(0, 1) again; directions that are left out are far below the noise
     """
     values, vectors = eigh(products)
-    chosen = np.flatnonzero(values > LEAST_DIRECTION)[-most:]
+    chosen = np.flatnonzero(values > LEAST_DIRECTION)[-MOST_DIRECTIONS:]
     return np.asarray(vectors[:, chosen])
 
 

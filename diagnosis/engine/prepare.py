@@ -8,9 +8,7 @@ from dataclasses import replace
 from diagnosis.engine.fit import Experiment
 from diagnosis.engine.point import Machine
 from diagnosis.engine.unknown import (
-    CALIBRATION,
     ClockOffset,
-    Group,
     InputGain,
     InputOffset,
     LossDelay,
@@ -111,7 +109,7 @@ def held_out_experiment(setup: InferenceSetup, experiment: Experiment) -> Experi
 
 def usual_unknowns(
     network: ThermalNetwork, recordings: Sequence[Recording], channels: Sequence[str], *, interval: float,
-    gain_of_torque: Parameter | None = None, group: Group = CALIBRATION,
+    gain_of_torque: Parameter | None = None,
 ) -> list[Unknown]:  # fmt: skip
     """Parameters of the network that may vary, sensors and inputs.
 
@@ -125,44 +123,42 @@ def usual_unknowns(
         Between rows, [s]
     gain_of_torque : Parameter or None
         Prior of the gain of a torque that follows from a power
-    group : Group
     """
     stated, slow = {c.name: c for r in recordings for c in r.channels}, slow_rows(recordings)
     found: list[Unknown] = []
     for p in network.parameters:
         if p.sd > 0.0:
             wider = replace(p, sd=max(p.sd, CAPACITY_SD)) if p.name.startswith("C_") else p
-            found.append(NetworkParameter(parameter=wider, group=group))
+            found.append(NetworkParameter(parameter=wider))
     for name in channels:
         if is_total_loss(name):
             gain = Parameter(name="loss_gain", start=1.0, sd=LOSS_GAIN_SD, lower=0.5, upper=2.0, log=False)
             zero = _normal("bias_P_loss", "W", LOSS_OFFSET_SD_W)
-            found += [LossGain(parameter=gain, group=group),
-                      SensorBias(parameter=zero, group=group, channel=TOTAL_LOSS)]  # fmt: skip
+            found += [LossGain(parameter=gain), SensorBias(parameter=zero, channel=TOTAL_LOSS)]
             if not slow:
                 delay = _normal("delay_P_loss", "s", ROWS_LATE * interval)
-                found.append(LossDelay(parameter=delay, group=group))
+                found.append(LossDelay(parameter=delay))
             continue
         sensor = stated.get(name)
         tolerance = (sensor.bias_sd if sensor else None) or 0.0
         bias = _normal(f"bias_{name}", "K", max(tolerance, BIAS_SD_K))
-        found.append(SensorBias(parameter=bias, group=group, channel=name))
+        found.append(SensorBias(parameter=bias, channel=name))
         if not slow:
             start = max((sensor.lag_s if sensor else None) or LAG_S, SHORTEST_LAG_S)
             sd = sensor.lag_sd_s / start if sensor is not None and sensor.lag_sd_s is not None else LAG_SD
             lag = Parameter(name=f"lag_{name}", unit="s", start=start, sd=sd, lower=0.01, upper=1e4, log=True,
                             description=f"time constant of the sensor at {name}")  # fmt: skip
-            found.append(SensorLag(parameter=lag, group=group, channel=name))
+            found.append(SensorLag(parameter=lag, channel=name))
     if slow:
-        found.append(ClockOffset(parameter=_normal("clock_offset", "s", ROWS_LATE * interval), group=group))
+        found.append(ClockOffset(parameter=_normal("clock_offset", "s", ROWS_LATE * interval)))
     if network.components:
         torque = Parameter(name="torque_gain", start=1.0, sd=TORQUE_GAIN_SD, lower=0.5, upper=2.0, log=False,
                            description="true over recorded torque")  # fmt: skip
-        found.append(InputGain(parameter=gain_of_torque or torque, group=group, input="torque"))
+        found.append(InputGain(parameter=gain_of_torque or torque, input="torque"))
     if "T_ambient" in network.inputs:
         assumed = any("T_ambient" in r.assumed for r in recordings)
         offset = _normal("ambient_offset", "K", AMBIENT_ASSUMED_SD_K if assumed else AMBIENT_SD_K)
-        found.append(InputOffset(parameter=offset, group=group, input="T_ambient"))
+        found.append(InputOffset(parameter=offset, input="T_ambient"))
     return found
 
 
