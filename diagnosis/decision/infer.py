@@ -23,7 +23,6 @@ from diagnosis.engine.gram import Given, Strengths
 from diagnosis.engine.learnt import ErrorClass, rule
 from diagnosis.engine.outside import judge_outside
 from diagnosis.engine.sessions import OverSessions, fit_over_sessions, over_sessions
-from diagnosis.engine.unknown import Group
 from models.base.errors import InputError
 from models.base.progress import Progress, silent
 from models.base.types import Array
@@ -251,7 +250,7 @@ def _with_wider_prior(fit: Fit, index: int, iterations: int) -> Fit:
     """Everything fitted with one parameter outside its prior."""
     experiment, z = fit.experiment, fit.z.copy()
     unknowns = list(experiment.unknowns)
-    unknowns[index] = replace(unknowns[index], group=Group(name="outside its prior", amplitude=rule().wider))  # type: ignore[type-var]
+    unknowns[index] = replace(unknowns[index], amplitude=rule().wider)  # type: ignore[type-var]
     z[index] /= rule().wider
     wider = replace(experiment, unknowns=tuple(unknowns))
     return wider.fit(z, [part.point.trajectory for part in fit.parts], iterations=iterations)

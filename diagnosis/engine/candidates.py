@@ -17,7 +17,7 @@ from diagnosis.engine.gram import Given, Gram, Strengths, strengths
 from diagnosis.engine.metric import Metric
 from diagnosis.engine.point import AT_ONCE, Machine, Point
 from diagnosis.engine.products import base_of, gram_of, whitened_base
-from diagnosis.engine.unknown import TERM_STEP, Group, Held, NetworkParameter, Scope, TermParameter, Unknown
+from diagnosis.engine.unknown import TERM_STEP, Held, NetworkParameter, Scope, TermParameter, Unknown
 from diagnosis.forward.network_on_grid import NetworkOnGrid
 from diagnosis.forward.observation import readings
 from diagnosis.forward.term_on_grid import TermOnGrid
@@ -27,7 +27,6 @@ from models.terms.term import Term
 
 START_SHARES = (1.0, 0.3, 0.03)  # of the strength that the scan promises
 ROUGH, ITERATIONS = 3, 10
-CANDIDATE = Group(name="candidate")
 SHAPES_TRIED = 3  # of what has a memory: its set-points may have several optima
 Starts = tuple[tuple[int, float], ...]  # variants and strengths
 DATE_STEP_S = 10.0
@@ -276,18 +275,17 @@ def with_candidate(fit: Fit, candidate: Hypothesis, variant: int) -> tuple[Exper
     added: list[Unknown] = []
     for p, value, scope in zip(term.parameters, values, scopes, strict=True):
         if p.name == candidate.clock:
-            added.append(Held(parameter=p, group=CANDIDATE, label=term.label, names=names,
-                              of_recording=experiment.starts_at))  # fmt: skip
+            added.append(Held(parameter=p, label=term.label, names=names, of_recording=experiment.starts_at))
         elif p.sd == 0.0:
-            held = replace(p, start=value)
-            added.append(Held(parameter=held, group=CANDIDATE, label=term.label, names=names))
+            added.append(Held(parameter=replace(p, start=value), label=term.label, names=names))
         elif outside:
             # Differences by a date must be small next to the time that a step takes.
             step = DATE_STEP_S / p.sd if candidate.clock and p.unit == "s" and not p.log else TERM_STEP
-            added.append(TermParameter(parameter=p, group=CANDIDATE, scope=scope, label=term.label, names=names,
-                                       step=min(step, TERM_STEP)))  # fmt: skip
+            added.append(
+                TermParameter(parameter=p, scope=scope, label=term.label, names=names, step=min(step, TERM_STEP))
+            )
         else:
-            added.append(NetworkParameter(parameter=p, group=CANDIDATE, scope=scope))
+            added.append(NetworkParameter(parameter=p, scope=scope))
     z = [unknown.z_of(value) for unknown, value in zip(added, values, strict=True)]
     return replace(experiment, machine=machine, unknowns=(*experiment.unknowns, *added)), np.array(z)
 

@@ -23,24 +23,6 @@ LAG_STEP = 0.01  # relative
 TERM_STEP = 0.05  # of a prior sd
 
 
-@dataclass(frozen=True, kw_only=True)
-class Group:
-    """Unknowns that share a prior amplitude.
-
-    Attributes
-    ----------
-    name : str
-    amplitude : float
-        Factor on the prior standard deviation of every unknown, above 0
-    """
-
-    name: str
-    amplitude: float = 1.0
-
-
-CALIBRATION = Group(name="calibration")
-
-
 class Unknown(Protocol):
     """Common protocol of all unknowns."""
 
@@ -49,8 +31,8 @@ class Unknown(Protocol):
         """Start, prior and bounds."""
 
     @property
-    def group(self) -> Group:
-        """Unknowns that it shares its amplitude with."""
+    def amplitude(self) -> float:
+        """Factor on the prior standard deviation, above 0."""
 
     @property
     def scope(self) -> Scope:
@@ -77,13 +59,13 @@ class _Prior:
     """Prior of one number: normal, or log-normal."""
 
     parameter: Parameter
-    group: Group = CALIBRATION
+    amplitude: float = 1.0
     scope: Scope = None
 
     @property
     def sd(self) -> float:
         """Prior standard deviation: of the logarithm of a log-normal number, else in its unit."""
-        return self.parameter.sd * self.group.amplitude
+        return self.parameter.sd * self.amplitude
 
     def value(self, z: float) -> float:
         """Value at `z`, held at the bounds."""

@@ -111,7 +111,7 @@ def sensors_and_inputs_of(
 def _estimate(unknown: Unknown, z: float, error: float) -> Estimate:
     """Value and standard error in the unit of the parameter."""
     value, p = unknown.value(z), unknown.parameter
-    return value, abs(error * p.sd * unknown.group.amplitude * (value if p.log else 1.0))
+    return value, abs(error * p.sd * unknown.amplitude * (value if p.log else 1.0))
 
 
 def _collect(collected: _Collected, unknown: Unknown, estimate: Estimate) -> None:

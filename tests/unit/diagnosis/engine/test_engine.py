@@ -11,7 +11,7 @@ from diagnosis.candidates.hypotheses import Hypothesis, hypothesis_of
 from diagnosis.engine.candidates import refit, scan
 from diagnosis.engine.fit import Experiment, Fit, calibrate
 from diagnosis.engine.prepare import prepare_experiment
-from diagnosis.engine.unknown import ClockOffset, Group, InputGain, SensorBias
+from diagnosis.engine.unknown import ClockOffset, InputGain, SensorBias
 from diagnosis.recordings.recording import Recording
 from diagnosis.setup.inference_setup import InferenceSetup
 from models.assembly.gearbox import Gearbox
@@ -141,10 +141,10 @@ def test_what_is_there_is_found_and_fitted(fit: Fit, hypotheses: list[Hypothesis
     assert again.log_evidence - fit.log_evidence > 5.0
 
 
-def test_the_amplitude_of_a_group_scales_the_prior(prepared: tuple[InferenceSetup, Experiment]) -> None:
+def test_an_amplitude_scales_the_prior(prepared: tuple[InferenceSetup, Experiment]) -> None:
     _, experiment = prepared
     bias = Parameter(name="bias_here", unit="K", start=0.0, sd=1.0, lower=-10.0, upper=10.0, log=False)
-    wide, narrow = (SensorBias(parameter=bias, channel="oil", group=Group(name="x", amplitude=a)) for a in (1.0, 0.1))
+    wide, narrow = (SensorBias(parameter=bias, channel="oil", amplitude=a) for a in (1.0, 0.1))
     assert (wide.value(2.0), narrow.value(2.0)) == pytest.approx((2.0, 0.2))
     assert narrow.z_of(narrow.value(1.5)) == pytest.approx(1.5)
     point = experiment.point(0, np.zeros(len(experiment.unknowns)))
