@@ -253,7 +253,7 @@ def _with_wider_prior(fit: Fit, index: int, iterations: int) -> Fit:
     unknowns[index] = replace(unknowns[index], amplitude=rule().wider)  # type: ignore[type-var]
     z[index] /= rule().wider
     wider = replace(experiment, unknowns=tuple(unknowns))
-    return wider.fit(z, [part.point.trajectory for part in fit.parts], iterations=iterations)
+    return wider.fit(z, fit.trajectories, iterations=iterations)
 
 
 def _spread(found: _Scanned, index: int) -> float:
@@ -356,7 +356,7 @@ def _nothing_gains(calibration: Calibration, best: Judged) -> float:
     found = [calibration.chosen.log_evidence, known.log_evidence]
     try:
         count = len(calibration.fit.z)
-        alone = known.fit.experiment.fit(fit.z[:count], [part.point.trajectory for part in fit.parts])
+        alone = known.fit.experiment.fit(fit.z[:count], fit.trajectories)
         found.append(fit_over_sessions(alone, count).log_evidence + float(np.log(best.error_class.prior)))
     except (InputError, ArithmeticError, np.linalg.LinAlgError):
         pass  # what is known counts

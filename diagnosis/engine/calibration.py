@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -14,7 +14,6 @@ from diagnosis.engine.model_error import ModelError
 from diagnosis.engine.products import gram_of, whitened_base
 from diagnosis.engine.sessions import fit_over_sessions, over_sessions, with_deviation
 from diagnosis.engine.set_apart import without_channels
-from diagnosis.forward.trajectory import Trajectory
 from models.base.types import Array
 
 TURNS = 3  # class, point, columns of model error and deviation between sessions settle together
@@ -66,8 +65,8 @@ class Near:
     def of(cls, experiment: Experiment, error: ModelError, fit: Fit) -> Near:
         """Linearise about the courses of a fit, with the model error assumed there and new noise filters."""
         free = replace(experiment, filters=None)
-        parts = tuple(free.linearised(i, fit.z, course, error=course.piece.error)
-                      for i, course in enumerate(_courses(fit.parts)))  # fmt: skip
+        parts = tuple(free.linearised(i, fit.z, trajectory, error=trajectory.piece.error)
+                      for i, trajectory in enumerate(fit.trajectories))  # fmt: skip
         return cls(experiment=free.with_filters(parts), parts=parts, error=error,
                    columns=tuple(error.whitened(part) for part in parts))  # fmt: skip
 
@@ -106,7 +105,7 @@ class Near:
             self.experiment, [part.columns for part in self.parts], [N @ directions for N in self.columns], deviation,
             [self.error.courses(part.point, directions) for part in self.parts],
         )  # fmt: skip
-        fit = here.fit(start.z, _courses(start.parts), iterations=iterations)
+        fit = here.fit(start.z, start.trajectories, iterations=iterations)
         over = fit_over_sessions(fit, len(fit.z))
         return InClass(error_class=one, fit=fit, log_evidence=float(np.log(one.prior)) + over.log_evidence,
                        session_s=over.mean, deviation=float(over.deviations[over.most_probable]))  # fmt: skip
@@ -199,7 +198,3 @@ def _calibrated(experiment: Experiment, error: ModelError, start: Fit) -> Calibr
         fit, deviation = chosen.fit, chosen.deviation
     largest = max(evidence.values())
     return Calibration(chosen=chosen, evidence={name: value - largest for name, value in evidence.items()}, near=near)
-
-
-def _courses(parts: Sequence[Linear]) -> list[Trajectory]:
-    return [part.point.trajectory for part in parts]

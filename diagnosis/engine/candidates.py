@@ -322,7 +322,7 @@ def refit(
         aside, experiment, shape = line(which)
         z = np.concatenate([fit.z + size * aside, [experiment.unknowns[len(fit.z)].z_of(size)], shape[1:]])
         try:
-            return [experiment.fit(z, [part.point.trajectory for part in fit.parts], iterations=ROUGH)]
+            return [experiment.fit(z, fit.trajectories, iterations=ROUGH)]
         except ArithmeticError:
             return []
 

@@ -192,8 +192,8 @@ class Experiment:
         z = np.zeros(len(self.unknowns)) if z is None else np.clip(z, lower, upper)
         at = at or self.linearise(z, guesses)
         if self.filters is None:  # those of the start serve on the way, those of the end afterwards
-            first = self.with_filters(at.parts).fit(z, _courses(at.parts), iterations=iterations)
-            final = self._attempt(first.z, _courses(first.parts))
+            first = self.with_filters(at.parts).fit(z, at.trajectories, iterations=iterations)
+            final = self._attempt(first.z, first.trajectories)
             return Fit(experiment=self, z=first.z, linearised=first.linearised if final is None else final)
         objective, damping, settled, fresh = at.objective(z), 0.0, False, True
         for _ in range(iterations * (SLOW_PATIENCE if self.slow else 1)):
@@ -202,7 +202,7 @@ class Experiment:
             step *= min(1.0, FARTHEST_STEP / max(longest, 1e-12))
             tried = np.clip(z + step, lower, upper)
             keep = fresh and longest < NEAR
-            trial = self._attempt(tried, _courses(at.parts), at.parts if keep else None, self._errors(at, tried - z))
+            trial = self._attempt(tried, at.trajectories, at.parts if keep else None, self._errors(at, tried - z))
             reached = np.inf if trial is None else trial.objective(tried)
             if trial is not None and reached <= objective + 1e-6:
                 gained, z, at, objective = objective - reached, tried, trial, reached
@@ -210,19 +210,19 @@ class Experiment:
                 if float(np.max(np.abs(step), initial=0.0)) < SETTLED or gained < LEAST_GAIN:
                     break
             elif not fresh:
-                at, fresh = self._attempt(z, _courses(at.parts)) or at, True
+                at, fresh = self._attempt(z, at.trajectories) or at, True
                 objective = at.objective(z)
             else:
                 # The trajectory may not have settled at these values yet, and look better than it is. Where switches
                 # follow means over minutes it never settles to the last.
-                again = None if settled or self.slow else self._attempt(z, _courses(at.parts))
+                again = None if settled or self.slow else self._attempt(z, at.trajectories)
                 if again is not None:
                     at, objective = again, again.objective(z)
                 settled, damping = True, max(4.0 * damping, 1.0)
                 if damping > 1e3:
                     break
         if not fresh:
-            at = self._attempt(z, _courses(at.parts)) or at
+            at = self._attempt(z, at.trajectories) or at
         return Fit(experiment=self, z=z, linearised=at)
 
     def linearise(self, z: Array, guesses: Sequence[Guess] | None = None) -> Linearised:
@@ -310,6 +310,11 @@ class Linearised:
         products = np.sum([X.T @ X for X in columns], axis=0) if metric is None else metric.products(columns)
         return cls(parts=tuple(parts), products=products)
 
+    @property
+    def trajectories(self) -> list[Trajectory]:
+        """Of every piece: where to linearise next."""
+        return [part.point.trajectory for part in self.parts]
+
     def objective(self, z: Array) -> float:
         """Squared residuals and priors."""
         return float(self.products[0, 0] + z @ z)
@@ -345,6 +350,11 @@ class Fit:
         return self.linearised.parts
 
     @property
+    def trajectories(self) -> list[Trajectory]:
+        """Of every piece."""
+        return self.linearised.trajectories
+
+    @property
     def objective(self) -> float:
         """Squared residuals and priors."""
         return self.linearised.objective(self.z)
@@ -372,9 +382,4 @@ class Fit:
 def calibrate(experiment: Experiment) -> Fit:
     """The unknowns of the nominal machine: a first fit chooses the noise filters, a second one is judged by them."""
     first = experiment.fit(iterations=FIRST_ITERATIONS)
-    return experiment.with_filters(first.parts).fit(first.z, _courses(first.parts))
-
-
-def _courses(parts: Sequence[Linear]) -> list[Trajectory]:
-    """Trajectories to linearise about."""
-    return [part.point.trajectory for part in parts]
+    return experiment.with_filters(first.parts).fit(first.z, first.trajectories)

@@ -9,7 +9,6 @@ import numpy as np
 
 from diagnosis.engine.fit import FIRST_ITERATIONS, Experiment, Fit, calibrate
 from diagnosis.engine.unknown import SensorBias, SensorLag, TermParameter, Unknown
-from diagnosis.forward.trajectory import Trajectory
 from models.base.types import Array
 from models.quantities.quantities import is_total_loss
 from models.terms.term import Term
@@ -111,14 +110,14 @@ def calibrate_without_error(fit: Fit, plain: Fit, apart: Collection[str] = ()) -
         return found
     terms = {term.label: term for term in every.machine.terms}
     own = [_describes(unknown, terms, apart) for unknown in every.unknowns]
-    return every.fit(np.where(own, fit.z, found.z), _courses(found), iterations=0)
+    return every.fit(np.where(own, fit.z, found.z), found.trajectories, iterations=0)
 
 
 def _calibrated_from(experiment: Experiment, z: Array, near: Fit) -> Fit | None:
     """The fit that a start leads to; None without a solution."""
     try:
-        first = experiment.fit(z, _courses(near), iterations=FIRST_ITERATIONS)
-        return experiment.with_filters(first.parts).fit(first.z, _courses(first))
+        first = experiment.fit(z, near.trajectories, iterations=FIRST_ITERATIONS)
+        return experiment.with_filters(first.parts).fit(first.z, first.trajectories)
     except (ArithmeticError, np.linalg.LinAlgError):
         return None
 
@@ -131,7 +130,3 @@ def _describes(unknown: Unknown, terms: Mapping[str, Term], channels: Collection
         return False
     term = terms[unknown.label]
     return term.kind == "sensor" and set(term.target) <= set(channels)
-
-
-def _courses(fit: Fit) -> list[Trajectory]:
-    return [part.point.trajectory for part in fit.parts]

@@ -313,7 +313,7 @@ def _floor(setup: InferenceSetup) -> str:
 def _predictions(experiment: Experiment, held_out: Experiment, plain: Fit, final: Fit, jobs: int) -> Predictions:
     """Free-running predictions of the training and the held-out pieces: as delivered, calibrated and after."""
     work: list[tuple[Experiment, Experiment, Array, Array, int, Array | None]] = []
-    near_train = [part.point.trajectory.T for part in final.parts]
+    near_train = [trajectory.T for trajectory in final.trajectories]
     for pieces_of, near in ((experiment, near_train), (held_out, [None] * len(held_out.pieces))):
         one, other = (replace(with_pieces_of(fit.experiment, pieces_of), filters=None) for fit in (plain, final))
         work += [(one, other, plain.z, final.z, index, T) for index, T in enumerate(near)]

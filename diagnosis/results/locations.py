@@ -50,7 +50,7 @@ def _place(
         return Location(node=node, probability=min(weight, 1.0), heat_mean_W=0.0, heat_max_W=0.0, when=(),
                         regime="always")  # fmt: skip
     heats = [np.sum(values, axis=0) for values in zip(*laws, strict=True)]
-    trajectories = [part.point.trajectory for part in fit.parts]
+    trajectories = fit.trajectories
     pieces = [trajectory.piece for trajectory in trajectories]
     together, steps = np.concatenate(heats), np.concatenate([piece.steps for piece in pieces])
     inputs = np.concatenate([piece.inputs for piece in pieces])

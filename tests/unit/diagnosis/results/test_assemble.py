@@ -206,7 +206,7 @@ def _fit_with(plain: Fit, effect: Hypothesis, values: dict[str, float]) -> Fit:
     experiment, _ = with_candidate(plain, effect, 0)
     added = experiment.unknowns[len(plain.z) :]
     z = np.array([*plain.z, *(u.z_of(values[u.parameter.name]) for u in added)])
-    return experiment.fit(z, [part.point.trajectory for part in plain.parts], iterations=0)
+    return experiment.fit(z, plain.trajectories, iterations=0)
 
 
 @pytest.mark.parametrize("starts_at", [0.0, AFTER_S])
@@ -225,7 +225,7 @@ def test_a_link_that_changes_at_a_date_acts_like(
     variant = np.array([[values[p.name.removeprefix(f"{effect.term.label}_")] for p in effect.term.parameters]])
     effect = replace(effect, variants=variant)
     changed, z = with_candidate(replace(plain, experiment=replace(plain.experiment, starts_at=starts)), effect, 0)
-    fit = changed.fit(np.concatenate([plain.z, z]), [part.point.trajectory for part in plain.parts], iterations=0)
+    fit = changed.fit(np.concatenate([plain.z, z]), plain.trajectories, iterations=0)
     judged = Judged(effects=(effect,), log_prior=-5.0, log_bayes=60.0, fit=fit, error_class=error_classes()[0])
     answer = Answer(best=judged, effect=effect, grade="likely", probability=0.97, joint=0.97, acts_like=True)
     found = assembled(posterior_of(plain, judged), [answer], experiment=own)
