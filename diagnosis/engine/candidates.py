@@ -83,16 +83,6 @@ class Scan:
         """Every candidate alone, in its best shape; the sign of a clock fault is that of its variant."""
         return given.singles(self.of_candidates, self.sd, self.sign)
 
-    def pairs(
-        self, given: Given, which: Sequence[int] | None = None
-    ) -> tuple[NDArray[np.intp], NDArray[np.intp], Array]:
-        """Log Bayes factors of all pairs of some candidates; their places among the candidates, and the factors."""
-        some = np.asarray(range(len(self.candidates)) if which is None else which, dtype=np.intp)
-        a, b = np.triu_indices(len(some), 1)
-        i, j, first = some[a], some[b], self.of_candidates.start
-        log_bayes = given.pairs(first + i, first + j, (self.sd[i], self.sd[j]), (self.sign[i], self.sign[j]))
-        return i, j, log_bayes
-
 
 def scan(fit: Fit, candidates: Sequence[Hypothesis], error: Sequence[Array] = ()) -> Scan:
     """Linearise everything at a fit.

@@ -10,8 +10,7 @@ With unknowns :math:`z \sim N(0, A^2)` (A the amplitudes, 0 for what is absent) 
 References
 ----------
 MacKay, Information Theory, Inference, and Learning Algorithms (2003), chapter 28, for the evidence; Petersen, Pedersen,
-The Matrix Cookbook (2012), sections 3.2 and 9.1, for inverse and determinant by Schur complements; Owen, Communications
-in Statistics B 9 (1980), for the bivariate normal distribution by the T function.
+The Matrix Cookbook (2012), sections 3.2 and 9.1, for inverse and determinant by Schur complements.
 """
 
 from __future__ import annotations
@@ -22,7 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cholesky, solve_triangular
-from scipy.special import log_ndtr, ndtr, owens_t
+from scipy.special import log_ndtr
 
 from models.base.types import Array
 
@@ -140,7 +139,7 @@ class Given:
         inner = scale[:, None] * self.matrix[np.ix_(at, at)] * scale + np.eye(len(at))
         return np.asarray(scale * np.linalg.solve(inner, scale * self.matrix[at, 0]))
 
-    def singles(self, candidates: Index, sd: Array | float, sign: NDArray[np.int_] | int = 0) -> Strengths:
+    def singles(self, candidates: Index, sd: Array | float, sign: Signs | int = 0) -> Strengths:
         """Every candidate alone.
 
         Parameters
@@ -154,34 +153,6 @@ class Given:
         """
         at = np.asarray(candidates, dtype=int) + 1
         return strengths(self.matrix[0, at], self.matrix[at, at], sd, sign)
-
-    def pairs(self, first: Index, second: Index, sd: tuple[Array, Array], sign: tuple[Signs, Signs]) -> Array:
-        """Log Bayes factors of pairs of candidates against nothing.
-
-        Parameters
-        ----------
-        first, second : sequence of int
-            Places of the members of n pairs among the columns
-        sd, sign : tuple of two Array, shape (n,)
-            Of either member, see :meth:`singles`
-
-        Returns
-        -------
-        Array, shape (n,)
-        """
-        i, j = np.asarray(first, dtype=int) + 1, np.asarray(second, dtype=int) + 1
-        M, (s, t) = self.matrix, (np.asarray(each, dtype=float) for each in sd)
-        a, b = s * M[0, i], t * M[0, j]
-        A, B, C = 1.0 + s * s * M[i, i], 1.0 + t * t * M[j, j], s * t * M[i, j]
-        determinant = A * B - C * C
-        x, y = (B * a - C * b) / determinant, (A * b - C * a) / determinant
-        log_bayes = 0.5 * (a * x + b * y) - 0.5 * np.log(determinant)
-        sx, sy, rho = np.sqrt(B / determinant), np.sqrt(A / determinant), -C / np.sqrt(A * B)
-        u, v = sign
-        left, right = u * x / sx, v * y / sy
-        inside = np.where(u == 0, log_ndtr(right) + np.log(2.0), log_ndtr(left) + np.log(2.0))
-        both = np.log(np.maximum(_both_below(left, right, u * v * rho), 1e-300)) + np.log(4.0)
-        return np.asarray(log_bayes + np.where((u == 0) & (v == 0), 0.0, np.where((u != 0) & (v != 0), both, inside)))
 
 
 def strengths(a: Array, b: Array, sd: Array | float, sign: Signs | int = 0) -> Strengths:
@@ -201,13 +172,3 @@ def strengths(a: Array, b: Array, sd: Array | float, sign: Signs | int = 0) -> S
     log_bayes = 0.5 * a * value - 0.5 * np.log1p(b * np.square(sd))
     log_bayes = log_bayes + np.where(sign != 0, np.log(2.0) + log_ndtr(sign * value / own), 0.0)
     return Strengths(log_bayes=np.where(b > LEAST, log_bayes, 0.0), value=value, sd=own)
-
-
-def _both_below(h: Array, k: Array, rho: Array) -> Array:
-    """Bivariate normal distribution function, by Owen's T."""
-    h, k = (np.where(np.abs(x) < 1e-12, 1e-12, x) for x in (h, k))
-    root = np.sqrt(np.maximum(1.0 - rho * rho, 1e-15))
-    apart = np.where(h * k < 0.0, 0.5, 0.0)
-    return np.asarray(
-        0.5 * (ndtr(h) + ndtr(k)) - owens_t(h, (k / h - rho) / root) - owens_t(k, (h / k - rho) / root) - apart
-    )
