@@ -108,8 +108,8 @@ def _baselines_of(fit: Fit) -> Fit:
     metric = experiment.metric
     if metric is not None:
         alone = replace(alone, metric=replace(
-            metric, sessions=sessions_of(alone), shared=tuple(metric.shared[i] for i in at),
-            own=tuple(metric.own[i] for i in at), courses=tuple(metric.courses[i] for i in at if metric.courses),
+            metric, sessions=sessions_of(alone), columns=tuple(metric.columns[i] for i in at),
+            courses=tuple(metric.courses[i] for i in at if metric.courses),
         ))  # fmt: skip
     parts = [fit.parts[i] for i in at]
     return Fit(experiment=alone, z=fit.z, linearised=Linearised.of(parts, alone.metric))

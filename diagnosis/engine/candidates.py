@@ -159,11 +159,11 @@ def _further_starts(candidate: Hypothesis, found: Strengths, best: int) -> Start
 
 def _with_unknowns(fit: Fit) -> Metric:
     """The metric of a fit, with its unknowns marginalised as well."""
-    metric, columns = fit.experiment.metric, [part.columns for part in fit.parts]
+    metric, columns, count = fit.experiment.metric, [part.columns for part in fit.parts], len(fit.z)
     if metric is None:
-        nothing = tuple(np.zeros((len(J), 0)) for J in columns)
-        return Metric(sessions=(tuple(range(len(columns))),), shared=tuple(columns), own=nothing)
-    return replace(metric, shared=tuple(np.column_stack(both) for both in zip(columns, metric.shared, strict=True)))
+        return Metric(sessions=(tuple(range(len(columns))),), columns=tuple(columns), shared=count, own=count)
+    both = tuple(np.column_stack(pair) for pair in zip(columns, metric.columns, strict=True))
+    return replace(metric, columns=both, shared=count + metric.shared, own=count + metric.own)
 
 
 def _columns(

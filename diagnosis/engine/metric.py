@@ -53,10 +53,13 @@ class Metric:
     ----------
     sessions : tuple of tuple of int
         Pieces of every test session
-    shared : tuple of Array, shape (M, n) each
-        Whitened columns of every piece, times their amplitudes, whose values all sessions share
-    own : tuple of Array, shape (M, m) each
-        The same of the deviations of a session, those of the shared columns last; m = 0 if sessions do not differ
+    columns : tuple of Array, shape (M, n) each
+        Whitened columns of every piece, those of model error times their amplitudes
+    shared : int
+        How many of them, from the first, have values that all sessions share
+    own : int
+        From which on every session has deviations of its own, those of the model error first; n if sessions do not
+        differ
     deviation : float
         Of a session, in prior standard deviations
     courses : tuple of ErrorCourses
@@ -64,35 +67,35 @@ class Metric:
     """
 
     sessions: tuple[tuple[int, ...], ...]
-    shared: tuple[Array, ...]
-    own: tuple[Array, ...]
+    columns: tuple[Array, ...]
+    shared: int
+    own: int
     deviation: float = 0.0
     courses: tuple[ErrorCourses, ...] = ()
 
+    @property
+    def shared_columns(self) -> list[Array]:
+        """Whitened columns of every piece whose values all sessions share, shape (M, shared) each."""
+        return [columns[:, : self.shared] for columns in self.columns]
+
     @cached_property
-    def _roots(self) -> tuple[list[Array], Array]:
-        """Lower Cholesky factors of every session, and of the shared columns given them."""
-        roots, whole = [], np.eye(self.shared[0].shape[1])
+    def _factors(self) -> tuple[list[Array], list[Array], Array]:
+        """Lower Cholesky factor of every session, the shared columns along it, and the factor of these given all."""
+        roots, across, whole = [], [], np.eye(self.shared)
         for pieces in self.sessions:
-            L = [self.own[p] for p in pieces]
-            root = np.asarray(np.linalg.cholesky(np.eye(L[0].shape[1]) + _sum(L, L)))
-            B = [self.shared[p] for p in pieces]
-            across = solve_triangular(root, _sum(L, B), lower=True)
-            whole += _sum(B, B) - across.T @ across
-            roots.append(root)
-        return roots, np.asarray(np.linalg.cholesky(whole))
+            columns = [self.columns[p] for p in pieces]
+            inner, s = _sum(columns, columns), self.deviation
+            own = s * s * inner[self.own :, self.own :]
+            roots.append(np.asarray(np.linalg.cholesky(np.eye(len(own)) + own)))
+            across.append(solve_triangular(roots[-1], s * inner[self.own :, : self.shared], lower=True))
+            whole += inner[: self.shared, : self.shared] - across[-1].T @ across[-1]
+        return roots, across, np.asarray(np.linalg.cholesky(whole))
 
     @cached_property
     def log_determinant(self) -> float:
         """Of what is marginalised."""
-        roots, whole = self._roots
+        roots, _, whole = self._factors
         return 2.0 * float(sum(np.log(np.diag(root)).sum() for root in (*roots, whole)))
-
-    @cached_property
-    def _across(self) -> list[Array]:
-        pairs = [([self.own[p] for p in pieces], [self.shared[p] for p in pieces]) for pieces in self.sessions]
-        return [solve_triangular(root, _sum(L, B), lower=True)
-                for root, (L, B) in zip(self._roots[0], pairs, strict=True)]  # fmt: skip
 
     def products(self, columns: Sequence[Array]) -> Array:
         """Inner products of whitened columns.
@@ -140,25 +143,25 @@ class Metric:
         -------
         list of Array, shape (n,) each
         """
-        (roots, whole), (mine, along) = self._roots, self._along([r[:, None] for r in residuals])
+        (roots, across, whole), (mine, along) = self._factors, self._along([r[:, None] for r in residuals])
         shared = solve_triangular(whole.T, along[:, 0])
         found = [shared] * len(residuals)
-        for root, across, own, pieces in zip(roots, self._across, mine, self.sessions, strict=True):
+        for root, over, own, pieces in zip(roots, across, mine, self.sessions, strict=True):
             if not len(root):
                 continue
-            deviation = solve_triangular(root.T, own[:, 0] - across @ shared)
+            deviation = solve_triangular(root.T, own[:, 0] - over @ shared)
             for p in pieces:
-                found[p] = shared + self.deviation * deviation[len(deviation) - len(shared) :]
+                found[p] = shared + self.deviation * deviation[: self.shared]
         return found
 
     def _along(self, columns: Sequence[Array]) -> tuple[list[Array], Array]:
         """Components of columns along what is marginalised: of every session, then of what all share."""
-        roots, whole = self._roots
+        roots, across, whole = self._factors
         mine, along = [], np.zeros((len(whole), columns[0].shape[1]))
-        for root, across, pieces in zip(roots, self._across, self.sessions, strict=True):
-            X = [columns[p] for p in pieces]
-            mine.append(solve_triangular(root, _sum([self.own[p] for p in pieces], X), lower=True))
-            along += _sum([self.shared[p] for p in pieces], X) - across.T @ mine[-1]
+        for root, over, pieces in zip(roots, across, self.sessions, strict=True):
+            inner = _sum([self.columns[p] for p in pieces], [columns[p] for p in pieces])
+            mine.append(solve_triangular(root, self.deviation * inner[self.own :], lower=True))
+            along += inner[: self.shared] - over.T @ mine[-1]
         return mine, solve_triangular(whole, along, lower=True)
 
 

@@ -111,11 +111,10 @@ def with_deviation(
     courses : sequence of ErrorCourses
         What the model error does, for simulations with it
     """
-    own = [
-        s * np.column_stack([J, N]) if s > 0.0 else np.zeros((len(J), 0)) for J, N in zip(columns, shared, strict=True)
-    ]
-    metric = Metric(sessions=sessions_of(experiment), shared=tuple(shared), own=tuple(own), deviation=s,
-                    courses=tuple(courses))  # fmt: skip
+    count, differing = shared[0].shape[1], s > 0.0
+    both = [np.column_stack(pair) for pair in zip(shared, columns, strict=True)] if differing else shared
+    metric = Metric(sessions=sessions_of(experiment), columns=tuple(both), shared=count, own=0 if differing else count,
+                    deviation=s, courses=tuple(courses))  # fmt: skip
     return replace(experiment, metric=metric)
 
 

@@ -35,8 +35,9 @@ def covariance(shared, own):
 
 @pytest.mark.parametrize("own_columns", [0, 4])
 def test_inner_products_equal_those_of_the_covariance(columns, own_columns):
-    shared, own, X = ([W[:, some] for W in columns] for some in (slice(0, 3), slice(0, own_columns), slice(4, 9)))
-    metric = Metric(sessions=SESSIONS, shared=tuple(shared), own=tuple(0.3 * L for L in own))
+    first = 4 - own_columns
+    shared, own, X = ([W[:, some] for W in columns] for some in (slice(0, 3), slice(first, 4), slice(4, 9)))
+    metric = Metric(sessions=SESSIONS, columns=tuple(W[:, :4] for W in columns), shared=3, own=first, deviation=0.3)
     S = covariance(shared, [0.3 * L for L in own])
     everything = np.concatenate(X)
     expected = everything.T @ np.linalg.solve(S, everything)
@@ -50,8 +51,9 @@ def test_inner_products_equal_those_of_the_covariance(columns, own_columns):
 @pytest.mark.parametrize("s", [0.0, 0.3])
 def test_explained_are_the_most_probable_values_and_deviations(columns, s):
     shared, J = [W[:, 1:4] for W in columns], [W[:, 4:6] for W in columns]
-    own = [s * np.column_stack([j, B]) if s else np.zeros((len(B), 0)) for j, B in zip(J, shared, strict=True)]
-    metric = Metric(sessions=SESSIONS, shared=tuple(shared), own=tuple(own), deviation=s)
+    both = [np.column_stack([B, j]) for B, j in zip(shared, J, strict=True)] if s else shared
+    own = [s * W[:, :5] if s else np.zeros((len(W), 0)) for W in both]
+    metric = Metric(sessions=SESSIONS, columns=tuple(both), shared=3, own=0 if s else 3, deviation=s)
     found = metric.explained([W[:, 0] for W in columns])
     # The same by ridge regression on all columns: shared, then those of both sessions.
     r, count = np.concatenate([W[:, 0] for W in columns]), own[0].shape[1]
@@ -63,7 +65,7 @@ def test_explained_are_the_most_probable_values_and_deviations(columns, s):
         X[rows, 3 + session * count : 3 + (session + 1) * count] = own[p]
     best = np.linalg.solve(np.eye(X.shape[1]) + X.T @ X, X.T @ r)
     for p, session in enumerate((0, 1, 0)):
-        deviation = best[3 + (session + 1) * count - 3 : 3 + (session + 1) * count] if s else 0.0
+        deviation = best[3 + session * count : 6 + session * count] if s else 0.0
         np.testing.assert_allclose(found[p], best[:3] + s * deviation, rtol=1e-9)
 
 
