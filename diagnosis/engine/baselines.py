@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 from diagnosis.candidates.hypotheses import Hypothesis
@@ -12,8 +12,6 @@ from diagnosis.engine.products import base_of, gram_of
 from diagnosis.engine.sessions import over_sessions, sessions_of
 from diagnosis.forward.grid import Piece
 from models.base.types import Array
-
-NOTED_FROM = 5.0  # nats
 
 
 def effects_in_baselines(fit: Fit, candidates: Sequence[Hypothesis]) -> Array:
@@ -65,32 +63,6 @@ def sessions_apart(fit: Fit) -> dict[str, float]:
         if mine and others:
             found[name] = log_evidence(mine) + log_evidence(others) - together
     return found
-
-
-def notes_of_baselines(acting: float, apart: Mapping[str, float], effect: str = "") -> tuple[str, ...]:
-    """Notes for a report on baselines that are not as they should be.
-
-    Parameters
-    ----------
-    acting : float
-        Evidence in the baselines for the effect that is reported, see :func:`effects_in_baselines`, [nat]
-    apart : mapping of session to float
-        See :func:`sessions_apart`, [nat]
-    effect : str
-        Its name for people
-    """
-    notes = []
-    if effect and acting > NOTED_FROM:
-        notes.append(
-            f"The baselines show {effect} too (evidence {acting:.0f} nats): the reported size is only its growth since "
-            "then. Take baselines from before it began, or leave them out."
-        )
-    notes += [
-        f"Session '{session}' looks like another machine, or one that was rebuilt (evidence {nats:.0f} nats): its "
-        "parameters are not those of the other recordings. Leave it out if that is so."
-        for session, nats in apart.items() if nats > NOTED_FROM
-    ]  # fmt: skip
-    return tuple(notes)
 
 
 def _baselines_of(fit: Fit) -> Fit:

@@ -9,13 +9,13 @@ import numpy as np
 
 from diagnosis.decision.posterior import KINDS, Answer, Judged, Posterior, act_on_the_same
 from diagnosis.decision.settings import Settings
-from diagnosis.engine.baselines import effects_in_baselines, notes_of_baselines, sessions_apart
 from diagnosis.engine.fit import Experiment, Fit
 from diagnosis.engine.predict import Prediction, log_score_gain, overall_rmse, predict, rmse, with_pieces_of
 from diagnosis.engine.prepare import held_out_experiment
 from diagnosis.engine.set_apart import calibrate_without_error, without_channels
 from diagnosis.recordings.recording import Recording
 from diagnosis.results.advice import next_test, without_sensor
+from diagnosis.results.baseline_notes import baseline_notes
 from diagnosis.results.findings import estimates_of, finding_of, name_in, names_of
 from diagnosis.results.instruments import sensors_and_inputs_of
 from diagnosis.results.locations import locations_of
@@ -154,7 +154,7 @@ def assemble(
             "version": project_version(),
         },
         notes=(
-            *ratio_notes(final), *_baseline_notes(experiment, posterior, answers),
+            *ratio_notes(final), *baseline_notes(experiment, posterior, answers),
             *(f"{r.name}: {note}" for r in (*train, *held_out) for note in r.notes),
         ),
         kinds={kind: posterior.of(kind) for kind in KINDS},
@@ -219,17 +219,6 @@ def _terms(best: Judged | None, final: Fit) -> tuple[Term, ...]:
 
     terms = [effect.term for effect in best.effects if effect.term is not None]
     return tuple(replace(term, parameters=tuple(map(as_found, term.parameters))) for term in terms)
-
-
-def _baseline_notes(experiment: Experiment, posterior: Posterior, answers: Sequence[Answer]) -> tuple[str, ...]:
-    """Notes on baselines in which the effect acts too, or that look like another machine."""
-    nothing = posterior.nothing.fit
-    if not experiment.healthy or nothing is None:
-        return ()
-    effects = [answer.effect for answer in answers[:1] if answer.effect.term is not None]
-    acting = effects_in_baselines(nothing, effects) if effects else [0.0]
-    best = (answers[0].best.fit if answers else None) or nothing
-    return notes_of_baselines(float(acting[0]), sessions_apart(best), effects[0].name if effects else "")
 
 
 def _distinct(found: Sequence[tuple[Answer, Finding]]) -> tuple[Finding, ...]:

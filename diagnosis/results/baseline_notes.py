@@ -1,0 +1,48 @@
+"""Notes on baselines: an effect that acts in them too, and sessions that look like another machine."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from diagnosis.decision.posterior import Answer, Posterior
+from diagnosis.engine.baselines import effects_in_baselines, sessions_apart
+from diagnosis.engine.fit import Experiment
+
+NOTED_FROM = 5.0  # nats
+
+
+def baseline_notes(experiment: Experiment, posterior: Posterior, answers: Sequence[Answer]) -> tuple[str, ...]:
+    """Notes on baselines in which the effect acts too, or that look like another machine."""
+    nothing = posterior.nothing.fit
+    if not experiment.healthy or nothing is None:
+        return ()
+    effects = [answer.effect for answer in answers[:1] if answer.effect.term is not None]
+    acting = effects_in_baselines(nothing, effects) if effects else [0.0]
+    best = (answers[0].best.fit if answers else None) or nothing
+    return baselines_told(float(acting[0]), sessions_apart(best), effects[0].name if effects else "")
+
+
+def baselines_told(acting: float, apart: Mapping[str, float], effect: str = "") -> tuple[str, ...]:
+    """Notes for a report on baselines that are not as they should be.
+
+    Parameters
+    ----------
+    acting : float
+        Evidence in the baselines for the effect that is reported, see :func:`effects_in_baselines`, [nat]
+    apart : mapping of session to float
+        See :func:`sessions_apart`, [nat]
+    effect : str
+        Its name for people
+    """
+    notes = []
+    if effect and acting > NOTED_FROM:
+        notes.append(
+            f"The baselines show {effect} too (evidence {acting:.0f} nats): the reported size is only its growth since "
+            "then. Take baselines from before it began, or leave them out."
+        )
+    notes += [
+        f"Session '{session}' looks like another machine, or one that was rebuilt (evidence {nats:.0f} nats): its "
+        "parameters are not those of the other recordings. Leave it out if that is so."
+        for session, nats in apart.items() if nats > NOTED_FROM
+    ]  # fmt: skip
+    return tuple(notes)
