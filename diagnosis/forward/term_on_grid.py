@@ -85,20 +85,22 @@ class TermOnGrid:
         if at_points:
             inputs = np.concatenate([piece.inputs[:1], 0.5 * (piece.inputs[1:] + piece.inputs[:-1]), piece.inputs[-1:]])
             T, time = trajectory.T, piece.time
-            memory, power = (
-                np.zeros((len(T), len(model.network.states))),
-                np.zeros((len(T), len(model.laws.components))),
-            )
+            memory = np.zeros((len(T), len(model.network.states)))
+            power = np.zeros((len(T), len(model.laws.components)))
         else:
             inputs, T, time, memory = piece.inputs, trajectory.middle, piece.middle, trajectory.memory
             power = trajectory.tangent.at(T[:, model.loss_nodes])
-        kept = trajectory.values[self._kept]
-        rows = [time, *inputs.T, *T.T, *(np.full(len(T), v) for v in kept), *memory[:, self._remembered].T, *power.T]
+        rows = self._rows(time, inputs, T, trajectory.values, memory, power)
         own = [values[:, index, None] for index in range(values.shape[1])]
         states = self._memories.follow(piece, [*rows, *own], trajectory.seen)
         law, other = self._law(*rows, *own, *states)
         size = (len(values), len(T))
         return np.broadcast_to(np.asarray(law, float), size), np.broadcast_to(np.asarray(other, float), size)
+
+    def _rows(self, time: Array, inputs: Array, T: Array, values: Array, memory: Array, power: Array) -> list[Array]:
+        """What the law is given of the network, its own numbers and states left out: one row of shape (K,) each."""
+        numbers = (np.full(len(T), value) for value in values[self._kept])
+        return [time, *inputs.T, *T.T, *numbers, *memory[:, self._remembered].T, *power.T]
 
     def constant(self, values: Array) -> float:
         """The law where it has nothing but the term's own parameters, of shape (parameters,); else nothing."""
@@ -197,16 +199,14 @@ class TermOnGrid:
             T = np.full((len(piece.steps), model.n), 20.0)
             memory = np.zeros((len(T), len(model.network.states)))
             power = np.zeros((len(T), len(model.laws.components)))
-            kept = model.start[self._kept]
+            numbers = model.start
         else:
             # A guess may stem from the network as it was before its latest term, whose numbers come last.
             T, memory = trajectory.middle, np.zeros((len(trajectory.piece.steps), len(model.network.states)))
             memory[:, : trajectory.memory.shape[1]] = trajectory.memory
-            values_before = len(trajectory.values)
-            kept = np.concatenate([trajectory.values, model.start[values_before:]])[self._kept]
+            numbers = np.concatenate([trajectory.values, model.start[len(trajectory.values) :]])
             power = trajectory.tangent.at(T[:, model.loss_nodes])
-        memory = memory[:, self._remembered]
-        rows = [piece.middle, *piece.inputs.T, *T.T, *(np.full(len(T), v) for v in kept), *memory.T, *power.T]
+        rows = self._rows(piece.middle, piece.inputs, T, numbers, memory, power)
         shift = np.broadcast_to(self._law(*rows, *values.tolist())[0], (len(T),))
         samples = np.array(piece.samples)
         samples[..., model.laws.inputs.index(self.term.target[0])] += shift[:, None]
