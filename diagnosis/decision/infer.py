@@ -71,11 +71,8 @@ def infer(
 
     Parameters
     ----------
-    calibration : Calibration
-    candidates : sequence of Hypothesis
     log_prior : Array, shape (candidates,)
         Of every candidate, to 1 of nothing
-    settings : Settings
     outside : sequence of Hypothesis
         Unknown heats, judged where something is missing
     progress : callable

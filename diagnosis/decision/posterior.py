@@ -87,12 +87,10 @@ class Explanation:
 
     Attributes
     ----------
-    names : tuple of str
     members : tuple of Judged
         Most probable first
     log_bayes : float
         Mean Bayes factor over places, courses and shapes; of a pair with the prior of a second effect, [nat]
-    probability : float
     """
 
     names: tuple[str, ...]
@@ -107,7 +105,6 @@ class Expected:
 
     Attributes
     ----------
-    effect : Hypothesis
     log_bayes : float
         Expected evidence for it, [nat]
     """
@@ -172,8 +169,6 @@ class Posterior:
         Log of the mean Bayes factor over everything that competes with nothing, [nat]
     threshold : float
         From which something is missing, [nat]
-    rule : Rule
-    likeness : Likeness
     odds_unknown : float
         Prior odds of a cause that is in no catalogue, see :class:`~diagnosis.decision.settings.Settings`
     error_class : str
@@ -184,8 +179,6 @@ class Posterior:
         Mean deviation between sessions that the readings support, in prior standard deviations; 0 of one session
     remainder : float
         Log Bayes factor of the best further effect, given the best single one, [nat]
-    scaled : tuple of ScaledError
-    expected : tuple of Expected
     """
 
     nothing: Judged

@@ -26,7 +26,6 @@ class InClass:
 
     Attributes
     ----------
-    error_class : ErrorClass
     fit : Fit
         Model error in its metric, with the most probable deviation between sessions
     log_evidence : float
@@ -50,8 +49,6 @@ class Near:
     ----------
     experiment : Experiment
         With the noise filters of this linearisation
-    parts : tuple of Linear
-    error : ModelError
     columns : tuple of Array, shape (M, unknowns of model error)
         Whitened, per unit, of every piece
     """
@@ -93,8 +90,6 @@ class Near:
 
         Parameters
         ----------
-        one : ErrorClass
-        start : Fit
         deviation : float
             In prior standard deviations
         iterations : int
@@ -160,7 +155,6 @@ def calibrate_with_error(experiment: Experiment, start: Fit, apart: Collection[s
 
     Parameters
     ----------
-    experiment : Experiment
     start : Fit
         Where to start, besides the middles of the priors: the machine calibrated without model error
     apart : collection of str

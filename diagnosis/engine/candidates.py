@@ -39,7 +39,6 @@ class Scan:
 
     Attributes
     ----------
-    candidates : tuple of Hypothesis
     best : tuple of int
         Best variant of each
     log_bayes : Array, shape (candidates,)
@@ -95,10 +94,6 @@ def scan(fit: Fit, candidates: Sequence[Hypothesis], error: Sequence[Array] = ()
         Terms; parameters out of their priors follow from the unknowns themselves
     error : sequence of Array, shape (M, n) each
         Whitened columns of model error per unit, for the Gram matrix; by default those of the metric
-
-    Returns
-    -------
-    Scan
     """
     count, model = len(fit.z), fit.experiment.machine.model
     placed = [(c, _on_grid(model, c.term)) for c in candidates if c.term is not None]
@@ -240,7 +235,6 @@ def with_candidate(fit: Fit, candidate: Hypothesis, variant: int) -> tuple[Exper
 
     Parameters
     ----------
-    fit : Fit
     candidate : Hypothesis
         Of a term
     variant : int

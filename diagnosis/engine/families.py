@@ -42,12 +42,6 @@ def candidates_of(
 ) -> tuple[Hypothesis, ...]:
     """All that may be missing, wrong, or changed.
 
-    Parameters
-    ----------
-    setup : InferenceSetup
-    experiment : Experiment
-    catalogue : mapping of str to Mechanism
-
     Returns
     -------
     tuple of Hypothesis
@@ -150,10 +144,6 @@ def _running(pieces: Sequence[Piece], inputs: Sequence[str]) -> list[float]:
 
 def log_prior(hypotheses: Sequence[Hypothesis]) -> Array:
     """Prior of every hypothesis, [nat]: its family's share, uniform over names and then over places.
-
-    Parameters
-    ----------
-    hypotheses : sequence of Hypothesis
 
     Returns
     -------

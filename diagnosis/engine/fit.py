@@ -34,9 +34,6 @@ class Experiment:
 
     Attributes
     ----------
-    machine : Machine
-    pieces : tuple of Piece
-    unknowns : tuple of Unknown
     noise : tuple of Noise
         One per piece
     starts : tuple of Array, shape (parts,)
@@ -109,11 +106,9 @@ class Experiment:
 
         Parameters
         ----------
-        index : int
         z : Array, shape (unknowns,)
         guess
             See :func:`diagnosis.forward.trajectory.simulate`
-        rounds : int
         error : ErrorCourse or None
             Model error that is assumed
 
@@ -276,8 +271,6 @@ class Linear:
 
     Attributes
     ----------
-    point : Point
-    filter : Whitening
     residual : Array, shape (M,)
         Without model error
     columns : Array, shape (M, unknowns)
@@ -295,7 +288,6 @@ class Linearised:
 
     Attributes
     ----------
-    parts : tuple of Linear
     products : Array, shape (1 + unknowns, 1 + unknowns)
         Inner products of residual and columns in the metric of the experiment
     """
@@ -335,9 +327,7 @@ class Fit:
 
     Attributes
     ----------
-    experiment : Experiment
     z : Array, shape (unknowns,)
-    linearised : Linearised
     """
 
     experiment: Experiment

@@ -21,8 +21,6 @@ class ErrorClass:
 
     Attributes
     ----------
-    name : str
-    prior : float
     threshold : float
         Evidence from which something is missing if the readings choose this class, [nat]
     amplitudes : mapping of group to float
@@ -78,7 +76,6 @@ class Rule:
 
         Parameters
         ----------
-        error : ErrorClass
         rate : float
             False-alarm rate that a user asks for
         """

@@ -58,8 +58,7 @@ class Metric:
     shared : int
         How many of them, from the first, have values that all sessions share
     own : int
-        From which on every session has deviations of its own, those of the model error first; n if sessions do not
-        differ
+        First of those from which every session deviates, model error before others; n if sessions do not differ
     deviation : float
         Of a session, in prior standard deviations
     courses : tuple of ErrorCourses

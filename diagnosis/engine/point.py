@@ -28,7 +28,6 @@ class Machine:
 
     Parameters
     ----------
-    model : NetworkOnGrid
     terms : sequence of Term
         What shifts an input or distorts a reading
     """
@@ -131,7 +130,6 @@ class Column:
 
     Attributes
     ----------
-    heat : Heat or None
     reading : Array, shape (K + 1, channels), or None
         Change of the readings of sound sensors, [K] or [W]
     shown : Array, shape (K + 1, channels), or None
@@ -156,8 +154,6 @@ class Point:
 
     Attributes
     ----------
-    setting : Setting
-    trajectory : Trajectory
     read : Array, shape (K + 1, channels)
         What the sensors read, [degC] or [W]
     """

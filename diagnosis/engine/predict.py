@@ -31,8 +31,6 @@ class Prediction:
 
     Attributes
     ----------
-    piece : Piece
-    trajectory : Trajectory
     read : Array, shape (K + 1, channels)
         [degC] or [W]
     counts_from : float
@@ -61,7 +59,6 @@ def predict(experiment: Experiment, index: int, z: Array | None, *, guess: Array
 
     Parameters
     ----------
-    experiment : Experiment
     index : int
         Which piece
     z : Array, shape (unknowns,), or None
@@ -172,7 +169,6 @@ def overall_rmse(predictions: Sequence[Prediction], columns: Sequence[int]) -> f
 
     Parameters
     ----------
-    predictions : sequence of Prediction
     columns : sequence of int
         Which channels
     """
@@ -202,8 +198,6 @@ def log_score_gain(final: Fit, plain: Fit, held_out: Experiment, guesses: Sequen
 
     Parameters
     ----------
-    final, plain : Fit
-    held_out : Experiment
     guesses : (sequence of Array or None, same)
         Temperatures of every piece to linearise about first, for `final` and `plain`
 

@@ -53,7 +53,6 @@ def prepare_experiment(
 
     Parameters
     ----------
-    gearbox : Gearbox
     recordings, holdout : sequence of Recording
         Without any held out, the last quarter of every recording is
     baseline : sequence of Recording
@@ -94,7 +93,6 @@ def held_out_experiment(setup: InferenceSetup, experiment: Experiment) -> Experi
     ----------
     setup : InferenceSetup
         Of the same recordings, see :func:`prepare_experiment`
-    experiment : Experiment
     """
     pieces = setup.held_out
     return replace(
@@ -115,10 +113,8 @@ def usual_unknowns(
 
     Parameters
     ----------
-    network : ThermalNetwork
     recordings : sequence of Recording
         What their mappings state of sensors is their prior: lag, its standard deviation and tolerance of the bias
-    channels : sequence of str
     interval : float
         Between rows, [s]
     gain_of_torque : Parameter or None

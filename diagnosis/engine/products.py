@@ -16,7 +16,6 @@ def whitened_base(parts: Sequence[Linear], z: Array, error: Sequence[Array] = ()
 
     Parameters
     ----------
-    parts : sequence of Linear
     z : Array, shape (unknowns,)
         Where they are linearised
     error : sequence of Array, shape (M, n) each
@@ -37,7 +36,6 @@ def gram_of(parts: Sequence[Linear], base: Sequence[Array], chosen: Sequence[Arr
 
     Parameters
     ----------
-    parts : sequence of Linear
     base : sequence of Array, shape (M, m) each
         Residual first
     chosen : sequence of Array, shape (M, n) each

@@ -74,7 +74,6 @@ def over_sessions(
 
     Parameters
     ----------
-    gram : Gram
     experiment : Experiment
         Says which recordings are one session
     unknowns : sequence of int
@@ -123,7 +122,6 @@ def fit_over_sessions(fit: Fit, base: int) -> OverSessions:
 
     Parameters
     ----------
-    fit : Fit
     base : int
         How many of its unknowns, from the first, may differ between sessions; the others are those of an effect
     """

@@ -26,7 +26,6 @@ def calibrate_apart(experiment: Experiment, plain: Fit) -> tuple[Fit, tuple[str,
 
     Parameters
     ----------
-    experiment : Experiment
     plain : Fit
         Of all channels
 

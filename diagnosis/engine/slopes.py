@@ -84,7 +84,6 @@ class LawSlopes:
 
         Parameters
         ----------
-        trajectory : Trajectory
         here : Balance
             Its heat balance, see :func:`diagnosis.forward.trajectory.settled_balance`
         """

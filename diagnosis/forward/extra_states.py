@@ -45,7 +45,6 @@ class Memories:
 
     Parameters
     ----------
-    states : sequence of ExtraState
     arguments : sequence of str
         Names of all other signals, in the order in which :meth:`follow` gets them
     parts : sequence of str
@@ -78,7 +77,6 @@ class Memories:
 
         Parameters
         ----------
-        piece : Piece
         rows : sequence of Array or float
             All other signals; of shape (K,) at the middles of the intervals, or (V, 1) for V values of a parameter
         seen : Array, shape (K + 1, parts)

@@ -31,8 +31,6 @@ def free_running(
 
     Parameters
     ----------
-    model : NetworkOnGrid
-    piece : Piece
     values : Array, shape (parameters,)
     start : Array, shape (parts,) or (parts + coupled,)
         As for :func:`simulate`

@@ -144,7 +144,6 @@ class Piece:
         ----------
         T : Array, shape (K + 1, parts)
             Simulated, at the grid points, [degC]
-        parts : sequence of str
         """
         measured = self.guide(parts)
         return np.where(np.isfinite(measured), measured, T)
@@ -191,7 +190,6 @@ def pieces(
 
     Parameters
     ----------
-    recordings : sequence of Recording
     inputs : sequence of str
         Names of the network's inputs, speed and torque first
     channels : sequence of str
@@ -286,7 +284,6 @@ def _thinned(even: Array, time: Array, inputs: Mapping[str, Array], values: Mapp
     even : Array
         Grid points :data:`INTERVAL_S` apart
     time : Array, shape (rows,)
-    inputs : mapping of str to Array
     values : mapping of str to Array
         What was measured, with gaps
     """

@@ -86,7 +86,6 @@ class NetworkOnGrid:
 
     Parameters
     ----------
-    network : ThermalNetwork
     losses : Losses
         The loss model behind the signals ``P_<component>``
     """
@@ -163,7 +162,6 @@ class NetworkOnGrid:
 
         Parameters
         ----------
-        piece : Piece
         T : Array, shape (K, parts) or (V, K, parts)
             [degC]
         values : Array, shape (parameters,) or (V, parameters)
@@ -336,7 +334,6 @@ class NetworkOnGrid:
 
         Parameters
         ----------
-        piece : Piece
         T : Array, shape (K + 1, parts)
             Temperatures at the grid points, [degC]
         seen : Array, shape (K + 1, parts)

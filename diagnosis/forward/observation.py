@@ -55,7 +55,6 @@ def reading_columns(
 
     Parameters
     ----------
-    model, trajectory, sensors
     T : Array, shape (K + 1, parts, columns)
         Changes of the temperatures, [K]
     direct_loss : Array, shape (K, columns)

@@ -29,7 +29,6 @@ def simulated_as_recorded(cycle: Cycle, correction: Correction, run: Callable[[C
     ----------
     cycle : Cycle
         Inputs as recorded
-    correction : Correction
     run : callable
         From a cycle to the columns of a result, of a model that holds the physics of the correction
 
@@ -72,7 +71,6 @@ def true_inputs(cycle: Cycle, correction: Correction, result: Columns | None = N
     ----------
     cycle : Cycle
         As recorded
-    correction : Correction
     result : mapping of column name to Array, shape (N,), optional
         Of a simulation, for faults that follow the machine's temperatures; without it they are left out
 
@@ -103,7 +101,6 @@ def read_as_recorded(columns: Columns, correction: Correction, *, late: float = 
     ----------
     columns : mapping of column name to Array, shape (N,)
         Result with true inputs
-    correction : Correction
     late : float
         Seconds by which every reading is late, see :func:`common_clock`
 

@@ -34,7 +34,6 @@ class TermOnGrid:
     ----------
     model : NetworkOnGrid
         The network that the term is added to; it need not be in it
-    term : Term
     """
 
     def __init__(self, model: NetworkOnGrid, term: Term) -> None:
@@ -71,7 +70,6 @@ class TermOnGrid:
 
         Parameters
         ----------
-        trajectory : Trajectory
         values : Array, shape (V, parameters)
             Of the term's own parameters
         at_points : bool
@@ -98,7 +96,7 @@ class TermOnGrid:
         return np.broadcast_to(np.asarray(law, float), size), np.broadcast_to(np.asarray(other, float), size)
 
     def _rows(self, time: Array, inputs: Array, T: Array, values: Array, memory: Array, power: Array) -> list[Array]:
-        """What the law is given of the network, its own numbers and states left out: one row of shape (K,) each."""
+        """Arguments of the law from the network, without those of the term itself: shape (K,) each."""
         numbers = (np.full(len(T), value) for value in values[self._kept])
         return [time, *inputs.T, *T.T, *numbers, *memory[:, self._remembered].T, *power.T]
 
@@ -115,7 +113,6 @@ class TermOnGrid:
 
         Parameters
         ----------
-        trajectory : Trajectory
         values : Array, shape (V, parameters)
         there : Array, shape (parameters,), optional
             Values that a network with the term had in this trajectory, where they are others

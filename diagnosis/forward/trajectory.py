@@ -40,16 +40,13 @@ class Trajectory:
 
     Attributes
     ----------
-    piece : Piece
     T : Array, shape (K + 1, parts)
         Temperatures at the grid points, [degC]
     values : Array, shape (parameters,)
         Values of the network's parameters
-    tangent : LossTangent
     seen : Array, shape (K + 1, parts)
         Temperatures that the memories followed, [degC]
     memory : Array, shape (K, states)
-    balance : Balance
     loss : Array, shape (K,)
         Total mechanical loss, [W]
     loss_slope : Array, shape (K, parts)
@@ -124,8 +121,6 @@ def simulate(
 
     Parameters
     ----------
-    model : NetworkOnGrid
-    piece : Piece
     values : Array, shape (parameters,)
         Values of the network's parameters
     start : Array, shape (parts,) or (parts + coupled,)
@@ -378,8 +373,6 @@ def parameter_heats(
 
     Parameters
     ----------
-    model : NetworkOnGrid
-    trajectory : Trajectory
     here : Balance
         Its :func:`settled_balance`
     indices : sequence of int

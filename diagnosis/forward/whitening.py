@@ -70,15 +70,7 @@ class Noise:
 
 
 class Whitening:
-    """The Kalman filter of one trajectory: its gains depend on the noise and the linearisation, not on the data.
-
-    Parameters
-    ----------
-    model : NetworkOnGrid
-    trajectory : Trajectory
-    sensors : Sensors
-    noise : Noise
-    """
+    """The Kalman filter of one trajectory: its gains depend on the noise and the linearisation, not on the data."""
 
     def __init__(self, model: NetworkOnGrid, trajectory: Trajectory, sensors: Sensors, noise: Noise) -> None:
         n, piece = trajectory.decay.shape[-1], trajectory.piece

@@ -34,8 +34,6 @@ class Family:
 
     Attributes
     ----------
-    name : str
-    members : tuple of str
     coordinates : tuple of str
         Quantities that their laws depend on
     calibrated : bool
@@ -53,7 +51,6 @@ class Anatomy:
 
     Parameters
     ----------
-    experiment : Experiment
     points : sequence of Point
         Its pieces, simulated: they give the sizes
     """

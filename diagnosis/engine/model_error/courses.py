@@ -91,13 +91,7 @@ class Standard:
 
 
 class View:
-    """Courses of one piece by name.
-
-    Parameters
-    ----------
-    point : Point
-    standard : Standard
-    """
+    """Courses of one piece by name."""
 
     def __init__(self, point: Point, standard: Standard) -> None:
         self.point, self.standard = point, standard

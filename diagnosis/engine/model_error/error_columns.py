@@ -64,7 +64,6 @@ class ModelError:
 
         Parameters
         ----------
-        experiment : Experiment
         points : sequence of Point, optional
             All pieces where they give the sizes; by default at the middles of the priors
 

@@ -48,10 +48,8 @@ class HeatChange:
 
     Attributes
     ----------
-    place : str
     heat : callable
         Heat per unit along the piece of a view
-    course : Course
     """
 
     place: str
@@ -70,7 +68,6 @@ class ReadingChange:
 
     Attributes
     ----------
-    channel, what : str
     reading : callable
         Change per unit along the piece of a view, shape (K + 1,), [K] or [W]
     """
