@@ -17,11 +17,12 @@ from diagnosis.candidates.hypotheses import Hypothesis
 from diagnosis.decision.posterior import Expected, Judged, Likeness, Posterior, ScaledError
 from diagnosis.decision.settings import Settings
 from diagnosis.engine.calibration import Calibration
-from diagnosis.engine.candidates import Scan, refit, scan
+from diagnosis.engine.candidates import Scan, scan
 from diagnosis.engine.fit import Fit
 from diagnosis.engine.gram import Given, Strengths
 from diagnosis.engine.learnt import ErrorClass, rule
 from diagnosis.engine.outside import judge_outside
+from diagnosis.engine.refit import refit
 from diagnosis.engine.sessions import OverSessions, fit_over_sessions, over_sessions
 from models.base.errors import InputError
 from models.base.progress import Progress, silent

@@ -6,18 +6,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cache, lru_cache
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.candidates.hypotheses import Hypothesis, chunks
-from diagnosis.engine.fit import Experiment, Fit, Linear, Linearised
+from diagnosis.engine.fit import Experiment, Fit, Linear
 from diagnosis.engine.gram import Given, Gram, Strengths, strengths
 from diagnosis.engine.metric import Metric
-from diagnosis.engine.point import AT_ONCE, Machine, Point
+from diagnosis.engine.point import AT_ONCE, Point
 from diagnosis.engine.products import base_of, gram_of, whitened_base
-from diagnosis.engine.unknown import TERM_STEP, Held, NetworkParameter, Scope, TermParameter, Unknown
+from diagnosis.engine.unknown import Scope
 from diagnosis.forward.network_on_grid import NetworkOnGrid
 from diagnosis.forward.observation import readings
 from diagnosis.forward.term_on_grid import TermOnGrid
@@ -25,11 +25,8 @@ from models.base.types import Array
 from models.quantities.quantities import is_total_loss
 from models.terms.term import Term
 
-START_SHARES = (1.0, 0.3, 0.03)  # of the strength that the scan promises
-ROUGH, ITERATIONS = 3, 10
 SHAPES_TRIED = 3  # of what has a memory: its set-points may have several optima
 Starts = tuple[tuple[int, float], ...]  # variants and strengths
-DATE_STEP_S = 10.0
 VALUES_AT_ONCE = 800_000  # of heats that are held together, per part: bounds the memory of long recordings
 
 
@@ -96,47 +93,67 @@ def scan(fit: Fit, candidates: Sequence[Hypothesis], error: Sequence[Array] = ()
         Whitened columns of model error per unit, for the Gram matrix; by default those of the metric
     """
     count, model = len(fit.z), fit.experiment.machine.model
-    placed = [(c, _on_grid(model, c.term)) for c in candidates if c.term is not None]
-    candidates, priors = [c for c, _ in placed], [on_grid.term.strength for _, on_grid in placed]
+    placed = [(c, term_on_grid(model, c.term)) for c in candidates if c.term is not None]
     base = whitened_base(fit.parts, fit.z, error) if error else base_of(fit)
-    known = range(count)
-    chosen = [np.empty((len(W), len(candidates)), order="F") for W in base]
-    best: list[int] = []
-    mean, spread, signs, peak, starts = [], [], [], [], []
+    chosen = [np.empty((len(W), len(placed)), order="F") for W in base]
+    shapes: list[_Shape] = []
+    peaks: list[tuple[float, float]] = []
     warm = [not is_total_loss(name) for name in fit.parts[0].point.sensors.channels]
     everything, residuals = _with_unknowns(fit), [W[:, 0] for W in base]
     intervals = max(len(part.point.trajectory.T) for part in fit.parts)
-    for chunk in chunks(candidates, max(16, min(AT_ONCE, VALUES_AT_ONCE // intervals))):
-        some = placed[len(best) : len(best) + len(chunk)]
-        raw, heats = zip(*(_columns(fit.experiment, part, some) for part in fit.parts), strict=True)
+    for chunk in chunks([c for c, _ in placed], max(16, min(AT_ONCE, VALUES_AT_ONCE // intervals))):
+        some = placed[len(shapes) : len(shapes) + len(chunk)]
+        raw, heats = zip(*(columns_of(fit.experiment, part, some) for part in fit.parts), strict=True)
         peaks_K, peaks_W = np.max([np.abs(X[:, warm]).max(axis=(0, 1)) for X in raw], axis=0), np.max(heats, axis=0)
         blocks = [part.filter(X) for part, X in zip(fit.parts, raw, strict=True)]
         (a, b), first = everything.against(residuals, blocks), 0
-        for c, on_grid in some:
-            n = len(c.variants)
-            way = np.sign(c.variants[:, 0]).astype(int)
-            sign = way if len(set(way.tolist())) > 1 else np.full(n, c.sign)
-            mine = slice(first, first + n)
-            found = strengths(a[mine], b[mine], on_grid.term.strength.sd, sign)
-            at = int(np.argmax(found.log_bayes))
+        for candidate, on_grid in some:
+            mine = slice(first, first + len(candidate.variants))
+            shape = _best_shape(candidate, on_grid.term.strength.sd, a[mine], b[mine])
+            at, first = first + shape.variant, mine.stop
             for kept, block in zip(chosen, blocks, strict=True):
-                kept[:, len(best)] = block[:, first + at]
-            best.append(at)
-            peak.append((float(peaks_K[first + at]), float(peaks_W[first + at])))
-            mean.append(float(np.logaddexp.reduce(found.log_bayes) - np.log(n)))
-            spread.append(float(found.log_bayes[at]) - mean[-1])
-            signs.append(int(sign[at]))
-            starts.append(_further_starts(c, found, at))
-            first += n
+                kept[:, len(shapes)] = block[:, at]
+            shapes.append(shape)
+            peaks.append((float(peaks_K[at]), float(peaks_W[at])))
     extra = base[0].shape[1] - 1 - count
-    peak_K, peak_W = np.array(peak).reshape(-1, 2).T
+    peak_K, peak_W = np.array(peaks).reshape(-1, 2).T
     return Scan(
-        candidates=tuple(candidates), best=tuple(best), log_bayes=np.array(mean), spread=np.array(spread),
-        gram=gram_of(fit.parts, base, chosen), unknowns=known,
-        further=range(count, count + extra), of_candidates=range(count + extra, count + extra + len(candidates)),
-        sd=np.array([strength.sd for strength in priors]), sign=np.array(signs, dtype=int), peak_K=peak_K,
-        peak_W=peak_W, starts=tuple(starts),
-    )  # fmt: skip
+        candidates=tuple(c for c, _ in placed),
+        best=tuple(shape.variant for shape in shapes),
+        log_bayes=np.array([shape.log_bayes for shape in shapes]),
+        spread=np.array([shape.spread for shape in shapes]),
+        gram=gram_of(fit.parts, base, chosen),
+        unknowns=range(count),
+        further=range(count, count + extra),
+        of_candidates=range(count + extra, count + extra + len(placed)),
+        sd=np.array([on_grid.term.strength.sd for _, on_grid in placed]),
+        sign=np.array([shape.sign for shape in shapes], dtype=int),
+        peak_K=peak_K,
+        peak_W=peak_W,
+        starts=tuple(shape.starts for shape in shapes),
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Shape:
+    """The best shape of a candidate; see :class:`Scan` for the numbers."""
+
+    variant: int
+    log_bayes: float
+    spread: float
+    sign: int
+    starts: Starts
+
+
+def _best_shape(candidate: Hypothesis, sd: float, a: Array, b: Array) -> _Shape:
+    """Compare all shapes of a candidate, by their inner products with the residual and with themselves."""
+    way = np.sign(candidate.variants[:, 0]).astype(int)
+    sign = way if len(set(way.tolist())) > 1 else np.full(len(way), candidate.sign)
+    found = strengths(a, b, sd, sign)
+    best = int(np.argmax(found.log_bayes))
+    mean = float(np.logaddexp.reduce(found.log_bayes) - np.log(len(way)))
+    return _Shape(variant=best, log_bayes=mean, spread=float(found.log_bayes[best]) - mean, sign=int(sign[best]),
+                  starts=_further_starts(candidate, found, best))  # fmt: skip
 
 
 def _further_starts(candidate: Hypothesis, found: Strengths, best: int) -> Starts:
@@ -161,7 +178,7 @@ def _with_unknowns(fit: Fit) -> Metric:
     return replace(metric, columns=both, shared=count + metric.shared, own=count + metric.own)
 
 
-def _columns(
+def columns_of(
     experiment: Experiment, part: Linear, some: Sequence[tuple[Hypothesis, TermOnGrid]]
 ) -> tuple[Array, Array]:
     """Effect per unit of strength of all variants of some candidates; zero where a candidate cannot act.
@@ -175,7 +192,8 @@ def _columns(
     """
     point, trajectory = part.point, part.point.trajectory
     count, recording = sum(len(candidate.variants) for candidate, _ in some), trajectory.piece.recording
-    acting = [_acts_in(experiment, candidate, recording) for candidate, _ in some]
+    scopes = [scope_of(experiment, candidate) for candidate, _ in some]
+    acting = [scope is None or recording in scope for scope in scopes]
     if not any(acting):
         return np.zeros((*point.read.shape, count)), np.zeros(count)
     into = np.zeros((len(trajectory.piece.steps), trajectory.decay.shape[-1], count))
@@ -226,109 +244,11 @@ def _finite(heat: Array) -> Array:
 
 
 @lru_cache(maxsize=2048)
-def _on_grid(model: NetworkOnGrid, term: Term) -> TermOnGrid:
+def term_on_grid(model: NetworkOnGrid, term: Term) -> TermOnGrid:
+    """A term at its place in a network; kept, since its laws take long to compile."""
     return TermOnGrid(model, term)
 
 
-def with_candidate(fit: Fit, candidate: Hypothesis, variant: int) -> tuple[Experiment, Array]:
-    """The experiment with one candidate as further unknowns, and their ``z`` in one of its shapes.
-
-    Parameters
-    ----------
-    candidate : Hypothesis
-        Of a term
-    variant : int
-        Shape, with strength 1
-
-    Returns
-    -------
-    experiment : Experiment
-    z : Array, shape (further unknowns,)
-    """
-    experiment, term = fit.experiment, candidate.term
-    assert term is not None  # noqa: S101 - parameters out of their priors have no term
-    machine = experiment.machine
-    names = tuple(p.name for p in term.parameters)
-    outside = term.kind in ("sensor", "signal")
-    if outside:
-        machine = Machine(machine.model, (*machine.terms, term))
-    else:
-        machine = Machine(NetworkOnGrid(term.apply(machine.model.network), machine.model.losses), machine.terms)
-    values = candidate.variants[variant].tolist()
-    scopes = [_scope(experiment, candidate), *(None for _ in names[1:])]
-    added: list[Unknown] = []
-    for p, value, scope in zip(term.parameters, values, scopes, strict=True):
-        if p.name == candidate.clock:
-            added.append(Held(parameter=p, label=term.label, names=names, of_recording=experiment.starts_at))
-        elif p.sd == 0.0:
-            added.append(Held(parameter=replace(p, start=value), label=term.label, names=names))
-        elif outside:
-            # Differences by a date must be small next to the time that a step takes.
-            step = DATE_STEP_S / p.sd if candidate.clock and p.unit == "s" and not p.log else TERM_STEP
-            added.append(
-                TermParameter(parameter=p, scope=scope, label=term.label, names=names, step=min(step, TERM_STEP))
-            )
-        else:
-            added.append(NetworkParameter(parameter=p, scope=scope))
-    z = [unknown.z_of(value) for unknown, value in zip(added, values, strict=True)]
-    return replace(experiment, machine=machine, unknowns=(*experiment.unknowns, *added)), np.array(z)
-
-
-def _acts_in(experiment: Experiment, candidate: Hypothesis, recording: str) -> bool:
-    """True if a candidate may act in a recording."""
-    scope = _scope(experiment, candidate)
-    return scope is None or recording in scope
-
-
-def _scope(experiment: Experiment, candidate: Hypothesis) -> Scope:
+def scope_of(experiment: Experiment, candidate: Hypothesis) -> Scope:
+    """Recordings in which a candidate may act; None for all."""
     return experiment.scope_of(candidate.name, dated=candidate.clock is not None)
-
-
-def refit(
-    fit: Fit, candidate: Hypothesis, variant: int, strength: float, *, further: Starts = (),
-    iterations: int = ITERATIONS,
-) -> Fit:  # fmt: skip
-    """A candidate fitted together with everything else, judged by the noise filters of a fit without it.
-
-    The other unknowns start where the straight line puts them with the candidate there. What it does may be far from
-    a straight line; so smaller shares of the promised strength are tried until a rough fit agrees better with the
-    readings than without the candidate, and all further starts. The best rough fit goes on.
-
-    Raises
-    ------
-    ArithmeticError
-        If there is no solution at any of the starts.
-    """
-    line = cache(lambda one: _straight_line(fit, candidate, one))
-
-    def rough_fit(which: int, size: float) -> list[Fit]:
-        """A few steps from one start; empty if it has no solution."""
-        aside, experiment, shape = line(which)
-        z = np.concatenate([fit.z + size * aside, [experiment.unknowns[len(fit.z)].z_of(size)], shape[1:]])
-        try:
-            return [experiment.fit(z, fit.trajectories, iterations=ROUGH)]
-        except ArithmeticError:
-            return []
-
-    rough: list[Fit] = []
-    for share in START_SHARES:
-        rough += rough_fit(variant, share * strength)
-        if rough and rough[-1].objective < fit.objective:
-            break
-    for other, size in further:
-        rough += rough_fit(other, size)
-    if not rough:
-        raise ArithmeticError(f"no simulation has a solution with {candidate.label}")
-    best = min(rough, key=lambda one: one.objective)
-    return best.experiment.fit(best.z, iterations=iterations - ROUGH, at=best.linearised)
-
-
-def _straight_line(fit: Fit, candidate: Hypothesis, variant: int) -> tuple[Array, Experiment, Array]:
-    """Change of the other unknowns per unit of strength, and the experiment with one variant and its ``z``."""
-    one = replace(candidate, variants=candidate.variants[[variant]])
-    assert candidate.term is not None  # noqa: S101 - parameters out of their priors have no term
-    on_grid = _on_grid(fit.experiment.machine.model, candidate.term)
-    column = [part.filter(_columns(fit.experiment, part, [(one, on_grid)])[0]) for part in fit.parts]
-    both = Linearised.of([replace(part, residual=x[:, 0]) for part, x in zip(fit.parts, column, strict=True)],
-                         fit.experiment.metric)  # fmt: skip
-    return (-fit.covariance @ both.products[1:, 0], *with_candidate(fit, candidate, variant))

@@ -10,11 +10,12 @@ import sympy as sp
 
 from diagnosis.candidates.dated import Axis
 from diagnosis.candidates.hypotheses import Hypothesis
-from diagnosis.engine.candidates import Scan, _columns, _on_grid, refit, scan, with_candidate
+from diagnosis.engine.candidates import Scan, columns_of, scan, term_on_grid
 from diagnosis.engine.families import axis_of, candidates_of, log_prior
 from diagnosis.engine.fit import Experiment, Fit, calibrate
 from diagnosis.engine.outside import judge_outside, outside_of
 from diagnosis.engine.prepare import prepare_experiment
+from diagnosis.engine.refit import refit, with_candidate
 from diagnosis.recordings.recording import Recording
 from diagnosis.setup.inference_setup import InferenceSetup
 from models.assembly.gearbox import Gearbox
@@ -134,8 +135,8 @@ def test_columns_are_those_of_repeated_simulation(fit: Fit, air: Hypothesis) -> 
     for index, part in enumerate(fit.parts):
         one = replace(air, variants=air.variants[[variant]])
         assert one.term is not None
-        on_grid = _on_grid(fit.experiment.machine.model, one.term)
-        column = _columns(fit.experiment, part, [(one, on_grid)])[0][:, :, 0]
+        on_grid = term_on_grid(fit.experiment.machine.model, one.term)
+        column = columns_of(fit.experiment, part, [(one, on_grid)])[0][:, :, 0]
         own[0] = experiment.unknowns[len(fit.z)].z_of(size)
         there = experiment.point(index, np.concatenate([fit.z, own]), part.point.trajectory, rounds=12).read
         own[0] = experiment.unknowns[len(fit.z)].z_of(-size)

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from diagnosis.candidates.hypotheses import hypothesis_of
-from diagnosis.engine.candidates import with_candidate
 from diagnosis.engine.fit import Experiment, Fit
+from diagnosis.engine.refit import with_candidate
 from diagnosis.engine.unknown import NetworkParameter
 from models.assembly.gearbox import Gearbox
 from models.base.types import Array

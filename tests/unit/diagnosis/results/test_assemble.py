@@ -14,11 +14,11 @@ import pytest
 from diagnosis.candidates.hypotheses import Hypothesis, hypothesis_of
 from diagnosis.decision.posterior import Answer, Expected, Judged, Posterior
 from diagnosis.decision.settings import Settings
-from diagnosis.engine.candidates import refit, with_candidate
 from diagnosis.engine.families import candidates_of
 from diagnosis.engine.fit import Experiment, Fit, calibrate
 from diagnosis.engine.learnt import error_classes, rule
 from diagnosis.engine.prepare import held_out_experiment, prepare_experiment
+from diagnosis.engine.refit import refit, with_candidate
 from diagnosis.engine.unknown import NetworkParameter
 from diagnosis.proof.scoring.answers import read_answer
 from diagnosis.recordings.recording import Recording

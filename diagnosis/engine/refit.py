@@ -1,0 +1,114 @@
+"""One candidate fitted together with everything else, from where the scan puts it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+
+from diagnosis.candidates.hypotheses import Hypothesis
+from diagnosis.engine.candidates import Starts, columns_of, scope_of, term_on_grid
+from diagnosis.engine.fit import Experiment, Fit, Linearised
+from diagnosis.engine.point import Machine
+from diagnosis.engine.unknown import TERM_STEP, Held, NetworkParameter, TermParameter, Unknown
+from diagnosis.forward.network_on_grid import NetworkOnGrid
+from models.base.types import Array
+
+START_SHARES = (1.0, 0.3, 0.03)  # of the strength that the scan promises
+ROUGH, ITERATIONS = 3, 10
+DATE_STEP_S = 10.0
+
+
+def refit(
+    fit: Fit, candidate: Hypothesis, variant: int, strength: float, *, further: Starts = (),
+    iterations: int = ITERATIONS,
+) -> Fit:  # fmt: skip
+    """A candidate fitted together with everything else, judged by the noise filters of a fit without it.
+
+    The other unknowns start where the straight line puts them with the candidate there. What it does may be far from
+    a straight line; so smaller shares of the promised strength are tried until a rough fit agrees better with the
+    readings than without the candidate, and all further starts. The best rough fit goes on.
+
+    Raises
+    ------
+    ArithmeticError
+        If there is no solution at any of the starts.
+    """
+    line = cache(lambda one: _straight_line(fit, candidate, one))
+
+    def rough_fit(which: int, size: float) -> list[Fit]:
+        """A few steps from one start; empty if it has no solution."""
+        aside, experiment, shape = line(which)
+        z = np.concatenate([fit.z + size * aside, [experiment.unknowns[len(fit.z)].z_of(size)], shape[1:]])
+        try:
+            return [experiment.fit(z, fit.trajectories, iterations=ROUGH)]
+        except ArithmeticError:
+            return []
+
+    rough: list[Fit] = []
+    for share in START_SHARES:
+        rough += rough_fit(variant, share * strength)
+        if rough and rough[-1].objective < fit.objective:
+            break
+    for other, size in further:
+        rough += rough_fit(other, size)
+    if not rough:
+        raise ArithmeticError(f"no simulation has a solution with {candidate.label}")
+    best = min(rough, key=lambda one: one.objective)
+    return best.experiment.fit(best.z, iterations=iterations - ROUGH, at=best.linearised)
+
+
+def _straight_line(fit: Fit, candidate: Hypothesis, variant: int) -> tuple[Array, Experiment, Array]:
+    """Change of the other unknowns per unit of strength, and the experiment with one variant and its ``z``."""
+    one = replace(candidate, variants=candidate.variants[[variant]])
+    assert candidate.term is not None  # noqa: S101 - parameters out of their priors have no term
+    on_grid = term_on_grid(fit.experiment.machine.model, candidate.term)
+    column = [part.filter(columns_of(fit.experiment, part, [(one, on_grid)])[0]) for part in fit.parts]
+    both = Linearised.of([replace(part, residual=x[:, 0]) for part, x in zip(fit.parts, column, strict=True)],
+                         fit.experiment.metric)  # fmt: skip
+    return (-fit.covariance @ both.products[1:, 0], *with_candidate(fit, candidate, variant))
+
+
+def with_candidate(fit: Fit, candidate: Hypothesis, variant: int) -> tuple[Experiment, Array]:
+    """The experiment with one candidate as further unknowns, and their ``z`` in one of its shapes.
+
+    Parameters
+    ----------
+    candidate : Hypothesis
+        Of a term
+    variant : int
+        Shape, with strength 1
+
+    Returns
+    -------
+    experiment : Experiment
+    z : Array, shape (further unknowns,)
+    """
+    experiment, term = fit.experiment, candidate.term
+    assert term is not None  # noqa: S101 - parameters out of their priors have no term
+    machine = experiment.machine
+    names = tuple(p.name for p in term.parameters)
+    outside = term.kind in ("sensor", "signal")
+    if outside:
+        machine = Machine(machine.model, (*machine.terms, term))
+    else:
+        machine = Machine(NetworkOnGrid(term.apply(machine.model.network), machine.model.losses), machine.terms)
+    values = candidate.variants[variant].tolist()
+    scopes = [scope_of(experiment, candidate), *(None for _ in names[1:])]
+    added: list[Unknown] = []
+    for p, value, scope in zip(term.parameters, values, scopes, strict=True):
+        if p.name == candidate.clock:
+            added.append(Held(parameter=p, label=term.label, names=names, of_recording=experiment.starts_at))
+        elif p.sd == 0.0:
+            added.append(Held(parameter=replace(p, start=value), label=term.label, names=names))
+        elif outside:
+            # Differences by a date must be small next to the time that a step takes.
+            step = DATE_STEP_S / p.sd if candidate.clock and p.unit == "s" and not p.log else TERM_STEP
+            added.append(
+                TermParameter(parameter=p, scope=scope, label=term.label, names=names, step=min(step, TERM_STEP))
+            )
+        else:
+            added.append(NetworkParameter(parameter=p, scope=scope))
+    z = [unknown.z_of(value) for unknown, value in zip(added, values, strict=True)]
+    return replace(experiment, machine=machine, unknowns=(*experiment.unknowns, *added)), np.array(z)
