@@ -7,7 +7,7 @@ them are fitted to the end, model error in place; a second scan given the best e
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -83,21 +83,7 @@ def infer(
     progress(f"scanning {len(candidates)} candidates")
     found = scan(base, [one for one in candidates if one.term is not None], calibration.near.columns)
     first = _scanned_in_classes(calibration, found, candidates, log_prior)
-    order = np.argsort(-(first.log_bayes + first.log_prior))
-    racing = _raced(first.candidates, first.log_bayes, order)
-    judged: dict[str, Judged] = {}
-    worth = max(WORTH, WORTH_SHARE * float(first.log_bayes.max(initial=0.0)))
-    racing = [index for index in racing if first.log_bayes[index] > worth]
-    for step, index in enumerate(racing):
-        progress(f"fitting {first.candidates[index].label}", step, len(racing))
-        near = calibration.in_class(first.best[index].error_class).fit
-        one = _refitted(calibration, near, first, index, RACE_STEPS)
-        judged[first.candidates[index].label] = one
-    ahead = sorted(judged.values(), key=lambda one: -(one.log_bayes + one.log_prior))
-    for step, one in enumerate(ahead[:REFITTED]):
-        progress(f"fitting {one.label} to the end", step, len(ahead[:REFITTED]))
-        if one.fit is not None:
-            judged[one.label] = _fitted_on(calibration, one, len(base.z))
+    judged = _raced(calibration, first, progress)
     alone = {one.label: float(value) for one, value in zip(first.candidates, first.log_bayes, strict=True)}
     remainder, gained, pairs = 0.0, 0.0, list[Judged]()
     best = max(judged.values(), key=lambda one: one.log_bayes + one.log_prior, default=None)
@@ -115,42 +101,31 @@ def infer(
     log_e = float(logsumexp([one.log_prior + one.log_bayes for one in judged.values()])) - gained
     missing = log_e > threshold
     unknown = _unknown(calibration, error_class, outside) if missing else []
-    nothing = Judged(effects=(), log_prior=0.0, log_bayes=0.0, error_class=chosen.error_class, fit=base)
     return Posterior(
-        nothing=nothing, log_e=log_e, threshold=threshold, rule=rule(),
+        nothing=Judged(effects=(), log_prior=0.0, log_bayes=0.0, error_class=chosen.error_class, fit=base),
         judged=tuple(replace(one, log_bayes=one.log_bayes - gained) for one in (*judged.values(), *pairs, *unknown)),
-        likeness=_likeness(first, error_class), odds_unknown=settings.odds_unknown,
-        error_class=(error_class if missing else chosen.error_class).name, error_evidence=dict(calibration.evidence),
-        session_s=chosen.session_s, remainder=remainder,
+        log_e=log_e,
+        threshold=threshold,
+        rule=rule(),
+        likeness=_likeness(first, error_class),
+        odds_unknown=settings.odds_unknown,
+        error_class=(error_class if missing else chosen.error_class).name,
+        error_evidence=dict(calibration.evidence),
+        session_s=chosen.session_s,
+        remainder=remainder,
         scaled=tuple(
             _with_scaled_error(calibration, found, candidates, log_prior, factor, settings.false_alarm_rate)
             for factor in SCALED
         ),
         expected=_expected(first.in_class(chosen.error_class), settings),
-    )  # fmt: skip
-
-
-def _with_scaled_error(
-    calibration: Calibration,
-    found: Scan,
-    candidates: Sequence[Hypothesis],
-    log_prior: Array,
-    factor: float,
-    rate: float,
-) -> ScaledError:
-    """Evidence of the scan if all model error were larger or smaller than assumed."""
-    there = _scanned_in_classes(calibration, found, candidates, log_prior, factor)
-    log = there.log_prior + there.log_bayes - max(one.ahead for one in there.classes)
-    best = int(np.argmax(log))
-    threshold = rule().threshold(there.best[best].error_class, rate)
-    return ScaledError(factor=factor, log_e=float(logsumexp(log)), threshold=threshold, best=there.candidates[best])
+    )
 
 
 def _scanned_in_classes(
     calibration: Calibration, found: Scan, candidates: Sequence[Hypothesis], log_prior: Array, factor: float = 1.0
 ) -> _Scanned:
     """The scan at the calibrated point with model error of all classes, their amplitudes scaled."""
-    fit, outside, judged = calibration.fit, _outside(candidates), []
+    fit, parameters, judged = calibration.fit, _parameters(candidates), []
     for one in calibration.classes:
         scaled = one.scaled(factor)
         here = found.in_directions(calibration.near.directions(scaled))
@@ -158,40 +133,25 @@ def _scanned_in_classes(
         judged.append((scaled, here, over, float(np.log(one.prior)) + over.log_evidence))
     nothing = next(evidence for one, _, _, evidence in judged if one.name == calibration.chosen.error_class.name)
     return _best_of([
-        _in_class(one, here, outside, over, evidence - nothing) for one, here, over, evidence in judged
-    ], candidates, log_prior, outside)  # fmt: skip
-
-
-def _scanned_given(
-    calibration: Calibration, fit: Fit, error_class: ErrorClass, candidates: Sequence[Hypothesis], log_prior: Array
-) -> _Scanned:
-    """Scan at the fit of an explanation, against that explanation, with model error of its class."""
-    found, outside = scan(fit, [one for one in candidates if one.term is not None]), _outside(candidates)
-    base = len(calibration.fit.z)
-    over = over_sessions(found.gram, fit.experiment, [*range(base), *found.further], range(base, len(fit.z)))
-    return _best_of([_in_class(error_class, found, outside, over, 0.0)], candidates, log_prior, outside)
-
-
-def _outside(candidates: Sequence[Hypothesis]) -> list[Hypothesis]:
-    """Parameters outside their priors."""
-    return [one for one in candidates if one.unknown is not None]
+        _in_class(one, here, parameters, over, evidence - nothing) for one, here, over, evidence in judged
+    ], candidates, log_prior, parameters)  # fmt: skip
 
 
 def _in_class(
-    error_class: ErrorClass, found: Scan, outside: Sequence[Hypothesis], over: OverSessions, ahead: float
+    error_class: ErrorClass, found: Scan, parameters: Sequence[Hypothesis], over: OverSessions, ahead: float
 ) -> _InClass:
     """Candidates in one class."""
-    strengths = _strengths(found, outside, over.given[over.most_probable])
+    strengths = _strengths(found, parameters, over.given[over.most_probable])
     return _InClass(error_class=error_class, ahead=ahead, scan=found, over=over,
-                    log_bayes=_weighed(found, outside, over) + ahead, strengths=strengths)  # fmt: skip
+                    log_bayes=_weighed(found, parameters, over) + ahead, strengths=strengths)  # fmt: skip
 
 
 def _best_of(
-    classes: Sequence[_InClass], candidates: Sequence[Hypothesis], log_prior: Array, outside: Sequence[Hypothesis]
+    classes: Sequence[_InClass], candidates: Sequence[Hypothesis], log_prior: Array, parameters: Sequence[Hypothesis]
 ) -> _Scanned:
     """Every candidate in the class that suits it best."""
     known = {one.label: value for one, value in zip(candidates, log_prior.tolist(), strict=True)}
-    every = (*classes[0].scan.candidates, *outside)
+    every = (*classes[0].scan.candidates, *parameters)
     table = np.stack([one.log_bayes for one in classes])
     return _Scanned(
         candidates=every, log_prior=np.array([known[one.label] for one in every]), log_bayes=table.max(axis=0),
@@ -199,33 +159,57 @@ def _best_of(
     )  # fmt: skip
 
 
-def _strengths(found: Scan, outside: Sequence[Hypothesis], given: Given) -> Strengths:
+def _parameters(candidates: Sequence[Hypothesis]) -> list[Hypothesis]:
+    """Parameters outside their priors."""
+    return [one for one in candidates if one.unknown is not None]
+
+
+def _strengths(found: Scan, parameters: Sequence[Hypothesis], given: Given) -> Strengths:
     """Of every term in its best shape, then of every parameter outside its prior, in prior standard deviations."""
     terms = found.singles(given)
     wider = np.sqrt(rule().wider ** 2 - 1.0)
-    further = given.singles([one.unknown for one in outside if one.unknown is not None], wider)
+    further = given.singles([one.unknown for one in parameters if one.unknown is not None], wider)
     return Strengths(**{name: np.concatenate([getattr(terms, name), getattr(further, name)])
                         for name in ("log_bayes", "value", "sd")})  # fmt: skip
 
 
-def _weighed(found: Scan, outside: Sequence[Hypothesis], over: OverSessions) -> Array:
+def _weighed(found: Scan, parameters: Sequence[Hypothesis], over: OverSessions) -> Array:
     """Log Bayes factors of all candidates, over variants and deviations between sessions."""
-    each = [_strengths(found, outside, given).log_bayes for given in over.given]
+    each = [_strengths(found, parameters, given).log_bayes for given in over.given]
     best, count = over.weighed(each), len(found.candidates)
     best[:count] -= found.spread
     return best
 
 
-def _raced(candidates: Sequence[Hypothesis], log_bayes: Array, order: Iterable[int]) -> list[int]:
-    """Best candidates by name, with a second place where it is near."""
+def _raced(calibration: Calibration, found: _Scanned, progress: Progress) -> dict[str, Judged]:
+    """The best candidates after a few steps of a fit, the best of these after a whole one, by label."""
+    judged: dict[str, Judged] = {}
+    racing = _worth_a_fit(found)
+    for step, index in enumerate(racing):
+        label = found.candidates[index].label
+        progress(f"fitting {label}", step, len(racing))
+        start = calibration.in_class(found.best[index].error_class).fit
+        judged[label] = _refitted(calibration, start, found, index, RACE_STEPS)
+    ahead = sorted(judged.values(), key=lambda one: -(one.log_bayes + one.log_prior))[:REFITTED]
+    for step, one in enumerate(ahead):
+        progress(f"fitting {one.label} to the end", step, len(ahead))
+        if one.fit is not None:
+            judged[one.label] = _fitted_on(calibration, one)
+    return judged
+
+
+def _worth_a_fit(found: _Scanned) -> list[int]:
+    """Places of the best candidates by name, with a second place where it is near."""
     of_name: dict[str, list[int]] = {}
-    for index in order:
-        mine = of_name.setdefault(candidates[index].name, [])
+    for index in np.argsort(-(found.log_bayes + found.log_prior)):
+        mine = of_name.setdefault(found.candidates[index].name, [])
         if not mine and len(of_name) > RACED:
             break
-        if not mine or (len(mine) < PLACES and log_bayes[mine[0]] - log_bayes[index] < NEAR_PLACE):
+        if not mine or (len(mine) < PLACES and found.log_bayes[mine[0]] - found.log_bayes[index] < NEAR_PLACE):
             mine.append(int(index))
-    return [index for mine in list(of_name.values())[:RACED] for index in mine]
+    worth = max(WORTH, WORTH_SHARE * float(found.log_bayes.max(initial=0.0)))
+    every = [index for mine in list(of_name.values())[:RACED] for index in mine]
+    return [index for index in every if found.log_bayes[index] > worth]
 
 
 def _refitted(calibration: Calibration, fit: Fit, found: _Scanned, index: int, iterations: int) -> Judged:
@@ -241,7 +225,7 @@ def _refitted(calibration: Calibration, fit: Fit, found: _Scanned, index: int, i
                             iterations=iterations)  # fmt: skip
     except (InputError, ArithmeticError, np.linalg.LinAlgError):
         return one
-    return _judged(calibration, replace(one, fit=reached), len(calibration.fit.z), _spread(found, index))
+    return _judged(calibration, replace(one, fit=reached), _spread(found, index))
 
 
 def _with_wider_prior(fit: Fit, index: int, iterations: int) -> Fit:
@@ -254,19 +238,43 @@ def _with_wider_prior(fit: Fit, index: int, iterations: int) -> Fit:
     return wider.fit(z, fit.trajectories, iterations=iterations)
 
 
-def _spread(found: _Scanned, index: int) -> float:
-    """Nats that the best course over the hours is ahead of the mean over all; other shapes are fitted."""
-    if found.candidates[index].how != "W":
-        return 0.0
-    return float(found.best[index].scan.spread[index])
+def _by_scan(found: _Scanned, index: int, log_bayes: float) -> Judged:
+    """A candidate in its best shape, without a fit."""
+    candidate = found.candidates[index]
+    variant = found.best[index].scan.best[index] if candidate.term is not None else 0
+    return Judged(
+        effects=(replace(candidate, variants=candidate.variants[[variant]]),), log_prior=float(found.log_prior[index]),
+        log_bayes=log_bayes, error_class=found.best[index].error_class,
+    )  # fmt: skip
 
 
-def _judged(calibration: Calibration, one: Judged, base: int, spread: float) -> Judged:
+def _fitted_on(calibration: Calibration, one: Judged) -> Judged:
+    """A raced fit continued to its end."""
+    fit = one.fit
+    assert fit is not None  # noqa: S101
+    reached, base = fit, len(calibration.fit.z)
+    try:
+        for _ in range(MOST_TURNS):
+            further = fit.experiment.fit(reached.z, at=reached.linearised)
+            gained, reached = 0.5 * (reached.objective - further.objective), further
+            if gained < SETTLED_NAT:
+                break
+    except (InputError, ArithmeticError, np.linalg.LinAlgError):
+        pass  # what was reached counts
+    if reached is fit:
+        return one
+    gained = fit_over_sessions(reached, base).log_evidence - fit_over_sessions(fit, base).log_evidence
+    final = _judged(calibration, replace(one, fit=reached), spread=0.0)
+    return replace(final, log_bayes=min(final.log_bayes, one.log_bayes + gained))
+
+
+def _judged(calibration: Calibration, one: Judged, spread: float) -> Judged:
     """A fitted explanation with its evidence against nothing."""
     fit = one.fit
     assert fit is not None  # noqa: S101
-    log_evidence = fit_over_sessions(fit, base).log_evidence + float(np.log(one.error_class.prior))
-    log_bayes, at = log_evidence - calibration.chosen.log_evidence - spread, base  # where the effects' unknowns begin
+    at = len(calibration.fit.z)  # where the effects' unknowns begin
+    log_evidence = fit_over_sessions(fit, at).log_evidence + float(np.log(one.error_class.prior))
+    log_bayes = log_evidence - calibration.chosen.log_evidence - spread
     for effect in one.effects:
         if effect.term is None:
             continue  # a parameter is not further
@@ -279,33 +287,11 @@ def _judged(calibration: Calibration, one: Judged, base: int, spread: float) -> 
     return replace(one, log_bayes=log_bayes)
 
 
-def _fitted_on(calibration: Calibration, one: Judged, base: int) -> Judged:
-    """A raced fit continued to its end."""
-    fit = one.fit
-    assert fit is not None  # noqa: S101
-    reached = fit
-    try:
-        for _ in range(MOST_TURNS):
-            further = fit.experiment.fit(reached.z, at=reached.linearised)
-            gained, reached = 0.5 * (reached.objective - further.objective), further
-            if gained < SETTLED_NAT:
-                break
-    except (InputError, ArithmeticError, np.linalg.LinAlgError):
-        pass  # what was reached counts
-    if reached is fit:
-        return one
-    gained = fit_over_sessions(reached, base).log_evidence - fit_over_sessions(fit, base).log_evidence
-    final = _judged(calibration, replace(one, fit=reached), base, 0.0)
-    return replace(final, log_bayes=min(final.log_bayes, one.log_bayes + gained))
-
-
-def _by_scan(found: _Scanned, index: int, log_bayes: float) -> Judged:
-    candidate = found.candidates[index]
-    variant = found.best[index].scan.best[index] if candidate.term is not None else 0
-    return Judged(
-        effects=(replace(candidate, variants=candidate.variants[[variant]]),), log_prior=float(found.log_prior[index]),
-        log_bayes=log_bayes, error_class=found.best[index].error_class,
-    )  # fmt: skip
+def _spread(found: _Scanned, index: int) -> float:
+    """Nats that the best course over the hours is ahead of the mean over all; other shapes are fitted."""
+    if found.candidates[index].how != "W":
+        return 0.0
+    return float(found.best[index].scan.spread[index])
 
 
 def _given_best(
@@ -323,25 +309,37 @@ def _given_best(
     """
     fit, error_class = best.fit, best.error_class
     assert fit is not None  # noqa: S101
-    base, mine = len(calibration.fit.z), {effect.label for effect in best.effects}
-    others = np.array([one.label not in mine for one in candidates])
-    left = [one for one in candidates if one.label not in mine]
-    second = _scanned_given(calibration, fit, error_class, left, log_prior[others])
+    mine = {effect.label for effect in best.effects}
+    left = [index for index, one in enumerate(candidates) if one.label not in mine]
+    second = _scanned_given(calibration, fit, error_class, [candidates[index] for index in left], log_prior[left])
     order = np.argsort(-(second.log_bayes + second.log_prior))
     pairs = []
     for index in order[:SECONDS]:
         one = _refitted(calibration, fit, second, int(index), RACE_STEPS + 2)
         if one.fit is None:
             continue
-        both = replace(one, effects=(*best.effects, *one.effects),
-                       log_prior=best.log_prior + one.log_prior)  # fmt: skip
-        both = _judged(calibration, both, base, _spread(second, int(index)))
-        pairs.append(_fitted_on(calibration, both, base))
-    found, outside = second.best[0].scan, second.candidates[len(second.best[0].scan.candidates) :]
-    without = over_sessions(found.gram, fit.experiment, [*range(base), *found.further])
-    alone = (_weighed(found, outside, without) + ahead).tolist()
-    labels = [one.label for one in second.candidates]
-    return float(second.log_bayes[order[0]]), pairs, dict(zip(labels, alone, strict=True))
+        both = replace(one, effects=(*best.effects, *one.effects), log_prior=best.log_prior + one.log_prior)
+        both = _judged(calibration, both, _spread(second, int(index)))
+        pairs.append(_fitted_on(calibration, both))
+    return float(second.log_bayes[order[0]]), pairs, _alone(calibration, fit, second, ahead)
+
+
+def _alone(calibration: Calibration, fit: Fit, second: _Scanned, ahead: float) -> dict[str, float]:
+    """Log Bayes factors of all other candidates against nothing, by the scan at the best explanation, without it."""
+    found = second.classes[0].scan
+    without = over_sessions(found.gram, fit.experiment, [*range(len(calibration.fit.z)), *found.further])
+    log_bayes = _weighed(found, _parameters(second.candidates), without) + ahead
+    return dict(zip((one.label for one in second.candidates), log_bayes.tolist(), strict=True))
+
+
+def _scanned_given(
+    calibration: Calibration, fit: Fit, error_class: ErrorClass, candidates: Sequence[Hypothesis], log_prior: Array
+) -> _Scanned:
+    """Scan at the fit of an explanation, against that explanation, with model error of its class."""
+    found, parameters = scan(fit, [one for one in candidates if one.term is not None]), _parameters(candidates)
+    base = len(calibration.fit.z)
+    over = over_sessions(found.gram, fit.experiment, [*range(base), *found.further], range(base, len(fit.z)))
+    return _best_of([_in_class(error_class, found, parameters, over, 0.0)], candidates, log_prior, parameters)
 
 
 def _nothing_gains(calibration: Calibration, best: Judged) -> float:
@@ -370,6 +368,22 @@ def _unknown(calibration: Calibration, error_class: ErrorClass, outside: Sequenc
                log_bayes=one.log_bayes + ahead, error_class=error_class)
         for one in judge_outside(here.fit, outside)
     ]  # fmt: skip
+
+
+def _with_scaled_error(
+    calibration: Calibration,
+    found: Scan,
+    candidates: Sequence[Hypothesis],
+    log_prior: Array,
+    factor: float,
+    rate: float,
+) -> ScaledError:
+    """Evidence of the scan if all model error were larger or smaller than assumed."""
+    there = _scanned_in_classes(calibration, found, candidates, log_prior, factor)
+    log = there.log_prior + there.log_bayes - max(one.ahead for one in there.classes)
+    best = int(np.argmax(log))
+    threshold = rule().threshold(there.best[best].error_class, rate)
+    return ScaledError(factor=factor, log_e=float(logsumexp(log)), threshold=threshold, best=there.candidates[best])
 
 
 def _likeness(found: _Scanned, error_class: ErrorClass) -> Likeness:
