@@ -12,7 +12,7 @@ learnt on plants of the zoo and of a stranger, see ``diagnosis/engine/learnt.tom
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Literal, get_args
@@ -218,35 +218,47 @@ class Posterior:
     @cached_property
     def explanations(self) -> tuple[Explanation, ...]:
         """Names, or pairs of names, with their probabilities; most probable first."""
-        mass: dict[str, float] = {}
         of_names: dict[tuple[str, ...], list[Judged]] = {}
         for one in self.judged:
             of_names.setdefault(one.names, []).append(one)
-            if len(one.effects) == 1 and one.kind != "outside":
-                mass[one.names[0]] = mass.get(one.names[0], 0.0) + float(np.exp(one.log_prior))
-        pair = float(np.log(self.rule.pair / max(len(mass), 1)))
-        open_names = {one.names for one in self.judged if one.kind == "outside"}
-        unknown = float(np.log(self.odds_unknown * max(len(mass), 1) / max(len(open_names), 1)))  # to a known name
-        log_bayes, log_prior = [], []
-        for names, members in of_names.items():
-            within = sum(np.log(mass.get(name, 1.0)) for name in names)
-            mean = float(logsumexp([one.log_prior + one.log_bayes for one in members]) - within)
-            log_bayes.append(mean + (pair if len(names) > 1 else 0.0))
-            log_prior.append(unknown if members[0].kind == "outside" else 0.0)
-        values = np.array(log_bayes)
-        a, b = self.rule.temper
-        most = max(float(values.max(initial=0.0)), 0.0)
-        left = (values >= self.rule.refuted * most) | (most == 0.0)
+        log_bayes = np.array([self._mean_log_bayes(names, members) for names, members in of_names.items()])
+        most = max(float(log_bayes.max(initial=0.0)), 0.0)
+        left = (log_bayes >= self.rule.refuted * most) | (most == 0.0)
         if self.remainder <= self.threshold:  # a second effect needs evidence of its own
             left &= np.array([len(names) == 1 for names in of_names], dtype=bool)
-        log = np.where(left, np.array(log_prior) + values / (a + b * most), -np.inf)
+        log_prior = np.array([self._log_odds(members[0].kind) for members in of_names.values()])
+        a, b = self.rule.temper
+        log = np.where(left, log_prior + log_bayes / (a + b * most), -np.inf)
         chance = self.something * np.exp(log - logsumexp(log))
         found = [
             Explanation(names=names, members=tuple(sorted(members, key=lambda one: -one.log_prior - one.log_bayes)),
                         log_bayes=value, probability=p)
-            for (names, members), value, p in zip(of_names.items(), log_bayes, chance.tolist(), strict=True)
+            for (names, members), value, p in zip(of_names.items(), log_bayes.tolist(), chance.tolist(), strict=True)
         ]  # fmt: skip
         return tuple(sorted(found, key=lambda one: -one.probability))
+
+    @cached_property
+    def _known_names(self) -> dict[str, float]:
+        """Prior of every name of the catalogue over all places, courses and shapes."""
+        mass: dict[str, float] = {}
+        for one in self.judged:
+            if len(one.effects) == 1 and one.kind != "outside":
+                mass[one.names[0]] = mass.get(one.names[0], 0.0) + float(np.exp(one.log_prior))
+        return mass
+
+    def _mean_log_bayes(self, names: tuple[str, ...], members: Sequence[Judged]) -> float:
+        """Evidence of a name over its places and shapes; of a pair with the prior of a second effect, [nat]."""
+        within = sum(np.log(self._known_names.get(name, 1.0)) for name in names)
+        mean = float(logsumexp([one.log_prior + one.log_bayes for one in members]) - within)
+        pair = float(np.log(self.rule.pair / max(len(self._known_names), 1)))
+        return mean + (pair if len(names) > 1 else 0.0)
+
+    def _log_odds(self, kind: Kind) -> float:
+        """Prior of a name to one of the catalogue, [nat]."""
+        if kind != "outside":
+            return 0.0
+        names = {one.names for one in self.judged if one.kind == "outside"}
+        return float(np.log(self.odds_unknown * max(len(self._known_names), 1) / max(len(names), 1)))
 
     @cached_property
     def ranked(self) -> tuple[tuple[Judged, float], ...]:

@@ -190,6 +190,14 @@ class Experiment:
             first = self.with_filters(at.parts).fit(z, at.trajectories, iterations=iterations)
             final = self._attempt(first.z, first.trajectories)
             return Fit(experiment=self, z=first.z, linearised=first.linearised if final is None else final)
+        return self._gauss_newton(z, at, iterations)
+
+    def _gauss_newton(self, z: Array, at: Linearised, iterations: int) -> Fit:
+        """Damped steps to the minimum of the objective, from `z` where `at` is linearised.
+
+        After short steps the columns are kept, every other time: `fresh` is False then.
+        """
+        lower, upper = self.bounds
         objective, damping, settled, fresh = at.objective(z), 0.0, False, True
         for _ in range(iterations * (SLOW_PATIENCE if self.slow else 1)):
             step = at.step(z, damping, lower, upper)
