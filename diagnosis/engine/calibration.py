@@ -62,7 +62,7 @@ class Near:
     def of(cls, experiment: Experiment, error: ModelError, fit: Fit) -> Near:
         """Linearise about the courses of a fit, with the model error assumed there and new noise filters."""
         free = replace(experiment, filters=None)
-        parts = tuple(free.linearised(i, fit.z, trajectory, error=trajectory.piece.error)
+        parts = tuple(free.linearise_piece(i, fit.z, trajectory, error=trajectory.piece.error)
                       for i, trajectory in enumerate(fit.trajectories))  # fmt: skip
         return cls(experiment=free.with_filters(parts), parts=parts, error=error,
                    columns=tuple(error.whitened(part) for part in parts))  # fmt: skip

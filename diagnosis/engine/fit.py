@@ -136,7 +136,7 @@ class Experiment:
             for unknown, value in zip(self.unknowns, z.tolist(), strict=True)
         ])  # fmt: skip
 
-    def linearised(
+    def linearise_piece(
         self, index: int, z: Array, guess: Guess, *, rounds: int = 1, kept: Linear | None = None,
         error: ErrorCourse | None = None,
     ) -> Linear:  # fmt: skip
@@ -189,7 +189,7 @@ class Experiment:
         if self.filters is None:  # those of the start serve on the way, those of the end afterwards
             first = self.with_filters(at.parts).fit(z, at.trajectories, iterations=iterations)
             final = self._attempt(first.z, first.trajectories)
-            return Fit(experiment=self, z=first.z, linearised=first.linearised if final is None else final)
+            return Fit(experiment=self, z=first.z, linearised=final or first.linearised)
         return self._gauss_newton(z, at, iterations)
 
     def _gauss_newton(self, z: Array, at: Linearised, iterations: int) -> Fit:
@@ -256,12 +256,13 @@ class Experiment:
         self, z: Array, guesses: Sequence[Guess] | None, kept: Sequence[Linear] | None = None,
         errors: Sequence[ErrorCourse | None] | None = None,
     ) -> Linearised | None:  # fmt: skip
+        """All pieces linearised; None if the simulation has no solution."""
         try:
             if guesses is None:
-                parts = [self.linearised(i, z, None, rounds=ROUNDS) for i in range(len(self.pieces))]
+                parts = [self.linearise_piece(i, z, None, rounds=ROUNDS) for i in range(len(self.pieces))]
             else:  # trajectory and unknowns settle together: one round per iteration
                 errors = errors or [self._assumed(guess) for guess in guesses]
-                parts = [self.linearised(i, z, guess, kept=None if kept is None else kept[i], error=error)
+                parts = [self.linearise_piece(i, z, guess, kept=None if kept is None else kept[i], error=error)
                          for i, (guess, error) in enumerate(zip(guesses, errors, strict=True))]  # fmt: skip
             with np.errstate(over="raise"):  # a trial that overflows has no solution
                 return Linearised.of(parts, self.metric)

@@ -210,9 +210,9 @@ def log_score_gain(final: Fit, plain: Fit, held_out: Experiment, guesses: Sequen
         return float("nan")
     try:
         there = with_pieces_of(plain.experiment, held_out)
-        parts = [there.linearised(i, plain.z, guess, rounds=ROUNDS) for i, guess in enumerate(guesses[1])]
+        parts = [there.linearise_piece(i, plain.z, guess, rounds=ROUNDS) for i, guess in enumerate(guesses[1])]
         other = with_pieces_of(final.experiment, held_out).with_filters(parts)
-        own = [other.linearised(i, final.z, guess, rounds=ROUNDS) for i, guess in enumerate(guesses[0])]
+        own = [other.linearise_piece(i, final.z, guess, rounds=ROUNDS) for i, guess in enumerate(guesses[0])]
     except (ArithmeticError, np.linalg.LinAlgError):
         return float("nan")
     return _log_density(own, final) - _log_density(parts, plain)

@@ -110,10 +110,12 @@ def with_deviation(
     courses : sequence of ErrorCourses
         What the model error does, for simulations with it
     """
-    count, differing = shared[0].shape[1], s > 0.0
-    both = [np.column_stack(pair) for pair in zip(shared, columns, strict=True)] if differing else shared
-    metric = Metric(sessions=sessions_of(experiment), columns=tuple(both), shared=count, own=0 if differing else count,
-                    deviation=s, courses=tuple(courses))  # fmt: skip
+    count = shared[0].shape[1]
+    metric = Metric(sessions=sessions_of(experiment), columns=tuple(shared), shared=count, own=count,
+                    courses=tuple(courses))  # fmt: skip
+    if s > 0.0:
+        both = tuple(np.column_stack(pair) for pair in zip(shared, columns, strict=True))
+        metric = replace(metric, columns=both, own=0, deviation=s)
     return replace(experiment, metric=metric)
 
 

@@ -222,8 +222,8 @@ class TermParameter(_Prior):
 
     def column(self, point: Point, z: float) -> Column:
         """Difference of the shifted heat or of the distorted reading."""
-        per_z = self.per_z(z)
-        return point.term_column(self.label, self.names.index(self.parameter.name), self.step * per_z) * per_z
+        per_z, index = self.per_z(z), self.names.index(self.parameter.name)
+        return point.term_column(self.label, index, self.step * per_z) * per_z
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -31,7 +31,7 @@ def test_readings_of_the_model_itself_leave_nothing(fit: Fit) -> None:
 def test_without_derivatives_there_is_no_fit(monkeypatch: pytest.MonkeyPatch, experiment: Experiment) -> None:
     monkeypatch.setattr(Experiment, "columns", lambda self, *_: np.full((2, 2, len(self.unknowns)), np.nan))
     with pytest.raises(ArithmeticError, match="no derivative"):
-        experiment.linearised(0, np.zeros(len(experiment.unknowns)), None)
+        experiment.linearise_piece(0, np.zeros(len(experiment.unknowns)), None)
     with pytest.raises(ArithmeticError, match="no solution where the fit should start"):
         experiment.fit()
 

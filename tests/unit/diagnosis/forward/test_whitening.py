@@ -59,7 +59,7 @@ def test_innovations_of_the_noise_are_white(
 def test_missing_readings_show_nothing(piece: Piece, experiment: Experiment) -> None:
     measured = np.array(piece.measured)
     measured[20:60, 1] = np.nan
-    part = with_measured(experiment, measured).linearised(0, np.zeros(len(experiment.unknowns)), None)
+    part = with_measured(experiment, measured).linearise_piece(0, np.zeros(len(experiment.unknowns)), None)
     white = part.residual.reshape(len(piece.time), -1)
     assert (white[20:60, 1] == 0.0).all()
     assert np.isfinite(part.columns).all()
