@@ -97,7 +97,7 @@ def infer(
     for index, candidate in enumerate(first.candidates):
         judged.setdefault(candidate.label, _by_scan(first, index, alone[candidate.label]))
     error_class = chosen.error_class if best is None else best.error_class
-    threshold = rule().threshold(error_class, settings.false_alarm_rate)
+    threshold = rule().threshold(chosen.error_class, error_class, settings.false_alarm_rate)
     log_e = float(logsumexp([one.log_prior + one.log_bayes for one in judged.values()])) - gained
     missing = log_e > threshold
     unknown = _unknown(calibration, error_class, outside) if missing else []
@@ -380,9 +380,10 @@ def _with_scaled_error(
 ) -> ScaledError:
     """Evidence of the scan if all model error were larger or smaller than assumed."""
     there = _scanned_in_classes(calibration, found, candidates, log_prior, factor)
-    log = there.log_prior + there.log_bayes - max(one.ahead for one in there.classes)
+    nothing = max(there.classes, key=lambda one: one.ahead)
+    log = there.log_prior + there.log_bayes - nothing.ahead
     best = int(np.argmax(log))
-    threshold = rule().threshold(there.best[best].error_class, rate)
+    threshold = rule().threshold(nothing.error_class, there.best[best].error_class, rate)
     return ScaledError(factor=factor, log_e=float(logsumexp(log)), threshold=threshold, best=there.candidates[best])
 
 

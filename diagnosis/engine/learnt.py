@@ -22,7 +22,7 @@ class ErrorClass:
     Attributes
     ----------
     threshold : float
-        Evidence from which something is missing if the readings choose this class, [nat]
+        Evidence from which something is missing if the readings choose this class with and without it, [nat]
     amplitudes : mapping of group to float
         Prior standard deviations of the groups' unknowns; groups that are not named are absent
     """
@@ -71,15 +71,17 @@ class Rule:
     nearest: float
     wider: float
 
-    def threshold(self, error: ErrorClass, rate: float) -> float:
+    def threshold(self, nothing: ErrorClass, best: ErrorClass, rate: float) -> float:
         """Evidence from which something is missing, [nat].
 
         Parameters
         ----------
+        nothing, best : ErrorClass
+            Class of model error without any effect, and with the best one: half-way between their thresholds
         rate : float
             False-alarm rate that a user asks for
         """
-        return error.threshold + self.temper[0] * float(np.log(self.rate / rate))
+        return 0.5 * (nothing.threshold + best.threshold) + self.temper[0] * float(np.log(self.rate / rate))
 
 
 @cache

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import cast
 
@@ -75,6 +76,18 @@ def test_a_concealed_effect_is_detected_and_first(concealed: Posterior) -> None:
     assert sum(concealed.of(kind) for kind in KINDS) == pytest.approx(1.0)
     answers = decide(concealed, Settings())
     assert [one.effect.label for one in answers] == ["windage@oil"]
+
+
+def test_nothing_gets_the_evidence_that_it_has_from_the_point_of_an_explanation(fzg: Gearbox) -> None:
+    """What every fit brings over a calibration in a worse basin is no evidence for a candidate."""
+    train = recorded(fzg, "train", windage_W=WINDAGE_W, hours=HOURS)
+    setup, experiment = prepare_experiment(fzg, [train], [train], [recorded(fzg, "april", seed=2, hours=HOURS)])
+    settled = calibrate_with_error(experiment, calibrate(experiment))
+    worse = replace(settled, chosen=replace(settled.chosen, log_evidence=settled.chosen.log_evidence - 50.0))
+    placed = CATALOGUE["windage"].placed(experiment.machine.model.network, setup.scale, setup.channels)
+    candidates = [hypothesis_of(one) for one in placed]
+    right, found = (infer(one, candidates, log_prior(candidates), Settings()) for one in (settled, worse))
+    assert right.log_e > 10.0 and found.log_e == pytest.approx(right.log_e, abs=3.0)
 
 
 def test_the_scan_is_told_for_less_and_more_model_error(concealed: Posterior, healthy: Posterior) -> None:
