@@ -18,8 +18,9 @@ from diagnosis.decision.infer import (
     _best_of,
     _InClass,
     _judged,
-    _raced,
+    _Scanned,
     _scanned_in_classes,
+    _worth_a_fit,
     infer,
 )
 from diagnosis.decision.posterior import KINDS, Judged, Posterior, decide
@@ -33,6 +34,7 @@ from diagnosis.engine.prepare import prepare_experiment
 from diagnosis.engine.unknown import TermParameter
 from diagnosis.results.findings import values_of
 from models.assembly.gearbox import Gearbox
+from models.base.types import Array
 from models.mechanisms import CATALOGUE, Placed
 from models.network.laws import Parameter, symbol
 from models.terms.term import Term
@@ -152,11 +154,17 @@ def named(name: str, place: str) -> Hypothesis:
     return Hypothesis(name=name, place=place, family="heat", variants=np.ones((1, 1)))
 
 
+def scanned_as(candidates: list[Hypothesis], log_bayes: Array) -> _Scanned:
+    return cast(_Scanned, SimpleNamespace(candidates=tuple(candidates), log_bayes=log_bayes,
+                                          log_prior=np.zeros(len(candidates))))  # fmt: skip
+
+
 def test_a_name_is_fitted_at_its_best_place_and_at_a_near_one() -> None:
     candidates = [named("near", "a"), named("near", "b"), named("near", "c"), named("far", "a"), named("far", "b")]
     log_bayes = np.array([20.0, 19.0, 18.5, 15.0, 15.0 - NEAR_PLACE])
-    chosen = _raced(candidates, log_bayes, np.argsort(-log_bayes))
+    chosen = _worth_a_fit(scanned_as(candidates, log_bayes))
     assert chosen == [0, 1, 3] and PLACES == 2
+    assert not _worth_a_fit(scanned_as(candidates, np.full(5, 0.9)))  # nothing explains anything
 
 
 def test_names_share_the_race() -> None:
@@ -165,8 +173,8 @@ def test_names_share_the_race() -> None:
         *(named("one", f"{i}") for i in range(3 * RACED)),
         *(named(f"law_{i}", "a") for i in range(2 * RACED)),
     ]
-    log_bayes = -0.01 * np.arange(len(candidates))
-    chosen = _raced(candidates, log_bayes, np.argsort(-log_bayes))
+    log_bayes = 20.0 - 0.01 * np.arange(len(candidates))
+    chosen = _worth_a_fit(scanned_as(candidates, log_bayes))
     names = [candidates[i].name for i in chosen]
     assert len(set(names)) == RACED and names.count("one") == PLACES
 
@@ -199,7 +207,7 @@ def test_a_share_of_a_swap_is_refused_with_a_number(
     monkeypatch.setattr(infer_module, "fit_over_sessions", lambda *_: SimpleNamespace(log_evidence=50.0))
     sure = ErrorClass(name="sure", prior=1.0, threshold=5.0, amplitudes={})
     one = Judged(effects=(swap,), log_prior=-5.0, log_bayes=40.0, fit=cast(Fit, fit), error_class=sure)
-    calibration = SimpleNamespace(chosen=SimpleNamespace(log_evidence=10.0))
-    found = _judged(cast(Calibration, calibration), one, 0, 0.0)
+    calibration = SimpleNamespace(chosen=SimpleNamespace(log_evidence=10.0), fit=SimpleNamespace(z=np.zeros(0)))
+    found = _judged(cast(Calibration, calibration), one, 0.0)
     assert np.isfinite(found.log_bayes)
     assert (found.log_bayes == 40.0) is possible and (found.log_bayes < -100.0) is not possible
