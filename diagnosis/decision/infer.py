@@ -14,7 +14,7 @@ import numpy as np
 from scipy.special import log_ndtr, logsumexp
 
 from diagnosis.candidates.hypotheses import Hypothesis
-from diagnosis.decision.posterior import Expected, Judged, Likeness, Posterior, ScaledError
+from diagnosis.decision.posterior import Expected, Judged, Likeness, Posterior, Repeating, ScaledError
 from diagnosis.decision.settings import Settings
 from diagnosis.engine.calibration import Calibration
 from diagnosis.engine.candidates import Scan, scan
@@ -34,6 +34,7 @@ REFITTED, SECONDS = 6, 2
 SETTLED_NAT, MOST_TURNS = 0.1, 5  # gain at which a fit has ended; how often it goes on at most
 IMPOSSIBLE = -1e3  # nats
 WHOLE = 0.3  # off 1, up to which two channels count as swapped
+WORSE, LEAST_DEVIATION = 2.0, 0.05  # times the deviation between sessions; prior standard deviations
 SCALED = (0.5, 1.0, 2.0)  # of the amplitudes of model error: what the scan says with each
 WORTH, WORTH_SHARE = 1.0, 0.1  # nats, and share of the best, from which a candidate is worth a fit
 
@@ -46,6 +47,7 @@ class _InClass:
     scan: Scan
     over: OverSessions
     ahead: float  # of the most probable class, without any candidate
+    parameters: Sequence[Hypothesis]
     log_bayes: Array  # against nothing in the most probable class
     strengths: Strengths
 
@@ -117,8 +119,23 @@ def infer(
             _with_scaled_error(calibration, found, candidates, log_prior, factor, settings.false_alarm_rate)
             for factor in SCALED
         ),
+        repeating=_repeating(first.in_class(error_class), first.log_prior),
         expected=_expected(first.in_class(chosen.error_class), settings),
     )
+
+
+def _repeating(here: _InClass, log_prior: Array) -> tuple[Repeating, ...]:
+    """Evidence of the scan in a class with the most probable deviation between sessions, and with a larger one."""
+    over, every = here.over, []
+    if len(over.deviations) == 1:
+        return ()
+    worse = np.searchsorted(over.deviations, WORSE * max(over.mean, LEAST_DEVIATION))
+    for at in (over.most_probable, min(int(worse), len(over.deviations) - 1)):
+        log = log_prior + _strengths(here.scan, here.parameters, over.given[at]).log_bayes
+        log[: len(here.scan.candidates)] -= here.scan.spread
+        best = (*here.scan.candidates, *here.parameters)[int(np.argmax(log))]
+        every.append(Repeating(deviation=float(over.deviations[at]), log_e=float(logsumexp(log)), best=best))
+    return tuple(every)
 
 
 def _scanned_in_classes(
@@ -142,7 +159,7 @@ def _in_class(
 ) -> _InClass:
     """Candidates in one class."""
     strengths = _strengths(found, parameters, over.given[over.most_probable])
-    return _InClass(error_class=error_class, ahead=ahead, scan=found, over=over,
+    return _InClass(error_class=error_class, ahead=ahead, scan=found, over=over, parameters=parameters,
                     log_bayes=_weighed(found, parameters, over) + ahead, strengths=strengths)  # fmt: skip
 
 

@@ -134,6 +134,25 @@ class ScaledError:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class Repeating:
+    """Evidence of the scan if the machine differs between sessions by so much.
+
+    Attributes
+    ----------
+    deviation : float
+        In prior standard deviations
+    log_e : float
+        Evidence that something is missing, [nat]
+    best : Hypothesis
+        The candidate ahead
+    """
+
+    deviation: float
+    log_e: float
+    best: Hypothesis
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Likeness:
     """How much alike effects look in these readings, with everything unknown marginalised.
 
@@ -193,6 +212,7 @@ class Posterior:
     session_s: float = 0.0
     remainder: float = 0.0
     scaled: tuple[ScaledError, ...] = ()
+    repeating: tuple[Repeating, ...] = ()
     expected: tuple[Expected, ...] = ()
 
     @property

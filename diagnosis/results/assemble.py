@@ -28,6 +28,7 @@ from diagnosis.results.result_parts import (
     NotDetectable,
     PredictedRun,
     Ranked,
+    Repeating,
     ScaledError,
     named,
 )
@@ -169,6 +170,11 @@ def assemble(
             for one in posterior.scaled
         ),
         session_s=posterior.session_s,
+        repeating=tuple(
+            Repeating(deviation_in_sd=one.deviation, log_e_value=one.log_e, mechanism=name_in(catalogue, one.best),
+                      place=one.best.place)
+            for one in posterior.repeating
+        ),
         holdout_gain=log_score_gain(final, plain, without_channels(judged, faulty), courses),
     )  # fmt: skip
 

@@ -7,7 +7,15 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from diagnosis.results.number_format import MINUS, number, with_error
-from diagnosis.results.result_parts import LEAST_RIVAL, MOST_NEAREST, NO_CLAIM, Finding, named, robustness_told
+from diagnosis.results.result_parts import (
+    LEAST_RIVAL,
+    MOST_NEAREST,
+    NO_CLAIM,
+    Finding,
+    named,
+    repeating_told,
+    robustness_told,
+)
 from models.mechanisms import OPEN_FORM
 from models.mechanisms.measurement import FAMILY as MEASUREMENT
 
@@ -130,8 +138,7 @@ def _how_sure(d: Diagnosis) -> tuple[str, ...]:
         lines.append(f"Model error assumed: class {d.error_class}{hides}.")
     if d.scaled_error and d.log_e_value > d.threshold:
         lines.append(robustness_told(d.scaled_error))
-    if d.session_s > LITTLE_SPREAD:
-        lines.append(f"Between sessions the machine differs by {d.session_s:.2f} of the priors' widths.")
+    lines += _sessions_told(d)
     far = sorted((c for c in d.calibration if abs(c.shift_in_sd) > FAR_SD), key=lambda c: -abs(c.shift_in_sd))
     if far:
         told = [f"{c.parameter} = {c.value:.3g}{_unit(c.unit)} ({abs(c.shift_in_sd):.1f} sd)"
@@ -140,6 +147,15 @@ def _how_sure(d: Diagnosis) -> tuple[str, ...]:
     if d.remaining_note:
         lines.append(f"Remaining: {d.remaining_note}")
     return tuple(lines)
+
+
+def _sessions_told(d: Diagnosis) -> list[str]:
+    lines = []
+    if d.repeating and d.log_e_value > d.threshold:
+        lines.append(repeating_told(*d.repeating))
+    if d.session_s > LITTLE_SPREAD:
+        lines.append(f"Between sessions the machine differs by {d.session_s:.2f} of the priors' widths.")
+    return lines
 
 
 def _how_much_better(d: Diagnosis) -> tuple[str, ...]:

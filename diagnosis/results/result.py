@@ -19,6 +19,7 @@ from diagnosis.results.result_parts import (
     NotDetectable,
     PredictedRun,
     Ranked,
+    Repeating,
     ScaledError,
     or_none,
 )
@@ -94,6 +95,8 @@ class Diagnosis:
     scaled_error : tuple of ScaledError
     session_s : float
         Deviation between sessions that the data support, in prior standard deviations
+    repeating : tuple of Repeating
+        What the scan says if sessions differ as the data support, and by more; empty of one session
     holdout_gain : float
         Log predictive density of the held-out readings: final model less the calibrated one, [nat]; NaN without any
     faulty : tuple of str
@@ -141,6 +144,7 @@ class Diagnosis:
     error_evidence: Mapping[str, float] = field(default_factory=dict)
     scaled_error: tuple[ScaledError, ...] = ()
     session_s: float = 0.0
+    repeating: tuple[Repeating, ...] = ()
     holdout_gain: float = math.nan
     faulty: tuple[str, ...] = ()
     terms: tuple[Term, ...] = ()
@@ -183,7 +187,7 @@ class Diagnosis:
                          "matters_K": self.matters_K, "matters_W": self.matters_W},
             "model_error": {"class": self.error_class, "evidence": dict(self.error_evidence),
                             "scaled": [asdict(one) for one in self.scaled_error]},
-            "sessions": {"deviation_in_sd": self.session_s},
+            "sessions": {"deviation_in_sd": self.session_s, "repeating": [asdict(one) for one in self.repeating]},
             "remaining": {
                 "p_value": or_none(self.remaining_p_value),
                 "note": self.remaining_note,

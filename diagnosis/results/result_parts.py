@@ -224,6 +224,43 @@ class ScaledError:
         return named(self.mechanism, self.place) if self.log_e_value > self.threshold else "nothing"
 
 
+@dataclass(frozen=True, kw_only=True)
+class Repeating:
+    """Evidence of the scan of all candidates if the machine differs between sessions by so much.
+
+    Attributes
+    ----------
+    deviation_in_sd : float
+        In standard deviations of the priors
+    log_e_value : float
+        Evidence that something is missing, [nat]
+    mechanism, place : str
+        The candidate ahead
+    """
+
+    deviation_in_sd: float
+    log_e_value: float
+    mechanism: str
+    place: str
+
+
+def repeating_told(supported: Repeating, worse: Repeating) -> str:
+    """Sentence on what the scan would say if the machine repeated worse.
+
+    Examples
+    --------
+    >>> from dataclasses import replace
+    >>> one = Repeating(deviation_in_sd=0.05, log_e_value=40.2, mechanism="windage", place="oil")
+    >>> repeating_told(one, replace(one, deviation_in_sd=0.1, log_e_value=31.0))
+    'Evidence before fits 40 nat; 31 nat if sessions differ by 0.1 prior widths instead of 0.05: windage at oil ahead.'
+    """
+    ahead = ", then ".join(dict.fromkeys(named(one.mechanism, one.place) for one in (supported, worse)))
+    return (
+        f"Evidence before fits {supported.log_e_value:.0f} nat; {worse.log_e_value:.0f} nat if sessions differ by "
+        f"{worse.deviation_in_sd:g} prior widths instead of {supported.deviation_in_sd:g}: {ahead} ahead."
+    )
+
+
 def robustness_told(every: Sequence[ScaledError]) -> str:
     """Sentence on the evidence that the scan gives with model error of all sizes.
 

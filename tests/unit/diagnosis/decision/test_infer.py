@@ -92,6 +92,14 @@ def test_nothing_gets_the_evidence_that_it_has_from_the_point_of_an_explanation(
     assert right.log_e > 10.0 and found.log_e == pytest.approx(right.log_e, abs=3.0)
 
 
+def test_the_scan_is_told_for_a_machine_that_repeats_worse(concealed: Posterior) -> None:
+    """With sessions that may differ by more, less of the difference between them is evidence."""
+    supported, worse = concealed.repeating
+    assert worse.deviation >= 2.0 * supported.deviation and worse.deviation > 0.0
+    assert {one.best.label for one in concealed.repeating} == {"windage@oil"}
+    assert worse.log_e < supported.log_e and supported.log_e > 5.0
+
+
 def test_the_scan_is_told_for_less_and_more_model_error(concealed: Posterior, healthy: Posterior) -> None:
     half, assumed, twice = concealed.scaled
     assert (half.factor, assumed.factor, twice.factor) == (0.5, 1.0, 2.0)

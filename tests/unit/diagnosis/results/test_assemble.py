@@ -163,7 +163,7 @@ def test_scorers_read_the_numbers(claimed: Diagnosis, fzg: Gearbox) -> None:
     assert answer.holdout_K == (claimed.holdout.calibrated, claimed.holdout.after)
     stored = json.loads(text)
     assert stored["schema"] == 1 and stored["model_error"]["class"] == "no-load losses"
-    assert stored["sessions"] == {"deviation_in_sd": 0.2}
+    assert stored["sessions"] == {"deviation_in_sd": 0.2, "repeating": []}
     assert sum(stored["kinds"].values()) == pytest.approx(1.0)
     assert stored["fit"]["holdout"]["log_score_gain"] == pytest.approx(claimed.holdout_gain)
 
