@@ -16,7 +16,7 @@ from diagnosis.engine.sessions import fit_over_sessions, over_sessions, with_dev
 from diagnosis.engine.set_apart import without_channels
 from models.base.types import Array
 
-TURNS = 3  # class, point, columns of model error and deviation between sessions settle together
+TURNS = 3  # with the chosen class: point, columns of model error and deviation between sessions settle together
 WIDEST_CLASS = "full"  # the point is calibrated with it: no parameter has to stand in for what the model cannot know
 
 
@@ -183,12 +183,12 @@ def _calibrated(experiment: Experiment, error: ModelError, start: Fit) -> Calibr
     first = [Near.of(experiment, error, one).fitted(widest, one) for one in (start, middles)]
     fit = max(first, key=lambda one: one.log_evidence).fit
     fit = Near.of(experiment, error, fit).fitted(widest, fit, iterations=ITERATIONS).fit
-    deviation = 0.0
-    for _ in range(TURNS):  # where one class leads the fit, another may have more evidence
-        near = Near.of(experiment, error, fit)
-        evidence = {one.name: near.log_evidence(one, fit.z) for one in classes}
-        best = max(classes, key=lambda one: evidence[one.name])
-        chosen = near.fitted(best, fit, deviation)
-        fit, deviation = chosen.fit, chosen.deviation
+    near = Near.of(experiment, error, fit)
+    evidence = {one.name: near.log_evidence(one, fit.z) for one in classes}
+    best = max(classes, key=lambda one: evidence[one.name])
+    chosen = near.fitted(best, fit)
+    for _ in range(TURNS - 1):
+        near = Near.of(experiment, error, chosen.fit)
+        chosen = near.fitted(best, chosen.fit, chosen.deviation)
     largest = max(evidence.values())
     return Calibration(chosen=chosen, evidence={name: value - largest for name, value in evidence.items()}, near=near)
