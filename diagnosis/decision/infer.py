@@ -47,7 +47,6 @@ class _InClass:
     scan: Scan
     over: OverSessions
     ahead: float  # of the most probable class, without any candidate
-    parameters: Sequence[Hypothesis]
     log_bayes: Array  # against nothing in the most probable class
     strengths: Strengths
 
@@ -119,22 +118,24 @@ def infer(
             _with_scaled_error(calibration, found, candidates, log_prior, factor, settings.false_alarm_rate)
             for factor in SCALED
         ),
-        repeating=_repeating(first.in_class(error_class), first.log_prior),
+        repeating=_repeating(first, error_class),
         expected=_expected(first.in_class(chosen.error_class), settings),
     )
 
 
-def _repeating(here: _InClass, log_prior: Array) -> tuple[Repeating, ...]:
+def _repeating(found: _Scanned, error_class: ErrorClass) -> tuple[Repeating, ...]:
     """Evidence of the scan in a class with the most probable deviation between sessions, and with a larger one."""
-    over, every = here.over, []
-    if len(over.deviations) == 1:
+    here = found.in_class(error_class)
+    deviations, supported = here.over.deviations, here.over.most_probable
+    worse = int(np.searchsorted(deviations, WORSE * max(deviations[supported], LEAST_DEVIATION)))
+    if worse >= len(deviations):
         return ()
-    worse = np.searchsorted(over.deviations, WORSE * max(over.mean, LEAST_DEVIATION))
-    for at in (over.most_probable, min(int(worse), len(over.deviations) - 1)):
-        log = log_prior + _strengths(here.scan, here.parameters, over.given[at]).log_bayes
-        log[: len(here.scan.candidates)] -= here.scan.spread
-        best = (*here.scan.candidates, *here.parameters)[int(np.argmax(log))]
-        every.append(Repeating(deviation=float(over.deviations[at]), log_e=float(logsumexp(log)), best=best))
+    every = []
+    for at in (supported, worse):
+        parameters = found.candidates[len(here.scan.candidates) :]
+        log = found.log_prior + _log_bayes(here.scan, parameters, here.over.given[at])
+        best = found.candidates[int(np.argmax(log))]
+        every.append(Repeating(deviation=float(deviations[at]), log_e=float(logsumexp(log)), best=best))
     return tuple(every)
 
 
@@ -159,7 +160,7 @@ def _in_class(
 ) -> _InClass:
     """Candidates in one class."""
     strengths = _strengths(found, parameters, over.given[over.most_probable])
-    return _InClass(error_class=error_class, ahead=ahead, scan=found, over=over, parameters=parameters,
+    return _InClass(error_class=error_class, ahead=ahead, scan=found, over=over,
                     log_bayes=_weighed(found, parameters, over) + ahead, strengths=strengths)  # fmt: skip
 
 
@@ -192,9 +193,13 @@ def _strengths(found: Scan, parameters: Sequence[Hypothesis], given: Given) -> S
 
 def _weighed(found: Scan, parameters: Sequence[Hypothesis], over: OverSessions) -> Array:
     """Log Bayes factors of all candidates, over variants and deviations between sessions."""
-    each = [_strengths(found, parameters, given).log_bayes for given in over.given]
-    best, count = over.weighed(each), len(found.candidates)
-    best[:count] -= found.spread
+    return over.weighed([_log_bayes(found, parameters, given) for given in over.given])
+
+
+def _log_bayes(found: Scan, parameters: Sequence[Hypothesis], given: Given) -> Array:
+    """Log Bayes factors of all candidates, over variants."""
+    best = np.array(_strengths(found, parameters, given).log_bayes)
+    best[: len(found.candidates)] -= found.spread
     return best
 
 

@@ -198,6 +198,9 @@ class Posterior:
         Mean deviation between sessions that the readings support, in prior standard deviations; 0 of one session
     remainder : float
         Log Bayes factor of the best further effect, given the best single one, [nat]
+    repeating : tuple of Repeating
+        With the deviation between sessions that the readings support, and with twice that or more; empty of one
+        session, and if none is larger
     """
 
     nothing: Judged

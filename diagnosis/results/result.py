@@ -96,7 +96,7 @@ class Diagnosis:
     session_s : float
         Deviation between sessions that the data support, in prior standard deviations
     repeating : tuple of Repeating
-        Evidence of the scan if sessions differ as the data support, and by more; empty of one session
+        Evidence of the scan if sessions differ as the data support, and by twice as much or more; else empty
     holdout_gain : float
         Log predictive density of the held-out readings: final model less the calibrated one, [nat]; NaN without any
     faulty : tuple of str

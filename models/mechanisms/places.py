@@ -70,6 +70,10 @@ def placements(network: ThermalNetwork, kind: Kind, pattern: str, channels: Sequ
     ('bearing_1-housing_lower', 'bearing_1-housing_upper')
     >>> [one.target for one in placements(network, "loss_factor", "each shafts>bearings", ())]
     [('bearing_1', 'bearing_2'), ('bearing_3', 'bearing_4')]
+    >>> [one.target for one in placements(network, "loss_factor", "churning+oil-gears", ())]
+    [('churning', 'pinion-oil', 'wheel-oil')]
+    >>> placements(network, "loss_factor", "churning+oil-air", ())
+    ()
     """
     if kind in ("source", "link"):
         found = _nodes(network, pattern)
@@ -117,7 +121,8 @@ def _sources(network: ThermalNetwork, pattern: str) -> Iterator[Placement]:
         yield from _held(network, holder, held)
         return
     wanted = [name for name in rest.split("+") if "-" not in name]
-    wet = [link for ends in rest.split("+") if "-" in ends for place in _links(network, ends) for link in place.target]
+    ends = "+".join(name for name in rest.split("+") if "-" in name)
+    links = [link for place in _links(network, ends) for link in place.target] if ends else []
     chosen = [
         source
         for source in network.sources
@@ -131,10 +136,10 @@ def _sources(network: ThermalNetwork, pattern: str) -> Iterator[Placement]:
     ]
     if each:
         yield from (Placement(name=source.name, target=(source.name,), here=(source.node,)) for source in chosen)
-    elif chosen:
+    elif chosen and bool(links) == bool(ends):
         name = "_".join(identifier(name.removeprefix(FACTOR)) for name in rest.split("+"))
         nodes = tuple(dict.fromkeys(source.node for source in chosen))
-        yield Placement(name=name, target=(*(source.name for source in chosen), *wet), here=nodes)
+        yield Placement(name=name, target=(*(source.name for source in chosen), *links), here=nodes)
 
 
 def _held(network: ThermalNetwork, holder: str, held: str) -> Iterator[Placement]:
