@@ -1,7 +1,8 @@
-"""From an experiment and its candidates to a posterior: scan, race, refit, second scan.
+"""From an experiment and its candidates to a posterior: scan, race, refit, second scan, third scan.
 
 The scan is linear and judges everything. A race of a few Gauss-Newton steps corrects it for the best names; the best of
-them are fitted to the end, model error in place; a second scan given the best explanation looks for a second effect.
+them are fitted to the end, model error in place; a second scan given the best explanation looks for a second effect, a
+third one given the best two for what they leave.
 """
 
 from __future__ import annotations
@@ -61,6 +62,16 @@ class _Scanned:
     classes: tuple[_InClass, ...]
     best: tuple[_InClass, ...]
 
+    @property
+    def order(self) -> list[int]:
+        """Indices of the candidates, most probable first."""
+        return [int(index) for index in np.argsort(-(self.log_bayes + self.log_prior))]
+
+    @property
+    def most(self) -> float:
+        """Log Bayes factor of the most probable candidate, [nat]."""
+        return float(self.log_bayes[self.order[0]])
+
     def in_class(self, error_class: ErrorClass) -> _InClass:
         return next(one for one in self.classes if one.error_class == error_class)
 
@@ -86,19 +97,24 @@ def infer(
     first = _scanned_in_classes(calibration, found, candidates, log_prior)
     judged = _raced(calibration, first, progress)
     alone = {one.label: float(value) for one, value in zip(first.candidates, first.log_bayes, strict=True)}
-    remainder, gained, pairs = 0.0, 0.0, list[Judged]()
-    best = max(judged.values(), key=lambda one: one.log_bayes + one.log_prior, default=None)
+    gained, pairs = 0.0, list[Judged]()
+    best = max(judged.values(), key=_weight, default=None)
+    error_class = chosen.error_class if best is None else best.error_class
+    threshold = rule().threshold(chosen.error_class, error_class, settings.false_alarm_rate)
     if best is not None and best.fit is not None and best.log_bayes > 0.0:
         progress(f"scanning again, given {best.label}")
-        of_class = first.in_class(best.error_class).ahead
-        remainder, pairs, there = _given_best(calibration, best, candidates, log_prior, of_class)
+        second = _scanned_given(calibration, best, candidates, log_prior)
+        judged[best.label] = replace(best, left=second.most)
+        pairs = sorted(_pairs(calibration, best, second), key=_weight, reverse=True)
+        if pairs and second.most > threshold:
+            progress(f"scanning once more, given {pairs[0].label}")
+            pairs[0] = replace(pairs[0], left=_scanned_given(calibration, pairs[0], candidates, log_prior).most)
+        there = _alone(calibration, best, second, first.in_class(best.error_class).ahead)
         alone |= {label: min(alone[label], value) for label, value in there.items()}
         progress("fitting nothing from there")
         gained = _nothing_gains(calibration, best)
     for index, candidate in enumerate(first.candidates):
         judged.setdefault(candidate.label, _by_scan(first, index, alone[candidate.label]))
-    error_class = chosen.error_class if best is None else best.error_class
-    threshold = rule().threshold(chosen.error_class, error_class, settings.false_alarm_rate)
     log_e = float(logsumexp([one.log_prior + one.log_bayes for one in judged.values()])) - gained
     missing = log_e > threshold
     unknown = _unknown(calibration, error_class, outside) if missing else []
@@ -113,7 +129,6 @@ def infer(
         error_class=(error_class if missing else chosen.error_class).name,
         error_evidence=dict(calibration.evidence),
         session_s=chosen.session_s,
-        remainder=remainder,
         scaled=tuple(
             _with_scaled_error(calibration, found, candidates, log_prior, factor, settings.false_alarm_rate)
             for factor in SCALED
@@ -212,7 +227,7 @@ def _raced(calibration: Calibration, found: _Scanned, progress: Progress) -> dic
         progress(f"fitting {label}", step, len(racing))
         start = calibration.in_class(found.best[index].error_class).fit
         judged[label] = _refitted(calibration, start, found, index, RACE_STEPS)
-    ahead = sorted(judged.values(), key=lambda one: -(one.log_bayes + one.log_prior))[:REFITTED]
+    ahead = sorted(judged.values(), key=_weight, reverse=True)[:REFITTED]
     for step, one in enumerate(ahead):
         progress(f"fitting {one.label} to the end", step, len(ahead))
         if one.fit is not None:
@@ -223,12 +238,12 @@ def _raced(calibration: Calibration, found: _Scanned, progress: Progress) -> dic
 def _worth_a_fit(found: _Scanned) -> list[int]:
     """Places of the best candidates by name, with a second place where it is near."""
     of_name: dict[str, list[int]] = {}
-    for index in np.argsort(-(found.log_bayes + found.log_prior)):
+    for index in found.order:
         mine = of_name.setdefault(found.candidates[index].name, [])
         if not mine and len(of_name) > RACED:
             break
         if not mine or (len(mine) < PLACES and found.log_bayes[mine[0]] - found.log_bayes[index] < NEAR_PLACE):
-            mine.append(int(index))
+            mine.append(index)
     worth = max(WORTH, WORTH_SHARE * float(found.log_bayes.max(initial=0.0)))
     every = [index for mine in list(of_name.values())[:RACED] for index in mine]
     return [index for index in every if found.log_bayes[index] > worth]
@@ -316,52 +331,46 @@ def _spread(found: _Scanned, index: int) -> float:
     return float(found.best[index].scan.spread[index])
 
 
-def _given_best(
-    calibration: Calibration, best: Judged, candidates: Sequence[Hypothesis], log_prior: Array, ahead: float
-) -> tuple[float, list[Judged], dict[str, float]]:
-    """Second effects given the best explanation, fitted; and all candidates alone, seen from there.
+def _weight(one: Judged) -> float:
+    """Evidence and prior of an explanation, [nat]."""
+    return one.log_bayes + one.log_prior
 
-    Returns
-    -------
-    remainder : float
-        Log Bayes factor of the best second effect, [nat]
-    pairs : list of Judged
-    alone : mapping of label to float
-        Log Bayes factors of all others against nothing, linear at the point of the best explanation, [nat]
-    """
-    fit, error_class = best.fit, best.error_class
+
+def _pairs(calibration: Calibration, best: Judged, second: _Scanned) -> list[Judged]:
+    """The best explanation with the best second effects, fitted."""
+    fit, pairs = best.fit, []
     assert fit is not None  # noqa: S101
-    mine = {effect.label for effect in best.effects}
-    left = [index for index, one in enumerate(candidates) if one.label not in mine]
-    second = _scanned_given(calibration, fit, error_class, [candidates[index] for index in left], log_prior[left])
-    order = np.argsort(-(second.log_bayes + second.log_prior))
-    pairs = []
-    for index in order[:SECONDS]:
-        one = _refitted(calibration, fit, second, int(index), RACE_STEPS + 2)
+    for index in second.order[:SECONDS]:
+        one = _refitted(calibration, fit, second, index, RACE_STEPS + 2)
         if one.fit is None:
             continue
         both = replace(one, effects=(*best.effects, *one.effects), log_prior=best.log_prior + one.log_prior)
-        both = _judged(calibration, both, _spread(second, int(index)))
+        both = _judged(calibration, both, _spread(second, index))
         pairs.append(_fitted_on(calibration, both))
-    return float(second.log_bayes[order[0]]), pairs, _alone(calibration, fit, second, ahead)
+    return pairs
 
 
-def _alone(calibration: Calibration, fit: Fit, second: _Scanned, ahead: float) -> dict[str, float]:
+def _alone(calibration: Calibration, best: Judged, second: _Scanned, ahead: float) -> dict[str, float]:
     """Log Bayes factors of all other candidates against nothing, by the scan at the best explanation, without it."""
-    found = second.classes[0].scan
+    fit, found = best.fit, second.classes[0].scan
+    assert fit is not None  # noqa: S101
     without = over_sessions(found.gram, fit.experiment, [*range(len(calibration.fit.z)), *found.further])
     log_bayes = _weighed(found, _parameters(second.candidates), without) + ahead
     return dict(zip((one.label for one in second.candidates), log_bayes.tolist(), strict=True))
 
 
 def _scanned_given(
-    calibration: Calibration, fit: Fit, error_class: ErrorClass, candidates: Sequence[Hypothesis], log_prior: Array
+    calibration: Calibration, given: Judged, candidates: Sequence[Hypothesis], log_prior: Array
 ) -> _Scanned:
-    """Scan at the fit of an explanation, against that explanation, with model error of its class."""
-    found, parameters = scan(fit, [one for one in candidates if one.term is not None]), _parameters(candidates)
+    """All others scanned at the fit of an explanation, against that explanation, with model error of its class."""
+    fit, mine = given.fit, {effect.label for effect in given.effects}
+    assert fit is not None  # noqa: S101
+    left = [index for index, one in enumerate(candidates) if one.label not in mine]
+    others = [candidates[index] for index in left]
+    found, parameters = scan(fit, [one for one in others if one.term is not None]), _parameters(others)
     base = len(calibration.fit.z)
     over = over_sessions(found.gram, fit.experiment, [*range(base), *found.further], range(base, len(fit.z)))
-    return _best_of([_in_class(error_class, found, parameters, over, 0.0)], candidates, log_prior, parameters)
+    return _best_of([_in_class(given.error_class, found, parameters, over, 0.0)], others, log_prior[left], parameters)
 
 
 def _nothing_gains(calibration: Calibration, best: Judged) -> float:

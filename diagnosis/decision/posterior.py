@@ -50,6 +50,8 @@ class Judged:
         Of model error: the one in which the scan gives it the largest evidence
     fit : Fit or None
         Fitted with everything else, model error in place; None if only the scan judged it
+    left : float or None
+        Log Bayes factor of the best further effect, given this explanation, [nat]; None: none was looked for
     """
 
     effects: tuple[Hypothesis, ...]
@@ -57,6 +59,7 @@ class Judged:
     log_bayes: float
     error_class: ErrorClass
     fit: Fit | None = None
+    left: float | None = None
 
     @property
     def kind(self) -> Kind:
@@ -196,8 +199,6 @@ class Posterior:
         Log evidence of every class without any effect, prior included, less that of the best
     session_s : float
         Mean deviation between sessions that the readings support, in prior standard deviations; 0 of one session
-    remainder : float
-        Log Bayes factor of the best further effect, given the best single one, [nat]
     repeating : tuple of Repeating
         With the deviation between sessions that the readings support, and with twice that or more; empty of one
         session, and if none is larger
@@ -213,20 +214,34 @@ class Posterior:
     error_class: str = ""
     error_evidence: dict[str, float] = field(default_factory=dict)
     session_s: float = 0.0
-    remainder: float = 0.0
     scaled: tuple[ScaledError, ...] = ()
     repeating: tuple[Repeating, ...] = ()
     expected: tuple[Expected, ...] = ()
 
     @property
-    def much_is_left(self) -> bool:
-        """True if the second scan finds much more, given the best single explanation.
+    def remainder(self) -> float:
+        """Log Bayes factor of the best further effect, given the best single one, [nat]; 0 if none was looked for."""
+        return self._looked_beyond.left or 0.0
 
-        Two effects look like that, and so does one whose law is not the true one (seen on the stranger's cases).
+    @property
+    def _looked_beyond(self) -> Judged:
+        """The single explanation that a further effect was looked for with; nothing if there is none."""
+        singles = (one for one in self.judged if len(one.effects) == 1)
+        return next((one for one in singles if one.left is not None), self.nothing)
+
+    def left_by(self, one: Judged | None) -> float:
+        """Log Bayes factor of the best further effect, given an explanation or else the best single one, [nat]."""
+        return self.remainder if one is None or one.left is None else one.left
+
+    def leaves_much(self, one: Judged) -> bool:
+        """True if a scan finds much more, given an explanation; of those without a scan, given the best single one.
+
+        Two effects look like that beside one, and so does one whose law is not the true one (seen on the stranger's
+        cases).
         """
         least, share = self.rule.much_left
-        most = max((one.log_bayes for one in self.judged if len(one.effects) == 1), default=0.0)
-        return self.remainder > max(least, share * most)
+        known = self._looked_beyond if one.left is None else one
+        return (known.left or 0.0) > max(least, share * known.log_bayes)
 
     @property
     def detected(self) -> bool:
@@ -382,8 +397,9 @@ def _best_fitted(posterior: Posterior) -> Judged:
 def _answer(posterior: Posterior, best: Judged, effect: Hypothesis, enough: float) -> Answer | None:
     """The narrowest set of names that holds enough probability."""
     name = name_of(effect)
-    vague = effect.how == "W" or effect.is_open or posterior.much_is_left
-    sure = posterior.rule.nearest if posterior.much_is_left else 1.0
+    much = posterior.leaves_much(best)
+    vague = effect.how == "W" or effect.is_open or much
+    sure = posterior.rule.nearest if much else 1.0
     own = posterior.of_names([name])
     answer = Answer(best=best, effect=effect, grade="likely", probability=sure * own, joint=sure * own, acts_like=vague)
     if own >= enough:

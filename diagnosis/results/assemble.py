@@ -137,7 +137,7 @@ def assemble(
         noise_K=setup.noise_K,
         floor=_floor(setup),
         misfit=_misfit(final),
-        remaining_p_value=_bound_on_chance(posterior.remainder),
+        remaining_p_value=_bound_on_chance(posterior.left_by(best)),
         remaining_note=_remaining(posterior, others, best),
         ranking=_ranking(posterior, catalogue),
         unseen=unseen,
@@ -278,13 +278,14 @@ def _remaining(posterior: Posterior, others: Others | None, best: Judged | None)
             return (f"something else is missing too (evidence {rest.log_e:.0f} nat without {channels}): "
                     "leave that out of the recordings and diagnose again")  # fmt: skip
         return f"without {channels} nothing stands out of noise and model error (evidence {rest.log_e:.1f} nat)"
-    if best is not None and best.kind == "pair":
+    if best is not None and best.kind == "pair" and best.left is None:
         return (
             f"two effects were fitted (evidence {posterior.remainder:.0f} nat of the second), no third was looked for"
         )
-    if posterior.remainder > posterior.threshold:
-        return f"a further effect would still help (evidence {posterior.remainder:.0f} nat)"
-    return f"nothing stands out of noise and model error (evidence {posterior.remainder:.1f} nat of a further effect)"
+    left = posterior.left_by(best)
+    if left > posterior.threshold:
+        return f"a further effect would still help (evidence {left:.0f} nat)"
+    return f"nothing stands out of noise and model error (evidence {left:.1f} nat of a further effect)"
 
 
 def _misfit(fit: Fit) -> float:

@@ -163,8 +163,8 @@ def named(name: str, place: str) -> Hypothesis:
 
 
 def scanned_as(candidates: list[Hypothesis], log_bayes: Array) -> _Scanned:
-    return cast(_Scanned, SimpleNamespace(candidates=tuple(candidates), log_bayes=log_bayes,
-                                          log_prior=np.zeros(len(candidates))))  # fmt: skip
+    return _Scanned(candidates=tuple(candidates), log_bayes=log_bayes, log_prior=np.zeros(len(candidates)),
+                    classes=(), best=())  # fmt: skip
 
 
 def test_a_name_is_fitted_at_its_best_place_and_at_a_near_one() -> None:

@@ -41,8 +41,11 @@ def judged(log_bayes: float, *effects: Hypothesis, log_prior: float | None = Non
     return Judged(effects=effects, log_prior=prior, log_bayes=log_bayes, error_class=error_classes()[0])
 
 
-def posterior(*each: Judged, **given: Any) -> Posterior:
+def posterior(*each: Judged, remainder: float | None = None, **given: Any) -> Posterior:
+    """Of some explanations; `remainder`: what a further effect explains beside the first one."""
     usual: dict[str, Any] = {"log_e": 100.0, "threshold": 5.0, "rule": rule()}
+    if remainder is not None:
+        each = (replace(each[0], left=remainder), *each[1:])
     return Posterior(nothing=judged(0.0), judged=each, **(usual | given))
 
 
@@ -220,6 +223,15 @@ def test_both_effects_of_a_pair_are_answered() -> None:
     answers = decide(found, Settings())
     assert [one.effect for one in answers] == [first, second] and found.of("pair") > ENOUGH
     assert [one.grade for one in answers] == ["claim", "claim"]
+
+
+@pytest.mark.parametrize(("left", "grade"), [(None, "likely"), (1.0, "claim"), (STRONG, "likely")])
+def test_a_pair_is_judged_by_what_it_leaves_itself(left: float | None, grade: str) -> None:
+    """One effect leaves the second; without a scan given both, nobody knows that they leave less."""
+    first, second = effect("first"), effect("second", "mesh")
+    both = replace(judged(2.0 * STRONG, first, second), left=left)
+    found = posterior(judged(STRONG, first), judged(STRONG, second), both, remainder=STRONG)
+    assert [one.grade for one in decide(found, Settings())] == [grade, grade]
 
 
 def test_a_pair_has_less_prior_than_one_effect() -> None:

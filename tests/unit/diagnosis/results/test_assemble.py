@@ -91,7 +91,11 @@ def judged_of(prepared: Prepared, name: str, place: str, log_bayes: float) -> Ju
                   error_class=error_classes()[0])  # fmt: skip
 
 
-def posterior_of(nothing: Fit, *judged: Judged, log_e: float = 80.0, **given: Any) -> Posterior:
+def posterior_of(
+    nothing: Fit, *judged: Judged, log_e: float = 80.0, remainder: float | None = None, **given: Any
+) -> Posterior:
+    if remainder is not None:
+        judged = (replace(judged[0], left=remainder), *judged[1:])
     return Posterior(
         nothing=Judged(effects=(), log_prior=0.0, log_bayes=0.0, fit=nothing, error_class=error_classes()[0]),
         judged=judged, log_e=log_e,
@@ -249,11 +253,13 @@ def test_a_link_that_changes_at_a_date_acts_like(
     assert "strength" not in finding.equation and "since" not in finding.equation
 
 
-def test_what_remains_beside_one_effect_is_known_and_beside_two_it_is_not(prepared: Prepared, windage: Judged) -> None:
+def test_what_remains_is_told_where_it_was_looked_for(prepared: Prepared, windage: Judged) -> None:
     pair = replace(windage, effects=(*windage.effects, effect_of(prepared[0], prepared[2], "pump_heat", "oil")))
     posterior = posterior_of(prepared[2], windage, pair, remainder=25.0)
     assert _remaining(posterior, None, windage) == "a further effect would still help (evidence 25 nat)"
     assert "25 nat of the second" in _remaining(posterior, None, pair)
+    for left, told in ((7.0, "a further effect would still help (evidence 7 nat)"), (1.0, "(evidence 1.0 nat of a")):
+        assert told in _remaining(posterior, None, replace(pair, left=left))
 
 
 def test_of_two_that_act_like_something_on_one_thing_the_larger_is_reported(
