@@ -135,8 +135,8 @@ def learnt_error(error: ModelError, values: Array, spread: Spread, network: Ther
                 node = node_of_channel(channel, network.node_names)
                 mixes.setdefault(channel, []).append(_mix(node, time, mine, spread))
     for node, heat in moved.items():
-        unknowns = np.max([np.abs(mine) for mine, _ in heat], axis=0)
-        terms.append(_term(f"heat into {node}", "source", (node,), unknowns, sp.Add(*(law for _, law in heat)), spread))
+        every = np.where(np.any([mine for mine, _ in heat], axis=0), values, 0.0)
+        terms.append(_term(f"heat into {node}", "source", (node,), every, sp.Add(*(law for _, law in heat)), spread))
     return LearntError(terms=tuple(terms), mixes={channel: tuple(found) for channel, found in mixes.items()})
 
 
@@ -168,4 +168,4 @@ def _term(
 
 def _mix(node: str, lag: float, values: Array, spread: Spread) -> Mix:
     size = float(np.linalg.norm(values))
-    return Mix(node=node, share=float(values.sum()), stderr=spread(values / size), lag=lag)
+    return Mix(node=node, share=float(np.clip(values.sum(), -1.0, 1.0)), stderr=spread(values / size), lag=lag)
