@@ -115,10 +115,10 @@ HYPHENATED = re.compile(r"(?<=[\s>])(?=[\w-]*-)[\w-]+(?=[\s<])")
 
 def keep_options_whole(_app: Sphinx, _page: str, _template: str, context: dict[str, object], _tree: object) -> None:
     """Let the lines of commands break between words only, and not after the hyphens of an option."""
-    whole = r'<span class="whole">\g<0></span>'
-    pieces = COMMANDS.split(str(context.get("body", "")))
-    pieces[1::2] = [HYPHENATED.sub(whole, piece) for piece in pieces[1::2]]
-    context["body"] = "".join(pieces)
+    if isinstance(body := context.get("body"), str):
+        pieces = COMMANDS.split(body)
+        pieces[1::2] = [HYPHENATED.sub(r'<span class="whole">\g<0></span>', piece) for piece in pieces[1::2]]
+        context["body"] = "".join(pieces)
 
 
 def setup(app: Sphinx) -> None:
