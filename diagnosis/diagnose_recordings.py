@@ -113,7 +113,8 @@ def diagnose(
             rest = infer(calibration.of_others, candidates, weights, settings, progress=progress)
         progress("predicting the recordings free-running")
         return assemble(
-            setup, experiment, posterior, decide(posterior, settings), plain=plain, settings=settings,
+            setup, experiment, posterior, decide(posterior, settings), plain=plain, near=calibration.near,
+            settings=settings,
             others=Others(fit=others, posterior=rest, channels=faulty) if rest is not None else None,
             catalogue=catalogue, train=train, held_out=held, jobs=jobs,
         )  # fmt: skip

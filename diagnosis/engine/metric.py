@@ -153,6 +153,10 @@ class Metric:
                 found[p] = shared + self.deviation * deviation[: self.shared]
         return found
 
+    def spread(self, combination: Array) -> float:
+        """Standard deviation that the readings leave to a combination of the shared columns, shape (n,)."""
+        return float(np.linalg.norm(solve_triangular(self._factors[2], combination, lower=True)))
+
     def _along(self, columns: Sequence[Array]) -> tuple[list[Array], Array]:
         """Components of columns along what is marginalised: of every session, then of what all share."""
         roots, across, whole = self._factors

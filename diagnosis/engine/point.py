@@ -16,6 +16,7 @@ from diagnosis.forward.sensor_fault import delayed
 from diagnosis.forward.term_on_grid import TermOnGrid, input_slope, moved_heat
 from diagnosis.forward.trajectory import Trajectory, parameter_heats, settled_balance
 from models.base.types import Array
+from models.correction.instruments import Mix
 from models.quantities.quantities import is_total_loss
 from models.terms.term import Term
 
@@ -30,10 +31,14 @@ class Machine:
     ----------
     terms : sequence of Term
         What shifts an input or distorts a reading
+    mixes : mapping of str to sequence of Mix, optional
+        What thermometers feel beside their own nodes, by channel
     """
 
-    def __init__(self, model: NetworkOnGrid, terms: Sequence[Term] = ()) -> None:
-        self.model, self.terms = model, tuple(terms)
+    def __init__(
+        self, model: NetworkOnGrid, terms: Sequence[Term] = (), mixes: Mapping[str, Sequence[Mix]] | None = None
+    ) -> None:
+        self.model, self.terms, self.mixes = model, tuple(terms), mixes or {}
         self.inputs = model.laws.inputs
         self.parameter_index = {p.name: i for i, p in enumerate(model.network.parameters)}
         self.on_grid = {term.label: TermOnGrid(model, term) for term in terms}
@@ -91,7 +96,7 @@ class Setting:
     def sensors(self) -> Sensors:
         """The sensors."""
         return Sensors(channels=self.channels, lag=self.lag, bias=self.bias, loss_gain=self.loss_gain,
-                       loss_delay=self.loss_delay)  # fmt: skip
+                       loss_delay=self.loss_delay, mixes=self.machine.mixes)  # fmt: skip
 
     def piece(self, piece: Piece, known: Trajectory | None) -> Piece:
         """The piece with its inputs as they probably were."""

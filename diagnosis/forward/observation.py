@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -10,6 +11,7 @@ from diagnosis.forward.network_on_grid import NetworkOnGrid
 from diagnosis.forward.recurrence import lagged
 from diagnosis.forward.trajectory import Trajectory
 from models.base.types import Array
+from models.correction.instruments import Mix
 from models.quantities.quantities import is_total_loss
 
 
@@ -27,6 +29,8 @@ class Sensors:
         Factor on the total loss, [-]
     loss_delay : float
         Of the total loss behind the inputs, [s]; negative where it is ahead
+    mixes : mapping of str to sequence of Mix
+        What thermometers feel beside their own nodes, by channel
     """
 
     channels: tuple[str, ...]
@@ -34,14 +38,29 @@ class Sensors:
     bias: Array
     loss_gain: float = 1.0
     loss_delay: float = 0.0
+    mixes: Mapping[str, Sequence[Mix]] = field(default_factory=dict)
+
+
+def boundary_temperatures(model: NetworkOnGrid, trajectory: Trajectory) -> dict[str, Array]:
+    """Temperatures of the boundaries at the middles of the intervals, shape (K,) each, [degC]."""
+    T = trajectory.middle
+    found = model.laws.boundary(*model.signals(trajectory.piece, T, trajectory.values, trajectory.memory))
+    return {name: np.broadcast_to(np.asarray(each, dtype=float), T.shape[:1])
+            for name, each in zip(model.laws.boundaries, found, strict=True)}  # fmt: skip
 
 
 def readings(model: NetworkOnGrid, trajectory: Trajectory, sensors: Sensors) -> Array:
     """Readings of the sensors along a trajectory, shape (K + 1, channels), [degC] or [W]."""
     read = np.empty((len(trajectory.T), len(sensors.channels)))
+    nodes = dict(zip(model.parts, trajectory.T.T, strict=False))
+    if sensors.mixes:
+        nodes |= {name: total_at_points(T) for name, T in boundary_temperatures(model, trajectory).items()}
     for index, name in enumerate(sensors.channels):
-        read[:, index] = delayed_loss(trajectory, sensors.loss_delay) * sensors.loss_gain if is_total_loss(name) else (
-            lagged(trajectory.T[:, model.part_index(name)], trajectory.piece.steps, sensors.lag[index]))  # fmt: skip
+        if is_total_loss(name):
+            read[:, index] = delayed_loss(trajectory, sensors.loss_delay) * sensors.loss_gain
+        else:
+            felt = _felt(model, nodes, sensors, name, trajectory)
+            read[:, index] = lagged(felt, trajectory.piece.steps, sensors.lag[index])
     error = trajectory.piece.error
     return np.asarray(read + sensors.bias + (0.0 if error is None else error.reading))
 
@@ -65,14 +84,28 @@ def reading_columns(
     Array, shape (K + 1, channels, columns)
     """
     read = np.empty((len(T), len(sensors.channels), T.shape[-1]))
+    nodes = dict(zip(model.parts, np.moveaxis(T, 1, 0), strict=False))
     for index, name in enumerate(sensors.channels):
         if is_total_loss(name):
             slope = 0.5 * trajectory.loss_slope[:, None, :]
             loss = (slope @ T[1:] + slope @ T[:-1])[:, 0] + direct_loss
             read[:, index] = total_at_points(loss) * sensors.loss_gain
         else:
-            read[:, index] = lagged(T[:, model.part_index(name)], trajectory.piece.steps, sensors.lag[index])
+            felt = _felt(model, nodes, sensors, name, trajectory)
+            read[:, index] = lagged(felt, trajectory.piece.steps, sensors.lag[index])
     return read
+
+
+def _felt(
+    model: NetworkOnGrid, nodes: Mapping[str, Array], sensors: Sensors, channel: str, trajectory: Trajectory
+) -> Array:  # fmt: skip
+    """What a thermometer feels of temperatures, or of their changes; boundaries that are not given do not change."""
+    own = nodes[model.parts[model.part_index(channel)]]
+    felt = own
+    for one in sensors.mixes.get(channel, ()):
+        other = nodes.get(one.node, np.zeros_like(own))
+        felt = felt + one.share * (lagged(other, trajectory.piece.steps, one.lag) - own)
+    return felt
 
 
 def total_at_points(loss: Array) -> Array:

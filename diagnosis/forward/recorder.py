@@ -125,11 +125,11 @@ def _reading(columns: Columns, sensor: SensorCorrection, node: str) -> Array:
     time, true = columns["time_s"], np.asarray(columns[channel_column(node)], dtype=float)
     if is_total_loss(sensor.channel):
         return sensor.gain * (delayed(true, time, sensor.delay) if sensor.delay else true) + sensor.bias
-    mixed = true
+    steps, mixed = np.diff(time), true
     for one in sensor.mix:
-        other = columns.get(channel_column(one.node))
-        mixed = mixed + one.share * ((columns["T_ambient_degC"] if other is None else other) - true)
-    return lagged(mixed, np.diff(time), sensor.lag) + sensor.bias
+        other = columns.get(channel_column(one.node), columns.get("T_ambient_degC"))
+        mixed = mixed + one.share * (lagged(np.asarray(other, dtype=float), steps, one.lag) - true)
+    return lagged(mixed, steps, sensor.lag) + sensor.bias
 
 
 def true_start(start: RecordedStart, correction: Correction) -> RecordedStart:

@@ -15,7 +15,7 @@ from diagnosis.forward.extra_states import Memories
 from diagnosis.forward.grid import Piece
 from diagnosis.forward.kept import kept
 from diagnosis.forward.network_on_grid import NetworkOnGrid
-from diagnosis.forward.observation import Sensors
+from diagnosis.forward.observation import Sensors, boundary_temperatures
 from diagnosis.forward.sensor_fault import passed_on
 from diagnosis.forward.trajectory import Trajectory, settled_balance
 from models.base.types import Array
@@ -173,15 +173,14 @@ class TermOnGrid:
 
     def _link_heat(self, trajectory: Trajectory, conductance: Array, other: Array, heat: Array) -> None:
         model, T = self.model, trajectory.middle
-        signals = model.signals(trajectory.piece, T, trajectory.values, trajectory.memory)
-        known = dict(zip(model.laws.boundaries, model.laws.boundary(*signals), strict=True))
+        known = boundary_temperatures(model, trajectory)
         *sides, end = self.term.target
         for node in sides:
             here = T[:, model.parts.index(node), None]
             if end in model.parts:
                 there = T[:, model.parts.index(end), None]
             else:
-                there = np.broadcast_to(known[end], (len(T),))[:, None] if end in known else other
+                there = known[end][:, None] if end in known else other
             flow = conductance / len(sides) * (here - there)
             heat[:, model.parts.index(node)] -= flow
             if end in model.parts:

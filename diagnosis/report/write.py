@@ -12,11 +12,12 @@ import pandas as pd
 from diagnosis.recordings.recording import Recording
 from diagnosis.results.result import Diagnosis
 from models.assembly.gearbox import Gearbox
-from models.correction.correction import Correction, Estimate, Finding, write_correction
+from models.correction.correction import MODEL_ERROR, Correction, Estimate, Finding, write_correction
 from models.quantities.quantities import is_total_loss
 from models.terms.term import Term
 
 SHAPE = "shape_"
+LEARNT = "What these recordings say of model error here; it names nothing."
 UNNAMED, IMPROVES = "without a name", "It improves the prediction; what it is, the data do not say."
 REPORT, NUMBERS, CORRECTION = "report.html", "diagnosis.json", "correction.toml"
 
@@ -38,6 +39,11 @@ def correction_of(diagnosis: Diagnosis, gearbox: Gearbox) -> Correction:
                 term, {name: (calibrated[name].value, calibrated[name].stderr)}, mechanism="shape",
                 family="calibration", place=name.removeprefix(SHAPE), says=term.strength.description, grade="learnt",
             ))  # fmt: skip
+    findings += [
+        Finding.of(term, {term.strength.name: (term.strength.start, term.strength.sd)}, mechanism=MODEL_ERROR,
+                   family="calibration", place=" ".join(term.target), says=LEARNT, grade="learnt")
+        for term in diagnosis.learnt
+    ]  # fmt: skip
     return Correction.of(
         gearbox,
         findings=findings,

@@ -9,7 +9,9 @@ import numpy as np
 
 from diagnosis.decision.posterior import KINDS, Answer, Judged, Posterior, act_on_the_same
 from diagnosis.decision.settings import Settings
+from diagnosis.engine.calibration import Near
 from diagnosis.engine.fit import Experiment, Fit
+from diagnosis.engine.learnt_error import is_writable, with_learnt_error
 from diagnosis.engine.predict import Prediction, log_score_gain, overall_rmse, predict, rmse, with_pieces_of
 from diagnosis.engine.prepare import held_out_experiment
 from diagnosis.engine.set_apart import calibrate_without_error, without_channels
@@ -74,6 +76,7 @@ def assemble(
     answers: Sequence[Answer],
     *,
     plain: Fit,
+    near: Near,
     others: Others | None = None,
     settings: Settings,
     catalogue: Mapping[str, Mechanism],
@@ -91,6 +94,8 @@ def assemble(
         Most important first
     plain : Fit
         The nominal machine calibrated without model error
+    near : Near
+        Where model error was linearised
     others : Others or None
         What all but faulty channels say, if there are any
     jobs : int
@@ -98,7 +103,9 @@ def assemble(
     """
     faulty = () if others is None else others.channels
     best = _best(posterior, answers)
-    final = _final(best, plain if others is None else others.fit, faulty)
+    judged = held_out_experiment(setup, experiment)
+    without = _final(best, plain if others is None else others.fit, faulty)
+    final, learnt = _with_learnt(best or posterior.nothing, near, faulty) or (without, ())
     findings = _distinct([
         (answer, finding_of(answer, answer.best.fit or final, setup, posterior, catalogue, train))
         for answer in answers
@@ -108,7 +115,6 @@ def assemble(
     unseen = tuple(one for one in _unseen(posterior, catalogue) if one.mechanism not in told)
     verdict = _verdict(posterior, answers, unseen)
     location = locations_of(setup, posterior) if posterior.detected else ()
-    judged = held_out_experiment(setup, experiment)
     predictions = _predictions(experiment, judged, plain, final, jobs)
     terms = _terms(best, final)
     sensors, true_inputs = sensors_and_inputs_of(
@@ -148,6 +154,7 @@ def assemble(
         courses=_courses(setup, predictions),
         network=setup.nominal,
         shapes=setup.shapes,
+        learnt=learnt,
         inputs={
             "recordings": {r.name: r.sha256 for r in train},
             "held_out": {r.name: r.sha256 for r in held_out},
@@ -211,6 +218,16 @@ def _final(best: Judged | None, plain: Fit, faulty: Sequence[str]) -> Fit:
         return calibrate_without_error(first, plain, faulty)
     except ArithmeticError:  # no solution without what model error allows
         return first
+
+
+def _with_learnt(best: Judged, near: Near, faulty: Sequence[str]) -> tuple[Fit, tuple[Term, ...]] | None:
+    """The best explanation with what was learnt of model error in it; None if a model cannot hold that.
+
+    No model error is to stand in for a broken sensor.
+    """
+    if best.fit is None or faulty or not is_writable(best.error_class):
+        return None
+    return with_learnt_error(best.fit, near, best.error_class)
 
 
 def _terms(best: Judged | None, final: Fit) -> tuple[Term, ...]:

@@ -93,12 +93,15 @@ def sensors_and_inputs_of(
             after.append((terms[unknown.label], estimate))
     for term, estimate in after:  # the engine shifts inputs after gains and offsets
         _collect_term(collected, term, estimate)
+    mixes = experiment.machine.mixes
     _collect_clock(collected, experiment.machine.inputs, has_loss=TOTAL_LOSS in experiment.pieces[0].channels)
     return (
         tuple(
-            SensorCorrection(channel=channel, **_table(collected.sensors[channel]))
+            SensorCorrection(
+                channel=channel, mix=tuple(mixes.get(channel, ())), **_table(collected.sensors.get(channel, {}))
+            )
             for channel in experiment.pieces[0].channels
-            if channel in collected.sensors
+            if channel in collected.sensors or channel in mixes
         ),
         tuple(
             InputCorrection(name=name, **_table(collected.inputs[name]))

@@ -78,6 +78,8 @@ class Diagnosis:
         The nominal one
     shapes : tuple of Term
         Tilts of the formulas that were calibrated along, see :mod:`diagnosis.setup.shapes`
+    learnt : tuple of Term
+        What was learnt of model error and is in the prediction, see :mod:`diagnosis.engine.learnt_error`
     inputs : mapping
         Hashes and version
     notes : tuple of str
@@ -135,6 +137,7 @@ class Diagnosis:
     network: ThermalNetwork
     shapes: tuple[Term, ...]
     inputs: Mapping[str, Any]
+    learnt: tuple[Term, ...] = ()
     notes: tuple[str, ...] = ()
     kinds: Mapping[str, float] = field(default_factory=dict)
     claim_from: float = 0.9

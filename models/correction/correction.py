@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 HEADER = "# Found by a diagnosis: the same gearbox definition plus this file is the corrected model.\n"
 BOUND_TOLERANCE = 1e-9  # a fit that ends at a bound may exceed it by rounding
 Grade = Literal["claim", "likely", "learnt"]
+MODEL_ERROR = "model error"  # mechanism of a finding that was learnt of it
 Sha256 = Annotated[str, StringConstraints(pattern=r"^[0-9a-f]{64}$")]
 NotNegative = Annotated[float, Field(ge=0.0)]
 
@@ -318,7 +319,7 @@ class Correction(Section):
             "findings": [
                 f"{'acts like ' if f.grade == 'likely' else ''}{f.mechanism} at {f.place}"
                 for f in self.findings
-                if f.mechanism != "shape"
+                if f.mechanism not in ("shape", MODEL_ERROR)
             ],
         }
 

@@ -6,7 +6,7 @@ channel = "oil"                # a node, <node>__<sensor>, or P_loss
 bias = 0.8                     # reading less truth, [K] or [W]
 bias_stderr = 0.1
 lag = 25.0                     # time constant, [s]
-mix = [{ node = "housing_lower", share = 0.05, stderr = 0.02 }]
+mix = [{ node = "housing_lower", share = 0.05, stderr = 0.02 }, { node = "oil", share = 0.1, lag = 150.0 }]
 
 [[input]]
 name = "T_ambient"
@@ -34,11 +34,15 @@ Positive = Annotated[float, Field(gt=0.0, le=1e9)]
 
 
 class Mix(Section):
-    """Share of another node in a reading: reading = (1 - share) node + share other node."""
+    """Share of another node in a reading, or of the sensor's own node behind time: ``lag`` is a time constant, [s].
+
+    reading = (1 - share) own node + share mixed node
+    """
 
     node: Name
     share: Annotated[float, Field(ge=-1.0, le=1.0)]
     stderr: NotNegative = 0.0
+    lag: NotNegative = 0.0
 
 
 class SensorCorrection(Section):
@@ -61,9 +65,9 @@ class SensorCorrection(Section):
             raise ValueError(f"{TOTAL_LOSS} has gain, delay and bias; lag and mix are those of a temperature")
         if not is_total_loss(self.channel) and (self.gain != 1.0 or self.delay):
             raise ValueError(f"gain and delay are those of {TOTAL_LOSS}; a temperature has mix, lag and bias")
-        nodes = [one.node for one in self.mix]
-        if len(set(nodes)) < len(nodes):
-            raise ValueError("a node is mixed in twice; keep one")
+        mixed = [(one.node, one.lag) for one in self.mix]
+        if len(set(mixed)) < len(mixed):
+            raise ValueError("a node is mixed in twice with the same lag; keep one")
         return self
 
 

@@ -13,6 +13,7 @@ from diagnosis.engine.fit import Experiment
 from diagnosis.engine.model_error.courses import SPEED, TEMPERATURE, TORQUE, Coordinate, Standard
 from diagnosis.engine.point import Point
 from diagnosis.forward.network_on_grid import NetworkOnGrid
+from diagnosis.forward.observation import boundary_temperatures
 from models.base.types import Array
 from models.network.laws import symbol
 from models.quantities.quantities import is_total_loss
@@ -76,14 +77,11 @@ class Anatomy:
     @cached_property
     def temperatures(self) -> Mapping[str, Array]:
         """Temperatures of all nodes at the middles of all intervals, [degC]."""
-        model, rows = self.model, [point.trajectory for point in self.points]
+        rows = [point.trajectory for point in self.points]
         T = np.concatenate([t.middle for t in rows])
         found = {part: T[:, index] for index, part in enumerate(self.parts)}
-        laws = [model.laws.boundary(*model.signals(t.piece, t.middle, t.values, t.memory)) for t in rows]
-        for index, name in enumerate(model.laws.boundaries):
-            each = [np.broadcast_to(law[index], t.middle.shape[:1]) for law, t in zip(laws, rows, strict=True)]
-            found[name] = np.concatenate(each)
-        return found
+        of_rows = [boundary_temperatures(self.model, t) for t in rows]
+        return found | {name: np.concatenate([each[name] for each in of_rows]) for name in self.model.laws.boundaries}
 
     @cached_property
     def sources_W(self) -> Array:

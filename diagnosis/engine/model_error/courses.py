@@ -21,11 +21,13 @@ from math import factorial
 from typing import Protocol
 
 import numpy as np
+import sympy as sp
 
 from diagnosis.engine.point import Point
-from diagnosis.forward.observation import total_at_points
+from diagnosis.forward.observation import boundary_temperatures, total_at_points
 from diagnosis.forward.recurrence import lagged
 from models.base.types import Array
+from models.network.laws import symbol
 
 SPEED, TORQUE, TEMPERATURE = "speed", "torque", "temperature"
 FARTHEST, WIDTH = 3.0, 1.5  # in standard deviations: where a coordinate is held, and the length of the kernel
@@ -54,6 +56,11 @@ class Coordinate:
         """Held within :data:`FARTHEST` standard deviations, in lengths of the kernel."""
         value = np.log(np.maximum(np.abs(raw), self.floor)) if self.floor > 0.0 else raw
         return np.asarray(np.clip((value - self.mean) / self.sd, -FARTHEST, FARTHEST) / WIDTH)
+
+    def law(self, raw: sp.Expr) -> sp.Expr:
+        """The same as an expression."""
+        value = sp.log(sp.Max(sp.Abs(raw), self.floor)) if self.floor > 0.0 else raw
+        return sp.Min(sp.Max((value - self.mean) / self.sd, -FARTHEST), FARTHEST) / WIDTH
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -89,6 +96,13 @@ class Standard:
     conductance: float
     rise: Mapping[str, float]
 
+    def law_of(self, coordinate: str) -> sp.Expr:
+        """A standardised coordinate as an expression of the network's signals."""
+        raw = symbol(coordinate)
+        if coordinate == TEMPERATURE:
+            raw = sp.Add(*(symbol(f"T_{part}") for part in self.warm)) / len(self.warm)
+        return self.coordinates[coordinate].law(raw)
+
 
 class View:
     """Courses of one piece by name."""
@@ -104,10 +118,7 @@ class View:
     @cached_property
     def boundaries(self) -> Mapping[str, Array]:
         """Temperatures of the boundaries at the middles of the intervals, shape (K,), [degC]."""
-        t, model = self.trajectory, self.model
-        found = model.laws.boundary(*model.signals(t.piece, t.middle, t.values, t.memory))
-        return {name: np.broadcast_to(np.asarray(T, dtype=float), t.middle.shape[:1])
-                for name, T in zip(model.laws.boundaries, found, strict=True)}  # fmt: skip
+        return boundary_temperatures(self.model, self.trajectory)
 
     def temperature(self, *nodes: str) -> Array:
         """Mean temperature of nodes at the middles of the intervals, shape (K,), [degC]."""
@@ -143,10 +154,14 @@ class View:
         """One smooth function of some coordinates, shape (K,); kept, since many laws use it."""
         if (names, powers) not in self._features:
             c = np.stack([self.coordinates[name] for name in names])
-            scale = np.sqrt(float(np.prod([factorial(power) for power in powers])))
-            value = np.exp(-0.5 * np.sum(c * c, axis=0)) * np.prod(c ** np.array(powers)[:, None], axis=0) / scale
+            product = np.prod(c ** np.array(powers)[:, None], axis=0)
+            value = np.exp(-0.5 * np.sum(c * c, axis=0)) * product / _scale(powers)
             self._features[names, powers] = value
         return self._features[names, powers]
+
+
+def _scale(powers: tuple[int, ...]) -> float:
+    return float(np.sqrt(np.prod([factorial(power) for power in powers])))
 
 
 class Course(Protocol):
@@ -196,6 +211,15 @@ class Smooth:
     def along(self, view: View) -> Array:
         """The functions."""
         return np.stack([view.feature(self.coordinates, powers) for powers in self.powers], axis=1)
+
+    def law(self, standard: Standard, values: Array) -> sp.Expr:
+        """Sum of the functions times `values`, shape (functions,), of the network's signals."""
+        c = [standard.law_of(name) for name in self.coordinates]
+        terms = (
+            value / _scale(powers) * sp.Mul(*(x**power for x, power in zip(c, powers, strict=True)))
+            for value, powers in zip(values.tolist(), self.powers, strict=True)
+        )
+        return sp.exp(-sp.Add(*(x**2 for x in c)) / 2) * sp.Add(*terms)
 
 
 @dataclass(frozen=True, kw_only=True)

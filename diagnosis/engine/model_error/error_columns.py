@@ -103,7 +103,7 @@ class ModelError:
         view, (points, channels) = View(point, self.standard), point.read.shape
         into = np.zeros((points - 1, point.trajectory.decay.shape[-1], last - first))
         loss, reading = np.zeros((points - 1, last - first)), np.zeros((points, channels, last - first))
-        for change, begin, end in self._between(first, last):
+        for change, begin, end in self.between(first, last):
             low, high = max(begin, first), min(end, last)
             mine = slice(low - first, high - first)
             if isinstance(change, HeatChange):
@@ -150,8 +150,8 @@ class ModelError:
         size = max(FEWEST_AT_ONCE, min(AT_ONCE, VALUES_AT_ONCE // len(point.trajectory.piece.steps)))
         return ((begin, min(begin + size, last)) for begin in range(first, last, size))
 
-    def _between(self, first: int, last: int) -> Iterator[tuple[Change, int, int]]:
-        """Changes with unknowns in a range; their own first and last unknowns."""
+    def between(self, first: int, last: int) -> Iterator[tuple[Change, int, int]]:
+        """Changes with unknowns in a range; the first unknown of each and the one after its last."""
         begin = 0
         for change in self.changes:
             end = begin + len(change.labels)

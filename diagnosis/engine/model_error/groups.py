@@ -85,6 +85,39 @@ class ReadingChange:
 Change = HeatChange | ReadingChange
 
 
+@dataclass(frozen=True, kw_only=True)
+class Near:
+    """A thermometer feels a neighbour of its node."""
+
+    channel: str
+    node: str
+
+    def __call__(self, view: View) -> Array:
+        """Along a piece, per share."""
+        own = view.model.parts[view.model.part_index(self.channel)]
+        return _by_sensor(view, self.channel, view.temperature_at_points(self.node) - view.temperature_at_points(own))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Late:
+    """A share of what a thermometer feels comes with a time constant, [s]."""
+
+    channel: str
+    time: float
+
+    def __call__(self, view: View) -> Array:
+        """Along a piece, per share."""
+        own = view.model.parts[view.model.part_index(self.channel)]
+        T = _by_sensor(view, self.channel, view.temperature_at_points(own))
+        return np.asarray(lagged(T, view.trajectory.piece.steps, self.time) - T)
+
+
+def _by_sensor(view: View, channel: str, T: Array) -> Array:
+    """A temperature as slow as a sensor follows it."""
+    sensors = view.point.sensors
+    return lagged(T, view.trajectory.piece.steps, float(sensors.lag[sensors.channels.index(channel)]))
+
+
 # ---------------------------------------------------------------------- base groups
 
 
@@ -112,7 +145,7 @@ def heat_splits(machine: Anatomy, course: Course | None = None) -> Iterator[Chan
         for node in dict.fromkeys(nodes[name] for name in family.members):
             names = tuple(name for name in family.members if nodes[name] == node)
             for target in machine.split_targets(node):
-                heat = partial(heats.split_heat, names=names, target=target)
+                heat = heats.SplitHeat(names=names, target=target)
                 yield HeatChange(place=f"{' '.join(names)} to {target}", heat=heat, course=course or CONSTANT)
 
 
@@ -120,14 +153,14 @@ def sensor_places(machine: Anatomy) -> Iterator[Change]:
     """A thermometer feels a neighbour of its node."""
     for channel in machine.thermometers:
         for node in machine.around_sensor(channel):
-            yield ReadingChange(channel=channel, what=f"near {node}", reading=partial(_near, channel, node))
+            yield ReadingChange(channel=channel, what=f"near {node}", reading=Near(channel=channel, node=node))
 
 
 def slow_sensors(machine: Anatomy) -> Iterator[Change]:
     """A share of a thermometer's reading comes late."""
     for channel in machine.thermometers:
         for time in machine.resolved(SENSOR_LAGS_S):
-            yield ReadingChange(channel=channel, what=f"{time:g} s late", reading=partial(_late, channel, time))
+            yield ReadingChange(channel=channel, what=f"{time:g} s late", reading=Late(channel=channel, time=time))
 
 
 def slow_cores(machine: Anatomy) -> Iterator[Change]:
@@ -227,11 +260,11 @@ GROUPS: Mapping[str, Callable[[Anatomy], Iterator[Change]]] = {
 
 
 def _of_sources(place: str, names: tuple[str, ...], course: Course | None = None) -> HeatChange:
-    return HeatChange(place=f"heat of {place}", heat=partial(heats.source_heat, names=names), course=course or CONSTANT)
+    return HeatChange(place=f"heat of {place}", heat=heats.SourceHeat(names=names), course=course or CONSTANT)
 
 
 def _of_links(place: str, names: tuple[str, ...], course: Course | None = None) -> HeatChange:
-    return HeatChange(place=f"path {place}", heat=partial(heats.link_heat, names=names), course=course or CONSTANT)
+    return HeatChange(place=f"path {place}", heat=heats.LinkHeat(names=names), course=course or CONSTANT)
 
 
 def _everything(machine: Anatomy, course: Course) -> Iterator[Change]:
@@ -253,21 +286,6 @@ def _link_course(machine: Anatomy, family: Family) -> Smooth | None:
     if not few:
         return _smooth(by, JOINT_DEGREE)
     return _smooth(by, DEGREE) if machine.of_oil(family) else _smooth(family.coordinates, JOINT_DEGREE)
-
-
-def _lagged(view: View, channel: str, T: Array) -> Array:
-    sensors = view.point.sensors
-    return lagged(T, view.trajectory.piece.steps, float(sensors.lag[sensors.channels.index(channel)]))
-
-
-def _near(channel: str, node: str, view: View) -> Array:
-    own = view.model.parts[view.model.part_index(channel)]
-    return _lagged(view, channel, view.temperature_at_points(node) - view.temperature_at_points(own))
-
-
-def _late(channel: str, time: float, view: View) -> Array:
-    T = _lagged(view, channel, view.temperature_at_points(view.model.parts[view.model.part_index(channel)]))
-    return np.asarray(lagged(T, view.trajectory.piece.steps, time) - T)
 
 
 def _zero(view: View) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,33 +16,52 @@ STEP = 0.01  # of the largest torque
 SPAN_K = 100.0  # that relative changes of a temperature mean
 
 
-def source_heat(view: View, *, names: tuple[str, ...]) -> Heat:
+@dataclass(frozen=True, kw_only=True)
+class SourceHeat:
     """Heat of some sources, into their own parts."""
-    into, loss = _nothing(view)
-    for name in names:
-        index = view.sources[name]
-        heat = view.point.balance.sources[:, index]
-        into[:, : view.model.n] += heat[:, None] * view.model.injection[index]
-        loss += heat * view.model.is_loss[index]
-    return Heat(into=into, loss=loss)
+
+    names: tuple[str, ...]
+
+    def __call__(self, view: View) -> Heat:
+        """Along a piece, per relative change."""
+        into, loss = _nothing(view)
+        for name in self.names:
+            index = view.sources[name]
+            heat = view.point.balance.sources[:, index]
+            into[:, : view.model.n] += heat[:, None] * view.model.injection[index]
+            loss += heat * view.model.is_loss[index]
+        return Heat(into=into, loss=loss)
 
 
-def link_heat(view: View, *, names: tuple[str, ...]) -> Heat:
+@dataclass(frozen=True, kw_only=True)
+class LinkHeat:
     """Heat flow through some links."""
-    into, loss = _nothing(view)
-    for name in names:
-        index, balance = view.links[name], view.point.balance
-        flow = balance.conductances[:, index] * balance.differences[:, index]
-        into[:, : view.model.n] += flow[:, None] * view.model.to_parts[index]
-    return Heat(into=into, loss=loss)
+
+    names: tuple[str, ...]
+
+    def __call__(self, view: View) -> Heat:
+        """Along a piece, per relative change."""
+        into, loss = _nothing(view)
+        for name in self.names:
+            index, balance = view.links[name], view.point.balance
+            flow = balance.conductances[:, index] * balance.differences[:, index]
+            into[:, : view.model.n] += flow[:, None] * view.model.to_parts[index]
+        return Heat(into=into, loss=loss)
 
 
-def split_heat(view: View, *, names: tuple[str, ...], target: str) -> Heat:
+@dataclass(frozen=True, kw_only=True)
+class SplitHeat:
     """Heat of some sources, from their own parts to another one."""
-    moved = source_heat(view, names=names).into
-    into = -moved
-    into[:, view.model.parts.index(target)] += moved.sum(axis=1)
-    return Heat(into=into, loss=np.zeros(len(into)))
+
+    names: tuple[str, ...]
+    target: str
+
+    def __call__(self, view: View) -> Heat:
+        """Along a piece, per share."""
+        moved = SourceHeat(names=self.names)(view).into
+        into = -moved
+        into[:, view.model.parts.index(self.target)] += moved.sum(axis=1)
+        return Heat(into=into, loss=np.zeros(len(into)))
 
 
 def pair_heat(view: View, *, pair: tuple[str, str]) -> Heat:
