@@ -46,10 +46,8 @@ def test_the_mechanisms_of_the_examples_have_places_and_names_of_their_own(fzg: 
     assert not {mechanism.name for mechanism in found} & set(CATALOGUE)
 
 
-def test_the_rod_is_drawn(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """From the recording in the repository, with the correction that was written by hand; errors as the page has them."""
+def test_the_rod_is_drawn(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    """From the recording in the repository, with the correction written by hand; the errors are those of the page."""
     monkeypatch.setattr("sys.argv", ["heated_rod.py", str(tmp_path / "rod.png")])
     runpy.run_path(str(EXAMPLES / "heated_rod.py"))
     nominal, corrected = (line.split()[1] for line in capsys.readouterr().out.splitlines()[:2])
