@@ -250,7 +250,8 @@ class Experiment:
         if self.metric is None or not self.metric.courses:
             return None
         found = self.metric.explained([part.residual - part.columns @ step for part in at.parts])
-        return [courses.along(values) for courses, values in zip(self.metric.courses, found, strict=True)]
+        shared = self.metric.shared
+        return [courses.along(values[:shared]) for courses, values in zip(self.metric.courses, found, strict=True)]
 
     def _attempt(
         self, z: Array, guesses: Sequence[Guess] | None, kept: Sequence[Linear] | None = None,

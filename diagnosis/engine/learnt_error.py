@@ -65,8 +65,9 @@ def is_writable(one: ErrorClass) -> bool:
 def with_learnt_error(fit: Fit, near: Near, error_class: ErrorClass) -> tuple[Fit, tuple[Term, ...]]:
     """The machine of a fit with the model error of its class written into it.
 
-    The values of the unknowns are those that were fitted with the straight lines of the same model error. Where the fit
-    is linearised, and so its covariance, remains that of the machine without: model error is marginalised there.
+    The values of the unknowns are those that were fitted with the straight lines of the same model error, deviations of
+    the tested session included. Where the fit is linearised, and so its covariance, remains that of the machine
+    without: model error is marginalised there.
 
     Parameters
     ----------
@@ -86,24 +87,25 @@ def with_learnt_error(fit: Fit, near: Near, error_class: ErrorClass) -> tuple[Fi
     assert metric is not None  # noqa: S101
     directions = near.directions(error_class)
     tested = next(i for i, piece in enumerate(experiment.pieces) if piece.recording not in experiment.healthy)
-    found = metric.explained([part.residual for part in fit.parts])[tested][: directions.shape[1]]
+    found = metric.explained([part.residual for part in fit.parts])[tested]
+    z = fit.z.copy()  # in the session that is predicted
+    z[: len(found) - metric.shared] += found[metric.shared :]
 
     def spread(combination: Array) -> float:
-        along = np.zeros(metric.shared)
-        along[: directions.shape[1]] = combination @ directions
-        return metric.spread(along)
+        return metric.spread(combination @ directions)
 
-    learnt = learnt_error(near.error, directions @ found, spread, experiment.machine.model.network)
-    return replace(fit, experiment=replace(experiment, machine=learnt.added_to(experiment.machine))), learnt.terms
+    learnt = learnt_error(near.error, directions @ found[: metric.shared], spread, experiment.machine.model.network)
+    there = replace(experiment, machine=learnt.added_to(experiment.machine))
+    return replace(fit, experiment=there, z=z), learnt.terms
 
 
 def learnt_error(error: ModelError, values: Array, spread: Spread, network: ThermalNetwork) -> LearntError:
-    """Terms and mixes of some values of model error; of other groups than :data:`WRITABLE` nothing is written.
+    """Terms and mixes of some values of model error.
 
     Parameters
     ----------
     values : Array, shape (unknowns,)
-        Per unit
+        Per unit; 0 in other groups than :data:`WRITABLE`
     network : ThermalNetwork
         That they are added to
     """
@@ -123,7 +125,7 @@ def learnt_error(error: ModelError, values: Array, spread: Spread, network: Ther
                 place = f"{one.place} law" if isinstance(course, Smooth) else one.place
                 terms.append(_term(place, kind, names, mine, law, spread))
             case groups.HeatChange(heat=heats.SplitHeat(names=names, target=target)):
-                share = sp.Float(values[begin], DIGITS)
+                share = float(values[begin])
                 for source in (each for each in network.sources if each.name in names):
                     moved.setdefault(source.node, []).append((mine, -share * _as_delivered(source.heat, network)))
                     moved.setdefault(target, []).append((mine, share * _as_delivered(source.heat, network)))

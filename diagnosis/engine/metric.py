@@ -132,7 +132,7 @@ class Metric:
         return np.asarray(a), np.asarray(b)
 
     def explained(self, residuals: Sequence[Array]) -> list[Array]:
-        """Most probable values of the shared columns in every piece, deviations of its session included.
+        """Most probable values of all columns in every piece, deviations of its session included.
 
         Parameters
         ----------
@@ -141,16 +141,14 @@ class Metric:
         Returns
         -------
         list of Array, shape (n,) each
+            Of columns that are not shared the deviation
         """
         (roots, across, whole), (mine, along) = self._factors, self._along([r[:, None] for r in residuals])
         shared = solve_triangular(whole.T, along[:, 0])
-        found = [shared] * len(residuals)
+        found = [np.pad(shared, (0, self.columns[0].shape[1] - self.shared))] * len(residuals)
         for root, over, own, pieces in zip(roots, across, mine, self.sessions, strict=True):
-            if not len(root):
-                continue
-            deviation = solve_triangular(root.T, own[:, 0] - over @ shared)
-            for p in pieces:
-                found[p] = shared + self.deviation * deviation[: self.shared]
+            for p in pieces if len(root) else ():
+                found[p] = found[p] + self.deviation * solve_triangular(root.T, own[:, 0] - over @ shared)
         return found
 
     def spread(self, combination: Array) -> float:

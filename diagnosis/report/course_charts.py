@@ -32,7 +32,7 @@ from models.base.types import Array
 from models.quantities.part_colours import AMBIENT, CALIBRATED, DELIVERED, MEASURED, part_colours
 from models.quantities.quantities import Input, node_of_channel
 
-STAGES = (("as delivered", "before"), ("calibrated", "calibrated"), ("with the findings", "after"))
+STAGES = (("as delivered", "before"), ("calibrated", "calibrated"), ("corrected", "after"))
 LINES: Mapping[str, dict[str, Any]] = {
     "before": {"dash": "dot", "width": 1.6, "color": DELIVERED},
     "calibrated": {"dash": "dash", "width": 1.6, "color": CALIBRATED},
@@ -74,7 +74,7 @@ class Shown:
 
 def stages_of(diagnosis: Diagnosis) -> tuple[tuple[str, str], ...]:
     """Return the models to compare; the last one only if it has more than the calibrated one."""
-    return STAGES if diagnosis.findings or diagnosis.terms else STAGES[:2]
+    return STAGES if diagnosis.has_correction else STAGES[:2]
 
 
 def recordings_of(diagnosis: Diagnosis) -> list[Shown]:
@@ -130,7 +130,7 @@ def measured_and_simulated(diagnosis: Diagnosis) -> Chart | None:
 
 
 def errors_over_time(diagnosis: Diagnosis) -> Chart | None:
-    """Errors of all sensors on one scale: calibrated, and with the findings."""
+    """Errors of all sensors on one scale: calibrated, and corrected."""
     shown = recordings_of(diagnosis)
     if not shown:
         return None

@@ -23,7 +23,7 @@ WORDS: Mapping[str, str] = {
     "as delivered": "The model as its definition has it, before any recording was seen.",
     "calibrated": "The same model with its existing parameters tuned to the recordings, each inside its prior. What a "
     "correction is worth counts against this, not against the model as delivered.",
-    "with the findings": "The calibrated model with the found physics added.",
+    "corrected": "The model with the found physics, and with what was learnt of model error where a model can hold it.",
     "held out": "Recordings that nothing was fitted to: their error is that of a model that got their inputs and no "
     "measured temperature beyond the first minutes, which do not count. They had no say in the findings.",
     "free-running": "Simulated from the start temperatures on with the recorded inputs alone, never corrected by a "

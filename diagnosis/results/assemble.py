@@ -47,7 +47,7 @@ from models.terms.term import Term
 VISIBLE_NAT = 5.0  # expected evidence below which an effect cannot be seen
 ENOUGH_VISIBLE = 0.1  # of the effects that were asked for, for a "consistent" that means something
 MOST_RANKED = 500
-STATES = ("before", "calibrated", "after")
+STATES = ("before", "calibrated", "found", "after")
 PROBABLY = 0.5
 Predictions = Mapping[str, Mapping[str, Sequence[Prediction]]]
 
@@ -106,6 +106,11 @@ def assemble(
     judged = held_out_experiment(setup, experiment)
     without = _final(best, plain if others is None else others.fit, faulty)
     final, learnt = _with_learnt(best or posterior.nothing, near, faulty) or (without, ())
+    try:
+        predictions = _predictions(experiment, judged, (plain, without, final), jobs)
+    except ArithmeticError:  # laws that were learnt may lead nowhere where nothing was recorded
+        final, learnt = without, ()
+        predictions = _predictions(experiment, judged, (plain, without, final), jobs)
     findings = _distinct([
         (answer, finding_of(answer, answer.best.fit or final, setup, posterior, catalogue, train))
         for answer in answers
@@ -115,7 +120,6 @@ def assemble(
     unseen = tuple(one for one in _unseen(posterior, catalogue) if one.mechanism not in told)
     verdict = _verdict(posterior, answers, unseen)
     location = locations_of(setup, posterior) if posterior.detected else ()
-    predictions = _predictions(experiment, judged, plain, final, jobs)
     terms = _terms(best, final)
     sensors, true_inputs = sensors_and_inputs_of(
         final, findings=[term.label for term in terms], inputs=setup.gearbox.network().inputs
@@ -323,29 +327,31 @@ def _floor(setup: InferenceSetup) -> str:
 # ---------------------------------------------------------------------- fits and courses
 
 
-def _predictions(experiment: Experiment, held_out: Experiment, plain: Fit, final: Fit, jobs: int) -> Predictions:
-    """Free-running predictions of the training and the held-out pieces: as delivered, calibrated and after."""
-    work: list[tuple[Experiment, Experiment, Array, Array, int, Array | None]] = []
-    near_train = [trajectory.T for trajectory in final.trajectories]
+def _predictions(experiment: Experiment, held_out: Experiment, fits: Sequence[Fit], jobs: int) -> Predictions:
+    """Free-running predictions of the training and the held-out pieces: as delivered, and by the fits of all states."""
+    work: list[tuple[list[tuple[Experiment, Array]], int, Array | None]] = []
+    different = list({id(fit): fit for fit in fits}.values())
+    near_train = [trajectory.T for trajectory in fits[-1].trajectories]
     for pieces_of, near in ((experiment, near_train), (held_out, [None] * len(held_out.pieces))):
-        one, other = (replace(with_pieces_of(fit.experiment, pieces_of), filters=None) for fit in (plain, final))
-        work += [(one, other, plain.z, final.z, index, T) for index, T in enumerate(near)]
+        there = [(replace(with_pieces_of(fit.experiment, pieces_of), filters=None), fit.z) for fit in different]
+        work += [(there, index, T) for index, T in enumerate(near)]
     found = run_parallel(_predicted, work, jobs=jobs)
+    of_states = [0, *(1 + different.index(fit) for fit in fits)]
 
     def by_state(of: Sequence[tuple[Prediction, ...]]) -> dict[str, list[Prediction]]:
-        return {state: [three[which] for three in of] for which, state in enumerate(STATES)}
+        return {state: [each[which] for each in of] for state, which in zip(STATES, of_states, strict=True)}
 
-    train = len(final.parts)
+    train = len(experiment.pieces)
     return {"train": by_state(found[:train]), "holdout": by_state(found[train:])}
 
 
-def _predicted(
-    plain: Experiment, final: Experiment, z: Array, z_final: Array, index: int, near: Array | None
-) -> tuple[Prediction, Prediction, Prediction]:
-    """One piece as delivered, calibrated and after; each starts from the one before, or the last from one `near` it."""
-    before = predict(plain, index, None)
-    tuned = predict(plain, index, z, guess=before.trajectory.T)
-    return before, tuned, predict(final, index, z_final, guess=tuned.trajectory.T if near is None else near)
+def _predicted(fits: Sequence[tuple[Experiment, Array]], index: int, near: Array | None) -> tuple[Prediction, ...]:
+    """One piece as delivered and by every fit; each starts from the one before, or the last from one `near` it."""
+    found = [predict(fits[0][0], index, None)]
+    for experiment, z in fits:
+        last = experiment is fits[-1][0] and near is not None
+        found.append(predict(experiment, index, z, guess=near if last else found[-1].trajectory.T))
+    return tuple(found)
 
 
 def _fits(setup: InferenceSetup, predictions: Mapping[str, Sequence[Prediction]], counting: Collection[str]) -> Fits:
@@ -361,7 +367,7 @@ def _fits(setup: InferenceSetup, predictions: Mapping[str, Sequence[Prediction]]
         name: (float(each["before"][i]), float(each["calibrated"][i]), float(each["after"][i]))
         for i, name in enumerate(setup.channels)
     }
-    return Fits(before=overall["before"], calibrated=overall["calibrated"], after=overall["after"], sensors=sensors)
+    return Fits(**overall, sensors=sensors)
 
 
 def _courses(setup: InferenceSetup, predictions: Predictions) -> tuple[PredictedRun, ...]:
@@ -370,7 +376,7 @@ def _courses(setup: InferenceSetup, predictions: Predictions) -> tuple[Predicted
 
     result, parts = [], [part.name for part in setup.nominal.parts]
     for which, states in predictions.items():
-        for before, calibrated, after in zip(*(states[state] for state in STATES), strict=True):
+        for before, calibrated, after in zip(states["before"], states["calibrated"], states["after"], strict=True):
             piece = before.piece
             at = np.clip(np.arange(len(piece.time)), 0, len(piece.steps) - 1)
             others = {name: after.trajectory.T[:, i] for i, name in enumerate(parts)}

@@ -162,18 +162,19 @@ def _how_much_better(d: Diagnosis) -> tuple[str, ...]:
     lines = []
     for name, fits in (("held-out", d.holdout), ("training", d.train)):
         if fits.before == fits.before:
-            after = f", {fits.after:.2f} K with the findings" if d.findings else ""
+            found = f", {fits.found:.2f} K with the findings" if d.findings else ""
+            learnt = f", {fits.after:.2f} K with what was learnt of model error" if d.learnt else ""
             lines.append(
-                f"RMSE {name}: {fits.before:.2f} K as delivered, {fits.calibrated:.2f} K calibrated{after} "
+                f"RMSE {name}: {fits.before:.2f} K as delivered, {fits.calibrated:.2f} K calibrated{found}{learnt} "
                 f"(noise {d.noise_K:.2f} K)"
             )
-    if d.findings and d.holdout.after > d.holdout.calibrated:
+    if d.has_correction and d.holdout.after > d.holdout.calibrated:
         lines.append("Held-out temperatures are not closer than with the calibrated model: predict with that one")
     named_terms = {finding.term.label for finding in d.findings if finding.term is not None}
     further = len([term for term in d.terms if term.label not in named_terms])
     if d.findings and further:
         lines.append(f"The findings' model holds {further} more effect{'s' * (further > 1)} without a certain name")
-    if d.findings and math.isfinite(d.holdout_gain):
+    if d.has_correction and math.isfinite(d.holdout_gain):
         way = "better" if d.holdout_gain >= 0.0 else "worse"
         lines.append(
             f"Held-out readings are predicted {way} than by the calibrated model, by "

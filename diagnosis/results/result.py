@@ -208,6 +208,11 @@ class Diagnosis:
         }  # fmt: skip
 
     @property
+    def has_correction(self) -> bool:
+        """True if the corrected model has more than calibrated parameters."""
+        return bool(self.findings or self.terms or self.learnt)
+
+    @property
     def verdict_text(self) -> str:
         """The verdict in a sentence."""
         return verdict_text_of(self)

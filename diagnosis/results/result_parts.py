@@ -316,11 +316,11 @@ class PredictedRun:
         By name in the network: speed [1/min], torque [N m], temperatures of the surroundings [degC] and others
     measured, before, calibrated, after : mapping of channel to Array, shape (rows,)
         [degC], or [W] for ``P_loss``; before: the model as delivered; calibrated: its parameters tuned inside their
-        priors; after: with the findings
+        priors; after: corrected, with findings and what was learnt of model error
     counts_from_s : float
         Rows before it served to find the start temperatures and do not count
     start : mapping of node to float
-        Temperatures of all nodes at the first row, with the findings, [degC]
+        Temperatures of all nodes at the first row, corrected, [degC]
     """
 
     recording: str
@@ -373,14 +373,16 @@ class Fits:
 
     Attributes
     ----------
-    before, calibrated, after : float
-        Over all temperatures, [K]; NaN without recordings
+    before, calibrated, found, after : float
+        Over all temperatures, as delivered, calibrated, with the findings alone, and with what was learnt of model
+        error too, [K]; NaN without recordings
     sensors : mapping of channel to (before, calibrated, after)
         [K], or [W] for ``P_loss``
     """
 
     before: float
     calibrated: float
+    found: float
     after: float
     sensors: Mapping[str, tuple[float, float, float]]
 
@@ -389,6 +391,7 @@ class Fits:
         return {
             "rmse_before_K": or_none(self.before),
             "rmse_calibrated_K": or_none(self.calibrated),
+            "rmse_findings_K": or_none(self.found),
             "rmse_after_K": or_none(self.after),
             "sensors": {
                 name: dict(zip(("before", "calibrated", "after"), map(or_none, errors), strict=True))

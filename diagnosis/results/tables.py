@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 Table = Literal["findings", "explanations", "calibration", "errors"]
 MOST_BARS, LEAST_DRAWN = 10, 0.005
 MODELS = ("before", "calibrated", "after")
-LEGEND = {"before": "as delivered", "calibrated": "calibrated", "after": "with the findings"}
+LEGEND = {"before": "as delivered", "calibrated": "calibrated", "after": "corrected"}
 
 
 def table_of(diagnosis: Diagnosis, what: Table) -> pd.DataFrame:

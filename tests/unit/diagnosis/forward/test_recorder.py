@@ -96,6 +96,13 @@ def test_readings_of_a_sensor(fzg: Gearbox) -> None:
     assert TIME[np.argmax(read["P_loss_W_as_recorded"] > 330.0)] == 550.0
 
 
+def test_a_share_of_a_reading_that_comes_late(fzg: Gearbox) -> None:
+    """Of a ramp a fifth is behind by its time constant, so the whole is by a fifth of that."""
+    oil = SensorCorrection(channel="oil", mix=(Mix(node="oil", share=0.2, lag=40.0), Mix(node="oil", share=0.0)))
+    read = read_as_recorded(RESULT, Correction.of(fzg, sensors=[oil]))["T_oil_degC_as_recorded"]
+    np.testing.assert_allclose((RESULT["T_oil_degC"] - read)[60:], 0.2 * 40.0 / 50.0, rtol=1e-3)
+
+
 def test_several_sensors_at_a_node(fzg: Gearbox) -> None:
     sensors = [SensorCorrection(channel="oil__sump", bias=1.0), SensorCorrection(channel="oil__drain", bias=-1.0)]
     read = read_as_recorded(RESULT, Correction.of(fzg, sensors=sensors))

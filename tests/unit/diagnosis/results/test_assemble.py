@@ -14,12 +14,15 @@ import pytest
 from diagnosis.candidates.hypotheses import Hypothesis, hypothesis_of
 from diagnosis.decision.posterior import Answer, Expected, Judged, Posterior
 from diagnosis.decision.settings import Settings
+from diagnosis.engine.calibration import Near
 from diagnosis.engine.families import candidates_of
 from diagnosis.engine.fit import Experiment, Fit, calibrate
 from diagnosis.engine.learnt import error_classes, rule
+from diagnosis.engine.model_error import ModelError
 from diagnosis.engine.prepare import held_out_experiment, prepare_experiment
 from diagnosis.engine.refit import refit, with_candidate
 from diagnosis.engine.unknown import NetworkParameter
+from diagnosis.forward.recorder import simulated_as_recorded
 from diagnosis.proof.scoring.answers import read_answer
 from diagnosis.recordings.recording import Recording
 from diagnosis.report import page
@@ -28,7 +31,8 @@ from diagnosis.results.assemble import _distinct, _remaining, assemble
 from diagnosis.results.result import Diagnosis
 from diagnosis.setup.inference_setup import InferenceSetup
 from models.assembly.gearbox import Gearbox
-from models.correction.correction import correction_text, read_correction, write_correction
+from models.correction.correction import MODEL_ERROR, correction_text, read_correction, write_correction
+from models.files.cycle import Cycle
 from models.mechanisms import CATALOGUE, Scale
 from tests.unit.diagnosis.inference_example import recording_of
 
@@ -107,12 +111,18 @@ Assemble = Callable[..., Diagnosis]
 
 
 @pytest.fixture(scope="module")
-def assembled(prepared: Prepared, recordings: tuple[Recording, Recording]) -> Assemble:
+def near(prepared: Prepared) -> Near:
+    _, experiment, plain = prepared
+    return Near.of(experiment, ModelError.of(experiment), plain)
+
+
+@pytest.fixture(scope="module")
+def assembled(prepared: Prepared, near: Near, recordings: tuple[Recording, Recording]) -> Assemble:
     setup, experiment, plain = prepared
 
     def result(posterior: Posterior, answers: list[Answer], **given: Any) -> Diagnosis:
         return assemble(
-            setup, given.pop("experiment", experiment), posterior, answers, plain=plain, settings=Settings(),
+            setup, given.pop("experiment", experiment), posterior, answers, plain=plain, near=near, settings=Settings(),
             catalogue=CATALOGUE, train=recordings[:1], held_out=recordings[1:], **given,
         )  # fmt: skip
 
@@ -394,3 +404,27 @@ def test_held_out_pieces_have_the_same_unknowns(prepared: Prepared) -> None:
     setup, experiment, _ = prepared
     judged = held_out_experiment(setup, experiment)
     assert judged.unknowns == experiment.unknowns and [p.recording for p in judged.pieces] == ["judged"]
+
+
+def test_what_was_learnt_of_model_error_is_in_prediction_and_correction(
+    assembled: Assemble, prepared: Prepared, near: Near, recordings: tuple[Recording, Recording], fzg: Gearbox
+) -> None:
+    """The full model with the correction, read through its sensors, gives the prediction that was judged."""
+    splits = next(one for one in error_classes() if one.name == "splits and law errors")
+    fit = near.fitted(splits, prepared[2]).fit
+    posterior = posterior_of(fit, log_e=-1.0)
+    found = assembled(replace(posterior, nothing=replace(posterior.nothing, error_class=splits)), [])
+    assert found.verdict in ("consistent", "insufficient_data") and found.learnt and found.has_correction
+    assert found.holdout.found == found.holdout.calibrated > found.holdout.after
+    correction = correction_of(found, fzg)
+    assert {one.mechanism for one in correction.findings if one.label.startswith("learnt_")} == {MODEL_ERROR}
+    assert any(sensor.mix for sensor in correction.sensors)
+    assert "with what was learnt of model error" in str(found)
+    (course,) = (one for one in found.courses if one.held_out)
+    network, cycle = correction.network(fzg), Cycle(recordings[1].time, recordings[1].inputs)
+    read = simulated_as_recorded(cycle, correction, lambda driven: network.simulate(
+        driven, losses=fzg.losses(), initial=course.start).columns())  # fmt: skip
+    for name in ("oil", "bearing_1"):
+        there = np.interp(course.time, cycle.time, read[f"T_{name}_degC_as_recorded"])
+        apart = (there - course.after[name])[course.time > course.counts_from_s]
+        assert float(np.sqrt(np.mean(apart**2))) < 0.03  # the grid of a prediction rounds corners
