@@ -123,7 +123,7 @@ def test_errors_are_told_for_every_sensor_of_both_sets() -> None:
 def test_without_a_finding_nothing_is_said_to_be_found(pages: dict[str, str]) -> None:
     for name in ("consistent", "insufficient_data"):
         text = Text(pages[name][: pages[name].index('<section id="words">')]).plain
-        for never in ("What was found", "with the findings", "pointed out"):
+        for never in ("What was found", "corrected", "pointed out"):
             assert never not in text, never
     assert "Nothing that these data show: evidence" in Text(pages["consistent"]).plain
     assert "none: it is in the recording, not in the gearbox" in Text(pages["sensor_fault"]).plain
@@ -253,7 +253,7 @@ def test_ambient_is_drawn_and_a_part_has_one_colour_everywhere() -> None:
     oil = part_colours(NETWORK.node_names)["oil"]
     lines = {trace.name: trace.line.color for trace in charts["errors"].data}
     assert lines["oil"] == oil
-    assert oil in {trace.line.color for trace in charts["courses"].data if trace.name == "with the findings"}
+    assert oil in {trace.line.color for trace in charts["courses"].data if trace.name == "corrected"}
     nodes = next(trace for trace in charts["network"].data if isinstance(trace.marker.line.color, tuple))
     assert nodes.marker.line.color[[text.startswith("<b>oil<") for text in nodes.text].index(True)] == oil
     assert charts["heat"].data[0].line.color == oil

@@ -65,7 +65,7 @@ def test_a_run_has_measured_and_predicted_columns() -> None:
 def test_a_channel_is_drawn_as_measured_and_by_three_models() -> None:
     run = FOUND.courses[0]
     ax = run.plot("P_loss")
-    assert [line.get_label() for line in ax.lines] == ["measured", "as delivered", "calibrated", "with the findings"]
+    assert [line.get_label() for line in ax.lines] == ["measured", "as delivered", "calibrated", "corrected"]
     assert ax.get_ylabel() == "Power loss in W"
     errors = {c: np.nanmean((run.before[c] - run.measured[c]) ** 2) for c in run.measured if c != "P_loss"}
     worst = max(errors, key=lambda c: errors[c])
