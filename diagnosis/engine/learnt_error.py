@@ -122,7 +122,7 @@ def learnt_error(error: ModelError, values: Array, spread: Spread, network: Ther
             case groups.HeatChange(heat=heats.SourceHeat(names=names) | heats.LinkHeat(names=names), course=course):
                 kind: Kind = "loss_factor" if isinstance(one.heat, heats.SourceHeat) else "link_factor"
                 law = _law(course, error.standard, mine[begin:end])
-                place = f"{one.place} law" if isinstance(course, Smooth) else one.place
+                place = f"law of the {one.place}" if isinstance(course, Smooth) else one.place
                 terms.append(_term(place, kind, names, mine, law, spread))
             case groups.HeatChange(heat=heats.SplitHeat(names=names, target=target)):
                 share = float(values[begin])
@@ -160,7 +160,7 @@ def _term(
     size = float(np.linalg.norm(values))
     strength = Parameter(
         name=f"{label}_size", start=size, lower=0.0, upper=max(1.0, size), sd=spread(values / size), log=False,
-        description="size of what was learnt: shares of heats, or relative changes",
+        description=f"{place}, {'shares moved' if kind == 'source' else 'relative change'}",
     )  # fmt: skip
     law = (law / size).xreplace({number: sp.Float(f"{float(number):.{DIGITS}g}") for number in law.atoms(sp.Float)})
     return Term(label=label, kind=kind, target=target, expression=symbol(strength.name) * law, parameters=(strength,))

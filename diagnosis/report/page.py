@@ -18,7 +18,7 @@ from diagnosis.results.result_parts import LEAST_RIVAL, NO_CLAIM, Calibrated, Fi
 
 PACKAGE = "diagnosis.report"
 PLOTLY = "plotly-basic.min.js"  # npm: plotly.js-basic-dist-min, of the version that the plotly of Python brings
-SHOWN_RANKS, MOST_RANKS = 10, 300
+SHOWN_RANKS, MOST_RANKS, MOST_LEARNT = 10, 300, 6
 DISTRESS = 2.0  # standard deviations of a prior
 BAR_SD = 4.0  # at the end of a bar
 
@@ -52,6 +52,10 @@ def page(diagnosis: Diagnosis) -> str:
         told=network_chart.marks(diagnosis).told(network_chart.corrected(diagnosis)),
         fits=[("Held out", _rows(diagnosis.holdout)), ("Learned from", _rows(diagnosis.train))],
         has_noise=diagnosis.noise_K > 0.0,
+        learnt=[
+            {"description": size.description, "size": numbers.with_error(size.start, size.sd)}
+            for size in sorted((term.strength for term in diagnosis.learnt), key=lambda size: -size.start)[:MOST_LEARNT]
+        ],
         calibration=[_calibrated(diagnosis, one) for one in farthest_first],
         ranking=diagnosis.ranking[:MOST_RANKS],
         shown_ranks=SHOWN_RANKS,

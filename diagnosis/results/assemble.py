@@ -11,16 +11,16 @@ from diagnosis.decision.posterior import KINDS, Answer, Judged, Posterior, act_o
 from diagnosis.decision.settings import Settings
 from diagnosis.engine.calibration import Near
 from diagnosis.engine.fit import Experiment, Fit
-from diagnosis.engine.learnt_error import is_writable, with_learnt_error
-from diagnosis.engine.predict import Prediction, log_score_gain, overall_rmse, predict, rmse, with_pieces_of
+from diagnosis.engine.predict import overall_rmse, rmse
 from diagnosis.engine.prepare import held_out_experiment
-from diagnosis.engine.set_apart import calibrate_without_error, without_channels
+from diagnosis.engine.set_apart import calibrate_without_error
 from diagnosis.recordings.recording import Recording
 from diagnosis.results.advice import next_test, without_sensor
 from diagnosis.results.baseline_notes import baseline_notes
 from diagnosis.results.findings import estimates_of, finding_of, name_in, names_of
 from diagnosis.results.instruments import sensors_and_inputs_of
 from diagnosis.results.locations import locations_of
+from diagnosis.results.predictions import Predicted, Predictions, predict_recordings, temperatures
 from diagnosis.results.ratios_only import ratio_notes
 from diagnosis.results.result import Diagnosis, Verdict
 from diagnosis.results.result_parts import (
@@ -36,20 +36,16 @@ from diagnosis.results.result_parts import (
 )
 from diagnosis.setup.inference_setup import InferenceSetup
 from diagnosis.setup.noise import HEAT_FRACTION, PARAMETRIC_FRACTION, PARAMETRIC_K
-from models.base.parallel import run_parallel
 from models.base.types import Array
 from models.base.version import project_version
 from models.mechanisms import Mechanism
 from models.network.laws import Parameter
-from models.quantities.quantities import is_total_loss
 from models.terms.term import Term
 
 VISIBLE_NAT = 5.0  # expected evidence below which an effect cannot be seen
 ENOUGH_VISIBLE = 0.1  # of the effects that were asked for, for a "consistent" that means something
 MOST_RANKED = 500
-STATES = ("before", "calibrated", "found", "after")
 PROBABLY = 0.5
-Predictions = Mapping[str, Mapping[str, Sequence[Prediction]]]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -103,14 +99,13 @@ def assemble(
     """
     faulty = () if others is None else others.channels
     best = _best(posterior, answers)
-    judged = held_out_experiment(setup, experiment)
-    without = _final(best, plain if others is None else others.fit, faulty)
-    final, learnt = _with_learnt(best or posterior.nothing, near, faulty) or (without, ())
-    try:
-        predictions = _predictions(experiment, judged, (plain, without, final), jobs)
-    except ArithmeticError:  # laws that were learnt may lead nowhere where nothing was recorded
-        final, learnt = without, ()
-        predictions = _predictions(experiment, judged, (plain, without, final), jobs)
+    counting = [name for name in setup.channels if name not in faulty]
+    predicted = predict_recordings(
+        experiment, held_out_experiment(setup, experiment), plain=plain,
+        found=_final(best, plain if others is None else others.fit, faulty),
+        explanation=None if faulty else best or posterior.nothing, near=near, counting=counting, jobs=jobs,
+    )  # fmt: skip
+    final = predicted.final
     findings = _distinct([
         (answer, finding_of(answer, answer.best.fit or final, setup, posterior, catalogue, train))
         for answer in answers
@@ -124,8 +119,6 @@ def assemble(
     sensors, true_inputs = sensors_and_inputs_of(
         final, findings=[term.label for term in terms], inputs=setup.gearbox.network().inputs
     )
-    counting = [name for name in setup.channels if name not in faulty]
-    courses = [[p.trajectory.T for p in predictions["holdout"][state]] for state in ("after", "calibrated")]
     assumed = {name for r in (*train, *held_out) for name in r.assumed}
     return Diagnosis(
         verdict=verdict,
@@ -137,8 +130,8 @@ def assemble(
         location=location,
         findings=findings,
         calibration=_calibration(final, plain, answers),
-        train=_fits(setup, predictions["train"], counting),
-        holdout=_fits(setup, predictions["holdout"], counting),
+        train=_fits(setup, predicted.train, counting),
+        holdout=_fits(setup, predicted.holdout, counting),
         faulty=faulty,
         terms=terms,
         sensors=sensors,
@@ -155,10 +148,10 @@ def assemble(
             verdict, findings, location, unseen, catalogue, assumed=assumed,
             free=without_sensor(setup.nominal, setup.channels),
         ),
-        courses=_courses(setup, predictions),
+        courses=_courses(setup, predicted),
         network=setup.nominal,
         shapes=setup.shapes,
-        learnt=learnt,
+        learnt=predicted.learnt,
         inputs={
             "recordings": {r.name: r.sha256 for r in train},
             "held_out": {r.name: r.sha256 for r in held_out},
@@ -186,7 +179,7 @@ def assemble(
                       place=one.best.place)
             for one in posterior.repeating
         ),
-        holdout_gain=log_score_gain(final, plain, without_channels(judged, faulty), courses),
+        holdout_gain=predicted.holdout_gain,
     )  # fmt: skip
 
 
@@ -222,16 +215,6 @@ def _final(best: Judged | None, plain: Fit, faulty: Sequence[str]) -> Fit:
         return calibrate_without_error(first, plain, faulty)
     except ArithmeticError:  # no solution without what model error allows
         return first
-
-
-def _with_learnt(best: Judged, near: Near, faulty: Sequence[str]) -> tuple[Fit, tuple[Term, ...]] | None:
-    """The best explanation with what was learnt of model error in it; None if a model cannot hold that.
-
-    No model error is to stand in for a broken sensor.
-    """
-    if best.fit is None or faulty or not is_writable(best.error_class):
-        return None
-    return with_learnt_error(best.fit, near, best.error_class)
 
 
 def _terms(best: Judged | None, final: Fit) -> tuple[Term, ...]:
@@ -327,42 +310,15 @@ def _floor(setup: InferenceSetup) -> str:
 # ---------------------------------------------------------------------- fits and courses
 
 
-def _predictions(experiment: Experiment, held_out: Experiment, fits: Sequence[Fit], jobs: int) -> Predictions:
-    """Free-running predictions of the training and the held-out pieces: as delivered, and by the fits of all states."""
-    work: list[tuple[list[tuple[Experiment, Array]], int, Array | None]] = []
-    different = list({id(fit): fit for fit in fits}.values())
-    near_train = [trajectory.T for trajectory in fits[-1].trajectories]
-    for pieces_of, near in ((experiment, near_train), (held_out, [None] * len(held_out.pieces))):
-        there = [(replace(with_pieces_of(fit.experiment, pieces_of), filters=None), fit.z) for fit in different]
-        work += [(there, index, T) for index, T in enumerate(near)]
-    found = run_parallel(_predicted, work, jobs=jobs)
-    of_states = [0, *(1 + different.index(fit) for fit in fits)]
-
-    def by_state(of: Sequence[tuple[Prediction, ...]]) -> dict[str, list[Prediction]]:
-        return {state: [each[which] for each in of] for state, which in zip(STATES, of_states, strict=True)}
-
-    train = len(experiment.pieces)
-    return {"train": by_state(found[:train]), "holdout": by_state(found[train:])}
-
-
-def _predicted(fits: Sequence[tuple[Experiment, Array]], index: int, near: Array | None) -> tuple[Prediction, ...]:
-    """One piece as delivered and by every fit; each starts from the one before, or the last from one `near` it."""
-    found = [predict(fits[0][0], index, None)]
-    for experiment, z in fits:
-        last = experiment is fits[-1][0] and near is not None
-        found.append(predict(experiment, index, z, guess=near if last else found[-1].trajectory.T))
-    return tuple(found)
-
-
-def _fits(setup: InferenceSetup, predictions: Mapping[str, Sequence[Prediction]], counting: Collection[str]) -> Fits:
-    temperatures = [i for i, name in enumerate(setup.channels) if not is_total_loss(name) and name in counting]
+def _fits(setup: InferenceSetup, predictions: Predictions, counting: Collection[str]) -> Fits:
+    columns = temperatures(setup.channels, counting)
     nothing = [np.zeros((0, len(setup.channels)))]
     each = {
         state: rmse(np.concatenate([p.residual for p in found] or nothing),
                     np.concatenate([p.weights for p in found] or [np.zeros(0)]))
         for state, found in predictions.items()
     }  # fmt: skip
-    overall = {state: overall_rmse(found, temperatures) for state, found in predictions.items()}
+    overall = {state: overall_rmse(found, columns) for state, found in predictions.items()}
     sensors = {
         name: (float(each["before"][i]), float(each["calibrated"][i]), float(each["after"][i]))
         for i, name in enumerate(setup.channels)
@@ -370,18 +326,18 @@ def _fits(setup: InferenceSetup, predictions: Mapping[str, Sequence[Prediction]]
     return Fits(**overall, sensors=sensors)
 
 
-def _courses(setup: InferenceSetup, predictions: Predictions) -> tuple[PredictedRun, ...]:
+def _courses(setup: InferenceSetup, predicted: Predicted) -> tuple[PredictedRun, ...]:
     def by_channel(values: Array) -> dict[str, Array]:
         return {name: values[:, i] for i, name in enumerate(setup.channels)}
 
     result, parts = [], [part.name for part in setup.nominal.parts]
-    for which, states in predictions.items():
+    for held_out, states in ((False, predicted.train), (True, predicted.holdout)):
         for before, calibrated, after in zip(states["before"], states["calibrated"], states["after"], strict=True):
             piece = before.piece
             at = np.clip(np.arange(len(piece.time)), 0, len(piece.steps) - 1)
             others = {name: after.trajectory.T[:, i] for i, name in enumerate(parts)}
             result.append(PredictedRun(
-                recording=piece.recording, held_out=which == "holdout", time=piece.time,
+                recording=piece.recording, held_out=held_out, time=piece.time,
                 inputs=dict(zip(setup.model.laws.inputs, piece.inputs[at].T, strict=True)),
                 measured=by_channel(piece.measured), before=by_channel(before.read),
                 calibrated=by_channel(calibrated.read), after=others | by_channel(after.read),

@@ -189,7 +189,11 @@ class Diagnosis:
             "settings": {"false_alarm_rate": self.false_alarm_rate, "claim_from": self.claim_from,
                          "matters_K": self.matters_K, "matters_W": self.matters_W},
             "model_error": {"class": self.error_class, "evidence": dict(self.error_evidence),
-                            "scaled": [asdict(one) for one in self.scaled_error]},
+                            "scaled": [asdict(one) for one in self.scaled_error],
+                            "learnt": [
+                                {"what": term.strength.description, "kind": term.kind, "target": list(term.target),
+                                 "size": term.strength.start, "stderr": term.strength.sd} for term in self.learnt
+                            ]},
             "sessions": {"deviation_in_sd": self.session_s, "repeating": [asdict(one) for one in self.repeating]},
             "remaining": {
                 "p_value": or_none(self.remaining_p_value),

@@ -1,0 +1,130 @@
+"""Free-running predictions of all recordings: as delivered, calibrated, with the findings, and corrected."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
+
+from diagnosis.decision.posterior import Judged
+from diagnosis.engine.calibration import Near
+from diagnosis.engine.fit import Experiment, Fit
+from diagnosis.engine.learnt_error import is_writable, with_learnt_error
+from diagnosis.engine.predict import Prediction, log_score_gain, overall_rmse, predict, with_pieces_of
+from diagnosis.engine.set_apart import without_channels
+from models.base.parallel import run_parallel
+from models.base.types import Array
+from models.quantities.quantities import is_total_loss
+from models.terms.term import Term
+
+Predictions = dict[str, Sequence[Prediction]]  # of all pieces: before, calibrated, found, after
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Predicted:
+    """What the recordings to learn from and those held out should have shown.
+
+    Attributes
+    ----------
+    train, holdout : mapping of state to predictions
+        ``before``: as delivered; ``calibrated``: without model error; ``found``: with the findings; ``after``:
+        corrected, with what was learnt of model error too where that helps
+    final : Fit
+        Of the corrected model
+    learnt : tuple of Term
+        What was learnt of model error and is in the corrected model
+    holdout_gain : float
+        Log score of the corrected model on the held-out readings, less that of the calibrated one, [nat]
+    """
+
+    train: Predictions
+    holdout: Predictions
+    final: Fit
+    learnt: tuple[Term, ...]
+    holdout_gain: float
+
+
+def predict_recordings(
+    experiment: Experiment, judged: Experiment, *, plain: Fit, found: Fit, explanation: Judged | None, near: Near,
+    counting: Collection[str], jobs: int,
+) -> Predicted:  # fmt: skip
+    """Predict all recordings, with model error written into the best explanation if that helps.
+
+    Parameters
+    ----------
+    experiment, judged : Experiment
+        With the pieces to learn from, and those held out
+    plain, found : Fit
+        The nominal machine, and that with the findings, both calibrated without model error
+    explanation : Judged or None
+        What model error may be written into; None: nothing, since it would stand in for a broken sensor
+    near : Near
+        Where model error was linearised
+    counting : collection of str
+        Channels that count
+
+    Raises
+    ------
+    ArithmeticError
+        If temperatures leave all bounds with the parameters as delivered, calibrated or found.
+    """
+    train = _states(experiment, plain, found, [trajectory.T for trajectory in found.trajectories], jobs)
+    holdout = _states(judged, plain, found, [], jobs)
+    final, learnt = found, tuple[Term, ...]()
+    if explanation is not None and explanation.fit is not None and is_writable(explanation.error_class):
+        written, terms = with_learnt_error(explanation.fit, near, explanation.error_class)
+        if _try_learnt(written, (experiment, judged), (train, holdout), counting, jobs):
+            final, learnt = written, terms
+    for states in (train, holdout):
+        states.setdefault("after", states["found"])
+    guesses = [_courses(holdout[state]) for state in ("after", "calibrated")]
+    faulty = set(experiment.pieces[0].channels) - set(counting)
+    gain = log_score_gain(final, plain, without_channels(judged, faulty), guesses)
+    return Predicted(train=train, holdout=holdout, final=final, learnt=learnt, holdout_gain=gain)
+
+
+def temperatures(channels: Sequence[str], counting: Collection[str]) -> list[int]:
+    """Indices of the channels that are temperatures and count."""
+    return [i for i, name in enumerate(channels) if not is_total_loss(name) and name in counting]
+
+
+def _states(pieces_of: Experiment, plain: Fit, found: Fit, near: Sequence[Array], jobs: int) -> Predictions:
+    """As delivered, calibrated, with the findings; `near`: temperatures by the findings, if they are known."""
+    before = _predictions(plain, pieces_of, [None] * len(pieces_of.pieces), jobs, as_delivered=True)
+    tuned = _predictions(plain, pieces_of, _courses(before), jobs)
+    last = tuned if found is plain else _predictions(found, pieces_of, near or _courses(tuned), jobs)
+    return {"before": before, "calibrated": tuned, "found": last}
+
+
+def _try_learnt(
+    fit: Fit, of: Sequence[Experiment], known: Sequence[Predictions], counting: Collection[str], jobs: int
+) -> bool:  # fmt: skip
+    """Add the predictions with what was learnt of model error, if they are closer to what it was learnt from.
+
+    Far from a straight line they may not be: parameters at their limits and large factors go together with each other.
+    """
+    try:
+        found = [_predictions(fit, one, _courses(states["found"]), jobs) for one, states in zip(of, known, strict=True)]
+    except ArithmeticError:
+        return False
+    columns = temperatures(of[0].pieces[0].channels, counting)
+    if not overall_rmse(found[0], columns) < overall_rmse(known[0]["found"], columns):
+        return False
+    for states, after in zip(known, found, strict=True):
+        states["after"] = after
+    return True
+
+
+def _predictions(
+    fit: Fit, pieces_of: Experiment, near: Sequence[Array | None], jobs: int, *, as_delivered: bool = False
+) -> list[Prediction]:  # fmt: skip
+    there = replace(with_pieces_of(fit.experiment, pieces_of), filters=None)
+    z = None if as_delivered else fit.z
+    return run_parallel(_predict, [(there, index, z, T) for index, T in enumerate(near)], jobs=jobs)
+
+
+def _predict(experiment: Experiment, index: int, z: Array | None, near: Array | None) -> Prediction:
+    return predict(experiment, index, z, guess=near)
+
+
+def _courses(found: Sequence[Prediction]) -> list[Array]:
+    return [one.trajectory.T for one in found]
