@@ -109,11 +109,24 @@ def set_texts(_app: Sphinx, doctree: nodes.document, _docname: str) -> None:
                 text.parent.replace(text, nodes.Text(kept))
 
 
+COMMANDS = re.compile(r'(<div class="highlight-(?:bash|console) .*?</pre>)', re.DOTALL)
+HYPHENATED = re.compile(r"(?<=[\s>])(?=[\w-]*-)[\w-]+(?=[\s<])")
+
+
+def keep_options_whole(_app: Sphinx, _page: str, _template: str, context: dict[str, object], _tree: object) -> None:
+    """Let the lines of commands break between words only, and not after the hyphens of an option."""
+    if isinstance(body := context.get("body"), str):
+        pieces = COMMANDS.split(body)
+        pieces[1::2] = [HYPHENATED.sub(r'<span class="whole">\g<0></span>', piece) for piece in pieces[1::2]]
+        context["body"] = "".join(pieces)
+
+
 def setup(app: Sphinx) -> None:
     """Register formulas, the order of work, units and literals in the help of commands."""
     setup_mathml(app)
     setup_generated(app)
     app.connect("env-before-read-docs", spread_notebooks)
     app.connect("doctree-resolved", set_texts)
+    app.connect("html-page-context", keep_options_whole)
     for part in ("description", "options", "arguments", "epilog"):
         app.connect(f"sphinx-click-process-{part}", mark_literals)

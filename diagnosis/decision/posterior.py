@@ -236,8 +236,7 @@ class Posterior:
     def leaves_much(self, one: Judged) -> bool:
         """True if a scan finds much more, given an explanation; of those without a scan, given the best single one.
 
-        Two effects look like that beside one, and so does one whose law is not the true one (seen on the stranger's
-        cases).
+        A second effect looks like that, and so does a law that is not the true one (seen on the stranger's cases).
         """
         least, share = self.rule.much_left
         known = self._looked_beyond if one.left is None else one

@@ -1,13 +1,13 @@
 """Model error that the readings ask for, written into the model: what predicts, and what an FMU holds.
 
-Heat splits, smooth factors of laws, and what thermometers feel beside their nodes have a form that a model can hold. In
-the classes of model error that consist of these the model is written with their most probable values.
+Heat splits, smooth factors of laws, and other nodes that thermometers feel have a form that a model can hold. In the
+classes of model error that consist of these the model is written with their most probable values.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,7 +17,7 @@ from diagnosis.engine.calibration import Near
 from diagnosis.engine.fit import Fit
 from diagnosis.engine.learnt import ErrorClass
 from diagnosis.engine.model_error import ModelError, groups, heats
-from diagnosis.engine.model_error.courses import Course, Smooth, Standard
+from diagnosis.engine.model_error.courses import Constant, Smooth, Standard
 from diagnosis.engine.point import Machine
 from diagnosis.forward.network_on_grid import NetworkOnGrid
 from models.base.types import Array
@@ -31,19 +31,21 @@ WRITABLE = frozenset({"a_loss", "a_link", "b_split", "c_sensor", "c_lag"})
 LEAST, LEAST_SHARE = 1e-3, 0.05  # relative change, and share of the largest in its law, that is written
 DIGITS = 4  # of what is written
 PREFIX = "learnt_"
+FACTORS: Mapping[Kind, str] = {"loss_factor": "factors of heats", "link_factor": "factors of paths"}
+Found = Sequence[tuple[groups.Change, Array, Array]]  # changes, values of their unknowns, and the same among all
 Spread = Callable[[Array], float]  # standard deviation of a combination of the unknowns of model error
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LearntError:
-    """What the readings say of model error, in a form that a model can hold.
+    """Model error by the readings, in a form that a model can hold.
 
     Attributes
     ----------
     terms : tuple of Term
         Factors of losses and links, and heat that goes elsewhere; the strength is the size, its `sd` the standard error
     mixes : mapping of str to tuple of Mix
-        What thermometers feel beside their own nodes, by channel
+        Other nodes that thermometers feel, by channel
     """
 
     terms: tuple[Term, ...]
@@ -109,42 +111,76 @@ def learnt_error(error: ModelError, values: Array, spread: Spread, network: Ther
     network : ThermalNetwork
         That they are added to
     """
-    terms: list[Term] = []
-    moved: dict[str, list[tuple[Array, sp.Expr]]] = {}
-    mixes: dict[str, list[Mix]] = {}
+    found: list[tuple[groups.Change, Array, Array]] = []
     for one, begin, end in error.between(0, len(values)):
-        mine = np.zeros(len(values))
-        mine[begin:end] = values[begin:end]
-        mine[np.abs(mine) < max(LEAST, LEAST_SHARE * np.abs(mine).max())] = 0.0
-        if not mine.any():
-            continue
+        size = np.abs(values[begin:end])
+        own = np.where(size >= max(LEAST, LEAST_SHARE * size.max()), values[begin:end], 0.0)
+        if own.any():
+            found.append((one, own, np.concatenate([np.zeros(begin), own, np.zeros(len(values) - end)])))
+    terms = (*_laws(found, error.standard, spread), *_factors(found, spread), *_moved(found, network, spread))
+    return LearntError(terms=terms, mixes=_mixes(found, network.node_names, spread))
+
+
+def _laws(found: Found, standard: Standard, spread: Spread) -> Iterator[Term]:
+    """Factors that follow operation and temperature smoothly, for all sources or links of a family together."""
+    for one, own, every in found:
         match one:
-            case groups.HeatChange(heat=heats.SourceHeat(names=names) | heats.LinkHeat(names=names), course=course):
-                kind: Kind = "loss_factor" if isinstance(one.heat, heats.SourceHeat) else "link_factor"
-                law = _law(course, error.standard, mine[begin:end])
-                place = f"law of the {one.place}" if isinstance(course, Smooth) else one.place
-                terms.append(_term(place, kind, names, mine, law, spread))
+            case groups.HeatChange(heat=heats.SourceHeat() | heats.LinkHeat() as heat, course=Smooth() as smooth):
+                law = smooth.law(standard, own)
+                yield _term(f"law of the {one.place}", _kind(heat), heat.names, every, law, spread)
+
+
+def _factors(found: Found, spread: Spread) -> Iterator[Term]:
+    """Constant factors of losses, and of links."""
+    of_kinds: dict[Kind, list[tuple[str, float, Array]]] = {}
+    for one, own, every in found:
+        match one:
+            case groups.HeatChange(heat=heats.SourceHeat() | heats.LinkHeat() as heat, course=Constant()):
+                of_kinds.setdefault(_kind(heat), []).append((heat.names[0], float(own[0]), every))
+    for kind, each in of_kinds.items():
+        names, factors, unknowns = zip(*each, strict=True)
+        size = float(np.linalg.norm(factors))
+        term = _term(FACTORS[kind], kind, names, np.sum(unknowns, axis=0), sp.Float(size), spread)
+        yield replace(term, weights=tuple(_rounded(factor / size) for factor in factors))
+
+
+def _moved(found: Found, network: ThermalNetwork, spread: Spread) -> Iterator[Term]:
+    """Heat that goes into a node, or less of it, because shares go elsewhere."""
+    of_nodes: dict[str, list[tuple[Array, sp.Expr]]] = {}
+    for one, own, every in found:
+        match one:
             case groups.HeatChange(heat=heats.SplitHeat(names=names, target=target)):
-                share = float(values[begin])
-                for source in (each for each in network.sources if each.name in names):
-                    moved.setdefault(source.node, []).append((mine, -share * _as_delivered(source.heat, network)))
-                    moved.setdefault(target, []).append((mine, share * _as_delivered(source.heat, network)))
+                sources = [source for source in network.sources if source.name in names]  # all in one node
+                heat = float(own[0]) * _as_delivered(sp.Add(*(source.heat for source in sources)), network)
+                of_nodes.setdefault(sources[0].node, []).append((every, -heat))
+                of_nodes.setdefault(target, []).append((every, heat))
+    for node, each in of_nodes.items():
+        unknowns, moved = zip(*each, strict=True)
+        yield _term(f"heat into {node}", "source", (node,), np.sum(unknowns, axis=0), sp.Add(*moved), spread)
+
+
+def _mixes(found: Found, nodes: Collection[str], spread: Spread) -> dict[str, tuple[Mix, ...]]:
+    """Other nodes, and temperatures of before, that thermometers feel."""
+    mixes: dict[str, tuple[Mix, ...]] = {}
+    for one, own, every in found:
+        match one:
             case groups.ReadingChange(channel=channel, reading=groups.Near(node=node)):
-                mixes.setdefault(channel, []).append(_mix(node, 0.0, mine, spread))
-            case groups.ReadingChange(channel=channel, reading=groups.Late(time=time)):
-                node = node_of_channel(channel, network.node_names)
-                mixes.setdefault(channel, []).append(_mix(node, time, mine, spread))
-    for node, heat in moved.items():
-        every = np.where(np.any([mine for mine, _ in heat], axis=0), values, 0.0)
-        terms.append(_term(f"heat into {node}", "source", (node,), every, sp.Add(*(law for _, law in heat)), spread))
-    return LearntError(terms=tuple(terms), mixes={channel: tuple(found) for channel, found in mixes.items()})
+                lag = 0.0
+            case groups.ReadingChange(channel=channel, reading=groups.Late(time=lag)):
+                node = node_of_channel(channel, nodes)
+            case _:
+                continue
+        mix = Mix(node=node, share=float(np.clip(own[0], -1.0, 1.0)), lag=lag, stderr=spread(np.sign(every)))
+        mixes[channel] = (*mixes.get(channel, ()), mix)
+    return mixes
 
 
-def _law(course: Course, standard: Standard, values: Array) -> sp.Expr:
-    """Law of a course that a model can hold."""
-    if isinstance(course, Smooth):
-        return course.law(standard, values)
-    return sp.Float(values[0])
+def _kind(heat: heats.SourceHeat | heats.LinkHeat) -> Kind:
+    return "loss_factor" if isinstance(heat, heats.SourceHeat) else "link_factor"
+
+
+def _rounded(number: float) -> float:
+    return float(f"{number:.{DIGITS}g}")
 
 
 def _as_delivered(heat: sp.Expr, network: ThermalNetwork) -> sp.Expr:
@@ -162,10 +198,6 @@ def _term(
         name=f"{label}_size", start=size, lower=0.0, upper=max(1.0, size), sd=spread(values / size), log=False,
         description=f"{place}, {'shares moved' if kind == 'source' else 'relative change'}",
     )  # fmt: skip
-    law = (law / size).xreplace({number: sp.Float(f"{float(number):.{DIGITS}g}") for number in law.atoms(sp.Float)})
+    law /= size
+    law = law.xreplace({number: sp.Float(_rounded(float(number))) for number in law.atoms(sp.Float)})
     return Term(label=label, kind=kind, target=target, expression=symbol(strength.name) * law, parameters=(strength,))
-
-
-def _mix(node: str, lag: float, values: Array, spread: Spread) -> Mix:
-    size = float(np.linalg.norm(values))
-    return Mix(node=node, share=float(np.clip(values.sum(), -1.0, 1.0)), stderr=spread(values / size), lag=lag)

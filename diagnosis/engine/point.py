@@ -32,7 +32,7 @@ class Machine:
     terms : sequence of Term
         What shifts an input or distorts a reading
     mixes : mapping of str to sequence of Mix, optional
-        What thermometers feel beside their own nodes, by channel
+        Other nodes that thermometers feel, by channel
     """
 
     def __init__(

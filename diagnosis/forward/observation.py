@@ -30,7 +30,7 @@ class Sensors:
     loss_delay : float
         Of the total loss behind the inputs, [s]; negative where it is ahead
     mixes : mapping of str to sequence of Mix
-        What thermometers feel beside their own nodes, by channel
+        Other nodes that thermometers feel, by channel
     """
 
     channels: tuple[str, ...]
@@ -99,7 +99,7 @@ def reading_columns(
 def _felt(
     model: NetworkOnGrid, nodes: Mapping[str, Array], sensors: Sensors, channel: str, trajectory: Trajectory
 ) -> Array:  # fmt: skip
-    """What a thermometer feels of temperatures, or of their changes; boundaries that are not given do not change."""
+    """Temperatures, or their changes, as a thermometer feels them; boundaries that are not given do not change."""
     own = nodes[model.parts[model.part_index(channel)]]
     felt = own
     for one in sensors.mixes.get(channel, ()):

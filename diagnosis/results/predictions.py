@@ -21,7 +21,7 @@ Predictions = dict[str, Sequence[Prediction]]  # of all pieces: before, calibrat
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Predicted:
-    """What the recordings to learn from and those held out should have shown.
+    """Readings that the recordings to learn from and those held out should have shown.
 
     Attributes
     ----------

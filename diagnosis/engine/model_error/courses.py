@@ -58,7 +58,7 @@ class Coordinate:
         return np.asarray(np.clip((value - self.mean) / self.sd, -FARTHEST, FARTHEST) / WIDTH)
 
     def law(self, raw: sp.Expr) -> sp.Expr:
-        """The same as an expression."""
+        """The standardised coordinate as an expression."""
         value = sp.log(sp.Max(sp.Abs(raw), self.floor)) if self.floor > 0.0 else raw
         return sp.Min(sp.Max((value - self.mean) / self.sd, -FARTHEST), FARTHEST) / WIDTH
 
