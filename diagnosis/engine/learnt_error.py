@@ -198,6 +198,6 @@ def _term(
         name=f"{label}_size", start=size, lower=0.0, upper=max(1.0, size), sd=spread(values / size), log=False,
         description=f"{place}, {'shares moved' if kind == 'source' else 'relative change'}",
     )  # fmt: skip
-    law /= size
+    law = sp.nsimplify(law / size) if law.is_number else law / size  # a constant is the size itself
     law = law.xreplace({number: sp.Float(_rounded(float(number))) for number in law.atoms(sp.Float)})
     return Term(label=label, kind=kind, target=target, expression=symbol(strength.name) * law, parameters=(strength,))

@@ -17,7 +17,6 @@ from models.quantities.quantities import is_total_loss
 from models.terms.term import Term
 
 SHAPE = "shape_"
-LEARNT = "What these recordings say of model error here; it names nothing."
 UNNAMED, IMPROVES = "without a name", "It improves the prediction; what it is, the data do not say."
 REPORT, NUMBERS, CORRECTION = "report.html", "diagnosis.json", "correction.toml"
 
@@ -41,7 +40,7 @@ def correction_of(diagnosis: Diagnosis, gearbox: Gearbox) -> Correction:
             ))  # fmt: skip
     findings += [
         Finding.of(term, {term.strength.name: (term.strength.start, term.strength.sd)}, mechanism=MODEL_ERROR,
-                   family="calibration", place=" ".join(term.target), says=LEARNT, grade="learnt")
+                   grade="learnt")
         for term in diagnosis.learnt
     ]  # fmt: skip
     return Correction.of(
