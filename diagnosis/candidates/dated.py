@@ -53,9 +53,10 @@ class Axis:
         return self.end / max(len(self.dates), 1)
 
     def moment(self, name: str) -> Parameter:
-        """A date as a parameter, [s]."""
+        """A date as a parameter, [s]: not so late that next to nothing is recorded after it."""
+        latest = 0.5 * (self.end + float(self.dates.max(initial=0.0)))
         return Parameter(name=name, unit="s", start=0.5 * self.end, sd=DATE_SD * self.end, lower=-self.end,
-                         upper=2.0 * self.end, log=False)  # fmt: skip
+                         upper=latest, log=False)  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

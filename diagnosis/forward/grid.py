@@ -223,8 +223,10 @@ def _pieces_of(recording: Recording, inputs: Sequence[str], channels: Sequence[s
             grid = np.arange(time[0], time[-1] + 0.5 * INTERVAL_S, INTERVAL_S)
             grid = grid[grid <= time[-1] + 1e-9]
             if not even:
-                grid = _thinned(grid, time, {name: recording.inputs[name][rows] for name in inputs},
-                                {name: values[name][rows] for name in channels if name in values})  # fmt: skip
+                driven = {name: recording.inputs[name][rows] for name in inputs}
+                grid = _thinned(grid, time, driven, {n: values[n][rows] for n in channels if n in values})
+                if any(np.ptp(course[time >= grid[-1]]) > _steady(name, course) for name, course in driven.items()):
+                    grid = np.append(grid, time[-1])  # the machine stops, say, in what is left of an interval
         if len(grid) < SHORTEST_PIECE:
             continue
         fractions = (np.arange(SAMPLES) + 0.5) / SAMPLES
@@ -295,7 +297,7 @@ def _thinned(even: Array, time: Array, inputs: Mapping[str, Array], values: Mapp
     longest = np.full(count, LONGEST)  # of the interval that begins there
     for name, rows in inputs.items():
         means = _cell_means(rows, cell, count)
-        allowed = STEADY_AMBIENT_K if name == "T_ambient" else STEADY_INPUT * float(np.percentile(np.abs(rows), 95))
+        allowed = _steady(name, rows)
         moved = np.abs(np.diff(means)) > allowed
         happens[1:] |= moved
         happens[:-1] |= moved
@@ -317,6 +319,11 @@ def _thinned(even: Array, time: Array, inputs: Mapping[str, Array], values: Mapp
         k += length
         chosen.append(k)
     return np.asarray(even[chosen])
+
+
+def _steady(name: str, rows: Array) -> float:
+    """By how much an input may move within an interval that counts as calm, in its unit."""
+    return STEADY_AMBIENT_K if name == "T_ambient" else STEADY_INPUT * float(np.percentile(np.abs(rows), 95))
 
 
 def _cell_means(rows: Array, cell: NDArray[np.intp], count: int) -> Array:

@@ -46,6 +46,12 @@ def test_a_step_is_on_after_its_date_and_in_later_recordings(air: Placed) -> Non
     assert value(term, 1500.0, 1000.0, **own) == pytest.approx(-0.2)
 
 
+def test_no_date_is_in_the_last_moments() -> None:
+    """A single odd row at the end is no change of the machine."""
+    assert AXIS.moment("since").upper == pytest.approx(8000.0)
+    assert Axis(dates=np.zeros(0), end=600.0).moment("since").upper == pytest.approx(300.0)
+
+
 def test_for_a_while_ends(air: Placed) -> None:
     term = changing(air, for_a_while(AXIS), AXIS).term
     assert isinstance(term, Placed)

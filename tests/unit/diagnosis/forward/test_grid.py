@@ -48,6 +48,15 @@ def test_fine_where_the_operation_jumps() -> None:
     assert piece.time[-1] == 7200.0
 
 
+def test_a_stop_in_the_last_row_is_not_cut_off() -> None:
+    """Ten seconds are left of the last interval: they count if the machine stops in them."""
+    time = TIME[:-1]
+    assert piece_of(time).time[-1] == 7180.0
+    stops = piece_of(time, speed=np.where(time < 7190.0, 1500.0, 0.0))
+    assert stops.time[-2:].tolist() == [7180.0, 7190.0]
+    assert stops.inputs[-1, 0] == pytest.approx(750.0) and stops.inputs[-2, 0] == 1500.0
+
+
 def test_a_drift_is_followed() -> None:
     """Within an interval inputs change by a hundredth at most."""
     speed = 1500.0 * (1.0 + 0.3 * np.sin(TIME / 1500.0))
