@@ -98,7 +98,7 @@ def with_learnt_error(fit: Fit, near: Near, error_class: ErrorClass) -> tuple[Fi
 
     learnt = learnt_error(near.error, directions @ found[: metric.shared], spread, experiment.machine.model.network)
     there = replace(experiment, machine=learnt.added_to(experiment.machine))
-    return replace(fit, experiment=there, z=z), learnt.terms
+    return replace(fit, experiment=there, z=np.clip(z, *experiment.bounds)), learnt.terms
 
 
 def learnt_error(error: ModelError, values: Array, spread: Spread, network: ThermalNetwork) -> LearntError:
