@@ -1,8 +1,9 @@
 """From an experiment and its candidates to a posterior: scan, race, refit, second scan, third scan.
 
 The scan is linear and judges everything. A race of a few Gauss-Newton steps corrects it for the best names; the best of
-them are fitted to the end, model error in place; a second scan given the best explanation looks for a second effect, a
-third one given the best two for what they leave.
+them are fitted to the end, model error in place; a second scan given the best explanation looks for a second effect.
+Where there are baselines a third one, given the best two, looks for what they leave; without, two effects and model
+error are too much alike.
 """
 
 from __future__ import annotations
@@ -106,7 +107,7 @@ def infer(
         second = _scanned_given(calibration, best, candidates, log_prior)
         judged[best.label] = replace(best, left=second.most)
         pairs = sorted(_pairs(calibration, best, second), key=_weight, reverse=True)
-        if pairs and second.most > threshold:
+        if pairs and second.most > threshold and base.experiment.healthy:
             progress(f"scanning once more, given {pairs[0].label}")
             pairs[0] = replace(pairs[0], left=_scanned_given(calibration, pairs[0], candidates, log_prior).most)
         there = _alone(calibration, best, second, first.in_class(best.error_class).ahead)
