@@ -14,8 +14,10 @@ from builder.workflows.held_out_fmu import overall
 from builder.workflows.prove_real import BY_SOUND, PLANTS, data_file, prove_real, rows_of
 from diagnosis.decision.posterior import Judged, Posterior
 from diagnosis.decision.settings import Settings
+from diagnosis.engine.calibration import Near
 from diagnosis.engine.fit import calibrate
 from diagnosis.engine.learnt import error_classes, rule
+from diagnosis.engine.model_error import ModelError
 from diagnosis.engine.prepare import prepare_experiment
 from diagnosis.engine.set_apart import calibrate_apart
 from diagnosis.results.assemble import Others, assemble
@@ -34,7 +36,8 @@ def calibrated(train: Any, gearbox: Any, *, holdout: Any, **_: object) -> Diagno
     nothing = Judged(effects=(), log_prior=0.0, log_bayes=0.0, fit=fit, error_class=error_classes()[0])
     posterior = Posterior(nothing=nothing, judged=(), log_e=-1.0, threshold=5.0, rule=rule())
     return assemble(
-        setup, experiment, posterior, (), plain=plain, others=Others(fit=fit, posterior=posterior, channels=apart),
+        setup, experiment, posterior, (), plain=plain, near=Near.of(experiment, ModelError.of(experiment), plain),
+        others=Others(fit=fit, posterior=posterior, channels=apart),
         settings=Settings(), catalogue=CATALOGUE, train=train, held_out=holdout,
     )  # fmt: skip
 
