@@ -92,12 +92,13 @@ def _where(d: Diagnosis) -> tuple[str, ...]:
     if not d.location or d.verdict in NO_CLAIM:
         return ()
     told = ", ".join(f"{place.node} ({_share(place.probability)})" for place in d.places)
-    place = d.location[0]
-    if not place.heat_max_W:
+    place = next((one for one in d.places if one.heat_max_W), None)
+    if place is None:
         return (f"{told}: in a reading or an input; no heat",)
     way = "taken away" if place.heat_mean_W < 0.0 else "added"
     mean, most = number(abs(place.heat_mean_W)), number(abs(place.heat_max_W))
-    heat = f"{mean} W {way} on average, {most} W at most"
+    where = "" if place is d.places[0] else f"in {place.node} "
+    heat = f"{where}{mean} W {way} on average, {most} W at most"
     return (f"{told}; {heat}; {place.regime}",)
 
 

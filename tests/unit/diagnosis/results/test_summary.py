@@ -25,6 +25,14 @@ def test_the_verdict_stands_first_then_the_questions_in_order() -> None:
     assert "41.3 nat, 3.9 needed" in lines[1]
 
 
+def test_of_an_instrument_and_a_place_with_heat_the_heat_is_told() -> None:
+    place = missing_physics().location[0]
+    torque = replace(place, node="torque", probability=0.99, heat_mean_W=0.0, heat_max_W=0.0)
+    assert told(replace(missing_physics(), location=(torque,)), "Where?").endswith("no heat")
+    where = told(replace(missing_physics(), location=(torque, replace(place, probability=0.98))), "Where?")
+    assert where.startswith(f"torque (0.99), {place.node} (0.98); in {place.node} ") and " W added on average" in where
+
+
 def test_a_claim_and_something_likely_stand_apart_by_words() -> None:
     claim, likely = two_effects().findings
     rivals = missing_physics().findings[0].confusable_with
