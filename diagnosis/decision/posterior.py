@@ -221,17 +221,18 @@ class Posterior:
     @property
     def remainder(self) -> float:
         """Log Bayes factor of the best further effect, given the best single one, [nat]; 0 if none was looked for."""
-        return self._looked_beyond.left or 0.0
-
-    @property
-    def _looked_beyond(self) -> Judged:
-        """The single explanation that a further effect was looked for with; nothing if there is none."""
-        singles = (one for one in self.judged if len(one.effects) == 1)
-        return next((one for one in singles if one.left is not None), self.nothing)
+        return self.left_by(None)
 
     def left_by(self, one: Judged | None) -> float:
         """Log Bayes factor of the best further effect, given an explanation or else the best single one, [nat]."""
-        return self.remainder if one is None or one.left is None else one.left
+        return self._scanned_beyond(one).left or 0.0
+
+    def _scanned_beyond(self, one: Judged | None) -> Judged:
+        """An explanation if a further effect was looked for with it, else the single one; nothing if there is none."""
+        if one is not None and one.left is not None:
+            return one
+        singles = (one for one in self.judged if len(one.effects) == 1)
+        return next((one for one in singles if one.left is not None), self.nothing)
 
     def leaves_much(self, one: Judged) -> bool:
         """True if a scan finds much more, given an explanation; of those without a scan, given the best single one.
@@ -239,8 +240,7 @@ class Posterior:
         A second effect looks like that, and so does a law that is not the true one (seen on the stranger's cases).
         """
         least, share = self.rule.much_left
-        known = self._looked_beyond if one.left is None else one
-        return (known.left or 0.0) > max(least, share * known.log_bayes)
+        return self.left_by(one) > max(least, share * self._scanned_beyond(one).log_bayes)
 
     @property
     def detected(self) -> bool:

@@ -126,7 +126,7 @@ def _laws(found: Found, standard: Standard, spread: Spread) -> Iterator[Term]:
     for one, own, every in found:
         match one:
             case groups.HeatChange(heat=heats.SourceHeat() | heats.LinkHeat() as heat, course=Smooth() as smooth):
-                law = smooth.law(standard, own)
+                law = smooth.law(standard, own / np.linalg.norm(own))
                 yield _term(f"law of the {one.place}", _kind(heat), heat.names, every, law, spread)
 
 
@@ -139,9 +139,8 @@ def _factors(found: Found, spread: Spread) -> Iterator[Term]:
                 of_kinds.setdefault(_kind(heat), []).append((heat.names[0], float(own[0]), every))
     for kind, each in of_kinds.items():
         names, factors, unknowns = zip(*each, strict=True)
-        size = float(np.linalg.norm(factors))
-        term = _term(FACTORS[kind], kind, names, np.sum(unknowns, axis=0), sp.Float(size), spread)
-        yield replace(term, weights=tuple(_rounded(factor / size) for factor in factors))
+        term = _term(FACTORS[kind], kind, names, np.sum(unknowns, axis=0), sp.Integer(1), spread)
+        yield replace(term, weights=tuple(_rounded(factor / term.strength.start) for factor in factors))
 
 
 def _moved(found: Found, network: ThermalNetwork, spread: Spread) -> Iterator[Term]:
@@ -156,7 +155,9 @@ def _moved(found: Found, network: ThermalNetwork, spread: Spread) -> Iterator[Te
                 of_nodes.setdefault(target, []).append((every, heat))
     for node, each in of_nodes.items():
         unknowns, moved = zip(*each, strict=True)
-        yield _term(f"heat into {node}", "source", (node,), np.sum(unknowns, axis=0), sp.Add(*moved), spread)
+        every = np.sum(unknowns, axis=0)
+        law = sp.Add(*moved) / float(np.linalg.norm(every))
+        yield _term(f"heat into {node}", "source", (node,), every, law, spread)
 
 
 def _mixes(found: Found, nodes: Collection[str], spread: Spread) -> dict[str, tuple[Mix, ...]]:
@@ -191,13 +192,12 @@ def _as_delivered(heat: sp.Expr, network: ThermalNetwork) -> sp.Expr:
 def _term(
     place: str, kind: Kind, target: tuple[str, ...], values: Array, law: sp.Expr, spread: Spread
 ) -> Term:  # fmt: skip
-    """A law as a term whose strength is the size of the `values` in it."""
+    """A law, per unit of the size of the `values` in it, as a term with this size as its strength."""
     label = PREFIX + re.sub(r"\W", "_", place)
     size = float(np.linalg.norm(values))
     strength = Parameter(
         name=f"{label}_size", start=size, lower=0.0, upper=max(1.0, size), sd=spread(values / size), log=False,
         description=f"{place}, {'shares moved' if kind == 'source' else 'relative change'}",
     )  # fmt: skip
-    law = sp.nsimplify(law / size) if law.is_number else law / size  # a constant is the size itself
     law = law.xreplace({number: sp.Float(_rounded(float(number))) for number in law.atoms(sp.Float)})
     return Term(label=label, kind=kind, target=target, expression=symbol(strength.name) * law, parameters=(strength,))

@@ -212,13 +212,11 @@ def log_score_gain(final: Fit, plain: Fit, held_out: Experiment, guesses: Sequen
         there = with_pieces_of(plain.experiment, held_out)
         parts = [there.linearise_piece(i, plain.z, guess, rounds=ROUNDS) for i, guess in enumerate(guesses[1])]
         other = with_pieces_of(final.experiment, held_out).with_filters(parts)
-        # What a fit is linearised at may be the machine without what was learnt of model error: its columns serve.
-        without = replace(other, machine=final.parts[0].point.machine)
-        own = [
-            other.linearise_piece(i, final.z, guess, rounds=ROUNDS,
-                                  kept=without.linearise_piece(i, final.z, guess, rounds=ROUNDS))
-            for i, guess in enumerate(guesses[0])
-        ]  # fmt: skip
+        linearised = replace(other, machine=final.parts[0].point.machine)
+        own = [linearised.linearise_piece(i, final.z, guess, rounds=ROUNDS) for i, guess in enumerate(guesses[0])]
+        if linearised.machine is not other.machine:  # model error is written into the one that predicts
+            own = [other.linearise_piece(i, final.z, guess, rounds=ROUNDS, kept=one)
+                   for i, (guess, one) in enumerate(zip(guesses[0], own, strict=True))]  # fmt: skip
     except (ArithmeticError, np.linalg.LinAlgError):
         return float("nan")
     return _log_density(own, final) - _log_density(parts, plain)

@@ -67,15 +67,14 @@ def predict_recordings(
     ArithmeticError
         If temperatures leave all bounds with the parameters as delivered, calibrated or found.
     """
-    train = _states(experiment, plain, found, [trajectory.T for trajectory in found.trajectories], jobs)
-    holdout = _states(judged, plain, found, [], jobs)
-    final, learnt = found, tuple[Term, ...]()
+    train = _states(experiment, plain, found, jobs, near=[trajectory.T for trajectory in found.trajectories])
+    holdout = _states(judged, plain, found, jobs)
+    final, learnt, after = found, tuple[Term, ...](), [train["found"], holdout["found"]]
     if explanation is not None and explanation.fit is not None and is_writable(explanation.error_class):
         written, terms = with_learnt_error(explanation.fit, near, explanation.error_class)
-        if _try_learnt(written, (experiment, judged), (train, holdout), counting, jobs):
-            final, learnt = written, terms
-    for states in (train, holdout):
-        states.setdefault("after", states["found"])
+        if there := _closer(written, (experiment, judged), after, counting, jobs):
+            final, learnt, after = written, terms, there
+    train["after"], holdout["after"] = after
     guesses = [_courses(holdout[state]) for state in ("after", "calibrated")]
     faulty = set(experiment.pieces[0].channels) - set(counting)
     gain = log_score_gain(final, plain, without_channels(judged, faulty), guesses)
@@ -87,7 +86,9 @@ def temperatures(channels: Sequence[str], counting: Collection[str]) -> list[int
     return [i for i, name in enumerate(channels) if not is_total_loss(name) and name in counting]
 
 
-def _states(pieces_of: Experiment, plain: Fit, found: Fit, near: Sequence[Array], jobs: int) -> Predictions:
+def _states(
+    pieces_of: Experiment, plain: Fit, found: Fit, jobs: int, *, near: Sequence[Array] | None = None
+) -> Predictions:  # fmt: skip
     """As delivered, calibrated, with the findings; `near`: temperatures by the findings, if they are known."""
     before = _predictions(plain, pieces_of, [None] * len(pieces_of.pieces), jobs, as_delivered=True)
     tuned = _predictions(plain, pieces_of, _courses(before), jobs)
@@ -95,23 +96,19 @@ def _states(pieces_of: Experiment, plain: Fit, found: Fit, near: Sequence[Array]
     return {"before": before, "calibrated": tuned, "found": last}
 
 
-def _try_learnt(
-    fit: Fit, of: Sequence[Experiment], known: Sequence[Predictions], counting: Collection[str], jobs: int
-) -> bool:  # fmt: skip
-    """Add the predictions with what was learnt of model error, if they are closer to what it was learnt from.
+def _closer(
+    fit: Fit, of: Sequence[Experiment], known: Sequence[Sequence[Prediction]], counting: Collection[str], jobs: int
+) -> list[Sequence[Prediction]] | None:  # fmt: skip
+    """Predictions of a fit with what was learnt of model error; None if `known` are closer to what it was learnt from.
 
-    Far from a straight line they may not be: parameters at their limits and large factors go together with each other.
+    Far from a straight line they may be: parameters at their limits and large factors go together with each other.
     """
     try:
-        found = [_predictions(fit, one, _courses(states["found"]), jobs) for one, states in zip(of, known, strict=True)]
+        found = [_predictions(fit, one, _courses(there), jobs) for one, there in zip(of, known, strict=True)]
     except ArithmeticError:
-        return False
+        return None
     columns = temperatures(of[0].pieces[0].channels, counting)
-    if not overall_rmse(found[0], columns) < overall_rmse(known[0]["found"], columns):
-        return False
-    for states, after in zip(known, found, strict=True):
-        states["after"] = after
-    return True
+    return [*found] if overall_rmse(found[0], columns) < overall_rmse(known[0], columns) else None
 
 
 def _predictions(

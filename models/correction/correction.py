@@ -74,9 +74,10 @@ class FoundParameter(LawParameter):
 class Finding(LawTable):
     """``[[finding]]``: physics that was left out, or a fault of an instrument.
 
-    The first five keys and `grade` are for people, see :class:`models.mechanisms.Mechanism`; the others, from `label`
-    on, are those of :class:`models.terms.term.Term`. `grade` is ``claim`` for a name that is certain enough, ``likely``
-    for what acts like it, ``learnt`` for the shape of a law, which names nothing.
+    The keys from `mechanism` to `grade`, in the order of this class, are for people, see
+    :class:`models.mechanisms.Mechanism`; the others are those of :class:`models.terms.term.Term`. `grade` is ``claim``
+    for a name that is certain enough, ``likely`` for what acts like it, ``learnt`` for what names nothing: shapes of
+    laws, model error, and effects without a certain name.
     """
 
     mechanism: Text

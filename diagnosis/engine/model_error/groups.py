@@ -94,8 +94,7 @@ class Near:
 
     def __call__(self, view: View) -> Array:
         """Along a piece, per share."""
-        own = view.model.parts[view.model.part_index(self.channel)]
-        return _by_sensor(view, self.channel, view.temperature_at_points(self.node) - view.temperature_at_points(own))
+        return _followed(view, self.channel, self.node) - _followed(view, self.channel)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -107,14 +106,14 @@ class Late:
 
     def __call__(self, view: View) -> Array:
         """Along a piece, per share."""
-        own = view.model.parts[view.model.part_index(self.channel)]
-        T = _by_sensor(view, self.channel, view.temperature_at_points(own))
+        T = _followed(view, self.channel)
         return np.asarray(lagged(T, view.trajectory.piece.steps, self.time) - T)
 
 
-def _by_sensor(view: View, channel: str, T: Array) -> Array:
-    """A temperature as slow as a sensor follows it."""
-    sensors = view.point.sensors
+def _followed(view: View, channel: str, node: str | None = None) -> Array:
+    """Temperature of a node, by default the sensor's own, as slow as the sensor follows it, shape (K + 1,), [degC]."""
+    sensors, own = view.point.sensors, view.model.parts[view.model.part_index(channel)]
+    T = view.temperature_at_points(node or own)
     return lagged(T, view.trajectory.piece.steps, float(sensors.lag[sensors.channels.index(channel)]))
 
 

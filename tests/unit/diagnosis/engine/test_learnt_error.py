@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 from diagnosis.engine import learnt_error as module
+from diagnosis.engine.calibration import Near
 from diagnosis.engine.fit import Experiment
 from diagnosis.engine.learnt import error_classes
-from diagnosis.engine.learnt_error import WRITABLE, LearntError, is_writable, learnt_error
+from diagnosis.engine.learnt_error import WRITABLE, LearntError, is_writable, learnt_error, with_learnt_error
 from diagnosis.engine.model_error import ModelError
 from diagnosis.engine.prepare import prepare_experiment
 from diagnosis.recordings.read import read_recordings
@@ -114,6 +115,22 @@ def test_a_correction_holds_it() -> None:
     assert {p.name for term in found for p in term.parameters} <= {
         p.name for p in correction.network(gearbox).parameters
     }
+
+
+def test_the_session_that_is_predicted_deviates_from_what_all_share() -> None:
+    experiment = experiment_of("fzg")
+    plain = experiment.with_filters(experiment.fit(iterations=0).parts).fit(iterations=0)
+    near = Near.of(experiment, ModelError.of(experiment), plain)
+    splits = next(one for one in error_classes() if one.name == "splits")
+    fit = near.fitted(splits, plain, 0.4, iterations=0).fit
+    metric = fit.experiment.metric
+    assert metric is not None
+    (found,) = metric.explained([part.residual for part in fit.parts])
+    deviation = found[metric.shared :]
+    assert len(deviation) == len(fit.z) and np.abs(deviation).max() > 0.01
+    there, terms = with_learnt_error(fit, near, splits)
+    np.testing.assert_allclose(there.z, np.clip(fit.z + deviation, *fit.experiment.bounds))
+    assert terms and there.experiment.machine.mixes
 
 
 def test_classes_that_a_model_can_hold() -> None:

@@ -123,7 +123,7 @@ def test_errors_are_told_for_every_sensor_of_both_sets() -> None:
 def test_without_a_finding_nothing_is_said_to_be_found(pages: dict[str, str]) -> None:
     for name in ("consistent", "insufficient_data"):
         text = Text(pages[name][: pages[name].index('<section id="words">')]).plain
-        for never in ("What was found", "corrected", "pointed out"):
+        for never in ("What was found", "with the findings", "corrected", "pointed out"):
             assert never not in text, never
     assert "Nothing that these data show: evidence" in Text(pages["consistent"]).plain
     assert "none: it is in the recording, not in the gearbox" in Text(pages["sensor_fault"]).plain

@@ -19,14 +19,17 @@ from diagnosis.engine.families import candidates_of
 from diagnosis.engine.fit import Experiment, Fit, calibrate
 from diagnosis.engine.learnt import error_classes, rule
 from diagnosis.engine.model_error import ModelError
+from diagnosis.engine.point import Machine
 from diagnosis.engine.prepare import held_out_experiment, prepare_experiment
 from diagnosis.engine.refit import refit, with_candidate
 from diagnosis.engine.unknown import NetworkParameter
+from diagnosis.forward.network_on_grid import NetworkOnGrid
 from diagnosis.forward.recorder import simulated_as_recorded
 from diagnosis.proof.scoring.answers import read_answer
 from diagnosis.recordings.recording import Recording
 from diagnosis.report import page
 from diagnosis.report.write import correction_of
+from diagnosis.results import predictions
 from diagnosis.results.assemble import _distinct, _remaining, assemble
 from diagnosis.results.result import Diagnosis
 from diagnosis.setup.inference_setup import InferenceSetup
@@ -428,3 +431,24 @@ def test_what_was_learnt_of_model_error_is_in_prediction_and_correction(
         there = np.interp(course.time, cycle.time, read[f"T_{name}_degC_as_recorded"])
         apart = (there - course.after[name])[course.time > course.counts_from_s]
         assert float(np.sqrt(np.mean(apart**2))) < 0.03  # the grid of a prediction rounds corners
+
+
+@pytest.mark.parametrize("far", [1.0, 1e4])
+def test_what_was_learnt_is_left_out_where_it_makes_the_recordings_worse(
+    assembled: Assemble, prepared: Prepared, near: Near, monkeypatch: pytest.MonkeyPatch, far: float
+) -> None:
+    """Far off, or with temperatures that leave all bounds."""
+    splits = next(one for one in error_classes() if one.name == "splits")
+    posterior = posterior_of(prepared[2], log_e=-1.0)
+    term = replace(effect_of(prepared[0], prepared[2], "windage", "oil").term, label="learnt_too_much")
+
+    def wrong(fit: Fit, *_: object) -> tuple[Fit, tuple[object, ...]]:
+        model = fit.experiment.machine.model
+        network = model.network.with_source("oil", 3000.0 * far, name=term.label)
+        machine = Machine(NetworkOnGrid(network, model.losses), fit.experiment.machine.terms)
+        return replace(fit, experiment=replace(fit.experiment, machine=machine)), (term,)
+
+    monkeypatch.setattr(predictions, "with_learnt_error", wrong)
+    found = assembled(replace(posterior, nothing=replace(posterior.nothing, error_class=splits)), [])
+    assert not found.learnt and not found.has_correction
+    assert found.holdout.after == found.holdout.calibrated
