@@ -9,7 +9,7 @@ error are too much alike.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,13 +19,13 @@ from diagnosis.candidates.hypotheses import Hypothesis
 from diagnosis.decision.posterior import Expected, Judged, Likeness, Posterior, Repeating, ScaledError
 from diagnosis.decision.settings import Settings
 from diagnosis.engine.calibration import Calibration
-from diagnosis.engine.candidates import Scan, scan
+from diagnosis.engine.candidates import Scan, scan, scope_of
 from diagnosis.engine.fit import Fit
 from diagnosis.engine.gram import Given, Strengths
 from diagnosis.engine.learnt import ErrorClass, rule
 from diagnosis.engine.outside import judge_outside
 from diagnosis.engine.refit import refit
-from diagnosis.engine.sessions import OverSessions, fit_over_sessions, over_sessions
+from diagnosis.engine.sessions import OverSessions, fit_over_sessions, over_sessions, sessions_of
 from models.base.errors import InputError
 from models.base.progress import Progress, silent
 from models.base.types import Array
@@ -38,6 +38,7 @@ IMPOSSIBLE = -1e3  # nats
 WHOLE = 0.3  # off 1, up to which two channels count as swapped
 WORSE, LEAST_DEVIATION = 2.0, 0.05  # times the deviation between sessions; prior standard deviations
 SCALED = (0.5, 1.0, 2.0)  # of the amplitudes of model error: what the scan says with each
+OVER_TIME = ("D", "C", "W")  # families whose effects change over time
 WORTH, WORTH_SHARE = 1.0, 0.1  # nats, and share of the best, from which a candidate is worth a fit
 
 
@@ -73,6 +74,13 @@ class _Scanned:
         """Log Bayes factor of the most probable candidate, [nat]."""
         return float(self.log_bayes[self.order[0]])
 
+    @property
+    def log_e(self) -> float:
+        """Log odds of all effects to none, parameters as they may be, [nat]."""
+        log = self.log_prior + self.log_bayes
+        parameter = np.array([one.how == "P" for one in self.candidates], dtype=bool)
+        return _log_sum(log[~parameter]) - _log_sum([0.0, *log[parameter]])
+
     def in_class(self, error_class: ErrorClass) -> _InClass:
         return next(one for one in self.classes if one.error_class == error_class)
 
@@ -101,7 +109,8 @@ def infer(
     gained, pairs = 0.0, list[Judged]()
     best = max(judged.values(), key=_weight, default=None)
     error_class = chosen.error_class if best is None else best.error_class
-    threshold = rule().threshold(chosen.error_class, error_class, settings.false_alarm_rate)
+    placebo = _placebo(calibration, first)
+    threshold = max(rule().threshold(chosen.error_class, error_class, settings.false_alarm_rate), placebo)
     if best is not None and best.fit is not None and best.log_bayes > 0.0:
         progress(f"scanning again, given {best.label}")
         second = _scanned_given(calibration, best, candidates, log_prior)
@@ -116,13 +125,17 @@ def infer(
         gained = _nothing_gains(calibration, best)
     for index, candidate in enumerate(first.candidates):
         judged.setdefault(candidate.label, _by_scan(first, index, alone[candidate.label]))
-    log_e = float(logsumexp([one.log_prior + one.log_bayes for one in judged.values()])) - gained
+    every = (*judged.values(), *pairs)
+    parameters = [_weight(one) for one in every if all(effect.term is None for effect in one.effects)]
+    effects = [_weight(one) for one in every if sum(effect.term is not None for effect in one.effects) == 1]
+    log_e = _log_sum(effects) - _log_sum([gained, *parameters])
     missing = log_e > threshold
     unknown = _unknown(calibration, error_class, outside) if missing else []
     return Posterior(
         nothing=Judged(effects=(), log_prior=0.0, log_bayes=0.0, error_class=chosen.error_class, fit=base),
         judged=tuple(replace(one, log_bayes=one.log_bayes - gained) for one in (*judged.values(), *pairs, *unknown)),
         log_e=log_e,
+        log_parameter=_log_sum(parameters) - gained,
         threshold=threshold,
         rule=rule(),
         likeness=_likeness(first, error_class),
@@ -131,12 +144,46 @@ def infer(
         error_evidence=dict(calibration.evidence),
         session_s=chosen.session_s,
         scaled=tuple(
-            _with_scaled_error(calibration, found, candidates, log_prior, factor, settings.false_alarm_rate)
+            _with_scaled_error(calibration, found, candidates, log_prior, factor, settings.false_alarm_rate, placebo)
             for factor in SCALED
         ),
         repeating=_repeating(first, error_class),
         expected=_expected(first.in_class(chosen.error_class), settings),
     )
+
+
+def _log_sum(log: Sequence[float] | Array) -> float:
+    """Logarithm of a sum, of nothing too."""
+    return float(np.logaddexp.reduce(np.asarray(log, dtype=float)))
+
+
+def _placebo(calibration: Calibration, found: _Scanned) -> float:
+    """Evidence that healthy sessions hold of an effect that cannot be in them, [nat]; without any, minus infinity.
+
+    Every baseline takes the place of the tested session in turn. What the best laws of the catalogue bring there is
+    owed to the model; in longer recordings it grows with their hours.
+    """
+    experiment = calibration.fit.experiment
+    hours = {piece.recording: 0.0 for piece in experiment.pieces}
+    for piece in experiment.pieces:
+        hours[piece.recording] += float(piece.steps.sum())
+    tested = sum(value for name, value in hours.items() if name not in experiment.healthy)
+    reached = [-np.inf]
+    for pieces in sessions_of(experiment):
+        names = {experiment.pieces[i].recording for i in pieces}
+        if not names <= experiment.healthy:
+            continue
+        swapped = replace(experiment, healthy=frozenset(hours) - names)
+        able = [
+            (one, prior) for one, prior in zip(found.candidates, found.log_prior.tolist(), strict=True)
+            if one.how == "P" or (one.how == "U" and scope_of(swapped, one) is not None)
+        ]  # fmt: skip
+        candidates, log_prior = [one for one, _ in able], np.array([prior for _, prior in able])
+        terms = [one for one in candidates if one.term is not None]
+        there = scan(replace(calibration.fit, experiment=swapped), terms, calibration.near.columns)
+        log_e = _scanned_in_classes(calibration, there, candidates, log_prior).log_e
+        reached.append(log_e * max(tested / sum(hours[name] for name in names), 1.0))
+    return max(reached)
 
 
 def _repeating(found: _Scanned, error_class: ErrorClass) -> tuple[Repeating, ...]:
@@ -149,9 +196,9 @@ def _repeating(found: _Scanned, error_class: ErrorClass) -> tuple[Repeating, ...
     every = []
     for at in (supported, worse):
         parameters = found.candidates[len(here.scan.candidates) :]
-        log = found.log_prior + _log_bayes(here.scan, parameters, here.over.given[at])
-        best = found.candidates[int(np.argmax(log))]
-        every.append(Repeating(deviation=float(deviations[at]), log_e=float(logsumexp(log)), best=best))
+        judged = replace(found, log_bayes=_log_bayes(here.scan, parameters, here.over.given[at]))
+        best = judged.candidates[judged.order[0]]
+        every.append(Repeating(deviation=float(deviations[at]), log_e=judged.log_e, best=best))
     return tuple(every)
 
 
@@ -167,17 +214,26 @@ def _scanned_in_classes(
         judged.append((scaled, here, over, float(np.log(one.prior)) + over.log_evidence))
     nothing = next(evidence for one, _, _, evidence in judged if one.name == calibration.chosen.error_class.name)
     return _best_of([
-        _in_class(one, here, parameters, over, evidence - nothing) for one, here, over, evidence in judged
+        _in_class(one, here, parameters, over, evidence - nothing, fit.experiment.healthy)
+        for one, here, over, evidence in judged
     ], candidates, log_prior, parameters)  # fmt: skip
 
 
 def _in_class(
-    error_class: ErrorClass, found: Scan, parameters: Sequence[Hypothesis], over: OverSessions, ahead: float
-) -> _InClass:
+    error_class: ErrorClass, found: Scan, parameters: Sequence[Hypothesis], over: OverSessions, ahead: float,
+    healthy: Collection[str],
+) -> _InClass:  # fmt: skip
     """Candidates in one class."""
     strengths = _strengths(found, parameters, over.given[over.most_probable])
+    less = _less((*found.candidates, *parameters), error_class, healthy)
     return _InClass(error_class=error_class, ahead=ahead, scan=found, over=over,
-                    log_bayes=_weighed(found, parameters, over) + ahead, strengths=strengths)  # fmt: skip
+                    log_bayes=_weighed(found, parameters, over) + ahead - less, strengths=strengths)  # fmt: skip
+
+
+def _less(candidates: Sequence[Hypothesis], error_class: ErrorClass, healthy: Collection[str]) -> Array:
+    """Nats less that changes over time count where they can stand in for model error: without a baseline."""
+    over_time = np.array([one.how in OVER_TIME for one in candidates], dtype=bool)
+    return (0.0 if healthy else error_class.over_time) * over_time
 
 
 def _best_of(
@@ -313,6 +369,7 @@ def _judged(calibration: Calibration, one: Judged, spread: float) -> Judged:
     at = len(calibration.fit.z)  # where the effects' unknowns begin
     log_evidence = fit_over_sessions(fit, at).log_evidence + float(np.log(one.error_class.prior))
     log_bayes = log_evidence - calibration.chosen.log_evidence - spread
+    log_bayes -= float(_less(one.effects, one.error_class, fit.experiment.healthy).sum())
     for effect in one.effects:
         if effect.term is None:
             continue  # a parameter is not further
@@ -357,6 +414,7 @@ def _alone(calibration: Calibration, best: Judged, second: _Scanned, ahead: floa
     assert fit is not None  # noqa: S101
     without = over_sessions(found.gram, fit.experiment, [*range(len(calibration.fit.z)), *found.further])
     log_bayes = _weighed(found, _parameters(second.candidates), without) + ahead
+    log_bayes -= _less(second.candidates, best.error_class, fit.experiment.healthy)
     return dict(zip((one.label for one in second.candidates), log_bayes.tolist(), strict=True))
 
 
@@ -371,7 +429,8 @@ def _scanned_given(
     found, parameters = scan(fit, [one for one in others if one.term is not None]), _parameters(others)
     base = len(calibration.fit.z)
     over = over_sessions(found.gram, fit.experiment, [*range(base), *found.further], range(base, len(fit.z)))
-    return _best_of([_in_class(given.error_class, found, parameters, over, 0.0)], others, log_prior[left], parameters)
+    here = _in_class(given.error_class, found, parameters, over, 0.0, fit.experiment.healthy)
+    return _best_of([here], others, log_prior[left], parameters)
 
 
 def _nothing_gains(calibration: Calibration, best: Judged) -> float:
@@ -409,14 +468,15 @@ def _with_scaled_error(
     log_prior: Array,
     factor: float,
     rate: float,
+    placebo: float,
 ) -> ScaledError:
     """Evidence of the scan if all model error were larger or smaller than assumed."""
     there = _scanned_in_classes(calibration, found, candidates, log_prior, factor)
     nothing = max(there.classes, key=lambda one: one.ahead)
-    log = there.log_prior + there.log_bayes - nothing.ahead
-    best = int(np.argmax(log))
-    threshold = rule().threshold(nothing.error_class, there.best[best].error_class, rate)
-    return ScaledError(factor=factor, log_e=float(logsumexp(log)), threshold=threshold, best=there.candidates[best])
+    there = replace(there, log_bayes=there.log_bayes - nothing.ahead)
+    best = there.order[0]
+    threshold = max(rule().threshold(nothing.error_class, there.best[best].error_class, rate), placebo)
+    return ScaledError(factor=factor, log_e=there.log_e, threshold=threshold, best=there.candidates[best])
 
 
 def _likeness(found: _Scanned, error_class: ErrorClass) -> Likeness:

@@ -18,7 +18,7 @@ from functools import cached_property
 from typing import Literal, get_args
 
 import numpy as np
-from scipy.special import expit, logsumexp
+from scipy.special import expit, logsumexp, softmax
 
 from diagnosis.candidates.dated import CHANGED, changed_law
 from diagnosis.candidates.hypotheses import Hypothesis
@@ -188,9 +188,11 @@ class Posterior:
     judged : tuple of Judged
         Everything else, of the scan or refitted
     log_e : float
-        Log of the mean Bayes factor over everything that competes with nothing, [nat]
+        Evidence that something is missing: log odds of all effects, parameters as they may be, to none, [nat]
+    log_parameter : float
+        Evidence that a parameter is outside its prior: log odds to all inside theirs, without any effect, [nat]
     threshold : float
-        From which something is missing, [nat]
+        From which something is missing, or a parameter is outside its prior, [nat]
     odds_unknown : float
         Prior odds of a cause that is in no catalogue, see :class:`~diagnosis.decision.settings.Settings`
     error_class : str
@@ -209,6 +211,7 @@ class Posterior:
     log_e: float
     threshold: float
     rule: Rule
+    log_parameter: float = -np.inf
     likeness: Likeness = Likeness(labels=(), cosines=np.zeros((0, 0)))
     odds_unknown: float = 0.1
     error_class: str = ""
@@ -252,6 +255,21 @@ class Posterior:
         """Probability that something is missing: one half at the threshold."""
         return float(expit((self.log_e - self.threshold) / self.rule.doubt))
 
+    @property
+    def parameter_outside(self) -> bool:
+        """True if nothing is missing, but a parameter is outside its prior."""
+        return not self.detected and self.log_parameter > self.threshold
+
+    @property
+    def evidence(self) -> float:
+        """Evidence for what is answered: that something is missing, or that a parameter is outside its prior, [nat]."""
+        return self.log_parameter if self.parameter_outside else self.log_e
+
+    @property
+    def _of_parameters(self) -> float:
+        """Probability that nothing is missing and a parameter is outside its prior."""
+        return (1.0 - self.something) * float(expit((self.log_parameter - self.threshold) / self.rule.doubt))
+
     @cached_property
     def explanations(self) -> tuple[Explanation, ...]:
         """Names, or pairs of names, with their probabilities; most probable first."""
@@ -259,14 +277,18 @@ class Posterior:
         for one in self.judged:
             of_names.setdefault(one.names, []).append(one)
         log_bayes = np.array([self._mean_log_bayes(names, members) for names, members in of_names.items()])
-        most = max(float(log_bayes.max(initial=0.0)), 0.0)
-        left = (log_bayes >= self.rule.refuted * most) | (most == 0.0)
+        able = np.ones(len(log_bayes), dtype=bool)
         if self.remainder <= self.threshold:  # a second effect needs evidence of its own
-            left &= np.array([len(names) == 1 for names in of_names], dtype=bool)
+            able = np.array([len(names) == 1 for names in of_names], dtype=bool)
+        parameter = np.array([members[0].kind == "parameter" for members in of_names.values()], dtype=bool)
         log_prior = np.array([self._log_odds(members[0].kind) for members in of_names.values()])
         a, b = self.rule.temper
-        log = np.where(left, log_prior + log_bayes / (a + b * most), -np.inf)
-        chance = self.something * np.exp(log - logsumexp(log))
+        chance = np.zeros(len(log_bayes))
+        for side, whole in ((parameter, self._of_parameters), (~parameter, self.something)):
+            most = float(log_bayes[side].max(initial=0.0))
+            left = np.flatnonzero(side & able & ((log_bayes >= self.rule.refuted * most) | (most == 0.0)))
+            if len(left):
+                chance[left] = whole * softmax(log_prior[left] + log_bayes[left] / (a + b * most))
         found = [
             Explanation(names=names, members=tuple(sorted(members, key=lambda one: -one.log_prior - one.log_bayes)),
                         log_bayes=value, probability=p)
@@ -310,7 +332,7 @@ class Posterior:
     def of(self, kind: Kind) -> float:
         """Probability of a kind of explanation."""
         if kind == "nothing":
-            return 1.0 - self.something
+            return 1.0 - self.something - self._of_parameters
         return min(float(sum(p for one, p in self.ranked if one.kind == kind)), 1.0)
 
     def of_names(self, names: Collection[str]) -> float:
@@ -362,7 +384,7 @@ def name_of(effect: Hypothesis) -> str:
 
 
 def decide(posterior: Posterior, settings: Settings) -> tuple[Answer, ...]:
-    """The answers of a posterior: empty if nothing is missing, or if nothing can be named.
+    """The answers of a posterior: empty if nothing is missing and no parameter outside its prior, or without a name.
 
     A name is a claim if its probability reaches :attr:`Settings.claim_from`. Else at most three names that reach it
     together are a tie. Else names that look alike in these readings, or act on the same thing, and reach it together
@@ -370,7 +392,7 @@ def decide(posterior: Posterior, settings: Settings) -> tuple[Answer, ...]:
     over the hours: the nearest name is found, not the cause. Where much is left, what is stated of it is only the
     share :attr:`Rule.nearest` of its probability, because most names that were nearest turned out wrong.
     """
-    if not posterior.detected:
+    if not posterior.detected and not posterior.parameter_outside:
         return ()
     best = _best_fitted(posterior)
     answers = (_answer(posterior, best, effect, settings.claim_from) for effect in best.effects)
@@ -383,7 +405,9 @@ def _best_fitted(posterior: Posterior) -> Judged:
     Far from a straight line the refit of the best place may fail, and that of another one end without the effect. A fit
     at the same place goes before others.
     """
-    explanation = posterior.explanations[0]
+    explanation = next(
+        one for one in posterior.explanations if (one.members[0].kind == "parameter") == posterior.parameter_outside
+    )
     first = explanation.members[0]
     if first.fit is not None:
         return first

@@ -23,6 +23,8 @@ class ErrorClass:
     ----------
     threshold : float
         Evidence from which something is missing if the readings choose this class with and without it, [nat]
+    over_time : float
+        How much less changes over time count in this class without a baseline, [nat]
     amplitudes : mapping of group to float
         Prior standard deviations of the groups' unknowns; groups that are not named are absent
     """
@@ -31,6 +33,7 @@ class ErrorClass:
     prior: float
     threshold: float
     amplitudes: Mapping[str, float]
+    over_time: float = 0.0
 
     def scaled(self, factor: float) -> ErrorClass:
         """The class with all amplitudes larger or smaller by a factor."""

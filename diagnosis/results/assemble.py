@@ -123,9 +123,9 @@ def assemble(
     return Diagnosis(
         verdict=verdict,
         gearbox=setup.gearbox.name,
-        log_e_value=posterior.log_e,
+        log_e_value=posterior.evidence,
         threshold=posterior.threshold,
-        p_value=_bound_on_chance(posterior.log_e),
+        p_value=_bound_on_chance(posterior.evidence),
         false_alarm_rate=settings.false_alarm_rate,
         location=location,
         findings=findings,
@@ -244,18 +244,16 @@ def _distinct(found: Sequence[tuple[Answer, Finding]]) -> tuple[Finding, ...]:
 
 
 def _verdict(posterior: Posterior, answers: Sequence[Answer], unseen: Sequence[NotDetectable]) -> Verdict:
-    if answers and all(answer.effect.term is None for answer in answers):
+    if posterior.parameter_outside:
         return "parameter_error"
     if not posterior.detected:
         asked = {one.effect.name for one in posterior.expected if one.effect.how == "U"}
         visible = 1.0 - len({one.mechanism for one in unseen}) / max(len(asked), 1)
         return "insufficient_data" if asked and visible < ENOUGH_VISIBLE else "consistent"
-    if not answers and posterior.of("nothing") + posterior.of("parameter") > 0.5:
-        return "parameter_error"
-    if not answers or any(answer.best.kind == "outside" or answer.effect.is_open for answer in answers):
+    terms = [answer.effect.term for answer in answers if answer.effect.term is not None]
+    if not terms or any(answer.best.kind == "outside" or answer.effect.is_open for answer in answers):
         return "unexplained"
-    terms = [answer.effect.term for answer in answers]
-    if all(term is None or term.of_measurement or term.kind == "sensor" for term in terms):
+    if all(term.of_measurement or term.kind == "sensor" for term in terms):
         return "sensor_fault"
     return "missing_physics"
 

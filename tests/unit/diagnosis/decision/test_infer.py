@@ -211,7 +211,8 @@ def test_a_share_of_a_swap_is_refused_with_a_number(
     swap = Hypothesis(name="swapped_channels", place="oil_pinion", family="measurement", term=term,
                       variants=np.ones((1, 1)))  # fmt: skip
     unknown = TermParameter(parameter=strength, label="swap", names=("swap",))
-    fit = SimpleNamespace(z=np.array([share]), covariance=np.eye(1), experiment=SimpleNamespace(unknowns=[unknown]))
+    experiment = SimpleNamespace(unknowns=[unknown], healthy=frozenset())
+    fit = SimpleNamespace(z=np.array([share]), covariance=np.eye(1), experiment=experiment)
     monkeypatch.setattr(infer_module, "fit_over_sessions", lambda *_: SimpleNamespace(log_evidence=50.0))
     sure = ErrorClass(name="sure", prior=1.0, threshold=5.0, amplitudes={})
     one = Judged(effects=(swap,), log_prior=-5.0, log_bayes=40.0, fit=cast(Fit, fit), error_class=sure)

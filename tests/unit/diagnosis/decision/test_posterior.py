@@ -110,11 +110,11 @@ def test_probabilities_sum_to_one_with_nothing() -> None:
     pair = judged(STRONG + 8.0, effect("first"), effect("second"))
     every = [judged(STRONG, effect("first")), judged(STRONG, sensor), judged(50.0, parameter), pair,
              judged(STRONG, effect("unknown_heat", family=OPEN_FORM), log_prior=0.0)]  # fmt: skip
-    found = posterior(*every, log_e=6.0, remainder=10.0)
+    found = posterior(*every, log_e=6.0, log_parameter=4.0, remainder=10.0)
     of_kind = {kind: found.of(kind) for kind in KINDS}
     assert sum(of_kind.values()) == pytest.approx(1.0)
     assert all(p > 0.0 for p in of_kind.values())
-    assert sum(p for _, p in found.ranked) == pytest.approx(found.something)
+    assert sum(p for _, p in found.ranked) == pytest.approx(1.0 - found.of("nothing"))
 
 
 def test_something_is_as_probable_as_nothing_at_the_threshold() -> None:
@@ -278,7 +278,7 @@ def test_a_fit_at_the_best_place_goes_before_others() -> None:
 
 def test_a_parameter_outside_its_prior_is_answered_by_its_name() -> None:
     h_air, h_oil = (effect("parameter", name, term=None, unknown=i, how="P") for i, name in enumerate(("air", "oil")))
-    found = posterior(judged(STRONG, h_air), judged(0.0, h_oil))
+    found = posterior(judged(STRONG, h_air), judged(0.0, h_oil), log_e=-1.0, log_parameter=100.0)
     (answer,) = decide(found, Settings())
     assert answer.effect is h_air and answer.grade == "claim"
     assert found.of("parameter") == pytest.approx(found.of_names(["parameter air"]))

@@ -339,7 +339,7 @@ def test_a_parameter(assembled: Assemble, prepared: Prepared) -> None:
     )
     judged = Judged(effects=(effect,), log_prior=-3.0, log_bayes=40.0, fit=fit, error_class=error_classes()[0])
     answer = Answer(best=judged, effect=effect, grade="claim", probability=0.95, joint=0.95)
-    found = assembled(posterior_of(plain, judged, log_e=1.0), [answer])
+    found = assembled(posterior_of(plain, judged, log_e=1.0, log_parameter=40.0), [answer])
     assert found.verdict == "parameter_error"  # known parameters raise no alarm
     (finding,) = found.findings
     assert finding.kind == "parameter" and finding.parameters[0].value == pytest.approx(value)
