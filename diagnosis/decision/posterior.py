@@ -156,6 +156,25 @@ class Repeating:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class Placebo:
+    """Evidence that a baseline holds of an effect that cannot be in it: owed to the model.
+
+    Attributes
+    ----------
+    session : str
+        Of the baseline that holds most
+    log_e : float
+        As if it were as many hours as the tested recordings, [nat]
+    best : Hypothesis
+        The law ahead
+    """
+
+    session: str
+    log_e: float
+    best: Hypothesis
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Likeness:
     """How much alike effects look in these readings, with everything unknown marginalised.
 
@@ -204,6 +223,8 @@ class Posterior:
     repeating : tuple of Repeating
         With the deviation between sessions that the readings support, and with twice that or more; empty of one
         session, and if none is larger
+    placebo : Placebo or None
+        The tested recordings have to bring more; None without baselines
     """
 
     nothing: Judged
@@ -220,6 +241,7 @@ class Posterior:
     scaled: tuple[ScaledError, ...] = ()
     repeating: tuple[Repeating, ...] = ()
     expected: tuple[Expected, ...] = ()
+    placebo: Placebo | None = None
 
     @property
     def remainder(self) -> float:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from diagnosis.decision.posterior import Answer, Posterior
+from diagnosis.decision.posterior import Answer, Placebo, Posterior
 from diagnosis.engine.baselines import effects_in_baselines, sessions_apart
 from diagnosis.engine.fit import Experiment
 
@@ -19,10 +19,15 @@ def baseline_notes(experiment: Experiment, posterior: Posterior, answers: Sequen
     effects = [answer.effect for answer in answers[:1] if answer.effect.term is not None]
     acting = effects_in_baselines(nothing, effects) if effects else [0.0]
     best = (answers[0].best.fit if answers else None) or nothing
-    return baselines_told(float(acting[0]), sessions_apart(best), effects[0].name if effects else "")
+    placebo = posterior.placebo
+    raised = placebo is not None and placebo.log_e >= posterior.threshold
+    return baselines_told(float(acting[0]), sessions_apart(best), effects[0].name if effects else "",
+                          placebo if raised else None)  # fmt: skip
 
 
-def baselines_told(acting: float, apart: Mapping[str, float], effect: str = "") -> tuple[str, ...]:
+def baselines_told(
+    acting: float, apart: Mapping[str, float], effect: str = "", placebo: Placebo | None = None
+) -> tuple[str, ...]:
     """Notes for a report on baselines that are not as they should be.
 
     Parameters
@@ -33,6 +38,8 @@ def baselines_told(acting: float, apart: Mapping[str, float], effect: str = "") 
         See :func:`sessions_apart`, [nat]
     effect : str
         Its name for people
+    placebo : Placebo or None
+        Where it raises what the recordings have to bring
     """
     notes = []
     if effect and acting > NOTED_FROM:
@@ -45,4 +52,10 @@ def baselines_told(acting: float, apart: Mapping[str, float], effect: str = "") 
         "parameters are not those of the other recordings. Leave it out if that is so."
         for session, nats in apart.items() if nats > NOTED_FROM
     ]  # fmt: skip
+    if placebo is not None:
+        notes.append(
+            f"Session '{placebo.session}', tested like the recordings, brings {placebo.log_e:.0f} nats "
+            f"({placebo.best.name} at {placebo.best.place}), though nothing can be missing in it: so much comes of the "
+            "model, and the recordings have to bring more. If that effect may have acted there, leave the session out."
+        )
     return tuple(notes)

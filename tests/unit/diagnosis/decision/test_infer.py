@@ -15,21 +15,18 @@ from diagnosis.decision.infer import (
     NEAR_PLACE,
     PLACES,
     RACED,
-    _best_of,
-    _InClass,
     _judged,
-    _Scanned,
-    _scanned_in_classes,
     _worth_a_fit,
     infer,
 )
 from diagnosis.decision.posterior import KINDS, Judged, Posterior, decide
+from diagnosis.decision.scanned import InClass, Scanned, in_best_classes, less_over_time, scan_in_classes
 from diagnosis.decision.settings import Settings
 from diagnosis.engine.calibration import Calibration, calibrate_with_error
 from diagnosis.engine.candidates import scan
 from diagnosis.engine.families import axis_of, changes, log_prior, parameters_outside
 from diagnosis.engine.fit import Fit, calibrate
-from diagnosis.engine.learnt import ErrorClass
+from diagnosis.engine.learnt import ErrorClass, error_classes
 from diagnosis.engine.prepare import prepare_experiment
 from diagnosis.engine.unknown import TermParameter
 from diagnosis.results.findings import values_of
@@ -44,10 +41,11 @@ LOOKED_FOR = ("windage", "air_cooling_change", "sensor_bias", "hot_neighbour")
 WINDAGE_W, AT_RPM, HOURS = 150.0, 3300.0, 1.5
 
 
-def inferred(fzg: Gearbox, windage_W: float) -> Posterior:
-    """A ride with windage in the oil, or without it, and a healthy one of another day."""
+def inferred(fzg: Gearbox, windage_W: float, in_baseline_W: float = 0.0) -> Posterior:
+    """A ride with windage in the oil, or without it, and a baseline of another day."""
     train = recorded(fzg, "train", windage_W=windage_W, hours=HOURS)
-    setup, experiment = prepare_experiment(fzg, [train], [train], [recorded(fzg, "april", seed=2, hours=HOURS)])
+    april = recorded(fzg, "april", seed=2, hours=HOURS, windage_W=in_baseline_W)
+    setup, experiment = prepare_experiment(fzg, [train], [train], [april])
     network = experiment.machine.model.network
     placed = [one for name in LOOKED_FOR for one in CATALOGUE[name].placed(network, setup.scale, setup.channels)]
     windage = [one for one in placed if one.label == "windage_oil"]
@@ -78,6 +76,38 @@ def test_a_concealed_effect_is_detected_and_first(concealed: Posterior) -> None:
     assert sum(concealed.of(kind) for kind in KINDS) == pytest.approx(1.0)
     answers = decide(concealed, Settings())
     assert [one.effect.label for one in answers] == ["windage@oil"]
+
+
+def test_a_baseline_that_brings_evidence_raises_what_is_asked_for(fzg: Gearbox, concealed: Posterior) -> None:
+    """Windage acts in the baseline alone: nothing is missing in the recordings, whatever has to be explained."""
+    assert concealed.placebo is not None and concealed.placebo.log_e < 5.0 == concealed.threshold
+    found = inferred(fzg, 0.0, in_baseline_W=WINDAGE_W)
+    assert found.placebo is not None
+    assert (found.placebo.session, found.placebo.best.label) == ("april", "windage@oil")
+    assert found.threshold == found.placebo.log_e > 10.0
+    assert not found.detected
+
+
+def test_a_parameter_outside_its_prior_is_no_sign_that_something_is_missing() -> None:
+    """What an effect explains less well than a parameter does is no evidence for it."""
+    mechanism = Hypothesis(name="windage", place="oil", family="no-load loss", variants=np.ones((1, 1)))
+    parameter = Hypothesis(name="parameter", place="h_air", family="parameter", unknown=0, variants=np.ones((1, 1)),
+                           how="P")  # fmt: skip
+    found = Scanned(candidates=(mechanism, parameter), log_prior=np.log([0.9, 0.1]), log_bayes=np.array([60.0, 80.0]),
+                    classes=(), best=())  # fmt: skip
+    assert found.log_e == pytest.approx(60.0 - 80.0 + np.log(9.0))
+    unlikely = replace(found, log_bayes=np.array([60.0, -50.0]))
+    assert unlikely.log_e == pytest.approx(60.0 + np.log(0.9))
+
+
+def test_without_a_baseline_a_change_over_time_counts_less_where_the_model_fits_badly() -> None:
+    full = next(one for one in error_classes() if one.name == "full")
+    small = next(one for one in error_classes() if one.name == "splits")
+    always, dated = (Hypothesis(name="windage", place="oil", family="no-load loss", variants=np.ones((1, 1)), how=how)
+                     for how in ("U", "D"))  # fmt: skip
+    assert less_over_time((always, dated), full, ()).tolist() == [0.0, full.over_time] and full.over_time > 20.0
+    assert not less_over_time((always, dated), full, {"april"}).any()
+    assert not less_over_time((always, dated), small, ()).any()
 
 
 def test_nothing_gets_the_evidence_that_it_has_from_the_point_of_an_explanation(fzg: Gearbox) -> None:
@@ -118,7 +148,7 @@ def test_scaled_model_error_is_that_of_a_class_with_such_amplitudes(fzg: Gearbox
     found = scan(calibration.fit, candidates, calibration.near.columns)
 
     def scanned(name: str, factor: float) -> tuple[float, float]:
-        every = _scanned_in_classes(calibration, found, candidates, np.zeros(len(candidates)), factor).classes
+        every = scan_in_classes(calibration, found, candidates, np.zeros(len(candidates)), factor).classes
         none, one = (next(each for each in every if each.error_class.name == which) for which in ("none", name))
         return one.ahead - none.ahead - float(np.log(one.error_class.prior)), float(one.log_bayes[0] - one.ahead)
 
@@ -162,8 +192,8 @@ def named(name: str, place: str) -> Hypothesis:
     return Hypothesis(name=name, place=place, family="heat", variants=np.ones((1, 1)))
 
 
-def scanned_as(candidates: list[Hypothesis], log_bayes: Array) -> _Scanned:
-    return _Scanned(candidates=tuple(candidates), log_bayes=log_bayes, log_prior=np.zeros(len(candidates)),
+def scanned_as(candidates: list[Hypothesis], log_bayes: Array) -> Scanned:
+    return Scanned(candidates=tuple(candidates), log_bayes=log_bayes, log_prior=np.zeros(len(candidates)),
                     classes=(), best=())  # fmt: skip
 
 
@@ -192,11 +222,13 @@ def test_every_candidate_is_judged_in_the_class_that_suits_it() -> None:
     candidates = [Hypothesis(name=name, place="oil", family="heat", variants=np.ones((1, 1))) for name in "ab"]
     scanned = SimpleNamespace(candidates=tuple(candidates))
 
-    def in_class(name: str, log_bayes: list[float]) -> _InClass:
+    def in_class(name: str, log_bayes: list[float]) -> InClass:
         error = ErrorClass(name=name, prior=0.5, threshold=5.0, amplitudes={})
-        return cast(_InClass, SimpleNamespace(error_class=error, scan=scanned, log_bayes=np.array(log_bayes)))
+        return cast(InClass, SimpleNamespace(error_class=error, scan=scanned, log_bayes=np.array(log_bayes)))
 
-    found = _best_of([in_class("full", [18.0, 4.0]), in_class("small", [78.0, -500.0])], candidates, np.zeros(2), [])
+    found = in_best_classes(
+        [in_class("full", [18.0, 4.0]), in_class("small", [78.0, -500.0])], candidates, np.zeros(2), []
+    )
     assert [one.error_class.name for one in found.best] == ["small", "full"]
     np.testing.assert_array_equal(found.log_bayes, [78.0, 4.0])
 

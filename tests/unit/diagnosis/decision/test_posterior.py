@@ -284,6 +284,18 @@ def test_a_parameter_outside_its_prior_is_answered_by_its_name() -> None:
     assert found.of("parameter") == pytest.approx(found.of_names(["parameter air"]))
 
 
+def test_a_parameter_outside_its_prior_goes_behind_something_that_is_missing() -> None:
+    """Next to an effect that is detected a parameter has only what that leaves."""
+    parameter = judged(STRONG + 20.0, effect("parameter", "air", term=None, unknown=0, how="P"))
+    found = posterior(judged(STRONG, effect("windage")), parameter, log_e=9.0, log_parameter=100.0)
+    (answer,) = decide(found, Settings())
+    assert answer.effect.name == "windage" and found.evidence == 9.0
+    assert found.of("parameter") == pytest.approx(1.0 - found.something)
+    silent = replace(found, log_e=4.0)
+    assert silent.parameter_outside and silent.evidence == 100.0
+    assert decide(silent, Settings())[0].effect.name == "parameter"
+
+
 def test_an_unknown_heat_is_never_a_claim() -> None:
     (answer,) = decide(posterior(judged(STRONG, effect("unknown_heat", family=OPEN_FORM), log_prior=0.0)), Settings())
     assert answer.probability > ENOUGH and (answer.grade, answer.acts_like) == ("likely", True)

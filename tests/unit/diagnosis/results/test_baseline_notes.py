@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import numpy as np
+
+from diagnosis.candidates.hypotheses import Hypothesis
+from diagnosis.decision.posterior import Placebo
 from diagnosis.results.baseline_notes import baselines_told
 
 
@@ -14,3 +18,9 @@ def test_an_effect_that_acts_in_the_baselines_is_noted() -> None:
 def test_a_session_of_another_machine_is_noted() -> None:
     (note,) = baselines_told(0.0, {"april": 10.0, "may": -5.0})
     assert note.startswith("Session 'april' looks like another machine")
+
+
+def test_a_baseline_that_brings_evidence_is_noted() -> None:
+    damage = Hypothesis(name="bearing_damage", place="bearing_1", family="bearing", variants=np.ones((1, 1)))
+    (note,) = baselines_told(0.0, {}, placebo=Placebo(session="april", log_e=50.6, best=damage))
+    assert note.startswith("Session 'april', tested like the recordings, brings 51 nats (bearing_damage at bearing_1)")

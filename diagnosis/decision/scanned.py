@@ -1,0 +1,254 @@
+"""Everything judged by straight lines: all candidates at one point, in every class of model error."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from diagnosis.candidates.hypotheses import Hypothesis
+from diagnosis.decision.posterior import Expected, Judged, Likeness, Placebo, Repeating, ScaledError
+from diagnosis.decision.settings import Settings
+from diagnosis.engine.calibration import Calibration
+from diagnosis.engine.candidates import Scan, scan, scope_of
+from diagnosis.engine.gram import Given, Strengths
+from diagnosis.engine.learnt import ErrorClass, rule
+from diagnosis.engine.sessions import OverSessions, over_sessions, sessions_of
+from models.base.types import Array
+
+OVER_TIME = ("D", "C", "W")  # families whose effects change over time
+WORSE, LEAST_DEVIATION = 2.0, 0.05  # times the deviation between sessions; prior standard deviations
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class InClass:
+    """Everything judged by straight lines with model error of one class: terms in the order of the scan, parameters."""
+
+    error_class: ErrorClass
+    scan: Scan
+    over: OverSessions
+    ahead: float  # of the most probable class, without any candidate
+    log_bayes: Array  # against nothing in the most probable class
+    strengths: Strengths
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Scanned:
+    """Everything judged by straight lines at one point, in the class of model error that suits each candidate best."""
+
+    candidates: tuple[Hypothesis, ...]
+    log_prior: Array
+    log_bayes: Array
+    classes: tuple[InClass, ...]
+    best: tuple[InClass, ...]
+
+    @property
+    def order(self) -> list[int]:
+        """Indices of the candidates, most probable first."""
+        return [int(index) for index in np.argsort(-(self.log_bayes + self.log_prior))]
+
+    @property
+    def most(self) -> float:
+        """Log Bayes factor of the most probable candidate, [nat]."""
+        return float(self.log_bayes[self.order[0]])
+
+    @property
+    def log_e(self) -> float:
+        """Log odds of all effects to none, parameters as they may be, [nat]."""
+        log = self.log_prior + self.log_bayes
+        parameter = np.array([one.how == "P" for one in self.candidates], dtype=bool)
+        return log_sum(log[~parameter]) - log_sum([0.0, *log[parameter]])
+
+    def in_class(self, error_class: ErrorClass) -> InClass:
+        """Everything with model error of one class."""
+        return next(one for one in self.classes if one.error_class == error_class)
+
+
+def scan_in_classes(
+    calibration: Calibration, found: Scan, candidates: Sequence[Hypothesis], log_prior: Array, factor: float = 1.0
+) -> Scanned:
+    """The scan at the calibrated point with model error of all classes, their amplitudes scaled."""
+    fit, parameters, judged = calibration.fit, _parameters(candidates), []
+    for one in calibration.classes:
+        scaled = one.scaled(factor)
+        here = found.in_directions(calibration.near.directions(scaled))
+        over = over_sessions(here.gram, fit.experiment, range(here.further.stop))
+        judged.append((scaled, here, over, float(np.log(one.prior)) + over.log_evidence))
+    nothing = next(evidence for one, _, _, evidence in judged if one.name == calibration.chosen.error_class.name)
+    return in_best_classes([
+        _in_class(one, here, parameters, over, evidence - nothing, fit.experiment.healthy)
+        for one, here, over, evidence in judged
+    ], candidates, log_prior, parameters)  # fmt: skip
+
+
+def scan_given(calibration: Calibration, given: Judged, candidates: Sequence[Hypothesis], log_prior: Array) -> Scanned:
+    """All others scanned at the fit of an explanation, against that explanation, with model error of its class."""
+    fit, mine = given.fit, {effect.label for effect in given.effects}
+    assert fit is not None  # noqa: S101
+    left = [index for index, one in enumerate(candidates) if one.label not in mine]
+    others = [candidates[index] for index in left]
+    found, parameters = scan(fit, [one for one in others if one.term is not None]), _parameters(others)
+    base = len(calibration.fit.z)
+    over = over_sessions(found.gram, fit.experiment, [*range(base), *found.further], range(base, len(fit.z)))
+    here = _in_class(given.error_class, found, parameters, over, 0.0, fit.experiment.healthy)
+    return in_best_classes([here], others, log_prior[left], parameters)
+
+
+def judge_alone(calibration: Calibration, best: Judged, second: Scanned, ahead: float) -> dict[str, float]:
+    """Log Bayes factors of all other candidates against nothing, by the scan at the best explanation, without it."""
+    fit, found = best.fit, second.classes[0].scan
+    assert fit is not None  # noqa: S101
+    without = over_sessions(found.gram, fit.experiment, [*range(len(calibration.fit.z)), *found.further])
+    log_bayes = _weighed(found, _parameters(second.candidates), without) + ahead
+    log_bayes -= less_over_time(second.candidates, best.error_class, fit.experiment.healthy)
+    return dict(zip((one.label for one in second.candidates), log_bayes.tolist(), strict=True))
+
+
+def _in_class(
+    error_class: ErrorClass, found: Scan, parameters: Sequence[Hypothesis], over: OverSessions, ahead: float,
+    healthy: Collection[str],
+) -> InClass:  # fmt: skip
+    """Candidates in one class."""
+    strengths = _strengths(found, parameters, over.given[over.most_probable])
+    less = less_over_time((*found.candidates, *parameters), error_class, healthy)
+    return InClass(error_class=error_class, ahead=ahead, scan=found, over=over,
+                    log_bayes=_weighed(found, parameters, over) + ahead - less, strengths=strengths)  # fmt: skip
+
+
+def in_best_classes(
+    classes: Sequence[InClass], candidates: Sequence[Hypothesis], log_prior: Array, parameters: Sequence[Hypothesis]
+) -> Scanned:
+    """Every candidate in the class that suits it best."""
+    known = {one.label: value for one, value in zip(candidates, log_prior.tolist(), strict=True)}
+    every = (*classes[0].scan.candidates, *parameters)
+    table = np.stack([one.log_bayes for one in classes])
+    return Scanned(
+        candidates=every, log_prior=np.array([known[one.label] for one in every]), log_bayes=table.max(axis=0),
+        classes=tuple(classes), best=tuple(classes[at] for at in table.argmax(axis=0).tolist()),
+    )  # fmt: skip
+
+
+def less_over_time(candidates: Sequence[Hypothesis], error_class: ErrorClass, healthy: Collection[str]) -> Array:
+    """Nats less that changes over time count where they can stand in for model error: without a baseline."""
+    over_time = np.array([one.how in OVER_TIME for one in candidates], dtype=bool)
+    return (0.0 if healthy else error_class.over_time) * over_time
+
+
+def _parameters(candidates: Sequence[Hypothesis]) -> list[Hypothesis]:
+    """Parameters outside their priors."""
+    return [one for one in candidates if one.unknown is not None]
+
+
+def _strengths(found: Scan, parameters: Sequence[Hypothesis], given: Given) -> Strengths:
+    """Of every term in its best shape, then of every parameter outside its prior, in prior standard deviations."""
+    terms = found.singles(given)
+    wider = np.sqrt(rule().wider ** 2 - 1.0)
+    further = given.singles([one.unknown for one in parameters if one.unknown is not None], wider)
+    return Strengths(**{name: np.concatenate([getattr(terms, name), getattr(further, name)])
+                        for name in ("log_bayes", "value", "sd")})  # fmt: skip
+
+
+def _weighed(found: Scan, parameters: Sequence[Hypothesis], over: OverSessions) -> Array:
+    """Log Bayes factors of all candidates, over variants and deviations between sessions."""
+    return over.weighed([_log_bayes(found, parameters, given) for given in over.given])
+
+
+def _log_bayes(found: Scan, parameters: Sequence[Hypothesis], given: Given) -> Array:
+    """Log Bayes factors of all candidates, over variants."""
+    best = np.array(_strengths(found, parameters, given).log_bayes)
+    best[: len(found.candidates)] -= found.spread
+    return best
+
+
+def log_sum(log: Sequence[float] | Array) -> float:
+    """Logarithm of a sum, of nothing too."""
+    return float(np.logaddexp.reduce(np.asarray(log, dtype=float)))
+
+
+def placebo_of(calibration: Calibration, found: Scanned) -> Placebo | None:
+    """Every baseline in the place of the tested session; evidence grows with the hours. None without baselines."""
+    experiment = calibration.fit.experiment
+    hours = {piece.recording: 0.0 for piece in experiment.pieces}
+    for piece in experiment.pieces:
+        hours[piece.recording] += float(piece.steps.sum())
+    tested = sum(value for name, value in hours.items() if name not in experiment.healthy)
+    reached: list[Placebo] = []
+    for pieces in sessions_of(experiment):
+        names = {experiment.pieces[i].recording for i in pieces}
+        if not names <= experiment.healthy:
+            continue
+        swapped = replace(experiment, healthy=frozenset(hours) - names)
+        able = [
+            (one, prior) for one, prior in zip(found.candidates, found.log_prior.tolist(), strict=True)
+            if one.how == "P" or (one.how == "U" and scope_of(swapped, one) is not None)
+        ]  # fmt: skip
+        candidates, log_prior = [one for one, _ in able], np.array([prior for _, prior in able])
+        terms = [one for one in candidates if one.term is not None]
+        there = scan(replace(calibration.fit, experiment=swapped), terms, calibration.near.columns)
+        judged = scan_in_classes(calibration, there, candidates, log_prior)
+        longer = max(tested / sum(hours[name] for name in names), 1.0)
+        best = next(one for one in map(judged.candidates.__getitem__, judged.order) if one.how != "P")
+        session = experiment.session_of.get(min(names), "")
+        reached.append(Placebo(session=session, log_e=judged.log_e * longer, best=best))
+    return max(reached, key=lambda one: one.log_e, default=None)
+
+
+def repeating_of(found: Scanned, error_class: ErrorClass) -> tuple[Repeating, ...]:
+    """Evidence of the scan in a class with the most probable deviation between sessions, and with a larger one."""
+    here = found.in_class(error_class)
+    deviations, supported = here.over.deviations, here.over.most_probable
+    worse = int(np.searchsorted(deviations, WORSE * max(deviations[supported], LEAST_DEVIATION)))
+    if worse >= len(deviations):
+        return ()
+    every = []
+    for at in (supported, worse):
+        parameters = found.candidates[len(here.scan.candidates) :]
+        judged = replace(found, log_bayes=_log_bayes(here.scan, parameters, here.over.given[at]))
+        best = judged.candidates[judged.order[0]]
+        every.append(Repeating(deviation=float(deviations[at]), log_e=judged.log_e, best=best))
+    return tuple(every)
+
+
+def with_scaled_error(
+    calibration: Calibration,
+    found: Scan,
+    candidates: Sequence[Hypothesis],
+    log_prior: Array,
+    factor: float,
+    rate: float,
+    least: float,
+) -> ScaledError:
+    """Evidence of the scan if all model error were larger or smaller than assumed."""
+    there = scan_in_classes(calibration, found, candidates, log_prior, factor)
+    nothing = max(there.classes, key=lambda one: one.ahead)
+    there = replace(there, log_bayes=there.log_bayes - nothing.ahead)
+    best = there.order[0]
+    threshold = max(rule().threshold(nothing.error_class, there.best[best].error_class, rate), least)
+    return ScaledError(factor=factor, log_e=there.log_e, threshold=threshold, best=there.candidates[best])
+
+
+def likeness_of(found: Scanned, error_class: ErrorClass) -> Likeness:
+    """How much alike candidates look in these readings, each in its best shape, with model error of one class."""
+    here = found.in_class(error_class)
+    given = here.over.given[here.over.most_probable]
+    unknown = [one.unknown for one in found.candidates if one.unknown is not None]
+    at = np.array([*here.scan.of_candidates, *unknown], dtype=int) + 1
+    inner = given.matrix[np.ix_(at, at)]
+    norm = np.sqrt(np.maximum(np.diag(inner), 1e-12))
+    return Likeness(labels=tuple(one.label for one in found.candidates), cosines=np.abs(inner / norm / norm[:, None]))
+
+
+def expected_of(found: InClass, settings: Settings) -> tuple[Expected, ...]:
+    """Expected evidence of every candidate at the size that matters: of a temperature or a heat, whichever is less."""
+    given, terms = found.over.given[found.over.most_probable], found.scan
+    at = np.array(terms.of_candidates) + 1
+    b = np.maximum(given.matrix[at, at], 0.0)
+    sd, size = terms.sd, np.full(len(b), np.inf)
+    for matters, peak in ((settings.matters_K, terms.peak_K), (settings.matters_W, terms.peak_W)):
+        reached = (peak > 0.0) & (matters > 0.0)
+        size[reached] = np.minimum(size[reached], matters / peak[reached])
+    size = np.where(np.isfinite(size), size, sd)
+    log_bayes = 0.5 * np.square(b * size) / (b + 1.0 / np.square(sd)) - 0.5 * np.log1p(b * np.square(sd))
+    return tuple(Expected(effect=one, log_bayes=float(value))
+                 for one, value in zip(terms.candidates, log_bayes, strict=True))  # fmt: skip
