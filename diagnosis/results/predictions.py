@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from diagnosis.decision.posterior import Judged
 from diagnosis.engine.calibration import Near
 from diagnosis.engine.fit import Experiment, Fit
@@ -120,7 +122,8 @@ def _predictions(
 
 
 def _predict(experiment: Experiment, index: int, z: Array | None, near: Array | None) -> Prediction:
-    return predict(experiment, index, z, guess=near)
+    with np.errstate(over="ignore", invalid="ignore"):  # what leaves all bounds is refused there
+        return predict(experiment, index, z, guess=near)
 
 
 def _courses(found: Sequence[Prediction]) -> list[Array]:
