@@ -10,7 +10,7 @@ import numpy as np
 from diagnosis.decision.infer import infer
 from diagnosis.decision.posterior import decide
 from diagnosis.decision.settings import Settings
-from diagnosis.engine.calibration import calibrate_with_error
+from diagnosis.engine.calibration import calibrate_with_error, recalibrate
 from diagnosis.engine.families import candidates_of, log_prior
 from diagnosis.engine.fit import calibrate
 from diagnosis.engine.outside import outside_of
@@ -107,6 +107,12 @@ def diagnose(
         candidates = candidates_of(setup, experiment, catalogue)
         weights, outside = log_prior(candidates), outside_of(setup, experiment)
         posterior = infer(calibration, candidates, weights, settings, outside=outside, progress=progress)
+        if posterior.elsewhere is not None:
+            progress("calibrating again in the better basin that was seen")
+            again = recalibrate(calibration, posterior.elsewhere)
+            if again.chosen.log_evidence > calibration.chosen.log_evidence:
+                calibration = again
+                posterior = infer(calibration, candidates, weights, settings, outside=outside, progress=progress)
         faulty, rest = faulty_channels(posterior, apart), None
         if faulty and calibration.of_others is not None:
             progress(f"looking at the machine without {', '.join(apart)}")

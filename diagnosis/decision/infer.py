@@ -47,6 +47,7 @@ NEAR_PLACE = 3.0  # nats behind the best place of its name, up to which a second
 REFITTED, SECONDS = 6, 2
 SETTLED_NAT, MOST_TURNS = 0.1, 5  # gain at which a fit has ended; how often it goes on at most
 IMPOSSIBLE = -1e3  # nats
+FAR_BETTER = 10.0  # nats, from which the calibration was in the wrong basin
 WHOLE = 0.3  # off 1, up to which two channels count as swapped
 SCALED = (0.5, 1.0, 2.0)  # of the amplitudes of model error: what the scan says with each
 WORTH, WORTH_SHARE = 1.0, 0.1  # nats, and share of the best, from which a candidate is worth a fit
@@ -73,7 +74,7 @@ def infer(
     first = scan_in_classes(calibration, found, candidates, log_prior)
     judged = _raced(calibration, first, progress)
     alone = {one.label: float(value) for one, value in zip(first.candidates, first.log_bayes, strict=True)}
-    gained, pairs = 0.0, list[Judged]()
+    gained, pairs, elsewhere = 0.0, list[Judged](), None
     best = max(judged.values(), key=_weight, default=None)
     error_class = chosen.error_class if best is None else best.error_class
     placebo = placebo_of(calibration, first)
@@ -90,7 +91,7 @@ def infer(
         there = judge_alone(calibration, best, second, first.in_class(best.error_class).ahead)
         alone |= {label: min(alone[label], value) for label, value in there.items()}
         progress("fitting nothing from there")
-        gained = _nothing_gains(calibration, best)
+        gained, elsewhere = _nothing_gains(calibration, best)
     for index, candidate in enumerate(first.candidates):
         judged.setdefault(candidate.label, _by_scan(first, index, alone[candidate.label]))
     every = (*judged.values(), *pairs)
@@ -118,6 +119,7 @@ def infer(
         repeating=repeating_of(first, error_class),
         expected=expected_of(first.in_class(chosen.error_class), settings),
         placebo=placebo,
+        elsewhere=elsewhere if gained > FAR_BETTER else None,
     )
 
 
@@ -254,21 +256,23 @@ def _pairs(calibration: Calibration, best: Judged, second: Scanned) -> list[Judg
     return pairs
 
 
-def _nothing_gains(calibration: Calibration, best: Judged) -> float:
-    """Nats by which nothing does better from the point and in the class of the best explanation, at least 0.
+def _nothing_gains(calibration: Calibration, best: Judged) -> tuple[float, Fit | None]:
+    """Nats by which nothing does better from the point and in the class of the best explanation, at least 0; its fit.
 
     The calibration may have ended in another basin, and its classes are compared by straight lines.
     """
     assert best.fit is not None  # noqa: S101
     fit, known = best.fit, calibration.in_class(best.error_class)
-    found = [calibration.chosen.log_evidence, known.log_evidence]
+    found, alone = max(calibration.chosen.log_evidence, known.log_evidence), None
     try:
         count = len(calibration.fit.z)
-        alone = known.fit.experiment.fit(fit.z[:count], fit.trajectories)
-        found.append(fit_over_sessions(alone, count).log_evidence + float(np.log(best.error_class.prior)))
+        there = known.fit.experiment.fit(fit.z[:count], fit.trajectories)
+        reached = fit_over_sessions(there, count).log_evidence + float(np.log(best.error_class.prior))
+        if reached > found:
+            found, alone = reached, there
     except (InputError, ArithmeticError, np.linalg.LinAlgError):
         pass  # what is known counts
-    return max(found) - calibration.chosen.log_evidence
+    return found - calibration.chosen.log_evidence, alone
 
 
 def _unknown(calibration: Calibration, error_class: ErrorClass, outside: Sequence[Hypothesis]) -> list[Judged]:

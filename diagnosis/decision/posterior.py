@@ -225,6 +225,8 @@ class Posterior:
         session, and if none is larger
     placebo : Placebo or None
         The tested recordings have to bring more; None without baselines
+    elsewhere : Fit or None
+        A far better fit of nothing, seen from the best explanation: everything is to be judged again from there
     """
 
     nothing: Judged
@@ -242,6 +244,7 @@ class Posterior:
     repeating: tuple[Repeating, ...] = ()
     expected: tuple[Expected, ...] = ()
     placebo: Placebo | None = None
+    elsewhere: Fit | None = None
 
     @property
     def remainder(self) -> float:

@@ -183,6 +183,19 @@ def _calibrated(experiment: Experiment, error: ModelError, start: Fit) -> Calibr
     first = [Near.of(experiment, error, one).fitted(widest, one) for one in (start, middles)]
     fit = max(first, key=lambda one: one.log_evidence).fit
     fit = Near.of(experiment, error, fit).fitted(widest, fit, iterations=ITERATIONS).fit
+    return _settled(experiment, error, fit)
+
+
+def recalibrate(calibration: Calibration, fit: Fit) -> Calibration:
+    """Calibration about the courses of another fit of the same machine, class of model error chosen anew."""
+    near = calibration.near
+    settled = _settled(near.experiment, near.error, fit)
+    return replace(settled, of_others=calibration.of_others)
+
+
+def _settled(experiment: Experiment, error: ModelError, fit: Fit) -> Calibration:
+    """The class of model error by the evidence about a fit, and the machine with it."""
+    classes = error_classes()
     near = Near.of(experiment, error, fit)
     evidence = {one.name: near.log_evidence(one, fit.z) for one in classes}
     best = max(classes, key=lambda one: evidence[one.name])
