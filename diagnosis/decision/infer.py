@@ -78,8 +78,9 @@ def infer(
     best = max(judged.values(), key=_weight, default=None)
     error_class = chosen.error_class if best is None else best.error_class
     placebo = placebo_of(calibration, first)
-    least = -np.inf if placebo is None else placebo.log_e
-    threshold = max(rule().threshold(chosen.error_class, error_class, settings.false_alarm_rate), least)
+    threshold = rule().threshold(chosen.error_class, error_class, settings.false_alarm_rate)
+    large = chosen.error_class.is_large or error_class.is_large
+    least = placebo.log_e if placebo is not None and large else -np.inf
     if best is not None and best.fit is not None and best.log_bayes > 0.0:
         progress(f"scanning again, given {best.label}")
         second = scan_given(calibration, best, candidates, log_prior)
@@ -98,14 +99,15 @@ def infer(
     parameters = [_weight(one) for one in every if all(effect.term is None for effect in one.effects)]
     effects = [_weight(one) for one in every if sum(effect.term is not None for effect in one.effects) == 1]
     log_e = log_sum(effects) - log_sum([gained, *parameters])
-    missing = log_e > threshold
+    missing = log_e > max(threshold, least)
     unknown = _unknown(calibration, error_class, outside) if missing else []
     return Posterior(
         nothing=Judged(effects=(), log_prior=0.0, log_bayes=0.0, error_class=chosen.error_class, fit=base),
         judged=tuple(replace(one, log_bayes=one.log_bayes - gained) for one in (*judged.values(), *pairs, *unknown)),
         log_e=log_e,
         log_parameter=log_sum(parameters) - gained,
-        threshold=threshold,
+        threshold=max(threshold, least),
+        class_threshold=threshold,
         rule=rule(),
         likeness=likeness_of(first, error_class),
         odds_unknown=settings.odds_unknown,

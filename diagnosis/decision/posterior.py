@@ -210,8 +210,9 @@ class Posterior:
         Evidence that something is missing: log odds of all effects, parameters as they may be, to none, [nat]
     log_parameter : float
         Evidence that a parameter is outside its prior: log odds to all inside theirs, without any effect, [nat]
-    threshold : float
-        From which something is missing, or a parameter is outside its prior, [nat]
+    threshold, class_threshold : float
+        From which something is missing, [nat]; that of the class of model error, from which a parameter is outside its
+        prior and a further effect competes: a baseline may ask for more
     odds_unknown : float
         Prior odds of a cause that is in no catalogue, see :class:`~diagnosis.decision.settings.Settings`
     error_class : str
@@ -224,7 +225,7 @@ class Posterior:
         With the deviation between sessions that the readings support, and with twice that or more; empty of one
         session, and if none is larger
     placebo : Placebo or None
-        The tested recordings have to bring more; None without baselines
+        With large model error the tested recordings have to bring more; None without baselines
     elsewhere : Fit or None
         A far better fit of nothing, seen from the best explanation: everything is to be judged again from there
     """
@@ -233,6 +234,7 @@ class Posterior:
     judged: tuple[Judged, ...]
     log_e: float
     threshold: float
+    class_threshold: float
     rule: Rule
     log_parameter: float = -np.inf
     likeness: Likeness = Likeness(labels=(), cosines=np.zeros((0, 0)))
@@ -283,7 +285,7 @@ class Posterior:
     @property
     def parameter_outside(self) -> bool:
         """True if nothing is missing, but a parameter is outside its prior."""
-        return not self.detected and self.log_parameter > self.threshold
+        return not self.detected and self.log_parameter > self.class_threshold
 
     @property
     def evidence(self) -> float:
@@ -293,7 +295,7 @@ class Posterior:
     @property
     def _of_parameters(self) -> float:
         """Probability that nothing is missing and a parameter is outside its prior."""
-        return (1.0 - self.something) * float(expit((self.log_parameter - self.threshold) / self.rule.doubt))
+        return (1.0 - self.something) * float(expit((self.log_parameter - self.class_threshold) / self.rule.doubt))
 
     @cached_property
     def explanations(self) -> tuple[Explanation, ...]:
@@ -303,7 +305,7 @@ class Posterior:
             of_names.setdefault(one.names, []).append(one)
         log_bayes = np.array([self._mean_log_bayes(names, members) for names, members in of_names.items()])
         able = np.ones(len(log_bayes), dtype=bool)
-        if self.remainder <= self.threshold:  # a second effect needs evidence of its own
+        if self.remainder <= self.class_threshold:  # a second effect needs evidence of its own
             able = np.array([len(names) == 1 for names in of_names], dtype=bool)
         parameter = np.array([members[0].kind == "parameter" for members in of_names.values()], dtype=bool)
         log_prior = np.array([self._log_odds(members[0].kind) for members in of_names.values()])

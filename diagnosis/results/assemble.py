@@ -285,7 +285,7 @@ def _remaining(posterior: Posterior, others: Others | None, best: Judged | None)
             f"two effects were fitted (evidence {posterior.remainder:.0f} nat of the second), no third was looked for"
         )
     left = posterior.left_by(best)
-    if left > posterior.threshold:
+    if left > posterior.class_threshold:
         return f"a further effect would still help (evidence {left:.0f} nat)"
     return f"nothing stands out of noise and model error (evidence {left:.1f} nat of a further effect)"
 

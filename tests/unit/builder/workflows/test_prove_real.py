@@ -34,7 +34,7 @@ def calibrated(train: Any, gearbox: Any, *, holdout: Any, **_: object) -> Diagno
     plain = calibrate(experiment)
     fit, apart = calibrate_apart(experiment, plain)
     nothing = Judged(effects=(), log_prior=0.0, log_bayes=0.0, fit=fit, error_class=error_classes()[0])
-    posterior = Posterior(nothing=nothing, judged=(), log_e=-1.0, threshold=5.0, rule=rule())
+    posterior = Posterior(nothing=nothing, judged=(), log_e=-1.0, threshold=5.0, class_threshold=5.0, rule=rule())
     return assemble(
         setup, experiment, posterior, (), plain=plain, near=Near.of(experiment, ModelError.of(experiment), plain),
         others=Others(fit=fit, posterior=posterior, channels=apart),

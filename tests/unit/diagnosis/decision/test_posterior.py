@@ -43,7 +43,7 @@ def judged(log_bayes: float, *effects: Hypothesis, log_prior: float | None = Non
 
 def posterior(*each: Judged, remainder: float | None = None, **given: Any) -> Posterior:
     """Of some explanations; `remainder`: what a further effect explains beside the first one."""
-    usual: dict[str, Any] = {"log_e": 100.0, "threshold": 5.0, "rule": rule()}
+    usual: dict[str, Any] = {"log_e": 100.0, "threshold": 5.0, "class_threshold": 5.0, "rule": rule()}
     if remainder is not None:
         each = (replace(each[0], left=remainder), *each[1:])
     return Posterior(nothing=judged(0.0), judged=each, **(usual | given))

@@ -106,7 +106,7 @@ def posterior_of(
     return Posterior(
         nothing=Judged(effects=(), log_prior=0.0, log_bayes=0.0, fit=nothing, error_class=error_classes()[0]),
         judged=judged, log_e=log_e,
-        threshold=4.0, rule=replace(rule(), temper=(3.0, 0.0)), **given,
+        threshold=4.0, class_threshold=4.0, rule=replace(rule(), temper=(3.0, 0.0)), **given,
     )  # fmt: skip
 
 
