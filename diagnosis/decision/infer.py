@@ -79,8 +79,7 @@ def infer(
     error_class = chosen.error_class if best is None else best.error_class
     placebo = placebo_of(calibration, first)
     threshold = rule().threshold(chosen.error_class, error_class, settings.false_alarm_rate)
-    large = chosen.error_class.is_large or error_class.is_large
-    least = placebo.log_e if placebo is not None and large else -np.inf
+    least = -np.inf if placebo is None else placebo.log_e
     if best is not None and best.fit is not None and best.log_bayes > 0.0:
         progress(f"scanning again, given {best.label}")
         second = scan_given(calibration, best, candidates, log_prior)

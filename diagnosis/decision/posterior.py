@@ -225,7 +225,7 @@ class Posterior:
         With the deviation between sessions that the readings support, and with twice that or more; empty of one
         session, and if none is larger
     placebo : Placebo or None
-        With large model error the tested recordings have to bring more; None without baselines
+        The tested recordings have to bring more; None without baselines
     elsewhere : Fit or None
         A far better fit of nothing, seen from the best explanation: everything is to be judged again from there
     """

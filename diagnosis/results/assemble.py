@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from diagnosis.decision.posterior import KINDS, Answer, Judged, Posterior, act_on_the_same
+from diagnosis.decision.posterior import KINDS, Answer, Judged, Placebo, Posterior, act_on_the_same
 from diagnosis.decision.settings import Settings
 from diagnosis.engine.calibration import Near
 from diagnosis.engine.fit import Experiment, Fit
@@ -28,6 +28,7 @@ from diagnosis.results.result_parts import (
     Finding,
     Fits,
     NotDetectable,
+    PlaceboEvidence,
     PredictedRun,
     Ranked,
     Repeating,
@@ -179,6 +180,7 @@ def assemble(
                       place=one.best.place)
             for one in posterior.repeating
         ),
+        placebo=_placebo(posterior.placebo, catalogue),
         holdout_gain=predicted.holdout_gain,
     )  # fmt: skip
 
@@ -256,6 +258,13 @@ def _verdict(posterior: Posterior, answers: Sequence[Answer], unseen: Sequence[N
     if all(term.of_measurement or term.kind == "sensor" for term in terms):
         return "sensor_fault"
     return "missing_physics"
+
+
+def _placebo(found: Placebo | None, catalogue: Mapping[str, Mechanism]) -> PlaceboEvidence | None:
+    if found is None:
+        return None
+    return PlaceboEvidence(session=found.session, log_e_value=found.log_e, mechanism=name_in(catalogue, found.best),
+                           place=found.best.place)  # fmt: skip
 
 
 def _unseen(posterior: Posterior, catalogue: Mapping[str, Mechanism]) -> tuple[NotDetectable, ...]:

@@ -17,6 +17,7 @@ from diagnosis.results.result_parts import (
     Fits,
     Location,
     NotDetectable,
+    PlaceboEvidence,
     PredictedRun,
     Ranked,
     Repeating,
@@ -99,6 +100,8 @@ class Diagnosis:
         Deviation between sessions that the data support, in prior standard deviations
     repeating : tuple of Repeating
         Evidence of the scan if sessions differ as the data support, and by twice as much or more; else empty
+    placebo : PlaceboEvidence or None
+        What a healthy session brings, if there is one
     holdout_gain : float
         Log predictive density of the held-out readings: final model less the calibrated one, [nat]; NaN without any
     faulty : tuple of str
@@ -148,6 +151,7 @@ class Diagnosis:
     scaled_error: tuple[ScaledError, ...] = ()
     session_s: float = 0.0
     repeating: tuple[Repeating, ...] = ()
+    placebo: PlaceboEvidence | None = None
     holdout_gain: float = math.nan
     faulty: tuple[str, ...] = ()
     terms: tuple[Term, ...] = ()
@@ -194,7 +198,8 @@ class Diagnosis:
                                 {"what": term.strength.description, "kind": term.kind, "target": list(term.target),
                                  "size": term.strength.start, "stderr": term.strength.sd} for term in self.learnt
                             ]},
-            "sessions": {"deviation_in_sd": self.session_s, "repeating": [asdict(one) for one in self.repeating]},
+            "sessions": {"deviation_in_sd": self.session_s, "repeating": [asdict(one) for one in self.repeating],
+                         "placebo": None if self.placebo is None else asdict(self.placebo)},
             "remaining": {
                 "p_value": or_none(self.remaining_p_value),
                 "note": self.remaining_note,

@@ -244,6 +244,26 @@ class Repeating:
     place: str
 
 
+@dataclass(frozen=True, kw_only=True)
+class PlaceboEvidence:
+    """Evidence of the scan in a baseline, in which nothing can be missing.
+
+    Attributes
+    ----------
+    session : str
+        The one that brings most
+    log_e_value : float
+        For as many hours as are tested, [nat]
+    mechanism, place : str
+        The candidate ahead
+    """
+
+    session: str
+    log_e_value: float
+    mechanism: str
+    place: str
+
+
 def repeating_told(supported: Repeating, worse: Repeating) -> str:
     """Sentence on what the scan would say if the machine repeated worse.
 

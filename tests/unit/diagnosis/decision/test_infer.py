@@ -78,18 +78,14 @@ def test_a_concealed_effect_is_detected_and_first(concealed: Posterior) -> None:
     assert [one.effect.label for one in answers] == ["windage@oil"]
 
 
-@pytest.mark.parametrize("large", [True, False])
-def test_with_large_model_error_a_baseline_that_brings_evidence_raises_what_is_asked_for(
-    large: bool, fzg: Gearbox, concealed: Posterior, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_baseline_that_brings_evidence_raises_what_is_asked_for(fzg: Gearbox, concealed: Posterior) -> None:
     """Windage acts in the baseline alone: nothing is missing in the recordings, whatever has to be explained."""
     assert concealed.placebo is not None and concealed.placebo.log_e < 5.0 == concealed.threshold
-    monkeypatch.setattr(ErrorClass, "is_large", property(lambda _: large))
     found = inferred(fzg, 0.0, in_baseline_W=WINDAGE_W)
     assert found.placebo is not None
     assert (found.placebo.session, found.placebo.best.label) == ("april", "windage@oil")
     assert found.placebo.log_e > 10.0 and found.class_threshold == 5.0
-    assert found.threshold == (found.placebo.log_e if large else 5.0)
+    assert found.threshold == found.placebo.log_e
     assert not found.detected
 
 
