@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from diagnosis.candidates.hypotheses import Hypothesis, hypothesis_of
-from diagnosis.decision.posterior import Answer, Expected, Judged, Posterior
+from diagnosis.decision.posterior import Answer, Expected, Judged, Placebo, Posterior
 from diagnosis.decision.settings import Settings
 from diagnosis.engine.calibration import Near
 from diagnosis.engine.families import candidates_of
@@ -136,7 +136,9 @@ def assembled(prepared: Prepared, near: Near, recordings: tuple[Recording, Recor
 def claimed(assembled: Assemble, prepared: Prepared, windage: Judged) -> Diagnosis:
     """Windage, 30 nat ahead of foaming oil."""
     far = judged_of(prepared, "hot_neighbour", "housing_lower", 82.0)
-    posterior = posterior_of(prepared[2], windage, far, session_s=0.2, error_class="no-load losses", remainder=1.5)
+    placebo = Placebo(session="april", log_e=2.5, best=windage.effects[0])
+    posterior = posterior_of(prepared[2], windage, far, session_s=0.2, error_class="no-load losses", remainder=1.5,
+                             placebo=placebo)  # fmt: skip
     probability = float(posterior.ranked[0][1])
     assert 0.9 < probability < 0.97
     return assembled(
@@ -180,7 +182,8 @@ def test_scorers_read_the_numbers(claimed: Diagnosis, fzg: Gearbox) -> None:
     assert answer.holdout_K == (claimed.holdout.calibrated, claimed.holdout.after)
     stored = json.loads(text)
     assert stored["schema"] == 1 and stored["model_error"]["class"] == "no-load losses"
-    assert stored["sessions"] == {"deviation_in_sd": 0.2, "repeating": []}
+    healthy = {"session": "april", "log_e_value": 2.5, "mechanism": "windage", "place": "oil"}
+    assert stored["sessions"] == {"deviation_in_sd": 0.2, "repeating": [], "placebo": healthy}
     assert sum(stored["kinds"].values()) == pytest.approx(1.0)
     assert stored["fit"]["holdout"]["log_score_gain"] == pytest.approx(claimed.holdout_gain)
 
