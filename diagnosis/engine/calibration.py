@@ -187,7 +187,7 @@ def _calibrated(experiment: Experiment, error: ModelError, start: Fit) -> Calibr
 
 
 def recalibrate(calibration: Calibration, fit: Fit) -> Calibration:
-    """Calibration about the courses of another fit of the same machine, with the class of model error that is best there."""
+    """Calibration about the courses of another fit of the same machine, in the class that is best there."""
     near = calibration.near
     settled = _settled(near.experiment, near.error, fit)
     return replace(settled, of_others=calibration.of_others)
