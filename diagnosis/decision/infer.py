@@ -95,7 +95,7 @@ def infer(
     for index, candidate in enumerate(first.candidates):
         judged.setdefault(candidate.label, _by_scan(first, index, alone[candidate.label]))
     every = (*judged.values(), *pairs)
-    parameters = [_weight(one) for one in every if all(effect.term is None for effect in one.effects)]
+    parameters = [_weight(one) for one in every if one.of_parameters]
     effects = [_weight(one) for one in every if sum(effect.term is not None for effect in one.effects) == 1]
     log_e = log_sum(effects) - log_sum([gained, *parameters])
     missing = log_e > max(threshold, least)

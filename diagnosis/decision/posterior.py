@@ -74,6 +74,11 @@ class Judged:
         return "measurement" if effect.term.of_measurement or effect.term.kind == "sensor" else "mechanism"
 
     @property
+    def of_parameters(self) -> bool:
+        """True if nothing is missing, but parameters are outside their priors."""
+        return bool(self.effects) and all(effect.term is None for effect in self.effects)
+
+    @property
     def names(self) -> tuple[str, ...]:
         """Names of the laws, whatever their places and courses."""
         return tuple(sorted(name_of(effect) for effect in self.effects))
@@ -307,7 +312,7 @@ class Posterior:
         able = np.ones(len(log_bayes), dtype=bool)
         if self.remainder <= self.class_threshold:  # a second effect needs evidence of its own
             able = np.array([len(names) == 1 for names in of_names], dtype=bool)
-        parameter = np.array([members[0].kind == "parameter" for members in of_names.values()], dtype=bool)
+        parameter = np.array([members[0].of_parameters for members in of_names.values()], dtype=bool)
         log_prior = np.array([self._log_odds(members[0].kind) for members in of_names.values()])
         a, b = self.rule.temper
         chance = np.zeros(len(log_bayes))
@@ -433,7 +438,7 @@ def _best_fitted(posterior: Posterior) -> Judged:
     at the same place goes before others.
     """
     explanation = next(
-        one for one in posterior.explanations if (one.members[0].kind == "parameter") == posterior.parameter_outside
+        one for one in posterior.explanations if one.members[0].of_parameters == posterior.parameter_outside
     )
     first = explanation.members[0]
     if first.fit is not None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -92,7 +93,19 @@ def curve_points(x: Array, y: Array, most: int = MOST_POINTS) -> tuple[Array, Ar
     xs = [piece for one, _ in thin for piece in (one, one[-1:])]
     ys = [piece for _, one in thin for piece in (one, np.full(min(len(one), 1), np.nan))]
     joined = np.concatenate(xs[:-1] or [x]), np.concatenate(ys[:-1] or [y])
-    return joined[0].astype(np.float32), joined[1].astype(np.float32)
+    return joined[0].astype(np.float32), single(joined[1])
+
+
+def single(values: Array) -> Array:
+    """Six digits of the largest value, in single precision: last bits differ between processes, a page must not.
+
+    Examples
+    --------
+    >>> single(np.array([85.1234567, np.nan])) == single(np.array([85.1234567 + 1e-12, np.nan]))
+    array([ True, False])
+    """
+    largest = float(np.max(np.abs(values), where=np.isfinite(values), initial=1e-30))
+    return np.round(values, 5 - math.floor(math.log10(largest))).astype(np.float32)
 
 
 def thinned(x: Array, y: Array, most: int = MOST_POINTS) -> tuple[Array, Array]:

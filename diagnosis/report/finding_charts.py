@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from plotly.subplots import make_subplots
 
-from diagnosis.report.chart import INK, MOST_POINTS, Chart, curve_points, dressed, row_titles, thinned, wrapped
+from diagnosis.report.chart import INK, MOST_POINTS, Chart, curve_points, dressed, row_titles, single, thinned, wrapped
 from diagnosis.report.wording import clause, name, share, short_title, time_scale
 from diagnosis.results.first_screen import date_told
 from diagnosis.results.result import Diagnosis
@@ -182,7 +182,7 @@ def heat_of_findings(diagnosis: Diagnosis) -> Chart | None:
     for row, (finding, label, x, heat) in enumerate(drivers, 2):
         order = np.argsort(x)
         few_x, few_y = thinned(x[order], heat[order], MOST_POINTS)
-        figure.add_scatter(x=few_x.astype(np.float32), y=few_y.astype(np.float32), mode="markers", showlegend=False,
+        figure.add_scatter(x=single(few_x), y=single(few_y), mode="markers", showlegend=False,
                            marker={"color": colours.get(finding.node, INK), "size": 4, "opacity": 0.6},
                            hovertemplate="%{x:.4g}: %{y:.4g} W<extra></extra>", row=row, col=1)  # fmt: skip
         figure.update_xaxes(title=label, row=row, col=1)

@@ -291,6 +291,10 @@ def test_a_parameter_outside_its_prior_goes_behind_something_that_is_missing() -
     (answer,) = decide(found, Settings())
     assert answer.effect.name == "windage" and found.evidence == 9.0
     assert found.of("parameter") == pytest.approx(1.0 - found.something)
+    two = judged(STRONG + 40.0, *(effect("parameter", name, term=None, unknown=i, how="P")
+                                  for i, name in enumerate(("air", "oil"))))  # fmt: skip
+    (answer,) = decide(replace(found, judged=(replace(found.judged[0], left=50.0), parameter, two)), Settings())
+    assert answer.effect.name == "windage"  # two of them are no effect either
     silent = replace(found, log_e=4.0)
     assert silent.parameter_outside and silent.evidence == 100.0
     assert decide(silent, Settings())[0].effect.name == "parameter"
