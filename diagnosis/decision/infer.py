@@ -102,7 +102,7 @@ def infer(
     unknown = _unknown(calibration, error_class, outside) if missing else []
     return Posterior(
         nothing=Judged(effects=(), log_prior=0.0, log_bayes=0.0, error_class=chosen.error_class, fit=base),
-        judged=tuple(replace(one, log_bayes=one.log_bayes - gained) for one in (*judged.values(), *pairs, *unknown)),
+        judged=tuple(replace(one, log_bayes=one.log_bayes - gained) for one in (*every, *unknown)),
         log_e=log_e,
         log_parameter=log_sum(parameters) - gained,
         threshold=max(threshold, least),
@@ -120,7 +120,8 @@ def infer(
         repeating=repeating_of(first, error_class),
         expected=expected_of(first.in_class(chosen.error_class), settings),
         placebo=placebo,
-        elsewhere=elsewhere if gained > FAR_BETTER else None,
+        # Where channels were set apart the others chose the basin: a broken one is not to draw the machine elsewhere.
+        elsewhere=elsewhere if gained > FAR_BETTER and calibration.of_others is None else None,
     )
 
 

@@ -298,6 +298,11 @@ class Posterior:
         return self.log_parameter if self.parameter_outside else self.log_e
 
     @property
+    def needed(self) -> float:
+        """What :attr:`evidence` has to exceed, [nat]."""
+        return self.class_threshold if self.parameter_outside else self.threshold
+
+    @property
     def _of_parameters(self) -> float:
         """Probability that nothing is missing and a parameter is outside its prior."""
         return (1.0 - self.something) * float(expit((self.log_parameter - self.class_threshold) / self.rule.doubt))

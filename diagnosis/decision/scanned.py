@@ -167,7 +167,11 @@ def log_sum(log: Sequence[float] | Array) -> float:
 
 
 def placebo_of(calibration: Calibration, found: Scanned) -> Placebo | None:
-    """Every baseline in the place of the tested session; evidence grows with the hours. None without baselines."""
+    """Evidence that the best laws of the catalogue bring in a baseline, which takes the place of the tested session.
+
+    Of the baseline that brings most, for as many hours as are tested; None without baselines. Changes over time are not
+    judged: most need more than one recording.
+    """
     experiment = calibration.fit.experiment
     hours = {piece.recording: 0.0 for piece in experiment.pieces}
     for piece in experiment.pieces:
@@ -185,6 +189,8 @@ def placebo_of(calibration: Calibration, found: Scanned) -> Placebo | None:
         ]  # fmt: skip
         candidates, log_prior = [one for one, _ in able], np.array([prior for _, prior in able])
         terms = [one for one in candidates if one.term is not None]
+        if not terms:  # what is switched off has no place in this machine
+            continue
         there = scan(replace(calibration.fit, experiment=swapped), terms, calibration.near.columns)
         judged = scan_in_classes(calibration, there, candidates, log_prior)
         longer = max(tested / sum(hours[name] for name in names), 1.0)

@@ -73,6 +73,8 @@ def _missing(d: Diagnosis) -> str:
         return "These data cannot decide it."
     reached = f"evidence {d.log_e_value:.1f} nat, {d.threshold:.1f} needed"
     rate = f"false-alarm rate {100.0 * d.false_alarm_rate:g} %"
+    if d.verdict == "parameter_error":
+        return f"No physics, but a parameter is outside its prior: {reached} ({rate})."
     if d.log_e_value > d.threshold:
         return f"Yes{_in_what(d)}: {reached} ({rate})."
     return f"Nothing that these data show: {reached} ({rate})."

@@ -52,7 +52,10 @@ class Diagnosis:
     log_e_value, threshold, p_value : float
         Evidence that something is missing, averaged over everything in the catalogue [nat], the level it had to reach,
         and exp(-evidence), at most 1. That would bound the chance of such evidence in a healthy machine only if the
-        model were exact, which it never is; the threshold decides
+        model were exact, which it never is; the threshold decides. With the verdict ``parameter_error``: evidence that
+        a parameter is outside its prior
+    further_threshold : float
+        From which a further effect counts, [nat]
     false_alarm_rate : float
         As asked for
     location : tuple of Location
@@ -121,6 +124,7 @@ class Diagnosis:
     gearbox: str
     log_e_value: float
     threshold: float
+    further_threshold: float
     p_value: float
     false_alarm_rate: float
     location: tuple[Location, ...]
@@ -240,7 +244,7 @@ class Diagnosis:
     @property
     def further_helps(self) -> bool:
         """True if the recordings give evidence of a further effect; without, its probability is only a prior one."""
-        return self.remaining_p_value < math.exp(-self.threshold)
+        return self.remaining_p_value < math.exp(-self.further_threshold)
 
     @property
     def nearest(self) -> tuple[Ranked, ...]:

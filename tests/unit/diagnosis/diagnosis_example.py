@@ -200,6 +200,7 @@ def _diagnosis(**given: object) -> Diagnosis:
     usual: dict[str, object] = {
         "gearbox": "fzg",
         "threshold": 3.9,
+        "further_threshold": 3.9,
         "false_alarm_rate": 0.05,
         "location": (),
         "findings": (),

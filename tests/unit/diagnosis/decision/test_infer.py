@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import cast
@@ -22,7 +23,7 @@ from diagnosis.decision.infer import (
 from diagnosis.decision.posterior import KINDS, Judged, Posterior, decide
 from diagnosis.decision.scanned import InClass, Scanned, in_best_classes, less_over_time, scan_in_classes
 from diagnosis.decision.settings import Settings
-from diagnosis.engine.calibration import Calibration, calibrate_with_error
+from diagnosis.engine.calibration import Calibration, calibrate_with_error, recalibrate
 from diagnosis.engine.candidates import scan
 from diagnosis.engine.families import axis_of, changes, log_prior, parameters_outside
 from diagnosis.engine.fit import Fit, calibrate
@@ -41,11 +42,11 @@ LOOKED_FOR = ("windage", "air_cooling_change", "sensor_bias", "hot_neighbour")
 WINDAGE_W, AT_RPM, HOURS = 150.0, 3300.0, 1.5
 
 
-def inferred(fzg: Gearbox, windage_W: float, in_baseline_W: float = 0.0) -> Posterior:
+def inferred(fzg: Gearbox, windage_W: float, in_baseline_W: float = 0.0, switched_off: Sequence[str] = ()) -> Posterior:
     """A ride with windage in the oil, or without it, and a baseline of another day."""
     train = recorded(fzg, "train", windage_W=windage_W, hours=HOURS)
     april = recorded(fzg, "april", seed=2, hours=HOURS, windage_W=in_baseline_W)
-    setup, experiment = prepare_experiment(fzg, [train], [train], [april])
+    setup, experiment = prepare_experiment(fzg, [train], [train], [april], switched_off=switched_off)
     network = experiment.machine.model.network
     placed = [one for name in LOOKED_FOR for one in CATALOGUE[name].placed(network, setup.scale, setup.channels)]
     windage = [one for one in placed if one.label == "windage_oil"]
@@ -89,6 +90,11 @@ def test_a_baseline_that_brings_evidence_raises_what_is_asked_for(fzg: Gearbox, 
     assert not found.detected
 
 
+def test_a_baseline_shows_nothing_of_what_has_no_place_in_the_machine(fzg: Gearbox) -> None:
+    found = inferred(fzg, 0.0, switched_off=["bearing_fed_by_return"])
+    assert found.placebo is None and found.threshold == 5.0
+
+
 def test_a_parameter_outside_its_prior_is_no_sign_that_something_is_missing() -> None:
     """What an effect explains less well than a parameter does is no evidence for it."""
     mechanism = Hypothesis(name="windage", place="oil", family="no-load loss", variants=np.ones((1, 1)))
@@ -121,6 +127,10 @@ def test_nothing_gets_the_evidence_that_it_has_from_the_point_of_an_explanation(
     candidates = [hypothesis_of(one) for one in placed]
     right, found = (infer(one, candidates, log_prior(candidates), Settings()) for one in (settled, worse))
     assert right.log_e > 10.0 and found.log_e == pytest.approx(right.log_e, abs=3.0)
+    assert right.elsewhere is None and found.elsewhere is not None
+    again = recalibrate(worse, found.elsewhere).chosen
+    assert again.error_class == settled.chosen.error_class
+    assert again.log_evidence == pytest.approx(settled.chosen.log_evidence, abs=3.0)
 
 
 def test_the_scan_is_told_for_a_machine_that_repeats_worse(concealed: Posterior) -> None:

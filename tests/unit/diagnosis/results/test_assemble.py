@@ -342,8 +342,11 @@ def test_a_parameter(assembled: Assemble, prepared: Prepared) -> None:
     )
     judged = Judged(effects=(effect,), log_prior=-3.0, log_bayes=40.0, fit=fit, error_class=error_classes()[0])
     answer = Answer(best=judged, effect=effect, grade="claim", probability=0.95, joint=0.95)
-    found = assembled(posterior_of(plain, judged, log_e=1.0, log_parameter=40.0), [answer])
+    raised = replace(posterior_of(plain, judged, log_e=1.0, log_parameter=40.0), threshold=238.0)  # by a baseline
+    found = assembled(raised, [answer])
     assert found.verdict == "parameter_error"  # known parameters raise no alarm
+    assert (found.log_e_value, found.threshold, found.further_threshold) == (40.0, 4.0, 4.0)
+    assert "No physics, but a parameter is outside its prior: evidence 40.0 nat, 4.0 needed" in str(found)
     (finding,) = found.findings
     assert finding.kind == "parameter" and finding.parameters[0].value == pytest.approx(value)
     row = next(c for c in found.calibration if c.parameter == name)
