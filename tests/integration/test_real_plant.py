@@ -1,16 +1,13 @@
-"""The heated rod from its recording to the corrected FMU: ``pytest -m slow tests/integration/test_real_plant.py``."""
+"""The heated rod from its recording to the corrected FMU."""
 
 from __future__ import annotations
 
 import json
 from pathlib import Path
 
-import pytest
-
 from tests.conftest import RunCli
 
 
-@pytest.mark.slow
 def test_the_broken_thermistor_is_found_and_the_fmu_predicts(run_cli: RunCli, tmp_path: Path) -> None:
     assert run_cli("prove", "--real", "rod", "--jobs", "1", "--output", tmp_path) == 0
     result = json.loads((tmp_path / "real.json").read_text())
