@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
+from diagnosis.decision.answer import decide
 from diagnosis.decision.infer import infer
-from diagnosis.decision.posterior import decide
 from diagnosis.decision.settings import Settings
 from diagnosis.engine.calibration import calibrate_with_error, recalibrate
 from diagnosis.engine.families import candidates_of, log_prior

@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from diagnosis.decision.posterior import KINDS, Answer, Judged, Placebo, Posterior, act_on_the_same
+from diagnosis.decision.answer import Answer, act_on_the_same
+from diagnosis.decision.posterior import KINDS, Judged, Placebo, Posterior
 from diagnosis.decision.settings import Settings
 from diagnosis.engine.calibration import Near
 from diagnosis.engine.fit import Experiment, Fit

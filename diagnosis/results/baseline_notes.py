@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from diagnosis.decision.posterior import Answer, Placebo, Posterior
+from diagnosis.decision.answer import Answer
+from diagnosis.decision.posterior import Placebo, Posterior
 from diagnosis.engine.baselines import effects_in_baselines, sessions_apart
 from diagnosis.engine.fit import Experiment
 

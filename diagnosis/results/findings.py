@@ -11,7 +11,8 @@ import sympy as sp
 
 from diagnosis.candidates.dated import CHANGED, HOURS, STEP, WHILE, changed_law
 from diagnosis.candidates.hypotheses import Hypothesis
-from diagnosis.decision.posterior import Answer, Posterior
+from diagnosis.decision.answer import Answer
+from diagnosis.decision.posterior import Posterior
 from diagnosis.engine.fit import Experiment, Fit
 from diagnosis.engine.unknown import SensorBias, Unknown
 from diagnosis.forward.term_on_grid import TermOnGrid

@@ -12,6 +12,7 @@ import pytest
 
 from diagnosis.candidates.hypotheses import Hypothesis, hypothesis_of
 from diagnosis.decision import infer as infer_module
+from diagnosis.decision.answer import decide
 from diagnosis.decision.infer import (
     NEAR_PLACE,
     PLACES,
@@ -20,7 +21,7 @@ from diagnosis.decision.infer import (
     _worth_a_fit,
     infer,
 )
-from diagnosis.decision.posterior import KINDS, Judged, Posterior, decide
+from diagnosis.decision.posterior import KINDS, Judged, Posterior
 from diagnosis.decision.scanned import InClass, Scanned, in_best_classes, less_over_time, scan_in_classes
 from diagnosis.decision.settings import Settings
 from diagnosis.engine.calibration import Calibration, calibrate_with_error, recalibrate

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from diagnosis.candidates.hypotheses import Hypothesis
-from diagnosis.decision.posterior import KINDS, Answer, Judged, Likeness, Posterior, decide
+from diagnosis.decision.answer import Answer, decide
+from diagnosis.decision.posterior import KINDS, Judged, Likeness, Posterior
 from diagnosis.decision.settings import Settings
 from diagnosis.engine.fit import Fit
 from diagnosis.engine.learnt import ErrorClass, error_classes, rule

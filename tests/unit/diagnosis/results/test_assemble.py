@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 from diagnosis.candidates.hypotheses import Hypothesis, hypothesis_of
-from diagnosis.decision.posterior import Answer, Expected, Judged, Placebo, Posterior
+from diagnosis.decision.answer import Answer
+from diagnosis.decision.posterior import Expected, Judged, Placebo, Posterior
 from diagnosis.decision.settings import Settings
 from diagnosis.engine.calibration import Near
 from diagnosis.engine.families import candidates_of

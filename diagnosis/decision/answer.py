@@ -1,0 +1,127 @@
+"""The one rule that turns the probabilities of all explanations into an answer."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from diagnosis.candidates.hypotheses import Hypothesis
+from diagnosis.decision.posterior import Judged, Posterior, name_of
+from diagnosis.decision.settings import Settings
+from models.terms.term import Term
+
+Grade = Literal["claim", "likely"]
+MOST_TIED = 3
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Answer:
+    """One effect that is reported: a name, or a set of names that these data do not separate.
+
+    Attributes
+    ----------
+    best : Judged
+        The most probable one, refitted
+    effect : Hypothesis
+        Which of its effects
+    grade : str
+        ``claim`` or ``likely``
+    probability : float
+        Of the name, whatever its place and shape
+    joint : float
+        Of all names that it may be: of a tie set, of those that look alike or act on the same thing; else `probability`
+    tied : tuple of (Hypothesis, float)
+        Names of a tie set with their probabilities, `effect` first; empty of a claim
+    acts_like : bool
+        True if what remains, or the kind of the effect (a course over the hours), shows that this is only the nearest
+        name
+    """
+
+    best: Judged
+    effect: Hypothesis
+    grade: Grade
+    probability: float
+    joint: float
+    tied: tuple[tuple[Hypothesis, float], ...] = ()
+    acts_like: bool = False
+
+
+def decide(posterior: Posterior, settings: Settings) -> tuple[Answer, ...]:
+    """The answers of a posterior: empty if nothing is missing and no parameter outside its prior, or without a name.
+
+    A name is a claim if its probability reaches :attr:`Settings.claim_from`. Else at most three names that reach it
+    together are a tie. Else names that look alike in these readings, or act on the same thing, and reach it together
+    are one answer: it "acts like" the best of them. So does what leaves much unexplained, and what only has a course
+    over the hours: the nearest name is found, not the cause. Where much is left, what is stated of it is only the
+    share :attr:`Rule.nearest` of its probability, because most names that were nearest turned out wrong.
+    """
+    if not posterior.detected and not posterior.parameter_outside:
+        return ()
+    best = _best_fitted(posterior)
+    answers = (_answer(posterior, best, effect, settings.claim_from) for effect in best.effects)
+    return tuple(answer for answer in answers if answer is not None)
+
+
+def _best_fitted(posterior: Posterior) -> Judged:
+    """The most probable explanation; if it has no fit, the one with its names whose fit has the most evidence.
+
+    Far from a straight line the refit of the best place may fail, and that of another one end without the effect. A fit
+    at the same place goes before others.
+    """
+    explanation = next(
+        one for one in posterior.explanations if one.members[0].of_parameters == posterior.parameter_outside
+    )
+    first = explanation.members[0]
+    if first.fit is not None:
+        return first
+    fitted = [one for one in posterior.judged if one.fit is not None and set(explanation.names) <= set(one.names)]
+    labels = {effect.label for effect in first.effects}
+    there = [one for one in fitted if labels <= {effect.label for effect in one.effects}]
+    return max(there or fitted, key=lambda one: one.log_bayes + one.log_prior, default=first)
+
+
+def _answer(posterior: Posterior, best: Judged, effect: Hypothesis, enough: float) -> Answer | None:
+    """The narrowest set of names that holds enough probability."""
+    name = name_of(effect)
+    much = posterior.leaves_much(best)
+    vague = effect.how == "W" or effect.is_open or much
+    sure = posterior.rule.nearest if much else 1.0
+    own = posterior.of_names([name])
+    answer = Answer(best=best, effect=effect, grade="likely", probability=sure * own, joint=sure * own, acts_like=vague)
+    if own >= enough:
+        return answer if vague else replace(answer, grade="claim")
+    names = _best_of_names(posterior, effect)
+    # Further effects in explanations with the effect's own name do not stand in its place.
+    further = {one for each in posterior.explanations if name in each.names for one in each.names if one != name}
+    rivals = [one for other, one in names.items() if other not in further]
+    for count in range(2, MOST_TIED + 1):
+        joint = posterior.of_names([name_of(one) for one in rivals[:count]])
+        if joint >= enough:
+            tied = tuple((one, sure * posterior.of_names([name_of(one)])) for one in rivals[:count])
+            return replace(answer, tied=tied, joint=sure * joint)
+    least, likeness = posterior.rule.alike, posterior.likeness
+    alike = [name_of(one) for one in rivals if likeness.of(effect, one) >= least]
+    alike += [other for other, one in names.items() if act_on_the_same(effect, one)]
+    joint = posterior.of_names([name, *alike])
+    return replace(answer, joint=sure * joint, acts_like=True) if joint >= enough else None
+
+
+def _best_of_names(posterior: Posterior, effect: Hypothesis) -> dict[str, Hypothesis]:
+    """Best effect of every name, that of one effect's own name first, then the most probable first."""
+    found = {name_of(effect): effect}
+    for judged, _ in posterior.ranked:
+        for one in judged.effects:
+            found.setdefault(name_of(one), one)
+    return found
+
+
+def act_on_the_same(first: Hypothesis, second: Hypothesis) -> bool:
+    """True if two effects change the same thing: the same heats, links, channels or inputs."""
+    if first.term is None or second.term is None:
+        return False
+    return first.term.kind == second.term.kind and not _changed(first.term).isdisjoint(_changed(second.term))
+
+
+def _changed(term: Term) -> set[str]:
+    """Names of what a term acts on; of a link without its other end, which many share."""
+    return set(term.target[:-1] if term.kind == "link" else term.target)
