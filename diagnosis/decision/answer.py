@@ -53,13 +53,23 @@ def decide(posterior: Posterior, settings: Settings) -> tuple[Answer, ...]:
     together are a tie. Else names that look alike in these readings, or act on the same thing, and reach it together
     are one answer: it "acts like" the best of them. So does what leaves much unexplained, and what only has a course
     over the hours: the nearest name is found, not the cause. Where much is left, what is stated of it is only the
-    share :attr:`Rule.nearest` of its probability, because most names that were nearest turned out wrong.
+    share :attr:`Rule.nearest` of its probability, because most names that were nearest turned out wrong. The same holds
+    of a parameter outside its prior if model error is large: it stands in for another structure of the machine.
     """
     if not posterior.detected and not posterior.parameter_outside:
         return ()
     best = _best_fitted(posterior)
     answers = (_answer(posterior, best, effect, settings.claim_from) for effect in best.effects)
     return tuple(answer for answer in answers if answer is not None)
+
+
+def unconfirmed(answer: Answer, posterior: Posterior) -> Answer:
+    """An answer with which held-out readings are predicted worse: the nearest name at most, no claim and no tie."""
+    if answer.acts_like:
+        return answer
+    sure = posterior.rule.nearest
+    return replace(answer, grade="likely", tied=(), acts_like=True, probability=sure * answer.probability,
+                   joint=sure * answer.joint)  # fmt: skip
 
 
 def _best_fitted(posterior: Posterior) -> Judged:
@@ -83,7 +93,7 @@ def _best_fitted(posterior: Posterior) -> Judged:
 def _answer(posterior: Posterior, best: Judged, effect: Hypothesis, enough: float) -> Answer | None:
     """The narrowest set of names that holds enough probability."""
     name = name_of(effect)
-    much = posterior.leaves_much(best)
+    much = posterior.leaves_much(best) or (effect.term is None and best.error_class.is_large)
     vague = effect.how == "W" or effect.is_open or much
     sure = posterior.rule.nearest if much else 1.0
     own = posterior.of_names([name])

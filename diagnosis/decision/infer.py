@@ -16,7 +16,7 @@ import numpy as np
 from scipy.special import log_ndtr
 
 from diagnosis.candidates.hypotheses import Hypothesis
-from diagnosis.decision.posterior import Judged, Posterior
+from diagnosis.decision.posterior import Judged, Posterior, name_of
 from diagnosis.decision.scanned import (
     Scanned,
     expected_of,
@@ -245,10 +245,11 @@ def _weight(one: Judged) -> float:
 
 
 def _pairs(calibration: Calibration, best: Judged, second: Scanned) -> list[Judged]:
-    """The best explanation with the best second effects, fitted."""
+    """The best explanation with the best second effects of other names, fitted."""
     fit, pairs = best.fit, []
     assert fit is not None  # noqa: S101
-    for index in second.order[:SECONDS]:
+    others = [index for index in second.order if name_of(second.candidates[index]) not in best.names]
+    for index in others[:SECONDS]:
         one = _refitted(calibration, fit, second, index, RACE_STEPS + 2)
         if one.fit is None:
             continue

@@ -35,6 +35,11 @@ class ErrorClass:
     amplitudes: Mapping[str, float]
     over_time: float = 0.0
 
+    @property
+    def is_large(self) -> bool:
+        """True if so much is unknown of the machine that effects can stand in for it."""
+        return self.over_time > 0.0
+
     def scaled(self, factor: float) -> ErrorClass:
         """The class with all amplitudes larger or smaller by a factor."""
         return replace(self, amplitudes={group: factor * value for group, value in self.amplitudes.items()})

@@ -25,7 +25,8 @@ WORDS: Mapping[str, str] = {
     "correction is worth counts against this, not against the model as delivered.",
     "corrected": "The model with the found physics, and with what was learnt of model error where a model can hold it.",
     "held out": "Recordings that nothing was fitted to: their error is that of a model that got their inputs and no "
-    "measured temperature beyond the first minutes, which do not count. They had no say in the findings.",
+    "measured temperature beyond the first minutes, which do not count. They did not choose the findings; what "
+    "predicts them worse is no claim.",
     "free-running": "Simulated from the start temperatures on with the recorded inputs alone, never corrected by a "
     "measurement on the way.",
     "RMSE": "Root mean square of simulated less measured: the typical size of the error.",

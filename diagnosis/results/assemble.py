@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from diagnosis.decision.answer import Answer, act_on_the_same
+from diagnosis.decision.answer import Answer, act_on_the_same, unconfirmed
 from diagnosis.decision.posterior import KINDS, Judged, Placebo, Posterior
 from diagnosis.decision.settings import Settings
 from diagnosis.engine.calibration import Near
@@ -108,6 +108,8 @@ def assemble(
         explanation=None if faulty else best or posterior.nothing, near=near, counting=counting, jobs=jobs,
     )  # fmt: skip
     final = predicted.final
+    if predicted.holdout_gain <= 0.0 and not faulty:
+        answers = [unconfirmed(answer, posterior) for answer in answers]
     findings = _distinct([
         (answer, finding_of(answer, answer.best.fit or final, setup, posterior, catalogue, train))
         for answer in answers

@@ -146,9 +146,11 @@ class Mechanism:
             return ()
         if channels is None:
             channels = (*(part.name for part in network.parts), TOTAL_LOSS)
-        found = [p for pattern in self.places for p in placements(network, self.kind, pattern, channels)]
+        found: dict[Placement, Placement] = {}
+        for one in (p for pattern in self.places for p in placements(network, self.kind, pattern, channels)):
+            found.setdefault(replace(one, name=""), one)  # a group of one node is that node
         common, traced = _aliases(network, scale), cache(partial(trace, stand_in=self.name))
-        placed = [self._at(network, scale, placement, common, traced) for placement in found]
+        placed = [self._at(network, scale, placement, common, traced) for placement in found.values()]
         if any(symbol(p.strength.name) not in p.expression.free_symbols for p in placed):
             raise InputError(f"mechanism {self.name!r}: its law must contain {STRENGTH!r}, the size of the effect")
         return tuple(

@@ -195,6 +195,8 @@ def test_every_candidate_is_judged_and_the_best_are_fitted(healthy: Posterior, c
     fitted = [one for one in concealed.judged if one.fit is not None]
     assert 1 <= len(fitted) < len(labels)
     assert max(concealed.judged, key=lambda one: one.log_bayes + one.log_prior) in fitted
+    pairs = [one.names for one in concealed.judged if one.kind == "pair"]
+    assert pairs and all(first != second for first, second in pairs)  # one law at two places is one name
 
 
 # ------------------------------------------------------------------ the race

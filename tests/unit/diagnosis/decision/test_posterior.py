@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from diagnosis.candidates.hypotheses import Hypothesis
-from diagnosis.decision.answer import Answer, decide
+from diagnosis.decision.answer import Answer, decide, unconfirmed
 from diagnosis.decision.posterior import KINDS, Judged, Likeness, Posterior
 from diagnosis.decision.settings import Settings
 from diagnosis.engine.fit import Fit
@@ -210,6 +210,21 @@ def test_where_much_is_left_there_is_no_claim(gain: float, limit: float) -> None
     assert much.probability == pytest.approx(rule().nearest * little.probability)
 
 
+def test_what_predicts_held_out_readings_worse_is_the_nearest_name_at_most() -> None:
+    found = posterior(*several(3))
+    for asked, tied in ((0.5, 2), (0.9, 3)):
+        (tie,) = decide(found, Settings(claim_from=asked))
+        assert len(tie.tied) == tied
+        left = unconfirmed(tie, found)
+        assert (left.grade, left.acts_like, left.tied) == ("likely", True, ())
+        assert left.joint == pytest.approx(rule().nearest * tie.joint)
+        assert unconfirmed(left, found) is left
+    (claim,) = decide(posterior(judged(STRONG, effect("law"))), Settings())
+    left = unconfirmed(claim, found)
+    assert claim.grade == "claim" and left.grade == "likely"
+    assert left.probability == pytest.approx(rule().nearest * claim.probability)
+
+
 def test_of_names_that_act_on_one_thing_the_joint_probability_is_told() -> None:
     bias, gain = (effect(name, "oil", kind="sensor") for name in ("sensor_bias", "sensor_gain"))
     drift, lag = (effect(name, "oil", kind="sensor") for name in ("sensor_drift", "sensor_lag"))
@@ -283,6 +298,11 @@ def test_a_parameter_outside_its_prior_is_answered_by_its_name() -> None:
     (answer,) = decide(found, Settings())
     assert answer.effect is h_air and answer.grade == "claim"
     assert found.of("parameter") == pytest.approx(found.of_names(["parameter air"]))
+    # Where model error is large it stands in for another structure of the machine.
+    large = next(one for one in error_classes() if one.is_large)
+    (nearest,) = decide(replace(found, judged=(replace(found.judged[0], error_class=large),)), Settings())
+    assert (nearest.effect, nearest.grade, nearest.acts_like) == (h_air, "likely", True)
+    assert nearest.probability < rule().nearest
 
 
 def test_a_parameter_outside_its_prior_goes_behind_something_that_is_missing() -> None:

@@ -173,6 +173,20 @@ def test_a_claim(claimed: Diagnosis, fzg: Gearbox) -> None:
     assert not names & {p.name for p in finding.term.parameters}
 
 
+def test_held_out_readings_that_are_predicted_worse_take_the_claim_away(
+    assembled: Assemble, prepared: Prepared, windage: Judged, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    posterior = posterior_of(prepared[2], windage, remainder=1.5)
+    claim = Answer(best=windage, effect=windage.effects[0], grade="claim", probability=0.95, joint=0.95)
+    for gain, grade, probability in ((3.0, "claim", 0.95), (-3.0, "likely", 0.95 * rule().nearest)):
+        monkeypatch.setattr(predictions, "log_score_gain", lambda *_, gain=gain: gain)
+        found = assembled(posterior, [claim])
+        (finding,) = found.findings
+        assert (finding.grade, finding.acts_like) == (grade, grade == "likely")
+        assert finding.probability == pytest.approx(probability)
+        assert found.has_correction  # what improves the prediction of the rest goes into the model all the same
+
+
 def test_scorers_read_the_numbers(claimed: Diagnosis, fzg: Gearbox) -> None:
     text = json.dumps(claimed.to_dict(), allow_nan=False)
     answer = read_answer(json.loads(text), fzg)

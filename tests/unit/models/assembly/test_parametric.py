@@ -161,7 +161,10 @@ def test_mechanisms_have_places_where_their_parts_are(gearbox):
     assert [p.place for p in placed["cooler_air_thermostat"]] == ["returns_air", "returns_outdoor", "oil_outdoor"]
     assert placed["cooler_air_thermostat"][0].target == ("oil_inlet", "air")
     assert placed["windage"] != () and placed["bearing_preload"] == ()  # there are no shafts
+    assert [p.place for p in placed["air_cooling_change"]] == ["housing_air"]  # a group of one node is that node
     rig = load_gearbox("fzg")
+    every = [p.place for p in CATALOGUE["air_cooling_change"].placed(rig.network(), Scale.of(rig))]
+    assert every == ["housing_air", "housing_lower_air", "housing_upper_air"]
     for name in ("cooler_air_thermostat", "cooler_air_proportional", "bearing_fed_by_return", "pump_fast_stage"):
         assert CATALOGUE[name].placed(rig.network(), Scale.of(rig)) == ()
 
