@@ -26,7 +26,10 @@ WORDS: Mapping[str, str] = {
     "corrected": "The model with the found physics, and with what was learnt of model error where a model can hold it.",
     "held out": "Recordings that nothing was fitted to: their error is that of a model that got their inputs and no "
     "measured temperature beyond the first minutes, which do not count. They did not choose the findings; what "
-    "predicts them worse is no claim.",
+    "they contradict is no claim.",
+    "log score": "Logarithm of the probability density that held-out readings had before they were seen, with noise "
+    "and all that a fit is unsure of. Other than the RMSE it weighs slow errors less than quick ones, and the measured "
+    "loss counts too.",
     "free-running": "Simulated from the start temperatures on with the recorded inputs alone, never corrected by a "
     "measurement on the way.",
     "RMSE": "Root mean square of simulated less measured: the typical size of the error.",

@@ -107,8 +107,8 @@ def assemble(
         found=_final(best, plain if others is None else others.fit, faulty),
         explanation=None if faulty else best or posterior.nothing, near=near, counting=counting, jobs=jobs,
     )  # fmt: skip
-    final = predicted.final
-    if predicted.holdout_gain <= 0.0 and not faulty:
+    final, holdout = predicted.final, _fits(setup, predicted.holdout, counting)
+    if not faulty and holdout.refute(predicted.holdout_gain, setup.noise_K):
         answers = [unconfirmed(answer, posterior) for answer in answers]
     findings = _distinct([
         (answer, finding_of(answer, answer.best.fit or final, setup, posterior, catalogue, train))
@@ -136,7 +136,7 @@ def assemble(
         findings=findings,
         calibration=_calibration(final, plain, answers),
         train=_fits(setup, predicted.train, counting),
-        holdout=_fits(setup, predicted.holdout, counting),
+        holdout=holdout,
         faulty=faulty,
         terms=terms,
         sensors=sensors,

@@ -178,11 +178,13 @@ def _how_much_better(d: Diagnosis) -> tuple[str, ...]:
     if d.findings and further:
         lines.append(f"The findings' model holds {further} more effect{'s' * (further > 1)} without a certain name")
     if d.has_correction and math.isfinite(d.holdout_gain):
-        way, so = ("better", "") if d.holdout_gain > 0.0 else ("worse", ": no name is a claim")
+        way = "better" if d.holdout_gain > 0.0 else "worse"
         lines.append(
             f"Held-out readings are predicted {way} than by the calibrated model, by "
-            f"{abs(d.holdout_gain):.0f} nat of log score{so if d.findings else ''}"
+            f"{abs(d.holdout_gain):.0f} nat of log score"
         )
+    if d.findings and not d.faulty and d.holdout.refute(d.holdout_gain, d.noise_K):
+        lines.append("So the held-out recordings contradict the findings: no name is a claim")
     return tuple(lines)
 
 

@@ -406,6 +406,10 @@ class Fits:
     after: float
     sensors: Mapping[str, tuple[float, float, float]]
 
+    def refute(self, gain: float, noise_K: float) -> bool:
+        """True if with the corrected model they are less probable, or the error is larger by more than the noise."""
+        return gain <= 0.0 or self.after - self.calibrated > noise_K
+
     def to_dict(self) -> dict[str, Any]:
         """The errors as they are in ``diagnosis.json``."""
         return {

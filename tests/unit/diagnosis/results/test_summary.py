@@ -109,8 +109,12 @@ def test_a_larger_held_out_error_is_not_called_better() -> None:
     worse = replace(base, holdout=replace(base.holdout, after=4.0), holdout_gain=93.0)
     assert "not closer than with the calibrated model" in told(worse, "How much better?")
     assert "not closer" not in told(replace(base, holdout_gain=93.0), "How much better?")
+    assert "by 93 nat of log score\nSo the held-out recordings contradict the findings" in told(
+        worse, "How much better?"
+    )
+    assert "contradict" not in told(base, "How much better?")
     unconfirmed = told(replace(base, holdout_gain=-3.0), "How much better?")
-    assert "predicted worse than by the calibrated model, by 3 nat of log score: no name is a claim" in unconfirmed
+    assert "predicted worse than by the calibrated model, by 3 nat of log score\nSo" in unconfirmed
 
 
 def test_laws_of_one_name_at_one_place_are_one_item() -> None:
