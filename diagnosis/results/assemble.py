@@ -18,7 +18,7 @@ from diagnosis.engine.set_apart import calibrate_without_error
 from diagnosis.recordings.recording import Recording
 from diagnosis.results.advice import next_test, without_sensor
 from diagnosis.results.baseline_notes import baseline_notes
-from diagnosis.results.findings import estimates_of, finding_of, name_in, names_of
+from diagnosis.results.findings import estimates_of, finding_of, joint_estimate_of, name_in, names_of
 from diagnosis.results.instruments import sensors_and_inputs_of
 from diagnosis.results.locations import locations_of
 from diagnosis.results.predictions import Predicted, Predictions, predict_recordings, temperatures
@@ -141,6 +141,7 @@ def assemble(
         terms=terms,
         sensors=sensors,
         true_inputs=true_inputs,
+        joint=joint_estimate_of(final),
         starts_at=experiment.starts_at,
         noise_K=setup.noise_K,
         floor=_floor(setup),

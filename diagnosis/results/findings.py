@@ -18,6 +18,7 @@ from diagnosis.engine.unknown import SensorBias, Unknown
 from diagnosis.forward.term_on_grid import TermOnGrid
 from diagnosis.recordings.recording import Recording
 from diagnosis.results.advice import separation, without_sensor
+from diagnosis.results.joint_estimate import JointEstimate
 from diagnosis.results.places import node_in
 from diagnosis.results.result_parts import LEAST_RIVAL, Change, Finding, ParameterValue, Rival, Switching
 from diagnosis.setup.inference_setup import InferenceSetup, heat_over_time
@@ -180,6 +181,17 @@ def estimates_of(fit: Fit) -> Values:
         unknown.parameter.name: (unknown.value(z), slope(unknown, z) * error)
         for unknown, z, error in zip(fit.experiment.unknowns, fit.z.tolist(), sd.tolist(), strict=True)
     }
+
+
+def joint_estimate_of(fit: Fit) -> JointEstimate:
+    """Every unknown with its standard error, and how they correlate; values grow with `z`."""
+    estimates, covariance = estimates_of(fit), fit.covariance
+    sd = np.sqrt(np.diag(covariance))
+    values, stderr = zip(*estimates.values(), strict=True)
+    return JointEstimate(
+        names=tuple(estimates), units=tuple(unknown.parameter.unit for unknown in fit.experiment.unknowns),
+        values=np.array(values), stderr=np.array(stderr), correlation=covariance / np.outer(sd, sd),
+    )  # fmt: skip
 
 
 def names_of(effect: Hypothesis) -> tuple[str, ...]:

@@ -9,6 +9,7 @@ from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
 from diagnosis.results.first_screen import first_screen_of, verdict_text_of
+from diagnosis.results.joint_estimate import JointEstimate
 from diagnosis.results.result_parts import (
     MOST_NEAREST,
     NO_CLAIM,
@@ -116,6 +117,8 @@ class Diagnosis:
         How its sensors differ from the machine, without what is in `terms`
     true_inputs : tuple of InputCorrection
         What it took the inputs to be
+    joint : JointEstimate
+        Posterior of all unknowns of the model that predicts: ``posterior.npz``
     starts_at : mapping of str to float
         Start of every recording on the time axis that they share, [s]: the clock of terms with a date
     """
@@ -161,6 +164,7 @@ class Diagnosis:
     terms: tuple[Term, ...] = ()
     sensors: tuple[SensorCorrection, ...] = ()
     true_inputs: tuple[InputCorrection, ...] = ()
+    joint: JointEstimate = field(default_factory=JointEstimate)
     starts_at: Mapping[str, float] = field(default_factory=dict)
 
     def to_dict(self) -> dict[str, Any]:

@@ -20,7 +20,7 @@ from models.base.errors import InputError
 from models.files.cycle import Cycle
 
 SENSORS = ("oil", "housing_lower", "bearing_1")
-REPORT = {"report.html", "diagnosis.json", "correction.toml", "train.csv"}
+REPORT = {"report.html", "diagnosis.json", "correction.toml", "posterior.npz", "train.csv"}
 
 
 def run(*arguments: object) -> int:

@@ -172,6 +172,7 @@ def test_a_claim(claimed: Diagnosis, fzg: Gearbox) -> None:
     names = {c.parameter for c in claimed.calibration}
     assert "bias_oil" in names and finding.term is not None
     assert not names & {p.name for p in finding.term.parameters}
+    assert set(claimed.joint.names) == names | {p.name for p in claimed.terms[0].parameters}
 
 
 def test_held_out_readings_that_are_predicted_worse_take_the_claim_away(
