@@ -122,7 +122,7 @@ def diagnose(
             setup, experiment, posterior, decide(posterior, settings), plain=plain, near=calibration.near,
             settings=settings,
             others=Others(fit=others, posterior=rest, channels=faulty) if rest is not None else None,
-            catalogue=catalogue, train=train, held_out=held, jobs=jobs,
+            catalogue=catalogue, train=train, held_out=held, healthy=healthy, switched_off=off, jobs=jobs,
         )  # fmt: skip
     except ArithmeticError as error:
         if type(error) is not ArithmeticError:

@@ -39,7 +39,7 @@ def _list_effects(context: click.Context, _: click.Parameter, asked: bool) -> No
 
 @click.command("conceal", epilog=example("conceal --effect windage --seed 1 --output out/concealed"))
 @click.option("--plant", type=click.Choice(["own", "zoo"]), default="own", show_default=True, is_eager=True,
-              help="own: built like the model, of any gearbox; zoo: of random structure.")  # fmt: skip
+              help="own: finer, with other formulas, of any gearbox; zoo: of random structure.")  # fmt: skip
 @click.option("--effect", default=None, metavar="NAME", help="Effect to conceal; --list shows the names.")
 @click.option(
     "--list", is_flag=True, is_eager=True, expose_value=False, callback=_list_effects, help="Show the effects."

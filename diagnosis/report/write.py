@@ -1,4 +1,4 @@
-"""The files of a diagnosis: report, numbers, correction, posterior, and one prediction per recording."""
+"""The files of a diagnosis: report, numbers, corrections, posterior, and one prediction per recording."""
 
 from __future__ import annotations
 
@@ -18,12 +18,14 @@ from models.terms.term import Term
 
 SHAPE = "shape_"
 UNNAMED, IMPROVES = "without a name", "It improves the prediction; what it is, the data do not say."
-REPORT, NUMBERS, CORRECTION, POSTERIOR = "report.html", "diagnosis.json", "correction.toml", "posterior.npz"
+REPORT, NUMBERS, CORRECTION, ALONE, POSTERIOR = (
+    "report.html", "diagnosis.json", "correction.toml", "calibrated.toml", "posterior.npz"
+)  # fmt: skip
 
 
 def names_of_files(recordings: Sequence[Recording]) -> tuple[str, ...]:
     """Names of the files of a diagnosis, the report first."""
-    return REPORT, NUMBERS, CORRECTION, POSTERIOR, *(f"{recording.name}.csv" for recording in recordings)
+    return REPORT, NUMBERS, CORRECTION, ALONE, POSTERIOR, *(f"{recording.name}.csv" for recording in recordings)
 
 
 def correction_of(diagnosis: Diagnosis, gearbox: Gearbox) -> Correction:
@@ -87,7 +89,7 @@ def prediction_table(diagnosis: Diagnosis, recording: Recording) -> pd.DataFrame
 def write_files(
     diagnosis: Diagnosis, gearbox: Gearbox, recordings: Sequence[Recording], folder: str | Path
 ) -> tuple[Path, ...]:
-    """Write report, numbers, correction, posterior, and the prediction of every recording into a folder.
+    """Write report, numbers, corrections, posterior, and the prediction of every recording into a folder.
 
     Returns
     -------
@@ -98,11 +100,12 @@ def write_files(
 
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    report, numbers, correction, posterior, *predictions = (folder / name for name in names_of_files(recordings))
+    report, numbers, correction, alone, posterior, *predictions = (folder / name for name in names_of_files(recordings))
     write_report(diagnosis, report)
     numbers.write_text(json.dumps(diagnosis.to_dict(), indent=2, allow_nan=False) + "\n", encoding="utf-8")
     write_correction(correction_of(diagnosis, gearbox), correction)
+    write_correction(correction_of(diagnosis.calibrated_alone, gearbox), alone)
     diagnosis.joint.write(posterior)
     for recording, path in zip(recordings, predictions, strict=True):
         prediction_table(diagnosis, recording).to_csv(path, index=False, float_format="%.3f", lineterminator="\n")
-    return report, numbers, correction, posterior, *predictions
+    return report, numbers, correction, alone, posterior, *predictions

@@ -67,7 +67,7 @@ def next_test(
         Parts that can have a sensor
     """
     if verdict == "unexplained" and "T_ambient" in assumed:
-        return "record T_ambient_degC: a constant replaces it, and effects of the air show up elsewhere"
+        return "record T_ambient_degC: it is taken as constant, so changes of the air look like heat at other parts"
     for finding in findings:
         rivals = [rival for rival in finding.confusable_with if rival.instead]
         if rivals and rivals[0].probability >= WORTH_ASKING:
@@ -79,7 +79,7 @@ def next_test(
         wanted, shown = Counter(one.needed for one in unseen).most_common(1)[0]
         return f"{wanted} (it would show {shown} effect{'s' if shown > 1 else ''} that these data cannot)"
     if verdict == "unexplained":
-        return "repeat the operation in which the heat is missing with one input changed at a time"
+        return "repeat the operation in which the model is wrong, and change one input at a time"
     if findings and findings[0].mechanism in catalogue:
         return catalogue[findings[0].mechanism].experiment
     return ""

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from diagnosis.candidates.hypotheses import Hypothesis
 from diagnosis.decision.answer import Answer, act_on_the_same, unconfirmed
 from diagnosis.decision.posterior import KINDS, Judged, Placebo, Posterior
 from diagnosis.decision.settings import Settings
@@ -18,7 +19,8 @@ from diagnosis.engine.set_apart import calibrate_without_error
 from diagnosis.recordings.recording import Recording
 from diagnosis.results.advice import next_test, without_sensor
 from diagnosis.results.baseline_notes import baseline_notes
-from diagnosis.results.findings import estimates_of, finding_of, joint_estimate_of, name_in, names_of
+from diagnosis.results.calibrated_model import CalibratedModel
+from diagnosis.results.findings import estimates_of, finding_of, joint_estimate_of, name_in
 from diagnosis.results.instruments import sensors_and_inputs_of
 from diagnosis.results.locations import locations_of
 from diagnosis.results.predictions import Predicted, Predictions, predict_recordings, temperatures
@@ -80,6 +82,8 @@ def assemble(
     catalogue: Mapping[str, Mechanism],
     train: Sequence[Recording],
     held_out: Sequence[Recording],
+    healthy: Sequence[Recording] = (),
+    switched_off: Sequence[str] = (),
     jobs: int = 1,
 ) -> Diagnosis:
     """The result of a decision.
@@ -96,6 +100,9 @@ def assemble(
         Where model error was linearised
     others : Others or None
         What all but faulty channels say, if there are any
+    train, held_out, healthy : sequence of Recording
+    switched_off : sequence of str
+        Mechanisms that are off in `healthy`; all if empty
     jobs : int
         Processes
     """
@@ -119,10 +126,8 @@ def assemble(
     unseen = tuple(one for one in _unseen(posterior, catalogue) if one.mechanism not in told)
     verdict = _verdict(posterior, answers, unseen)
     location = locations_of(setup, posterior) if posterior.detected else ()
-    terms = _terms(best, final)
-    sensors, true_inputs = sensors_and_inputs_of(
-        final, findings=[term.label for term in terms], inputs=setup.gearbox.network().inputs
-    )
+    inputs = setup.gearbox.network().inputs
+    model = _calibrated(final, plain, inputs, best.effects if best else ())
     assumed = {name for r in (*train, *held_out) for name in r.assumed}
     return Diagnosis(
         verdict=verdict,
@@ -134,13 +139,14 @@ def assemble(
         false_alarm_rate=settings.false_alarm_rate,
         location=location,
         findings=findings,
-        calibration=_calibration(final, plain, answers),
+        calibration=model.calibration,
         train=_fits(setup, predicted.train, counting),
         holdout=holdout,
         faulty=faulty,
-        terms=terms,
-        sensors=sensors,
-        true_inputs=true_inputs,
+        terms=_terms(best, final),
+        sensors=model.sensors,
+        true_inputs=model.true_inputs,
+        alone=_calibrated(plain, plain, inputs),
         joint=joint_estimate_of(final),
         starts_at=experiment.starts_at,
         noise_K=setup.noise_K,
@@ -161,17 +167,20 @@ def assemble(
         inputs={
             "recordings": {r.name: r.sha256 for r in train},
             "held_out": {r.name: r.sha256 for r in held_out},
+            "baselines": {r.name: r.sha256 for r in healthy},
+            "switched_off": list(switched_off),
             "gearbox": setup.gearbox.hash,
             "version": project_version(),
         },
         notes=(
             *ratio_notes(final), *baseline_notes(experiment, posterior, answers),
-            *(f"{r.name}: {note}" for r in (*train, *held_out) for note in r.notes),
+            *(f"{r.name}: {note}" for r in (*train, *held_out, *healthy) for note in r.notes),
         ),
         kinds={kind: posterior.of(kind) for kind in KINDS},
         claim_from=settings.claim_from,
         matters_K=settings.matters_K,
         matters_W=settings.matters_W,
+        odds_unknown=settings.odds_unknown,
         error_class=posterior.error_class,
         error_evidence=posterior.error_evidence,
         scaled_error=tuple(
@@ -359,18 +368,24 @@ def _courses(setup: InferenceSetup, predicted: Predicted) -> tuple[PredictedRun,
     return tuple(result)
 
 
-def _calibration(final: Fit, plain: Fit, answers: Sequence[Answer]) -> tuple[Calibrated, ...]:
-    """Every usual parameter, and how far it is from its prior as the definition has it: that of one found is wider."""
+def _calibrated(fit: Fit, plain: Fit, inputs: Collection[str], effects: Sequence[Hypothesis] = ()) -> CalibratedModel:
+    """Every usual parameter, the sensors and the inputs of a fit, without those of effects.
+
+    How far a parameter is from its prior is that of the definition: that of one found is wider.
+    """
     stated = {unknown.parameter.name: unknown for unknown in plain.experiment.unknowns}
-    found = {name for answer in answers for effect in answer.best.effects if effect.term is not None
-             for name in names_of(effect)}  # fmt: skip
-    estimates = estimates_of(final)
-    usual = (unknown.parameter for unknown in final.experiment.unknowns)
-    return tuple(
-        Calibrated(parameter=p.name, prior=p.start, value=value, stderr=stderr,
-                   shift_in_sd=stated[p.name].z_of(value), unit=p.unit)
-        for p in usual if p.name in stated and p.name not in found
-        for value, stderr in [estimates[p.name]]
+    terms = [effect.term for effect in effects if effect.term is not None]
+    found = {p.name for term in terms for p in term.parameters}
+    usual = [one.parameter for one in fit.experiment.unknowns if one.parameter.name in {*stated} - found]
+    estimates = estimates_of(fit)
+    sensors, true_inputs = sensors_and_inputs_of(fit, findings=[term.label for term in terms], inputs=inputs)
+    return CalibratedModel(
+        calibration=tuple(
+            Calibrated(parameter=p.name, prior=p.start, value=value, stderr=stderr,
+                       shift_in_sd=stated[p.name].z_of(value), unit=p.unit)
+            for p in usual for value, stderr in [estimates[p.name]]
+        ),
+        sensors=sensors, true_inputs=true_inputs,
     )  # fmt: skip
 
 

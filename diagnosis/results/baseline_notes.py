@@ -45,18 +45,18 @@ def baselines_told(
     notes = []
     if effect and acting > NOTED_FROM:
         notes.append(
-            f"The baselines show {effect} too (evidence {acting:.0f} nats): the reported size is only its growth since "
+            f"The baselines show {effect} too (evidence {acting:.0f} nat): the reported size is only its growth since "
             "then. Take baselines from before it began, or leave them out."
         )
     notes += [
-        f"Session '{session}' looks like another machine, or one that was rebuilt (evidence {nats:.0f} nats): its "
+        f"Session '{session}' looks like another machine, or one that was rebuilt (evidence {nats:.0f} nat): its "
         "parameters are not those of the other recordings. Leave it out if that is so."
         for session, nats in apart.items() if nats > NOTED_FROM
     ]  # fmt: skip
     if placebo is not None:
         notes.append(
-            f"Session '{placebo.session}', tested like the recordings, brings {placebo.log_e:.0f} nats "
-            f"({placebo.best.name} at {placebo.best.place}), though nothing can be missing in it: so much comes of the "
-            "model, and the recordings have to bring more. If that effect may have acted there, leave the session out."
+            f"In the baseline '{placebo.session}' nothing is wrong, but the same test finds {placebo.log_e:.0f} nat in "
+            f"it ({placebo.best.name} at {placebo.best.place}; for as many hours as are tested). So much is model "
+            "error: the recordings have to bring more. If that effect may have acted there, leave the session out."
         )
     return tuple(notes)

@@ -27,10 +27,10 @@ VERDICT_TEXT: Mapping[str, str] = {
     "parameter_error": "A known parameter of the model is outside what its definition allows.",
     "missing_physics": "The machine shows physics that the model leaves out.",
     "sensor_fault": "A sensor, clock or recorded input is at fault, not the machine.",
-    "unexplained": "Something is missing, and it matches no physics in the catalogue.",
+    "unexplained": "Something is missing, and no name of the catalogue is certain enough.",
     "insufficient_data": "These recordings are too short or too calm to decide.",
 }
-PARTLY = "Part of what is missing was found; the rest matches no physics in the catalogue."
+PARTLY = "Part of what is missing has a name; of the rest none is certain enough."
 LIKELY_TEXT: Mapping[str, str] = {  # of the same verdicts where no name is a claim
     "parameter_error": "A parameter of the model is probably outside what its definition allows.",
     "missing_physics": "The machine probably shows physics that the model leaves out; its name is not certain.",
@@ -71,13 +71,15 @@ def first_screen_of(d: Diagnosis) -> tuple[tuple[str, tuple[str, ...]], ...]:
 def _missing(d: Diagnosis) -> str:
     if d.verdict == "insufficient_data":
         return "These data cannot decide it."
-    reached = f"evidence {d.log_e_value:.1f} nat, {d.threshold:.1f} needed"
-    rate = f"false-alarm rate {100.0 * d.false_alarm_rate:g} %"
+    why = f"false-alarm rate {100.0 * d.false_alarm_rate:g} %"
+    if d.placebo is not None and d.threshold > d.further_threshold:
+        why = f"as much as the baseline '{d.placebo.session}' brings"
+    reached = f"evidence {d.log_e_value:.1f} nat, {d.threshold:.1f} needed ({why})"
     if d.verdict == "parameter_error":
-        return f"No physics, but a parameter is outside its prior: {reached} ({rate})."
+        return f"No physics, but a parameter is outside its prior: {reached}."
     if d.log_e_value > d.threshold:
-        return f"Yes{_in_what(d)}: {reached} ({rate})."
-    return f"Nothing that these data show: {reached} ({rate})."
+        return f"Yes{_in_what(d)}: {reached}."
+    return f"Nothing that these data show: {reached}."
 
 
 def _in_what(d: Diagnosis) -> str:
@@ -96,7 +98,8 @@ def _where(d: Diagnosis) -> tuple[str, ...]:
     told = ", ".join(f"{place.node} ({_share(place.probability)})" for place in d.places)
     place = next((one for one in d.places if one.heat_max_W), None)
     if place is None:
-        return (f"{told}: in a reading or an input; no heat",)
+        fault = d.verdict == "sensor_fault" or d.location[0].node not in d.network.node_names
+        return (f"{told}: {'in a reading or an input; no heat' if fault else 'no heat was estimated there'}",)
     way = "taken away" if place.heat_mean_W < 0.0 else "added"
     mean, most = number(abs(place.heat_mean_W)), number(abs(place.heat_max_W))
     where = "" if place is d.places[0] else f"in {place.node} "
@@ -137,8 +140,8 @@ def _how_sure(d: Diagnosis) -> tuple[str, ...]:
         told = [f"{kind} {_share(p)}" for kind, p in kinds if p >= LEAST_RIVAL]
         lines.append(f"Probabilities: {', '.join(told)}.")
     if d.error_class:
-        hides = ", the largest: a real effect can hide in it" if d.error_class == LARGEST_ERROR else ""
-        lines.append(f"Model error assumed: class {d.error_class}{hides}.")
+        hides = ", the largest, because the model fits badly: a real effect can hide in it"
+        lines.append(f"Model error assumed: class {d.error_class}{hides if d.error_class == LARGEST_ERROR else ''}.")
     if d.scaled_error and d.log_e_value > d.threshold:
         lines.append(robustness_told(d.scaled_error))
     lines += _sessions_told(d)
@@ -157,7 +160,7 @@ def _sessions_told(d: Diagnosis) -> list[str]:
     if d.repeating and d.log_e_value > d.threshold:
         lines.append(repeating_told(*d.repeating))
     if d.session_s > LITTLE_SPREAD:
-        lines.append(f"Between sessions the machine differs by {d.session_s:.2f} of the priors' widths.")
+        lines.append(f"Between sessions parameters differ by {d.session_s:.2f} standard deviations of their priors.")
     return lines
 
 
@@ -165,18 +168,24 @@ def _how_much_better(d: Diagnosis) -> tuple[str, ...]:
     lines = []
     for name, fits in (("held-out", d.holdout), ("training", d.train)):
         if fits.before == fits.before:
-            found = f", {fits.found:.2f} K with the findings" if d.findings else ""
+            found = f", {fits.found:.2f} K with {'the findings' if d.findings else 'what was fitted'}" * (
+                bool(d.findings or d.terms)
+            )
             learnt = f", {fits.after:.2f} K with what was learnt of model error" if d.learnt else ""
             lines.append(
                 f"RMSE {name}: {fits.before:.2f} K as delivered, {fits.calibrated:.2f} K calibrated{found}{learnt} "
                 f"(noise {d.noise_K:.2f} K)"
             )
     if d.has_correction and d.holdout.after > d.holdout.calibrated:
-        lines.append("Held-out temperatures are not closer than with the calibrated model: predict with that one")
+        lines.append(
+            "Held-out temperatures are not closer than with the calibrated model: predict with calibrated.toml"
+        )
     named_terms = {finding.term.label for finding in d.findings if finding.term is not None}
     further = len([term for term in d.terms if term.label not in named_terms])
     if d.findings and further:
-        lines.append(f"The findings' model holds {further} more effect{'s' * (further > 1)} without a certain name")
+        lines.append(
+            f"The correction also holds {further} effect{'s' * (further > 1)} without a certain name (grade learnt)"
+        )
     if d.has_correction and math.isfinite(d.holdout_gain):
         way = "better" if d.holdout_gain > 0.0 else "worse"
         lines.append(
@@ -184,7 +193,10 @@ def _how_much_better(d: Diagnosis) -> tuple[str, ...]:
             f"{abs(d.holdout_gain):.0f} nat of log score"
         )
     if d.findings and not d.faulty and d.holdout.refute(d.holdout_gain, d.noise_K):
-        lines.append("So the held-out recordings contradict the findings: no name is a claim")
+        what = (
+            "temperatures are further off by more than the noise" if d.holdout_gain > 0.0 else "less probable readings"
+        )
+        lines.append(f"So the held-out recordings contradict the findings ({what}): no name is a claim")
     return tuple(lines)
 
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 import html
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Literal
 
+from diagnosis.results.calibrated_model import CalibratedModel
 from diagnosis.results.first_screen import first_screen_of, verdict_text_of
 from diagnosis.results.joint_estimate import JointEstimate
 from diagnosis.results.result_parts import (
@@ -51,7 +52,7 @@ class Diagnosis:
     verdict : str
     gearbox : str
     log_e_value, threshold, p_value : float
-        Evidence that something is missing, averaged over everything in the catalogue [nat], the level it had to reach,
+        Log odds of all effects to a machine without one, parameters as they may be [nat], the level it had to reach,
         and exp(-evidence), at most 1. That would bound the chance of such evidence in a healthy machine only if the
         model were exact, which it never is; the threshold decides. With the verdict ``parameter_error``: evidence that
         a parameter is outside its prior
@@ -69,8 +70,8 @@ class Diagnosis:
     floor : str
         What structural floor was assumed
     misfit : float
-        Mean square of the residual in the training recordings or, where something was found, in the held-out ones,
-        whichever is larger, in multiples of what noise and structural floor make of it; above 1 they are not explained
+        Mean square of the residual of the model that predicts in the training recordings, in multiples of what noise
+        and random heat make of it
     remaining_p_value : float
         exp(-evidence) of a further effect, at most 1, as `p_value`; NaN where no further look was taken
     remaining_note : str
@@ -95,6 +96,8 @@ class Diagnosis:
         Probability from which a name is a claim, as asked for
     matters_K, matters_W : float
         Size from which an effect matters, as asked for
+    odds_unknown : float
+        Prior odds of a cause that is in no catalogue, as asked for
     error_class : str
         Class of model error of the best explanation; of nothing where nothing is missing
     error_evidence : mapping of str to float
@@ -117,6 +120,8 @@ class Diagnosis:
         How its sensors differ from the machine, without what is in `terms`
     true_inputs : tuple of InputCorrection
         What it took the inputs to be
+    alone : CalibratedModel
+        The nominal machine calibrated without findings: ``calibrated.toml``
     joint : JointEstimate
         Posterior of all unknowns of the model that predicts: ``posterior.npz``
     starts_at : mapping of str to float
@@ -153,6 +158,7 @@ class Diagnosis:
     claim_from: float = 0.9
     matters_K: float = 1.0
     matters_W: float = 0.0
+    odds_unknown: float = 0.1
     error_class: str = ""
     error_evidence: Mapping[str, float] = field(default_factory=dict)
     scaled_error: tuple[ScaledError, ...] = ()
@@ -164,6 +170,7 @@ class Diagnosis:
     terms: tuple[Term, ...] = ()
     sensors: tuple[SensorCorrection, ...] = ()
     true_inputs: tuple[InputCorrection, ...] = ()
+    alone: CalibratedModel = field(default_factory=CalibratedModel)
     joint: JointEstimate = field(default_factory=JointEstimate)
     starts_at: Mapping[str, float] = field(default_factory=dict)
 
@@ -178,9 +185,10 @@ class Diagnosis:
                 "log_e_value": self.log_e_value,
                 "threshold": self.threshold,
                 "false_alarm_rate": self.false_alarm_rate,
-                "test": "log_e_value: log of the mean Bayes factor over the catalogue, all parameters marginalised; "
-                        "something is missing if it exceeds threshold. p_value = exp(-log_e_value), at most 1: a bound "
-                        "on chance for an exact model only",
+                "test": "log_e_value: log odds of all effects to a machine without one, whose parameters may be "
+                        "outside their priors (verdict parameter_error: of such parameters to none); something is "
+                        "missing if it exceeds threshold. p_value = exp(-log_e_value), at most 1: a bound on chance "
+                        "for an exact model only, no false-alarm rate",
             },
             "location": [
                 {
@@ -199,7 +207,8 @@ class Diagnosis:
                     "faulty_channels": list(self.faulty), "noise_K": self.noise_K, "floor": self.floor},
             "kinds": dict(self.kinds),
             "settings": {"false_alarm_rate": self.false_alarm_rate, "claim_from": self.claim_from,
-                         "matters_K": self.matters_K, "matters_W": self.matters_W},
+                         "matters_K": self.matters_K, "matters_W": self.matters_W,
+                         "odds_unknown": self.odds_unknown},
             "model_error": {"class": self.error_class, "evidence": dict(self.error_evidence),
                             "scaled": [asdict(one) for one in self.scaled_error],
                             "learnt": [
@@ -228,6 +237,12 @@ class Diagnosis:
     def has_correction(self) -> bool:
         """True if the corrected model has more than calibrated parameters."""
         return bool(self.findings or self.terms or self.learnt)
+
+    @property
+    def calibrated_alone(self) -> Diagnosis:
+        """A diagnosis in which the model that predicts is the nominal one, calibrated without findings."""
+        return replace(self, findings=(), terms=(), learnt=(), calibration=self.alone.calibration,
+                       sensors=self.alone.sensors, true_inputs=self.alone.true_inputs)  # fmt: skip
 
     @property
     def verdict_text(self) -> str:

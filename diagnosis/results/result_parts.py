@@ -272,11 +272,11 @@ def repeating_told(supported: Repeating, worse: Repeating) -> str:
     >>> from dataclasses import replace
     >>> one = Repeating(deviation_in_sd=0.05, log_e_value=40.2, mechanism="windage", place="oil")
     >>> repeating_told(one, replace(one, deviation_in_sd=0.1, log_e_value=31.0))
-    'Evidence before fits 40 nat; 31 nat if sessions differ by 0.1 prior widths instead of 0.05: windage at oil ahead.'
+    'Quick scan: 40 nat; 31 nat if sessions differ by 0.1 prior widths instead of 0.05: windage at oil ahead.'
     """
     ahead = ", then ".join(dict.fromkeys(named(one.mechanism, one.place) for one in (supported, worse)))
     return (
-        f"Evidence before fits {supported.log_e_value:.0f} nat; {worse.log_e_value:.0f} nat if sessions differ by "
+        f"Quick scan: {supported.log_e_value:.0f} nat; {worse.log_e_value:.0f} nat if sessions differ by "
         f"{worse.deviation_in_sd:g} prior widths instead of {supported.deviation_in_sd:g}: {ahead} ahead."
     )
 
@@ -289,14 +289,14 @@ def robustness_told(every: Sequence[ScaledError]) -> str:
     >>> from dataclasses import replace
     >>> one = ScaledError(factor=0.5, log_e_value=40.2, threshold=5.0, mechanism="windage", place="oil")
     >>> robustness_told([one, replace(one, factor=2.0, log_e_value=31.0)])
-    'Evidence before fits with model error half as large 40 nat, twice as large 31 nat: windage at oil ahead.'
+    'Quick scan (before fits) with model error half as large 40 nat, twice as large 31 nat: windage at oil ahead.'
     >>> robustness_told([one, replace(one, factor=2.0, log_e_value=3.0)])
-    'Evidence before fits with model error half as large 40 nat (windage at oil), twice as large 3 nat (nothing).'
+    'Quick scan (before fits) with model error half as large 40 nat (windage at oil), twice as large 3 nat (nothing).'
     """
     ahead = {one.ahead for one in every}
     told = [f"{one.size} {one.log_e_value:.0f} nat{f' ({one.ahead})' if len(ahead) > 1 else ''}" for one in every]
     together = f": {ahead.pop()} ahead" if len(ahead) == 1 else ""
-    return f"Evidence before fits with model error {', '.join(told)}{together}."
+    return f"Quick scan (before fits) with model error {', '.join(told)}{together}."
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -76,8 +76,8 @@ class Finding(LawTable):
 
     The keys from `mechanism` to `grade`, in the order of this class, are for people, see
     :class:`models.mechanisms.Mechanism`; the others are those of :class:`models.terms.term.Term`. `grade` is ``claim``
-    for a name that is certain enough, ``likely`` for what acts like it, ``learnt`` for what names nothing: shapes of
-    laws, model error, and effects without a certain name.
+    for a name that is certain enough, ``likely`` for a tie or what acts like it, ``learnt`` for what names nothing:
+    shapes of laws, model error, and effects without a certain name.
     """
 
     mechanism: Text
@@ -318,9 +318,9 @@ class Correction(Section):
         return {
             "sha256": hashlib.sha256(correction_text(self).encode()).hexdigest(),
             "findings": [
-                f"{'acts like ' if f.grade == 'likely' else ''}{f.mechanism} at {f.place}"
+                f"{'likely ' if f.grade == 'likely' else ''}{f.mechanism} at {f.place}"
                 for f in self.findings
-                if f.mechanism not in ("shape", MODEL_ERROR)
+                if f.grade != "learnt" and f.mechanism not in ("shape", MODEL_ERROR)
             ],
         }
 

@@ -32,6 +32,7 @@ from diagnosis.report import page
 from diagnosis.report.write import correction_of
 from diagnosis.results import predictions
 from diagnosis.results.assemble import _distinct, _remaining, assemble
+from diagnosis.results.findings import estimates_of
 from diagnosis.results.result import Diagnosis
 from diagnosis.results.result_parts import Fits
 from diagnosis.setup.inference_setup import InferenceSetup
@@ -222,7 +223,7 @@ def test_the_summary_answers_in_order(claimed: Diagnosis) -> None:
     text = "\n".join(lines)
     assert "not ruled out instead: hot_neighbour at housing_lower" in text
     assert "class no-load losses" in text
-    assert "Between sessions the machine differs by 0.20" in text
+    assert "Between sessions parameters differ by 0.20" in text
 
 
 def test_a_tie_is_one_item_and_only_likely(assembled: Assemble, prepared: Prepared, windage: Judged) -> None:
@@ -425,6 +426,20 @@ def test_correction_keeps_grades(claimed: Diagnosis, fzg: Gearbox, tmp_path: Any
     assert not [f for f in left.findings if f.mechanism == "windage"] and left.calibration == read.calibration
     assert [f for f in correction_of(claimed, fzg).claims_only().findings if f.mechanism == "windage"]
     assert 'grade = "claim"' not in correction_text(correction_of(claimed, fzg))  # the usual one, as in older files
+
+
+def test_the_calibrated_machine_alone_is_a_correction_too(
+    claimed: Diagnosis, prepared: Prepared, fzg: Gearbox, tmp_path: Any
+) -> None:
+    """Where the findings do not improve the prediction it is the one to predict with."""
+    write_correction(correction_of(claimed.calibrated_alone, fzg), tmp_path / "calibrated.toml")
+    read, known = read_correction(tmp_path / "calibrated.toml", fzg), estimates_of(prepared[2])
+    assert not [f for f in read.findings if f.mechanism != "shape"]
+    for one in read.calibration:
+        assert (one.value, one.stderr) == pytest.approx(known[one.name], rel=1e-6)
+    with_findings = {c.parameter: c.value for c in claimed.calibration}
+    assert max(abs(one.value / with_findings[one.name] - 1.0) for one in read.calibration) > 0.05
+    assert {s.channel: s.bias for s in read.sensors} != {s.channel: s.bias for s in correction_of(claimed, fzg).sensors}
 
 
 def test_the_report_shows_the_first_screen(claimed: Diagnosis) -> None:

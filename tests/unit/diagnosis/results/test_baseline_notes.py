@@ -12,7 +12,7 @@ from diagnosis.results.baseline_notes import baselines_told
 def test_an_effect_that_acts_in_the_baselines_is_noted() -> None:
     assert not baselines_told(2.0, {}, "a drift")
     (note,) = baselines_told(20.0, {}, "a drift")
-    assert "show a drift too (evidence 20 nats)" in note
+    assert "show a drift too (evidence 20 nat)" in note
 
 
 def test_a_session_of_another_machine_is_noted() -> None:
@@ -23,4 +23,6 @@ def test_a_session_of_another_machine_is_noted() -> None:
 def test_a_baseline_that_brings_evidence_is_noted() -> None:
     damage = Hypothesis(name="bearing_damage", place="bearing_1", family="bearing", variants=np.ones((1, 1)))
     (note,) = baselines_told(0.0, {}, placebo=Placebo(session="april", log_e=50.6, best=damage))
-    assert note.startswith("Session 'april', tested like the recordings, brings 51 nats (bearing_damage at bearing_1)")
+    assert note.startswith(
+        "In the baseline 'april' nothing is wrong, but the same test finds 51 nat in it (bearing_damage"
+    )

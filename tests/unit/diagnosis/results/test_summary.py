@@ -7,7 +7,7 @@ from dataclasses import replace
 from diagnosis.report import page
 from diagnosis.results.first_screen import VERDICT_TEXT
 from diagnosis.results.result import Diagnosis
-from diagnosis.results.result_parts import Change, Ranked, Switching
+from diagnosis.results.result_parts import Change, PlaceboEvidence, Ranked, Switching
 from tests.unit.diagnosis.diagnosis_example import consistent, missing_physics, two_effects, unexplained
 
 
@@ -23,6 +23,14 @@ def test_the_verdict_stands_first_then_the_questions_in_order() -> None:
     assert [line.split("?")[0] + "?" for line in lines[1:] if not line.startswith(" ")] == asked
     assert "5.21 K as delivered, 3.62 K calibrated, 0.52 K with the findings" in str(missing_physics())
     assert "41.3 nat, 3.9 needed" in lines[1]
+
+
+def test_a_baseline_that_raises_the_threshold_is_told_with_it() -> None:
+    healthy = PlaceboEvidence(session="march", log_e_value=38.0, mechanism="windage", place="oil")
+    raised = replace(missing_physics(), placebo=healthy, threshold=38.0)
+    assert "38.0 needed (as much as the baseline 'march' brings)" in told(raised, "Is something missing?")
+    little = replace(raised, threshold=raised.further_threshold)
+    assert "needed (false-alarm rate 5 %)" in told(little, "Is something missing?")
 
 
 def test_of_an_instrument_and_a_place_with_heat_the_heat_is_told() -> None:
@@ -107,7 +115,7 @@ def test_every_likely_place_is_told_with_what_the_first_one_does() -> None:
 def test_a_larger_held_out_error_is_not_called_better() -> None:
     base = missing_physics()
     worse = replace(base, holdout=replace(base.holdout, after=4.0), holdout_gain=93.0)
-    assert "not closer than with the calibrated model" in told(worse, "How much better?")
+    assert "not closer than with the calibrated model: predict with calibrated.toml" in told(worse, "How much better?")
     assert "not closer" not in told(replace(base, holdout_gain=93.0), "How much better?")
     assert "by 93 nat of log score\nSo the held-out recordings contradict the findings" in told(
         worse, "How much better?"
