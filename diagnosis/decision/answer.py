@@ -8,6 +8,7 @@ from typing import Literal
 from diagnosis.candidates.hypotheses import Hypothesis
 from diagnosis.decision.posterior import Judged, Posterior, name_of
 from diagnosis.decision.settings import Settings
+from diagnosis.engine.learnt import Rule
 from models.terms.term import Term
 
 Grade = Literal["claim", "likely"]
@@ -33,8 +34,8 @@ class Answer:
     tied : tuple of (Hypothesis, float)
         Names of a tie set with their probabilities, `effect` first; empty of a claim
     acts_like : bool
-        True if what remains, or the kind of the effect (a course over the hours), shows that this is only the nearest
-        name
+        True if this is only the nearest name: by what remains, by the kind of the effect (a course over the hours), or
+        because held-out recordings contradict it
     """
 
     best: Judged
@@ -63,13 +64,12 @@ def decide(posterior: Posterior, settings: Settings) -> tuple[Answer, ...]:
     return tuple(answer for answer in answers if answer is not None)
 
 
-def unconfirmed(answer: Answer, posterior: Posterior) -> Answer:
-    """An answer with which held-out readings are predicted worse: the nearest name at most, no claim and no tie."""
+def withdraw_claim(answer: Answer, rule: Rule) -> Answer:
+    """An answer that held-out recordings contradict: no claim and no tie, but the nearest name at most."""
     if answer.acts_like:
         return answer
-    sure = posterior.rule.nearest
-    return replace(answer, grade="likely", tied=(), acts_like=True, probability=sure * answer.probability,
-                   joint=sure * answer.joint)  # fmt: skip
+    return replace(answer, grade="likely", tied=(), acts_like=True, probability=rule.nearest * answer.probability,
+                   joint=rule.nearest * answer.joint)  # fmt: skip
 
 
 def _best_fitted(posterior: Posterior) -> Judged:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from diagnosis.candidates.hypotheses import Hypothesis
-from diagnosis.decision.answer import Answer, act_on_the_same, unconfirmed
+from diagnosis.decision.answer import Answer, act_on_the_same, withdraw_claim
 from diagnosis.decision.posterior import KINDS, Judged, Placebo, Posterior
 from diagnosis.decision.settings import Settings
 from diagnosis.engine.calibration import Near
@@ -115,8 +115,9 @@ def assemble(
         explanation=None if faulty else best or posterior.nothing, near=near, counting=counting, jobs=jobs,
     )  # fmt: skip
     final, holdout = predicted.final, _fits(setup, predicted.holdout, counting)
-    if not faulty and holdout.refute(predicted.holdout_gain, setup.noise_K):
-        answers = [unconfirmed(answer, posterior) for answer in answers]
+    contradicted = bool(answers) and not faulty and holdout.contradict(predicted.holdout_gain, setup.noise_K)
+    if contradicted:
+        answers = [withdraw_claim(answer, posterior.rule) for answer in answers]
     findings = _distinct([
         (answer, finding_of(answer, answer.best.fit or final, setup, posterior, catalogue, train))
         for answer in answers
@@ -196,6 +197,7 @@ def assemble(
         ),
         placebo=_placebo(posterior.placebo, catalogue),
         holdout_gain=predicted.holdout_gain,
+        contradicted=contradicted,
     )  # fmt: skip
 
 

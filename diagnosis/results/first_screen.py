@@ -168,9 +168,8 @@ def _how_much_better(d: Diagnosis) -> tuple[str, ...]:
     lines = []
     for name, fits in (("held-out", d.holdout), ("training", d.train)):
         if fits.before == fits.before:
-            found = f", {fits.found:.2f} K with {'the findings' if d.findings else 'what was fitted'}" * (
-                bool(d.findings or d.terms)
-            )
+            what = "the findings" if d.findings else "what was fitted"
+            found = f", {fits.found:.2f} K with {what}" if d.findings or d.terms else ""
             learnt = f", {fits.after:.2f} K with what was learnt of model error" if d.learnt else ""
             lines.append(
                 f"RMSE {name}: {fits.before:.2f} K as delivered, {fits.calibrated:.2f} K calibrated{found}{learnt} "
@@ -192,11 +191,9 @@ def _how_much_better(d: Diagnosis) -> tuple[str, ...]:
             f"Held-out readings are predicted {way} than by the calibrated model, by "
             f"{abs(d.holdout_gain):.0f} nat of log score"
         )
-    if d.findings and not d.faulty and d.holdout.refute(d.holdout_gain, d.noise_K):
-        what = (
-            "temperatures are further off by more than the noise" if d.holdout_gain > 0.0 else "less probable readings"
-        )
-        lines.append(f"So the held-out recordings contradict the findings ({what}): no name is a claim")
+    if d.contradicted:
+        by = "larger error of temperatures" if d.holdout_gain > 0.0 else "less probable readings"
+        lines.append(f"So the held-out recordings contradict the findings ({by}): no name is a claim")
     return tuple(lines)
 
 

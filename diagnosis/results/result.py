@@ -111,6 +111,8 @@ class Diagnosis:
         What a healthy session brings, if there is one
     holdout_gain : float
         Log predictive density of the held-out readings: final model less the calibrated one, [nat]; NaN without any
+    contradicted : bool
+        True if held-out recordings contradict the findings, see :meth:`Fits.contradict`: none is a claim
     faulty : tuple of str
         Channels that neither the calibration nor the errors over all temperatures count, because their sensors fail
     terms : tuple of Term
@@ -166,6 +168,7 @@ class Diagnosis:
     repeating: tuple[Repeating, ...] = ()
     placebo: PlaceboEvidence | None = None
     holdout_gain: float = math.nan
+    contradicted: bool = False
     faulty: tuple[str, ...] = ()
     terms: tuple[Term, ...] = ()
     sensors: tuple[SensorCorrection, ...] = ()
@@ -203,7 +206,8 @@ class Diagnosis:
             "findings": [finding.to_dict() for finding in self.findings],
             "calibration": [asdict(one) for one in self.calibration],
             "fit": {"train": self.train.to_dict(),
-                    "holdout": self.holdout.to_dict() | {"log_score_gain": or_none(self.holdout_gain)},
+                    "holdout": self.holdout.to_dict() | {"log_score_gain": or_none(self.holdout_gain),
+                                                           "contradicts_findings": self.contradicted},
                     "faulty_channels": list(self.faulty), "noise_K": self.noise_K, "floor": self.floor},
             "kinds": dict(self.kinds),
             "settings": {"false_alarm_rate": self.false_alarm_rate, "claim_from": self.claim_from,

@@ -406,8 +406,11 @@ class Fits:
     after: float
     sensors: Mapping[str, tuple[float, float, float]]
 
-    def refute(self, gain: float, noise_K: float) -> bool:
-        """True if with the corrected model they are less probable, or the error is larger by more than the noise."""
+    def contradict(self, gain: float, noise_K: float) -> bool:
+        """True if these recordings contradict the findings: a lower log score, or an error larger by the noise.
+
+        The gain in log score is in nat, the white noise of a temperature row in K.
+        """
         return gain <= 0.0 or self.after - self.calibrated > noise_K
 
     def to_dict(self) -> dict[str, Any]:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from diagnosis.candidates.hypotheses import Hypothesis
-from diagnosis.decision.answer import Answer, decide, unconfirmed
+from diagnosis.decision.answer import Answer, decide, withdraw_claim
 from diagnosis.decision.posterior import KINDS, Judged, Likeness, Posterior
 from diagnosis.decision.settings import Settings
 from diagnosis.engine.fit import Fit
@@ -210,17 +210,17 @@ def test_where_much_is_left_there_is_no_claim(gain: float, limit: float) -> None
     assert much.probability == pytest.approx(rule().nearest * little.probability)
 
 
-def test_what_predicts_held_out_readings_worse_is_the_nearest_name_at_most() -> None:
+def test_a_claim_that_is_withdrawn_is_the_nearest_name_at_most() -> None:
     found = posterior(*several(3))
     for asked, tied in ((0.5, 2), (0.9, 3)):
         (tie,) = decide(found, Settings(claim_from=asked))
         assert len(tie.tied) == tied
-        left = unconfirmed(tie, found)
+        left = withdraw_claim(tie, rule())
         assert (left.grade, left.acts_like, left.tied) == ("likely", True, ())
         assert left.joint == pytest.approx(rule().nearest * tie.joint)
-        assert unconfirmed(left, found) is left
+        assert withdraw_claim(left, rule()) is left
     (claim,) = decide(posterior(judged(STRONG, effect("law"))), Settings())
-    left = unconfirmed(claim, found)
+    left = withdraw_claim(claim, rule())
     assert claim.grade == "claim" and left.grade == "likely"
     assert left.probability == pytest.approx(rule().nearest * claim.probability)
 

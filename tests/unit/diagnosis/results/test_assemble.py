@@ -34,7 +34,6 @@ from diagnosis.results import predictions
 from diagnosis.results.assemble import _distinct, _remaining, assemble
 from diagnosis.results.findings import estimates_of
 from diagnosis.results.result import Diagnosis
-from diagnosis.results.result_parts import Fits
 from diagnosis.setup.inference_setup import InferenceSetup
 from models.assembly.gearbox import Gearbox
 from models.correction.correction import MODEL_ERROR, correction_text, read_correction, write_correction
@@ -187,15 +186,9 @@ def test_held_out_readings_that_are_predicted_worse_take_the_claim_away(
         (finding,) = found.findings
         assert (finding.grade, finding.acts_like) == (grade, grade == "likely")
         assert finding.probability == pytest.approx(probability)
+        assert found.contradicted is found.to_dict()["fit"]["holdout"]["contradicts_findings"] is (grade == "likely")
+        assert not assembled(posterior, []).contradicted  # nothing was found
         assert found.has_correction  # what improves the prediction of the rest goes into the model all the same
-
-
-@pytest.mark.parametrize(("gain", "more_K", "refuted"), [
-    (3.0, -0.2, False), (-3.0, -0.2, True), (3.0, 0.09, False), (3.0, 0.11, True), (np.nan, np.nan, False),
-])  # fmt: skip
-def test_what_held_out_recordings_refute(gain: float, more_K: float, refuted: bool) -> None:
-    fits = Fits(before=3.0, calibrated=0.5, found=0.5, after=0.5 + more_K, sensors={})
-    assert fits.refute(gain, noise_K=NOISE_K) is refuted
 
 
 def test_scorers_read_the_numbers(claimed: Diagnosis, fzg: Gearbox) -> None:

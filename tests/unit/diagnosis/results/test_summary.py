@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+import pytest
+
 from diagnosis.report import page
 from diagnosis.results.first_screen import VERDICT_TEXT
 from diagnosis.results.result import Diagnosis
-from diagnosis.results.result_parts import Change, PlaceboEvidence, Ranked, Switching
+from diagnosis.results.result_parts import Change, Fits, PlaceboEvidence, Ranked, Switching
 from tests.unit.diagnosis.diagnosis_example import consistent, missing_physics, two_effects, unexplained
 
 
@@ -114,15 +117,22 @@ def test_every_likely_place_is_told_with_what_the_first_one_does() -> None:
 
 def test_a_larger_held_out_error_is_not_called_better() -> None:
     base = missing_physics()
-    worse = replace(base, holdout=replace(base.holdout, after=4.0), holdout_gain=93.0)
+    worse = replace(base, holdout=replace(base.holdout, after=4.0), holdout_gain=93.0, contradicted=True)
     assert "not closer than with the calibrated model: predict with calibrated.toml" in told(worse, "How much better?")
     assert "not closer" not in told(replace(base, holdout_gain=93.0), "How much better?")
-    assert "by 93 nat of log score\nSo the held-out recordings contradict the findings" in told(
-        worse, "How much better?"
-    )
+    better = told(worse, "How much better?")
+    assert "by 93 nat of log score\nSo the held-out recordings contradict the findings (larger error of" in better
     assert "contradict" not in told(base, "How much better?")
-    unconfirmed = told(replace(base, holdout_gain=-3.0), "How much better?")
+    unconfirmed = told(replace(base, holdout_gain=-3.0, contradicted=True), "How much better?")
     assert "predicted worse than by the calibrated model, by 3 nat of log score\nSo" in unconfirmed
+
+
+@pytest.mark.parametrize(("gain", "more_K", "contradicted"), [
+    (3.0, -0.2, False), (-3.0, -0.2, True), (3.0, 0.09, False), (3.0, 0.11, True), (np.nan, np.nan, False),
+])  # fmt: skip
+def test_what_held_out_recordings_contradict(gain: float, more_K: float, contradicted: bool) -> None:
+    fits = Fits(before=3.0, calibrated=0.5, found=0.5, after=0.5 + more_K, sensors={})
+    assert fits.contradict(gain, noise_K=0.1) is contradicted
 
 
 def test_laws_of_one_name_at_one_place_are_one_item() -> None:
