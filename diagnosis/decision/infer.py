@@ -78,14 +78,14 @@ def infer(
     best = max(judged.values(), key=_weight, default=None)
     error_class = chosen.error_class if best is None else best.error_class
     placebo = placebo_of(calibration, first)
-    threshold = rule().threshold(chosen.error_class, error_class, settings.false_alarm_rate)
+    detection, of_class = rule().thresholds(chosen.error_class, error_class, settings.false_alarm_rate)
     least = -np.inf if placebo is None else placebo.log_e
     if best is not None and best.fit is not None and best.log_bayes > 0.0:
         progress(f"scanning again, given {best.label}")
         second = scan_given(calibration, best, candidates, log_prior)
         judged[best.label] = replace(best, left=second.most)
         pairs = sorted(_pairs(calibration, best, second), key=_weight, reverse=True)
-        if pairs and second.most > threshold and base.experiment.healthy:
+        if pairs and second.most > of_class and base.experiment.healthy:
             progress(f"scanning once more, given {pairs[0].label}")
             pairs[0] = replace(pairs[0], left=scan_given(calibration, pairs[0], candidates, log_prior).most)
         there = judge_alone(calibration, best, second, first.in_class(best.error_class).ahead)
@@ -98,15 +98,16 @@ def infer(
     parameters = [_weight(one) for one in every if one.of_parameters]
     effects = [_weight(one) for one in every if sum(effect.term is not None for effect in one.effects) == 1]
     log_e = log_sum(effects) - log_sum([gained, *parameters])
-    missing = log_e > max(threshold, least)
+    threshold = max(detection, least)
+    missing = log_e > threshold
     unknown = _unknown(calibration, error_class, outside) if missing else []
     return Posterior(
         nothing=Judged(effects=(), log_prior=0.0, log_bayes=0.0, error_class=chosen.error_class, fit=base),
         judged=tuple(replace(one, log_bayes=one.log_bayes - gained) for one in (*every, *unknown)),
         log_e=log_e,
         log_parameter=log_sum(parameters) - gained,
-        threshold=max(threshold, least),
-        class_threshold=threshold,
+        threshold=threshold,
+        class_threshold=of_class,
         rule=rule(),
         likeness=likeness_of(first, error_class),
         odds_unknown=settings.odds_unknown,
@@ -219,7 +220,7 @@ def _judged(calibration: Calibration, one: Judged, spread: float) -> Judged:
     at = len(calibration.fit.z)  # where the effects' unknowns begin
     log_evidence = fit_over_sessions(fit, at).log_evidence + float(np.log(one.error_class.prior))
     log_bayes = log_evidence - calibration.chosen.log_evidence - spread
-    log_bayes -= float(less_over_time(one.effects, one.error_class, fit.experiment.healthy).sum())
+    log_bayes -= float(less_over_time(one.effects, calibration.chosen.error_class, one.error_class).sum())
     for effect in one.effects:
         if effect.term is None:
             continue  # a parameter is not further

@@ -213,7 +213,7 @@ class Posterior:
         Evidence that a parameter is outside its prior: log odds to all inside theirs, without any effect, [nat]
     threshold, class_threshold : float
         From which something is missing, [nat]; that of the class of model error, from which a parameter is outside its
-        prior and a further effect competes: a baseline may ask for more
+        prior and a further effect competes
     odds_unknown : float
         Prior odds of a cause that is in no catalogue, see :class:`~diagnosis.decision.settings.Settings`
     error_class : str

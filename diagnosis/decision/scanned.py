@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -77,7 +77,7 @@ def scan_in_classes(
         judged.append((scaled, here, over, float(np.log(one.prior)) + over.log_evidence))
     nothing = next(evidence for one, _, _, evidence in judged if one.name == calibration.chosen.error_class.name)
     return in_best_classes([
-        _in_class(one, here, parameters, over, evidence - nothing, fit.experiment.healthy)
+        _in_class(one, here, parameters, over, evidence - nothing, calibration.chosen.error_class)
         for one, here, over, evidence in judged
     ], candidates, log_prior, parameters)  # fmt: skip
 
@@ -91,7 +91,7 @@ def scan_given(calibration: Calibration, given: Judged, candidates: Sequence[Hyp
     found, parameters = scan(fit, [one for one in others if one.term is not None]), _parameters(others)
     base = len(calibration.fit.z)
     over = over_sessions(found.gram, fit.experiment, [*range(base), *found.further], range(base, len(fit.z)))
-    here = _in_class(given.error_class, found, parameters, over, 0.0, fit.experiment.healthy)
+    here = _in_class(given.error_class, found, parameters, over, 0.0, given.error_class)
     return in_best_classes([here], others, log_prior[left], parameters)
 
 
@@ -101,17 +101,17 @@ def judge_alone(calibration: Calibration, best: Judged, second: Scanned, ahead: 
     assert fit is not None  # noqa: S101
     without = over_sessions(found.gram, fit.experiment, [*range(len(calibration.fit.z)), *found.further])
     log_bayes = _weighed(found, _parameters(second.candidates), without) + ahead
-    log_bayes -= less_over_time(second.candidates, best.error_class, fit.experiment.healthy)
+    log_bayes -= less_over_time(second.candidates, calibration.chosen.error_class, best.error_class)
     return dict(zip((one.label for one in second.candidates), log_bayes.tolist(), strict=True))
 
 
 def _in_class(
     error_class: ErrorClass, found: Scan, parameters: Sequence[Hypothesis], over: OverSessions, ahead: float,
-    healthy: Collection[str],
+    nothing: ErrorClass,
 ) -> InClass:  # fmt: skip
-    """Candidates in one class."""
+    """Candidates in one class; `nothing`: that without any effect."""
     strengths = _strengths(found, parameters, over.given[over.most_probable])
-    less = less_over_time((*found.candidates, *parameters), error_class, healthy)
+    less = less_over_time((*found.candidates, *parameters), nothing, error_class)
     return InClass(error_class=error_class, ahead=ahead, scan=found, over=over,
                     log_bayes=_weighed(found, parameters, over) + ahead - less, strengths=strengths)  # fmt: skip
 
@@ -129,10 +129,10 @@ def in_best_classes(
     )  # fmt: skip
 
 
-def less_over_time(candidates: Sequence[Hypothesis], error_class: ErrorClass, healthy: Collection[str]) -> Array:
-    """Nats less that changes over time count where they can stand in for model error: without a baseline."""
-    over_time = np.array([one.how in OVER_TIME for one in candidates], dtype=bool)
-    return (0.0 if healthy else error_class.over_time) * over_time
+def less_over_time(candidates: Sequence[Hypothesis], nothing: ErrorClass, here: ErrorClass) -> Array:
+    """Nats less that changes over time count: the mean of the classes without any effect and with them."""
+    less = 0.5 * (nothing.over_time + here.over_time)
+    return less * np.array([one.how in OVER_TIME for one in candidates], dtype=bool)
 
 
 def _parameters(candidates: Sequence[Hypothesis]) -> list[Hypothesis]:
@@ -230,8 +230,8 @@ def with_scaled_error(
     nothing = max(there.classes, key=lambda one: one.ahead)
     there = replace(there, log_bayes=there.log_bayes - nothing.ahead)
     best = there.order[0]
-    threshold = max(rule().threshold(nothing.error_class, there.best[best].error_class, rate), least)
-    return ScaledError(factor=factor, log_e=there.log_e, threshold=threshold, best=there.candidates[best])
+    detection, _ = rule().thresholds(nothing.error_class, there.best[best].error_class, rate)
+    return ScaledError(factor=factor, log_e=there.log_e, threshold=max(detection, least), best=there.candidates[best])
 
 
 def likeness_of(found: Scanned, error_class: ErrorClass) -> Likeness:

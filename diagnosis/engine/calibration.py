@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cache
 
 import numpy as np
 
@@ -14,9 +15,12 @@ from diagnosis.engine.model_error import ModelError
 from diagnosis.engine.products import gram_of, whitened_base
 from diagnosis.engine.sessions import fit_over_sessions, over_sessions, with_deviation
 from diagnosis.engine.set_apart import without_channels
+from diagnosis.forward.whitening import RandomHeat, Whitening
 from models.base.types import Array
 
 TURNS = 3  # with the chosen class: point, columns of model error and deviation between sessions settle together
+LONGEST = 16.0  # times as long as assumed, random heats may last where only the form of the laws is known
+WORTH = 1.0  # nats that another random heat has to bring
 WIDEST_CLASS = "full"  # the point is calibrated with it: no parameter has to stand in for what the model cannot know
 
 
@@ -83,6 +87,48 @@ class Near:
         gram = gram_of(self.parts, whitened_base(self.parts, z, [N @ directions for N in self.columns]))
         return float(np.log(one.prior)) + over_sessions(gram, self.experiment, range(gram.count)).log_evidence
 
+    def likely_random_heat(self, one: ErrorClass, z: Array) -> RandomHeat:
+        """Factors on the assumed random heats that make the readings most probable with model error of a class.
+
+        They are halved, and made to last twice as long where no more than the form of the laws is known, by the step
+        that brings most evidence as long as one does. They are never more than assumed, and with geometry they do not
+        last longer: an effect of hours would pass for random.
+
+        Parameters
+        ----------
+        z : Array, shape (unknowns,)
+            Where everything is linearised
+        """
+        model, noise, directions = self.experiment.machine.model, self.experiment.noise, self.directions(one)
+        raw = [
+            np.concatenate([part.point.residual_without_error[:, :, None], self.experiment.columns(part.point, z),
+                            self.error.combined_responses(part.point, directions)], axis=2)
+            for part in self.parts
+        ]  # fmt: skip
+
+        @cache
+        def log_evidence(factors: RandomHeat) -> float:
+            parts, errors = [], []
+            for part, assumed, columns in zip(self.parts, noise, raw, strict=True):
+                there = Whitening(model, part.point.trajectory, part.point.sensors, assumed.with_random_heat(factors))
+                residual, known, error = np.split(there(columns), [1, 1 + len(z)], axis=1)
+                parts.append(Linear(point=part.point, filter=there, residual=residual[:, 0], columns=known))
+                errors.append(error)
+            gram = gram_of(parts, whitened_base(parts, z, errors))
+            return over_sessions(gram, self.experiment, range(gram.count)).log_evidence
+
+        longest = LONGEST if noise[0].goes_with_capacity else 1.0
+        best = RandomHeat()
+        while True:
+            near = [replace(best, **{name: times * getattr(best, name)})
+                    for name in ("heat", "wander", "time") for times in (0.5, 2.0)]  # fmt: skip
+            near += [replace(best, heat=times * best.heat, time=best.time / times) for times in (0.5, 2.0)]
+            able = [one for one in near if max(one.heat, one.wander) <= 1.0 <= one.time <= longest]
+            other = max(able, key=log_evidence)
+            if log_evidence(other) < log_evidence(best) + WORTH:
+                return best
+            best = other
+
     def fitted(
         self, one: ErrorClass, start: Fit, deviation: float = 0.0, *, iterations: int = FIRST_ITERATIONS
     ) -> InClass:
@@ -118,6 +164,8 @@ class Calibration:
         Log evidence of every class, prior included, less that of the best
     near : Near
         Where it is linearised
+    random_heat : RandomHeat
+        Factors on the assumed one that are most probable
     of_others : Calibration or None
         By the readings without the channels set apart alone, if there are any
     """
@@ -125,6 +173,7 @@ class Calibration:
     chosen: InClass
     evidence: Mapping[str, float]
     near: Near
+    random_heat: RandomHeat
     of_others: Calibration | None = None
     _known: dict[str, InClass] = field(default_factory=dict, init=False)
 
@@ -170,7 +219,7 @@ def calibrate_with_error(experiment: Experiment, start: Fit, apart: Collection[s
     found = _calibrated(without_channels(experiment, apart) if apart else experiment, error, start)
     if not apart:
         return found
-    near, others = Near.of(experiment, error, found.fit), found.chosen
+    near, others = Near.of(experiment.with_random_heat(found.random_heat), error, found.fit), found.chosen
     chosen = near.fitted(others.error_class, found.fit, others.deviation, iterations=0)
     return replace(found, chosen=chosen, near=near, of_others=found)
 
@@ -182,18 +231,21 @@ def _calibrated(experiment: Experiment, error: ModelError, start: Fit) -> Calibr
     middles = experiment.fit(np.zeros(len(experiment.unknowns)), iterations=0)
     first = [Near.of(experiment, error, one).fitted(widest, one) for one in (start, middles)]
     fit = max(first, key=lambda one: one.log_evidence).fit
+    near = Near.of(experiment, error, fit)
+    random_heat = near.likely_random_heat(widest, fit.z)
+    experiment = experiment.with_random_heat(random_heat)
     fit = Near.of(experiment, error, fit).fitted(widest, fit, iterations=ITERATIONS).fit
-    return _settled(experiment, error, fit)
+    return _settled(experiment, error, fit, random_heat)
 
 
 def recalibrate(calibration: Calibration, fit: Fit) -> Calibration:
     """Calibration about the courses of another fit of the same machine, in the class that is best there."""
     near = calibration.near
-    settled = _settled(near.experiment, near.error, fit)
+    settled = _settled(near.experiment, near.error, fit, calibration.random_heat)
     return replace(settled, of_others=calibration.of_others)
 
 
-def _settled(experiment: Experiment, error: ModelError, fit: Fit) -> Calibration:
+def _settled(experiment: Experiment, error: ModelError, fit: Fit, random_heat: RandomHeat) -> Calibration:
     """The class of model error by the evidence about a fit, and the machine with it."""
     classes = error_classes()
     near = Near.of(experiment, error, fit)
@@ -204,4 +256,5 @@ def _settled(experiment: Experiment, error: ModelError, fit: Fit) -> Calibration
         near = Near.of(experiment, error, chosen.fit)
         chosen = near.fitted(best, chosen.fit, chosen.deviation)
     largest = max(evidence.values())
-    return Calibration(chosen=chosen, evidence={name: value - largest for name, value in evidence.items()}, near=near)
+    return Calibration(chosen=chosen, evidence={name: value - largest for name, value in evidence.items()}, near=near,
+                       random_heat=random_heat)  # fmt: skip

@@ -14,7 +14,7 @@ from diagnosis.engine.point import Column, Machine, Point, Setting
 from diagnosis.engine.unknown import Scope, Unknown, in_scope
 from diagnosis.forward.grid import ErrorCourse, Piece
 from diagnosis.forward.trajectory import ROUNDS, Trajectory, simulate
-from diagnosis.forward.whitening import Noise, Whitening
+from diagnosis.forward.whitening import Noise, RandomHeat, Whitening
 from models.base.errors import InputError
 from models.base.types import Array
 
@@ -244,6 +244,10 @@ class Experiment:
     def with_filters(self, parts: Sequence[Linear]) -> Experiment:
         """Experiment that is judged by the noise filters of a linearisation."""
         return replace(self, filters=tuple(part.filter for part in parts))
+
+    def with_random_heat(self, times: RandomHeat) -> Experiment:
+        """Experiment with other random heats, without filters."""
+        return replace(self, noise=tuple(noise.with_random_heat(times) for noise in self.noise), filters=None)
 
     def _errors(self, at: Linearised, step: Array) -> Sequence[ErrorCourse | None] | None:
         """The most probable model error in every piece after a step of the unknowns, if the metric has any."""

@@ -24,7 +24,7 @@ class ErrorClass:
     threshold : float
         Evidence from which something is missing if the readings choose this class with and without it, [nat]
     over_time : float
-        How much less changes over time count in this class without a baseline, [nat]
+        How much less changes over time count in this class, [nat]
     amplitudes : mapping of group to float
         Prior standard deviations of the groups' unknowns; groups that are not named are absent
     """
@@ -55,6 +55,8 @@ class Rule:
         False-alarm rate that the thresholds of the classes are for, [-]
     temper : (float, float)
         a [nat] and b [-]
+    detection : float
+        Evidence without which nothing is missing at the usual rate, whatever the class, [nat]
     doubt : float
         Width about the threshold, [nat]
     pair : float
@@ -71,6 +73,7 @@ class Rule:
 
     rate: float
     temper: tuple[float, float]
+    detection: float
     doubt: float
     pair: float
     refuted: float
@@ -79,8 +82,8 @@ class Rule:
     nearest: float
     wider: float
 
-    def threshold(self, nothing: ErrorClass, best: ErrorClass, rate: float) -> float:
-        """Evidence from which something is missing, [nat].
+    def thresholds(self, nothing: ErrorClass, best: ErrorClass, rate: float) -> tuple[float, float]:
+        """Evidence from which something is missing; that from which a parameter is outside, or a further effect.
 
         Parameters
         ----------
@@ -88,8 +91,15 @@ class Rule:
             Class of model error without any effect, and with the best one: half-way between their thresholds
         rate : float
             False-alarm rate that a user asks for
+
+        Returns
+        -------
+        detection, class_threshold : float
+            [nat]
         """
-        return 0.5 * (nothing.threshold + best.threshold) + self.temper[0] * float(np.log(self.rate / rate))
+        of_class = 0.5 * (nothing.threshold + best.threshold)
+        stricter = self.temper[0] * float(np.log(self.rate / rate))
+        return max(of_class, self.detection) + stricter, of_class + stricter
 
 
 @cache

@@ -85,7 +85,7 @@ def calibrate_without_error(fit: Fit, plain: Fit, apart: Collection[str] = ()) -
     Parameters
     ----------
     fit : Fit
-        With model error in its metric
+        With model error in its metric, and with random heats that go with it
     plain : Fit
         The nominal machine so calibrated: a second start of the search, because there may be several basins
     apart : collection of str
@@ -96,7 +96,7 @@ def calibrate_without_error(fit: Fit, plain: Fit, apart: Collection[str] = ()) -
     ArithmeticError
         If there is no solution.
     """
-    every = replace(fit.experiment, filters=None, metric=None)
+    every = replace(fit.experiment, noise=plain.experiment.noise, filters=None, metric=None)
     counting = without_channels(every, apart) if apart else every
     usual = zip(every.unknowns, plain.experiment.unknowns, plain.z.tolist(), strict=False)
     nominal = fit.z.copy()

@@ -31,6 +31,15 @@ JUMP_SHARE = 0.3  # of a change within one interval: whether it came early or la
 
 
 @dataclass(frozen=True, kw_only=True)
+class RandomHeat:
+    """Factors on assumed random heats: those in the parts, the share of what surroundings take, correlation time."""
+
+    heat: float = 1.0
+    wander: float = 1.0
+    time: float = 1.0
+
+
+@dataclass(frozen=True, kw_only=True)
 class Noise:
     """Noise of a recording: everything that its model leaves out.
 
@@ -64,9 +73,15 @@ class Noise:
     wander: float = 0.0
     capacity: float = 0.0
 
-    def with_floor(self, times: float) -> Noise:
+    @property
+    def goes_with_capacity(self) -> bool:
+        """True of a machine without geometry: its watts are known but for a common factor."""
+        return self.capacity > 0.0
+
+    def with_random_heat(self, times: RandomHeat) -> Noise:
         """Noise with its random heats multiplied."""
-        return replace(self, heat_sd=self.heat_sd * times, wander=self.wander * times)
+        return replace(self, heat_sd=self.heat_sd * times.heat, wander=self.wander * times.wander,
+                       heat_time=self.heat_time * times.time)  # fmt: skip
 
 
 class Whitening:
@@ -74,7 +89,7 @@ class Whitening:
 
     def __init__(self, model: NetworkOnGrid, trajectory: Trajectory, sensors: Sensors, noise: Noise) -> None:
         n, piece = trajectory.decay.shape[-1], trajectory.piece
-        if noise.capacity > 0.0:
+        if noise.goes_with_capacity:
             share = float(trajectory.capacities.sum()) / noise.capacity
             noise = replace(noise, heat_sd=noise.heat_sd * share)
         shaken = np.flatnonzero(noise.heat_sd > 0.0)

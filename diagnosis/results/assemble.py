@@ -46,7 +46,6 @@ from models.mechanisms import Mechanism
 from models.network.laws import Parameter
 from models.terms.term import Term
 
-VISIBLE_NAT = 5.0  # expected evidence below which an effect cannot be seen
 ENOUGH_VISIBLE = 0.1  # of the effects that were asked for, for a "consistent" that means something
 MOST_RANKED = 500
 PROBABLY = 0.5
@@ -292,7 +291,7 @@ def _unseen(posterior: Posterior, catalogue: Mapping[str, Mechanism]) -> tuple[N
             best[name] = (one.log_bayes, one.effect.place)
     return tuple(
         NotDetectable(mechanism=name, place=place, needed=catalogue[name].experiment, expected=reached)
-        for name, (reached, place) in sorted(best.items()) if reached < VISIBLE_NAT
+        for name, (reached, place) in sorted(best.items()) if reached < posterior.rule.detection
     )  # fmt: skip
 
 

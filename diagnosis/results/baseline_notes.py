@@ -21,7 +21,7 @@ def baseline_notes(experiment: Experiment, posterior: Posterior, answers: Sequen
     acting = effects_in_baselines(nothing, effects) if effects else [0.0]
     best = (answers[0].best.fit if answers else None) or nothing
     placebo = posterior.placebo
-    raised = posterior.threshold > posterior.class_threshold
+    raised = placebo is not None and posterior.threshold == placebo.log_e
     return baselines_told(float(acting[0]), sessions_apart(best), effects[0].name if effects else "",
                           placebo if raised else None)  # fmt: skip
 

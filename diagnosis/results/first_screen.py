@@ -72,7 +72,7 @@ def _missing(d: Diagnosis) -> str:
     if d.verdict == "insufficient_data":
         return "These data cannot decide it."
     why = f"false-alarm rate {100.0 * d.false_alarm_rate:g} %"
-    if d.placebo is not None and d.threshold > d.further_threshold:
+    if d.placebo is not None and d.threshold == d.placebo.log_e_value:
         why = f"as much as the baseline '{d.placebo.session}' brings"
     reached = f"evidence {d.log_e_value:.1f} nat, {d.threshold:.1f} needed ({why})"
     if d.verdict == "parameter_error":

@@ -132,6 +132,13 @@ class ModelError:
             result[:, begin:end] = part.filter(self.responses(part.point, begin, end))
         return result
 
+    def combined_responses(self, point: Point, combinations: Array) -> Array:
+        """Change of what is recorded per unit of combinations of the unknowns, shape (K + 1, channels, n)."""
+        result = np.zeros((*point.read.shape, combinations.shape[1]))
+        for begin, end in self._chunks(point, 0, len(self.groups)):
+            result += self.responses(point, begin, end) @ combinations[begin:end]
+        return result
+
     def courses(self, point: Point, combinations: Array) -> ErrorCourses:
         """Courses of combinations of the unknowns, shape (unknowns, n), along a piece."""
         points, channels = point.read.shape

@@ -14,6 +14,7 @@ from diagnosis.engine.fit import calibrate as fitted
 from diagnosis.engine.prepare import prepare_experiment
 from diagnosis.engine.unknown import InputGain, InputOffset, NetworkParameter
 from diagnosis.forward.recurrence import lagged
+from diagnosis.forward.whitening import RandomHeat
 from diagnosis.proof.injection.control import Control, find_control
 from diagnosis.proof.injection.real_recording import RealRecording
 from diagnosis.setup.inference_setup import InferenceSetup
@@ -226,7 +227,7 @@ def _fitted(
     kept = tuple(c for c in real.recording.channels if c.name not in left_out)
     recording = replace(real.recording, channels=kept)
     setup, experiment = prepare_experiment(gearbox, [recording], [recording])
-    found = fitted(replace(experiment, noise=tuple(noise.with_floor(floor) for noise in experiment.noise)))
+    found = fitted(experiment.with_random_heat(RandomHeat(heat=floor, wander=floor)))
     residual = np.concatenate([part.point.residual for part in found.parts])
     size = np.sqrt(np.nanmean(residual**2, axis=0))
     return setup, found, {n: float(s) for n, s in zip(setup.channels, size, strict=True) if not is_total_loss(n)}

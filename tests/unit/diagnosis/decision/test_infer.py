@@ -28,7 +28,7 @@ from diagnosis.engine.calibration import Calibration, calibrate_with_error, reca
 from diagnosis.engine.candidates import scan
 from diagnosis.engine.families import axis_of, changes, log_prior, parameters_outside
 from diagnosis.engine.fit import Fit, calibrate
-from diagnosis.engine.learnt import ErrorClass, error_classes
+from diagnosis.engine.learnt import ErrorClass, error_classes, rule
 from diagnosis.engine.prepare import prepare_experiment
 from diagnosis.engine.unknown import TermParameter
 from diagnosis.results.findings import values_of
@@ -82,7 +82,7 @@ def test_a_concealed_effect_is_detected_and_first(concealed: Posterior) -> None:
 
 def test_a_baseline_that_brings_evidence_raises_what_is_asked_for(fzg: Gearbox, concealed: Posterior) -> None:
     """Windage acts in the baseline alone: nothing is missing in the recordings, whatever has to be explained."""
-    assert concealed.placebo is not None and concealed.placebo.log_e < 5.0 == concealed.threshold
+    assert concealed.placebo is not None and concealed.placebo.log_e < 10.0 == concealed.threshold
     found = inferred(fzg, 0.0, in_baseline_W=WINDAGE_W)
     assert found.placebo is not None
     assert (found.placebo.session, found.placebo.best.label) == ("april", "windage@oil")
@@ -93,7 +93,7 @@ def test_a_baseline_that_brings_evidence_raises_what_is_asked_for(fzg: Gearbox, 
 
 def test_a_baseline_shows_nothing_of_what_has_no_place_in_the_machine(fzg: Gearbox) -> None:
     found = inferred(fzg, 0.0, switched_off=["bearing_fed_by_return"])
-    assert found.placebo is None and found.threshold == 5.0
+    assert found.placebo is None and found.threshold == rule().detection
 
 
 def test_a_parameter_outside_its_prior_is_no_sign_that_something_is_missing() -> None:
