@@ -164,8 +164,6 @@ class Calibration:
         Log evidence of every class, prior included, less that of the best
     near : Near
         Where it is linearised
-    random_heat : RandomHeat
-        Factors on the assumed one that are most probable
     of_others : Calibration or None
         By the readings without the channels set apart alone, if there are any
     """
@@ -173,7 +171,6 @@ class Calibration:
     chosen: InClass
     evidence: Mapping[str, float]
     near: Near
-    random_heat: RandomHeat
     of_others: Calibration | None = None
     _known: dict[str, InClass] = field(default_factory=dict, init=False)
 
@@ -219,7 +216,8 @@ def calibrate_with_error(experiment: Experiment, start: Fit, apart: Collection[s
     found = _calibrated(without_channels(experiment, apart) if apart else experiment, error, start)
     if not apart:
         return found
-    near, others = Near.of(experiment.with_random_heat(found.random_heat), error, found.fit), found.chosen
+    whole, others = experiment.with_random_heat(found.near.experiment.random_heat), found.chosen
+    near = Near.of(whole, error, found.fit)
     chosen = near.fitted(others.error_class, found.fit, others.deviation, iterations=0)
     return replace(found, chosen=chosen, near=near, of_others=found)
 
@@ -232,20 +230,18 @@ def _calibrated(experiment: Experiment, error: ModelError, start: Fit) -> Calibr
     first = [Near.of(experiment, error, one).fitted(widest, one) for one in (start, middles)]
     fit = max(first, key=lambda one: one.log_evidence).fit
     near = Near.of(experiment, error, fit)
-    random_heat = near.likely_random_heat(widest, fit.z)
-    experiment = experiment.with_random_heat(random_heat)
+    experiment = experiment.with_random_heat(near.likely_random_heat(widest, fit.z))
     fit = Near.of(experiment, error, fit).fitted(widest, fit, iterations=ITERATIONS).fit
-    return _settled(experiment, error, fit, random_heat)
+    return _settled(experiment, error, fit)
 
 
 def recalibrate(calibration: Calibration, fit: Fit) -> Calibration:
     """Calibration about the courses of another fit of the same machine, in the class that is best there."""
     near = calibration.near
-    settled = _settled(near.experiment, near.error, fit, calibration.random_heat)
-    return replace(settled, of_others=calibration.of_others)
+    return replace(_settled(near.experiment, near.error, fit), of_others=calibration.of_others)
 
 
-def _settled(experiment: Experiment, error: ModelError, fit: Fit, random_heat: RandomHeat) -> Calibration:
+def _settled(experiment: Experiment, error: ModelError, fit: Fit) -> Calibration:
     """The class of model error by the evidence about a fit, and the machine with it."""
     classes = error_classes()
     near = Near.of(experiment, error, fit)
@@ -256,5 +252,4 @@ def _settled(experiment: Experiment, error: ModelError, fit: Fit, random_heat: R
         near = Near.of(experiment, error, chosen.fit)
         chosen = near.fitted(best, chosen.fit, chosen.deviation)
     largest = max(evidence.values())
-    return Calibration(chosen=chosen, evidence={name: value - largest for name, value in evidence.items()}, near=near,
-                       random_heat=random_heat)  # fmt: skip
+    return Calibration(chosen=chosen, evidence={name: value - largest for name, value in evidence.items()}, near=near)

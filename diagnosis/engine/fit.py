@@ -14,7 +14,7 @@ from diagnosis.engine.point import Column, Machine, Point, Setting
 from diagnosis.engine.unknown import Scope, Unknown, in_scope
 from diagnosis.forward.grid import ErrorCourse, Piece
 from diagnosis.forward.trajectory import ROUNDS, Trajectory, simulate
-from diagnosis.forward.whitening import Noise, RandomHeat, Whitening
+from diagnosis.forward.whitening import AS_ASSUMED, Noise, RandomHeat, Whitening
 from models.base.errors import InputError
 from models.base.types import Array
 
@@ -51,6 +51,8 @@ class Experiment:
         Names of the only effects that cannot act in them; empty: none can
     metric : Metric or None
         In which residuals are judged, if there is more than noise; of whitened readings under `filters`
+    random_heat : RandomHeat
+        Factors on those assumed, which `noise` has
     """
 
     machine: Machine
@@ -64,6 +66,7 @@ class Experiment:
     healthy: frozenset[str] = frozenset()
     switched_off: frozenset[str] = frozenset()
     metric: Metric | None = None
+    random_heat: RandomHeat = AS_ASSUMED
 
     @property
     def slow(self) -> bool:
@@ -246,8 +249,9 @@ class Experiment:
         return replace(self, filters=tuple(part.filter for part in parts))
 
     def with_random_heat(self, times: RandomHeat) -> Experiment:
-        """Experiment with other random heats, without filters."""
-        return replace(self, noise=tuple(noise.with_random_heat(times) for noise in self.noise), filters=None)
+        """Experiment with other random heats than assumed, without filters."""
+        noise = tuple(one.with_random_heat(times) for one in self.noise)
+        return replace(self, noise=noise, random_heat=times, filters=None)
 
     def _errors(self, at: Linearised, step: Array) -> Sequence[ErrorCourse | None] | None:
         """The most probable model error in every piece after a step of the unknowns, if the metric has any."""

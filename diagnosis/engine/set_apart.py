@@ -9,6 +9,7 @@ import numpy as np
 
 from diagnosis.engine.fit import FIRST_ITERATIONS, Experiment, Fit, calibrate
 from diagnosis.engine.unknown import SensorBias, SensorLag, TermParameter, Unknown
+from diagnosis.forward.whitening import AS_ASSUMED
 from models.base.types import Array
 from models.quantities.quantities import is_total_loss
 from models.terms.term import Term
@@ -96,7 +97,7 @@ def calibrate_without_error(fit: Fit, plain: Fit, apart: Collection[str] = ()) -
     ArithmeticError
         If there is no solution.
     """
-    every = replace(fit.experiment, noise=plain.experiment.noise, filters=None, metric=None)
+    every = replace(fit.experiment, noise=plain.experiment.noise, random_heat=AS_ASSUMED, filters=None, metric=None)
     counting = without_channels(every, apart) if apart else every
     usual = zip(every.unknowns, plain.experiment.unknowns, plain.z.tolist(), strict=False)
     nominal = fit.z.copy()

@@ -39,6 +39,9 @@ class RandomHeat:
     time: float = 1.0
 
 
+AS_ASSUMED = RandomHeat()
+
+
 @dataclass(frozen=True, kw_only=True)
 class Noise:
     """Noise of a recording: everything that its model leaves out.

@@ -16,6 +16,7 @@ from diagnosis.engine.fit import Experiment, Fit
 from diagnosis.engine.predict import overall_rmse, rmse
 from diagnosis.engine.prepare import held_out_experiment
 from diagnosis.engine.set_apart import calibrate_without_error
+from diagnosis.forward.whitening import RandomHeat
 from diagnosis.recordings.recording import Recording
 from diagnosis.results.advice import next_test, without_sensor
 from diagnosis.results.baseline_notes import baseline_notes
@@ -39,7 +40,7 @@ from diagnosis.results.result_parts import (
     named,
 )
 from diagnosis.setup.inference_setup import InferenceSetup
-from diagnosis.setup.noise import HEAT_FRACTION, PARAMETRIC_FRACTION, PARAMETRIC_K
+from diagnosis.setup.noise import HEAT_FRACTION, HEAT_TIME_S, PARAMETRIC_FRACTION, PARAMETRIC_K, WANDER
 from models.base.types import Array
 from models.base.version import project_version
 from models.mechanisms import Mechanism
@@ -150,7 +151,7 @@ def assemble(
         joint=joint_estimate_of(final),
         starts_at=experiment.starts_at,
         noise_K=setup.noise_K,
-        floor=_floor(setup),
+        floor=_floor(setup, near.experiment.random_heat),
         misfit=_misfit(final),
         remaining_p_value=_bound_on_chance(posterior.left_by(best)),
         remaining_note=_remaining(posterior, others, best),
@@ -320,13 +321,15 @@ def _misfit(fit: Fit) -> float:
     return float(fit.linearised.products[0, 0]) / max(rows, 1)
 
 
-def _floor(setup: InferenceSetup) -> str:
+def _floor(setup: InferenceSetup, factors: RandomHeat) -> str:
     share = HEAT_FRACTION
     text = f"of the typical loss ({setup.loss_W:.0f} W) in every part"
     if setup.gearbox.is_parametric:  # watts are known but for a common factor
         share = PARAMETRIC_FRACTION
-        text += f"; of a part of little heat capacity {PARAMETRIC_K:.1f} K"
-    return f"random heat of {100.0 * share:.1f} % {text}"
+        text += f"; of a part of little heat capacity {factors.heat * PARAMETRIC_K:.2g} K"
+    draughts, minutes = 100.0 * factors.wander * WANDER, factors.time * HEAT_TIME_S / 60.0
+    return (f"random heat of {100.0 * factors.heat * share:.2g} % {text}; "
+            f"of {draughts:.2g} % of the heat to the surroundings; over {minutes:.0f} min")  # fmt: skip
 
 
 # ---------------------------------------------------------------------- fits and courses
