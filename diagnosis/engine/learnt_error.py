@@ -27,10 +27,12 @@ from models.quantities.quantities import node_of_channel
 from models.simulation.thermal_network import ThermalNetwork
 from models.terms.term import Kind, Term
 
-WRITABLE = frozenset({"a_loss", "a_link", "b_split", "c_sensor", "c_lag"})
+WRITABLE = frozenset({"a_loss", "a_link", "b_split", "c_sensor", "c_lag", "e_link"})
+LEFT_OUT = frozenset({"d_sub"})  # a core shows in minutes; what is learnt beside it is written all the same
 LEAST, LEAST_SHARE = 1e-3, 0.05  # relative change, and share of the largest in its law, that is written
 DIGITS = 4  # of what is written
 PREFIX = "learnt_"
+SIZES: Mapping[Kind, str] = {"source": "shares moved", "link": "of the machine's conductance"}
 FACTORS: Mapping[Kind, str] = {"loss_factor": "factors of heats", "link_factor": "factors of paths"}
 Found = Sequence[tuple[groups.Change, Array, Array]]  # changes, values of their unknowns, and the same among all
 Spread = Callable[[Array], float]  # standard deviation of a combination of the unknowns of model error
@@ -60,8 +62,8 @@ class LearntError:
 
 
 def is_writable(one: ErrorClass) -> bool:
-    """True if a model can hold all model error of a class, and there is any."""
-    return bool(one.amplitudes) and set(one.amplitudes) <= WRITABLE
+    """True if a model can hold the model error of a class, and there is any; cores of parts are left out."""
+    return bool(one.amplitudes) and set(one.amplitudes) <= WRITABLE | LEFT_OUT
 
 
 def with_learnt_error(fit: Fit, near: Near, error_class: ErrorClass) -> tuple[Fit, tuple[Term, ...]]:
@@ -117,7 +119,8 @@ def learnt_error(error: ModelError, values: Array, spread: Spread, network: Ther
         own = np.where(size >= max(LEAST, LEAST_SHARE * size.max()), values[begin:end], 0.0)
         if own.any():
             found.append((one, own, np.concatenate([np.zeros(begin), own, np.zeros(len(values) - end)])))
-    terms = (*_laws(found, error.standard, spread), *_factors(found, spread), *_moved(found, network, spread))
+    terms = (*_laws(found, error.standard, spread), *_factors(found, spread), *_moved(found, network, spread),
+             *_paths(found, error.standard, spread))  # fmt: skip
     return LearntError(terms=terms, mixes=_mixes(found, network.node_names, spread))
 
 
@@ -160,6 +163,15 @@ def _moved(found: Found, network: ThermalNetwork, spread: Spread) -> Iterator[Te
         yield _term(f"heat into {node}", "source", (node,), every, law, spread)
 
 
+def _paths(found: Found, standard: Standard, spread: Spread) -> Iterator[Term]:
+    """Heat paths between nodes that have none."""
+    for one, own, every in found:
+        match one:
+            case groups.HeatChange(heat=heats.PairHeat(pair=pair)):
+                law = sp.Float(float(np.sign(own[0])) * standard.conductance)
+                yield _term(f"path {'-'.join(pair)}", "link", pair, every, law, spread)
+
+
 def _mixes(found: Found, nodes: Collection[str], spread: Spread) -> dict[str, tuple[Mix, ...]]:
     """Other nodes, and temperatures of before, that thermometers feel."""
     mixes: dict[str, tuple[Mix, ...]] = {}
@@ -197,7 +209,7 @@ def _term(
     size = float(np.linalg.norm(values))
     strength = Parameter(
         name=f"{label}_size", start=size, lower=0.0, upper=max(1.0, size), sd=spread(values / size), log=False,
-        description=f"{place}, {'shares moved' if kind == 'source' else 'relative change'}",
+        description=f"{place}, {SIZES.get(kind, 'relative change')}",
     )  # fmt: skip
     law = law.xreplace({number: sp.Float(_rounded(float(number))) for number in law.atoms(sp.Float)})
     return Term(label=label, kind=kind, target=target, expression=symbol(strength.name) * law, parameters=(strength,))
