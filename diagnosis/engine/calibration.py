@@ -92,7 +92,8 @@ class Near:
 
         They are halved, and made to last twice as long where no more than the form of the laws is known, by the step
         that brings most evidence as long as one does. They are never more than assumed, and with geometry they do not
-        last longer: an effect of hours would pass for random.
+        last longer: an effect of hours would pass for random. The evidence of a noise is that of its innovations
+        (Harvey 1989, section 3.4; see :mod:`diagnosis.forward.whitening`).
 
         Parameters
         ----------
@@ -120,10 +121,11 @@ class Near:
         longest = LONGEST if noise[0].goes_with_capacity else 1.0
         best = RandomHeat()
         while True:
-            near = [replace(best, **{name: times * getattr(best, name)})
-                    for name in ("heat", "wander", "time") for times in (0.5, 2.0)]  # fmt: skip
-            near += [replace(best, heat=times * best.heat, time=best.time / times) for times in (0.5, 2.0)]
-            able = [one for one in near if max(one.heat, one.wander) <= 1.0 <= one.time <= longest]
+            tried = [replace(best, **{name: times * getattr(best, name)})
+                     for name in ("heat", "wander", "time") for times in (0.5, 2.0)]  # fmt: skip
+            # Less heat that lasts longer does nearly the same: both change at once, or neither would alone.
+            tried += [replace(best, heat=times * best.heat, time=best.time / times) for times in (0.5, 2.0)]
+            able = [one for one in tried if max(one.heat, one.wander) <= 1.0 <= one.time <= longest]
             other = max(able, key=log_evidence)
             if log_evidence(other) < log_evidence(best) + WORTH:
                 return best

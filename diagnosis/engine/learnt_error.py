@@ -109,7 +109,7 @@ def learnt_error(error: ModelError, values: Array, spread: Spread, network: Ther
     Parameters
     ----------
     values : Array, shape (unknowns,)
-        Per unit; 0 in other groups than :data:`WRITABLE`
+        Per unit; those of other groups than :data:`WRITABLE` are left out
     network : ThermalNetwork
         That they are added to
     """

@@ -41,7 +41,7 @@ WORDS: Mapping[str, str] = {
     "claim": "A name that is certain enough: its probability reached the limit that was asked for.",
     "likely": "Less than a claim: one of at most three names that these data cannot separate, or a law and a place "
     "whose cause was not found (acts like ...). It improves the prediction all the same.",
-    "cannot be seen": "Of an effect at the size that matters these recordings would give evidence of less than 5 nat: "
+    "cannot be seen": "Of an effect at the size that matters these recordings would give evidence of less than 10 nat: "
     "whether it is there or not, they look the same.",
     "model error": "What formulas, load sharings and lumped nodes cannot know: further small unknowns with priors, in "
     "classes between which the data choose. What they can explain is not called missing physics.",

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from diagnosis.engine.calibration import WIDEST_CLASS, Calibration, Near, calibrate_with_error
+from diagnosis.engine.calibration import WIDEST_CLASS, Calibration, Near, calibrate_with_error, recalibrate
 from diagnosis.engine.fit import Experiment, calibrate
 from diagnosis.engine.learnt import error_classes
 from diagnosis.engine.model_error import ModelError
@@ -23,18 +23,25 @@ WIDEST = next(one for one in error_classes() if one.name == WIDEST_CLASS)
 @pytest.fixture(scope="module")
 def found(fzg: Gearbox) -> Calibration:
     """A machine whose losses have another law than the model's."""
-    train = recorded(fzg, "train", windage_W=150.0, hours=3.0, factors={"h_air": 1.6, "mesh": 0.8})
+    train = recorded(fzg, "train", windage_W=150.0, hours=3.0, factors={"h_air": 2.2, "mesh": 0.8})
     _, experiment = prepare_experiment(fzg, [train], [train])
     return calibrate_with_error(experiment, calibrate(experiment))
 
 
 def test_model_error_brings_the_simulation_to_the_readings(found: Calibration) -> None:
-    """Alone, a linear model error leaves the simulation about a kelvin beside them."""
+    """Alone, a linear model error leaves the simulation kelvins beside them."""
     there = found.near.fitted(WIDEST, found.fit)
     for part in there.fit.parts:
         assert part.point.trajectory.piece.error is not None
         with_error, without = (np.nanstd(r[5:]) for r in (part.point.residual, part.point.residual_without_error))
-        assert without > 0.8 and with_error < 0.2 * without
+        assert without > 1.0 and with_error < 0.2 * without
+
+
+def test_it_is_judged_by_the_random_heat_that_its_readings_show(found: Calibration) -> None:
+    """There is none in them."""
+    chosen = found.fit.experiment
+    assert chosen.random_heat.heat <= 0.25 and chosen.random_heat == found.near.experiment.random_heat
+    assert recalibrate(found, found.fit).fit.experiment.random_heat == chosen.random_heat
 
 
 def test_it_has_settled(found: Calibration) -> None:

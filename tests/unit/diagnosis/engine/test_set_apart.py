@@ -12,6 +12,7 @@ from diagnosis.engine.fit import Experiment, Fit, calibrate
 from diagnosis.engine.prepare import prepare_experiment
 from diagnosis.engine.set_apart import calibrate_apart, calibrate_without_error, without_channels
 from diagnosis.engine.unknown import SensorBias
+from diagnosis.forward.whitening import AS_ASSUMED, RandomHeat
 from diagnosis.recordings.read import read_recordings
 from models.assembly.gearbox import load_gearbox
 
@@ -44,13 +45,15 @@ def test_sound_sensors_are_not_set_apart() -> None:
     assert fit is plain
 
 
-def test_a_fit_without_error_keeps_the_values_of_faulty_sensors() -> None:
+def test_a_fit_without_error_keeps_the_values_of_faulty_sensors_and_has_the_assumed_random_heat() -> None:
     experiment, plain = rod()
     fit, apart = calibrate_apart(experiment, plain)
     at = next(i for i, u in enumerate(experiment.unknowns) if isinstance(u, SensorBias) and u.channel == BROKEN)
     z = fit.z.copy()
     z[at] = 9.0
-    given = experiment.with_filters(plain.parts).fit(z, iterations=0)
+    less = experiment.with_random_heat(RandomHeat(heat=0.25, wander=0.25))
+    given = less.with_filters(plain.parts).fit(z, iterations=0)
     found = calibrate_without_error(given, fit, apart)
     assert found.z[at] == 9.0
+    assert found.experiment.noise == experiment.noise and found.experiment.random_heat == AS_ASSUMED
     assert np.delete(found.z, at) == pytest.approx(np.delete(fit.z, at), abs=0.3)
