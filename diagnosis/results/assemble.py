@@ -271,7 +271,8 @@ def _verdict(posterior: Posterior, answers: Sequence[Answer], unseen: Sequence[N
     terms = [answer.effect.term for answer in answers if answer.effect.term is not None]
     if not terms or any(answer.best.kind == "outside" or answer.effect.is_open for answer in answers):
         return "unexplained"
-    if all(term.of_measurement or term.kind == "sensor" for term in terms):
+    tied = [effect.term for answer in answers for effect, _ in answer.tied if effect.term is not None]
+    if all(term.of_measurement or term.kind == "sensor" for term in (*terms, *tied)):
         return "sensor_fault"
     return "missing_physics"
 

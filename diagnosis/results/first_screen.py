@@ -36,6 +36,7 @@ LIKELY_TEXT: Mapping[str, str] = {  # of the same verdicts where no name is a cl
     "missing_physics": "The machine probably shows physics that the model leaves out; its name is not certain.",
     "sensor_fault": "A sensor, clock or recorded input is probably at fault, not the machine.",
 }
+EITHER = "Either the measurement is at fault, which is more probable, or the model leaves out physics of the machine."
 LARGEST_ERROR = "full"  # class of model error
 FAR_SD, MOST_FAR = 3.0, 3  # standard deviations of a prior, beyond which the summary tells of a parameter; how many
 MOST_UNSEEN = 6  # effects that the summary names of those that cannot be seen
@@ -51,6 +52,8 @@ def verdict_text_of(d: Diagnosis) -> str:
         return PARTLY
     if any(finding.grade == "claim" for finding in d.findings):
         return VERDICT_TEXT[d.verdict]
+    if _may_be_either(d):
+        return EITHER
     return LIKELY_TEXT.get(d.verdict, VERDICT_TEXT[d.verdict])
 
 
@@ -86,10 +89,22 @@ def _in_what(d: Diagnosis) -> str:
     """The model or the measurement; with a word of caution where the other one has some probability too."""
     if d.verdict == "unexplained":
         return ""
-    measurement = sum(one.probability for one in d.ranking if one.family == MEASUREMENT)
     fault = d.verdict == "sensor_fault"
+    if _may_be_either(d):
+        return ", in the model or, more probably, in the measurement"
+    measurement = _of_measurement(d)
     sure = (measurement if fault else 1.0 - measurement) >= d.claim_from
     return f", {'' if sure else 'probably '}in the {'measurement' if fault else 'model'}"
+
+
+def _may_be_either(d: Diagnosis) -> bool:
+    """True if only a tie is reported, and a fault of measurement is the more probable name in it."""
+    tied = all(finding.tie_set for finding in d.findings)
+    return d.verdict == "missing_physics" and tied and _of_measurement(d) > 0.5
+
+
+def _of_measurement(d: Diagnosis) -> float:
+    return sum(one.probability for one in d.ranking if one.family == MEASUREMENT)
 
 
 def _where(d: Diagnosis) -> tuple[str, ...]:

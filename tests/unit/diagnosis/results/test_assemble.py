@@ -394,6 +394,17 @@ def test_a_sensor_fault(assembled: Assemble, prepared: Prepared, fzg: Gearbox) -
     assert read_answer(found.to_dict(), fzg).claims[0].what == "sensor"
 
 
+def test_a_fault_tied_with_physics_is_no_verdict_on_the_sensor(
+    assembled: Assemble, prepared: Prepared, windage: Judged
+) -> None:
+    setup, _, plain = prepared
+    fault = effect_of(setup, plain, "sensor_bias", "oil")
+    answer = Answer(best=windage, effect=fault, grade="likely", probability=0.75, joint=0.97)
+    tied = replace(answer, tied=((fault, 0.75), (windage.effects[0], 0.22)))
+    assert assembled(posterior_of(plain, windage), [tied]).verdict == "missing_physics"
+    assert assembled(posterior_of(plain, windage), [replace(tied, tied=((fault, 0.75),))]).verdict == "sensor_fault"
+
+
 def test_switch_temperatures_are_on_and_off(prepared: Prepared) -> None:
     from diagnosis.results.findings import switching_of
 
