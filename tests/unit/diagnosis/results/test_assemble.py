@@ -375,7 +375,7 @@ def test_a_parameter(assembled: Assemble, prepared: Prepared) -> None:
     assert claim.sign == -1 and "air" in claim.nodes
 
 
-def test_a_sensor_fault(assembled: Assemble, prepared: Prepared, fzg: Gearbox) -> None:
+def test_a_sensor_fault(assembled: Assemble, prepared: Prepared, windage: Judged, fzg: Gearbox) -> None:
     setup, _, plain = prepared
     effect = effect_of(setup, plain, "sensor_bias", "oil")
     assert effect.term is not None
@@ -392,17 +392,9 @@ def test_a_sensor_fault(assembled: Assemble, prepared: Prepared, fzg: Gearbox) -
     assert abs(term.parameters[0].start) < 1.0
     assert "in the measurement" in str(found)
     assert read_answer(found.to_dict(), fzg).claims[0].what == "sensor"
-
-
-def test_a_fault_tied_with_physics_is_no_verdict_on_the_sensor(
-    assembled: Assemble, prepared: Prepared, windage: Judged
-) -> None:
-    setup, _, plain = prepared
-    fault = effect_of(setup, plain, "sensor_bias", "oil")
-    answer = Answer(best=windage, effect=fault, grade="likely", probability=0.75, joint=0.97)
-    tied = replace(answer, tied=((fault, 0.75), (windage.effects[0], 0.22)))
-    assert assembled(posterior_of(plain, windage), [tied]).verdict == "missing_physics"
-    assert assembled(posterior_of(plain, windage), [replace(tied, tied=((fault, 0.75),))]).verdict == "sensor_fault"
+    tied = Answer(best=judged, effect=effect, grade="likely", probability=0.75, joint=0.97,
+                  tied=((effect, 0.75), (windage.effects[0], 0.22)))  # fmt: skip
+    assert assembled(posterior_of(plain, judged), [tied]).verdict == "missing_physics"  # no verdict on the sensor
 
 
 def test_switch_temperatures_are_on_and_off(prepared: Prepared) -> None:
