@@ -119,7 +119,7 @@ def diagnose(
             rest = infer(calibration.of_others, candidates, weights, settings, progress=progress)
         progress("predicting the recordings free-running")
         return assemble(
-            setup, experiment, posterior, decide(posterior, settings), plain=plain, near=calibration.near,
+            setup, experiment, posterior, decide(posterior, settings), plain=plain, calibration=calibration,
             settings=settings,
             others=Others(fit=others, posterior=rest, channels=faulty) if rest is not None else None,
             catalogue=catalogue, train=train, held_out=held, healthy=healthy, switched_off=off, jobs=jobs,

@@ -13,9 +13,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 import sympy as sp
 
-from diagnosis.engine.calibration import Near
+from diagnosis.engine.calibration import WIDEST_CLASS, Calibration, Near
 from diagnosis.engine.fit import Fit
-from diagnosis.engine.learnt import ErrorClass
+from diagnosis.engine.learnt import ErrorClass, error_classes
 from diagnosis.engine.model_error import ModelError, groups, heats
 from diagnosis.engine.model_error.courses import Constant, Smooth, Standard
 from diagnosis.engine.point import Machine
@@ -27,12 +27,10 @@ from models.quantities.quantities import node_of_channel
 from models.simulation.thermal_network import ThermalNetwork
 from models.terms.term import Kind, Term
 
-WRITABLE = frozenset({"a_loss", "a_link", "b_split", "c_sensor", "c_lag", "e_link"})
-LEFT_OUT = frozenset({"d_sub"})  # a core shows in minutes; what is learnt beside it is written all the same
+WRITABLE = frozenset({"a_loss", "a_link", "b_split", "c_sensor", "c_lag"})
 LEAST, LEAST_SHARE = 1e-3, 0.05  # relative change, and share of the largest in its law, that is written
 DIGITS = 4  # of what is written
 PREFIX = "learnt_"
-SIZES: Mapping[Kind, str] = {"source": "shares moved", "link": "of the machine's conductance"}
 FACTORS: Mapping[Kind, str] = {"loss_factor": "factors of heats", "link_factor": "factors of paths"}
 Found = Sequence[tuple[groups.Change, Array, Array]]  # changes, values of their unknowns, and the same among all
 Spread = Callable[[Array], float]  # standard deviation of a combination of the unknowns of model error
@@ -62,8 +60,28 @@ class LearntError:
 
 
 def is_writable(one: ErrorClass) -> bool:
-    """True if a model can hold the model error of a class, and there is any; cores of parts are left out."""
-    return bool(one.amplitudes) and set(one.amplitudes) <= WRITABLE | LEFT_OUT
+    """True if a model can hold all model error of a class, and there is any."""
+    return bool(one.amplitudes) and set(one.amplitudes) <= WRITABLE
+
+
+def in_writable_class(fit: Fit, error_class: ErrorClass, calibration: Calibration) -> tuple[Fit, ErrorClass] | None:
+    """A fit with model error that a model can hold: of its own class, else of the best that is; None if all is too far.
+
+    With the widest class the machine has another structure than the model: without all of it, laws and splits would
+    stand in for the rest.
+
+    Raises
+    ------
+    ArithmeticError
+        If the fit in the other class has no solution.
+    """
+    if is_writable(error_class):
+        return fit, error_class
+    if error_class.name == WIDEST_CLASS or not error_class.amplitudes:
+        return None
+    best = max(filter(is_writable, error_classes()), key=lambda one: calibration.evidence[one.name])
+    there = replace(fit.experiment, metric=calibration.in_class(best).fit.experiment.metric)
+    return there.fit(fit.z, fit.trajectories), best
 
 
 def with_learnt_error(fit: Fit, near: Near, error_class: ErrorClass) -> tuple[Fit, tuple[Term, ...]]:
@@ -119,8 +137,7 @@ def learnt_error(error: ModelError, values: Array, spread: Spread, network: Ther
         own = np.where(size >= max(LEAST, LEAST_SHARE * size.max()), values[begin:end], 0.0)
         if own.any():
             found.append((one, own, np.concatenate([np.zeros(begin), own, np.zeros(len(values) - end)])))
-    terms = (*_laws(found, error.standard, spread), *_factors(found, spread), *_moved(found, network, spread),
-             *_paths(found, error.standard, spread))  # fmt: skip
+    terms = (*_laws(found, error.standard, spread), *_factors(found, spread), *_moved(found, network, spread))
     return LearntError(terms=terms, mixes=_mixes(found, network.node_names, spread))
 
 
@@ -163,15 +180,6 @@ def _moved(found: Found, network: ThermalNetwork, spread: Spread) -> Iterator[Te
         yield _term(f"heat into {node}", "source", (node,), every, law, spread)
 
 
-def _paths(found: Found, standard: Standard, spread: Spread) -> Iterator[Term]:
-    """Heat paths between nodes that have none."""
-    for one, own, every in found:
-        match one:
-            case groups.HeatChange(heat=heats.PairHeat(pair=pair)):
-                law = sp.Float(float(np.sign(own[0])) * standard.conductance)
-                yield _term(f"path {'-'.join(pair)}", "link", pair, every, law, spread)
-
-
 def _mixes(found: Found, nodes: Collection[str], spread: Spread) -> dict[str, tuple[Mix, ...]]:
     """Other nodes, and temperatures of before, that thermometers feel."""
     mixes: dict[str, tuple[Mix, ...]] = {}
@@ -209,7 +217,7 @@ def _term(
     size = float(np.linalg.norm(values))
     strength = Parameter(
         name=f"{label}_size", start=size, lower=0.0, upper=max(1.0, size), sd=spread(values / size), log=False,
-        description=f"{place}, {SIZES.get(kind, 'relative change')}",
+        description=f"{place}, {'shares moved' if kind == 'source' else 'relative change'}",
     )  # fmt: skip
     law = law.xreplace({number: sp.Float(_rounded(float(number))) for number in law.atoms(sp.Float)})
     return Term(label=label, kind=kind, target=target, expression=symbol(strength.name) * law, parameters=(strength,))

@@ -11,7 +11,7 @@ from diagnosis.candidates.hypotheses import Hypothesis
 from diagnosis.decision.answer import Answer, act_on_the_same, withdraw_claim
 from diagnosis.decision.posterior import KINDS, Judged, Placebo, Posterior
 from diagnosis.decision.settings import Settings
-from diagnosis.engine.calibration import Near
+from diagnosis.engine.calibration import Calibration
 from diagnosis.engine.fit import Experiment, Fit
 from diagnosis.engine.predict import overall_rmse, rmse
 from diagnosis.engine.prepare import held_out_experiment
@@ -76,7 +76,7 @@ def assemble(
     answers: Sequence[Answer],
     *,
     plain: Fit,
-    near: Near,
+    calibration: Calibration,
     others: Others | None = None,
     settings: Settings,
     catalogue: Mapping[str, Mechanism],
@@ -96,8 +96,8 @@ def assemble(
         Most important first
     plain : Fit
         The nominal machine calibrated without model error
-    near : Near
-        Where model error was linearised
+    calibration : Calibration
+        With model error
     others : Others or None
         What all but faulty channels say, if there are any
     train, held_out, healthy : sequence of Recording
@@ -112,7 +112,8 @@ def assemble(
     predicted = predict_recordings(
         experiment, held_out_experiment(setup, experiment), plain=plain,
         found=_final(best, plain if others is None else others.fit, faulty),
-        explanation=None if faulty else best or posterior.nothing, near=near, counting=counting, jobs=jobs,
+        explanation=None if faulty else best or posterior.nothing, calibration=calibration, counting=counting,
+        jobs=jobs,
     )  # fmt: skip
     final, holdout = predicted.final, _fits(setup, predicted.holdout, counting)
     contradicted = bool(answers) and not faulty and holdout.contradict(predicted.holdout_gain, setup.noise_K)
@@ -151,7 +152,7 @@ def assemble(
         joint=joint_estimate_of(final),
         starts_at=experiment.starts_at,
         noise_K=setup.noise_K,
-        floor=_floor(setup, near.experiment.random_heat),
+        floor=_floor(setup, calibration.near.experiment.random_heat),
         misfit=_misfit(final),
         remaining_p_value=_bound_on_chance(posterior.left_by(best)),
         remaining_note=_remaining(posterior, others, best),

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from diagnosis.decision.posterior import Judged
-from diagnosis.engine.calibration import Near
+from diagnosis.engine.calibration import Calibration
 from diagnosis.engine.fit import Experiment, Fit
-from diagnosis.engine.learnt_error import is_writable, with_learnt_error
+from diagnosis.engine.learnt_error import in_writable_class, with_learnt_error
 from diagnosis.engine.predict import Prediction, log_score_gain, overall_rmse, predict, with_pieces_of
 from diagnosis.engine.set_apart import without_channels
 from models.base.parallel import run_parallel
@@ -46,8 +46,8 @@ class Predicted:
 
 
 def predict_recordings(
-    experiment: Experiment, judged: Experiment, *, plain: Fit, found: Fit, explanation: Judged | None, near: Near,
-    counting: Collection[str], jobs: int,
+    experiment: Experiment, judged: Experiment, *, plain: Fit, found: Fit, explanation: Judged | None,
+    calibration: Calibration, counting: Collection[str], jobs: int,
 ) -> Predicted:  # fmt: skip
     """Predict all recordings, with model error written into the best explanation if that helps.
 
@@ -59,8 +59,8 @@ def predict_recordings(
         The nominal machine, and that with the findings, both calibrated without model error
     explanation : Judged or None
         What model error may be written into; None: nothing, since it would stand in for a broken sensor
-    near : Near
-        Where model error was linearised
+    calibration : Calibration
+        Where model error was linearised, and its classes
     counting : collection of str
         Channels that count
 
@@ -72,10 +72,14 @@ def predict_recordings(
     train = _states(experiment, plain, found, jobs, near=[trajectory.T for trajectory in found.trajectories])
     holdout = _states(judged, plain, found, jobs)
     final, learnt, after = found, tuple[Term, ...](), [train["found"], holdout["found"]]
-    if explanation is not None and explanation.fit is not None and is_writable(explanation.error_class):
-        written, terms = with_learnt_error(explanation.fit, near, explanation.error_class)
-        if there := _closer(written, (experiment, judged), after, counting, jobs):
-            final, learnt, after = written, terms, there
+    if explanation is not None and explanation.fit is not None:
+        try:
+            if held := in_writable_class(explanation.fit, explanation.error_class, calibration):
+                written, terms = with_learnt_error(held[0], calibration.near, held[1])
+                if there := _closer(written, (experiment, judged), after, counting, jobs):
+                    final, learnt, after = written, terms, there
+        except ArithmeticError:
+            pass  # no solution with what was learnt
     train["after"], holdout["after"] = after
     guesses = [_courses(holdout[state]) for state in ("after", "calibrated")]
     faulty = set(experiment.pieces[0].channels) - set(counting)
@@ -105,10 +109,7 @@ def _closer(
 
     Far from a straight line they may be: parameters at their limits and large factors go together with each other.
     """
-    try:
-        found = [_predictions(fit, one, _courses(there), jobs) for one, there in zip(of, known, strict=True)]
-    except ArithmeticError:
-        return None
+    found = [_predictions(fit, one, _courses(there), jobs) for one, there in zip(of, known, strict=True)]
     columns = temperatures(of[0].pieces[0].channels, counting)
     return [*found] if overall_rmse(found[0], columns) < overall_rmse(known[0], columns) else None
 

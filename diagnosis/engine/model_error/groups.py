@@ -172,7 +172,7 @@ def slow_cores(machine: Anatomy) -> Iterator[Change]:
 def missing_links(machine: Anatomy) -> Iterator[Change]:
     """A heat path between nodes that have none, as a share of the machine's conductance."""
     for pair in machine.unlinked:
-        yield HeatChange(place="-".join(pair), heat=heats.PairHeat(pair=pair))
+        yield HeatChange(place="-".join(pair), heat=partial(heats.pair_heat, pair=pair))
 
 
 def input_errors(machine: Anatomy) -> Iterator[Change]:

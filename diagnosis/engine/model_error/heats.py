@@ -64,20 +64,14 @@ class SplitHeat:
         return Heat(into=into, loss=np.zeros(len(into)))
 
 
-@dataclass(frozen=True, kw_only=True)
-class PairHeat:
+def pair_heat(view: View, *, pair: tuple[str, str]) -> Heat:
     """Heat between two nodes through the mean conductance of the machine."""
-
-    pair: tuple[str, str]
-
-    def __call__(self, view: View) -> Heat:
-        """Along a piece, per share of that conductance."""
-        into, loss = _nothing(view)
-        flow = view.standard.conductance * (view.temperature(self.pair[0]) - view.temperature(self.pair[1]))
-        for node, sign in zip(self.pair, (-1.0, 1.0), strict=True):
-            if node in view.model.parts:
-                into[:, view.model.parts.index(node)] += sign * flow
-        return Heat(into=into, loss=loss)
+    into, loss = _nothing(view)
+    flow = view.standard.conductance * (view.temperature(pair[0]) - view.temperature(pair[1]))
+    for node, sign in zip(pair, (-1.0, 1.0), strict=True):
+        if node in view.model.parts:
+            into[:, view.model.parts.index(node)] += sign * flow
+    return Heat(into=into, loss=loss)
 
 
 def capacity_heat(view: View, *, part: str) -> Heat:

@@ -15,7 +15,7 @@ from diagnosis.candidates.hypotheses import Hypothesis, hypothesis_of
 from diagnosis.decision.answer import Answer
 from diagnosis.decision.posterior import Expected, Judged, Placebo, Posterior
 from diagnosis.decision.settings import Settings
-from diagnosis.engine.calibration import Near
+from diagnosis.engine.calibration import Calibration, Near
 from diagnosis.engine.families import candidates_of
 from diagnosis.engine.fit import Experiment, Fit, calibrate
 from diagnosis.engine.learnt import error_classes, rule
@@ -116,18 +116,21 @@ Assemble = Callable[..., Diagnosis]
 
 
 @pytest.fixture(scope="module")
-def near(prepared: Prepared) -> Near:
+def calibration(prepared: Prepared) -> Calibration:
     _, experiment, plain = prepared
-    return Near.of(experiment, ModelError.of(experiment), plain)
+    near = Near.of(experiment, ModelError.of(experiment), plain)
+    evidence = {one.name: near.log_evidence(one, plain.z) for one in error_classes()}
+    return Calibration(chosen=near.fitted(error_classes()[0], plain, iterations=0), evidence=evidence, near=near)
 
 
 @pytest.fixture(scope="module")
-def assembled(prepared: Prepared, near: Near, recordings: tuple[Recording, Recording]) -> Assemble:
+def assembled(prepared: Prepared, calibration: Calibration, recordings: tuple[Recording, Recording]) -> Assemble:
     setup, experiment, plain = prepared
 
     def result(posterior: Posterior, answers: list[Answer], **given: Any) -> Diagnosis:
         return assemble(
-            setup, given.pop("experiment", experiment), posterior, answers, plain=plain, near=near, settings=Settings(),
+            setup, given.pop("experiment", experiment), posterior, answers, plain=plain,
+            calibration=calibration, settings=Settings(),
             catalogue=CATALOGUE, train=recordings[:1], held_out=recordings[1:], **given,
         )  # fmt: skip
 
@@ -452,12 +455,12 @@ def test_held_out_pieces_have_the_same_unknowns(prepared: Prepared) -> None:
 
 
 def test_what_was_learnt_of_model_error_is_in_prediction_and_correction(
-    assembled: Assemble, prepared: Prepared, near: Near, recordings: tuple[Recording, Recording], fzg: Gearbox
-) -> None:
+    assembled: Assemble, prepared: Prepared, calibration: Calibration, recordings: tuple[Recording, Recording],
+    fzg: Gearbox,
+) -> None:  # fmt: skip
     """The full model with the correction, read through its sensors, gives the prediction that was judged."""
     splits = next(one for one in error_classes() if one.name == "splits and law errors")
-    fit = near.fitted(splits, prepared[2]).fit
-    posterior = posterior_of(fit, log_e=-1.0)
+    posterior = posterior_of(calibration.near.fitted(splits, prepared[2]).fit, log_e=-1.0)
     found = assembled(replace(posterior, nothing=replace(posterior.nothing, error_class=splits)), [])
     assert found.verdict in ("consistent", "insufficient_data") and found.learnt and found.has_correction
     assert found.holdout.found == found.holdout.calibrated > found.holdout.after
@@ -477,7 +480,7 @@ def test_what_was_learnt_of_model_error_is_in_prediction_and_correction(
 
 @pytest.mark.parametrize("far", [1.0, 1e4])
 def test_what_was_learnt_is_left_out_where_it_makes_the_recordings_worse(
-    assembled: Assemble, prepared: Prepared, near: Near, monkeypatch: pytest.MonkeyPatch, far: float
+    assembled: Assemble, prepared: Prepared, monkeypatch: pytest.MonkeyPatch, far: float
 ) -> None:
     """Far off, or with temperatures that leave all bounds."""
     splits = next(one for one in error_classes() if one.name == "splits")
