@@ -65,10 +65,10 @@ def is_writable(one: ErrorClass) -> bool:
 
 
 def in_writable_class(fit: Fit, error_class: ErrorClass, calibration: Calibration) -> tuple[Fit, ErrorClass] | None:
-    """A fit with model error that a model can hold: of its class, else of the best that one can; None where all is too far.
+    """A fit with model error that a model can hold: of its class, or of the best class that one can hold.
 
-    With the widest class the machine has another structure than the model: without all of it, laws and splits would
-    stand in for the rest.
+    None without model error, and with the widest class: the machine has another structure than the model there, and
+    what can be held would stand in for the rest.
 
     Raises
     ------
