@@ -36,7 +36,7 @@ LIKELY_TEXT: Mapping[str, str] = {  # of the same verdicts where no name is a cl
     "missing_physics": "The machine probably shows physics that the model leaves out; its name is not certain.",
     "sensor_fault": "A sensor, clock or recorded input is probably at fault, not the machine.",
 }
-EITHER = "Either the measurement is at fault, which is more probable, or the model leaves out physics of the machine."
+EITHER = "The measurement is at fault, or the model leaves out physics of the machine: these data do not tell which."
 LARGEST_ERROR = "full"  # class of model error
 FAR_SD, MOST_FAR = 3.0, 3  # standard deviations of a prior, beyond which the summary tells of a parameter; how many
 MOST_UNSEEN = 6  # effects that the summary names of those that cannot be seen
@@ -91,20 +91,16 @@ def _in_what(d: Diagnosis) -> str:
         return ""
     fault = d.verdict == "sensor_fault"
     if _may_be_either(d):
-        return ", in the model or, more probably, in the measurement"
-    measurement = _of_measurement(d)
+        return ", in the measurement or in the model"
+    measurement = sum(one.probability for one in d.ranking if one.family == MEASUREMENT)
     sure = (measurement if fault else 1.0 - measurement) >= d.claim_from
     return f", {'' if sure else 'probably '}in the {'measurement' if fault else 'model'}"
 
 
 def _may_be_either(d: Diagnosis) -> bool:
-    """True if only a tie is reported, and a fault of measurement is the more probable name in it."""
-    tied = all(finding.tie_set for finding in d.findings)
-    return d.verdict == "missing_physics" and tied and _of_measurement(d) > 0.5
-
-
-def _of_measurement(d: Diagnosis) -> float:
-    return sum(one.probability for one in d.ranking if one.family == MEASUREMENT)
+    """True if all that is reported are ties that a fault of the measurement leads, with physics among them."""
+    led = [bool(finding.tie_set) and finding.kind == "sensor" for finding in d.findings]
+    return d.verdict == "missing_physics" and bool(led) and all(led)
 
 
 def _where(d: Diagnosis) -> tuple[str, ...]:

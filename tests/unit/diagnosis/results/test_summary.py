@@ -11,7 +11,6 @@ from diagnosis.report import page
 from diagnosis.results.first_screen import EITHER, VERDICT_TEXT
 from diagnosis.results.result import Diagnosis
 from diagnosis.results.result_parts import Change, Fits, PlaceboEvidence, Ranked, Switching
-from models.mechanisms.measurement import FAMILY as MEASUREMENT
 from tests.unit.diagnosis.diagnosis_example import consistent, missing_physics, two_effects, unexplained
 
 
@@ -80,16 +79,16 @@ def test_dates_and_switches() -> None:
     assert stored["switching"] == {"on_degC": 73.0, "off_degC": 67.0}
 
 
-def test_a_tie_of_machine_and_measurement_is_told_as_either() -> None:
+def test_a_tie_of_measurement_and_machine_is_told_as_either() -> None:
     base = missing_physics()
     (finding,) = base.findings
-    tied = replace(finding, grade="likely", tie_set=("air_speed_gain", "windage"))
-    fault = Ranked(mechanism="air_speed_gain", place="air_speed", family=MEASUREMENT, log_bayes=30.0, probability=0.75)
-    either = replace(base, findings=(tied,), ranking=(fault,))
+    tied = replace(finding, grade="likely", kind="sensor", tie_set=("air_speed_gain", "windage"))
+    either = replace(base, findings=(tied,))
     assert str(either).splitlines()[0].endswith(EITHER)
-    assert "in the model or, more probably, in the measurement" in told(either, "Is something missing?")
-    less = replace(either, ranking=(replace(fault, probability=0.25),))
-    assert EITHER not in str(less) and "Yes, probably in the model" in told(less, "Is something missing?")
+    assert "Yes, in the measurement or in the model: evidence" in told(either, "Is something missing?")
+    for other in (replace(tied, kind="source"), replace(tied, tie_set=())):  # physics leads; and a name alone
+        found = replace(base, findings=(tied, other))
+        assert EITHER not in str(found) and "in the measurement" not in told(found, "Is something missing?")
 
 
 def test_what_is_nearest_to_something_without_a_name_is_told() -> None:
