@@ -36,7 +36,7 @@ LIKELY_TEXT: Mapping[str, str] = {  # of the same verdicts where no name is a cl
     "missing_physics": "The machine probably shows physics that the model leaves out; its name is not certain.",
     "sensor_fault": "A sensor, clock or recorded input is probably at fault, not the machine.",
 }
-EITHER = "The measurement is at fault, or the model leaves out physics of the machine: these data do not tell which."
+EITHER = "The measurement is at fault, or the model leaves out physics of the machine: these data do not separate the two."
 LARGEST_ERROR = "full"  # class of model error
 FAR_SD, MOST_FAR = 3.0, 3  # standard deviations of a prior, beyond which the summary tells of a parameter; how many
 MOST_UNSEEN = 6  # effects that the summary names of those that cannot be seen
