@@ -62,7 +62,7 @@ def diagnose(
     switched_off : str, or several
         Mechanisms that are known to be off in the baselines; by default all are
     settings : Settings
-        The four numbers of the decision
+        Numbers of the decision
     catalogue : mapping of str to Mechanism, optional
         By default :data:`models.mechanisms.CATALOGUE`
     jobs : int
@@ -121,7 +121,7 @@ def diagnose(
         return assemble(
             setup, experiment, posterior, decide(posterior, settings), plain=plain, calibration=calibration,
             settings=settings,
-            others=Others(fit=others, posterior=rest, channels=faulty) if rest is not None else None,
+            others=None if rest is None else Others(fit=others, posterior=rest, channels=faulty, apart=tuple(apart)),
             catalogue=catalogue, train=train, held_out=held, healthy=healthy, switched_off=off, jobs=jobs,
         )  # fmt: skip
     except ArithmeticError as error:

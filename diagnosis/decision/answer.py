@@ -34,8 +34,9 @@ class Answer:
     tied : tuple of (Hypothesis, float)
         Names of a tie set with their probabilities, `effect` first; empty of a claim
     acts_like : bool
-        True if this is only the nearest name: by what remains, by the kind of the effect (a course over the hours), or
-        because held-out recordings contradict it
+        True if this is only the nearest name: by names that look alike or act on the same thing, by what remains, by
+        the kind of the effect (a course over the hours, a parameter where model error is large), or because held-out
+        recordings contradict it
     """
 
     best: Judged

@@ -119,7 +119,7 @@ def infer(
             for factor in SCALED
         ),
         repeating=repeating_of(first, error_class),
-        expected=expected_of(first.in_class(chosen.error_class), settings),
+        expected=expected_of(first, chosen.error_class, settings),
         placebo=placebo,
         # Where channels were set apart the others chose the basin: a broken one is not to draw the machine elsewhere.
         elsewhere=elsewhere if gained > FAR_BETTER and calibration.of_others is None else None,
@@ -134,7 +134,8 @@ def _raced(calibration: Calibration, found: Scanned, progress: Progress) -> dict
         label = found.candidates[index].label
         progress(f"fitting {label}", step, len(racing))
         start = calibration.in_class(found.best[index].error_class).fit
-        judged[label] = _refitted(calibration, start, found, index, RACE_STEPS)
+        one = _refitted(start, found, index, RACE_STEPS)
+        judged[label] = one if one.fit is None else _judged(calibration, one, _spread(found, index))
     ahead = sorted(judged.values(), key=_weight, reverse=True)[:REFITTED]
     for step, one in enumerate(ahead):
         progress(f"fitting {one.label} to the end", step, len(ahead))
@@ -157,8 +158,8 @@ def _worth_a_fit(found: Scanned) -> list[int]:
     return [index for index in every if found.log_bayes[index] > worth]
 
 
-def _refitted(calibration: Calibration, fit: Fit, found: Scanned, index: int, iterations: int) -> Judged:
-    """A candidate fitted together with everything else; judged by the scan if there is no solution."""
+def _refitted(fit: Fit, found: Scanned, index: int, iterations: int) -> Judged:
+    """A candidate, judged by the scan, with its fit together with everything else if that has a solution."""
     candidate, one = found.candidates[index], _by_scan(found, index, float(found.log_bayes[index]))
     here = found.best[index]
     try:
@@ -170,7 +171,7 @@ def _refitted(calibration: Calibration, fit: Fit, found: Scanned, index: int, it
                             iterations=iterations)  # fmt: skip
     except (InputError, ArithmeticError, np.linalg.LinAlgError):
         return one
-    return _judged(calibration, replace(one, fit=reached), _spread(found, index))
+    return replace(one, fit=reached)
 
 
 def _with_wider_prior(fit: Fit, index: int, iterations: int) -> Fit:
@@ -251,7 +252,7 @@ def _pairs(calibration: Calibration, best: Judged, second: Scanned) -> list[Judg
     assert fit is not None  # noqa: S101
     others = [index for index in second.order if name_of(second.candidates[index]) not in best.names]
     for index in others[:SECONDS]:
-        one = _refitted(calibration, fit, second, index, RACE_STEPS + 2)
+        one = _refitted(fit, second, index, RACE_STEPS + 2)
         if one.fit is None:
             continue
         both = replace(one, effects=(*best.effects, *one.effects), log_prior=best.log_prior + one.log_prior)

@@ -111,10 +111,13 @@ class Expected:
     ----------
     log_bayes : float
         Expected evidence for it, [nat]
+    log_prior : float
+        To 1 of nothing, [nat]; both together are what may reach the threshold
     """
 
     effect: Hypothesis
     log_bayes: float
+    log_prior: float
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

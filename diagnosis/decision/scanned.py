@@ -245,8 +245,10 @@ def likeness_of(found: Scanned, error_class: ErrorClass) -> Likeness:
     return Likeness(labels=tuple(one.label for one in found.candidates), cosines=np.abs(inner / norm / norm[:, None]))
 
 
-def expected_of(found: InClass, settings: Settings) -> tuple[Expected, ...]:
+def expected_of(scanned: Scanned, error_class: ErrorClass, settings: Settings) -> tuple[Expected, ...]:
     """Expected evidence of every candidate at the size that matters: of a temperature or a heat, whichever is less."""
+    found = scanned.in_class(error_class)
+    known = {one.label: value for one, value in zip(scanned.candidates, scanned.log_prior.tolist(), strict=True)}
     given, terms = found.over.given[found.over.most_probable], found.scan
     at = np.array(terms.of_candidates) + 1
     b = np.maximum(given.matrix[at, at], 0.0)
@@ -256,5 +258,5 @@ def expected_of(found: InClass, settings: Settings) -> tuple[Expected, ...]:
         size[reached] = np.minimum(size[reached], matters / peak[reached])
     size = np.where(np.isfinite(size), size, sd)
     log_bayes = 0.5 * np.square(b * size) / (b + 1.0 / np.square(sd)) - 0.5 * np.log1p(b * np.square(sd))
-    return tuple(Expected(effect=one, log_bayes=float(value))
+    return tuple(Expected(effect=one, log_bayes=float(value), log_prior=known[one.label])
                  for one, value in zip(terms.candidates, log_bayes, strict=True))  # fmt: skip

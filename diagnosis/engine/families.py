@@ -121,7 +121,7 @@ def axis_of(experiment: Experiment) -> Axis:
         else:
             middle = start + pieces[0].time[0] + 0.5 * span[name]
             dates += [middle] if name == sick[0] else [start, middle]
-    end = max(experiment.starts_at.get(name, 0.0) + float(of_recording[name][-1].time[-1]) for name in names)
+    end = max(experiment.starts_at.get(name, 0.0) + float(of_recording[name][-1].time[-1]) for name in sick)
     interval = float(np.median(np.concatenate([piece.steps for piece in experiment.pieces])))
     return Axis(dates=np.array(sorted(dates)), end=end, edge_s=2.0 * max(EDGE_S, interval if experiment.slow else 0.0))
 

@@ -99,7 +99,7 @@ class Rule:
         """
         of_class = 0.5 * (nothing.threshold + best.threshold)
         stricter = self.temper[0] * float(np.log(self.rate / rate))
-        return max(of_class, self.detection) + stricter, of_class + stricter
+        return max(of_class, self.detection) + stricter, max(of_class + stricter, 0.0)
 
 
 @cache

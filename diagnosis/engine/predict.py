@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.linalg import solve_triangular
 
 from diagnosis.engine.fit import PASSES, Experiment, Fit, Linear
 from diagnosis.engine.point import Setting
@@ -224,7 +225,7 @@ def log_score_gain(final: Fit, plain: Fit, held_out: Experiment, guesses: Sequen
 
 def _log_density(parts: Sequence[Linear], fit: Fit) -> float:
     residual = np.concatenate([part.residual for part in parts])
-    X = np.concatenate([part.columns for part in parts]) @ np.linalg.cholesky(fit.covariance)
+    X = solve_triangular(fit.root, np.concatenate([part.columns for part in parts]).T, lower=True).T
     inner, along = np.eye(X.shape[1]) + X.T @ X, X.T @ residual
     quadratic = float(residual @ residual - along @ np.linalg.solve(inner, along))
     return -0.5 * (quadratic + float(np.linalg.slogdet(inner)[1]))

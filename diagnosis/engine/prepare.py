@@ -114,13 +114,14 @@ def usual_unknowns(
     Parameters
     ----------
     recordings : sequence of Recording
-        What their mappings state of sensors is their prior: lag, its standard deviation and tolerance of the bias
+        What the mapping of the first one states of a sensor is its prior: lag, its standard deviation and tolerance of
+        the bias
     interval : float
         Between rows, [s]
     gain_of_torque : Parameter or None
         Prior of the gain of a torque that follows from a power
     """
-    stated, slow = {c.name: c for r in recordings for c in r.channels}, slow_rows(recordings)
+    stated, slow = {c.name: c for r in reversed(recordings) for c in r.channels}, slow_rows(recordings)
     found: list[Unknown] = []
     for p in network.parameters:
         if p.sd > 0.0:

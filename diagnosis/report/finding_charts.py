@@ -66,14 +66,14 @@ def names_by_grade(diagnosis: Diagnosis) -> Chart | None:
 def _names(diagnosis: Diagnosis) -> list[tuple[str, str, float]]:
     """Label, grade and probability of names, most probable first."""
     grades = {name_: finding.grade for finding in diagnosis.findings
-              for name_ in (finding.mechanism, *finding.tie_set)}  # fmt: skip
-    reported = {finding.mechanism: finding for finding in diagnosis.findings}
+              for name_ in (finding.law, *finding.tie_set)}  # fmt: skip
+    reported = {finding.law: finding for finding in diagnosis.findings}
     sums: dict[str, float] = {}
     for one in diagnosis.ranking:
         for law in dict.fromkeys(one.laws):
             sums[law] = sums.get(law, 0.0) + one.probability
-    for mechanism, finding in reported.items():
-        sums[mechanism] = max(sums.get(mechanism, 0.0), finding.probability)
+    for law, finding in reported.items():
+        sums[law] = max(sums.get(law, 0.0), finding.probability)
     idle = set() if diagnosis.further_helps else _companions(diagnosis)
     rows = [(_label(law), grades.get(law, "not reported"), p) for law, p in sums.items()
             if p >= LEAST_RIVAL and law not in idle]  # fmt: skip
@@ -85,7 +85,7 @@ def _names(diagnosis: Diagnosis) -> list[tuple[str, str, float]]:
 
 def _companions(diagnosis: Diagnosis) -> set[str]:
     """Names that explain the data only together with a finding."""
-    return {rival.mechanism for finding in diagnosis.findings for rival in finding.confusable_with if not rival.instead}
+    return {rival.law for finding in diagnosis.findings for rival in finding.confusable_with if not rival.instead}
 
 
 def _label(mechanism: str) -> str:

@@ -75,8 +75,8 @@ def marks(diagnosis: Diagnosis) -> Marks:
     names: dict[str, str] = {}
     pointed: list[tuple[str, tuple[str, float]]] = []
     for finding in diagnosis.findings:
-        title = " or ".join(map(name, finding.tie_set or (finding.mechanism,)))
-        said = (f"acts like {name(finding.mechanism)}" if finding.acts_like else title, finding.sureness)
+        title = " or ".join(map(name, finding.tie_set or (finding.law,)))
+        said = (f"acts like {name(finding.law)}" if finding.acts_like else title, finding.sureness)
         pointed += [(target, said) for target in _targets(finding)]
         if finding.term is not None and finding.term.kind == "link":
             label = finding.term.label

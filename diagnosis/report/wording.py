@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from diagnosis.results.number_format import NONE, SUPERSCRIPTS
-from diagnosis.results.result_parts import PARAMETER, Finding, named
+from diagnosis.results.result_parts import PARAMETER, Finding
 from models.quantities.quantities import TOTAL_LOSS
 
 DAY, HOUR, MINUTE = 86_400.0, 3600.0, 60.0
@@ -41,11 +41,12 @@ WORDS: Mapping[str, str] = {
     "claim": "A name that is certain enough: its probability reached the limit that was asked for.",
     "likely": "Less than a claim: one of at most three names that these data cannot separate, or a law and a place "
     "whose cause was not found (acts like ...). It improves the prediction all the same.",
-    "cannot be seen": "Of an effect at the size that matters these recordings would give evidence of less than 10 nat: "
-    "whether it is there or not, they look the same.",
+    "cannot be seen": "At the size that matters the effect would not reach the threshold in these recordings, with its "
+    "prior: whether it is there or not, the answer is the same.",
     "model error": "What formulas, load sharings and lumped nodes cannot know: further small unknowns with priors, in "
     "classes between which the data choose. What they can explain is not called missing physics.",
-    "threshold": "Evidence that has to be reached before anything is claimed; set by the false-alarm rate asked for.",
+    "threshold": "Evidence that has to be reached before anything is claimed: by the class of model error, at least "
+    "10 nat, moved by the false-alarm rate asked for, and at least what a healthy baseline brings.",
     "false-alarm rate": "In how many of 100 healthy cases a mismatch may be reported, as asked for. It moves the "
     "threshold; the thresholds were set on healthy machines of simulated plants, so on a real machine it is an aim.",
     "standard error": "68 % of such estimates lie within ± this of the truth, if the form of the law is right.",
@@ -99,8 +100,7 @@ def headline(mechanism: str, place: str) -> str:
 def short_title(finding: Finding) -> str:
     """The names of a finding without their places."""
     like = "acts like " if finding.acts_like else ""
-    one = named(finding.mechanism, finding.place) if finding.mechanism == PARAMETER else finding.mechanism
-    return like + " or ".join(map(name, finding.tie_set or (one,)))
+    return like + " or ".join(map(name, finding.tie_set or (finding.law,)))
 
 
 def plain(text: str) -> str:

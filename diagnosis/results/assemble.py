@@ -9,7 +9,7 @@ import numpy as np
 
 from diagnosis.candidates.hypotheses import Hypothesis
 from diagnosis.decision.answer import Answer, act_on_the_same, withdraw_claim
-from diagnosis.decision.posterior import KINDS, Judged, Placebo, Posterior
+from diagnosis.decision.posterior import KINDS, Expected, Judged, Placebo, Posterior
 from diagnosis.decision.settings import Settings
 from diagnosis.engine.calibration import Calibration
 from diagnosis.engine.fit import Experiment, Fit
@@ -37,7 +37,7 @@ from diagnosis.results.result_parts import (
     Ranked,
     Repeating,
     ScaledError,
-    named,
+    law_of,
 )
 from diagnosis.setup.inference_setup import InferenceSetup
 from diagnosis.setup.noise import HEAT_FRACTION, HEAT_TIME_S, PARAMETRIC_FRACTION, PARAMETRIC_K, WANDER
@@ -62,11 +62,14 @@ class Others:
         The nominal machine calibrated by them, without model error
     channels : tuple of str
         The faulty ones
+    apart : tuple of str
+        All that were left out for the posterior
     """
 
     fit: Fit
     posterior: Posterior
     channels: tuple[str, ...]
+    apart: tuple[str, ...]
 
 
 def assemble(
@@ -287,14 +290,13 @@ def _placebo(found: Placebo | None, catalogue: Mapping[str, Mechanism]) -> Place
 
 def _unseen(posterior: Posterior, catalogue: Mapping[str, Mechanism]) -> tuple[NotDetectable, ...]:
     """Mechanisms that would not have been seen at the size that matters, at their best place."""
-    best: dict[str, tuple[float, str]] = {}
-    for one in posterior.expected:
-        name = one.effect.name
-        if name in catalogue and one.log_bayes > best.get(name, (-np.inf, ""))[0]:
-            best[name] = (one.log_bayes, one.effect.place)
+    best: dict[str, Expected] = {}
+    for one in sorted(posterior.expected, key=lambda one: one.log_bayes + one.log_prior):
+        if one.effect.name in catalogue:
+            best[one.effect.name] = one
     return tuple(
-        NotDetectable(mechanism=name, place=place, needed=catalogue[name].experiment, expected=reached)
-        for name, (reached, place) in sorted(best.items()) if reached < posterior.rule.detection
+        NotDetectable(mechanism=name, place=one.effect.place, needed=catalogue[name].experiment, expected=one.log_bayes)
+        for name, one in sorted(best.items()) if one.log_bayes + one.log_prior < posterior.threshold
     )  # fmt: skip
 
 
@@ -302,10 +304,10 @@ def _remaining(posterior: Posterior, others: Others | None, best: Judged | None)
     if not posterior.detected:
         return ""
     if others is not None:
-        channels, rest = ", ".join(others.channels), others.posterior
+        channels, rest = ", ".join(others.apart), others.posterior
         if rest.detected:
             return (f"something else is missing too (evidence {rest.log_e:.0f} nat without {channels}): "
-                    "leave that out of the recordings and diagnose again")  # fmt: skip
+                    f"leave {channels} out of the recordings and diagnose again")  # fmt: skip
         return f"without {channels} nothing stands out of noise and model error (evidence {rest.log_e:.1f} nat)"
     if best is not None and best.kind == "pair" and best.left is None:
         return (
@@ -403,7 +405,7 @@ def _ranking(posterior: Posterior, catalogue: Mapping[str, Mechanism]) -> tuple[
             place=" + ".join(effect.place for effect in one.effects),
             family=" + ".join(dict.fromkeys(effect.family for effect in one.effects)), log_bayes=one.log_bayes,
             probability=probability,
-            laws=tuple(named(e.name, e.place) if e.term is None else name_in(catalogue, e) for e in one.effects),
+            laws=tuple(law_of(name_in(catalogue, effect), effect.place) for effect in one.effects),
         )
         for one, probability in posterior.ranked[:MOST_RANKED]
     )  # fmt: skip

@@ -20,7 +20,7 @@ from diagnosis.recordings.recording import Recording
 from diagnosis.results.advice import separation, without_sensor
 from diagnosis.results.joint_estimate import JointEstimate
 from diagnosis.results.places import node_in
-from diagnosis.results.result_parts import LEAST_RIVAL, Change, Finding, ParameterValue, Rival, Switching
+from diagnosis.results.result_parts import LEAST_RIVAL, Change, Finding, ParameterValue, Rival, Switching, law_of
 from diagnosis.setup.inference_setup import InferenceSetup, heat_over_time
 from models.base.types import Array
 from models.mechanisms import Mechanism, Placed
@@ -80,7 +80,7 @@ def finding_of(
         heat=heat_over_time(pieces, heats) if heats else {},
         term=None if term is None else term.with_values(found),
         grade=answer.grade,
-        tie_set=tuple(dict.fromkeys(name_in(catalogue, one) for one, _ in answer.tied)),
+        tie_set=tuple(dict.fromkeys(law_of(name_in(catalogue, one), one.place) for one, _ in answer.tied)),
         joint_probability=answer.joint,
         acts_like=answer.acts_like,
         date=change_of(values, effect, fit.experiment, recordings),

@@ -10,6 +10,7 @@ from diagnosis.results.number_format import MINUS, number, with_error
 from diagnosis.results.result_parts import (
     LEAST_RIVAL,
     MOST_NEAREST,
+    NEAREST,
     NO_CLAIM,
     Finding,
     named,
@@ -36,7 +37,7 @@ LIKELY_TEXT: Mapping[str, str] = {  # of the same verdicts where no name is a cl
     "missing_physics": "The machine probably shows physics that the model leaves out; its name is not certain.",
     "sensor_fault": "A sensor, clock or recorded input is probably at fault, not the machine.",
 }
-EITHER = "The measurement is at fault, or the model leaves out physics of the machine: these data do not separate the two."
+EITHER = "The measurement is at fault, or the model leaves out physics: these data do not separate the two."
 LARGEST_ERROR = "full"  # class of model error
 FAR_SD, MOST_FAR = 3.0, 3  # standard deviations of a prior, beyond which the summary tells of a parameter; how many
 MOST_UNSEEN = 6  # effects that the summary names of those that cannot be seen
@@ -124,10 +125,10 @@ def _what(d: Diagnosis) -> tuple[str, ...]:
         lines.append(f"{item[0].grade.capitalize()}: {item[0].says} [{item[0].title}]")
         lines += [f"  {line}" for finding in item for line in (values_told(finding), date_told(finding)) if line]
     if d.nearest:
-        told = ", ".join(f"{one.mechanism} at {one.place} ({one.probability:.2f})" for one in d.nearest)
+        told = ", ".join(f"{named(one.mechanism, one.place)} ({one.probability:.2f})" for one in d.nearest)
         lines.append(f"No name is certain enough to be reported; most like: {told}.")
     elif not d.findings and d.verdict not in NO_CLAIM:
-        lines.append("Nothing in the catalogue is like it.")
+        lines.append(f"No name of the catalogue stands out: none has a probability of {NEAREST:g}.")
     return tuple(lines)
 
 
@@ -140,7 +141,7 @@ def _how_sure(d: Diagnosis) -> tuple[str, ...]:
         title = f"{finding.title}: " if len(d.items) > 1 else ""
         line = " ".join(filter(None, (f"{title}{finding.grade}, probability", of, _share(finding.sureness))))
         others = [r for r in finding.confusable_with
-                  if r.probability >= LEAST_RIVAL and r.mechanism not in finding.tie_set]  # fmt: skip
+                  if r.probability >= LEAST_RIVAL and r.law not in finding.tie_set]  # fmt: skip
         roles = (("not ruled out instead", True), ("may act as well", False))
         for words, instead in roles[: 1 + d.further_helps]:
             told = [f"{named(r.mechanism, r.place)} ({r.probability:.2f})" for r in others if r.instead is instead]
@@ -203,7 +204,7 @@ def _how_much_better(d: Diagnosis) -> tuple[str, ...]:
             f"{abs(d.holdout_gain):.0f} nat of log score"
         )
     if d.contradicted:
-        by = "larger error of temperatures" if d.holdout_gain > 0.0 else "less probable readings"
+        by = "less probable readings" if d.holdout_gain <= 0.0 else "larger error of temperatures"
         lines.append(f"So the held-out recordings contradict the findings ({by}): no name is a claim")
     return tuple(lines)
 

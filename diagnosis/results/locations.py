@@ -49,8 +49,9 @@ def _place(
     if fit is None or not laws:
         return Location(node=node, probability=min(weight, 1.0), heat_mean_W=0.0, heat_max_W=0.0, when=(),
                         regime="always")  # fmt: skip
-    heats = [np.sum(values, axis=0) for values in zip(*laws, strict=True)]
-    trajectories = fit.trajectories
+    tested = [i for i, one in enumerate(fit.trajectories) if one.piece.recording not in fit.experiment.healthy]
+    heats = [np.sum([law[i] for law in laws], axis=0) for i in tested]
+    trajectories = [fit.trajectories[i] for i in tested]
     pieces = [trajectory.piece for trajectory in trajectories]
     together, steps = np.concatenate(heats), np.concatenate([piece.steps for piece in pieces])
     inputs = np.concatenate([piece.inputs for piece in pieces])
@@ -60,6 +61,7 @@ def _place(
         T = np.concatenate([trajectory.middle[:, parts.index(node)] for trajectory in trajectories])
         signals[f"temperature of {node}"] = (T, "degC")
     signals["time"] = (np.concatenate([piece.middle for piece in pieces]) / 3600.0, "h")
+    signals = {name: signal for name, signal in signals.items() if np.ptp(signal[0]) > 0.0}
     acting = active(together, steps)
     here = [effect for effect in effects if nodes[effect.label] == node]
     dated = BETWEEN if here[0].name.endswith(WHILE) else FROM_DATE if here[0].how == "D" else ""

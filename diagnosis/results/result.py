@@ -13,6 +13,7 @@ from diagnosis.results.first_screen import first_screen_of, verdict_text_of
 from diagnosis.results.joint_estimate import JointEstimate
 from diagnosis.results.result_parts import (
     MOST_NEAREST,
+    NEAREST,
     NO_CLAIM,
     Calibrated,
     Finding,
@@ -36,7 +37,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 SCHEMA = 1
-NEAREST = 0.1  # probability from which an explanation is told that was not reported
 LIKELY = 0.5  # probability from which a further place is told
 Verdict = Literal[
     "consistent", "parameter_error", "missing_physics", "sensor_fault", "unexplained", "insufficient_data"
@@ -73,7 +73,7 @@ class Diagnosis:
         Mean square of the residual of the model that predicts in the training recordings, in multiples of what noise
         and random heat make of it
     remaining_p_value : float
-        exp(-evidence) of a further effect, at most 1, as `p_value`; NaN where no further look was taken
+        exp(-evidence) of a further effect, at most 1, as `p_value`; 1 where no further look was taken
     remaining_note : str
     ranking : tuple of Ranked
     unseen : tuple of NotDetectable
@@ -271,10 +271,16 @@ class Diagnosis:
 
     @property
     def nearest(self) -> tuple[Ranked, ...]:
-        """Most probable explanations if something is missing and none could be reported."""
+        """Most probable names, at their best places, if something is missing and none could be reported."""
         if self.findings or self.verdict in NO_CLAIM:
             return ()
-        return tuple(one for one in self.ranking[:MOST_NEAREST] if one.probability >= NEAREST)
+        of_names: dict[tuple[str, ...], list[Ranked]] = {}
+        for one in self.ranking:
+            of_names.setdefault(one.laws, []).append(one)
+        found = [replace(first, probability=min(first.probability + sum(one.probability for one in others), 1.0))
+                 for first, *others in of_names.values()]  # fmt: skip
+        found.sort(key=lambda one: -one.probability)
+        return tuple(one for one in found[:MOST_NEAREST] if one.probability >= NEAREST)
 
     @property
     def first_screen(self) -> tuple[tuple[str, tuple[str, ...]], ...]:

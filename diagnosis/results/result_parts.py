@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
+from diagnosis.decision.answer import Grade
 from models.base.types import Array
 from models.terms.term import Term
 
@@ -14,11 +15,11 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
-Grade = Literal["claim", "likely"]
 PARAMETER = "parameter"
 NO_CLAIM = ("consistent", "insufficient_data")  # verdicts
 LEAST_RIVAL = 0.01  # probability of what is told as a rival
 MOST_NEAREST = 3  # names that are told of those that were not reported
+NEAREST = 0.1  # their probability at least
 SIZES = {0.5: "half as large", 1.0: "as assumed", 2.0: "twice as large"}  # of model error, by factor
 
 
@@ -51,6 +52,11 @@ class Rival:
     probability: float
     separate_by: str
     instead: bool = True
+
+    @property
+    def law(self) -> str:
+        """Name of the law; of a parameter its own."""
+        return law_of(self.mechanism, self.place)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -156,10 +162,17 @@ class Finding:
     switching: Switching | None = None
 
     @property
+    def law(self) -> str:
+        """Name of the law; of a parameter its own."""
+        return law_of(self.mechanism, self.place)
+
+    @property
     def title(self) -> str:
         """Names and places as its grade allows them."""
         if self.acts_like:
             return f"acts like {named(self.mechanism, self.place)}"
+        if self.mechanism == PARAMETER:
+            return " or ".join(self.tie_set or (self.law,))
         places = {r.mechanism: r.place for r in reversed(self.confusable_with)} | {self.mechanism: self.place}
         tied = self.tie_set or (self.mechanism,)
         at: dict[str, list[str]] = {}
@@ -457,7 +470,7 @@ class Ranked:
     family: str
     log_bayes: float
     probability: float
-    laws: tuple[str, ...] = ()
+    laws: tuple[str, ...]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -489,6 +502,17 @@ def named(mechanism: str, place: str) -> str:
     ('windage at oil', 'parameter h_air')
     """
     return f"{mechanism} {place}" if mechanism == PARAMETER else f"{mechanism} at {place}"
+
+
+def law_of(mechanism: str, place: str) -> str:
+    """Name of a law; of a parameter its own.
+
+    Examples
+    --------
+    >>> law_of("windage", "oil"), law_of("parameter", "h_air")
+    ('windage', 'parameter h_air')
+    """
+    return named(mechanism, place) if mechanism == PARAMETER else mechanism
 
 
 def or_none(value: float) -> float | None:

@@ -60,7 +60,7 @@ def draw_explanations(diagnosis: Diagnosis, ax: Axes | None) -> Axes:
     from models.columns.curves import PALETTE, axes_or_new  # imports matplotlib
 
     likely = [r for r in diagnosis.ranking if r.probability >= LEAST_DRAWN]
-    shown = sorted(likely, key=lambda r: -r.probability)[:MOST_BARS][::-1]
+    shown = likely[:MOST_BARS][::-1]
     with axes_or_new(ax) as axes:
         names = [named(r.mechanism, r.place).replace("__", " ").replace("_", " ") for r in shown]
         axes.barh(names, [r.probability for r in shown], color=PALETTE[0])

@@ -75,9 +75,9 @@ def channel_noise(recordings: Sequence[Recording], channels: Sequence[str]) -> M
 
 
 def display_noise(recordings: Sequence[Recording], channels: Sequence[str]) -> Array:
-    """Standard deviation of the rounding of every display, shape (channels,), [K] or [W]; 0 if its step is unknown."""
-    stated = {c.name: c.resolution or 0.0 for r in recordings for c in r.channels}
-    return np.asarray([stated.get(name, 0.0) for name in channels], dtype=float) / float(np.sqrt(12.0))
+    """Standard deviation of the coarsest rounding of a display, shape (channels,), [K] or [W]; 0 if none is known."""
+    steps = [[c.resolution or 0.0 for r in recordings for c in r.channels if c.name == name] for name in channels]
+    return np.asarray([max(found, default=0.0) for found in steps]) / float(np.sqrt(12.0))
 
 
 def noise_of(

@@ -39,7 +39,7 @@ def calibrated(train: Any, gearbox: Any, *, holdout: Any, **_: object) -> Diagno
     calibration = Calibration(chosen=near.fitted(nothing.error_class, plain, iterations=0), evidence={}, near=near)
     return assemble(
         setup, experiment, posterior, (), plain=plain, calibration=calibration,
-        others=Others(fit=fit, posterior=posterior, channels=apart),
+        others=Others(fit=fit, posterior=posterior, channels=apart, apart=apart),
         settings=Settings(), catalogue=CATALOGUE, train=train, held_out=holdout,
     )  # fmt: skip
 

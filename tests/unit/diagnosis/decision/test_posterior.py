@@ -129,6 +129,7 @@ def test_the_threshold_follows_the_rate_that_is_asked_for() -> None:
     usual, often, seldom = (rule().thresholds(error, error, rate) for rate in (rule().rate, 0.1, 0.001))
     assert usual == (pytest.approx(10.0), pytest.approx(7.0))
     assert all(less < middle < more for less, middle, more in zip(often, usual, seldom, strict=True))
+    assert rule().thresholds(replace(error, threshold=5.0), replace(error, threshold=5.0), 0.5)[1] == 0.0
 
 
 def test_a_machine_that_fits_badly_without_the_effect_needs_more_evidence() -> None:

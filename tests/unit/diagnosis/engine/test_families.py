@@ -100,6 +100,8 @@ def test_recordings_follow_each_other_and_dates_spread_over_the_long_one(fit: Fi
     assert fit.experiment.starts_at["after"] in axis.dates
     healthy = axis_of(replace(fit.experiment, healthy=frozenset({"before"})))
     assert healthy.dates.min() > start
+    shorter = axis_of(replace(fit.experiment, healthy=frozenset({"after"})))
+    assert shorter.end <= fit.experiment.starts_at["after"] < axis.end  # nothing changes in a baseline
 
 
 def test_the_change_wins_in_the_scan(fit: Fit, found: Scan, axis: Axis) -> None:

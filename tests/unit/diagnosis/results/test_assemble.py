@@ -323,11 +323,12 @@ def test_nothing(assembled: Assemble, prepared: Prepared, windage: Judged) -> No
     weak = replace(windage, log_bayes=1.0, fit=None)
     setup, _, plain = prepared
     fog = effect_of(setup, plain, "hot_neighbour", "housing_lower")
-    expected = (Expected(effect=windage.effects[0], log_bayes=40.0), Expected(effect=fog, log_bayes=3.0),
-                Expected(effect=replace(fog, place="oil"), log_bayes=1.0))  # fmt: skip
+    there = Expected(effect=windage.effects[0], log_bayes=40.0, log_prior=-5.0)
+    dim = replace(there, effect=fog, log_bayes=8.5)  # 4 nat are needed, and its prior is small
+    expected = (there, dim, replace(dim, effect=replace(fog, place="oil"), log_bayes=1.0))
     found = assembled(posterior_of(plain, weak, log_e=-1.0, expected=expected), [])
     assert found.verdict == "consistent" and found.findings == () and found.location == ()
-    assert [(u.mechanism, u.place, u.expected) for u in found.unseen] == [("hot_neighbour", "housing_lower", 3.0)]
+    assert [(u.mechanism, u.place, u.expected) for u in found.unseen] == [("hot_neighbour", "housing_lower", 8.5)]
     assert "What cannot be seen in these data? hot_neighbour: silence" in str(found)
     assert "Is something missing? Nothing that these data show" in str(found)
     assert found.next_test.startswith(CATALOGUE["hot_neighbour"].experiment)

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from diagnosis.report import page
+from diagnosis.report import finding_charts, page
 from diagnosis.results.first_screen import EITHER, VERDICT_TEXT
 from diagnosis.results.result import Diagnosis
-from diagnosis.results.result_parts import Change, Fits, PlaceboEvidence, Ranked, Switching
+from diagnosis.results.result_parts import Change, Fits, PlaceboEvidence, Ranked, Rival, Switching
 from tests.unit.diagnosis.diagnosis_example import consistent, missing_physics, two_effects, unexplained
 
 
@@ -93,7 +93,7 @@ def test_a_tie_of_measurement_and_machine_is_told_as_either() -> None:
 
 def test_what_is_nearest_to_something_without_a_name_is_told() -> None:
     ranking = tuple(
-        Ranked(mechanism=name, place="mesh", family="", log_bayes=log_bayes, probability=probability)
+        Ranked(mechanism=name, place="mesh", family="", log_bayes=log_bayes, probability=probability, laws=(name,))
         for name, log_bayes, probability in (
             ("unknown_loss", 190.0, 0.65), ("unknown_heat", 170.0, 0.33), ("bearing_preload", 70.0, 0.02)
         )
@@ -104,6 +104,34 @@ def test_what_is_nearest_to_something_without_a_name_is_told() -> None:
     assert "<b>Most like:</b> unknown loss at mesh (0.65)" in page(nameless)
     for other in (unexplained(), replace(consistent(), ranking=ranking)):
         assert other.nearest == () and "most like" not in str(other) and "<b>Most like" not in page(other)
+
+
+def test_the_probability_of_a_name_is_that_of_all_its_places() -> None:
+    places = tuple(
+        Ranked(mechanism="windage", place=place, family="", log_bayes=9.0, probability=0.09, laws=("windage",))
+        for place in ("oil", "gears", "wheel", "pinion")
+    )
+    spread = replace(unexplained(), findings=(), ranking=places)
+    assert "most like: windage at oil (0.36)." in told(spread, "What?")
+    assert "none has a probability of 0.1" in told(replace(spread, ranking=places[:1]), "What?")
+
+
+def test_parameters_in_a_tie_have_names_of_their_own() -> None:
+    (finding,) = missing_physics().findings
+    h_air, h_oil = "parameter h_air", "parameter h_oil"
+    rivals = tuple(Rival(mechanism="parameter", place=place, probability=p, separate_by="a warm-up")
+                   for place, p in (("h_oil", 0.45), ("h_wheel", 0.03)))  # fmt: skip
+    tied = replace(finding, mechanism="parameter", place="h_air", kind="parameter", grade="likely",
+                   tie_set=(h_air, h_oil), joint_probability=0.95, confusable_with=rivals)  # fmt: skip
+    assert tied.title == f"{h_air} or {h_oil}" and replace(tied, tie_set=()).title == h_air
+    found = replace(missing_physics(), verdict="parameter_error", findings=(tied,))
+    assert "not ruled out instead: parameter h_wheel (0.03)" in told(found, "How sure?")
+    ranking = tuple(Ranked(mechanism="parameter", place=place, family="parameter", log_bayes=20.0, probability=p,
+                           laws=(f"parameter {place}",)) for place, p in (("h_air", 0.5), ("h_oil", 0.45)))  # fmt: skip
+    names = finding_charts._names(replace(found, ranking=ranking))
+    assert [(label.replace("<br>", " "), grade) for label, grade, _ in names] == [
+        ("parameter h air", "likely"), ("parameter h oil", "likely")
+    ]  # fmt: skip
 
 
 def test_parameters_far_from_their_priors_are_told_the_farthest_first() -> None:

@@ -40,5 +40,7 @@ def test_watts_are_no_start_temperature(model: NetworkOnGrid, piece: Piece) -> N
 def test_a_display_is_off_by_up_to_half_its_step(ride: dict[str, Array]) -> None:
     recording = recording_of(ride, {name: np.zeros(len(ride["time_s"])) for name in ("oil", "bearing_1")})
     stated = tuple(replace(c, resolution=0.5) if c.name == "oil" else c for c in recording.channels)
-    found = display_noise([replace(recording, channels=stated)], ("oil", "bearing_1", "P_loss"))
-    np.testing.assert_allclose(found, [0.5 / np.sqrt(12.0), 0.0, 0.0])
+    tested = replace(recording, channels=stated)
+    for every in ([tested], [tested, recording], [recording, tested]):  # one whose step is unknown is no finer one
+        found = display_noise(every, ("oil", "bearing_1", "P_loss"))
+        np.testing.assert_allclose(found, [0.5 / np.sqrt(12.0), 0.0, 0.0])
