@@ -32,13 +32,11 @@ from diagnosis.results.result_parts import (
     Finding,
     Fits,
     NotDetectable,
-    PlaceboEvidence,
     PredictedRun,
     Ranked,
-    Repeating,
-    ScaledError,
     law_of,
 )
+from diagnosis.results.robustness import PlaceboEvidence, Repeating, ScaledError
 from diagnosis.setup.inference_setup import InferenceSetup
 from diagnosis.setup.noise import HEAT_FRACTION, HEAT_TIME_S, PARAMETRIC_FRACTION, PARAMETRIC_K, WANDER
 from models.base.types import Array

@@ -14,9 +14,8 @@ from diagnosis.results.result_parts import (
     NO_CLAIM,
     Finding,
     named,
-    repeating_told,
-    robustness_told,
 )
+from diagnosis.results.robustness import repeating_told, robustness_told
 from models.mechanisms import OPEN_FORM
 from models.mechanisms.measurement import FAMILY as MEASUREMENT
 

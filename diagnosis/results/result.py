@@ -20,13 +20,11 @@ from diagnosis.results.result_parts import (
     Fits,
     Location,
     NotDetectable,
-    PlaceboEvidence,
     PredictedRun,
     Ranked,
-    Repeating,
-    ScaledError,
     or_none,
 )
+from diagnosis.results.robustness import PlaceboEvidence, Repeating, ScaledError
 from diagnosis.results.tables import Table, draw_explanations, table_of
 from models.correction.instruments import InputCorrection, SensorCorrection
 from models.simulation.thermal_network import ThermalNetwork

@@ -10,7 +10,8 @@ import pytest
 from diagnosis.report import finding_charts, page
 from diagnosis.results.first_screen import EITHER, VERDICT_TEXT
 from diagnosis.results.result import Diagnosis
-from diagnosis.results.result_parts import Change, Fits, PlaceboEvidence, Ranked, Rival, Switching
+from diagnosis.results.result_parts import Change, Fits, Ranked, Rival, Switching
+from diagnosis.results.robustness import PlaceboEvidence
 from tests.unit.diagnosis.diagnosis_example import consistent, missing_physics, two_effects, unexplained
 
 
