@@ -12,7 +12,7 @@ from diagnosis.decision.settings import LIMITS, Settings
 
 DEFAULT = Settings()
 OPTIONS = {
-    "false_alarm_rate": ("--false-alarm-rate", "P", "How often recordings that agree may be called inconsistent."),
+    "false_alarm_rate": ("--false-alarm-rate", "P", "How often a healthy machine may be called inconsistent: an aim."),
     "matters_K": ("--matters-K", "K", "Change of a temperature from which an effect matters."),
     "matters_W": ("--matters-W", "W", "The same of a heat; 0: by temperatures alone."),
     "claim_from": ("--claim-from", "P", "Probability from which a name is a claim."),

@@ -104,6 +104,8 @@ def build_fmu(
         raise click.UsageError("--platforms is about native FMUs; give it without --target python")
     if fmi is not None and target == "python":
         raise click.UsageError("--fmi is about native FMUs, the Python FMU is FMI 2.0; give it without --target python")
+    if claims_only and correction is None:
+        raise click.UsageError("--claims-only is about --correction; give both")
     definition = load_gearbox(gearbox)
     found = None if correction is None else read_correction(correction, definition)
     found = found.claims_only() if found and claims_only else found

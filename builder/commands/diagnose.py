@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
+from click.core import ParameterSource
 
 from builder.base import console
 from builder.base.decision_settings import settings_options
@@ -112,6 +113,8 @@ def diagnose(
         from models.mechanisms.user_files import check_placeable, load_mechanisms
 
     _check_options(recordings, (*holdout, *baseline), dask, fleet=fleet)
+    if click.get_current_context().get_parameter_source("gearbox") is ParameterSource.DEFAULT:
+        console.err.print(f"note: the machine is taken to be {gearbox!r}, the FZG rig; --gearbox names another one")
     definition = load_gearbox(gearbox)
     catalogue = dict(CATALOGUE)
     for file in mechanisms:

@@ -203,8 +203,7 @@ def simulate(
     a recording that diagnose reads as well, or a part of one (FILE@start..end), or files that follow each other in
     time (FILE+FILE).
     """
-    if len(files) > 2 or (len(files) == 2) == (gearbox is not None):
-        raise InputError("simulate takes FMU CYCLE, or --gearbox NAME|FILE and CYCLE")
+    _check_usage(files, gearbox, correction, claims_only=claims_only)
     named = [Path(name) for name in (gearbox, initial, mapping, correction) if name is not None]
     _check_outputs(output, plot, inputs=[*_read_as_files(files, gearbox), *named])
     given = None if initial in (None, RECORDED) else read_initial(str(initial))
@@ -245,6 +244,13 @@ def _read_as_files(files: tuple[Path, ...], gearbox: str | None) -> tuple[Path, 
     from diagnosis.recordings.as_cycle import files_of
 
     return (*(files[:-1] if gearbox is None else ()), *files_of(files[-1]))
+
+
+def _check_usage(files: tuple[Path, ...], gearbox: str | None, correction: Path | None, *, claims_only: bool) -> None:
+    if len(files) > 2 or (len(files) == 2) == (gearbox is not None):
+        raise InputError("simulate takes FMU CYCLE, or --gearbox NAME|FILE and CYCLE")
+    if claims_only and correction is None:
+        raise InputError("--claims-only is about --correction; give both")
 
 
 def _check_outputs(output: Path, plot: Path | None, inputs: list[Path]) -> None:

@@ -278,7 +278,7 @@ def _row(name: str, found: Diagnosis) -> Row:
     return Row(
         gearbox=name,
         verdict=found.verdict,
-        found="; ".join(f"{f.mechanism} at {f.place} ({f.probability:.2f})" for f in found.findings),
+        found="; ".join(f"{f.grade}: {f.title} ({f.sureness:.2f})" for f in found.findings),
         heat_W=heat,
         p_value=found.p_value,
         rmse_before_K=found.holdout.before,

@@ -74,7 +74,7 @@ def first_screen_of(d: Diagnosis) -> tuple[tuple[str, tuple[str, ...]], ...]:
 def _missing(d: Diagnosis) -> str:
     if d.verdict == "insufficient_data":
         return "These data cannot decide it."
-    why = f"false-alarm rate {100.0 * d.false_alarm_rate:g} %"
+    why = f"false-alarm rate of {100.0 * d.false_alarm_rate:g} % asked for"
     if d.placebo is not None and d.threshold == d.placebo.log_e_value:
         why = f"as much as the baseline '{d.placebo.session}' brings"
     reached = f"evidence {d.log_e_value:.1f} nat, {d.threshold:.1f} needed ({why})"

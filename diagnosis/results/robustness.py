@@ -1,4 +1,4 @@
-"""What the scan would say with other assumptions, and what it says of a healthy machine."""
+"""Evidence of the scan with other assumptions, and in a healthy machine."""
 
 from __future__ import annotations
 

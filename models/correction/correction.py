@@ -314,13 +314,13 @@ class Correction(Section):
         return self.model_copy(update={"findings": tuple(f for f in self.findings if f.grade != "likely")})
 
     def summary(self) -> dict[str, Any]:
-        """Return the names of the findings and a hash of the whole, for a report."""
+        """Return the names of the findings that change the machine, and a hash of the whole, for a report."""
         return {
             "sha256": hashlib.sha256(correction_text(self).encode()).hexdigest(),
             "findings": [
                 f"{'likely ' if f.grade == 'likely' else ''}{f.mechanism} at {f.place}"
                 for f in self.findings
-                if f.grade != "learnt" and f.mechanism not in ("shape", MODEL_ERROR)
+                if not f.of_measurement and f.grade != "learnt" and f.mechanism not in ("shape", MODEL_ERROR)
             ],
         }
 

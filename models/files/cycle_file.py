@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from models.base.errors import InputError
 from models.base.types import Array
 from models.files.cycle import Cycle
-from models.files.table_file import read_table
+from models.files.table_file import KINDS, read_table
 from models.quantities.quantities import GEARBOX_INPUTS, Input
 
 DECIMALS = 6  # of results: a millionth of a kelvin or a watt
@@ -121,6 +121,10 @@ def read_initial(value: str) -> float | dict[str, float]:
     try:
         return float(value)
     except ValueError:
+        if not value.lower().endswith(KINDS) and not Path(value).exists():
+            raise InputError(
+                f"{value}: is no start; a temperature in degC, 'recorded', or a table ({', '.join(KINDS)}) is"
+            ) from None
         table = read_table(Path(value))
     last = {column: table[column].iloc[-1] for column in _temperature_columns(table) if len(table)}
     if not last:

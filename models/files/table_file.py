@@ -289,9 +289,9 @@ def _advice(separator: str, form: TextForm) -> str:
     """Return what to do with a file of another separator."""
     plain = "write it with ',' and decimal points"
     if not form.by_mapping:
-        return plain
+        return f"{plain}, or state in a mapping file (--mapping) how it is written"
     if separator == ",":
-        return 'give csv = { separator = "," } in a mapping file'
+        return 'the mapping file in use states others: give csv = { separator = "," } there, or name another --mapping'
     shown = "\\t" if separator == "\t" else separator
     return (
         f'give csv = {{ separator = "{shown}", decimal = "," }} in a mapping file (decimal = "." where its numbers '

@@ -91,7 +91,7 @@ def test_every_gearbox_has_its_row_and_the_good_ones_their_report(diagnosed: tup
     assert list(table.index) == ["biased", "broken", "empty", "sound"]
     assert sorted(p.name for p in out.iterdir()) == ["biased", "sound", "summary.csv"]
     assert table.loc["biased", "verdict"] == "sensor_fault"
-    assert table.loc["biased", "found"].startswith("sensor_bias at oil")
+    assert table.loc["biased", "found"].startswith("likely: acts like sensor_bias at oil")
     assert list(table.loc[["broken", "empty"], "verdict"]) == ["error", "error"]
     assert "column torque_Nm is missing" in table.loc["broken", "error"]
     assert "no recording to learn from" in table.loc["empty", "error"]

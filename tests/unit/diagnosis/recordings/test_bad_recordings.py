@@ -250,7 +250,8 @@ def test_the_verb_ends_with_status_2_and_leaves_nothing(
 ) -> None:
     path = tmp_path / "run.csv"
     path.write_text(content)
-    monkeypatch.setattr(sys, "argv", ["builder", "diagnose", str(path), "--jobs", "1", "--output", f"{tmp_path}/out"])
+    options = ["--gearbox", "fzg", "--jobs", "1", "--output", f"{tmp_path}/out"]
+    monkeypatch.setattr(sys, "argv", ["builder", "diagnose", str(path), *options])
     with pytest.raises(SystemExit) as end:
         main()
     shown = capsys.readouterr()

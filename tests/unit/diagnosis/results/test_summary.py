@@ -34,7 +34,7 @@ def test_a_baseline_that_raises_the_threshold_is_told_with_it() -> None:
     raised = replace(missing_physics(), placebo=healthy, threshold=38.0)
     assert "38.0 needed (as much as the baseline 'march' brings)" in told(raised, "Is something missing?")
     little = replace(raised, threshold=raised.further_threshold)
-    assert "needed (false-alarm rate 5 %)" in told(little, "Is something missing?")
+    assert "needed (false-alarm rate of 5 % asked for)" in told(little, "Is something missing?")
 
 
 def test_of_an_instrument_and_a_place_with_heat_the_heat_is_told() -> None:

@@ -443,3 +443,10 @@ def test_faults_of_a_python_file(tmp_path: Path, fzg: Gearbox, content: str | No
         path.write_text(content, encoding="utf-8")
     with pytest.raises(InputError, match=f"own.py: .*{says}"):
         check_placeable(load_mechanisms(path), fzg, path)
+
+
+def test_an_fmu_does_not_claim_what_is_wrong_with_the_recorder() -> None:
+    assert "windage at oil" in CORRECTION.words
+    faults = tuple(one.model_copy(update={"of_measurement": True}) for one in CORRECTION.findings)
+    at_fault = CORRECTION.model_copy(update={"findings": faults})
+    assert at_fault.words.startswith("corrected by calibration (")
