@@ -88,8 +88,9 @@ def infer(
         if pairs and second.most > of_class and base.experiment.healthy:
             progress(f"scanning once more, given {pairs[0].label}")
             pairs[0] = replace(pairs[0], left=scan_given(calibration, pairs[0], candidates, log_prior).most)
-        there = judge_alone(calibration, best, second, first.in_class(best.error_class).ahead)
-        alone |= {label: min(alone[label], value) for label, value in there.items()}
+        if not best.of_parameters:  # else the wider prior would stay in what is called nothing
+            there = judge_alone(calibration, best, second, first.in_class(best.error_class).ahead)
+            alone |= {label: min(alone[label], value) for label, value in there.items()}
         progress("fitting nothing from there")
         gained, elsewhere = _nothing_gains(calibration, best)
     for index, candidate in enumerate(first.candidates):
@@ -270,9 +271,8 @@ def _nothing_gains(calibration: Calibration, best: Judged) -> tuple[float, Fit |
     fit, known = best.fit, calibration.in_class(best.error_class)
     found, alone = max(calibration.chosen.log_evidence, known.log_evidence), None
     try:
-        count = len(calibration.fit.z)
-        there = known.fit.experiment.fit(fit.z[:count], fit.trajectories)
-        reached = fit_over_sessions(there, count).log_evidence + float(np.log(best.error_class.prior))
+        there = known.fit.experiment.fit(fit.z_in(known.fit.experiment), fit.trajectories)
+        reached = fit_over_sessions(there, len(there.z)).log_evidence + float(np.log(best.error_class.prior))
         if reached > found:
             found, alone = reached, there
     except (InputError, ArithmeticError, np.linalg.LinAlgError):

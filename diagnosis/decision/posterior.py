@@ -352,8 +352,9 @@ class Posterior:
         """Prior of a name to one of the catalogue, [nat]."""
         if kind != "outside":
             return 0.0
-        names = {one.names for one in self.judged if one.kind == "outside"}
-        return float(np.log(self.odds_unknown * max(len(self._known_names), 1) / max(len(names), 1)))
+        unknown = {one.names for one in self.judged if one.kind == "outside"}
+        known = {one.names for one in self.judged if len(one.effects) == 1 and one.kind not in ("outside", "parameter")}
+        return float(np.log(self.odds_unknown * max(len(known), 1) / max(len(unknown), 1)))
 
     @cached_property
     def ranked(self) -> tuple[tuple[Judged, float], ...]:

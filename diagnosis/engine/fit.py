@@ -381,6 +381,11 @@ class Fit:
             determinants += self.experiment.metric.log_determinant
         return -0.5 * (self.objective + determinants) - float(np.log(np.diag(self.root)).sum())
 
+    def z_in(self, experiment: Experiment) -> Array:
+        """Values of the first unknowns, which an experiment has too, in the priors that they have there."""
+        both = zip(experiment.unknowns, self.experiment.unknowns, self.z.tolist(), strict=False)
+        return np.array([there.z_of(own.value(z)) for there, own, z in both])
+
     @cached_property
     def root(self) -> Array:
         """Lower Cholesky factor of the curvature of half the objective, shape (unknowns, unknowns)."""

@@ -99,9 +99,8 @@ def calibrate_without_error(fit: Fit, plain: Fit, apart: Collection[str] = ()) -
     """
     every = replace(fit.experiment, noise=plain.experiment.noise, random_heat=AS_ASSUMED, filters=None, metric=None)
     counting = without_channels(every, apart) if apart else every
-    usual = zip(every.unknowns, plain.experiment.unknowns, plain.z.tolist(), strict=False)
     nominal = fit.z.copy()
-    nominal[: len(plain.z)] = [mine.z_of(own.value(there)) for mine, own, there in usual]
+    nominal[: len(plain.z)] = plain.z_in(every)
     reached = [one for start in (fit.z, nominal) if (one := _calibrated_from(counting, start, fit)) is not None]
     if not reached:
         raise ArithmeticError("the simulation has no solution without model error")
