@@ -226,7 +226,9 @@ def simulate(
         if picture is not None:
             from builder.drive.plots import plot_cycle
 
-            plot_cycle(picture, columns, title=f"{model.title}: {files[-1].name}", groups=model.groups)
+            plot_cycle(
+                picture, columns, title=f"{model.title}: {files[-1].name}", groups=model.groups, inputs=model.inputs
+            )
         write_table(output, columns)
     _show(columns, model.inputs)
     _print_assumed_inputs(columns, cycle, model.inputs)

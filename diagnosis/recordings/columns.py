@@ -18,6 +18,7 @@ from models.quantities.quantities import TOTAL_LOSS, Quantity, node_of_channel, 
 from models.quantities.units import units_in_files
 
 NEAR = 0.85  # likeness of names that makes one a slip of the other
+SWAPPED = str.maketrans(",.", ".,")
 MOST_NAMED = 12  # unused columns in a note
 FEW = 0.01  # share of rows that may be impossible
 CODES, CODED = 3, 0.5  # so many different impossible values, in up to this share of rows, are codes of a logger
@@ -139,7 +140,7 @@ def auxiliary_numbers(cells: pd.Series, name: str, column: Column, notes: list[s
     return None
 
 
-def _numbers(cells: pd.Series, name: str, problems: Problems) -> Array | None:
+def _numbers(cells: pd.Series, name: str, decimal: str, problems: Problems) -> Array | None:
     """Return a column as numbers, shape (rows,), in the unit of the file; None and a problem if a cell is no number."""
     rows = np.asarray(cells.index) + 1
     if pd.api.types.is_bool_dtype(cells.dtype) or pd.api.types.is_datetime64_any_dtype(cells.dtype):
@@ -147,14 +148,17 @@ def _numbers(cells: pd.Series, name: str, problems: Problems) -> Array | None:
         return None
     if pd.api.types.is_numeric_dtype(cells.dtype):
         return np.array(cells.to_numpy(dtype=np.float64, na_value=np.nan))
-    parsed = pd.to_numeric(cells.astype(object), errors="coerce")
+    texts = cells.astype(object)
+    if decimal == ",":  # a single cell that is no number leaves the others as texts with commas
+        texts = texts.map(lambda cell: cell.translate(SWAPPED) if isinstance(cell, str) else cell)
+    parsed = pd.to_numeric(texts, errors="coerce")
     wrong = np.flatnonzero((parsed.isna() & cells.notna()).to_numpy(dtype=bool))
     if not len(wrong):
         return np.array(parsed.to_numpy(dtype=np.float64, na_value=np.nan))
     cell = str(cells.iloc[int(wrong[0])])[:40]
     advice = "if it means a missing value, name it under 'missing' in a mapping file"
     whole, comma, rest = cell.strip().partition(",")
-    if comma and whole.lstrip("+-").isdigit() and rest.isdigit():
+    if decimal == "." and comma and whole.lstrip("+-").isdigit() and rest.isdigit():
         advice = 'with decimal commas, give csv = { separator = ";", decimal = "," } in a mapping file'
     problems.add(
         f"{name} holds {cell!r} at row {rows[wrong[0]]}, which is no number ({len(wrong)} such cells, "
@@ -169,6 +173,7 @@ def quantity_values(
     column: Column,
     quantity: Quantity,
     unit_of_file: str | None,
+    decimal: str,
     outside: NDArray[np.bool_],
     problems: Problems,
     notes: list[str],
@@ -185,6 +190,8 @@ def quantity_values(
         What the mapping states of it
     unit_of_file : str or None
         Unit that the file itself names
+    decimal : str
+        Sign in numbers that are texts
     outside : array of bool, shape (rows,)
         Rows that the mapping leaves out
 
@@ -193,7 +200,7 @@ def quantity_values(
     Array or None
         None, and a problem, if the column cannot be used
     """
-    values = _numbers(cells, name, problems)
+    values = _numbers(cells, name, decimal, problems)
     rows = np.asarray(cells.index) + 1
     if values is None or not _keep_valid(values, name, column, rows, problems, notes):
         return None
@@ -252,7 +259,10 @@ def _possible(
         return values
     good = values[np.isfinite(values)]
     if not len(good):
-        problems.add(f"{name} has no value in any of its {len(values)} rows; remove the column, or mend it")
+        problems.add(
+            f"{name} has no value in any of its {len(values)} rows; mend it, remove it, or give it "
+            f'quantity = "{IGNORE}" in a mapping file'
+        )
         return values
     if looks_like_kelvin(quantity, good.min(), good.max()):
         problems.add(

@@ -14,6 +14,8 @@ from diagnosis.recordings.time_axis import STANDARD
 from models.base.errors import InputError
 from models.files.table_file import check_file
 
+FARTHEST_STEPS = 1.5  # of the usual time between rows, that a sample may be from its row
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MdfTable:
@@ -85,11 +87,14 @@ def _on_rows_of(base: str, groups: list[pd.DataFrame], path: Path) -> pd.DataFra
     if len(time) == 0:
         raise InputError(f"{path}: channel {base} has no samples")
     middles = 0.5 * (time[1:] + time[:-1])
+    reach = FARTHEST_STEPS * float(np.median(np.diff(time))) if len(time) > 1 else np.inf
     columns = []
     for frame in groups:
         values = frame.astype(np.float64)
         if not np.array_equal(values.index, time):
-            row = np.searchsorted(middles, values.index.to_numpy())
-            values = values.groupby(row).mean().reindex(range(len(time)))
+            at = values.index.to_numpy(dtype=np.float64)
+            row = np.searchsorted(middles, at)
+            near = np.abs(at - time[row]) <= reach
+            values = values[near].groupby(row[near]).mean().reindex(range(len(time)))
         columns.append(values.set_axis(range(len(time))))
     return pd.concat([pd.DataFrame({STANDARD: time}), *columns], axis=1)

@@ -298,14 +298,16 @@ def _with_known_inputs(found: RecordedRows, network: RecordedMachine, gap: float
     partial = []
     for name in found.inputs(network):
         values, column = found.values[name], found.names.get(name, name)
-        filled, known = bridged(time, values, gap if network.inputs[name].required else SLOW_GAPS * gap)
+        is_slow = network.inputs[name].quantity.is_temperature or name == "air_speed"
+        longest = SLOW_GAPS * gap if is_slow else gap
+        filled, known = bridged(time, values, longest)
         found.values[name] = filled
         missing, lost = int(np.isnan(values).sum()), rows[~known]
         if missing:
             left = f"; {len(lost)} rows without are left out ({rows_text(lost)})" if len(lost) else ""
             found.notes.append(
-                f"{column} is missing in {missing} of {len(rows)} rows, bridged where shorter than max_gap_s = "
-                f"{gap:g}{left}"
+                f"{column} is missing in {missing} of {len(rows)} rows, bridged where shorter than {longest:g} s "
+                f"({'ten times ' if is_slow else ''}max_gap_s){left}"
             )
         if known.sum() < FEWEST_ROWS:
             problems.add(
@@ -342,9 +344,11 @@ def _segments(found: RecordedRows, gap: float) -> tuple[slice, ...]:
     segments = tuple(piece for piece in pieces if piece.stop - piece.start > 1)
     if not segments:
         raise InputError(f"{found.path}: no two rows are closer than {gap:g} s (max_gap_s); raise it in a mapping file")
+    alone = len(pieces) - len(segments)
     if len(pieces) > 1:
         cuts = found.rows[[piece.start for piece in pieces[1:]]]
         found.notes.append(
             f"{len(cuts)} gaps longer than {gap:g} s split it into {len(pieces)} pieces (before {rows_text(cuts)})"
+            + (f"; {alone} of a single row are not used" if alone else "")
         )
     return segments

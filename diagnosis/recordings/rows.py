@@ -90,7 +90,8 @@ def read_rows(
             found.names[role.channel], found.roles[role.channel] = name, role
             outside = ~file.in_rows_of(name, role, seconds, first_s)
             quantity = known[role.quantity]
-            values = quantity_values(table[name], name, role, quantity, file.units.get(name), outside, problems, notes)
+            values = quantity_values(table[name], name, role, quantity, file.units.get(name), file.mapping.csv.decimal,
+                                     outside, problems, notes)  # fmt: skip
             if values is not None:
                 found.values[role.channel] = values
     if to_compare and not any(q.startswith("T_") and is_measurable(q, network) for q in found.names):

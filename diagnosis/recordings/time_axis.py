@@ -29,6 +29,7 @@ _ISO = re.compile(
 SHORTEST_STEP = 1e-3  # s; no temperature is recorded faster, so smaller steps are another unit
 LONGEST_STEP = 1800.0  # s; a gearbox warms within an hour or two
 LONGEST_TIME = 1e11  # s since 1970 or since the start: 3000 years
+LONGEST_DATES = 3e9  # s from the first to the last: a century
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -151,14 +152,14 @@ class Clock:
         if pd.api.types.is_datetime64_any_dtype(values.dtype):
             stamps = pd.to_datetime(values, utc=True)
         else:
-            texts = values.astype(str).str.strip()
+            texts = values.astype(str).str.strip().str.replace(",", ".")
             stamps = pd.to_datetime(
                 texts.where(texts.map(lambda text: bool(_ISO.fullmatch(text)))),
                 format="ISO8601",
                 utc=True,
                 errors="coerce",
             )
-        seconds = (stamps - pd.Timestamp(0, tz="UTC")) / pd.Timedelta(seconds=1)
+        seconds = (stamps - pd.Timestamp(0, tz="UTC").as_unit("s")) / pd.Timedelta(seconds=1)
         return np.asarray(seconds.to_numpy(dtype=np.float64, na_value=np.nan), dtype=np.float64)
 
 
@@ -262,9 +263,9 @@ def check_time(values: pd.Series, seconds: Array, clock: Clock, problems: Proble
         _check_zones(values, name, rows, problems)
     steps = np.diff(seconds)
     back, same = np.flatnonzero(steps < 0.0), np.flatnonzero(steps == 0.0)
+    hint = "; local time that is set back in autumn needs a zone, e.g. +02:00" if clock.is_date else ""
     if len(back):
         row = int(back[0])
-        hint = "; local time that is set back in autumn needs a zone, e.g. +02:00" if clock.is_date else ""
         problems.add(
             f"{name} goes back from {values.iloc[row]} to {values.iloc[row + 1]} at row {rows[row + 1]} "
             f"({len(back)} times in all); it must increase from row to row: sort the rows, or split the file where a "
@@ -274,7 +275,7 @@ def check_time(values: pd.Series, seconds: Array, clock: Clock, problems: Proble
         row = int(same[0])
         problems.add(
             f"{name} is {values.iloc[row]} at row {rows[row]} and again at row {rows[row + 1]} ({len(same)} times in "
-            "all); it must increase from row to row: remove the repeated rows"
+            f"all); it must increase from row to row: remove the repeated rows{hint}"
         )
     if not len(back) and not len(same) and len(steps):
         _check_time_unit(name, seconds, float(np.median(steps)), clock, problems)
@@ -289,7 +290,9 @@ def _check_time_unit(name: str, seconds: Array, step: float, clock: Clock, probl
             f"{name} advances by {step:.4g} s from row to row (median), at most {LONGEST_STEP:g} s is useful{hint}"
         )
     elif clock.is_date:
-        return
+        if seconds[-1] - seconds[0] > LONGEST_DATES:
+            years = (seconds[-1] - seconds[0]) / 31557600.0
+            problems.add(f"{name} goes on over {years:.0f} years; leave out the rows whose clock was not set")
     elif latest > LONGEST_TIME:
         problems.add(f"{name} reaches {latest:.4g} s; were milliseconds meant? {fix}")
     elif step < SHORTEST_STEP:

@@ -55,11 +55,14 @@ class Shown:
     ----------
     unscored : sequence of (from, to)
         Stretches that served to find start temperatures, [s]
+    weights : Array, shape (rows,)
+        Time that each row stands for in its part, [s]
     """
 
     title: str
     run: PredictedRun
     unscored: Sequence[tuple[float, float]]
+    weights: Array
 
     @property
     def scale(self) -> tuple[float, str]:
@@ -185,7 +188,8 @@ def _joined(title: str, pieces: Sequence[PredictedRun]) -> Shown:
         calibrated=joined("calibrated"), after=joined("after"), counts_from_s=first.counts_from_s, start=first.start,
     )  # fmt: skip
     starts = [(float(piece.time[0]), piece.counts_from_s) for piece in pieces if len(piece.time)]
-    return Shown(title=title, run=run, unscored=[(a, b) for a, b in starts if b > a])
+    weights = np.concatenate([stands_for(piece.time) for piece in pieces])
+    return Shown(title=title, run=run, unscored=[(a, b) for a, b in starts if b > a], weights=weights)
 
 
 def _colours(diagnosis: Diagnosis, channels: Sequence[str]) -> dict[str, str]:
@@ -276,7 +280,7 @@ def _line(
 def _errors(one: Shown, channel: str, stages: Sequence[tuple[str, str]]) -> list[float]:
     """RMSE of the rows that count, by stage."""
     rows = one.counted()
-    weights = stands_for(one.run.time)[rows]
+    weights = one.weights[rows]
     return [
         float(rmse((getattr(one.run, look)[channel] - one.run.measured[channel])[rows, None], weights)[0])
         for _, look in stages

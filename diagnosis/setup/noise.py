@@ -37,11 +37,10 @@ def loss_noise(recordings: Sequence[Recording]) -> tuple[float, float]:
             if is_total_loss(channel.name):
                 for rows in recording.segments:
                     values = channel.values[rows]
+                    values = values[np.isfinite(values)]
                     seconds.append(np.diff(values, 2))
                     levels.append(values[1:-1])
     second, level = np.concatenate(seconds), np.abs(np.concatenate(levels))
-    good = np.isfinite(second) & np.isfinite(level)
-    second, level = second[good], level[good]
     if len(second) < FEWEST_ROWS:
         return LOWEST_SD_W, DEFAULT_LOSS_RELATIVE
     classes = np.array_split(np.argsort(level), 5)

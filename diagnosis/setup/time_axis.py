@@ -21,9 +21,9 @@ def start_times(recordings: Sequence[Recording]) -> dict[str, float]:
     dict of str to float
         From 0
     """
-    if all(recording.start is not None for recording in recordings):
-        first = min((recording.from_s for recording in recordings), default=0.0)
-        return {recording.name: recording.from_s - first for recording in recordings}
+    dates = {recording.name: recording.start.timestamp() for recording in recordings if recording.start is not None}
+    if all(recording.name in dates for recording in recordings):
+        return {name: date - min(dates.values()) for name, date in dates.items()}
     result: dict[str, float] = {}
     now = 0.0
     for recording in recordings:

@@ -16,8 +16,6 @@ from models.files.cycle import Cycle
 from models.files.table_file import KINDS, read_table
 from models.quantities.quantities import GEARBOX_INPUTS, Input
 
-DECIMALS = 6  # of results: a millionth of a kelvin or a watt
-
 
 @dataclass(frozen=True)
 class RecordedStart:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from diagnosis.forward.free_running import free_running
-from diagnosis.forward.grid import FREE_S, INTERVAL_S, LONGEST, SAMPLES, Piece, pieces, stands_for
+from diagnosis.forward.grid import FREE_S, INTERVAL_S, LONGEST, SAMPLES, Piece, pieces, stands_for, white_sd
 from diagnosis.forward.network_on_grid import NetworkOnGrid
 from diagnosis.forward.recurrence import lagged
 from diagnosis.recordings.recording import Channel, Recording
@@ -190,3 +190,17 @@ def test_the_first_minutes_of_a_piece() -> None:
     assert early.time[-1] <= 600.0 < piece.time[len(early.time)]
     assert len(early.steps) == len(early.samples) == len(early.measured) - 1 == len(early.counts) - 1
     assert len(piece.until(0.0).steps) == 1
+
+
+def test_a_pulsating_input_keeps_its_mean() -> None:
+    time = np.arange(0.0, 3601.0, 1.0)
+    for phase in range(4):  # on for 1 s of 4 s, which the parts of an interval would alias
+        pulses = np.where((time.astype(int) + phase) % 4 == 0, 2000.0, 0.0)
+        piece = piece_of(time, speed=pulses, even=True)
+        np.testing.assert_allclose(piece.inputs[:, 0], 500.0, atol=1e-9)
+
+
+def test_noise_of_a_channel_with_gaps_is_that_of_its_values() -> None:
+    values = np.random.default_rng(0).normal(0.0, 0.3, 4000)
+    sparse = np.where(np.arange(4000) % 5 == 0, values, np.nan)
+    assert white_sd(sparse) == pytest.approx(0.3, rel=0.1)

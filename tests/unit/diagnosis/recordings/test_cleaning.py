@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from diagnosis.recordings.cleaning import bridged, dropouts, outliers, resolution_of, stuck_rows
+from diagnosis.recordings.cleaning import bridged, dropouts, outliers, resolution_of, steady_rows, stuck_rows
 
 
 def test_a_slowly_sampled_input_is_no_row_of_holes() -> None:
@@ -65,3 +65,14 @@ def test_the_resolution_is_found(quantum: float) -> None:
     assert resolution_of(values) == pytest.approx(quantum, rel=1e-5)
     assert resolution_of(values[:1]) == 0.0
     assert resolution_of(np.concatenate([values, values + 1e-9])) == pytest.approx(quantum, rel=1e-4)  # converted twice
+
+
+def test_a_hole_in_an_input_makes_no_other_row_steady() -> None:
+    speed = np.full(400, 500.0)
+    speed[100:102] = 3000.0
+    whole = steady_rows({"speed": speed})
+    speed[350] = np.nan
+    holed = steady_rows({"speed": speed})
+    assert not whole[100] and whole[300]
+    np.testing.assert_array_equal(holed[:300], whole[:300])
+    assert not holed[350]

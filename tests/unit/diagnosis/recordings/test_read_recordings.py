@@ -14,6 +14,7 @@ import pandas as pd
 import pytest
 
 import diagnosis
+from diagnosis.recordings.mdf import _on_rows_of
 from diagnosis.recordings.read import named_apart, read_by_role, read_recordings
 from diagnosis.recordings.recording import Recording
 from diagnosis.recordings.shared_rows import check_shared_rows
@@ -306,6 +307,7 @@ def test_gaps_split_and_short_holes_are_bridged(tmp_path: Path, network: Thermal
     assert [(rows.start, rows.stop) for rows in recording.segments] == [(0, 50), (50, 99), (99, 159)]
     assert all(np.isfinite(values).all() for values in recording.inputs.values())
     assert any("torque_Nm is missing in 21 of 180 rows" in n and "rows 51-71" in n for n in recording.notes)
+    assert any("bridged where shorter than 60 s (max_gap_s)" in n for n in recording.notes)
     longer = read(tmp_path / "run.csv", network, max_gap_s=600.0)
     assert longer.segments == (slice(0, 180),)
 
@@ -488,3 +490,13 @@ def test_diagnose_is_a_function_whatever_is_imported_first() -> None:
 def test_a_wrong_name_of_the_package_is_an_attribute_error() -> None:
     with pytest.raises(AttributeError, match="no attribute 'diagnos'"):
         diagnosis.diagnos  # noqa: B018
+
+
+def test_samples_far_from_a_row_are_in_none() -> None:
+    """The speed channel of an MDF file pauses, the temperature goes on."""
+    time = np.concatenate([np.arange(0.0, 100.0), np.arange(700.0, 800.0)])
+    speed = pd.DataFrame({"speed_rpm": np.full(len(time), 1000.0)}, index=time)
+    every = np.arange(0.0, 1000.0, 0.5)
+    oil = pd.DataFrame({"T_oil_degC": 20.0 + 0.1 * every}, index=every)
+    table = _on_rows_of("speed_rpm", [speed, oil], Path("run.mf4"))
+    np.testing.assert_allclose(table["T_oil_degC"], 20.0 + 0.1 * time, atol=0.1)

@@ -29,3 +29,9 @@ def test_dates_count_if_all_have_them() -> None:
     dated = [made("a", 100.0, 5000.0), made("b", 100.0, 1000.0)]
     assert start_times(dated) == {"a": 4000.0, "b": 0.0}
     assert start_times([*dated, made("c", 1.0)]) == {"a": 0.0, "b": 100.0, "c": 200.0}
+
+
+def test_a_date_of_the_start_counts_where_times_begin_at_0() -> None:
+    """As in MDF files."""
+    first, second = (replace(made(name, 100.0, at), from_s=0.0) for name, at in (("a", 1000.0), ("b", 5000.0)))
+    assert start_times([first, second]) == {"a": 0.0, "b": 4000.0}
