@@ -56,7 +56,7 @@ class Shown:
     unscored : sequence of (from, to)
         Stretches that served to find start temperatures, [s]
     weights : Array, shape (rows,)
-        Time that each row stands for in its part, [s]
+        Of every row in a mean over its part, [s]
     """
 
     title: str

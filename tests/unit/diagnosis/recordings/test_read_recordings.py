@@ -14,7 +14,6 @@ import pandas as pd
 import pytest
 
 import diagnosis
-from diagnosis.recordings.mdf import _on_rows_of
 from diagnosis.recordings.read import named_apart, read_by_role, read_recordings
 from diagnosis.recordings.recording import Recording
 from diagnosis.recordings.shared_rows import check_shared_rows
@@ -490,13 +489,3 @@ def test_diagnose_is_a_function_whatever_is_imported_first() -> None:
 def test_a_wrong_name_of_the_package_is_an_attribute_error() -> None:
     with pytest.raises(AttributeError, match="no attribute 'diagnos'"):
         diagnosis.diagnos  # noqa: B018
-
-
-def test_samples_far_from_a_row_are_in_none() -> None:
-    """The speed channel of an MDF file pauses, the temperature goes on."""
-    time = np.concatenate([np.arange(0.0, 100.0), np.arange(700.0, 800.0)])
-    speed = pd.DataFrame({"speed_rpm": np.full(len(time), 1000.0)}, index=time)
-    every = np.arange(0.0, 1000.0, 0.5)
-    oil = pd.DataFrame({"T_oil_degC": 20.0 + 0.1 * every}, index=every)
-    table = _on_rows_of("speed_rpm", [speed, oil], Path("run.mf4"))
-    np.testing.assert_allclose(table["T_oil_degC"], 20.0 + 0.1 * time, atol=0.1)

@@ -1,0 +1,20 @@
+"""Channels of an MDF file on the rows of one of them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from diagnosis.recordings.mdf import _on_rows_of
+
+
+def test_samples_far_from_a_row_are_in_none() -> None:
+    """The speed channel of an MDF file pauses, the temperature goes on."""
+    time = np.concatenate([np.arange(0.0, 100.0), np.arange(700.0, 800.0)])
+    speed = pd.DataFrame({"speed_rpm": np.full(len(time), 1000.0)}, index=time)
+    every = np.arange(0.0, 1000.0, 0.5)
+    oil = pd.DataFrame({"T_oil_degC": 20.0 + 0.1 * every}, index=every)
+    table = _on_rows_of("speed_rpm", [speed, oil], Path("run.mf4"))
+    np.testing.assert_allclose(table["T_oil_degC"], 20.0 + 0.1 * time, atol=0.1)
