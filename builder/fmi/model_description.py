@@ -19,7 +19,7 @@ from models.quantities.units import UNITS, conversion, find_unit
 DEPENDENCY_KINDS = ("constant", "tunable")
 INITIAL_DEPENDENCY_KINDS = ("constant",)  # parameters may change before the simulation starts
 LOG_CATEGORIES: Mapping[str, str] = {
-    "logStatusWarning": "The operating point left the range that the networks were trained on",
+    "logStatusWarning": "Done, but look at it: outside the range of the networks, or a value that does not count",
     "logStatusDiscard": "A step was refused; the state is unchanged",
     "logStatusError": "A call was not allowed, or its values cannot be used",
     "logStatusFatal": "The FMU is damaged or incomplete",

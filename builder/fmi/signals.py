@@ -348,7 +348,7 @@ class _Table:
         for given in (s for s in expression.free_symbols if s.name in self.inputs):
             factors = {s.name for s in sp.diff(expression, given).free_symbols}
             if factors <= set(self.parameters):
-                kinds[fmi_name(given.name)] = "tunable" if factors else "constant"
+                kinds[self.network.inputs[given.name].quantity.fmi] = "tunable" if factors else "constant"
         return kinds
 
     def _direct(self, expression: sp.Expr) -> tuple[tuple[str, ...], tuple[str, ...]]:

@@ -165,11 +165,12 @@ class NetworkSpec:
 
     @property
     def sampled(self) -> tuple[LossTerm, ...]:
-        """Terms that the full model is sampled for: of a shared network the one on the slowest shaft.
+        """Terms that the full model is sampled for: of a shared network the one on the slowest shaft that has a load.
 
         Its speed stays above the full model's lowest speed over all of the range.
         """
-        return (min(self.terms, key=lambda term: term.inputs[0].factor),) if self.shared else self.terms
+        loaded = [term for term in self.terms if all(i.factor > 0.0 for i in term.inputs)]
+        return (min(loaded or self.terms, key=lambda term: term.inputs[0].factor),) if self.shared else self.terms
 
     @property
     def inputs(self) -> tuple[str, ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -80,7 +81,8 @@ def _value(law: sp.Expr, network: ThermalNetwork, values: Mapping[str, float]) -
     laws = {symbol(name): derived for name, derived in network.derived.items()}
     laws |= {symbol(f"T_{n.name}"): n.temperature for n in network.nodes if n.temperature is not None}
     numbers = {symbol(name): sp.Float(value) for name, value in values.items()}
-    return float(law.xreplace(laws).xreplace(laws).xreplace(numbers))
+    value = complex(law.xreplace(laws).xreplace(laws).xreplace(numbers))
+    return value.real if value.imag == 0.0 else math.nan
 
 
 def _nodes(gearbox: Gearbox, network: ThermalNetwork) -> Grid:

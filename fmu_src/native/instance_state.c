@@ -179,11 +179,15 @@ static Status add_derivatives(Instance *self, unsigned known, double seed, const
                               size_t n_unknowns, double sums[]) {
     static const double PLACES[] = {1.0, -1.0, 2.0, -2.0};
     static const double WEIGHTS[] = {2.0 / 3.0, -2.0 / 3.0, -1.0 / 12.0, 1.0 / 12.0};
+    const Variable *variable = &model_variables[known];
     const double value = self->values[known];
-    const double h = RELATIVE_STEP * fmax(fabs(value), model_variables[known].nominal);
+    const double h = RELATIVE_STEP * fmax(fabs(value), variable->nominal);
+    /* Near a bound the places move inside: beyond it a value is held, and the slope would come out too small. */
+    double centre = fmax(value, variable->minimum + 2.0 * h);
     Status status = STATUS_OK;
+    if (centre > variable->maximum - 2.0 * h) centre = variable->maximum - 2.0 * h;
     for (int i = 0; i < 4 && status == STATUS_OK; i++)
-        status = add_unknowns_at(self, known, value + PLACES[i] * h, unknowns, n_unknowns, WEIGHTS[i] * seed / h, sums);
+        status = add_unknowns_at(self, known, centre + PLACES[i] * h, unknowns, n_unknowns, WEIGHTS[i] * seed / h, sums);
     self->values[known] = value;
     self->model.changed |= CHANGED_INPUTS | CHANGED_PARAMETERS;
     return status;

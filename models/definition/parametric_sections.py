@@ -15,12 +15,21 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace
+from keyword import iskeyword
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from models.base.errors import did_you_mean
-from models.definition.sections import FluidTemperature, Name, OneOrMore, Section, Text, Viscosity
+from models.definition.sections import (
+    FluidTemperature,
+    Name,
+    OneOrMore,
+    Section,
+    Text,
+    Viscosity,
+    check_viscosity_points,
+)
 from models.formulas.oil import TYPICAL_OIL, d341_constants
 from models.quantities.definition_units import between
 from models.quantities.quantities import GEARBOX_INPUTS, INPUT_KINDS, Input, named_input, usual_inputs
@@ -47,7 +56,10 @@ class Surroundings(Section):
 class Lubricant(Section):
     """``[oil]``: two points of its viscosity, known or assumed."""
 
-    viscosity_points: tuple[tuple[FluidTemperature, Viscosity], tuple[FluidTemperature, Viscosity]]
+    viscosity_points: Annotated[
+        tuple[tuple[FluidTemperature, Viscosity], tuple[FluidTemperature, Viscosity]],
+        AfterValidator(check_viscosity_points),
+    ]
 
 
 class NamedInput(Section):
@@ -253,9 +265,12 @@ def _names(definition: ParametricDefinition) -> Iterator[str]:
     for name, count in Counter([*parts, *(b.name for b in definition.boundary)]).items():
         if count > 1:
             yield f"name '{name}' is given {count} times; every part and boundary needs its own"
-    for name, count in Counter(loss.name for loss in definition.loss).items():
-        if count > 1:
-            yield f"loss: '{name}' is given {count} times"
+    for what, tables in (("loss", definition.loss), ("heat", definition.heat)):
+        repeated = Counter(one.name for one in tables)
+        yield from (f"{what}: '{name}' is given {count} times" for name, count in repeated.items() if count > 1)
+    signals = (*(given.name for given in definition.input), *(p.name for p in definition.parameter))
+    yield from (f"'{name}' has a meaning in formulas; give the input or parameter another name" for name in signals
+                if iskeyword(name) or name in ("pi", "math", "numpy"))  # fmt: skip
     for heat in definition.heat:
         for part in heat.parts:
             if part not in parts:

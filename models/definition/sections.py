@@ -9,9 +9,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Annotated, Any, Literal, Self, TypeVar, get_args
 
+import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, StringConstraints, model_validator
 
 from models.formulas.geometry import GearPair, gear_pair
+from models.formulas.oil import kinematic_viscosity_d341
 from models.quantities.definition_units import InSI, between, in_si
 
 T = TypeVar("T")
@@ -115,6 +117,19 @@ class Gold(Section):
     t: Annotated[float, between(0.05, 0.3)]
 
 
+def check_viscosity_points(points: Sequence[tuple[float, float]]) -> Sequence[tuple[float, float]]:
+    """Two points (temperature, kinematic viscosity) of an oil, refused unless the hotter one is the thinner one."""
+    (cold, nu_cold), (hot, nu_hot) = sorted(points)
+    if cold == hot:
+        raise ValueError(f"viscosity_points are both at {hot:g} degC; two different temperatures are needed")
+    if nu_hot >= nu_cold:
+        raise ValueError(
+            f"viscosity_points: {nu_hot:g} mm2/s at {hot:g} degC is not below {nu_cold:g} mm2/s at {cold:g} degC; the "
+            "hotter oil must be the thinner one"
+        )
+    return points
+
+
 class Fluid(Section):
     """The properties of an oil, whatever gearbox it is in."""
 
@@ -149,14 +164,14 @@ class Fluid(Section):
     @model_validator(mode="after")
     def _viscosity_falls(self) -> Self:
         if self.viscosity_points is not None:
-            (cold, nu_cold), (hot, nu_hot) = sorted(self.viscosity_points)
-            if cold == hot:
-                raise ValueError(f"viscosity_points are both at {hot:g} degC; two different temperatures are needed")
-            if nu_hot >= nu_cold:
-                raise ValueError(
-                    f"viscosity_points: {nu_hot:g} mm2/s at {hot:g} degC is not below {nu_cold:g} mm2/s at "
-                    f"{cold:g} degC; the hotter oil must be the thinner one"
-                )
+            check_viscosity_points(self.viscosity_points)
+        if self.d341 is not None:
+            with np.errstate(over="ignore"):
+                nu = {T: float(kinematic_viscosity_d341(T, m=self.d341.m, n=self.d341.n)) for T in (40.0, 100.0)}
+            for T, value in nu.items():
+                if not 0.5 <= value <= 1e5:
+                    raise ValueError(f"d341: m = {self.d341.m:g}, n = {self.d341.n:g} give {value:.3g} mm2/s at {T:g} "
+                                     "degC; 0.5 to 1e5 is plausible")  # fmt: skip
         return self
 
 

@@ -14,7 +14,7 @@ LOWEST_BRACKET = 5.0  # the straight line in temperature would turn negative abo
 
 
 def seal_loss_linke(*, d_mm: float, n_rpm: Numeric, T_oil: Numeric, nu_40: float, c_T: float = 1.6) -> Array:
-    r"""Power loss of one radial shaft seal after Linke (ISO/TR 14179-2).
+    r"""Power loss of one radial shaft seal after Linke.
 
     .. math:: P_{VD} = [145 - c_T \vartheta + 350 \lg\lg(\nu_{40} + 0.8)]\, d^2 n \cdot 10^{-7}
 
@@ -29,7 +29,7 @@ def seal_loss_linke(*, d_mm: float, n_rpm: Numeric, T_oil: Numeric, nu_40: float
     nu_40 : float
         Kinematic viscosity at 40 degC (ISO VG), [mm^2/s]
     c_T : float
-        Temperature coefficient, [1/K]; 1.6 in the standard, 1.0 as printed in the paper's eq. (10)
+        Temperature coefficient, [1/K]; 1.6 after Linke, 1.0 as printed in the paper's eq. (10)
 
     Returns
     -------
@@ -38,15 +38,15 @@ def seal_loss_linke(*, d_mm: float, n_rpm: Numeric, T_oil: Numeric, nu_40: float
 
     References
     ----------
-    ISO/TR 14179-2:2001, after Linke, "Stirnradverzahnung".
+    Linke, "Stirnradverzahnung"; gear programs list it apart from ISO/TR 14179-1 and -2.
 
     Examples
     --------
-    The two seals of the FZG rig at 8.3 m/s, in the standard's and in the printed form:
+    The two seals of the FZG rig at 8.3 m/s, in Linke's and in the printed form:
 
-    >>> standard, printed = (sum(float(seal_loss_linke(d_mm=d, n_rpm=n, T_oil=60.0, nu_40=32.0, c_T=c))
+    >>> linke, printed = (sum(float(seal_loss_linke(d_mm=d, n_rpm=n, T_oil=60.0, nu_40=32.0, c_T=c))
     ...                          for d, n in ((24.0, 2165.7), (54.0, 1443.8))) for c in (1.6, 1.0))
-    >>> round(standard, 2), round(printed, 2)
+    >>> round(linke, 2), round(printed, 2)
     (61.25, 80.9)
     """
     bracket = 145.0 - c_T * np.asarray(T_oil) + 350.0 * np.log10(np.log10(nu_40 + 0.8))
@@ -70,7 +70,7 @@ def seal_loss_iso_simple(*, d_mm: float, n_rpm: Numeric) -> Array:
 
     References
     ----------
-    ISO/TR 14179-1:2001.
+    ISO/TR 14179-2:2001.
 
     Examples
     --------

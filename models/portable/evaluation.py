@@ -251,7 +251,8 @@ class NetworkSystem:
 
     def _stacked(self, values: tuple[Any, ...], shape: tuple[int, ...]) -> Array:
         if not self.vector:
-            return np.array(values, dtype=float)
+            # A broken power of a negative number is complex in plain Python, and no number in numpy and C.
+            return np.array([np.nan if isinstance(value, complex) else value for value in values], dtype=float)
         if not values:
             return np.zeros((*shape, 0))
         return np.stack([np.broadcast_to(np.asarray(value, dtype=float), shape) for value in values], axis=-1)

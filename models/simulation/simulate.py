@@ -133,7 +133,13 @@ def simulate(
     states[..., 0, :] = state.states
     for row in range(n_rows - 1):
         t = float(cycle.time[row])
-        state = solver.advance(system, state, t, float(cycle.time[row + 1]) - t, table[row], table[row + 1])
+        try:
+            state = solver.advance(system, state, t, float(cycle.time[row + 1]) - t, table[row], table[row + 1])
+        except (ArithmeticError, ValueError) as error:
+            raise InputError(
+                f"the temperatures from {t:g} s on cannot be calculated ({error}); check the definition's laws and the "
+                "cycle's units"
+            ) from error
         states[..., row + 1, :] = state.states
         heat_in[..., row + 1], heat_out[..., row + 1, :] = state.heat_in, state.heat_out
         if progress is not None and (row % 50 == 49 or row == n_rows - 2):

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal, get_args
+from typing import Literal
 
 import sympy as sp
 
@@ -17,10 +17,8 @@ from models.network.laws import Parameter, symbol
 from models.simulation.thermal_network import ExtraState, ThermalNetwork
 
 Kind = Literal["source", "link", "loss_factor", "link_factor", "signal", "sensor"]
-KINDS: tuple[Kind, ...] = get_args(Kind)
 FACTORS: tuple[Kind, ...] = ("loss_factor", "link_factor")
 Form = Literal["shift", "lag", "clock", "stuck", "swapped"]
-FORMS: tuple[Form, ...] = get_args(Form)
 DIGITS = 4  # of the numbers in a printed equation
 LETTERS = {
     "speed": "n", "torque": "M", "time": "t",

@@ -158,6 +158,16 @@ def test_directional_derivatives_are_those_of_the_outputs(host: Host, known: str
     assert any(found) == (known != "air_speed")  # which acts on the temperatures of later moments only
 
 
+@pytest.mark.parametrize("bound", ["min", "max"])
+def test_derivatives_at_a_bound_are_those_inside(host: Host, bound: str) -> None:
+    host.step(10.0)
+    at = float(getattr(host.fmu.variables["factor.mesh"], bound))
+    host.set_all({"factor.mesh": at})
+    loss = host.get("loss.mesh_sliding")[0]
+    assert derivative(host, ["loss.mesh_sliding"], "factor.mesh")[0] == pytest.approx(loss / at, rel=1e-9)
+    assert host.get("factor.mesh")[0] == at and host.get("loss.mesh_sliding")[0] == loss
+
+
 def test_derivatives_are_exact_to_ten_digits_where_they_are_known(host: Host) -> None:
     host.step(10.0)
     loss, power = host.get("loss.mesh_sliding")[0], 300.0 * 150.0

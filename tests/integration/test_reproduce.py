@@ -34,7 +34,7 @@ Table 2: reproduced
     values_equal_the_print: reproduced
 Eqs. (6), (10): differs
     eq_6_is_below_the_power_transmitted: differs
-    eq_10_is_the_standards: differs
+    eq_10_is_linkes: differs
 Fig. 3: reproduced
     underestimates_at_high_speed_and_low_torque: reproduced
     underestimation_stays_constant_over_torque: reproduced

@@ -78,6 +78,13 @@ def test_bearings_of_two_kinds_get_a_network_each():
     assert specs[2].lower[1] == pytest.approx(2.0 * 1.5 * 9.80665)
 
 
+def test_a_bearing_without_load_is_learnt_from_the_others():
+    floating = FZG.with_values({"bearing.2.load_share": 0.0, "bearing.3.load_share": 1.0})
+    spec = next(s for s in network_specs(floating.losses(), PRESETS["paper"].domain) if s.name.startswith("bearing"))
+    rows = np.random.default_rng(0).uniform(spec.lower, spec.upper, (50, len(spec.lower)))
+    assert np.isfinite(spec.losses(rows)).all() and (spec.losses(rows) > 0.0).all()
+
+
 def test_dry_gears_do_not_churn():
     dry = FZG.with_values({"oil.level_below_axis_mm": 70.0})
     result = train_surrogate(dry, preset=replace(PRESETS["default"], **TINY), samples=60)

@@ -97,6 +97,8 @@ FAULTS = [
     ("[oil]", "[oil]\nviscosity_points = [[40.0, 9.0], [40.0, 5.45]]", "oil: viscosity_points are both at 40 degC"),
     ("[oil]", "[oil]\nviscosity_points = [[313.15, 9.0], [100.0, 5.0]]", "oil.viscosity_points #1 #1: 313.15 kelvin"),
     ("[oil]", "[oil]\nd341 = { m = 9.5, n = 3.75 }\nviscosity_points = [[40.0, 9.0], [100.0, 5.0]]", "oil: not both"),
+    ("[oil]", "[oil]\nd341 = { m = 4.0, n = 7.0 }", "d341: m = 4, n = 7 give 0.3 mm2/s at 40 degC"),
+    ("[oil]", "[oil]\nd341 = { m = 16.0, n = 1.0 }", "d341: m = 16, n = 1 give inf mm2/s at 40 degC"),
     ("[oil]", "[oil]\ngold = { s = 0.139, t = 0.9904 }", "oil.gold.s: 0.139 is below 2"),
     ("[oil]", '[oil]\nname = "x"\npressure_viscosity = "roelands"\ngold = 1', "oil.gold: must be a table, not 1"),
     ("surface_to_air = false", "length_in_air_mm = 50.0", "shaft 'shaft_1': length_in_air_mm is 50, set it to true"),

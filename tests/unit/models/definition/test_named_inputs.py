@@ -89,6 +89,7 @@ def rig(text: str = RIG) -> Gearbox:
     ('heat_W = "1000.0 * heater"', 'heat_W = "1000.0 * "', "heat 'heater'.heat_W: '1000.0 * ' is not an expression"),
     ('part = "body"', 'part = "bdy"', "heat 'heater'.part: there is no part 'bdy'; did you mean 'body'"),
     ('name = "heater"\nquantity', 'name = "T_body"\nquantity', "'T_body' names several inputs, parameters or nodes"),
+    ('name = "heater"\nquantity', 'name = "lambda"\nquantity', "'lambda' has a meaning in formulas; give the input"),
     ('input = "T_coolant"', 'input = "T_cool"', "'T_cool' is no [[input]]; declare it, or give"),
     ('input = "T_coolant"', 'input = "heater"', "boundary 'coolant'.input: 'heater' is a power, not a temperature"),
     ('name = "heater"\nquantity = "power"', 'name = "speed"\nquantity = "power"', "speed is always a speed in 1/min"),
