@@ -109,7 +109,7 @@ WRONG = {
         "fake.fmu cycle.csv": "fake.fmu: is not an FMU",
         "zip.fmu cycle.csv": "zip.fmu: is not an FMU",
         "FMU cycle.csv --claims-only": "--claims-only is about --correction",
-        "FMU cycle.csv --initial recored": "recored: is no start; a temperature in degC, 'recorded', or a table",
+        "FMU cycle.csv --initial warm": "warm: is no start; a temperature in degC, 'recorded', or a table",
         "FMU cycle.csv --initial 293": "if kelvin are meant, give 19.85",
         "FMU cycle.csv --initial T_some.csv": "start temperatures are missing for: housing_lower",
         "FMU cycle.csv --correction found.toml": "was not built with found.toml, which changes the physics",
