@@ -26,6 +26,7 @@ def test_the_mapping_of_the_examples_reads_a_recording_from_a_bench(tmp_path: Pa
     })  # fmt: skip
     text = table.astype({"Sumpf": object})
     text.loc[7, "Sumpf"] = "---"
+    text["Sumpf"] = text["Sumpf"].astype(str).str.replace(".", ",")
     text.to_csv(tmp_path / "run.csv", sep=";", decimal=",", index=False)
     shutil.copy(EXAMPLES / "mapping.toml", tmp_path / "mapping.toml")
     (recording,) = read_recordings([tmp_path / "run.csv"], fzg.network())

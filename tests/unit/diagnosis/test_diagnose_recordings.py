@@ -22,7 +22,7 @@ def test_all_is_judged_once_more_from_a_better_basin(
     fzg: Gearbox, monkeypatch: pytest.MonkeyPatch, seen_from: list[str], again: float, judged: list[str], reported: str
 ) -> None:
     def calibration(name: str, log_evidence: float) -> Any:
-        return SimpleNamespace(name=name, chosen=SimpleNamespace(log_evidence=log_evidence), near=name, of_others=None)
+        return SimpleNamespace(name=name, chosen=SimpleNamespace(log_evidence=log_evidence), of_others=None)
 
     found: list[str] = []
 
@@ -38,7 +38,7 @@ def test_all_is_judged_once_more_from_a_better_basin(
         "recalibrate": lambda *_: calibration("second", again),
         "candidates_of": lambda *_: (), "log_prior": lambda *_: (), "outside_of": lambda *_: (),
         "infer": infer, "faulty_channels": lambda *_: (), "decide": lambda *_: (),
-        "assemble": lambda setup, experiment, posterior, *_, **given: (posterior.name, given["near"]),
+        "assemble": lambda setup, experiment, posterior, *_, **given: (posterior.name, given["calibration"].name),
     }  # fmt: skip
     for name, stage in stages.items():
         monkeypatch.setattr(diagnose_recordings, name, stage)

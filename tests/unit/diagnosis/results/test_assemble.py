@@ -42,7 +42,7 @@ from models.mechanisms import CATALOGUE, Scale
 from tests.unit.diagnosis.inference_example import recording_of
 
 NODES = ("oil", "housing_lower", "bearing_1", "pinion")
-WINDAGE_W, NOISE_K, DATE_S = 60.0, 0.1, 2400.0
+WINDAGE_W, NOISE_K, DATE_S = 65.0, 0.1, 2400.0
 BEFORE, RECORDED, AFTER_S = "earlier", "made", 5000.0  # names of recordings, and start of the second one
 
 
