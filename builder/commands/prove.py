@@ -31,7 +31,7 @@ NOT_REAL = (*ONLY_NEW, "recordings", "truth", "answers", "continued")
 @click.option("--cases", type=click.IntRange(min=1, max=10_000), default=None, metavar="N",
               help="Number of cases.  [default: 247 (own), 60 (zoo)]")  # fmt: skip
 @click.option("--seed", type=click.IntRange(min=0, max=2**32 - 1), default=None, metavar="N",
-              help="Seed of the cases.  [default: 2043 (own), 3002 (zoo), which nobody has opened]")  # fmt: skip
+              help="Seed of the cases.  [default: 2044 (own), 3003 (zoo), which nobody has opened]")  # fmt: skip
 @click.option("--recordings", type=click.Path(path_type=Path, file_okay=False, exists=True), default=None,
               metavar="DIR", help="Recordings that exist, a folder per case, in place of --plant.")  # fmt: skip
 @click.option("--truth", type=click.Path(path_type=Path, exists=True), default=None, metavar="FILE|DIR",
