@@ -15,7 +15,7 @@ from models.portable import solver
 from models.portable.evaluation import NoLosses
 from models.portable.surrogate import KELVIN, SurrogateLosses
 from models.simulation.result import Result
-from models.simulation.simulate import evaluate, initial_states, input_table, network_system
+from models.simulation.simulate import advance, evaluate, initial_states, input_table, network_system
 from models.simulation.thermal_network import ThermalNetwork
 
 STEP_S = 10.0
@@ -51,7 +51,7 @@ def reference_run(
     held = np.concatenate((rows[:1], rows[:-1]))  # at the end of a step its inputs still hold
     states = [solver.start(starts, system.n_boundaries)]
     for begin, end, row in zip(cycle.time[:-1], cycle.time[1:], rows[:-1], strict=True):
-        states.append(solver.advance(system, states[-1], float(begin), float(end - begin), row, row))
+        states.append(advance(system, states[-1], float(begin), float(end - begin), row, row))
     result = evaluate(
         network, losses, None, time=cycle.time, table=held, states=np.stack([s.states for s in states]),
         heat_in=np.array([s.heat_in for s in states]), heat_out=np.array([s.heat_out for s in states]),

@@ -109,19 +109,19 @@ def axis_of(experiment: Experiment) -> Axis:
     """
     of_recording: dict[str, list[Piece]] = {}
     for piece in experiment.pieces:
-        of_recording.setdefault(piece.recording, []).append(piece)
+        if piece.recording not in experiment.healthy:
+            of_recording.setdefault(piece.recording, []).append(piece)
     names = sorted(of_recording, key=lambda name: experiment.starts_at.get(name, 0.0))
     span = {name: float(of_recording[name][-1].time[-1] - of_recording[name][0].time[0]) for name in names}
-    sick = [name for name in names if name not in experiment.healthy]
     dates: list[float] = []
-    for name in sick:
+    for name in names:
         start, pieces = experiment.starts_at.get(name, 0.0), of_recording[name]
-        if span[name] >= LONG * max(span[one] for one in sick):
+        if span[name] >= LONG * max(span.values()):
             dates += [start + date for date in _running(pieces, experiment.machine.inputs)]
         else:
             middle = start + pieces[0].time[0] + 0.5 * span[name]
-            dates += [middle] if name == sick[0] else [start, middle]
-    end = max(experiment.starts_at.get(name, 0.0) + float(of_recording[name][-1].time[-1]) for name in sick)
+            dates += [middle] if name == names[0] else [start, middle]
+    end = max(experiment.starts_at.get(name, 0.0) + float(of_recording[name][-1].time[-1]) for name in names)
     interval = float(np.median(np.concatenate([piece.steps for piece in experiment.pieces])))
     return Axis(dates=np.array(sorted(dates)), end=end, edge_s=2.0 * max(EDGE_S, interval if experiment.slow else 0.0))
 

@@ -112,7 +112,7 @@ def simulate(
     Raises
     ------
     InputError
-        For faulty cycles, parameters and initial temperatures.
+        For faulty cycles, parameters and initial temperatures, and where the laws give no temperatures.
 
     References
     ----------
@@ -133,13 +133,7 @@ def simulate(
     states[..., 0, :] = state.states
     for row in range(n_rows - 1):
         t = float(cycle.time[row])
-        try:
-            state = solver.advance(system, state, t, float(cycle.time[row + 1]) - t, table[row], table[row + 1])
-        except (ArithmeticError, ValueError) as error:
-            raise InputError(
-                f"the temperatures from {t:g} s on cannot be calculated ({error}); check the definition's laws and the "
-                "cycle's units"
-            ) from error
+        state = advance(system, state, t, float(cycle.time[row + 1]) - t, table[row], table[row + 1])
         states[..., row + 1, :] = state.states
         heat_in[..., row + 1], heat_out[..., row + 1, :] = state.heat_in, state.heat_out
         if progress is not None and (row % 50 == 49 or row == n_rows - 2):
@@ -148,6 +142,25 @@ def simulate(
         network, losses, parameters, time=cycle.time, table=table, states=states, heat_in=heat_in, heat_out=heat_out,
         trained=trained,
     )  # fmt: skip
+
+
+def advance(
+    system: NetworkSystem, state: solver.State, time: float, duration: float, inputs: Array, inputs_end: Array
+) -> solver.State:
+    """A step of :func:`models.portable.solver.advance`, whose faults here are those of a definition or a cycle.
+
+    Raises
+    ------
+    InputError
+        If the laws give no temperatures.
+    """
+    try:
+        return solver.advance(system, state, time, duration, inputs, inputs_end)
+    except (ArithmeticError, ValueError) as error:
+        raise InputError(
+            f"the temperatures from {time:g} s on cannot be calculated ({error}); check the definition's laws and the "
+            "cycle's units"
+        ) from error
 
 
 def surroundings(system: NetworkSystem, table: Array, *, vector: bool) -> Array:

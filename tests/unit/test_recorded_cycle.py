@@ -277,3 +277,17 @@ def test_faults_of_a_recording_are_those_of_a_diagnosis(
     with pytest.raises(InputError) as raised:
         read_cycle_or_recording(tmp_path / name, network)
     assert message in str(raised.value)
+
+
+@pytest.mark.parametrize(("cell", "message"), [("Bad", "holds 'Bad' at row 4, which is no number (1 such cells"),
+                                               ("1.480", "holds '1.480' at row 4")])  # fmt: skip
+def test_a_cell_that_is_no_number_does_not_blame_those_with_decimal_commas(
+    tmp_path: Path, network: ThermalNetwork, cell: str, message: str
+) -> None:
+    rows = [f"{0.5 * i};{100.5 + i};0,5;295,15;40,5".replace(".", ",") for i in range(ROWS)]
+    rows[3] = rows[3].replace("0,5;295,15", f"{cell};295,15")
+    (tmp_path / "run.csv").write_text("\n".join(["Zeit;n Antrieb;Moment;Raum;Sumpf", *rows]))
+    (tmp_path / "mapping.toml").write_text(GERMAN)
+    with pytest.raises(InputError) as raised:
+        read_cycle_or_recording(tmp_path / "run.csv", network)
+    assert message in str(raised.value) and "decimal commas" not in str(raised.value)

@@ -96,6 +96,7 @@ FILES: list[tuple[str | bytes, tuple[str, ...]]] = [
     # time
     (text(lambda t: t.assign(time_s=t["time_s"].where(W != 17, -5.0))), ("time_s goes back", "row 18", "1 times")),
     (dated(lambda s: ["0001-01-01T00:00:00Z", *s[1:]]), ("time_utc goes on over 2017 years",)),
+    (dated(lambda s: [*s[:18], s[17], *s[19:]]), ("again at row 19", "set back in autumn")),
     (text(lambda t: pd.concat([t[:18], t[17:]])), ("time_s is 170.0 at row 18 and again at row 19",)),
     (with_column("time_s", 1e3 * sound()["time_s"] + 1.0), ("advances by 1e+04 s", "were milliseconds meant")),
     (with_column("time_s", 1.5e12 + sound()["time_s"]), ("time_s reaches 1.5e+12 s", "milliseconds")),

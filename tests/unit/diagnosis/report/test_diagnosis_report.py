@@ -19,7 +19,7 @@ from diagnosis.report import equation as equations
 from diagnosis.report import network_chart as drawing
 from diagnosis.report import page, write_report
 from diagnosis.report.chart import Chart, averaged, curve_points, stretches, thinned
-from diagnosis.report.course_charts import _joined, errors_over_time, measured_and_simulated, recordings_of
+from diagnosis.report.course_charts import _errors, _joined, errors_over_time, measured_and_simulated, recordings_of
 from diagnosis.report.finding_charts import dates_with_bands, driver_of, heat_of_findings, names_by_grade
 from diagnosis.report.network_layout import WIDEST_ROW, places_of
 from diagnosis.report.page import PLOTLY, charts_of
@@ -239,6 +239,8 @@ def test_a_night_off_weighs_nothing_in_the_error_of_a_chart() -> None:
     night = replace(course, time=course.time + 36.0 * 3600.0, counts_from_s=course.counts_from_s + 36.0 * 3600.0)
     joined, alone = (_joined("hold_1", pieces) for pieces in ([course, night], [course]))
     assert joined.weights.sum() == pytest.approx(2.0 * alone.weights.sum())
+    stages = (("calibrated", "calibrated"),)
+    assert _errors(joined, "oil", stages) == pytest.approx(_errors(alone, "oil", stages))
 
 
 def test_held_out_recordings_come_first_and_one_is_shown_at_a_time() -> None:

@@ -6,11 +6,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+import sympy as sp
 
 from builder.surrogate.train import TrainingResult
 from models.assembly.gearbox import load_gearbox
 from models.base.errors import InputError
 from models.files.cycle import Cycle
+from models.network.laws import symbol
 from models.portable.evaluation import efficiency, torque_loss
 from models.portable.surrogate import range_distance
 from models.simulation.simulate import initial_states, input_table, network_system
@@ -196,3 +198,12 @@ def test_output_torque_balances_the_loss_whoever_drives() -> None:
     np.testing.assert_allclose(power_out, power_in - result.loss, rtol=1e-12)
     useful = np.where(power_in > 0.0, power_out / power_in, power_in / power_out)
     np.testing.assert_allclose(useful, result.efficiency, rtol=1e-12)
+
+
+@pytest.mark.parametrize("law", [
+    (symbol("T_oil") - 100) ** sp.Float(0.25), sp.sqrt(symbol("T_oil") - 100), 1 / symbol("torque"),
+])  # fmt: skip
+def test_a_law_without_a_real_number_is_a_fault_of_the_definition(law: sp.Expr) -> None:
+    idle = CYCLE | {"torque_Nm": [0.0, 0.0, 0.0]}
+    with pytest.raises(InputError, match="from 0 s on cannot be calculated .* check the definition's laws"):
+        NETWORK.with_source("oil", law, name="broken").simulate(idle, losses=LOSSES, initial=20.0)
