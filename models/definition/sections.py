@@ -238,7 +238,7 @@ class Friction(Section):
     model: Literal["arana", "schlenk"]
     mu_solid: Annotated[float, between(0.005, 0.3)]
     asperity_load_share: Literal["doleschel", "erf", "diab", "matsumoto"] = "doleschel"
-    roughness: Literal["mean", "composite", "composite_rms"] = "mean"
+    roughness: Literal["of_the_law", "mean", "composite", "composite_rms"] = "of_the_law"
     film: Literal["hamrock_dowson", "dowson_toyoda", "grubin"] = "hamrock_dowson"
     thermal_reduction: Literal["gupta", "gupta_simple", "murch_wilson"] = "gupta"
     average: Literal["base_pitch", "path_of_contact"] = "base_pitch"

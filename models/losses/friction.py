@@ -22,7 +22,7 @@ SCHLENK_LOWEST_LOAD = 150e3  # N/m, ISO/TR 14179-2
 AsperityShare = Literal["doleschel", "erf", "diab", "matsumoto"]
 Film = Literal["hamrock_dowson", "dowson_toyoda", "grubin"]
 ThermalReduction = Literal["gupta", "gupta_simple", "murch_wilson"]
-Roughness = Literal["mean", "composite", "composite_rms"]
+Roughness = Literal["of_the_law", "mean", "composite", "composite_rms"]
 
 
 def friction_schlenk(
@@ -141,7 +141,7 @@ class MeshContact:
     mu_solid: float
     friction: Literal["arana", "schlenk"] = "arana"
     asperity_share: AsperityShare = "doleschel"
-    roughness: Roughness = "mean"
+    roughness: Roughness = "of_the_law"
     film: Film = "hamrock_dowson"
     thermal_reduction: ThermalReduction = "gupta"
     rolling_constant: float = 9.0e7
@@ -262,18 +262,19 @@ class MeshContact:
         return ehl.thermal_reduction_murch_wilson(L=L)
 
     def _asperity_share(self, h: Array) -> Array:
-        composite = float(np.hypot(*self.Ra))
         if self.asperity_share == "matsumoto":
             return ehl.asperity_share_matsumoto(h, RZ_OVER_RA * (self.Ra[0] + self.Ra[1]))
-        roughness = {"mean": 0.5 * (self.Ra[0] + self.Ra[1]), "composite": composite, "composite_rms": 1.25 * composite}
-        law = {
-            "doleschel": ehl.asperity_share_doleschel,
-            "erf": ehl.asperity_share_erf,
-            "diab": ehl.asperity_share_diab,
+        mean, composite = 0.5 * (self.Ra[0] + self.Ra[1]), float(np.hypot(*self.Ra))
+        roughness = {"mean": mean, "composite": composite, "composite_rms": RQ_OVER_RA * composite}
+        law, own = {
+            "doleschel": (ehl.asperity_share_doleschel, "mean"),
+            "erf": (ehl.asperity_share_erf, "composite_rms"),
+            "diab": (ehl.asperity_share_diab, "composite_rms"),
         }[self.asperity_share]
-        return law(h, roughness[self.roughness])
+        return law(h, roughness[own if self.roughness == "of_the_law" else self.roughness])
 
 
+RQ_OVER_RA = 1.25  # of heights in a normal distribution: sqrt(pi / 2) = 1.253
 RZ_OVER_RA = 6.0  # customary for ground flanks; the paper gives Ra only
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -37,6 +38,18 @@ def test_film_temperature_is_found_over_the_whole_design_space() -> None:
         assert np.abs(state.residual).max() <= 0.01
         assert np.all(state.T_film >= state.T_in - 0.01)
         assert np.all((state.mu >= 0.0) & (state.mu <= max(MESH.mu_solid, 0.047)))
+
+
+@pytest.mark.parametrize(("law", "own"), [("doleschel", "mean"), ("erf", "composite_rms"), ("diab", "composite_rms")])
+def test_a_law_of_the_asperities_has_its_own_roughness(law: Any, own: Any) -> None:
+    """Arana et al. 2019, Table 1: the mean Ra for Doleschel, the composite r.m.s. for the error functions."""
+    x = np.array([[1500.0, 200.0, 80.0, 80.0]])
+    loss = {
+        of: replace(MESH, asperity_share=law, roughness=of).power(x)[0, 0]
+        for of in ("of_the_law", "mean", "composite_rms")
+    }
+    assert loss["of_the_law"] == loss[own]
+    assert loss["composite_rms"] > 1.02 * loss["mean"]
 
 
 def test_contact_state_agrees_with_the_formulas_one_by_one() -> None:
