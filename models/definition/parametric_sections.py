@@ -282,7 +282,10 @@ def _inputs(definition: ParametricDefinition) -> Iterator[str]:
     taken = Counter(["time", *(p.name for p in definition.parameter), *(f"T_{part.name}" for part in definition.part)])
     taken.update(f"T_{b.name}" for b in definition.boundary if b.input != f"T_{b.name}")
     taken.update(given.name for given in definition.input)
-    yield from (f"'{name}' names several inputs, parameters or nodes" for name, count in taken.items() if count > 1)
+    taken.update(_factors(definition))
+    yield from (
+        f"'{name}' names several inputs, parameters, factors or nodes" for name, count in taken.items() if count > 1
+    )
     for boundary in definition.boundary:
         yield from _boundary_input(boundary, named.get(boundary.input))
     if definition.torque is None:
@@ -295,6 +298,18 @@ def _inputs(definition: ParametricDefinition) -> Iterator[str]:
         yield "input 'torque': the torque follows from a power ([torque]); keep one of them"
     if not definition.loss:
         yield "torque: there is no [[loss]] that needs it"
+
+
+def _factors(definition: ParametricDefinition) -> Iterator[str]:
+    """Names that :func:`models.assembly.parametric.build_parametric_network` gives to factors and losses."""
+    yield from (f"C_{part.name}" for part in definition.part)
+    yield from (f"{kind}_{'_'.join(path.between)}" for path in definition.link for kind in ("G", "standstill"))
+    yield from (f"{heat.name}_gain" for heat in definition.heat)
+    kinds = ("no_load", "speed_exponent", "viscosity_exponent", "load", "torque_exponent")
+    yield from (f"{loss.name}_{kind}" for loss in definition.loss for kind in kinds)
+    yield from (f"P_{loss.name}_{kind}" for loss in definition.loss for kind in ("no_load", "load"))
+    if definition.torque is not None:
+        yield "efficiency"
 
 
 def _boundary_input(boundary: Boundary, own: NamedInput | None) -> Iterator[str]:
