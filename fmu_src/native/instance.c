@@ -45,8 +45,7 @@ static const char *mode_text(Mode mode) {
     case INITIALIZATION: return "in initialization mode";
     case STEP_COMPLETE: return "after the initialization";
     case STEP_FAILED: return "after a refused step";
-    case TERMINATED: return "after the end of the simulation";
-    default: return "after a fault; a reset or a saved state helps";
+    default: return "after the end of the simulation";
     }
 }
 
@@ -140,7 +139,7 @@ static void to_start(Instance *self) {
     }
     memset(self->model.state, 0, model_state_size);
     self->model.time = 0.0;
-    self->model.changed = CHANGED_INPUTS | CHANGED_PARAMETERS | CHANGED_STATE;
+    self->model.changed = 1;
     self->mode = INSTANTIATED;
     self->set_up = 0;
     self->fresh = 0;
@@ -217,8 +216,7 @@ Status instance_exit_initialization(Instance *self, const char *function) {
     if (self->faults) describe_faults(self, 0.0);
     else status = model_start(&self->model);
     self->fresh = 0;
-    if (status == MODEL_BROKEN) self->mode = BROKEN;
-    if (status >= MODEL_REFUSED)
+    if (status == MODEL_REFUSED)
         return instance_report(self, STATUS_ERROR, "the initialization cannot end: %s", self->model.message);
     self->mode = STEP_COMPLETE;
     /* Logged, but not returned: there are hosts that take all but OK for a failed initialization. */
@@ -273,7 +271,7 @@ static Status refresh(Instance *self) {
     if (self->faults) describe_faults(self, 0.0);
     else status = model_outputs(model);
     self->fresh = 1;
-    self->blank = status >= MODEL_REFUSED;
+    self->blank = status == MODEL_REFUSED;
     if (!self->blank) return STATUS_OK;
     for (unsigned i = 0; i < model_variable_count; i++)
         if (model_variables[i].access == CALCULATED) self->values[i] = model_variables[i].type == REAL ? NAN : 0.0;
@@ -291,7 +289,7 @@ Status instance_prepare_get(Instance *self, const unsigned references[], size_t 
     for (size_t i = 0; i < count; i++) {
         const Variable *variable = &model_variables[references[i]];
         if (variable->access != CALCULATED) continue;
-        if (self->mode == INSTANTIATED || self->mode == BROKEN)
+        if (self->mode == INSTANTIATED)
             return instance_report(self, STATUS_ERROR, "%s: %s has no value %s", function, variable->name,
                                    mode_text(self->mode));
         return refresh(self);
@@ -323,7 +321,7 @@ void instance_put(Instance *self, unsigned reference, double value) {
     if (!usable(variable, self->values[reference])) self->faults--;
     if (!usable(variable, value)) self->faults++;
     self->values[reference] = value;
-    self->model.changed |= variable->access == INPUT ? CHANGED_INPUTS : CHANGED_PARAMETERS;
+    if (variable->access != INPUT) self->model.changed = 1;
     self->fresh = 0;
 }
 
@@ -379,11 +377,11 @@ static Status try_step(Instance *self, double time, double duration) {
         model->time = time;
         status = model_step(model, duration);
     }
-    if (status >= MODEL_REFUSED) model->time = before;
-    if (status == MODEL_REFUSED)
+    if (status == MODEL_REFUSED) {
+        model->time = before;
         return instance_report(self, STATUS_DISCARD, "step refused, state unchanged: %s", model->message);
+    }
     self->fresh = 0;
-    if (status == MODEL_BROKEN) return instance_report(self, STATUS_ERROR, "%s", model->message);
     model->time = time + duration;
     if (self->ramping) memset(self->slopes, 0, model_variable_count * sizeof(double));
     self->ramping = 0;
@@ -394,10 +392,6 @@ static Status try_step(Instance *self, double time, double duration) {
 Status instance_step(Instance *self, double time, double duration, const char *function) {
     if (!instance_allows(self, STEPPING, function)) return STATUS_ERROR;
     self->last_step = try_step(self, time, duration);
-    switch (self->last_step) {
-    case STATUS_DISCARD: self->mode = STEP_FAILED; break;
-    case STATUS_ERROR: self->mode = BROKEN; break;
-    default: self->mode = STEP_COMPLETE;
-    }
+    self->mode = self->last_step == STATUS_DISCARD ? STEP_FAILED : STEP_COMPLETE;
     return self->last_step;
 }

@@ -19,15 +19,14 @@ typedef enum {
     INITIALIZATION,
     STEP_COMPLETE,
     STEP_FAILED, /* the last step was refused; everything is as before it */
-    TERMINATED,
-    BROKEN
+    TERMINATED
 } Mode;
 
 /* Sets of modes, in which a call is allowed */
 #define ONLY(mode) (1u << (mode))
 #define STEPPING (ONLY(STEP_COMPLETE) | ONLY(STEP_FAILED))
 #define STARTING (ONLY(INSTANTIATED) | ONLY(INITIALIZATION))
-#define ANY_MODE (STARTING | STEPPING | ONLY(TERMINATED) | ONLY(BROKEN))
+#define ANY_MODE (STARTING | STEPPING | ONLY(TERMINATED))
 
 /* The simulation tool: its log and its memory. */
 typedef struct Host Host;

@@ -41,7 +41,7 @@ static const char *foreign(const SavedState *saved) {
     if (memcmp(saved->magic, MAGIC, sizeof MAGIC)) return "it is not a saved state of such an FMU";
     if (strncmp(saved->guid, model_guid, sizeof saved->guid)) return "it was saved by another FMU";
     if (saved->size != saved_size()) return "its size is not that of this FMU's states";
-    if (saved->mode >= BROKEN) return "it is damaged";
+    if (saved->mode > TERMINATED) return "it is damaged";
     return NULL;
 }
 
@@ -61,7 +61,7 @@ static SavedState *room_for_state(Instance *self, void **state, const char *func
 Status instance_save(Instance *self, void **state, const char *function) {
     SavedState *saved;
     double *values;
-    if (!instance_allows(self, ANY_MODE & ~ONLY(BROKEN), function)) return STATUS_ERROR;
+    if (!instance_allows(self, ANY_MODE, function)) return STATUS_ERROR;
     saved = room_for_state(self, state, function);
     if (!saved) return STATUS_ERROR;
     memset(saved, 0, sizeof *saved);
@@ -95,7 +95,7 @@ Status instance_restore(Instance *self, const void *state, const char *function)
     memcpy(self->values, values, model_variable_count * sizeof(double));
     memcpy(self->slopes, values + model_variable_count, model_variable_count * sizeof(double));
     memcpy(self->model.state, values + 2 * model_variable_count, model_state_size);
-    self->model.changed = CHANGED_INPUTS | CHANGED_PARAMETERS | CHANGED_STATE;
+    self->model.changed = 1;
     self->fresh = 0;
     self->blank = 0;
     self->ramping = 1;
@@ -169,8 +169,8 @@ Status instance_deserialize(Instance *self, const void *bytes, size_t size, void
 static Status add_unknowns_at(Instance *self, unsigned known, double value, const unsigned unknowns[],
                               size_t n_unknowns, double weight, double sums[]) {
     self->values[known] = value;
-    self->model.changed |= model_variables[known].access == INPUT ? CHANGED_INPUTS : CHANGED_PARAMETERS;
-    if (model_outputs(&self->model) >= MODEL_REFUSED) return STATUS_ERROR;
+    if (model_variables[known].access != INPUT) self->model.changed = 1;
+    if (model_outputs(&self->model) == MODEL_REFUSED) return STATUS_ERROR;
     for (size_t i = 0; i < n_unknowns; i++) sums[i] += weight * self->values[unknowns[i]];
     return STATUS_OK;
 }
@@ -189,7 +189,7 @@ static Status add_derivatives(Instance *self, unsigned known, double seed, const
     for (int i = 0; i < 4 && status == STATUS_OK; i++)
         status = add_unknowns_at(self, known, centre + PLACES[i] * h, unknowns, n_unknowns, WEIGHTS[i] * seed / h, sums);
     self->values[known] = value;
-    self->model.changed |= CHANGED_INPUTS | CHANGED_PARAMETERS;
+    if (variable->access != INPUT) self->model.changed = 1;
     return status;
 }
 

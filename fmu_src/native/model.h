@@ -24,7 +24,6 @@ typedef struct {
     double start, minimum, maximum, nominal;
 } Variable;
 
-enum { CHANGED_INPUTS = 1, CHANGED_PARAMETERS = 2, CHANGED_STATE = 4 };
 enum { MESSAGE_SIZE = 1024 };
 
 typedef struct {
@@ -33,15 +32,14 @@ typedef struct {
     void *state;          /* model_state_size bytes that the future depends on: no pointers, zero before the start */
     void *scratch;        /* model_scratch_size bytes of the model's own; not saved, all zero when instantiated */
     double time;          /* s; the FMI layer moves it on after a step */
-    unsigned changed;     /* CHANGED_...: what was set or restored since the model cleared the bit */
+    int changed;          /* parameters were set or restored since the model took them over, which clears it */
     char message[MESSAGE_SIZE]; /* of a warning or refusal */
 } Model;
 
 typedef enum {
     MODEL_OK,
     MODEL_WARNING, /* done, with a message */
-    MODEL_REFUSED, /* not done, with a message; values and state are as before */
-    MODEL_BROKEN   /* not done, with a message; only a saved state or a reset helps */
+    MODEL_REFUSED  /* not done, with a message; values and state are as before */
 } ModelStatus;
 
 /* Generated */

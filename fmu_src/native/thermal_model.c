@@ -19,12 +19,7 @@ typedef struct {
     double flow[AT_LEAST_ONE(N_BOUNDARIES)]; /* W to each boundary, mean over the last step */
 } State;
 
-typedef struct {
-    int usable; /* the network has the present parameters */
-    Network network;
-} Scratch;
-
-const size_t model_state_size = sizeof(State), model_scratch_size = sizeof(Scratch);
+const size_t model_state_size = sizeof(State), model_scratch_size = sizeof(Network);
 
 static double inner_after(const Model *model, Place place, double elapsed) {
     return value_after(model, place.reference, elapsed) * place.scale + place.offset;
@@ -45,12 +40,11 @@ static void start_values(const Model *model, ThermalState *thermal) {
 
 /* Bring the network up to the present parameters. */
 static ModelStatus prepare(Model *model) {
-    Scratch *scratch = model->scratch;
-    if (model->changed & CHANGED_PARAMETERS) {
+    if (model->changed) {
         double parameters[AT_LEAST_ONE(N_PARAMETERS)] = {0.0};
         const char *fault;
         for (int i = 0; i < N_PARAMETERS; i++) parameters[i] = inner(model, FACTOR[i]);
-        fault = network_set(&scratch->network, parameters);
+        fault = network_set(model->scratch, parameters);
         if (fault) {
             snprintf(model->message, MESSAGE_SIZE, "the parameters cannot be used: %s", fault);
             return MODEL_REFUSED;
@@ -131,7 +125,7 @@ static ModelStatus watch_domain(Model *model, const LossPoint *begin, const Loss
 
 ModelStatus model_step(Model *model, double duration) {
     State *state = model->state;
-    Scratch *scratch = model->scratch;
+    Network *network = model->scratch;
     ThermalState thermal = state->thermal;
     Heat exchanged;
     double before[AT_LEAST_ONE(N_INPUTS)] = {0.0}, inputs[AT_LEAST_ONE(N_INPUTS)] = {0.0}, failed_at;
@@ -141,7 +135,7 @@ ModelStatus model_step(Model *model, double duration) {
         before[i] = inner(model, INPUTS[i]);
         inputs[i] = inner_after(model, INPUTS[i], duration);
     }
-    fault = network_advance(&scratch->network, &thermal, model->time, duration, before, inputs, &exchanged,
+    fault = network_advance(network, &thermal, model->time, duration, before, inputs, &exchanged,
                             &failed_at);
     if (fault) {
         snprintf(model->message, MESSAGE_SIZE, "the heat balance cannot be solved from %g s on: %s at %g s",
@@ -158,8 +152,8 @@ ModelStatus model_step(Model *model, double duration) {
     }
 #ifdef IN_DOMAIN
     {
-        const LossPoint begin = network_loss_point(&scratch->network, model->time, before, &state->thermal);
-        const LossPoint end = network_loss_point(&scratch->network, model->time + duration, inputs, &thermal);
+        const LossPoint begin = network_loss_point(network, model->time, before, &state->thermal);
+        const LossPoint end = network_loss_point(network, model->time + duration, inputs, &thermal);
         state->thermal = thermal;
         return watch_domain(model, &begin, &end, duration);
     }
@@ -171,11 +165,11 @@ ModelStatus model_step(Model *model, double duration) {
 
 /* Heat that the nodes hold above that of their start temperatures, J. */
 static double stored_heat(const Model *model, const ThermalState *thermal) {
-    const Scratch *scratch = model->scratch;
+    const Network *network = model->scratch;
     ThermalState first;
     double stored = 0.0;
     start_values(model, &first);
-    for (int i = 0; i < N_PARTS; i++) stored += scratch->network.capacity[i] * (thermal->T[i] - first.T[i]);
+    for (int i = 0; i < N_PARTS; i++) stored += network->capacity[i] * (thermal->T[i] - first.T[i]);
     return stored;
 }
 
@@ -191,19 +185,19 @@ static void shaft_outputs(Model *model, double speed, double torque, double loss
 
 ModelStatus model_outputs(Model *model) {
     const State *state = model->state;
-    Scratch *scratch = model->scratch;
+    Network *network = model->scratch;
     ThermalState thermal = state->thermal;
     double inputs[AT_LEAST_ONE(N_INPUTS)] = {0.0}, flow[AT_LEAST_ONE(N_BOUNDARIES)] = {0.0};
     const Balance *balance;
     if (prepare(model) != MODEL_OK) return MODEL_REFUSED;
     if (state->started == 0.0) start_values(model, &thermal);
     for (int i = 0; i < N_INPUTS; i++) inputs[i] = inner(model, INPUTS[i]);
-    balance = network_balance(&scratch->network, model->time, inputs, &thermal);
+    balance = network_balance(network, model->time, inputs, &thermal);
     for (int i = 0; i < N_PARTS; i++) show(model, PART_TEMPERATURE[i], thermal.T[i]);
     for (int i = 0; i < N_BOUNDARIES; i++) show(model, BOUNDARY_TEMPERATURE[i], balance->T_boundary[i]);
     for (int i = 0; i < N_MEMORY; i++) show(model, MEMORY_OUTPUT[i], thermal.memory[i]);
     for (int i = 0; i < N_SOURCES; i++) show(model, HEAT_OUTPUT[i], balance->heat[i]);
-    if (state->stepped == 0.0) network_outflow(&scratch->network, flow);
+    if (state->stepped == 0.0) network_outflow(network, flow);
     else memcpy(flow, state->flow, sizeof flow);
     for (int i = 0; i < N_BOUNDARIES; i++) {
         show(model, BOUNDARY_FLOW[i], flow[i]);
@@ -221,7 +215,7 @@ ModelStatus model_outputs(Model *model) {
 #endif
 #ifdef IN_DOMAIN
     {
-        const LossPoint point = network_loss_point(&scratch->network, model->time, inputs, &thermal);
+        const LossPoint point = network_loss_point(network, model->time, inputs, &thermal);
         model->values[DOMAIN_DISTANCE] = domain_distance(&point);
         model->values[IN_DOMAIN] = model->values[DOMAIN_DISTANCE] <= 0.0;
     }
