@@ -317,7 +317,7 @@ class Fits:
 
         The gain in log score is in nat, the white noise of a temperature row in K.
         """
-        return gain <= 0.0 or self.after - self.calibrated > noise_K
+        return gain < 0.0 or self.after - self.calibrated > noise_K
 
     def to_dict(self) -> dict[str, Any]:
         """The errors as they are in ``diagnosis.json``."""

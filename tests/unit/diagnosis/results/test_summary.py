@@ -166,10 +166,12 @@ def test_a_larger_held_out_error_is_not_called_better() -> None:
     assert "contradict" not in told(base, "How much better?")
     unconfirmed = told(replace(base, holdout_gain=-3.0, contradicted=True), "How much better?")
     assert "predicted worse than by the calibrated model, by 3 nat of log score\nSo" in unconfirmed
+    assert "log score" not in told(replace(base, holdout_gain=0.0), "How much better?")  # nothing was fitted
 
 
 @pytest.mark.parametrize(("gain", "more_K", "contradicted"), [
-    (3.0, -0.2, False), (-3.0, -0.2, True), (3.0, 0.09, False), (3.0, 0.11, True), (np.nan, np.nan, False),
+    (3.0, -0.2, False), (-3.0, -0.2, True), (3.0, 0.09, False), (3.0, 0.11, True), (0.0, 0.0, False),
+    (np.nan, np.nan, False),
 ])  # fmt: skip
 def test_what_held_out_recordings_contradict(gain: float, more_K: float, contradicted: bool) -> None:
     fits = Fits(before=3.0, calibrated=0.5, found=0.5, after=0.5 + more_K, sensors={})
