@@ -16,6 +16,7 @@ from diagnosis.engine.fit import calibrate
 from diagnosis.engine.outside import outside_of
 from diagnosis.engine.prepare import prepare_experiment
 from diagnosis.engine.set_apart import calibrate_apart
+from diagnosis.forward.grid import Piece
 from diagnosis.recordings.read import named_apart, read_recordings
 from diagnosis.recordings.recording import Recording
 from diagnosis.recordings.shared_rows import check_shared_rows
@@ -146,7 +147,7 @@ def _refuse_unusable(recordings: Sequence[Recording]) -> None:
         raise InputError("\n".join(faults))
 
 
-def _refuse_too_short(recordings: Sequence[Recording], pieces: Sequence[object]) -> None:
-    if not pieces:
+def _refuse_too_short(recordings: Sequence[Recording], pieces: Sequence[Piece]) -> None:
+    if not {r.name for r in recordings} & {piece.recording for piece in pieces}:
         rows = ", ".join(f"{r.name}: {len(r.time)} rows" for r in recordings)
         raise InputError(f"no piece of the recordings is long enough to simulate ({rows}); a few minutes are needed")

@@ -116,22 +116,24 @@ def score(results: Path, truth: Path, gearbox: str, output: Path) -> None:
 
     RESULTS holds <case>/diagnosis.json for every case of the truth. A case without a readable file counts as failed.
     """
+    from diagnosis.proof.scoring.answers import read_answer
     from diagnosis.proof.scoring.lines import Task
     from diagnosis.proof.scoring.outcome import outcome
     from diagnosis.proof.scoring.truth import read_truths
     from models.assembly.gearbox import load_gearbox
 
-    truths = read_truths(truth)
+    truths, machine = read_truths(truth), load_gearbox(gearbox)
     if not any((results / case / "diagnosis.json").exists() for case in truths):
         raise InputError(f"{results}: holds no <case>/diagnosis.json of the cases in {truth}")
     records: dict[Task, dict[str, Any]] = {}
     for case in truths:
         try:
             answer = json.loads((results / case / "diagnosis.json").read_text(encoding="utf-8"))
-            records[Task(case=case)] = {"status": "answered", "answer": answer | {"verdict": answer["verdict"]}}
-        except (OSError, ValueError, KeyError, TypeError):
+            read_answer(answer, machine)
+            records[Task(case=case)] = {"status": "answered", "answer": answer}
+        except (OSError, ValueError, KeyError, TypeError, AttributeError):
             records[Task(case=case)] = {"status": "failed", "answer": None}
-    _show(outcome(truths, records, load_gearbox(gearbox)), output)
+    _show(outcome(truths, records, machine), output)
 
 
 def _settings_of_made(

@@ -116,7 +116,9 @@ def infer(
         error_evidence=dict(calibration.evidence),
         session_s=chosen.session_s,
         scaled=tuple(
-            with_scaled_error(calibration, found, candidates, log_prior, factor, settings.false_alarm_rate, least)
+            with_scaled_error(
+                calibration, found, candidates, log_prior, factor, first, settings.false_alarm_rate, least
+            )
             for factor in SCALED
         ),
         repeating=repeating_of(first, error_class),
@@ -179,7 +181,7 @@ def _with_wider_prior(fit: Fit, index: int, iterations: int) -> Fit:
     """Everything fitted with one parameter outside its prior."""
     experiment, z = fit.experiment, fit.z.copy()
     unknowns = list(experiment.unknowns)
-    unknowns[index] = replace(unknowns[index], amplitude=rule().wider)  # type: ignore[type-var]
+    unknowns[index] = replace(unknowns[index], amplitude=rule().wider)
     z[index] /= rule().wider
     wider = replace(experiment, unknowns=tuple(unknowns))
     return wider.fit(z, fit.trajectories, iterations=iterations)

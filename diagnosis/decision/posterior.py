@@ -321,7 +321,7 @@ class Posterior:
         a, b = self.rule.temper
         chance = np.zeros(len(log_bayes))
         for side, whole in ((parameter, self._of_parameters), (~parameter, self.something)):
-            most = float(log_bayes[side].max(initial=0.0))
+            most = float(log_bayes[side & able].max(initial=0.0))
             left = np.flatnonzero(side & able & ((log_bayes >= self.rule.refuted * most) | (most == 0.0)))
             if len(left):
                 chance[left] = whole * softmax(log_prior[left] + log_bayes[left] / (a + b * most))

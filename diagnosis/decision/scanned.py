@@ -222,11 +222,12 @@ def with_scaled_error(
     candidates: Sequence[Hypothesis],
     log_prior: Array,
     factor: float,
+    first: Scanned,
     rate: float,
     least: float,
 ) -> ScaledError:
     """Evidence of the scan if all model error were larger or smaller than assumed."""
-    there = scan_in_classes(calibration, found, candidates, log_prior, factor)
+    there = first if factor == 1.0 else scan_in_classes(calibration, found, candidates, log_prior, factor)
     nothing = max(there.classes, key=lambda one: one.ahead)
     there = replace(there, log_bayes=there.log_bayes - nothing.ahead)
     best = there.order[0]
@@ -248,7 +249,6 @@ def likeness_of(found: Scanned, error_class: ErrorClass) -> Likeness:
 def expected_of(scanned: Scanned, error_class: ErrorClass, settings: Settings) -> tuple[Expected, ...]:
     """Expected evidence of every candidate at the size that matters: of a temperature or a heat, whichever is less."""
     found = scanned.in_class(error_class)
-    known = {one.label: value for one, value in zip(scanned.candidates, scanned.log_prior.tolist(), strict=True)}
     given, terms = found.over.given[found.over.most_probable], found.scan
     at = np.array(terms.of_candidates) + 1
     b = np.maximum(given.matrix[at, at], 0.0)
@@ -258,5 +258,5 @@ def expected_of(scanned: Scanned, error_class: ErrorClass, settings: Settings) -
         size[reached] = np.minimum(size[reached], matters / peak[reached])
     size = np.where(np.isfinite(size), size, sd)
     log_bayes = 0.5 * np.square(b * size) / (b + 1.0 / np.square(sd)) - 0.5 * np.log1p(b * np.square(sd))
-    return tuple(Expected(effect=one, log_bayes=float(value), log_prior=known[one.label])
-                 for one, value in zip(terms.candidates, log_bayes, strict=True))  # fmt: skip
+    each = zip(terms.candidates, log_bayes.tolist(), scanned.log_prior.tolist(), strict=False)  # terms come first
+    return tuple(Expected(effect=one, log_bayes=value, log_prior=prior) for one, value, prior in each)

@@ -35,9 +35,9 @@ class Settings:
     """
 
     false_alarm_rate: float = 0.02
+    claim_from: float = 0.9
     matters_K: float = 1.0
     matters_W: float = 0.0
-    claim_from: float = 0.9
     odds_unknown: float = 0.1
 
     def __post_init__(self) -> None:

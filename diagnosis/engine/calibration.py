@@ -10,10 +10,10 @@ import numpy as np
 
 from diagnosis.engine.fit import FIRST_ITERATIONS, ITERATIONS, Experiment, Fit, Linear
 from diagnosis.engine.learnt import ErrorClass, error_classes
-from diagnosis.engine.metric import leading_directions
+from diagnosis.engine.metric import Metric, leading_directions
 from diagnosis.engine.model_error import ModelError
 from diagnosis.engine.products import gram_of, whitened_base
-from diagnosis.engine.sessions import fit_over_sessions, over_sessions, with_deviation
+from diagnosis.engine.sessions import fit_over_sessions, over_sessions, sessions_of
 from diagnosis.engine.set_apart import without_channels
 from diagnosis.forward.whitening import RandomHeat, Whitening
 from models.base.types import Array
@@ -144,11 +144,15 @@ class Near:
             At most
         """
         directions = self.directions(one)
-        here = with_deviation(
-            self.experiment, [part.columns for part in self.parts], [N @ directions for N in self.columns], deviation,
-            [self.error.courses(part.point, directions) for part in self.parts],
+        shared, count = tuple(N @ directions for N in self.columns), directions.shape[1]
+        metric = Metric(
+            sessions=sessions_of(self.experiment), columns=shared, shared=count, own=count,
+            courses=tuple(self.error.courses(part.point, directions) for part in self.parts),
         )  # fmt: skip
-        fit = here.fit(start.z, start.trajectories, iterations=iterations)
+        if deviation > 0.0:
+            both = tuple(np.column_stack([N, part.columns]) for N, part in zip(shared, self.parts, strict=True))
+            metric = replace(metric, columns=both, own=0, deviation=deviation)
+        fit = replace(self.experiment, metric=metric).fit(start.z, start.trajectories, iterations=iterations)
         over = fit_over_sessions(fit, len(fit.z))
         return InClass(error_class=one, fit=fit, log_evidence=float(np.log(one.prior)) + over.log_evidence,
                        session_s=over.mean, deviation=float(over.deviations[over.most_probable]))  # fmt: skip

@@ -117,7 +117,7 @@ def axis_of(experiment: Experiment) -> Axis:
     for name in names:
         start, pieces = experiment.starts_at.get(name, 0.0), of_recording[name]
         if span[name] >= LONG * max(span.values()):
-            dates += [start + date for date in _running(pieces, experiment.machine.inputs)]
+            dates += [start + date for date in _running(pieces)]
         else:
             middle = start + pieces[0].time[0] + 0.5 * span[name]
             dates += [middle] if name == names[0] else [start, middle]
@@ -126,13 +126,10 @@ def axis_of(experiment: Experiment) -> Axis:
     return Axis(dates=np.array(sorted(dates)), end=end, edge_s=2.0 * max(EDGE_S, interval if experiment.slow else 0.0))
 
 
-def _running(pieces: Sequence[Piece], inputs: Sequence[str]) -> list[float]:
+def _running(pieces: Sequence[Piece]) -> list[float]:
     """Dates in a recording, evenly over the time that the machine runs, [s] since its first row."""
     begin, steps = np.concatenate([p.time[:-1] for p in pieces]), np.concatenate([p.steps for p in pieces])
-    runs = np.ones(len(begin), dtype=bool)
-    if "speed" in inputs:
-        speed = np.concatenate([p.inputs[:, list(inputs).index("speed")] for p in pieces])
-        runs = np.abs(speed) > STANDSTILL_RPM
+    runs = np.abs(np.concatenate([p.inputs[:, 0] for p in pieces])) > STANDSTILL_RPM  # of the speed
     if not runs.any():
         runs[:] = True
     passed = np.concatenate([[0.0], np.cumsum(steps * runs)])

@@ -392,7 +392,7 @@ class Fit:
         return np.asarray(np.linalg.cholesky(np.eye(len(self.z)) + self.linearised.products[1:, 1:]))
 
 
-def calibrate(experiment: Experiment) -> Fit:
-    """The unknowns of the nominal machine: a first fit chooses the noise filters, a second one is judged by them."""
-    first = experiment.fit(iterations=FIRST_ITERATIONS)
+def calibrate(experiment: Experiment, z: Array | None = None, guesses: Sequence[Guess] | None = None) -> Fit:
+    """The unknowns from a start: a first fit chooses the noise filters, a second one is judged by them."""
+    first = experiment.fit(z, guesses, iterations=FIRST_ITERATIONS)
     return experiment.with_filters(first.parts).fit(first.z, first.trajectories)

@@ -13,8 +13,8 @@ from diagnosis.forward.grid import Piece
 from diagnosis.forward.network_on_grid import Balance, NetworkOnGrid
 from diagnosis.forward.observation import Sensors, reading_columns, readings
 from diagnosis.forward.sensor_fault import delayed
-from diagnosis.forward.term_on_grid import TermOnGrid, input_slope, moved_heat
-from diagnosis.forward.trajectory import Trajectory, parameter_heats, settled_balance
+from diagnosis.forward.term_on_grid import TermOnGrid, moved_heat
+from diagnosis.forward.trajectory import Trajectory, parameter_heat, settled_balance
 from models.base.types import Array
 from models.correction.instruments import Mix
 from models.quantities.quantities import is_total_loss
@@ -47,12 +47,8 @@ class Machine:
     def slopes(self) -> LawSlopes:
         """Derivatives of the laws by parameters that vary, inputs and losses."""
         network = self.model.network
-        varying = [p.name for p in network.parameters if p.sd > 0.0 and not self.by_difference(p.name)]
+        varying = [p.name for p in network.parameters if p.sd > 0.0 and p.name not in self.model.remembered]
         return LawSlopes(self.model, [*varying, *self.inputs, *(f"P_{c}" for c in network.components)])
-
-    def by_difference(self, parameter: str) -> bool:
-        """True if a parameter decides on memories, or laws have no symbolic form: finite differences serve then."""
-        return parameter in self.model.remembered or bool(self.model.network.numeric_laws)
 
     @property
     def shifts(self) -> list[TermOnGrid]:
@@ -72,7 +68,6 @@ class Setting:
     machine: Machine
     recording: str
     channels: tuple[str, ...]
-    inputs: tuple[str, ...]
     values: Array
     samples: Array
     lag: Array
@@ -87,7 +82,7 @@ class Setting:
         """As delivered: parameters at their start, ideal sensors, inputs as recorded."""
         nothing = np.zeros(len(piece.channels))
         return cls(
-            machine=machine, recording=piece.recording, channels=piece.channels, inputs=machine.inputs,
+            machine=machine, recording=piece.recording, channels=piece.channels,
             values=machine.model.start.copy(), samples=np.array(piece.samples), lag=nothing.copy(), bias=nothing.copy(),
             of_terms={term.label: np.array([p.start for p in term.parameters]) for term in machine.terms},
         )  # fmt: skip
@@ -203,49 +198,49 @@ class Point:
 
     def heat_per(self, name: str) -> Heat:
         """Net heat per unit of a parameter or of an input that no loss depends on."""
-        model, index = self.machine.model, self.machine.parameter_index
-        if name in index and self.machine.by_difference(name):
-            p = model.network.parameters[index[name]]
-            value = float(self.trajectory.values[index[name]])
-            step = np.array([MEMORY_STEP * p.sd * (value if p.log else 1.0)])
-            into, loss = parameter_heats(model, self.trajectory, self.balance, [index[name]], step)
-            return Heat(into=into[:, :, 0], loss=loss[:, 0])
-        if model.network.numeric_laws:
-            into, loss = input_slope(model, self.trajectory, name)
-            return Heat(into=self._whole(into), loss=loss)
-        return self._heats[name]
+        model = self.machine.model
+        if name not in model.remembered:
+            return self._heats[name]
+        index = self.machine.parameter_index[name]
+        p, value = model.network.parameters[index], float(self.trajectory.values[index])
+        step = MEMORY_STEP * p.sd * (value if p.log else 1.0)
+        into, loss = parameter_heat(model, self.trajectory, self.balance, index, step)
+        return Heat(into=into, loss=loss)
 
     def heat_per_relative(self, name: str) -> Heat:
         """Net heat per relative change of an input, through the losses too."""
-        model, trajectory = self.machine.model, self.trajectory
-        at = self.machine.inputs.index(name)
-        if name == "torque" and not model.network.numeric_laws:
+        trajectory, at = self.trajectory, self.machine.inputs.index(name)
+        if name == "torque":
             heat = self.heat_per(name) * trajectory.piece.inputs[:, at]
-            for component, slope in zip(model.network.components, trajectory.tangent.torque_slope.T, strict=True):
+            components = self.machine.model.network.components
+            for component, slope in zip(components, trajectory.tangent.torque_slope.T, strict=True):
                 heat = heat + self._heats[f"P_{component}"] * slope
             return heat
         samples, step = np.array(trajectory.piece.samples), 0.01
         samples[..., at] *= 1.0 + step
-        into, loss = moved_heat(model, trajectory, replace(trajectory.piece, samples=samples))
-        return Heat(into=self._whole(into / step), loss=loss / step)
+        return self.moved_heat(samples, step)
+
+    def moved_heat(self, samples: Array, step: float) -> Heat:
+        """Net heat per unit of a change of the inputs by so many units, shape of `samples` (K, S, inputs)."""
+        piece = replace(self.trajectory.piece, samples=samples)
+        into, loss = moved_heat(self.machine.model, self.trajectory, piece)
+        return Heat(into=into / step, loss=loss / step)
 
     def term_column(self, label: str, index: int, step: float) -> Column:
         """Column per unit of a parameter of a term outside the network."""
-        term, trajectory, model = self.machine.on_grid[label], self.trajectory, self.machine.model
+        term, trajectory = self.machine.on_grid[label], self.trajectory
         values = self.setting.of_terms[label]
         moved = np.array(values)
         moved[index] += step
         if term.term.kind == "sensor":
-            read = readings(model, trajectory, self.sensors)
+            read = readings(self.machine.model, trajectory, self.sensors)
             there = term.distorted(trajectory, self.sensors, read, moved)
             here = term.distorted(trajectory, self.sensors, read, values)
             return Column(shown=(there - here) / step)
         # The trajectory's piece is shifted already: only the difference is added.
         there = term.adjusted(trajectory.piece, moved, trajectory).samples
         here = term.adjusted(trajectory.piece, values, trajectory).samples
-        piece = replace(trajectory.piece, samples=trajectory.piece.samples + there - here)
-        into, loss = moved_heat(model, trajectory, piece)
-        return Column(heat=Heat(into=self._whole(into / step), loss=loss / step))
+        return Column(heat=self.moved_heat(trajectory.piece.samples + there - here, step))
 
     def clock_column(self) -> Array:
         """Change of the readings per second of delay, shape (K + 1, channels)."""
@@ -259,9 +254,6 @@ class Point:
         result = np.zeros(self.read.shape)
         result[:, self.sensors.channels.index(channel)] = values
         return result
-
-    def _whole(self, into: Array) -> Array:
-        return np.pad(into, ((0, 0), (0, len(self.machine.model.coupled))))
 
     def heated(self, into: Array, loss: Array) -> Array:
         """Change of the readings for many heats in one pass.

@@ -8,7 +8,7 @@ weigh it, under nothing as under every candidate.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.special import logsumexp
@@ -16,7 +16,6 @@ from scipy.special import logsumexp
 from diagnosis.engine.fit import Experiment, Fit
 from diagnosis.engine.gram import Given, Gram
 from diagnosis.engine.learnt import deviation_priors
-from diagnosis.engine.metric import ErrorCourses, Metric
 from diagnosis.engine.products import base_of, gram_of
 from models.base.types import Array
 
@@ -91,32 +90,6 @@ def over_sessions(
         whole = Given(matrix=matrix, log_determinant=sum(one.log_determinant for one in own))
         found.append(whole.given(every))
     return OverSessions(deviations=np.array(list(prior)), log_priors=np.log(list(prior.values())), given=tuple(found))
-
-
-def with_deviation(
-    experiment: Experiment, columns: Sequence[Array], shared: Sequence[Array], s: float,
-    courses: Sequence[ErrorCourses] = (),
-) -> Experiment:  # fmt: skip
-    """The experiment judged with a deviation between sessions.
-
-    Parameters
-    ----------
-    experiment : Experiment
-        With filters
-    columns, shared : sequence of Array, shape (M, n) each
-        Whitened columns of unknowns, and of model error times its amplitudes
-    s : float
-        In prior standard deviations
-    courses : sequence of ErrorCourses
-        What the model error does, for simulations with it
-    """
-    count = shared[0].shape[1]
-    metric = Metric(sessions=sessions_of(experiment), columns=tuple(shared), shared=count, own=count,
-                    courses=tuple(courses))  # fmt: skip
-    if s > 0.0:
-        both = tuple(np.column_stack(pair) for pair in zip(shared, columns, strict=True))
-        metric = replace(metric, columns=both, own=0, deviation=s)
-    return replace(experiment, metric=metric)
 
 
 def fit_over_sessions(fit: Fit, base: int) -> OverSessions:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
 
-from diagnosis.engine.fit import FIRST_ITERATIONS, Experiment, Fit, calibrate
+from diagnosis.engine.fit import Experiment, Fit, calibrate
 from diagnosis.engine.unknown import SensorBias, SensorLag, TermParameter, Unknown
 from diagnosis.forward.whitening import AS_ASSUMED
-from models.base.types import Array
 from models.quantities.quantities import is_total_loss
 from models.terms.term import Term
 
@@ -65,19 +65,15 @@ def without_channels(experiment: Experiment, names: Collection[str]) -> Experime
 
 def _missed_by(experiment: Experiment, fit: Fit, apart: Collection[str]) -> dict[str, float]:
     """How much every temperature is missed by, to the median one; without those that are apart."""
-    of_pieces = [_residual(experiment, fit, index) for index in range(len(experiment.pieces))]
-    squares = np.square(np.concatenate(of_pieces))
+    # Of all readings, also those that the fit left out.
+    pairs = zip(experiment.pieces, fit.parts, strict=True)
+    squares = np.square(np.concatenate([piece.measured - part.point.read for piece, part in pairs]))
     seen = np.isfinite(squares).sum(axis=0)
     rms = np.sqrt(np.nansum(squares, axis=0) / np.maximum(seen, 1))
     found = {name: float(value) for name, value in zip(experiment.pieces[0].channels, rms, strict=True)
              if not is_total_loss(name) and name not in apart}  # fmt: skip
     middle = max(float(np.median(list(found.values()))), 1e-9)
     return {name: value / middle for name, value in found.items()}
-
-
-def _residual(experiment: Experiment, fit: Fit, index: int) -> Array:
-    """Measured minus read of a piece, with the readings that the fit left out."""
-    return np.asarray(experiment.pieces[index].measured - fit.parts[index].point.read)
 
 
 def calibrate_without_error(fit: Fit, plain: Fit, apart: Collection[str] = ()) -> Fit:
@@ -101,7 +97,10 @@ def calibrate_without_error(fit: Fit, plain: Fit, apart: Collection[str] = ()) -
     counting = without_channels(every, apart) if apart else every
     nominal = fit.z.copy()
     nominal[: len(plain.z)] = plain.z_in(every)
-    reached = [one for start in (fit.z, nominal) if (one := _calibrated_from(counting, start, fit)) is not None]
+    reached: list[Fit] = []
+    for start in (fit.z, nominal):
+        with suppress(ArithmeticError, np.linalg.LinAlgError):
+            reached.append(calibrate(counting, start, fit.trajectories))
     if not reached:
         raise ArithmeticError("the simulation has no solution without model error")
     found = max(reached, key=lambda one: one.log_evidence)
@@ -110,15 +109,6 @@ def calibrate_without_error(fit: Fit, plain: Fit, apart: Collection[str] = ()) -
     terms = {term.label: term for term in every.machine.terms}
     own = [_describes(unknown, terms, apart) for unknown in every.unknowns]
     return every.fit(np.where(own, fit.z, found.z), found.trajectories, iterations=0)
-
-
-def _calibrated_from(experiment: Experiment, z: Array, near: Fit) -> Fit | None:
-    """The fit that a start leads to; None without a solution."""
-    try:
-        first = experiment.fit(z, near.trajectories, iterations=FIRST_ITERATIONS)
-        return experiment.with_filters(first.parts).fit(first.z, first.trajectories)
-    except (ArithmeticError, np.linalg.LinAlgError):
-        return None
 
 
 def _describes(unknown: Unknown, terms: Mapping[str, Term], channels: Collection[str]) -> bool:

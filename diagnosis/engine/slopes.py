@@ -17,7 +17,6 @@ from diagnosis.forward.network_on_grid import Balance, NetworkOnGrid
 from diagnosis.forward.trajectory import Trajectory
 from models.base.types import Array
 from models.network.laws import compile_function, function_source, symbol
-from models.simulation.thermal_network import BASE_SIGNALS
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -49,15 +48,14 @@ class LawSlopes:
     Parameters
     ----------
     model : NetworkOnGrid
-        Of a network without numeric laws
+        Of a network whose laws all are expressions
     names : sequence of str
         Parameters, inputs, states and losses (``P_<component>``) to differentiate by
     """
 
     def __init__(self, model: NetworkOnGrid, names: Sequence[str]) -> None:
         self.model, network = model, model.network
-        derived = {symbol(name): law for name, law in network.derived.items()}
-        known = derived | {s: law.xreplace(derived) for s, law in model.boundary.items()}
+        known = model.boundary
         laws = [
             *(("link", i, link.conductance.xreplace(known)) for i, link in enumerate(network.links)),
             *(("source", i, source.heat.xreplace(known)) for i, source in enumerate(network.sources)),
@@ -65,17 +63,12 @@ class LawSlopes:
             *(("capacity", i, part.capacity) for i, part in enumerate(network.parts)),
             *(("rate", i, network.states[s].rate.xreplace(known)) for i, s in enumerate(model.coupled)),
         ]
-        self._arguments = [
-            *BASE_SIGNALS, *network.inputs, *(f"T_{part}" for part in model.parts),
-            *(p.name for p in network.parameters), *(s.name for s in network.states),
-            *(f"P_{c}" for c in network.components),
-        ]  # fmt: skip
         self._laws: list[tuple[str, int, list[str], Callable[..., tuple[Any, ...]], list[int]]] = []
         for kind, index, law in laws:
             free = {s.name for s in law.free_symbols}
             if by := [name for name in names if name in free]:
-                used = [i for i, name in enumerate(self._arguments) if name in free]
-                function = _slopes(law, tuple(self._arguments[i] for i in used), tuple(by))
+                used = [i for i, name in enumerate(model.arguments) if name in free]
+                function = _slopes(law, tuple(model.arguments[i] for i in used), tuple(by))
                 self._laws.append((kind, index, by, function, used))
         self._names = tuple(names)
 

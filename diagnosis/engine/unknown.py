@@ -6,9 +6,9 @@ exact derivative of the readings. Parameters of a calibration, faults of measure
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Protocol
 
 import numpy as np
 
@@ -23,40 +23,19 @@ LAG_STEP = 0.01  # relative
 TERM_STEP = 0.05  # of a prior sd
 
 
-class Unknown(Protocol):
-    """Common protocol of all unknowns."""
-
-    @property
-    def parameter(self) -> Parameter:
-        """Start, prior and bounds."""
-
-    @property
-    def amplitude(self) -> float:
-        """Factor on the prior standard deviation, above 0."""
-
-    @property
-    def scope(self) -> Scope:
-        """Recordings in which it is there; None for all."""
-
-    def value(self, z: float) -> float:
-        """Value at `z`, in its unit."""
-
-    def z_of(self, value: float) -> float:
-        """The ``z`` of the nearest possible value."""
-
-    def bounds(self) -> tuple[float, float]:
-        """Lowest and highest ``z``."""
-
-    def act(self, setting: Setting, z: float) -> None:
-        """Put the value into what is simulated and read."""
-
-    def column(self, point: Point, z: float) -> Column:
-        """Derivative of the readings with respect to `z`."""
-
-
 @dataclass(frozen=True, kw_only=True)
-class _Prior:
-    """Prior of one number: normal, or log-normal."""
+class Unknown(ABC):
+    """One number with a normal or log-normal prior.
+
+    Attributes
+    ----------
+    parameter : Parameter
+        Start, prior and bounds
+    amplitude : float
+        Factor on the prior standard deviation, above 0
+    scope : frozenset of str, or None
+        Recordings in which it is there; None for all
+    """
 
     parameter: Parameter
     amplitude: float = 1.0
@@ -88,9 +67,17 @@ class _Prior:
         p = self.parameter
         return -np.inf if p.log and p.lower <= 0.0 else self.z_of(p.lower), self.z_of(p.upper)
 
+    @abstractmethod
+    def act(self, setting: Setting, z: float) -> None:
+        """Put the value into what is simulated and read."""
+
+    @abstractmethod
+    def column(self, point: Point, z: float) -> Column:
+        """Derivative of the readings with respect to `z`."""
+
 
 @dataclass(frozen=True, kw_only=True)
-class NetworkParameter(_Prior):
+class NetworkParameter(Unknown):
     """A parameter of the network's laws."""
 
     def act(self, setting: Setting, z: float) -> None:
@@ -103,7 +90,7 @@ class NetworkParameter(_Prior):
 
 
 @dataclass(frozen=True, kw_only=True)
-class SensorBias(_Prior):
+class SensorBias(Unknown):
     """A constant error of a channel, [K] or [W]."""
 
     channel: str
@@ -118,7 +105,7 @@ class SensorBias(_Prior):
 
 
 @dataclass(frozen=True, kw_only=True)
-class SensorLag(_Prior):
+class SensorLag(Unknown):
     """Time constant of a temperature sensor, [s]."""
 
     channel: str
@@ -138,7 +125,7 @@ class SensorLag(_Prior):
 
 
 @dataclass(frozen=True, kw_only=True)
-class LossGain(_Prior):
+class LossGain(Unknown):
     """Gain of the measured total loss, [-]."""
 
     def act(self, setting: Setting, z: float) -> None:
@@ -152,7 +139,7 @@ class LossGain(_Prior):
 
 
 @dataclass(frozen=True, kw_only=True)
-class LossDelay(_Prior):
+class LossDelay(Unknown):
     """Delay of the measured total loss behind the inputs, [s]."""
 
     def act(self, setting: Setting, z: float) -> None:
@@ -166,14 +153,14 @@ class LossDelay(_Prior):
 
 
 @dataclass(frozen=True, kw_only=True)
-class InputGain(_Prior):
+class InputGain(Unknown):
     """True over recorded value of an input, [-]."""
 
     input: str
 
     def act(self, setting: Setting, z: float) -> None:
         """Scale the input."""
-        setting.samples[..., setting.inputs.index(self.input)] *= self.value(z)
+        setting.samples[..., setting.machine.inputs.index(self.input)] *= self.value(z)
 
     def column(self, point: Point, z: float) -> Column:
         """Heat per relative change of the input, as it was taken in this simulation."""
@@ -181,14 +168,14 @@ class InputGain(_Prior):
 
 
 @dataclass(frozen=True, kw_only=True)
-class InputOffset(_Prior):
+class InputOffset(Unknown):
     """True less recorded value of an input that no loss depends on, in its unit."""
 
     input: str
 
     def act(self, setting: Setting, z: float) -> None:
         """Shift the input."""
-        setting.samples[..., setting.inputs.index(self.input)] += self.value(z)
+        setting.samples[..., setting.machine.inputs.index(self.input)] += self.value(z)
 
     def column(self, point: Point, z: float) -> Column:
         """Heat by the exact derivative of the laws."""
@@ -196,7 +183,7 @@ class InputOffset(_Prior):
 
 
 @dataclass(frozen=True, kw_only=True)
-class ClockOffset(_Prior):
+class ClockOffset(Unknown):
     """Time by which the readings of temperatures come after the inputs, [s]."""
 
     def act(self, setting: Setting, z: float) -> None:
@@ -209,7 +196,7 @@ class ClockOffset(_Prior):
 
 
 @dataclass(frozen=True, kw_only=True)
-class TermParameter(_Prior):
+class TermParameter(Unknown):
     """A parameter of a term outside the network: an input shifted, or a reading distorted."""
 
     label: str
@@ -227,7 +214,7 @@ class TermParameter(_Prior):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Held(_Prior):
+class Held(Unknown):
     """A parameter of a term that is not fitted.
 
     Attributes

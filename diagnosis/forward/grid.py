@@ -137,17 +137,6 @@ class Piece:
         )  # fmt: skip
         return fine, at
 
-    def seen(self, T: Array, parts: Sequence[str]) -> Array:
-        """Temperatures of the parts that memories follow: measured where the piece is guided, else as simulated.
-
-        Parameters
-        ----------
-        T : Array, shape (K + 1, parts)
-            Simulated, at the grid points, [degC]
-        """
-        measured = self.guide(parts)
-        return np.where(np.isfinite(measured), measured, T)
-
     def guide(self, parts: Sequence[str]) -> Array:
         """Measured temperatures of parts if the piece is guided, else NaN; shape (K + 1, parts), [degC]."""
         found = np.full((len(self.time), len(parts)), np.nan)

@@ -13,7 +13,7 @@ import sympy as sp
 from diagnosis.forward.extra_states import Memories, update_of
 from diagnosis.forward.grid import Piece
 from models.base.types import Array
-from models.network.compiled import FUNCTIONS, law_expressions, laws_of, structure
+from models.network.compiled import FUNCTIONS, law_expressions, laws_of
 from models.network.laws import compile_each, compile_function, function_source, symbol
 from models.quantities.quantities import node_of_channel
 from models.simulation.thermal_network import BASE_SIGNALS, Losses, ThermalNetwork
@@ -96,17 +96,15 @@ class NetworkOnGrid:
         self.laws = laws_of(network, {name: compile_each(*functions[name]) for name in FUNCTIONS})
         self.parts = self.laws.parts
         self.n = len(self.parts)
-        _, to_boundary, self.injection = structure(network)
-        n_all = self.n + to_boundary.shape[-1]
-        self.incidence = np.zeros((len(network.links), n_all))
+        self.injection = self.laws.injection
         names = [*self.parts, *self.laws.boundaries]
+        self.incidence = np.zeros((len(network.links), len(names)))
         for index, link in enumerate(network.links):
             self.incidence[index, names.index(link.nodes[0])] = 1.0
             self.incidence[index, names.index(link.nodes[1])] = -1.0
         self.to_parts = -self.incidence[:, : self.n]
-        varying = np.array(self.laws.varying, dtype=int)
-        self._varying = varying
-        self._constant = np.array([i for i in range(len(network.links)) if i not in set(self.laws.varying)], dtype=int)
+        self._varying = np.array(self.laws.varying, dtype=int)
+        self._constant = np.setdiff1d(np.arange(len(network.links)), self._varying)
         self.loss_nodes = np.array([self.parts.index(name) for name in losses.temperature_nodes], dtype=int)
         self._apart = _apart(losses)
         self.is_loss = np.array(self.laws.losses_of_sources, dtype=bool)
@@ -117,26 +115,25 @@ class NetworkOnGrid:
         return self.parts.index(node_of_channel(channel, self.parts))
 
     # ------------------------------------------------------------------ heat balance on all intervals
-    # Temperatures, losses, memories and parameters may each be many at once: a further first axis, V.
+    # Temperatures and losses may each be many at once: a further first axis, V.
 
     def signals(self, piece: Piece, T: Array, values: Array, memory: Array) -> list[Array | float]:
         """The common signals of the laws at the middles of the intervals; see
         :class:`models.portable.evaluation.Laws`.
         """
         return [
-            piece.middle, *np.moveaxis(piece.inputs, -1, 0), *np.moveaxis(T, -1, 0), *_one_each(values),
+            piece.middle, *np.moveaxis(piece.inputs, -1, 0), *np.moveaxis(T, -1, 0), *values,
             *np.moveaxis(memory, -1, 0),
         ]  # fmt: skip
 
     def capacities(self, values: Array) -> Array:
-        """Heat capacities of the parts [J/K], shape (parts,) or (V, parts)."""
-        found = self.laws.fixed(*np.moveaxis(values, -1, 0))[len(self._constant) :]
-        return np.stack([np.broadcast_to(np.asarray(c, float), np.shape(values)[:-1]) for c in found], axis=-1)
+        """Heat capacities of the parts [J/K], shape (parts,)."""
+        return np.array(self.laws.fixed(*values)[len(self._constant) :], dtype=float)
 
     def conductances(self, signals: Sequence[Array | float], values: Array, shape: tuple[int, ...]) -> Array:
         """Conductances of all links [W/K], shape (K, links) or (V, K, links)."""
         result = np.empty((*shape, len(self.incidence)))
-        for index, value in zip(self._constant, self.laws.fixed(*_one_each(values)), strict=False):
+        for index, value in zip(self._constant, self.laws.fixed(*values), strict=False):
             result[..., index] = value
         for index, value in zip(self._varying, self.laws.exchange(*signals), strict=True):
             result[..., index] = value
@@ -164,13 +161,13 @@ class NetworkOnGrid:
         ----------
         T : Array, shape (K, parts) or (V, K, parts)
             [degC]
-        values : Array, shape (parameters,) or (V, parameters)
+        values : Array, shape (parameters,)
             Parameters of the network
         power : Array, shape (K, components) or (V, K, components)
             Nominal losses, [W]
-        memory : Array, shape (K, states) or (V, K, states)
+        memory : Array, shape (K, states)
         """
-        shape = np.broadcast_shapes(T.shape[:-1], power.shape[:-1], memory.shape[:-1], (*values.shape[:-1], 1))
+        shape = np.broadcast_shapes(T.shape[:-1], power.shape[:-1])
         signals = self.signals(piece, T, values, memory)
         conductances = self.conductances(signals, values, shape)
         differences = self.differences(signals, T, shape)
@@ -182,7 +179,7 @@ class NetworkOnGrid:
 
     def rates(self, piece: Piece, T: Array, values: Array, power: Array, memory: Array) -> Array:
         """Rates of the states that are solved with the temperatures [1/s times their unit], shape (..., K, coupled)."""
-        shape = np.broadcast_shapes(T.shape[:-1], power.shape[:-1], memory.shape[:-1], (*values.shape[:-1], 1))
+        shape = np.broadcast_shapes(T.shape[:-1], power.shape[:-1])
         found = self._coupled_law(*self.signals(piece, T, values, memory), *np.moveaxis(power, -1, 0))
         return np.stack([np.broadcast_to(rate, shape) for rate in found], axis=-1)
 
@@ -310,11 +307,15 @@ class NetworkOnGrid:
                 *(p.name for p in self.network.parameters)]  # fmt: skip
 
     @cached_property
-    def _coupled_law(self) -> Callable[..., tuple[Any, ...]]:
+    def arguments(self) -> list[str]:
+        """All signals, in the order in which laws get them."""
         network = self.network
-        arguments = [*self._signal_names, *(s.name for s in network.states), *(f"P_{c}" for c in network.components)]
-        laws = [network.states[index].rate.xreplace(self.boundary) for index in self.coupled]
-        return compile_function(function_source("rates", arguments, laws, vector=True), "rates")
+        return [*self._signal_names, *(s.name for s in network.states), *(f"P_{c}" for c in network.components)]
+
+    @cached_property
+    def _coupled_law(self) -> Callable[..., tuple[Any, ...]]:
+        laws = [self.network.states[index].rate.xreplace(self.boundary) for index in self.coupled]
+        return compile_function(function_source("rates", self.arguments, laws, vector=True), "rates")
 
     @cached_property
     def _memories(self) -> Memories:
@@ -338,7 +339,7 @@ class NetworkOnGrid:
             Temperatures at the grid points, [degC]
         seen : Array, shape (K + 1, parts)
             Those that switches follow, [degC]
-        values : Array, shape (parameters,) or (V, parameters)
+        values : Array, shape (parameters,)
         power : Array, shape (K, components)
             Nominal losses, [W]
         before : Array, shape (K, states), optional
@@ -346,15 +347,15 @@ class NetworkOnGrid:
 
         Returns
         -------
-        Array, shape (K, states) or (V, K, states)
+        Array, shape (K, states)
         """
         count = len(self.network.states)
         known = {} if before is None or before.shape[1] != count else {i: before[:, i] for i in self.coupled}
         middle = 0.5 * (T[1:] + T[:-1])
-        rows = [piece.middle, *piece.inputs.T, *middle.T, *_one_each(np.atleast_2d(values)), *power.T]
-        result = np.empty((*values.shape[:-1], len(piece.steps), count))
+        rows = [piece.middle, *piece.inputs.T, *middle.T, *values, *power.T]
+        result = np.empty((len(piece.steps), count))
         for index, state in enumerate(self._memories.follow(piece, rows, seen, known)):
-            result[..., index] = state
+            result[:, index] = state
         return result
 
     def switching(self, *, averaged: bool) -> Callable[[Sequence[Any]], tuple[float, ...]]:
@@ -368,9 +369,7 @@ class NetworkOnGrid:
         return self._picked([*(s.rate for s in states), *(sp.diff(s.rate, symbol(s.name)) for s in states)])
 
     def _picked(self, laws: Sequence[sp.Expr]) -> Callable[[Sequence[Any]], tuple[float, ...]]:
-        network = self.network
-        laws = [law.xreplace(self.boundary) for law in laws]
-        names = [*self._signal_names, *(s.name for s in network.states), *(f"P_{c}" for c in network.components)]
+        laws, names = [law.xreplace(self.boundary) for law in laws], self.arguments
         used = {s.name for law in laws for s in law.free_symbols}
         places = [index for index, name in enumerate(names) if name in used]  # few of dozens
         function = compile_function(function_source("laws", [names[i] for i in places], laws, vector=False), "laws")
@@ -404,8 +403,3 @@ def _stronger(now: Array, before: Array) -> tuple[Array, Array]:
     change = (torque - then).mean(axis=1) / np.maximum(then.mean(axis=1), 1e-9)
     unlike = np.abs(torque - then).max(axis=1) / np.maximum(then.max(axis=1), 1e-9)
     return change, np.where((now[..., 0] == before[..., 0]).all(axis=1), np.maximum(unlike, np.abs(change)), np.inf)
-
-
-def _one_each(values: Array) -> list[Array | float]:
-    """Parameters one by one: numbers, or columns of shape (V, 1)."""
-    return list(values) if values.ndim == 1 else [values[:, index, None] for index in range(values.shape[1])]

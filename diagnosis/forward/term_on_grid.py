@@ -139,12 +139,10 @@ class TermOnGrid:
             if self._inside:
                 within = law if there is None else self.law(trajectory, there[None, :])[0].T
             loss = loss + self._factor_heat(trajectory, law, within, heat)
-        elif term.kind == "signal":
+        else:  # an input
             per_unit, loss_per_unit = input_slope(model, trajectory, term.target[0])
             heat = per_unit[:, :, None] * law[:, None, :]
             loss = loss_per_unit[:, None] * law
-        else:
-            raise ValueError(f"{term.label}: a term of kind {term.kind!r} brings no heat")
         return heat, loss
 
     def _factor_heat(self, trajectory: Trajectory, law: Array, within: Array, heat: Array) -> Array:
@@ -238,7 +236,7 @@ def _compiled(
 
 
 def input_slope(model: NetworkOnGrid, trajectory: Trajectory, name: str) -> tuple[Array, Array]:
-    """Net heat, shape (K, parts), and loss, (K,), per unit of an input."""
+    """Net heat, shape (K, parts + coupled), and loss, (K,), per unit of an input."""
     return kept(model, trajectory, f"slope {name}", lambda: _input_slope(model, trajectory, name))
 
 
@@ -251,7 +249,7 @@ def _input_slope(model: NetworkOnGrid, trajectory: Trajectory, name: str) -> tup
 
 
 def moved_heat(model: NetworkOnGrid, trajectory: Trajectory, moved: Piece) -> tuple[Array, Array]:
-    """Change of the net heat, shape (K, parts), and of the loss, (K,), when the inputs of a piece are others."""
+    """Change of the net heat, (K, parts + coupled), and of the loss, (K,), when the inputs of a piece are others."""
     piece, T = trajectory.piece, trajectory.middle
     power = trajectory.tangent.at(T[:, model.loss_nodes])
     changed = power
@@ -259,5 +257,10 @@ def moved_heat(model: NetworkOnGrid, trajectory: Trajectory, moved: Piece) -> tu
         before = kept(model, trajectory, "losses", lambda: model.loss_at(piece.samples, T))
         changed = power + model.loss_at(moved.samples, T) - before
     here = settled_balance(model, trajectory)
-    there = model.balance(moved, T, trajectory.values, changed, trajectory.memory)
-    return there.heat - here.heat, (there.sources - here.sources)[:, model.is_loss].sum(axis=-1)
+    values, memory = trajectory.values, trajectory.memory
+    there = model.balance(moved, T, values, changed, memory)
+    into = there.heat - here.heat
+    if model.coupled:
+        driven = model.rates(moved, T, values, changed, memory) - model.rates(piece, T, values, power, memory)
+        into = np.concatenate([into, driven], axis=1)
+    return into, (there.sources - here.sources)[:, model.is_loss].sum(axis=-1)

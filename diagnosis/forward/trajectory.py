@@ -31,7 +31,6 @@ RUNAWAY_T = 1500.0  # degC; beyond it there is no trajectory
 # A switching that no row shows, be they means over minutes or noisy near a set-point, sends a guided trajectory astray.
 # Further off than this, switches follow the simulated temperature until it is back.
 ASTRAY_K = 4.0
-MOST_AT_ONCE = 40_000  # intervals times parameters whose derivatives are taken together
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -322,7 +321,8 @@ def linear_round(
     T = 0.5 * (T_ref[1:] + T_ref[:-1])
     tangent = model.loss_tangent(piece, T, tangent)
     power = tangent.at(T[:, model.loss_nodes])
-    guide, seen = piece.guide(model.parts), piece.seen(T_ref, model.parts)
+    guide = piece.guide(model.parts)
+    seen = np.where(np.isfinite(guide), guide, T_ref)
     memory = model.memory(piece, T_ref, seen, values, power, states) if given is None else given.copy()
     solved, result = _walked(model, piece, values, start, T, tangent, memory)
     read = model.switched_by
@@ -366,52 +366,35 @@ def _settled_balance(model: NetworkOnGrid, trajectory: Trajectory) -> Balance:
     return model.balance(trajectory.piece, T, trajectory.values, power, trajectory.memory)
 
 
-def parameter_heats(
-    model: NetworkOnGrid, trajectory: Trajectory, here: Balance, indices: Sequence[int], steps: Array
+def parameter_heat(
+    model: NetworkOnGrid, trajectory: Trajectory, here: Balance, index: int, step: float
 ) -> tuple[Array, Array]:
-    """Net heat and total loss per unit of some parameters, along a trajectory.
+    """Net heat and total loss per unit of a parameter, along a trajectory, by a difference.
 
     Parameters
     ----------
     here : Balance
         Its :func:`settled_balance`
-    indices : sequence of int
-        Which parameters
-    steps : Array, shape (V,)
-        Of every parameter, in its unit
+    index : int
+        Which parameter
+    step : float
+        In its unit
 
     Returns
     -------
-    heat : Array, shape (K, parts + coupled, V)
+    heat : Array, shape (K, parts + coupled)
         Including the change of stored heat that another capacity makes, per unit of the parameter, [W/unit]; then the
         rates of the states that are solved with the temperatures
-    loss : Array, shape (K, V)
+    loss : Array, shape (K,)
     """
-    count = max(1, MOST_AT_ONCE // len(trajectory.memory))
-    found = [_parameter_heats(model, trajectory, here, indices[i : i + count], steps[i : i + count])
-             for i in range(0, len(indices), count)]  # fmt: skip
-    heats, losses = zip(*found, strict=True)
-    return np.concatenate(heats, axis=-1), np.concatenate(losses, axis=-1)
-
-
-def _parameter_heats(
-    model: NetworkOnGrid, trajectory: Trajectory, here: Balance, indices: Sequence[int], steps: Array
-) -> tuple[Array, Array]:
     T, piece, memory = trajectory.middle, trajectory.piece, trajectory.memory
-    values = np.tile(trajectory.values, (len(indices), 1))
-    values[range(len(indices)), indices] += steps
+    values = trajectory.values.copy()
+    values[index] += step
     power = trajectory.tangent.at(T[:, model.loss_nodes])
-    remembered = [i for i, index in enumerate(indices) if model.network.parameters[index].name in model.remembered]
-    memories = memory
-    if remembered:
-        memories = np.tile(memory, (len(indices), 1, 1))
-        memories[remembered] = model.memory(piece, trajectory.T, trajectory.seen, values[remembered], power, memory)
-    there = model.balance(piece, T, values, power, memories)
-    stored = (trajectory.capacities / model.capacities(values))[:, None, :]
-    heat = (there.heat * stored - here.heat) / steps[:, None, None]
+    moved = model.memory(piece, trajectory.T, trajectory.seen, values, power, memory)
+    there = model.balance(piece, T, values, power, moved)
+    heat = (there.heat * (trajectory.capacities / model.capacities(values)) - here.heat) / step
     if model.coupled:
-        before = model.rates(piece, T, trajectory.values, power, memory)
-        driven = (model.rates(piece, T, values, power, memories) - before) / steps[:, None, None]
-        heat = np.concatenate([heat, driven], axis=-1)
-    loss = (there.sources - here.sources)[..., model.is_loss].sum(axis=-1) / steps[:, None]
-    return np.moveaxis(heat, 0, -1), loss.T
+        driven = model.rates(piece, T, values, power, moved) - model.rates(piece, T, trajectory.values, power, memory)
+        heat = np.concatenate([heat, driven / step], axis=-1)
+    return heat, (there.sources - here.sources)[:, model.is_loss].sum(axis=-1) / step

@@ -102,24 +102,23 @@ class Whitening:
         # The states are of variance 1; how much heat they are goes with the heat that the surroundings take.
         heat_sd = np.hypot(noise.heat_sd, noise.wander * _to_surroundings(model, trajectory))[:, shaken]
         per_capacity = trajectory.gain[:, :, shaken] * (heat_sd / trajectory.capacities[shaken])[:, None, :]
-        self._transition = np.zeros((count, size, size))
-        self._transition[:, :n, :n] = trajectory.decay
-        self._transition[:, :n, n:] = per_capacity
-        self._transition[:, range(n, size), range(n, size)] = rho[:, None]
+        transition = np.zeros((count, size, size))
+        transition[:, :n, :n] = trajectory.decay
+        transition[:, :n, n:] = per_capacity
+        transition[:, range(n, size), range(n, size)] = rho[:, None]
         renewed = 1.0 - rho**2
         observe = _observation(model, trajectory, sensors, size)
         self._seen = np.isfinite(piece.measured)
         variance = reading_variance(model, trajectory, sensors, noise)
         variance = np.where(self._seen, variance, MISSING_VARIANCE)
         points, m = variance.shape
-        self._root = np.empty((points, m, m))
-        self._gain = np.empty((points, size, m))
+        root = np.empty((points, m, m))
+        gains = np.empty((points, size, m))
         self.log_determinant = 0.0
         covariance = np.zeros((size, size))
         covariance[range(n), range(n)] = float(noise.start_sd.max()) ** 2  # of a tank it is as little known as can be
         covariance[range(model.n), range(model.n)] = noise.start_sd**2
         covariance[range(n, size), range(n, size)] = 1.0
-        half = np.zeros((size, size))
         for k in range(points):
             H = observe[k]
             PH = covariance @ H.T
@@ -127,21 +126,19 @@ class Whitening:
             S[range(m), range(m)] += variance[k]
             inverse_root = np.linalg.inv(np.linalg.cholesky(S))
             gain = PH @ inverse_root.T
-            self._root[k] = inverse_root
-            self._gain[k] = gain @ inverse_root
+            root[k] = inverse_root
+            gains[k] = gain @ inverse_root
             self.log_determinant -= 2.0 * float(np.log(np.diag(inverse_root)[self._seen[k]]).sum())
             covariance = covariance - gain @ gain.T
             if k < count:
-                half = self._transition[k]
-                covariance = half @ covariance @ half.T
+                covariance = transition[k] @ covariance @ transition[k].T
                 covariance[range(n, size), range(n, size)] += renewed[k]
         # One matrix per step takes (state, reading) to (next state, innovation).
         self._step = np.zeros((points, size + m, size + m))
-        self._step[:-1, :size, :size] = self._transition - self._transition @ self._gain[:-1] @ observe[:-1]
-        self._step[:-1, :size, size:] = self._transition @ self._gain[:-1]
-        self._step[:, size:, :size] = -self._root @ observe
-        self._step[:, size:, size:] = self._root
-        del self._transition, self._gain, self._root
+        self._step[:-1, :size, :size] = transition - transition @ gains[:-1] @ observe[:-1]
+        self._step[:-1, :size, size:] = transition @ gains[:-1]
+        self._step[:, size:, :size] = -root @ observe
+        self._step[:, size:, size:] = root
 
     def __call__(self, columns: Array) -> Array:
         """Innovations of signals.

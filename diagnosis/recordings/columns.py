@@ -14,7 +14,7 @@ from diagnosis.recordings.mapping import AUXILIARY, IGNORE, Column, RecordingMap
 from models.base.errors import Problems, did_you_mean
 from models.base.types import Array
 from models.quantities.column_names import meant
-from models.quantities.quantities import TOTAL_LOSS, Quantity, node_of_channel, quantity_of, quantity_of_column
+from models.quantities.quantities import TOTAL_LOSS, Quantity, node_of_channel, quantity_of
 from models.quantities.units import units_in_files
 
 NEAR = 0.85  # likeness of names that makes one a slip of the other
@@ -45,7 +45,7 @@ def match_columns(
     problems: Problems,
     notes: list[str],
 ) -> dict[str, Column]:
-    """Find the quantity of every column: from the mapping, then from the standard names; the rest is auxiliary.
+    """Find the quantity of every column: from the mapping, then from the standard names.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ def match_columns(
             problems.add(f"column {given.column} is missing; it has: {shown}")
     rest = [n for n in present if n not in roles and n not in mapping.columns and n != time_column]
     _report_unused(rest, lacking, problems, notes)
-    return roles | {name: Column(quantity=AUXILIARY) for name in rest}
+    return roles
 
 
 def _mapped_columns(
@@ -119,25 +119,6 @@ def _report_unused(rest: Sequence[str], lacking: Sequence[str], problems: Proble
     if unused:
         more = f" and {len(unused) - MOST_NAMED} more" if len(unused) > MOST_NAMED else ""
         notes.append(f"not used, being no input and no node of this gearbox: {', '.join(unused[:MOST_NAMED])}{more}")
-
-
-def auxiliary_numbers(cells: pd.Series, name: str, column: Column, notes: list[str]) -> Array | None:
-    """Return an auxiliary column as numbers, shape (rows,), in the unit of the file; None if it holds others.
-
-    A column of the table of quantities (``torque_out_Nm``) loses its impossible values.
-    """
-    if pd.api.types.is_numeric_dtype(cells.dtype):
-        values = np.asarray(cells.to_numpy(dtype=np.float64, na_value=np.nan) * column.scale)
-        quantity = quantity_of_column(name)
-        wrong = np.zeros(len(values), bool) if quantity is None else (values < quantity.low) | (values > quantity.high)
-        if quantity is not None and wrong.any():
-            where = rows_text(np.asarray(cells.index)[wrong] + 1)
-            limits = f"{quantity.low:g} ... {quantity.high:g} {quantity.unit}"
-            notes.append(f"{name}: {int(wrong.sum())} values ({where}) outside {limits} taken as missing")
-        return np.where(wrong, np.nan, values)
-    if cells.notna().any():
-        notes.append(f"column {name[:80]} is not numeric; ignored")
-    return None
 
 
 def _numbers(cells: pd.Series, name: str, decimal: str, problems: Problems) -> Array | None:

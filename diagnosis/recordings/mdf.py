@@ -12,7 +12,6 @@ import pandas as pd
 
 from diagnosis.recordings.time_axis import STANDARD
 from models.base.errors import InputError
-from models.files.table_file import check_file
 
 FARTHEST_STEPS = 1.5  # of the usual time between rows, that a sample may be from its row
 
@@ -49,7 +48,6 @@ def read_mdf(path: Path, *, base: str) -> MdfTable:
     InputError
         If asammdf is not installed, or the file cannot be read, lacks `base`, or names a channel twice.
     """
-    check_file(path)
     if find_spec("asammdf") is None:
         raise InputError(f"{path}: reading MDF4 needs asammdf; python -m pip install asammdf")
     from asammdf import MDF

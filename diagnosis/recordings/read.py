@@ -23,7 +23,7 @@ from diagnosis.recordings.cleaning import (
 from diagnosis.recordings.columns import quantities_of
 from diagnosis.recordings.file import open_recording, set_to_one_clock, sha256_of, stem_of
 from diagnosis.recordings.machine import MachineDefinition, RecordedMachine
-from diagnosis.recordings.mapping import RecordingMapping, mapping_of_definition
+from diagnosis.recordings.mapping import mapping_of_definition
 from diagnosis.recordings.recording import Channel, Recording
 from diagnosis.recordings.rows import RecordedRows, joined, read_rows
 from diagnosis.recordings.time_axis import split_path
@@ -171,7 +171,7 @@ def read_recording(
         where = " in the part that is named" if parts else ""
         rows = len(found.seconds) or "no"
         raise InputError(f"{found.path}: has {rows} rows{where}; a recording has {FEWEST_ROWS} or more")
-    _add_unrecorded(found, files[0].mapping, network)
+    _add_unrecorded(found, network)
     stated = max_gap_s if max_gap_s is not None else files[0].mapping.max_gap_s
     usual = GAP_STEPS * float(np.median(np.diff(found.seconds)))
     gap = stated if stated is not None else max(SHORTEST_GAP_S, usual)
@@ -209,7 +209,6 @@ def read_recording(
             for quantity in found.measured(network)
             for role in [found.roles[quantity]]
         ),
-        auxiliary=found.auxiliary,
         segments=segments,
         assumed=tuple(found.assumed),
         notes=tuple(found.notes),
@@ -244,14 +243,11 @@ def _names(paths: Sequence[str | Path]) -> list[str]:
 # ---------------------------------------------------------------------- cleaning
 
 
-def _add_unrecorded(found: RecordedRows, mapping: RecordingMapping, network: RecordedMachine) -> None:
-    """Add the constants of the mapping, and the definition's values of inputs that were not recorded."""
-    size = len(found.seconds)
-    for name, value in mapping.constants.items():
-        found.values[name] = np.full(size, value)
+def _add_unrecorded(found: RecordedRows, network: RecordedMachine) -> None:
+    """Add the definition's values of inputs that were not recorded."""
     for name, given in network.inputs.items():
         if name not in found.values:
-            found.values[name] = np.full(size, given.default)
+            found.values[name] = np.full(len(found.seconds), given.default)
             found.assumed.append(name)
             found.notes.append(f"{given.column} was not recorded; {given.default:g} is assumed, as in the definition")
 
@@ -328,7 +324,6 @@ def _with_known_inputs(found: RecordedRows, network: RecordedMachine, gap: float
         seconds=time[usable],
         rows=rows[usable],
         values={name: values[usable] for name, values in found.values.items()},
-        auxiliary={name: values[usable] for name, values in found.auxiliary.items()},
     )
 
 

@@ -83,8 +83,6 @@ class Recording:
     inputs : mapping of signal to Array, shape (rows,)
         Every input of the network; free of NaN
     channels : tuple of Channel
-    auxiliary : mapping of column to Array, shape (rows,)
-        Other numeric columns
     segments : tuple of slice
         Gap-free pieces
     assumed : tuple of str
@@ -109,7 +107,6 @@ class Recording:
     rows: NDArray[np.int64] = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     inputs: Mapping[str, Array]
     channels: tuple[Channel, ...]
-    auxiliary: Mapping[str, Array] = field(default_factory=dict)
     segments: tuple[slice, ...]
     assumed: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()

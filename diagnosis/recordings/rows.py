@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from diagnosis.recordings.columns import auxiliary_numbers, is_measurable, match_columns, quantities_of, quantity_values
+from diagnosis.recordings.columns import is_measurable, match_columns, quantities_of, quantity_values
 from diagnosis.recordings.file import RecordingFile
 from diagnosis.recordings.machine import RecordedMachine
 from diagnosis.recordings.mapping import AUXILIARY, IGNORE, Column
@@ -31,7 +31,6 @@ class RecordedRows:
         Numbers of the rows in the file, counted from 1
     values : dict of quantity to Array, shape (rows,)
         Inputs and measurements; NaN where missing
-    auxiliary : dict of column to Array, shape (rows,)
     names, roles : dict of quantity to str, Column
         Its column, and what the mapping states of it
     """
@@ -42,7 +41,6 @@ class RecordedRows:
     seconds: Array
     rows: NDArray[np.int64]
     values: dict[str, Array] = field(default_factory=dict)
-    auxiliary: dict[str, Array] = field(default_factory=dict)
     names: dict[str, str] = field(default_factory=dict)
     roles: dict[str, Column] = field(default_factory=dict)
     assumed: list[str] = field(default_factory=list)
@@ -82,11 +80,7 @@ def read_rows(
     known = quantities_of(network)
     roles = match_columns(present, clock.column if clock else "", file.mapping, network, problems, notes)
     for name, role in roles.items():
-        if role.quantity == AUXILIARY:
-            auxiliary = auxiliary_numbers(table[name], name, role, notes)
-            if auxiliary is not None:
-                found.auxiliary[name] = auxiliary
-        elif role.quantity != IGNORE:
+        if role.quantity not in (AUXILIARY, IGNORE):
             found.names[role.channel], found.roles[role.channel] = name, role
             outside = ~file.in_rows_of(name, role, seconds, first_s)
             quantity = known[role.quantity]
@@ -94,6 +88,7 @@ def read_rows(
                                      outside, problems, notes)  # fmt: skip
             if values is not None:
                 found.values[role.channel] = values
+    found.values |= {name: np.full(len(table), value) for name, value in file.mapping.constants.items()}
     if to_compare and not any(q.startswith("T_") and is_measurable(q, network) for q in found.names):
         problems.add(
             "no temperature was measured: a column T_<node>_degC is needed, of the nodes "
@@ -122,13 +117,6 @@ def joined(tables: Sequence[RecordedRows]) -> RecordedRows:
                 "follow each other in time: remove the rows that are there twice, or name separate recordings"
             )
 
-    def together_of(kind: str) -> dict[str, Array]:
-        names = dict.fromkeys(name for table in tables for name in getattr(table, kind))
-        return {
-            name: np.concatenate([getattr(t, kind).get(name, np.full(len(t.seconds), np.nan)) for t in tables])
-            for name in names
-        }
-
     before_rows = np.cumsum([0, *(int(table.rows[-1]) for table in tables[:-1])])
     numbered = [table.rows + start for table, start in zip(tables, before_rows, strict=True)]
     ranges = ", ".join(
@@ -141,8 +129,10 @@ def joined(tables: Sequence[RecordedRows]) -> RecordedRows:
         clock=tables[0].clock,
         seconds=np.concatenate([table.seconds for table in tables]),
         rows=np.concatenate(numbered),
-        values=together_of("values"),
-        auxiliary=together_of("auxiliary"),
+        values={
+            name: np.concatenate([t.values.get(name, np.full(len(t.seconds), np.nan)) for t in tables])
+            for name in dict.fromkeys(name for table in tables for name in table.values)
+        },
         names={quantity: name for table in reversed(tables) for quantity, name in table.names.items()},
         roles={quantity: role for table in reversed(tables) for quantity, role in table.roles.items()},
         notes=[f"joined from {ranges}", *notes],

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from textwrap import wrap
 from typing import Any
 
@@ -13,6 +12,7 @@ import numpy as np
 import plotly.graph_objects as go
 from markupsafe import Markup
 
+from diagnosis.recordings.cleaning import time_pieces
 from models.base.types import Array
 
 INK, LINE = "#1f2328", "#dfe3e8"
@@ -139,11 +139,8 @@ def averaged(x: Array, y: Array, most: int) -> tuple[Array, Array]:
 
 def stretches(x: Array) -> list[slice]:
     """Rows between gaps that are much longer than the usual distance."""
-    if len(x) < 3:
-        return [slice(0, len(x))]
-    step = np.diff(x)
-    cuts = [0, *(np.flatnonzero(step > GAP * max(float(np.median(step)), 1e-12)) + 1).tolist(), len(x)]
-    return [slice(a, b) for a, b in pairwise(cuts)]
+    usual = float(np.median(np.diff(x))) if len(x) > 1 else 0.0
+    return time_pieces(x, GAP * max(usual, 1e-12))
 
 
 def limits(curves: Sequence[Array]) -> list[float] | None:

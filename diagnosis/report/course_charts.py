@@ -97,8 +97,9 @@ def measured_and_simulated(diagnosis: Diagnosis) -> Chart | None:
     if not shown:
         return None
     channels = list(shown[0].run.measured)
-    inputs = _driving(diagnosis, shown)
-    airs = [key for key, given in _inputs(diagnosis, shown).items() if given.quantity.is_temperature]
+    driven = _inputs(diagnosis, shown)
+    inputs = [key for key, given in driven.items() if not given.quantity.is_temperature][:MOST_INPUTS]
+    airs = [key for key, given in driven.items() if given.quantity.is_temperature]
     rows = [*inputs, *([AIR] if airs else []), *channels]
     stages = stages_of(diagnosis)
     heights = [INPUT_PX] * (len(rows) - len(channels)) + [ROW_PX] * len(channels)
@@ -204,11 +205,6 @@ def _inputs(diagnosis: Diagnosis, shown: Sequence[Shown]) -> dict[str, Input]:
     known = diagnosis.network.inputs
     return {key: known[key] for key in shown[0].run.inputs
             if key in known and any(np.any(one.run.inputs[key]) for one in shown)}  # fmt: skip
-
-
-def _driving(diagnosis: Diagnosis, shown: Sequence[Shown]) -> list[str]:
-    usable = _inputs(diagnosis, shown)
-    return [key for key, given in usable.items() if not given.quantity.is_temperature][:MOST_INPUTS]
 
 
 def _grid(heights: Sequence[int]) -> go.Figure:

@@ -8,8 +8,9 @@ import numpy as np
 from plotly.subplots import make_subplots
 
 from diagnosis.report.chart import INK, MOST_POINTS, Chart, curve_points, dressed, row_titles, single, thinned, wrapped
-from diagnosis.report.wording import clause, name, share, short_title, time_scale
+from diagnosis.report.wording import clause, name, short_title, time_scale
 from diagnosis.results.first_screen import date_told
+from diagnosis.results.number_format import share
 from diagnosis.results.result import Diagnosis
 from diagnosis.results.result_parts import LEAST_RIVAL, Finding, PredictedRun
 from models.base.types import Array
@@ -48,17 +49,17 @@ def names_by_grade(diagnosis: Diagnosis) -> Chart | None:
                 text=[share(p) for _, p in own], textposition="outside", cliponaxis=False,
                 hovertemplate="%{y}: %{x:.3f}<extra></extra>",
             )  # fmt: skip
-    figure.update_xaxes(range=[0.0, 1.12], tickvals=[0.0, 0.5, diagnosis.claim_from, 1.0], title="Probability")
+    figure.update_xaxes(range=[0.0, 1.12], tickvals=[0.0, 0.5, diagnosis.settings.claim_from, 1.0], title="Probability")
     figure.update_yaxes(categoryorder="array", categoryarray=labels[::-1], ticksuffix=" ")
-    figure.add_vline(x=diagnosis.claim_from, line={"color": INK, "width": 1, "dash": "dash"})
+    figure.add_vline(x=diagnosis.settings.claim_from, line={"color": INK, "width": 1, "dash": "dash"})
     dressed(
         figure, 110 + BAR_PX * len(labels), barmode="overlay", bargap=0.35, margin={"l": 10, "r": 14, "t": 40, "b": 10}
     )
     told = "; ".join(f"{label.replace('<br>', ' ')} {share(p)} ({grade})" for label, grade, p in found)
     return Chart(
         name="names", title="How probable each name is", figure=figure,
-        note=f"Dashed: the limit of a claim, {diagnosis.claim_from:g}. A bar counts all explanations that hold the "
-             "name, so bars of effects that act together overlap and need not add up to 1.",
+        note=f"Dashed: the limit of a claim, {diagnosis.settings.claim_from:g}. A bar counts all explanations that "
+             "hold the name, so bars of effects that act together overlap and need not add up to 1.",
         alt=f"Probabilities of names: {told}.",
     )  # fmt: skip
 
@@ -140,11 +141,11 @@ def dates_with_bands(diagnosis: Diagnosis) -> Chart | None:
 
 
 def _spans(diagnosis: Diagnosis) -> dict[str, tuple[float, float, bool]]:
-    """Begin and end of every recording on the common clock, [s], and True if it is held out as a whole."""
+    """Begin and end of every recording but baselines, [s] on their clock, and True if it is held out as a whole."""
     spans: dict[str, tuple[float, float, bool]] = {}
     for course in diagnosis.courses:
-        if len(course.time):
-            start = diagnosis.starts_at.get(course.recording, 0.0)
+        if len(course.time) and course.recording in diagnosis.starts_at:
+            start = diagnosis.starts_at[course.recording]
             a, b, held = spans.get(course.recording, (np.inf, -np.inf, True))
             spans[course.recording] = (
                 min(a, start + float(course.time[0])), max(b, start + float(course.time[-1])), held and course.held_out,

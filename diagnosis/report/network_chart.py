@@ -11,7 +11,8 @@ import plotly.graph_objects as go
 
 from diagnosis.report.chart import INK, Chart, dressed
 from diagnosis.report.network_layout import places_of
-from diagnosis.report.wording import name, share
+from diagnosis.report.wording import name
+from diagnosis.results.number_format import share
 from diagnosis.results.result import Diagnosis
 from diagnosis.results.result_parts import NO_CLAIM, Finding
 from models.base.types import Array

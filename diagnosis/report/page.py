@@ -31,7 +31,7 @@ def page(diagnosis: Diagnosis) -> str:
         unit=wording.unit,
         number=numbers.number,
         fixed=numbers.fixed,
-        share=wording.share,
+        share=numbers.share,
         sentence=wording.sentence,
         clause=wording.clause,
         plain=wording.plain,
@@ -84,11 +84,9 @@ def _text(file: str) -> str:
     return (resources.files(PACKAGE) / file).read_text(encoding="utf-8")
 
 
-def _evidence(diagnosis: Diagnosis) -> dict[str, Any] | None:
-    """Evidence and threshold, and where both are on a bar; None if nothing was tested."""
+def _evidence(diagnosis: Diagnosis) -> dict[str, Any]:
+    """Evidence and threshold, and where both are on a bar."""
     found, needed = diagnosis.log_e_value, diagnosis.threshold
-    if not (math.isfinite(found) and math.isfinite(needed)):
-        return None
     end = max(2.0 * needed, found, 1.0)
     return {
         "reached": found >= needed,
@@ -99,7 +97,6 @@ def _evidence(diagnosis: Diagnosis) -> dict[str, Any] | None:
 
 def _finding(finding: Finding) -> dict[str, Any]:
     """A finding as the template needs it."""
-    prefix = f"{finding.term.label}_" if finding.term is not None else ""
     return {
         "of": finding,
         "title": wording.plain(finding.title),
@@ -108,7 +105,7 @@ def _finding(finding: Finding) -> dict[str, Any]:
         "mean_heat": numbers.with_error(finding.heat_mean_W, finding.heat_stderr_W),
         "equation": equation.drawn(finding.equation),
         "parameters": [
-            (wording.name(p.name.removeprefix(prefix)), numbers.with_error(p.value, p.stderr), wording.unit(p.unit))
+            (wording.name(p.name), numbers.with_error(p.value, p.stderr), wording.unit(p.unit))
             for p in finding.parameters
         ],
         "rivals": [one for one in finding.confusable_with if one.instead and one.probability >= LEAST_RIVAL],

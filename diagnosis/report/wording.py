@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from diagnosis.results.number_format import NONE, SUPERSCRIPTS
+from diagnosis.results.number_format import SUPERSCRIPTS
 from diagnosis.results.result_parts import PARAMETER, Finding
 from models.quantities.quantities import TOTAL_LOSS
 
@@ -142,21 +141,6 @@ def sentence(text: str) -> str:
     """
     text = clause(text)
     return f"{text[0].upper()}{text[1:]}." if text else ""
-
-
-def share(probability: float) -> str:
-    """A probability among explanations; never rounded to certainty.
-
-    Examples
-    --------
-    >>> share(0.914), share(0.9999), share(0.0003)
-    ('0.91', '> 0.99', '< 0.01')
-    """
-    if not math.isfinite(probability):
-        return NONE
-    if probability < 0.01:
-        return "< 0.01"
-    return "> 0.99" if probability > 0.99 else f"{probability:.2f}"
 
 
 def time_scale(end_s: float) -> tuple[float, str]:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from diagnosis.results.number_format import MINUS, number, with_error
+from diagnosis.results.number_format import MINUS, number, share, with_error
 from diagnosis.results.result_parts import (
     LEAST_RIVAL,
     MOST_NEAREST,
@@ -74,7 +74,7 @@ def first_screen_of(d: Diagnosis) -> tuple[tuple[str, tuple[str, ...]], ...]:
 def _missing(d: Diagnosis) -> str:
     if d.verdict == "insufficient_data":
         return "These data cannot decide it."
-    why = f"false-alarm rate of {100.0 * d.false_alarm_rate:g} % asked for"
+    why = f"false-alarm rate of {100.0 * d.settings.false_alarm_rate:g} % asked for"
     if d.placebo is not None and d.threshold == d.placebo.log_e_value:
         why = f"as much as the baseline '{d.placebo.session}' brings"
     reached = f"evidence {d.log_e_value:.1f} nat, {d.threshold:.1f} needed ({why})"
@@ -93,7 +93,7 @@ def _in_what(d: Diagnosis) -> str:
     if _may_be_either(d):
         return ", in the measurement or in the model"
     measurement = sum(one.probability for one in d.ranking if one.family == MEASUREMENT)
-    sure = (measurement if fault else 1.0 - measurement) >= d.claim_from
+    sure = (measurement if fault else 1.0 - measurement) >= d.settings.claim_from
     return f", {'' if sure else 'probably '}in the {'measurement' if fault else 'model'}"
 
 
@@ -106,7 +106,7 @@ def _may_be_either(d: Diagnosis) -> bool:
 def _where(d: Diagnosis) -> tuple[str, ...]:
     if not d.location or d.verdict in NO_CLAIM:
         return ()
-    told = ", ".join(f"{place.node} ({_share(place.probability)})" for place in d.places)
+    told = ", ".join(f"{place.node} ({share(place.probability)})" for place in d.places)
     place = next((one for one in d.places if one.heat_max_W), None)
     if place is None:
         fault = d.verdict == "sensor_fault" or d.location[0].node not in d.network.node_names
@@ -136,9 +136,9 @@ def _how_sure(d: Diagnosis) -> tuple[str, ...]:
     for finding, *_ in d.items:
         of = "of this name, the nearest one," if finding.acts_like else "of one of these" if finding.tie_set else ""
         if finding.acts_like and finding.sureness > finding.probability:
-            of = f"of this name {_share(finding.probability)}, of all that act alike"
+            of = f"of this name {share(finding.probability)}, of all that act alike"
         title = f"{finding.title}: " if len(d.items) > 1 else ""
-        line = " ".join(filter(None, (f"{title}{finding.grade}, probability", of, _share(finding.sureness))))
+        line = " ".join(filter(None, (f"{title}{finding.grade}, probability", of, share(finding.sureness))))
         others = [r for r in finding.confusable_with
                   if r.probability >= LEAST_RIVAL and r.law not in finding.tie_set]  # fmt: skip
         roles = (("not ruled out instead", True), ("may act as well", False))
@@ -148,7 +148,7 @@ def _how_sure(d: Diagnosis) -> tuple[str, ...]:
         lines.append(line)
     if not d.findings and d.kinds:
         kinds = sorted(d.kinds.items(), key=lambda kind: -kind[1])
-        told = [f"{kind} {_share(p)}" for kind, p in kinds if p >= LEAST_RIVAL]
+        told = [f"{kind} {share(p)}" for kind, p in kinds if p >= LEAST_RIVAL]
         lines.append(f"Probabilities: {', '.join(told)}.")
     if d.error_class:
         hides = ", the largest, because the model fits badly: a real effect can hide in it"
@@ -248,8 +248,3 @@ def _time(seconds: float) -> str:
 def _unit(symbol: str) -> str:
     """A unit behind a number."""
     return "" if symbol == "1" else f" {symbol}"
-
-
-def _share(probability: float) -> str:
-    """A probability; never rounded to certainty."""
-    return f"{probability:.2f}" if probability < 0.995 else "> 0.99"

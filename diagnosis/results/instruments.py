@@ -86,7 +86,7 @@ def sensors_and_inputs_of(
     for unknown, z, error in zip(experiment.unknowns, fit.z.tolist(), errors, strict=True):
         if not in_scope(unknown, recording):
             continue
-        estimate = _estimate(unknown, z, error)
+        estimate = unknown.value(z), error * unknown.per_z(z)
         if not isinstance(unknown, TermParameter):
             _collect(collected, unknown, estimate)
         elif unknown.label not in findings and unknown.parameter.name == terms[unknown.label].strength.name:
@@ -109,12 +109,6 @@ def sensors_and_inputs_of(
             if name in collected.inputs and (inputs is None or name in inputs)
         ),
     )  # fmt: skip
-
-
-def _estimate(unknown: Unknown, z: float, error: float) -> Estimate:
-    """Value and standard error in the unit of the parameter."""
-    value, p = unknown.value(z), unknown.parameter
-    return value, abs(error * p.sd * unknown.amplitude * (value if p.log else 1.0))
 
 
 def _collect(collected: _Collected, unknown: Unknown, estimate: Estimate) -> None:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from diagnosis.candidates.dated import WHILE
 from diagnosis.decision.posterior import Judged, Posterior
+from diagnosis.recordings.cleaning import runs
 from diagnosis.results.findings import heats_of
 from diagnosis.results.places import node_in
 from diagnosis.results.result_parts import Location
@@ -99,9 +100,8 @@ def windows(time: Array, acting: NDArray[np.bool_]) -> list[tuple[float, float]]
     >>> windows(time, (time >= 1000.0) & (time < 2500.0) & (time != 1500.0))
     [(1000.0, 2400.0)]
     """
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], acting, [False]]).astype(int)))
     found: list[tuple[float, float]] = []
-    for begin, end in zip(edges[::2], edges[1::2], strict=True):
+    for begin, end in runs(acting):
         window = float(time[begin]), float(time[end - 1])
         if found and window[0] - found[-1][1] <= SHORTEST_GAP_S:
             found[-1] = (found[-1][0], window[1])

@@ -59,3 +59,18 @@ def with_error(value: float, stderr: float) -> str:
         return f"{number(value, 4)} ± {number(stderr, 2)}"
     shown = max(decimals, 0)
     return f"{round(value, decimals):.{shown}f} ± {round(stderr, decimals):.{shown}f}".replace("-", MINUS)
+
+
+def share(probability: float) -> str:
+    """A probability among explanations; never rounded to certainty.
+
+    Examples
+    --------
+    >>> share(0.914), share(0.9999), share(0.0003)
+    ('0.91', '> 0.99', '< 0.01')
+    """
+    if not math.isfinite(probability):
+        return NONE
+    if probability < 0.01:
+        return "< 0.01"
+    return "> 0.99" if probability > 0.99 else f"{probability:.2f}"

@@ -16,7 +16,7 @@ import sympy as sp
 from diagnosis.engine.fit import Fit
 from diagnosis.engine.unknown import NetworkParameter
 from models.base.types import Array
-from models.network.laws import Parameter, symbol
+from models.network.laws import symbol
 from models.simulation.thermal_network import ThermalNetwork
 
 LITTLE = 0.01  # of what the recordings know about the sizes one by one: a small part of fixed capacity pretends so much
@@ -49,15 +49,10 @@ def scale_direction(fit: Fit) -> Array:
     """
     names = set(sizes(fit.experiment.machine.model.network))
     return np.array([
-        _along(unknown.parameter, unknown.value(z))
+        unknown.value(z) / unknown.per_z(z)
         if isinstance(unknown, NetworkParameter) and unknown.parameter.name in names else 0.0
         for unknown, z in zip(fit.experiment.unknowns, fit.z.tolist(), strict=True)
     ])  # fmt: skip
-
-
-def _along(parameter: Parameter, value: float) -> float:
-    """Change of a size that multiplies it by e, in standard deviations of its prior: a logarithmic one moves by 1."""
-    return (1.0 if parameter.log else value) / parameter.sd
 
 
 def sizes(network: ThermalNetwork) -> Iterator[str]:

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Literal
 
+from diagnosis.decision.settings import Settings
 from diagnosis.results.calibrated_model import CalibratedModel
 from diagnosis.results.first_screen import first_screen_of, verdict_text_of
 from diagnosis.results.joint_estimate import JointEstimate
@@ -56,8 +57,6 @@ class Diagnosis:
         a parameter is outside its prior
     further_threshold : float
         From which a further effect counts, [nat]
-    false_alarm_rate : float
-        As asked for
     location : tuple of Location
         Most probable first
     findings : tuple of Finding
@@ -90,12 +89,8 @@ class Diagnosis:
         What was cleaned in the recordings
     kinds : mapping of str to float
         Probability of every kind of explanation: nothing, parameter, measurement, mechanism, pair, outside
-    claim_from : float
-        Probability from which a name is a claim, as asked for
-    matters_K, matters_W : float
-        Size from which an effect matters, as asked for
-    odds_unknown : float
-        Prior odds of a cause that is in no catalogue, as asked for
+    settings : Settings
+        As asked for
     error_class : str
         Class of model error of the best explanation; of nothing where nothing is missing
     error_evidence : mapping of str to float
@@ -134,7 +129,6 @@ class Diagnosis:
     threshold: float
     further_threshold: float
     p_value: float
-    false_alarm_rate: float
     location: tuple[Location, ...]
     findings: tuple[Finding, ...]
     calibration: tuple[Calibrated, ...]
@@ -155,10 +149,7 @@ class Diagnosis:
     learnt: tuple[Term, ...] = ()
     notes: tuple[str, ...] = ()
     kinds: Mapping[str, float] = field(default_factory=dict)
-    claim_from: float = 0.9
-    matters_K: float = 1.0
-    matters_W: float = 0.0
-    odds_unknown: float = 0.1
+    settings: Settings = field(default_factory=Settings)
     error_class: str = ""
     error_evidence: Mapping[str, float] = field(default_factory=dict)
     scaled_error: tuple[ScaledError, ...] = ()
@@ -185,7 +176,7 @@ class Diagnosis:
                 "p_value": self.p_value,
                 "log_e_value": self.log_e_value,
                 "threshold": self.threshold,
-                "false_alarm_rate": self.false_alarm_rate,
+                "false_alarm_rate": self.settings.false_alarm_rate,
                 "test": "log_e_value: log odds of all effects to a machine without one, whose parameters may be "
                         "outside their priors (verdict parameter_error: of such parameters to none); something is "
                         "missing if it exceeds threshold. p_value = exp(-log_e_value), at most 1: a bound on chance "
@@ -208,9 +199,7 @@ class Diagnosis:
                                                            "contradicts_findings": self.contradicted},
                     "faulty_channels": list(self.faulty), "noise_K": self.noise_K, "floor": self.floor},
             "kinds": dict(self.kinds),
-            "settings": {"false_alarm_rate": self.false_alarm_rate, "claim_from": self.claim_from,
-                         "matters_K": self.matters_K, "matters_W": self.matters_W,
-                         "odds_unknown": self.odds_unknown},
+            "settings": asdict(self.settings),
             "model_error": {"class": self.error_class, "evidence": dict(self.error_evidence),
                             "scaled": [asdict(one) for one in self.scaled_error],
                             "learnt": [

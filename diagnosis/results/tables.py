@@ -101,6 +101,6 @@ def draw_channel(run: PredictedRun, channel: str | None, ax: Axes | None) -> Axe
 
 def _worst(run: PredictedRun) -> str:
     """Return the temperature that the model as delivered predicts worst; the loss if there is no temperature."""
-    temperatures = [channel for channel in run.measured if not is_total_loss(channel)]
+    temperatures = [c for c, seen in run.measured.items() if not is_total_loss(c) and np.isfinite(seen).any()]
     errors = {c: float(np.sqrt(np.nanmean((run.before[c] - run.measured[c]) ** 2))) for c in temperatures}
     return max(errors, key=lambda c: errors[c]) if errors else next(iter(run.measured))

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 # Relative: inside an FMU these files form a package of another, unique name.
-from .solver import Balance, LossesAt, error_weights
+from .solver import Balance, LossesAt, error_weights, times
 
 Array = NDArray[np.float64]
 RPM = np.pi / 30.0
@@ -194,9 +194,9 @@ class NetworkSystem:
         to_boundary = np.swapaxes(coupling, -1, -2)
         heats, memory = self._flows(signals, power, shape)
         T, T_boundary = states[..., :n], self._stacked(self.laws.boundary(*common), shape)
-        rate = (heats @ self.laws.injection + _times(coupling, T_boundary) - _times(leaving, T)) * self._per_capacity
+        rate = (heats @ self.laws.injection + times(coupling, T_boundary) - times(leaving, T)) * self._per_capacity
         matrix = leaving * -self._per_capacity[..., None]
-        heat_out = _times(to_boundary, T) - to_boundary.sum(axis=-1) * T_boundary
+        heat_out = times(to_boundary, T) - to_boundary.sum(axis=-1) * T_boundary
         if self.n_states:
             rate = np.concatenate((rate, memory[..., : self.n_states]), axis=-1)
             matrix = np.pad(matrix, [(0, 0)] * len(shape) + [(0, self.n_states)] * 2)
@@ -256,10 +256,6 @@ class NetworkSystem:
         if not values:
             return np.zeros((*shape, 0))
         return np.stack([np.broadcast_to(np.asarray(value, dtype=float), shape) for value in values], axis=-1)
-
-
-def _times(matrix: Array, vector: Array) -> Array:
-    return np.asarray(matrix @ vector if vector.ndim == 1 else (matrix @ vector[..., None])[..., 0])
 
 
 def torque_loss(loss: Any, speed: Any) -> Array:

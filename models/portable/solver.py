@@ -189,11 +189,11 @@ def advance(system: System, state: State, time: float, duration: float, inputs: 
         early, late = elapsed + GAMMA * h, elapsed + (1.0 - GAMMA) * h
         now = system.balance(time + early, inputs + slope * early, state.states)
         inverse = np.linalg.inv(identity - (GAMMA * h) * now.matrix)
-        k_1 = _times(inverse, now.derivative)
+        k_1 = times(inverse, now.derivative)
         then = system.balance(time + late, inputs + slope * late, state.states + h * k_1, now)
-        k_2 = _times(inverse, then.derivative - 2.0 * k_1)
+        k_2 = times(inverse, then.derivative - 2.0 * k_1)
         # Filtered once more by the implicit matrix: what a stiff node relaxes within the step is no error of the step.
-        errors = system.error_weights * np.abs(_times(inverse, k_1 + k_2))
+        errors = system.error_weights * np.abs(times(inverse, k_1 + k_2))
         error = float(np.max(errors)) * 0.5 * h / TOLERANCE_K
         if not error < np.inf:
             raise ArithmeticError(f"the heat balance is not finite at {time + elapsed:g} s")
@@ -206,7 +206,7 @@ def advance(system: System, state: State, time: float, duration: float, inputs: 
         elapsed = duration if h == remaining else elapsed + h
         later = state.states + h * (1.5 * k_1 + 0.5 * k_2)
         # The two stages with the weights of the temperatures, 3/2 and 1/2: what leaves the nodes arrives there.
-        flow = 0.5 * (now.heat_out + then.heat_out + GAMMA * h * _times(now.heat_out_slope, k_1 + k_2))
+        flow = 0.5 * (now.heat_out + then.heat_out + GAMMA * h * times(now.heat_out_slope, k_1 + k_2))
         state = State(
             states=system.updated(time + elapsed, inputs + slope * elapsed, later),
             # A short communication step says nothing about the step that the network would allow.
@@ -217,5 +217,6 @@ def advance(system: System, state: State, time: float, duration: float, inputs: 
     return state
 
 
-def _times(matrix: Array, vector: Array) -> Array:
+def times(matrix: Array, vector: Array) -> Array:
+    """Product of matrices and vectors."""
     return np.asarray(matrix @ vector if vector.ndim == 1 else (matrix @ vector[..., None])[..., 0])

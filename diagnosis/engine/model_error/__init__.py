@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-from diagnosis.engine.model_error.error_columns import Columns, ModelError
+from diagnosis.engine.model_error.error_columns import ModelError
 
-__all__ = ["Columns", "ModelError"]
+__all__ = ["ModelError"]

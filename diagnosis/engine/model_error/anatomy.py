@@ -15,7 +15,6 @@ from diagnosis.engine.point import Point
 from diagnosis.forward.network_on_grid import NetworkOnGrid
 from diagnosis.forward.observation import boundary_temperatures
 from models.base.types import Array
-from models.network.laws import symbol
 from models.quantities.quantities import is_total_loss
 from models.simulation.thermal_network import Link, Source, ThermalNetwork
 
@@ -175,7 +174,6 @@ class Anatomy:
 
     def _felt(self, law: Source | Link) -> set[str]:
         expression = law.heat if isinstance(law, Source) else law.conductance
-        expression = expression.xreplace({symbol(name): derived for name, derived in self.network.derived.items()})
         names = {s.name for s in expression.free_symbols}
         felt = {name for name in names if name in self.coordinates and name != AMBIENT}
         if any(name == f"T_{node}" for name in names for node in self.network.node_names):

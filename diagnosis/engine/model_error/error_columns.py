@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -19,25 +19,6 @@ from models.base.types import Array
 
 VALUES_AT_ONCE = 800_000  # of heats that are held together, per part: bounds the memory of long recordings
 FEWEST_AT_ONCE = 16
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Columns:
-    """Change per unit of some unknowns along one piece.
-
-    Attributes
-    ----------
-    into : Array, shape (K, parts + coupled, n)
-        Heat into every part, see :class:`diagnosis.engine.slopes.Heat`, [W]
-    loss : Array, shape (K, n)
-        Part of it that is mechanical loss, [W]
-    reading : Array, shape (K + 1, channels, n)
-        Change of the readings of sound sensors, [K] or [W]
-    """
-
-    into: Array
-    loss: Array
-    reading: Array
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -59,13 +40,8 @@ class ModelError:
     of_changes: tuple[str, ...]
 
     @classmethod
-    def of(cls, experiment: Experiment, points: Sequence[Point] | None = None) -> ModelError:
-        """Unknowns of a machine with its recordings.
-
-        Parameters
-        ----------
-        points : sequence of Point, optional
-            All pieces where they give the sizes; by default at the middles of the priors
+    def of(cls, experiment: Experiment) -> ModelError:
+        """Unknowns of a machine with its recordings, whose sizes are those at the middles of the priors.
 
         Raises
         ------
@@ -73,7 +49,7 @@ class ModelError:
             If the temperatures leave all bounds at the middles of the priors.
         """
         middles = np.zeros(len(experiment.unknowns))
-        points = points or [experiment.point(index, middles) for index in range(len(experiment.pieces))]
+        points = [experiment.point(index, middles) for index in range(len(experiment.pieces))]
         machine = Anatomy(experiment, points)
         found = [(group, change) for group, declare in GROUPS.items() for change in declare(machine)]
         groups, changes = zip(*found, strict=True)
@@ -94,12 +70,11 @@ class ModelError:
         """Amplitude of every unknown in a class, 0 of those that are absent, shape (unknowns,)."""
         return np.array([one.amplitudes.get(group, 0.0) for group in self.groups])
 
-    def columns(self, point: Point, first: int = 0, last: int | None = None) -> Columns:
-        """Change per unit of the unknowns from `first` up to `last` (excluded; by default all).
+    def columns(self, point: Point, first: int, last: int) -> ErrorCourses:
+        """Change per unit of the unknowns from `first` up to `last` (excluded), heat with rates of coupled states.
 
         The point may be that of an extended machine: everything is found by its name.
         """
-        last = len(self.groups) if last is None else last
         view, (points, channels) = View(point, self.standard), point.read.shape
         into = np.zeros((points - 1, point.trajectory.decay.shape[-1], last - first))
         loss, reading = np.zeros((points - 1, last - first)), np.zeros((points, channels, last - first))
@@ -113,7 +88,7 @@ class ModelError:
                 loss[:, mine] = heat.loss[:, None] * course
             else:
                 reading[:, point.sensors.channels.index(change.channel), mine.start] = change.reading(view)
-        return Columns(into=into, loss=loss, reading=reading)
+        return ErrorCourses(heat=into, loss=loss, reading=reading)
 
     def responses(self, point: Point, first: int = 0, last: int | None = None) -> Array:
         """Change of what is recorded per unit of some unknowns, shape (K + 1, channels, n); see :meth:`columns`."""
@@ -122,7 +97,7 @@ class ModelError:
         for begin, end in self._chunks(point, first, last):
             found = self.columns(point, begin, end)
             shown = point.setting.passed_on(point.trajectory, found.reading)
-            result[:, :, begin - first : end - first] = point.heated(found.into, found.loss) + shown
+            result[:, :, begin - first : end - first] = point.heated(found.heat, found.loss) + shown
         return result
 
     def whitened(self, part: Linear) -> Array:
@@ -147,7 +122,7 @@ class ModelError:
         reading = np.zeros((points, channels, count))
         for begin, end in self._chunks(point, 0, len(self.groups)):
             found, some = self.columns(point, begin, end), combinations[begin:end]
-            heat += found.into[:, :n] @ some
+            heat += found.heat[:, :n] @ some
             loss += found.loss @ some
             reading += found.reading @ some
         return ErrorCourses(heat=heat, loss=loss, reading=reading)

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from diagnosis.engine.model_error.courses import SPEED, TORQUE, View
 from diagnosis.engine.slopes import Heat
 from diagnosis.forward.recurrence import lagged
-from diagnosis.forward.term_on_grid import moved_heat
 from models.base.types import Array
 
 STEP = 0.01  # of the largest torque
@@ -92,7 +91,7 @@ def torque_heat(view: View) -> Heat:
     samples, inputs = np.array(view.trajectory.piece.samples), view.point.machine.inputs
     turning = np.abs(samples[..., inputs.index(SPEED)]) > view.standard.coordinates[SPEED].floor
     samples[..., inputs.index(TORQUE)] += STEP * view.standard.largest[TORQUE] * turning
-    return _moved(view, samples, STEP)
+    return view.point.moved_heat(samples, STEP)
 
 
 def gain_heat(view: View, *, name: str) -> Heat:
@@ -119,9 +118,3 @@ def _into_part(view: View, index: int, heat: Array) -> Heat:
 def _stored(view: View, index: int, T: Array) -> Array:
     """Heat [W] that the capacity of a part stores along temperatures at the grid points."""
     return np.asarray(view.trajectory.capacities[index] * np.diff(T) / view.trajectory.piece.steps)
-
-
-def _moved(view: View, samples: Array, step: float) -> Heat:
-    into, loss = moved_heat(view.model, view.trajectory, replace(view.trajectory.piece, samples=samples))
-    whole = np.pad(into, ((0, 0), (0, len(view.model.coupled))))
-    return Heat(into=whole / step, loss=loss / step)

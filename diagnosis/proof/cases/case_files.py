@@ -33,20 +33,6 @@ def keep_apart(recordings: Path, truth: Path) -> None:
         raise InputError(f"{truth}: the truth must not lie among the recordings in {recordings}; name another folder")
 
 
-def check_layout(cases: int, recordings: Path, truth: Path | None, *, flat: bool) -> None:
-    """Refuse a truth among the recordings, and several cases in one folder.
-
-    Raises
-    ------
-    InputError
-        If it is so.
-    """
-    if flat and cases != 1:
-        raise InputError(f"{cases} cases cannot share one folder; only a single case is written flat")
-    if truth is not None:
-        keep_apart(recordings, truth)
-
-
 def keep_other_cases(made: Path, output: Path) -> None:
     """Refuse to replace files of another case; the same case may be made again.
 

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from diagnosis.proof.cases.case_files import check_layout, staged_folders, write_case
+from diagnosis.proof.cases.case_files import staged_folders, write_case
 from diagnosis.proof.cases.concealed_case import CONTROLS, FAULTS, ConcealedCase, Plan
 from diagnosis.proof.cases.truth import truth_of
 from diagnosis.proof.plant.cycles import Programme, ambient, ornstein_uhlenbeck, programmes
@@ -170,7 +170,7 @@ def conceal_set(
     *,
     seed: int,
     recordings: Path,
-    truth: Path | None,
+    truth: Path,
     flat: bool = False,
     progress: Callable[[int, int], None] | None = None,
 ) -> list[str]:
@@ -180,8 +180,8 @@ def conceal_set(
     ----------
     recordings : Path
         Folder that gets one folder per case
-    truth : Path or None
-        Folder that gets ``<case>.json`` with the concealed effects; must be another one. None: it is not written
+    truth : Path
+        Folder that gets ``<case>.json`` with the concealed effects; another one, see :func:`staged_folders`
     flat : bool
         True to write the recordings of a single case straight into `recordings`
     progress : callable or None
@@ -195,10 +195,8 @@ def conceal_set(
     Raises
     ------
     InputError
-        If an effect is not known, the truth is to lie among the recordings, several cases are to share a folder, or a
-        folder cannot be written to.
+        If an effect is not known, or a folder cannot be written to.
     """
-    check_layout(len(plans), recordings, truth, flat=flat)
     plant = Plant(gearbox)
     digits = max(3, len(str(len(plans))))
     cases = [draw_case(plant, plan, seed=(seed, i), name=f"case_{i + 1:0{digits}d}") for i, plan in enumerate(plans)]
@@ -210,8 +208,7 @@ def conceal_set(
 
         for case, columns, facts in simulate_cases(plant, cases[first : first + TOGETHER], report):
             folder = recordings if flat else recordings / case.name
-            truth_file = None if truth is None else truth / f"{case.name}.json"
-            write_case(folder, truth_file, columns, facts, case.instruments.stated)
+            write_case(folder, truth / f"{case.name}.json", columns, facts, case.instruments.stated)
     return [case.name for case in cases]
 
 

@@ -14,7 +14,8 @@ from diagnosis.proof.plant.cycles import ROW_S
 from diagnosis.proof.plant.effect import Concealed
 from diagnosis.proof.plant.instruments import record
 from diagnosis.proof.plant.plant import Plant
-from diagnosis.proof.plant.plant_run import Outcome
+from diagnosis.proof.plant.plant_run import Outcome, factor_sd
+from diagnosis.recordings.cleaning import runs
 from models.base.types import Array
 
 SCHEMA = 1
@@ -92,8 +93,8 @@ def _farthest(plant: Plant, case: ConcealedCase) -> str:
     """The parameter that is farthest from its nominal value, in standard deviations of its prior."""
 
     def distance(name: str) -> float:
-        sd = min(plant.gearbox.priors.get(f"factors.{name}", 0.2), 0.6)
-        return abs(math.log(case.individual.factors[name] / plant.gearbox.factors[name])) / sd
+        off = math.log(case.individual.factors[name] / plant.gearbox.factors[name])
+        return abs(off) / factor_sd(plant.gearbox, name)
 
     return max(case.individual.factors, key=distance)
 
@@ -196,8 +197,7 @@ def _heat(case: ConcealedCase, heat: Sequence[Mapping[str, Array]]) -> dict[str,
 
 def spans_of(active: NDArray[np.bool_], row_s: float) -> list[list[float]]:
     """Begin and end [s] of all stretches of rows in which something acts."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], active, [False]]).astype(int)))
-    return [[row_s * float(a), row_s * float(b)] for a, b in edges.reshape(-1, 2)]
+    return [[row_s * first, row_s * end] for first, end in runs(active)]
 
 
 def _felt(with_it: Sequence[Outcome], without: Sequence[Outcome], effect: Concealed) -> dict[str, Any]:

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from diagnosis.proof.cases.truth import size_of_heat
 from diagnosis.proof.injection.calibrated_model import CalibratedModel, calibrate
 from diagnosis.proof.injection.instrument_faults import (
     INPUT_FAULTS,
@@ -25,7 +26,6 @@ from diagnosis.proof.injection.trial import FORMS, Form, Trial, choose_size, dra
 from diagnosis.recordings.time_axis import moment_text
 from models.assembly.gearbox import Gearbox
 from models.base.errors import InputError, did_you_mean
-from models.base.types import Array
 
 SCHEMA = 1
 # Largest change of a measured temperature, [K]: of fast recordings, and of those whose rows are means over minutes.
@@ -303,7 +303,7 @@ def _effect(injector: Injector, trial: Trial, chosen: int) -> dict[str, Any]:
         "K": {name: {"rms": 0.0, "max": 0.0} for name in trial.K} if is_input else _sizes(trial.K, chosen),
         "K_of_model": _sizes(trial.K, chosen) if is_input else None,
         "column_shift": {injector.real.found.names[q]: round(value, 4) for q, value in units.items()},
-        "heat_W": {node: _watts(values[chosen]) for node, values in trial.heat.items()},
+        "heat_W": {node: size_of_heat(values[chosen]) for node, values in trial.heat.items()},
         **trial.facts,
     }
 
@@ -315,14 +315,4 @@ def _sizes(K: Any, chosen: int) -> dict[str, dict[str, float]]:
             "max": round(float(np.nanmax(np.abs(values[chosen]))), 3),
         }
         for name, values in K.items()
-    }
-
-
-def _watts(heat: Array) -> dict[str, float]:
-    """Return mean and greatest heat, and the mean while it acts, [W]."""
-    acting = np.abs(heat) > 0.1 * np.abs(heat).max(initial=0.0)
-    return {
-        "mean": round(float(heat.mean()), 3),
-        "mean_active": round(float(heat[acting].mean()) if acting.any() else 0.0, 3),
-        "max": round(float(heat[np.abs(heat).argmax()]), 3),
     }

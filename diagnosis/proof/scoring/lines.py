@@ -171,9 +171,11 @@ def _with_sensors(path: Path, sensors: Sensors) -> bytes:
     content = path.read_bytes()
     if sensors == SENSORS[0]:
         return content
-    rows = [line.split(",") for line in gzip.decompress(content).decode().splitlines()]
+    zipped = path.name.endswith(".gz")
+    rows = [line.split(",") for line in (gzip.decompress(content) if zipped else content).decode().splitlines()]
     at = [rows[0].index(c) for c in kept_columns(rows[0], sensors)]
-    return gzip.compress("".join(",".join(row[i] for i in at) + "\n" for row in rows).encode(), mtime=0)
+    kept = "".join(",".join(row[i] for i in at) + "\n" for row in rows).encode()
+    return gzip.compress(kept, mtime=0) if zipped else kept
 
 
 def _of_columns(mapping: str, recording: bytes) -> str:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from diagnosis.proof.cases.case_files import DEFINITION, check_layout, write_case
+from diagnosis.proof.cases.case_files import DEFINITION, write_case
 from diagnosis.proof.zoo.case import BASELINE, CONTROLS, GROUPS, Oracle, ZooCase
 from diagnosis.proof.zoo.draw import draw_case, oracle_of
 from diagnosis.proof.zoo.families import FAMILIES, find_family
@@ -102,7 +102,7 @@ def conceal_zoo(
     plans: Sequence[ZooPlan],
     *,
     recordings: Path,
-    truth: Path | None,
+    truth: Path,
     flat: bool = False,
     baselines: int = 0,
     session_deviation: float | None = None,
@@ -115,8 +115,8 @@ def conceal_zoo(
     ----------
     recordings : Path
         Folder that gets one folder per case
-    truth : Path or None
-        Folder that gets ``<case>.json``; must be another one. None: it is not written
+    truth : Path
+        Folder that gets ``<case>.json``; another one, see :func:`~diagnosis.proof.cases.case_files.staged_folders`
     flat : bool
         True to write the recordings of a single case straight into `recordings`
     baselines : int
@@ -134,19 +134,15 @@ def conceal_zoo(
     Raises
     ------
     InputError
-        If the truth is to lie among the recordings, several cases are to share a folder, a definition cannot be split,
-        or a folder cannot be written to.
+        If a definition cannot be split, or a folder cannot be written to.
     """
-    check_layout(len(plans), recordings, truth, flat=flat)
     digits, names = max(3, len(str(len(plans)))), []
     for i, plan in enumerate(plans):
         case = draw_case(
             plan.family, plan.machine, plan.seed, plan.group, name=f"case_{i + 1:0{digits}d}", kind=plan.kind,
             baselines=baselines, session_deviation=session_deviation, oracle=oracle,
         )  # fmt: skip
-        write_zoo_case(
-            case, recordings if flat else recordings / case.name, None if truth is None else truth / f"{case.name}.json"
-        )
+        write_zoo_case(case, recordings if flat else recordings / case.name, truth / f"{case.name}.json")
         names.append(case.name)
         if progress is not None:
             progress(i + 1, len(plans))

@@ -28,7 +28,7 @@ from diagnosis.proof.zoo.effects_losses import LOSS_MAKERS
 from diagnosis.proof.zoo.effects_outside import OUTSIDE_MAKERS
 from diagnosis.proof.zoo.families import find_family
 from diagnosis.proof.zoo.faults import AMBIENT, INPUT_FAULTS, SENSOR_FAULTS, Fault, FaultMaker, input_of
-from diagnosis.proof.zoo.oracle_columns import Measurement, design_of
+from diagnosis.proof.zoo.oracle_columns import design_of
 from diagnosis.proof.zoo.recorder import ZooInstruments, draw_instruments, with_slow_sensors
 from diagnosis.proof.zoo.setting import Setting, UnfitError, either
 from diagnosis.proof.zoo.simulate import simulate
@@ -53,13 +53,7 @@ DRIFT_K = 15.0  # greatest drift over a session
 
 def oracle_of(plant: ZooPlant, programmes: Sequence[Programme], instruments: ZooInstruments) -> NatsOf:
     """The oracle of a plant with these instruments."""
-    measurement = Measurement(
-        channels=instruments.channels,
-        noise_K=instruments.noise_K,
-        quantum_K=instruments.quantum_K,
-        loss_noise=instruments.loss_noise,
-    )
-    return design_of(plant, programmes, measurement).nats_of
+    return design_of(plant, programmes, instruments).nats_of
 
 
 def draw_case(

@@ -15,10 +15,12 @@ from itertools import combinations_with_replacement
 
 import numpy as np
 
+from diagnosis.proof.plant.instruments import Instruments
 from diagnosis.proof.zoo.oracle import LOSS, MEAN_S, Design, RecordingColumns, averaged
+from diagnosis.proof.zoo.recorder import ZooInstruments
 from diagnosis.proof.zoo.run import follow, read_probes
 from diagnosis.proof.zoo.simulate import Direction, Linearised, ParameterDirection, StartDirection
-from diagnosis.proof.zoo.structure import Change, Law, Moment, Probe, Programme, Variant, ZooPlant, constant, times
+from diagnosis.proof.zoo.structure import Change, Law, Moment, Probe, Programme, ZooPlant, constant, times
 from models.base.types import Array
 
 SMOOTH_SD, LUMPED_SD, MIXING_SD, SENSOR_K = 0.04, 0.1, 0.04, 0.1
@@ -31,27 +33,7 @@ TOGETHER = 250  # directions that are simulated at once
 FARTHEST = 3.0  # standard deviations, where coordinates are held
 
 
-@dataclass(frozen=True, kw_only=True)
-class Measurement:
-    """Recorded channels of a plant and their noise.
-
-    Attributes
-    ----------
-    channels : tuple of str
-        Recorded temperatures, channels of probes
-    noise_K, quantum_K : float
-        White noise of a row, standard deviation, and display step
-    loss_noise : (float, float) or None
-        White noise of a row of the measured loss: relative [-] and absolute [W]; None: the loss is not measured
-    """
-
-    channels: tuple[str, ...]
-    noise_K: float
-    quantum_K: float
-    loss_noise: tuple[float, float] | None
-
-
-def design_of(plant: ZooPlant, programmes: Sequence[Programme], measurement: Measurement) -> Design:
+def design_of(plant: ZooPlant, programmes: Sequence[Programme], instruments: ZooInstruments | Instruments) -> Design:
     """The oracle's design of one plant; of `programmes` those whose name starts with ``train`` count.
 
     Parameters
@@ -59,20 +41,23 @@ def design_of(plant: ZooPlant, programmes: Sequence[Programme], measurement: Mea
     plant : ZooPlant
         Healthy
     """
-    runs = [Linearised(plant, one, at=Variant()) for one in programmes if one.name.startswith("train")]
+    runs = [Linearised(plant, one) for one in programmes if one.name.startswith("train")]
     parameters = [ParameterDirection(name=n, step=sd * plant.parameters[n]) for n, sd in plant.spread.items()]
     smooth = _Smooth(plant, runs)
     errors = [*_errors_of_laws(plant, smooth), *_errors_of_splits(plant), *_errors_of_inputs(plant)]
-    return Design([_columns(run, measurement, parameters, errors) for run in runs])
+    return Design([_columns(run, instruments, parameters, errors) for run in runs])
 
 
 def _columns(
-    run: Linearised, measurement: Measurement, parameters: Sequence[Direction], errors: Sequence[Direction]
+    run: Linearised,
+    instruments: ZooInstruments | Instruments,
+    parameters: Sequence[Direction],
+    errors: Sequence[Direction],
 ) -> RecordingColumns:
     """All columns of one recording."""
     plant, programme = run.laws.plant, run.clock.programme
-    probes = [probe for probe in plant.probes if probe.channel in measurement.channels]
-    channels = (*(probe.channel for probe in probes), *(() if measurement.loss_noise is None else (LOSS,)))
+    probes = [probe for probe in plant.probes if probe.channel in instruments.channels]
+    channels = (*(probe.channel for probe in probes), *(() if instruments.loss_noise is None else (LOSS,)))
     per_mean = max(1, round(MEAN_S / plant.row_s))
     whole = {name: run.base_rows.T[name][None] for name in (*run.laws.bodies, *run.laws.boundaries)}
     readings = read_probes(plant, whole, programme.unrecorded)
@@ -99,19 +84,19 @@ def _columns(
         rows=len(loss),
         rows_per_mean=per_mean,
         step_s=per_mean * plant.row_s,
-        white=_white(measurement, averaged(loss, per_mean), len(probes), per_mean),
+        white=_white(instruments, averaged(loss, per_mean), len(probes), per_mean),
         local=np.concatenate(rooted),
         plant=of_plant,
         tool=np.concatenate([of_tool, np.array(mixes)]),
     )
 
 
-def _white(measurement: Measurement, loss: Array, probes: int, per_mean: int) -> Array:
+def _white(instruments: ZooInstruments | Instruments, loss: Array, probes: int, per_mean: int) -> Array:
     """Standard deviation of the white noise of means, shape (channels, means)."""
-    reading = np.hypot(measurement.noise_K, measurement.quantum_K / np.sqrt(12.0))
+    reading = np.hypot(instruments.noise_K, instruments.quantum_K / np.sqrt(12.0))
     rows = [np.full(len(loss), reading)] * probes
-    if measurement.loss_noise is not None:
-        relative, absolute = measurement.loss_noise
+    if instruments.loss_noise is not None:
+        relative, absolute = instruments.loss_noise
         rows.append(np.hypot(relative * loss, absolute))
     return np.asarray(np.stack(rows) / np.sqrt(per_mean))
 
@@ -120,8 +105,8 @@ def _responses(run: Linearised, directions: Sequence[Direction], channels: Seque
     """Means of the channels along directions, shape (directions, channels, means)."""
     found = []
     for first in range(0, len(directions), TOGETHER):
-        outcome = run.respond(directions[first : first + TOGETHER], ())
-        rows = [outcome.P_loss if channel == LOSS else outcome.readings[channel] for channel in channels]
+        readings, loss = run.respond(directions[first : first + TOGETHER])
+        rows = [loss if channel == LOSS else readings[channel] for channel in channels]
         found.append(np.stack([averaged(values, per_mean) for values in rows], axis=1))
     return np.concatenate(found)
 

@@ -15,7 +15,7 @@ from diagnosis.proof.plant.plant import Moment as OwnMoment
 from diagnosis.proof.plant.plant import Plant
 from diagnosis.proof.plant.plant_run import EXPONENTS, ORDINARY_SPREAD, Individual, Run, factor_sd, run_plant
 from diagnosis.proof.zoo.oracle import LOSS, Design
-from diagnosis.proof.zoo.oracle_columns import Measurement, design_of
+from diagnosis.proof.zoo.oracle_columns import design_of
 from diagnosis.proof.zoo.simulate import simulate
 from diagnosis.proof.zoo.structure import Body, Boundary, Law, Moment, Path, Probe, Programme, Source, Variant, ZooPlant
 from models.base.types import Array
@@ -38,14 +38,8 @@ def design_of_own_kind(plant: Plant, individual: Individual, runs: Sequence[Run]
     runs : sequence of Run
         All recordings; those whose name starts with ``train`` count
     """
-    measurement = Measurement(
-        channels=instruments.channels,
-        noise_K=instruments.noise_K,
-        quantum_K=instruments.quantum_K,
-        loss_noise=instruments.loss_noise,
-    )
     programmes = [as_programme(plant, run) for run in runs]
-    return design_of(as_zoo(plant, individual, instruments), programmes, measurement)
+    return design_of(as_zoo(plant, individual, instruments), programmes, instruments)
 
 
 def effect_on_readings(

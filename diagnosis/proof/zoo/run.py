@@ -81,12 +81,12 @@ class Clock:
 
 
 def integrate(
-    plant: ZooPlant, programme: Programme, variants: Sequence[Variant], further: Sequence[Change] = ()
+    plant: ZooPlant, programme: Programme, variants: Sequence[Variant]
 ) -> tuple[Run, Clock, Laws, list[Change]]:
-    """Integrate a batch: the run, its clock, its laws, the different changes; bridges of `further` do nothing yet."""
+    """Integrate a batch: the run, its clock, its laws, the different changes."""
     clock, B = Clock(plant, programme), len(variants)
     unique = list({id(change): change for variant in variants for change in variant.changes}.values())
-    laws = Laws(plant, [change for change in (*unique, *further) if change.kind == "bridge"])
+    laws = Laws(plant, [change for change in unique if change.kind == "bridge"])
     acting: Acting = [
         (change, np.array([b for b, variant in enumerate(variants) if any(c is change for c in variant.changes)]))
         for change in unique

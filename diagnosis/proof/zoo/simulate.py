@@ -10,7 +10,7 @@ import numpy as np
 
 from diagnosis.proof.plant.integrator import GAMMA
 from diagnosis.proof.zoo.laws import Acting, Balance, feel
-from diagnosis.proof.zoo.run import HeatBalance, integrate, read_probes, rows_of_run
+from diagnosis.proof.zoo.run import integrate, read_probes, rows_of_run
 from diagnosis.proof.zoo.structure import Change, Moment, Outcome, Programme, Variant, ZooPlant
 from models.base.types import Array
 
@@ -20,7 +20,7 @@ ROWS_AT_ONCE = 200
 
 @dataclass(frozen=True, kw_only=True)
 class ParameterDirection:
-    """A direction of :func:`tangents`: the parameter `name` of the plant grows by `step` per unit amplitude.
+    """A direction of :class:`Linearised`: the parameter `name` of the plant grows by `step` per unit amplitude.
 
     Attributes
     ----------
@@ -34,7 +34,7 @@ class ParameterDirection:
 
 @dataclass(frozen=True, kw_only=True)
 class StartDirection:
-    """A direction of :func:`tangents`: bodies start warmer by these amounts per unit amplitude.
+    """A direction of :class:`Linearised`: bodies start warmer by these amounts per unit amplitude.
 
     Attributes
     ----------
@@ -87,42 +87,6 @@ def simulate(plant: ZooPlant, programme: Programme, variants: Sequence[Variant])
     )
 
 
-def heat_balance(plant: ZooPlant, programme: Programme, variants: Sequence[Variant]) -> HeatBalance:
-    """Heat stored, given and shed over whole runs."""
-    return integrate(plant, programme, variants)[0].balance
-
-
-def tangents(
-    plant: ZooPlant,
-    programme: Programme,
-    changes: Sequence[Direction],
-    *,
-    at: Variant,
-    bodies: Sequence[str] = (),
-) -> Outcome:
-    """Derivatives of a run to the amplitudes of changes, all directions in one batch.
-
-    The run is simulated once. The derivatives of its heat balance are differences of laws, every law over all steps at
-    once; the changes go through the same time step as the run.
-
-    Parameters
-    ----------
-    changes : sequence of Change, ParameterDirection or StartDirection
-        Directions; a change enters as amplitude times its law
-    at : Variant
-        The run about which is linearised
-    bodies : sequence of str
-        Bodies whose temperatures are kept; the probes' and the loss always are
-
-    Returns
-    -------
-    Outcome
-        Derivatives in place of values, one row per direction; ``heat`` is empty
-    """
-    further = [change for change in changes if isinstance(change, Change)]
-    return Linearised(plant, programme, at=at, further=further).respond(changes, bodies)
-
-
 def _of_all(variant: Variant) -> Acting:
     """Changes of one run, acting on every column of a moment."""
     return [(change, slice(None)) for change in variant.changes]
@@ -148,25 +112,19 @@ class _Push:
 
 
 class Linearised:
-    """A run and its linear time steps, for any number of directions.
+    """A run of the plant as it is, and its linear time steps for any number of directions.
 
-    Parameters
-    ----------
-    at : Variant
-        The run about which is linearised
-    further : sequence of Change
-        Directions to come; needed of those that are bridges
+    The derivatives of its heat balance are differences of laws, every law over all steps at once; the directions go
+    through the same time step as the run.
     """
 
-    def __init__(self, plant: ZooPlant, programme: Programme, *, at: Variant, further: Sequence[Change] = ()) -> None:
-        run, clock, laws, _ = integrate(plant, programme, [at], further=further)
-        T_rows, T_steps = run.T[:, :, 0], run.T_steps[:, :, 0]
-        self.laws, self.clock, self.at, self.T_rows = laws, clock, at, T_rows
-        self.acting = _of_all(at)
-        start, self.end = T_steps[:-1].T, T_steps[1:].T  # (bodies, steps)
+    def __init__(self, plant: ZooPlant, programme: Programme) -> None:
+        run, clock, laws, _ = integrate(plant, programme, [Variant()])
+        self.laws, self.clock = laws, clock
+        start = run.T_steps[:-1, :, 0].T  # (bodies, steps)
         before = np.concatenate([start[:, :1], start[:, :-1]], axis=1)
         self.raw = self._moment(clock.in_steps, clock.inputs_in_steps, start + 0.5 * (start - before))
-        self.raw_rows = self._moment(clock.at_rows, clock.inputs_at_rows, T_rows.T)
+        self.raw_rows = self._moment(clock.at_rows, clock.inputs_at_rows, run.T[:, :, 0].T)
         self.base, self.values = self._evaluate(self.raw)
         self.base_rows, self.values_rows = self._evaluate(self.raw_rows)
         self.whole = replace(self.raw, T=self.base.T)
@@ -175,7 +133,7 @@ class Linearised:
 
     def _moment(self, times: tuple[Array, Array], inputs: Mapping[str, Array], T: Array) -> Moment:
         count = len(times[0])
-        p = {k: np.full(count, self.at.parameters.get(k, v)) for k, v in self.laws.plant.parameters.items()}
+        p = {k: np.full(count, v) for k, v in self.laws.plant.parameters.items()}
         return Moment(
             hours=times[0], since_start=times[1], inputs=inputs, T=dict(zip(self.laws.bodies, T, strict=True)), p=p
         )
@@ -183,9 +141,8 @@ class Linearised:
     def _evaluate(
         self, raw: Moment, held: Array | None = None, fresh: Sequence[int] | None = None
     ) -> tuple[Balance, Array]:
-        moment = feel(raw, self.acting)
-        values = self.laws.values(moment, held=held, fresh=fresh)
-        return self.laws.balance(moment, values, self.acting), values
+        values = self.laws.values(raw, held=held, fresh=fresh)
+        return self.laws.balance(raw, values, ()), values
 
     def _stages(self, start: Array) -> None:
         """Temperatures and rates of the two stages of every step, and the matrices of the step."""
@@ -197,7 +154,7 @@ class Linearised:
         self.inverse = np.linalg.inv(M)
         heat = base.q + laws.heat_from_boundaries(base)
         for name, watts in self.clock.random_heat.items():
-            heat[laws.body[name]] += 0.0 if self.at.quiet else watts
+            heat[laws.body[name]] += watts
         rate_1 = _apply(self.inverse, heat - _apply(self.K, start))
         second = start + (1.0 - GAMMA) * dt * rate_1
         rate_2 = _apply(self.inverse, heat - _apply(self.K, second))
@@ -235,7 +192,7 @@ class Linearised:
         J_out = np.zeros((self.clock.rows, 1 + len(laws.boundaries), n))
         for k, name in enumerate(laws.bodies):
             fresh = laws.reached_by(("T", name))
-            if not fresh and not self.acting:
+            if not fresh:
                 continue
             moved = self._moved(self.raw, self.values, "T", name, STEP_K, fresh)
             for J_stage, force in zip(J, self._both_stages(moved, STEP_K), strict=True):
@@ -253,44 +210,41 @@ class Linearised:
     ) -> Balance:
         field = dict(getattr(raw, kind))
         field[name] = field[name] + step
-        moved = replace(raw, **{kind: field})  # type: ignore[arg-type]
-        # A change may make the inputs follow a temperature, and then every law may.
-        everything = kind == "T" and any(change.kind == "input" for change, _ in self.acting)
-        return self._evaluate(moved, None if everything else values, None if everything else fresh)[0]
+        return self._evaluate(replace(raw, **{kind: field}), values, fresh)[0]  # type: ignore[arg-type]
 
     def _along(self, direction: Direction) -> _Push:
         still = np.zeros(len(self.laws.bodies))
+        steps: list[Array | float]
         if isinstance(direction, StartDirection):
             for name, kelvin in direction.start.items():
                 still[self.laws.body[name]] = kelvin
             return _Push(into={}, outputs={}, start=still)
-        if isinstance(direction, Change) and direction.kind != "input" and not self.acting:
-            return self._push_of_change(direction, still)
         if isinstance(direction, ParameterDirection):
-            step = RELATIVE_STEP * direction.step
-            fresh = self.laws.reached_by(("p", direction.name))
-            moved = self._moved(self.raw, self.values, "p", direction.name, step, fresh)
-            at_rows = self._moved(self.raw_rows, self.values_rows, "p", direction.name, step, fresh)
-            scale = RELATIVE_STEP
+            kind, name, steps = "p", direction.name, [direction.step, direction.step]
+        elif direction.kind == "input":
+            kind, name = "inputs", direction.target
+            steps = [feel(raw, [(direction, slice(None))]).inputs[name] - raw.inputs[name]
+                     for raw in (self.raw, self.raw_rows)]  # fmt: skip
         else:
-            scale = RELATIVE_STEP if direction.kind == "input" else 1.0
-            moved = self._with_change(self.raw, self.values, direction, scale)
-            at_rows = self._with_change(self.raw_rows, self.values_rows, direction, scale)
-        early, late = self._both_stages(moved, scale)
-        direct = (self._outputs(at_rows) - self._outputs(self.base_rows)) / scale
+            return self._push_of_change(direction, still)
+        fresh = self.laws.reached_by((kind, name))
+        moved = self._moved(self.raw, self.values, kind, name, RELATIVE_STEP * steps[0], fresh)
+        at_rows = self._moved(self.raw_rows, self.values_rows, kind, name, RELATIVE_STEP * steps[1], fresh)
+        early, late = self._both_stages(moved, RELATIVE_STEP)
+        direct = (self._outputs(at_rows) - self._outputs(self.base_rows)) / RELATIVE_STEP
         pushed = np.flatnonzero(np.any((early != 0.0) | (late != 0.0), axis=1))
         return _Push(into={int(k): (early[k], late[k]) for k in pushed}, outputs=dict(enumerate(direct)), start=still)
 
     def _push_of_change(self, change: Change, still: Array) -> _Push:
-        """Forces of a change on a run without changes, without a balance of all bodies."""
+        """Forces of a change without a balance of all bodies."""
         laws = self.laws
         amount = np.broadcast_to(change.law(self.whole), self.clock.steps)
         at_rows = np.broadcast_to(change.law(self.whole_rows), self.clock.rows)
         into: dict[int, tuple[Array, Array]] = {}
         outputs = {}
-        if change.kind in ("path", "bridge"):
-            k = laws.path[change.target] if change.kind == "path" else laws.bridge[id(change)]
-            G = amount * self.base.G[k] if change.kind == "path" else amount
+        if change.kind == "path":
+            k = laws.path[change.target]
+            G = amount * self.base.G[k]
             for own, other in (laws.ends[k], laws.ends[k][::-1]):
                 if own in laws.body:
                     ends = [
@@ -313,28 +267,17 @@ class Linearised:
             outputs = {0: change.is_loss * at_rows}
         return _Push(into=into, outputs=outputs, start=still)
 
-    def _with_change(self, raw: Moment, values: Array, change: Change, amplitude: float) -> Balance:
-        """Balance with one change more; linear in the amplitude but for inputs."""
-        if change.kind == "input":
-            felt = feel(raw, [(change, slice(None))])
-            step = (felt.inputs[change.target] - raw.inputs[change.target]) * amplitude
-            return self._moved(
-                raw, values, "inputs", change.target, step, self.laws.reached_by(("inputs", change.target))
-            )
-        moment = feel(raw, self.acting)
-        return self.laws.balance(moment, values, [*self.acting, (change, slice(None))])
-
     # ------------------------------------------------------------------ response
 
-    def respond(self, directions: Sequence[Direction], kept: Sequence[str]) -> Outcome:
-        """Run all directions through the linear time steps."""
+    def respond(self, directions: Sequence[Direction]) -> tuple[dict[str, Array], Array]:
+        """Derivatives of the readings by channel, and of the loss, shape (directions, rows)."""
         laws, clock = self.laws, self.clock
         J_1, J_2, J_out = self._jacobians
         along = [self._along(direction) for direction in directions]
         dT = np.stack([push.start for push in along], axis=1)
         before = dT
         seats = [name for probe in laws.plant.probes for name in probe.mix]
-        wanted = [name for name in laws.bodies if name in seats or name in kept]
+        wanted = [name for name in laws.bodies if name in seats]
         of_wanted = np.array([laws.body[name] for name in wanted])
         T = np.empty((len(wanted), len(directions), clock.rows))
         outputs = np.zeros((1 + len(laws.boundaries), len(directions), clock.rows))
@@ -351,7 +294,8 @@ class Linearised:
         T[:, :, -1] = dT[of_wanted]
         outputs[:, :, -1] += J_out[-1] @ dT
         seat = dict(zip(wanted, T, strict=True)) | dict(zip(laws.boundaries, outputs[1:], strict=True))
-        return self._outcome(directions, seat, outputs[0], kept)
+        first = clock.programme.unrecorded
+        return read_probes(laws.plant, seat, first), outputs[0][:, first:]
 
     def _chunks(self, J_1: Array, J_2: Array, along: Sequence[_Push]) -> Iterator[tuple[Array, Array, Array]]:
         """Per step: matrices of the temperatures at its start and at its middle, and what the directions add."""
@@ -371,23 +315,6 @@ class Linearised:
             transit = last @ second
             early, late = (1.0 - GAMMA) * dt * (last @ inverse), GAMMA * dt * inverse
             yield from zip(transit, early @ J_1[part] + late @ J_2[part], early @ F_1 + late @ F_2, strict=True)
-
-    def _outcome(
-        self, directions: Sequence[Direction], T: Mapping[str, Array], P_loss: Array, kept: Sequence[str]
-    ) -> Outcome:
-        first = self.clock.programme.unrecorded
-        inputs = {name: np.zeros_like(P_loss) for name in self.clock.programme.inputs}
-        for k, direction in enumerate(directions):
-            if isinstance(direction, Change) and direction.kind == "input":
-                felt = feel(self.raw_rows, [(direction, slice(None))]).inputs[direction.target]
-                inputs[direction.target][k] = felt - self.raw_rows.inputs[direction.target]
-        return Outcome(
-            T={name: T[name][:, first:] for name in kept},
-            readings=read_probes(self.laws.plant, T, first),
-            P_loss=P_loss[:, first:],
-            inputs={name: values[:, first:] for name, values in inputs.items()},
-            heat=(),
-        )
 
 
 def _apply(matrices: Array, vectors: Array) -> Array:

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from diagnosis.decision.settings import Settings
 from diagnosis.results.result import Diagnosis
 from diagnosis.results.result_parts import (
     Calibrated,
@@ -201,7 +202,7 @@ def _diagnosis(**given: object) -> Diagnosis:
         "gearbox": "fzg",
         "threshold": 3.9,
         "further_threshold": 3.9,
-        "false_alarm_rate": 0.05,
+        "settings": Settings(false_alarm_rate=0.05),
         "location": (),
         "findings": (),
         "calibration": tuple(

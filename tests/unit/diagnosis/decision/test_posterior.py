@@ -252,6 +252,13 @@ def test_a_pair_is_judged_by_what_it_leaves_itself(left: float | None, grade: st
     assert [one.grade for one in decide(found, Settings())] == [grade, grade]
 
 
+def test_a_pair_that_is_not_allowed_refutes_no_single_name() -> None:
+    first, second = effect("first"), effect("second")
+    found = posterior(judged(20.0, first), judged(18.0, second), judged(100.0, first, second), remainder=4.0)
+    assert sum(chances(found).values()) == pytest.approx(found.something) and found.of("pair") == 0.0
+    assert decide(found, Settings())
+
+
 def test_a_pair_has_less_prior_than_one_effect() -> None:
     first, second = effect("first"), effect("second", "mesh")
     found = posterior(judged(STRONG, first), judged(-50.0, second), judged(STRONG, first, second))

@@ -10,13 +10,12 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from diagnosis.forward import trajectory
 from diagnosis.forward.extra_states import SWITCHED_PARTS, Memories, within
 from diagnosis.forward.free_running import free_running
 from diagnosis.forward.grid import Piece, pieces
 from diagnosis.forward.network_on_grid import NetworkOnGrid
 from diagnosis.forward.recurrence import lagged, recurrence
-from diagnosis.forward.trajectory import parameter_heats, settled_balance, simulate
+from diagnosis.forward.trajectory import parameter_heat, settled_balance, simulate
 from diagnosis.recordings.recording import Recording
 from models.assembly.gearbox import Gearbox, load_gearbox
 from models.base.types import Array
@@ -78,9 +77,9 @@ def test_at_once_as_interval_by_interval(fzg: Gearbox, name: str, spacing: float
     values = np.stack([model.start, model.start * 1.1])
     memories = model._memories
     assert memories._in_turn  # all of the catalogue: else its diagnosis would be slow
-    found = model.memory(piece, T, T, values, power)
+    found = np.stack([model.memory(piece, T, T, each, power) for each in values])
     memories._in_turn = False
-    expected = model.memory(piece, T, T, values, power)
+    expected = np.stack([model.memory(piece, T, T, each, power) for each in values])
     for index, state in enumerate(model.network.states):
         range_of = np.ptp(expected[..., index], axis=1)
         assert (range_of > 0.0).all()
@@ -169,8 +168,8 @@ def test_derivatives_of_a_slow_valve(fzg: Gearbox) -> None:
     names, here = [p.name for p in model.network.parameters], settled_balance(model, found)
     for parameter, least in zip((placed.parameters[0], placed.parameters[4]), (1.0, 0.01), strict=True):
         step = 0.02 * given[parameter.name]
-        heat, _ = parameter_heats(model, found, here, [names.index(parameter.name)], np.array([step]))
-        column = found.response(heat)[..., 0]
+        heat, _ = parameter_heat(model, found, here, names.index(parameter.name), step)
+        column = found.response(heat[:, :, None])[..., 0]
         sides = []
         for moved in (given[parameter.name] + step, given[parameter.name] - step):
             values = named_values(model.network, given | {parameter.name: moved})
@@ -178,20 +177,6 @@ def test_derivatives_of_a_slow_valve(fzg: Gearbox) -> None:
         numeric = (sides[0] - sides[1]) / (2.0 * step)
         assert np.abs(numeric).max() > least
         np.testing.assert_allclose(column, numeric, atol=0.02 * np.abs(numeric).max())
-
-
-def test_derivatives_taken_a_few_at_a_time_are_the_same(fzg: Gearbox, monkeypatch: pytest.MonkeyPatch) -> None:
-    model, _, given = thermostat(fzg)
-    found = simulate(
-        model, piece_of(np.arange(0.0, 3601.0, 20.0)), named_values(model.network, given), np.full(model.n, 40.0)
-    )
-    here, indices = settled_balance(model, found), list(range(len(model.network.parameters)))
-    steps = 0.02 * np.array([p.sd * (p.start if p.log else 1.0) for p in model.network.parameters])
-    together = parameter_heats(model, found, here, indices, steps)
-    monkeypatch.setattr(trajectory, "MOST_AT_ONCE", 3 * len(found.memory))
-    few = parameter_heats(model, found, here, indices, steps)
-    for one, other in zip(few, together, strict=True):
-        np.testing.assert_allclose(one, other, rtol=1e-9, atol=1e-9)
 
 
 @pytest.mark.parametrize(

@@ -147,10 +147,9 @@ def test_a_slow_sensor_guides_switches_by_what_it_does_not_show_yet() -> None:
     shown = lagged(at, even.steps, 60.0)
     assert np.abs(shown - at).max() > 2.0
     piece = replace(even, measured=shown[:, None], lags=np.array([60.0]))
-    elsewhere = np.full((len(at), 1), 20.0)
-    assert np.abs(piece.seen(elsewhere, ("oil",))[:, 0] - at)[5:-1].max() < 0.1
-    assert np.abs(replace(piece, lags=None).seen(elsewhere, ("oil",))[:, 0] - at)[5:].max() > 2.0
-    np.testing.assert_array_equal(replace(piece, guided=False).seen(elsewhere, ("oil",)), elsewhere)
+    assert np.abs(piece.guide(("oil",))[:, 0] - at)[5:-1].max() < 0.1
+    assert np.abs(replace(piece, lags=None).guide(("oil",))[:, 0] - at)[5:].max() > 2.0
+    assert np.isnan(replace(piece, guided=False).guide(("oil",))).all()
 
 
 def test_noise_hides_no_peak_that_a_switch_has_made() -> None:
@@ -159,7 +158,7 @@ def test_noise_hides_no_peak_that_a_switch_has_made() -> None:
     saw = 67.0 + 3.0 * (2.0 * np.abs(2.0 * ((time / 600.0) % 1.0) - 1.0) - 1.0)
     oil = saw + np.random.default_rng(1).normal(0.0, 0.2, len(time))
     piece = replace(piece_of(time, oil=oil, even=True), guided=True)
-    seen, measured = piece.seen(np.zeros((len(piece.time), 1)), ("oil",))[:, 0], piece.measured[:, 0]
+    seen, measured = piece.guide(("oil",))[:, 0], piece.measured[:, 0]
 
     def around(signal: Array, first: int) -> list[Array]:
         return [signal[np.abs(piece.time - t) < 100.0] for t in range(first, 24000, 600)]

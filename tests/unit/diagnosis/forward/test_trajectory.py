@@ -11,8 +11,8 @@ from diagnosis.forward.grid import Piece, pieces
 from diagnosis.forward.matrix_exponential import exponential
 from diagnosis.forward.network_on_grid import SLOW_NEAR_K, SLOW_REACH_K, NetworkOnGrid
 from diagnosis.forward.recurrence import lagged
-from diagnosis.forward.term_on_grid import TermOnGrid
-from diagnosis.forward.trajectory import parameter_heats, settled_balance, simulate
+from diagnosis.forward.term_on_grid import TermOnGrid, input_slope
+from diagnosis.forward.trajectory import parameter_heat, settled_balance, simulate
 from diagnosis.setup.shapes import shape_terms
 from models.assembly.gearbox import Gearbox
 from models.base.types import Array
@@ -124,12 +124,19 @@ def test_a_tank_is_solved_with_the_temperatures(fzg: Gearbox, piece: Piece, ride
     names, here = [p.name for p in model.network.parameters], settled_balance(model, found)
     for name in (placed.parameters[1].name, placed.parameters[2].name):
         step = 0.02 * given[name]
-        heat, _ = parameter_heats(model, found, here, [names.index(name)], np.array([step]))
-        column = found.response(heat)[:, nodes, 0]
+        heat, _ = parameter_heat(model, found, here, names.index(name), step)
+        column = found.response(heat[:, :, None])[:, nodes, 0]
         sides = [simulate(model, piece, named_values(model.network, given | {name: given[name] + sign * step}),
                           found.T[0], settled_K=1e-6, rounds=20).T[:, nodes] for sign in (1, -1)]  # fmt: skip
         numeric = (sides[0] - sides[1]) / (2.0 * step)
         assert np.abs(column - numeric).max() < 0.03 * np.abs(numeric).max()
+    warm, at = np.array(piece.samples), model.laws.inputs.index("T_ambient")
+    warm[..., at] += 0.5
+    column = found.response(input_slope(model, found, "T_ambient")[0][:, :, None])[:, nodes, 0]
+    sides = [simulate(model, one, values, found.T[0], settled_K=1e-6, rounds=20).T[:, nodes]
+             for one in (replace(piece, samples=warm), piece)]  # fmt: skip
+    numeric = (sides[0] - sides[1]) / 0.5
+    assert np.abs(column - numeric).max() < 0.02 * np.abs(numeric).max()  # the tank follows the air as well
 
 
 def test_temperatures_that_run_away_are_no_trajectory(model: NetworkOnGrid, piece: Piece) -> None:
@@ -164,8 +171,8 @@ def test_term_gives_the_same_heat_inside_its_network_and_beside_it(
         tangent = model.loss_tangent(piece, 0.5 * (T[1:] + T[:-1]))
         start = named_values(model.network, given)
         trajectory = simulate(model, piece, start, T[0], guess=T, rounds=1)
-        memory = model.memory(piece, T, piece.seen(T, model.parts), start, tangent.power)
-        here = replace(trajectory, T=T, seen=piece.seen(T, model.parts), tangent=tangent, memory=memory)
+        memory = model.memory(piece, T, T, start, tangent.power)
+        here = replace(trajectory, T=T, seen=T, tangent=tangent, memory=memory)
         here = replace(here, balance=settled_balance(model, here))
         found.append(TermOnGrid(model, placed).heat(here, values)[0])
     assert np.abs(found[0]).max() > 1.0

@@ -233,6 +233,10 @@ def test_verb_scores_a_folder(tmp_path: Path) -> None:
     assert done.exit_code == 0 and "1 diagnoses ended without an answer" in done.output
     assert "| named | 1/1 (2 to 100 %) |" in (tmp_path / "out" / "proof.md").read_text()
     assert (tmp_path / "out" / "reliability.png").read_bytes().startswith(b"\x89PNG")
+    (tmp_path / "results" / "b").mkdir()
+    (tmp_path / "results" / "b" / "diagnosis.json").write_text('{"verdict": "missing_physics", "findings": [{}]}')
+    done = CliRunner().invoke(commands, ["score", *arguments], catch_exceptions=False)
+    assert done.exit_code == 0 and "1 diagnoses ended without an answer" in done.output
     truths.write_text('{"a": 1}')
     assert "is no truth of a set of cases" in str(CliRunner().invoke(verb, arguments).exception)
 

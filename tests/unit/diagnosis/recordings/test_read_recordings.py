@@ -146,18 +146,6 @@ def test_columns_that_nothing_asks_for_are_noted(tmp_path: Path, network: Therma
     assert note.endswith("x11 and 3 more")
 
 
-def test_an_impossible_value_of_a_computed_quantity_is_missing(tmp_path: Path, network: ThermalNetwork) -> None:
-    """The table of quantities has the range of the output torque; another column has none."""
-    kept = "".join(f'[columns.{name}]\nquantity = "auxiliary"\n' for name in ("torque_out_Nm", "pump"))
-    wrong = np.array([-1e9, 1e9, *[50.0] * 198])
-    recording = read(write(tmp_path / "run.csv", table().assign(torque_out_Nm=wrong, pump=wrong)), network, kept)
-    np.testing.assert_array_equal(recording.auxiliary["torque_out_Nm"], [np.nan, np.nan, *wrong[2:]])
-    np.testing.assert_array_equal(recording.auxiliary["pump"], wrong)
-    assert any(
-        note.startswith("torque_out_Nm: 2 values (rows 1-2) outside -1e+08 ... 1e+08 N m") for note in recording.notes
-    )
-
-
 def test_parts_of_a_file(tmp_path: Path, network: ThermalNetwork) -> None:
     source = table()
     path = write(tmp_path / "run.csv", source.assign(time_s=source["time_s"] + 100.0))
@@ -230,7 +218,6 @@ def test_a_mapping_names_converts_and_describes(tmp_path: Path, network: Thermal
     np.testing.assert_allclose(oil.values, source["T_oil_degC"])
     assert (oil.noise, oil.resolution, oil.lag_s, oil.lag_sd_s, oil.bias_sd) == (0.2, 0.1, 15.0, 5.0, 0.5)
     np.testing.assert_allclose(channel(recording, "P_loss"), source["P_loss_W"])
-    assert list(recording.auxiliary) == ["valve"]
 
 
 def test_semicolons_decimal_commas_and_texts_for_missing(tmp_path: Path, network: ThermalNetwork) -> None:
@@ -264,7 +251,7 @@ def test_the_own_mapping_comes_before_that_of_the_folder_and_a_definition_is_non
     path = write(tmp_path / "run.csv", table().rename(columns={"T_oil_degC": "sump"}))
     (tmp_path / "mapping.toml").write_text('schema = 1\n[columns.sump]\nquantity = "auxiliary"\n')
     (tmp_path / "run.toml").write_text("schema = 1\n[[stage]]\n")
-    assert "sump" in read(path, network).auxiliary
+    assert "oil" not in {c.name for c in read(path, network).channels}
     (tmp_path / "run.toml").write_text('schema = 1\n[columns.sump]\nquantity = "T_oil"\n')
     assert "oil" in {c.name for c in read(path, network).channels}
 
@@ -445,6 +432,18 @@ def test_a_column_that_one_of_the_files_lacks_is_missing_there(tmp_path: Path, n
     joined = read(f"{first}+{write(tmp_path / 'b.csv', source[120:])}", network)
     assert np.isnan(channel(joined, "pinion")[:120]).all()
     assert np.isfinite(channel(joined, "pinion")[120:]).all()
+
+
+@pytest.mark.parametrize("order", [("a", "b"), ("b", "a")])
+def test_a_constant_holds_for_the_file_whose_mapping_states_it(
+    tmp_path: Path, network: ThermalNetwork, order: tuple[str, str]
+) -> None:
+    source = table().assign(T_ambient_degC=35.0)
+    first = write(tmp_path / "a.csv", source[:120].drop(columns="T_ambient_degC"))
+    first.with_suffix(".toml").write_text("schema = 1\nconstants = { T_ambient = 20.0 }\n")
+    write(tmp_path / "b.csv", source[120:])
+    ambient = read("+".join(str(tmp_path / f"{name}.csv") for name in order), network).inputs["T_ambient"]
+    assert set(ambient[:120]) == {20.0} and set(ambient[120:]) == {35.0}
 
 
 def test_files_that_overlap_are_refused(tmp_path: Path, network: ThermalNetwork) -> None:

@@ -307,6 +307,7 @@ def test_the_date_is_drawn_with_its_band() -> None:
     (band,) = figure.layout.shapes
     assert (band.x0, band.x1) == pytest.approx((66500.0 / 3600.0, 66700.0 / 3600.0))
     assert figure.data[-1].x[0] == pytest.approx(66600.0 / 3600.0)
+    assert {name for bars in figure.data[:2] for name in bars.y} == {"train_2"}  # baselines have no place on this axis
     assert dates_with_bands(missing_physics()) is None
 
 

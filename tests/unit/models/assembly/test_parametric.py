@@ -193,7 +193,6 @@ def test_columns_of_the_farm_need_no_mapping_file(gearbox, tmp_path):
     (recording,) = read_recordings([_scada(tmp_path / "R1.csv")], gearbox.network())
     assert {c.name for c in recording.channels} == {"oil", "oil_inlet", "bearing_1", "bearing_2"}
     assert recording.inputs["T_ambient"][0] == 25.0 and recording.inputs["T_outdoor"][0] == 12.0
-    assert "P_avg" in recording.auxiliary
 
 
 def test_a_driver_that_was_not_recorded_is_assumed_and_noted(gearbox, tmp_path):
@@ -219,9 +218,9 @@ def test_rows_minutes_apart_guide_the_memories_by_sharpened_means(gearbox, tmp_p
     (recording,) = read_recordings([_scada(tmp_path / "R1.csv", Gost_avg=means)], gearbox.network())
     (piece,) = pieces([recording], ("speed", "torque", "T_ambient", "T_outdoor"), ("oil",))
     assert piece.guided and piece.slow
-    seen = piece.seen(np.zeros((60, 2)), ("oil", "casing"))
+    seen = piece.guide(("oil", "casing"))
     np.testing.assert_allclose(seen[1:-1, 0], 50.0 + 2.0 * np.sign(means[1:-1] - 50.0))
-    assert not seen[:, 1].any()  # what is not measured stays as simulated
+    assert np.isnan(seen[:, 1]).all()  # what is not measured stays as simulated
 
 
 # ---------------------------------------------------------------------- switches over weeks
