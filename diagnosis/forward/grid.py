@@ -9,6 +9,7 @@ which makes no difference.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -192,6 +193,15 @@ def pieces(
         Pieces too short to learn anything from are left out
     """
     return tuple(piece for recording in recordings for piece in _pieces_of(recording, inputs, channels, even=even))
+
+
+def too_short(recordings: Sequence[Recording], made: Sequence[Piece]) -> Iterator[str]:
+    """A note on every recording with gap-free pieces that are too short to simulate; `made` by :func:`pieces`."""
+    used = Counter(piece.recording for piece in made)
+    for recording in recordings:
+        every = len(recording.segments)
+        if left := every - used[recording.name]:
+            yield f"{recording.name}: {left} of {every} pieces without gaps are too short to simulate and not used"
 
 
 def slow_rows(recordings: Sequence[Recording]) -> bool:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,7 +16,7 @@ from diagnosis.engine.fit import Experiment, Fit
 from diagnosis.engine.predict import overall_rmse, rmse
 from diagnosis.engine.prepare import held_out_experiment
 from diagnosis.engine.set_apart import calibrate_without_error
-from diagnosis.forward.grid import Piece
+from diagnosis.forward.grid import too_short
 from diagnosis.forward.whitening import RandomHeat
 from diagnosis.recordings.recording import Recording
 from diagnosis.results.advice import next_test, without_sensor
@@ -178,7 +177,7 @@ def assemble(
         },
         notes=(
             *ratio_notes(final), *baseline_notes(experiment, posterior, answers),
-            *_too_short((*train, *healthy), experiment.pieces), *_too_short(held_out, setup.held_out),
+            *too_short((*train, *healthy), experiment.pieces), *too_short(held_out, setup.held_out),
             *(f"{r.name}: {note}" for r in (*train, *held_out, *healthy) for note in r.notes),
         ),
         kinds={kind: posterior.of(kind) for kind in KINDS},
@@ -215,15 +214,6 @@ def faulty_channels(posterior: Posterior, apart: Sequence[str]) -> tuple[str, ..
                if any(e.term is not None and e.term.kind == "sensor" and channel in e.term.target for e in one.effects)
                ) > PROBABLY
     )  # fmt: skip
-
-
-def _too_short(recordings: Sequence[Recording], pieces: Sequence[Piece]) -> Iterator[str]:
-    """A note on every recording with gap-free pieces that are too short to simulate."""
-    used = Counter(piece.recording for piece in pieces)
-    for recording in recordings:
-        every = len(recording.segments)
-        if left := every - used[recording.name]:
-            yield f"{recording.name}: {left} of {every} pieces without gaps are too short to simulate and not used"
 
 
 def _best(posterior: Posterior, answers: Sequence[Answer]) -> Judged | None:

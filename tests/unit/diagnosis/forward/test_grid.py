@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from diagnosis.forward.free_running import free_running
-from diagnosis.forward.grid import FREE_S, INTERVAL_S, LONGEST, SAMPLES, Piece, pieces, stands_for, white_sd
+from diagnosis.forward.grid import FREE_S, INTERVAL_S, LONGEST, SAMPLES, Piece, pieces, stands_for, too_short, white_sd
 from diagnosis.forward.network_on_grid import NetworkOnGrid
 from diagnosis.forward.recurrence import lagged
 from diagnosis.recordings.recording import Channel, Recording
@@ -22,17 +22,20 @@ TIME = np.arange(0.0, 7201.0, 10.0)
 COARSE = LONGEST * INTERVAL_S
 
 
-def piece_of(
-    time: Array = TIME, *, speed: Array | float = 1500.0, oil: Array | None = None, even: bool = False
-) -> Piece:
+def recorded(time: Array, speed: Array | float = 1500.0, oil: Array | None = None) -> Recording:
     inputs = {"speed": speed, "torque": 120.0, "T_ambient": 22.0, "air_speed": 2.0}
     channels = () if oil is None else (Channel(name="oil", values=oil),)
-    recording = Recording(
+    return Recording(
         name="made", path=Path("made.csv"), sha256="0" * 64, time=time, channels=channels,
         inputs={name: np.broadcast_to(np.asarray(values, float), time.shape) for name, values in inputs.items()},
         segments=(slice(0, len(time)),),
     )  # fmt: skip
-    (found,) = pieces([recording], INPUTS, () if oil is None else ("oil",), even=even)
+
+
+def piece_of(
+    time: Array = TIME, *, speed: Array | float = 1500.0, oil: Array | None = None, even: bool = False
+) -> Piece:
+    (found,) = pieces([recorded(time, speed, oil)], INPUTS, () if oil is None else ("oil",), even=even)
     return found
 
 
@@ -55,6 +58,15 @@ def test_a_stop_in_the_last_row_is_not_cut_off() -> None:
     stops = piece_of(time, speed=np.where(time < 7190.0, 1500.0, 0.0))
     assert stops.time[-2:].tolist() == [7180.0, 7190.0]
     assert stops.inputs[-1, 0] == pytest.approx(750.0) and stops.inputs[-2, 0] == 1500.0
+
+
+def test_pieces_that_are_too_short_are_told() -> None:
+    """Eight rows of 10 s have four grid points."""
+    whole = recorded(TIME)
+    torn = replace(whole, segments=(slice(0, 600), slice(600, 608), slice(608, 721)))
+    assert list(too_short([whole], pieces([whole], INPUTS, ()))) == []
+    (note,) = too_short([torn], pieces([torn], INPUTS, ()))
+    assert note == "made: 1 of 3 pieces without gaps are too short to simulate and not used"
 
 
 def test_a_drift_is_followed() -> None:

@@ -131,7 +131,7 @@ def assembled(prepared: Prepared, calibration: Calibration, recordings: tuple[Re
         return assemble(
             setup, given.pop("experiment", experiment), posterior, answers, plain=plain,
             calibration=calibration, settings=Settings(),
-            catalogue=CATALOGUE, train=given.pop("train", recordings[:1]), held_out=recordings[1:], **given,
+            catalogue=CATALOGUE, train=recordings[:1], held_out=recordings[1:], **given,
         )  # fmt: skip
 
     return result
@@ -192,16 +192,6 @@ def test_held_out_readings_that_are_predicted_worse_take_the_claim_away(
         assert found.contradicted is found.to_dict()["fit"]["holdout"]["contradicts_findings"] is (grade == "likely")
         assert not assembled(posterior, []).contradicted  # nothing was found
         assert found.has_correction  # what improves the prediction of the rest goes into the model all the same
-
-
-def test_pieces_that_are_too_short_are_told(
-    assembled: Assemble, prepared: Prepared, claimed: Diagnosis, recordings: tuple[Recording, Recording]
-) -> None:
-    learnt, _ = recordings
-    torn = replace(learnt, segments=(slice(0, len(learnt.time) - 3), slice(len(learnt.time) - 3, len(learnt.time))))
-    notes = assembled(posterior_of(prepared[2], log_e=-1.0), [], train=[torn]).notes
-    assert f"{RECORDED}: 1 of 2 pieces without gaps are too short to simulate and not used" in notes
-    assert not any("too short" in note for note in claimed.notes)
 
 
 def test_scorers_read_the_numbers(claimed: Diagnosis, fzg: Gearbox) -> None:
