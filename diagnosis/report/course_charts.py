@@ -143,11 +143,17 @@ def errors_over_time(diagnosis: Diagnosis) -> Chart | None:
     has_loss = LOSS in shown[0].run.measured
     rows = [stage.capitalize() for stage, _ in stages] + ["Total loss"] * has_loss
     heights = [ERROR_PX] * len(stages) + [ROW_PX] * has_loss
-    figure, colours, owners = _grid(heights), _colours(diagnosis, channels), []
+    titles = [f"<b>{row}</b>, simulated less measured in {'W' if row == 'Total loss' else 'K'}" for row in rows]
+    figure, colours, owners, looks = _grid(heights), _colours(diagnosis, channels), [], []
     for index, one in enumerate(shown):
-        for row, (_, look) in enumerate(stages, 1):
-            for channel in channels:
-                error = getattr(one.run, look)[channel] - one.run.measured[channel]
+        ranges = dict[str, Any]()
+        errors = [{c: getattr(one.run, look)[c] - one.run.measured[c] for c in channels} for _, look in stages]
+        courses = [averaged(one.run.time, error, ERROR_POINTS)[1] for of in errors for error in of.values()]
+        for row, of in enumerate(errors, 1):
+            ranges[f"{axis('yaxis', row)}.range"] = limits(
+                [*courses, BAND_SD * diagnosis.noise_K * np.array([-1.0, 1.0])]
+            )
+            for channel, error in of.items():
                 faulty = " (faulty sensor)" if channel in diagnosis.faulty else ""
                 line = {"color": colours[channel], "width": 1.5, "dash": "dot" if faulty else "solid"}
                 trace = _line(one, error, name(channel) + faulty, line, ERROR_POINTS, mean=True)
@@ -159,10 +165,11 @@ def errors_over_time(diagnosis: Diagnosis) -> Chart | None:
             trace = _line(one, error, stage, LINES[look], ERROR_POINTS, mean=True)
             figure.add_trace(trace.update(visible=index == 0, showlegend=False), row=len(rows), col=1)
             owners.append(index)
+        if has_loss:
+            ranges[f"{axis('yaxis', len(rows))}.autorange"] = True
+        looks.append({"annotations": row_titles(titles), **_x_axis(one, len(rows)), **ranges,
+                      "shapes": [*_noise(diagnosis, len(stages)), *_unscored(one, len(rows))]})  # fmt: skip
     figure.update_yaxes(matches="y", row=2, col=1)
-    titles = [f"<b>{row}</b>, simulated less measured in {'W' if row == 'Total loss' else 'K'}" for row in rows]
-    looks = [{"annotations": row_titles(titles), **_x_axis(one, len(rows)),
-              "shapes": [*_noise(diagnosis, len(stages)), *_unscored(one, len(rows))]} for one in shown]  # fmt: skip
     _one_at_a_time(figure, heights, [one.title for one in shown], looks, owners)
     band = f" Band: ± {BAND_SD:g} standard deviations of the noise." if diagnosis.noise_K > 0.0 else ""
     return Chart(

@@ -156,7 +156,7 @@ def _viscosity_exponents(
         power = losses.power([speed], [torque], [[T] * len(losses.temperature_nodes)])[0]
         here = dict(at) | {symbol(f"T_{part.name}"): T for part in network.parts}
         here |= {symbol(f"P_{name}"): value for name, value in zip(losses.components, power, strict=True)}
-        heats = [float(source.heat.xreplace(here).evalf()) for source in network.sources]
+        heats = [float(sp.N(source.heat.xreplace(here))) for source in network.sources]
         logs.append(np.log(np.maximum([*heats, kinematic_viscosity_d341(T, *oil)], LEAST)))
     change = logs[1] - logs[0]
     exponents = np.clip(change[:-1] / change[-1], *EXPONENTS)

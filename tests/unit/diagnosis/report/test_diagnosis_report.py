@@ -281,7 +281,10 @@ def test_charts_are_six_at_most_and_have_texts(name: str) -> None:
 
 def test_errors_share_one_scale() -> None:
     figure = figure_of(errors_over_time(missing_physics()))
-    assert figure.layout.yaxis2.matches == "y"
+    low, high = figure.layout.yaxis.range
+    shown = [trace for trace in figure.data if trace.visible and trace.yaxis in ("y", "y2")]
+    assert all(low < min(trace.y) and max(trace.y) < high for trace in shown) and len(shown) > 2
+    assert figure.layout.yaxis2.matches == "y" and figure.layout.yaxis2.range == (low, high)
 
 
 def test_names_stand_by_grade() -> None:

@@ -155,6 +155,16 @@ def test_all_sizes_times_one_factor_change_no_temperature(gearbox):
 # ---------------------------------------------------------------------- what the catalogue does with it
 
 
+def test_a_loss_without_a_number_to_calibrate_is_its_own_law():
+    """No standard deviation: the source is the loss as assumed, without a factor."""
+    plain = re.sub(r"load_W = \{ value = ([0-9.e+]+)[^}]*\}", r"load_W = \1", TEXT)
+    plain = re.sub(r"torque_exponent = \{ value = ([0-9.]+)[^}]*\}", r"torque_exponent = \1", plain)
+    assert plain != TEXT
+    gearbox = read_gearbox(plain, file="plain.toml")
+    exponents = Scale.of(gearbox).viscosity_exponents
+    assert all(np.isfinite(value) for value in exponents.values()) and exponents
+
+
 def test_mechanisms_have_places_where_their_parts_are(gearbox):
     scale = Scale.of(gearbox)
     placed = {name: m.placed(gearbox.network(), scale) for name, m in CATALOGUE.items()}
