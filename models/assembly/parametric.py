@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -25,6 +26,7 @@ RATIOS = (0.02, 50.0)  # of speed, torque or viscosity, beyond which an exponent
 SLOWEST_RPM = 1.0  # below it a torque from a power is that at it
 RPM = np.pi / 30.0
 FARTHEST = 1000.0  # limits of a factor; its prior keeps it much nearer to 1
+COLD_DEGC = 20.0  # from which to the stated temperature factors on conductances are tried
 
 
 @dataclass(frozen=True)
@@ -117,16 +119,39 @@ def law_faults(definition: ParametricDefinition) -> list[tuple[str, str]]:
     faults = []
     for path, text in laws:
         try:
-            used = sorted(s.name for s in parse_expression(text).free_symbols)
+            law = parse_expression(text)
         except InputError as error:
             faults.append((path, str(error)))
             continue
+        used = sorted(s.name for s in law.free_symbols)
+        unknown = [name for name in used if name not in known]
         faults += [
             (path, f"{name!r} is no input and no temperature of this definition{did_you_mean(name, known)}")
-            for name in used
-            if name not in known
+            for name in unknown
         ]
+        if path.startswith("link.") and not unknown:
+            faults += [(path, fault) for fault in _negative(law, definition)]
     return faults
+
+
+def _negative(factor: sp.Expr, definition: ParametricDefinition) -> Iterator[str]:
+    """A fault if a factor on a conductance is below 0 at low, middle or high values of what is in it."""
+    speed, torque = definition.operation.speed_rpm, definition.operation.torque_Nm
+    ranges = {"time": (0.0, 1e5), "speed": (0.0, speed), "torque": (0.0, torque)}
+    ranges |= {p.name: (p.start, p.start) for p in definition.parameter}
+    for name, given in definition.inputs.items():
+        if name not in ranges and not given.quantity.is_temperature:
+            ranges[name] = given.quantity.low, given.quantity.high
+    names = sorted(s.name for s in factor.free_symbols)
+    warm = COLD_DEGC, definition.operation.temperature_degC
+    levels = [np.linspace(*ranges.get(name, warm), 3) for name in names]
+    for point in product(*(level[np.isfinite(level)] for level in levels)):
+        value = complex(factor.xreplace({symbol(n): sp.Float(v) for n, v in zip(names, point, strict=True)}))
+        if value.imag == 0.0 and value.real < 0.0:
+            where = ", ".join(f"{name} = {at:g}" for name, at in zip(names, point, strict=True))
+            at = f" at {where}" if where else ""
+            yield f"is {value.real:.3g}{at}; a conductance is never negative: keep it above 0, with Max(0, ...)"
+            return
 
 
 def with_losses_as_laws(network: ThermalNetwork, definition: ParametricDefinition) -> ThermalNetwork:
