@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -106,18 +107,22 @@ def diagnose(
         progress("calibrating with model error")
         calibration = calibrate_with_error(experiment, others, apart)
         candidates = candidates_of(setup, experiment, catalogue)
-        weights, outside = log_prior(candidates), outside_of(setup, experiment)
-        posterior = infer(calibration, candidates, weights, settings, outside=outside, progress=progress)
+        weigh = partial(
+            infer, candidates=candidates, log_prior=log_prior(candidates), settings=settings, progress=progress,
+            candidates_in=lambda there: candidates_of(setup, there, catalogue),
+        )  # fmt: skip
+        outside = outside_of(setup, experiment)
+        posterior = weigh(calibration, outside=outside)
         if posterior.elsewhere is not None:
             progress("calibrating again in the better basin that was seen")
             again = recalibrate(calibration, posterior.elsewhere)
             if again.chosen.log_evidence > calibration.chosen.log_evidence:
                 calibration = again
-                posterior = infer(calibration, candidates, weights, settings, outside=outside, progress=progress)
+                posterior = weigh(calibration, outside=outside)
         faulty, rest = faulty_channels(posterior, apart), None
         if faulty and calibration.of_others is not None:
             progress(f"looking at the machine without {', '.join(apart)}")
-            rest = infer(calibration.of_others, candidates, weights, settings, progress=progress)
+            rest = weigh(calibration.of_others)
         progress("predicting the recordings free-running")
         return assemble(
             setup, experiment, posterior, decide(posterior, settings), plain=plain, calibration=calibration,

@@ -38,6 +38,8 @@ class Hypothesis:
         its prior
     clock : str or None
         Parameter of the term that is the start of the recording on the time axis that all recordings share, [s]
+    less : float
+        By how much its evidence counts less: baselines bring as much of its law, [nat]
     """
 
     name: str
@@ -48,6 +50,7 @@ class Hypothesis:
     variants: Array
     how: How = "U"
     clock: str | None = None
+    less: float = 0.0
 
     @property
     def label(self) -> str:

@@ -16,15 +16,15 @@ import numpy as np
 from scipy.special import log_ndtr
 
 from diagnosis.candidates.hypotheses import Hypothesis
+from diagnosis.decision.placebo import CandidatesIn, counting_less, judge_baselines
 from diagnosis.decision.posterior import Judged, Posterior, name_of
 from diagnosis.decision.scanned import (
     Scanned,
+    counts_less,
     expected_of,
     judge_alone,
-    less_over_time,
     likeness_of,
     log_sum,
-    placebo_of,
     repeating_of,
     scan_given,
     scan_in_classes,
@@ -55,7 +55,7 @@ WORTH, WORTH_SHARE = 1.0, 0.1  # nats, and share of the best, from which a candi
 
 def infer(
     calibration: Calibration, candidates: Sequence[Hypothesis], log_prior: Array, settings: Settings, *,
-    outside: Sequence[Hypothesis] = (), progress: Progress = silent,
+    outside: Sequence[Hypothesis] = (), candidates_in: CandidatesIn = lambda _: (), progress: Progress = silent,
 ) -> Posterior:  # fmt: skip
     """Weigh all explanations.
 
@@ -65,10 +65,16 @@ def infer(
         Of every candidate, to 1 of nothing
     outside : sequence of Hypothesis
         Unknown heats, judged where something is missing
+    candidates_in : callable
+        Gives the candidates of an experiment in which a baseline is tested
     progress : callable
         Told what is being done
     """
     base, chosen = calibration.fit, calibration.chosen
+    if base.experiment.healthy:
+        progress("judging the baselines as if they were tested")
+    placebo, over_time = judge_baselines(calibration, candidates_in)
+    candidates = counting_less(candidates, over_time)
     progress(f"scanning {len(candidates)} candidates")
     found = scan(base, [one for one in candidates if one.term is not None], calibration.near.columns)
     first = scan_in_classes(calibration, found, candidates, log_prior)
@@ -77,7 +83,6 @@ def infer(
     gained, pairs, elsewhere = 0.0, list[Judged](), None
     best = max(judged.values(), key=_weight, default=None)
     error_class = chosen.error_class if best is None else best.error_class
-    placebo = placebo_of(calibration, first)
     detection, of_class = rule().thresholds(chosen.error_class, error_class, settings.false_alarm_rate)
     least = -np.inf if placebo is None else placebo.log_e
     if best is not None and best.fit is not None and best.log_bayes > 0.0:
@@ -224,7 +229,7 @@ def _judged(calibration: Calibration, one: Judged, spread: float) -> Judged:
     at = len(calibration.fit.z)  # where the effects' unknowns begin
     log_evidence = fit_over_sessions(fit, at).log_evidence + float(np.log(one.error_class.prior))
     log_bayes = log_evidence - calibration.chosen.log_evidence - spread
-    log_bayes -= float(less_over_time(one.effects, calibration.chosen.error_class, one.error_class).sum())
+    log_bayes -= float(counts_less(one.effects, calibration.chosen.error_class, one.error_class).sum())
     for effect in one.effects:
         if effect.term is None:
             continue  # a parameter is not further

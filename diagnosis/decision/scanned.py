@@ -8,13 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from diagnosis.candidates.hypotheses import Hypothesis
-from diagnosis.decision.posterior import Expected, Judged, Likeness, Placebo, Repeating, ScaledError
+from diagnosis.decision.posterior import Expected, Judged, Likeness, Repeating, ScaledError
 from diagnosis.decision.settings import Settings
 from diagnosis.engine.calibration import Calibration
-from diagnosis.engine.candidates import Scan, scan, scope_of
+from diagnosis.engine.candidates import Scan, scan
 from diagnosis.engine.gram import Given, Strengths
 from diagnosis.engine.learnt import ErrorClass, rule
-from diagnosis.engine.sessions import OverSessions, over_sessions, sessions_of
+from diagnosis.engine.sessions import OverSessions, over_sessions
 from models.base.types import Array
 
 OVER_TIME = ("D", "C", "W")  # families whose effects change over time
@@ -101,7 +101,7 @@ def judge_alone(calibration: Calibration, best: Judged, second: Scanned, ahead: 
     assert fit is not None  # noqa: S101
     without = over_sessions(found.gram, fit.experiment, [*range(len(calibration.fit.z)), *found.further])
     log_bayes = _weighed(found, _parameters(second.candidates), without) + ahead
-    log_bayes -= less_over_time(second.candidates, calibration.chosen.error_class, best.error_class)
+    log_bayes -= counts_less(second.candidates, calibration.chosen.error_class, best.error_class)
     return dict(zip((one.label for one in second.candidates), log_bayes.tolist(), strict=True))
 
 
@@ -111,7 +111,7 @@ def _in_class(
 ) -> InClass:  # fmt: skip
     """Candidates in one class; `nothing`: that without any effect."""
     strengths = _strengths(found, parameters, over.given[over.most_probable])
-    less = less_over_time((*found.candidates, *parameters), nothing, error_class)
+    less = counts_less((*found.candidates, *parameters), nothing, error_class)
     return InClass(error_class=error_class, ahead=ahead, scan=found, over=over,
                     log_bayes=_weighed(found, parameters, over) + ahead - less, strengths=strengths)  # fmt: skip
 
@@ -129,10 +129,10 @@ def in_best_classes(
     )  # fmt: skip
 
 
-def less_over_time(candidates: Sequence[Hypothesis], nothing: ErrorClass, here: ErrorClass) -> Array:
-    """Nats less that changes over time count: the mean of the classes without any effect and with them."""
-    less = 0.5 * (nothing.over_time + here.over_time)
-    return less * np.array([one.how in OVER_TIME for one in candidates], dtype=bool)
+def counts_less(candidates: Sequence[Hypothesis], nothing: ErrorClass, here: ErrorClass) -> Array:
+    """Nats that changes over time count less: what baselines bring of them, and the mean of both classes."""
+    over_time = 0.5 * (nothing.over_time + here.over_time)
+    return np.array([one.less + over_time * (one.how in OVER_TIME) for one in candidates])
 
 
 def _parameters(candidates: Sequence[Hypothesis]) -> list[Hypothesis]:
@@ -166,40 +166,6 @@ def log_sum(log: Sequence[float] | Array) -> float:
     return float(np.logaddexp.reduce(np.asarray(log, dtype=float)))
 
 
-def placebo_of(calibration: Calibration, found: Scanned) -> Placebo | None:
-    """Evidence that the best laws of the catalogue bring in a baseline, which takes the place of the tested session.
-
-    Of the baseline that brings most, for as many hours as are tested; None without baselines. Changes over time are not
-    judged: most need more than one recording.
-    """
-    experiment = calibration.fit.experiment
-    hours = {piece.recording: 0.0 for piece in experiment.pieces}
-    for piece in experiment.pieces:
-        hours[piece.recording] += float(piece.steps.sum())
-    tested = sum(value for name, value in hours.items() if name not in experiment.healthy)
-    reached: list[Placebo] = []
-    for pieces in sessions_of(experiment):
-        names = {experiment.pieces[i].recording for i in pieces}
-        if not names <= experiment.healthy:
-            continue
-        swapped = replace(experiment, healthy=frozenset(hours) - names)
-        able = [
-            (one, prior) for one, prior in zip(found.candidates, found.log_prior.tolist(), strict=True)
-            if one.how == "P" or (one.how == "U" and scope_of(swapped, one) is not None)
-        ]  # fmt: skip
-        candidates, log_prior = [one for one, _ in able], np.array([prior for _, prior in able])
-        terms = [one for one in candidates if one.term is not None]
-        if not terms:  # what is switched off has no place in this machine
-            continue
-        there = scan(replace(calibration.fit, experiment=swapped), terms, calibration.near.columns)
-        judged = scan_in_classes(calibration, there, candidates, log_prior)
-        longer = max(tested / sum(hours[name] for name in names), 1.0)
-        best = next(one for one in map(judged.candidates.__getitem__, judged.order) if one.how != "P")
-        session = experiment.session_of.get(min(names), "")
-        reached.append(Placebo(session=session, log_e=judged.log_e * longer, best=best))
-    return max(reached, key=lambda one: one.log_e, default=None)
-
-
 def repeating_of(found: Scanned, error_class: ErrorClass) -> tuple[Repeating, ...]:
     """Evidence of the scan in a class with the most probable deviation between sessions, and with a larger one."""
     here = found.in_class(error_class)
@@ -210,7 +176,8 @@ def repeating_of(found: Scanned, error_class: ErrorClass) -> tuple[Repeating, ..
     every = []
     for at in (supported, worse):
         parameters = found.candidates[len(here.scan.candidates) :]
-        judged = replace(found, log_bayes=_log_bayes(here.scan, parameters, here.over.given[at]))
+        log_bayes = _log_bayes(here.scan, parameters, here.over.given[at]) - [one.less for one in found.candidates]
+        judged = replace(found, log_bayes=log_bayes)
         best = judged.candidates[judged.order[0]]
         every.append(Repeating(deviation=float(deviations[at]), log_e=judged.log_e, best=best))
     return tuple(every)
@@ -258,5 +225,6 @@ def expected_of(scanned: Scanned, error_class: ErrorClass, settings: Settings) -
         size[reached] = np.minimum(size[reached], matters / peak[reached])
     size = np.where(np.isfinite(size), size, sd)
     log_bayes = 0.5 * np.square(b * size) / (b + 1.0 / np.square(sd)) - 0.5 * np.log1p(b * np.square(sd))
+    log_bayes -= [one.less for one in terms.candidates]
     each = zip(terms.candidates, log_bayes.tolist(), scanned.log_prior.tolist(), strict=False)  # terms come first
     return tuple(Expected(effect=one, log_bayes=value, log_prior=prior) for one, value, prior in each)

@@ -33,6 +33,7 @@ from models.quantities.quantities import is_total_loss, node_of_channel
 FEWEST_ROWS = 3
 SHORTEST_GAP_S, GAP_STEPS = 60.0, 3.0  # a gap is longer than both, unless stated
 SLOW_GAPS = 10.0  # ambient temperature and air speed change slowly: holes so many times longer are bridged
+HOT_AIR = 50.0  # degC on average, from which ambient air is more likely in another unit
 LEAST_USABLE = 0.1  # share of the rows
 ByRole: TypeAlias = tuple[tuple[Recording, ...], tuple[Recording, ...], tuple[Recording, ...]]
 
@@ -178,6 +179,7 @@ def read_recording(
     resolutions = {quantity: resolution_of(found.values[quantity]) for quantity in found.measured(network)}
     _remove_spikes(found, network, gap)
     _note_stuck(found, network)
+    _note_hot_air(found)
     found = _with_known_inputs(found, network, gap)
     segments = _segments(found, gap)
     seconds, clock = found.seconds, files[0].clock
@@ -268,6 +270,18 @@ def _remove_spikes(found: RecordedRows, network: RecordedMachine, gap: float) ->
             found.values[quantity] = np.where(wrong, np.nan, values)
             name, where = found.names.get(quantity, quantity), rows_text(found.rows[wrong])
             found.notes.append(f"{name}: {int(wrong.sum())} outliers and dropouts in {where} taken as missing")
+
+
+def _note_hot_air(found: RecordedRows) -> None:
+    """A note on an ambient temperature that is more likely in another unit."""
+    ambient = found.values.get("T_ambient", np.zeros(0))
+    mean = float(np.mean(ambient[np.isfinite(ambient)])) if np.isfinite(ambient).any() else 0.0
+    if mean > HOT_AIR:
+        name = found.names.get("T_ambient", "T_ambient")
+        found.notes.append(
+            f"{name}: {mean:.0f} degC on average is hot for ambient air; another unit is named in a mapping "
+            '(unit = "degF")'
+        )
 
 
 def _note_stuck(found: RecordedRows, network: RecordedMachine) -> None:

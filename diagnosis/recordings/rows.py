@@ -76,6 +76,10 @@ def read_rows(
         return found
     if clock is not None:
         check_time(table[clock.column], seconds, clock, problems)
+        if clock.lacks_zone(table[clock.column]):
+            notes.append(
+                f"{clock.column} has no time zone: it is taken as UTC, and dates marked UTC are the file's own"
+            )
     present = [str(column) for column in table.columns]
     known = quantities_of(network)
     roles = match_columns(present, clock.column if clock else "", file.mapping, network, problems, notes)

@@ -145,6 +145,15 @@ class Clock:
         """True for dates."""
         return self.unit == ISO
 
+    def lacks_zone(self, values: pd.Series) -> bool:
+        """True for dates without a time zone, which are taken as UTC."""
+        if not self.is_date or values.empty:
+            return False
+        if pd.api.types.is_datetime64_any_dtype(values.dtype):
+            return values.dt.tz is None
+        found = _ISO.fullmatch(str(values.iloc[0]).strip())
+        return found is not None and found["zone"] is None
+
     def seconds(self, values: pd.Series) -> Array:
         """Convert a time column, shape (rows,), to [s], dates since 1970; NaN for a cell that is no time."""
         if not self.is_date:

@@ -128,7 +128,8 @@ def assemble(
     told = {name for finding in findings for name in (finding.mechanism, *finding.tie_set)}
     told |= {rival.mechanism for finding in findings for rival in finding.confusable_with}
     unseen = tuple(one for one in _unseen(posterior, catalogue) if one.mechanism not in told)
-    verdict = _verdict(posterior, answers, unseen)
+    train_fits = _fits(setup, predicted.train, counting)
+    verdict = verdict_of(posterior, answers, unseen, worse_K=train_fits.calibrated - train_fits.before - setup.noise_K)
     location = locations_of(setup, posterior) if posterior.detected else ()
     inputs = setup.gearbox.network().inputs
     model = _calibrated(final, plain, inputs, best.effects if best else ())
@@ -143,7 +144,7 @@ def assemble(
         location=location,
         findings=findings,
         calibration=model.calibration,
-        train=_fits(setup, predicted.train, counting),
+        train=train_fits,
         holdout=holdout,
         faulty=faulty,
         terms=_terms(best, final),
@@ -159,6 +160,7 @@ def assemble(
         remaining_note=_remaining(posterior, others, best),
         ranking=_ranking(posterior, catalogue),
         unseen=unseen,
+        not_tried=tuple(sorted(catalogue.keys() - {one.effect.name for one in posterior.expected})),
         next_test=next_test(
             verdict, findings, location, unseen, catalogue, assumed=assumed,
             free=without_sensor(setup.nominal, setup.channels),
@@ -261,9 +263,17 @@ def _distinct(found: Sequence[tuple[Answer, Finding]]) -> tuple[Finding, ...]:
 # ---------------------------------------------------------------------- verdict
 
 
-def _verdict(posterior: Posterior, answers: Sequence[Answer], unseen: Sequence[NotDetectable]) -> Verdict:
+def verdict_of(
+    posterior: Posterior, answers: Sequence[Answer], unseen: Sequence[NotDetectable], *, worse_K: float
+) -> Verdict:
+    """The verdict; `worse_K`: error of the calibrated model less that as delivered and the noise, when learning, [K].
+
+    Above 0 no calibration was found that suits the recordings, so that silence means nothing.
+    """
     if posterior.parameter_outside:
         return "parameter_error"
+    if not posterior.detected and worse_K > 0.0:
+        return "unexplained"
     if not posterior.detected:
         asked = {one.effect.name for one in posterior.expected if one.effect.how == "U"}
         visible = 1.0 - len({one.mechanism for one in unseen}) / max(len(asked), 1)

@@ -28,7 +28,7 @@ VERDICT_TEXT: Mapping[str, str] = {
     "missing_physics": "The machine shows physics that the model leaves out.",
     "sensor_fault": "A sensor, clock or recorded input is at fault, not the machine.",
     "unexplained": "Something is missing, and no name of the catalogue is certain enough.",
-    "insufficient_data": "These recordings are too short or too calm to decide.",
+    "insufficient_data": "These recordings are too short or too calm, or the model fits too badly, to decide.",
 }
 PARTLY = "Part of what is missing has a name; of the rest none is certain enough."
 LIKELY_TEXT: Mapping[str, str] = {  # of the same verdicts where no name is a claim
@@ -37,6 +37,7 @@ LIKELY_TEXT: Mapping[str, str] = {  # of the same verdicts where no name is a cl
     "sensor_fault": "A sensor, clock or recorded input is probably at fault, not the machine.",
 }
 EITHER = "The measurement is at fault, or the model leaves out physics: these data do not separate the two."
+UNFIT = "The model cannot be brought to fit these recordings, and why has no name."
 LARGEST_ERROR = "full"  # class of model error
 FAR_SD, MOST_FAR = 3.0, 3  # standard deviations of a prior, beyond which the summary tells of a parameter; how many
 MOST_UNSEEN = 6  # effects that the summary names of those that cannot be seen
@@ -48,6 +49,8 @@ LITTLE_SPREAD = 0.05  # deviation between sessions that is not worth a word, in 
 
 def verdict_text_of(d: Diagnosis) -> str:
     """The verdict in a sentence."""
+    if _cannot_be_fitted(d):
+        return UNFIT
     if d.verdict == "unexplained" and any(f.family != OPEN_FORM for f in d.findings):
         return PARTLY
     if any(finding.grade == "claim" for finding in d.findings):
@@ -82,7 +85,18 @@ def _missing(d: Diagnosis) -> str:
         return f"No physics, but a parameter is outside its prior: {reached}."
     if d.log_e_value > d.threshold:
         return f"Yes{_in_what(d)}: {reached}."
+    if _cannot_be_fitted(d):
+        return (
+            f"Yes: calibrated, the model is further from what it was learnt from ({d.train.calibrated:.2f} K) than as "
+            f"delivered ({d.train.before:.2f} K), and no effect explains that ({reached}). Look first for swapped or "
+            "wrong columns, other units, and a wrong definition."
+        )
     return f"Nothing that these data show: {reached}."
+
+
+def _cannot_be_fitted(d: Diagnosis) -> bool:
+    """True if nothing was detected, but calibration made the model worse."""
+    return d.verdict == "unexplained" and d.log_e_value <= d.threshold
 
 
 def _in_what(d: Diagnosis) -> str:
@@ -126,7 +140,7 @@ def _what(d: Diagnosis) -> tuple[str, ...]:
     if d.nearest:
         told = ", ".join(f"{named(one.mechanism, one.place)} ({one.probability:.2f})" for one in d.nearest)
         lines.append(f"No name is certain enough to be reported; most like: {told}.")
-    elif not d.findings and d.verdict not in NO_CLAIM:
+    elif not d.findings and d.verdict not in NO_CLAIM and not _cannot_be_fitted(d):
         lines.append(f"No name of the catalogue stands out: none has a probability of {NEAREST:g}.")
     return tuple(lines)
 
@@ -146,7 +160,7 @@ def _how_sure(d: Diagnosis) -> tuple[str, ...]:
             told = [f"{named(r.mechanism, r.place)} ({r.probability:.2f})" for r in others if r.instead is instead]
             line += f"; {words}: {', '.join(told[:MOST_NEAREST])}" if told else ""
         lines.append(line)
-    if not d.findings and d.kinds:
+    if not d.findings and d.kinds and not _cannot_be_fitted(d):
         kinds = sorted(d.kinds.items(), key=lambda kind: -kind[1])
         told = [f"{kind} {share(p)}" for kind, p in kinds if p >= LEAST_RIVAL]
         lines.append(f"Probabilities: {', '.join(told)}.")
@@ -209,11 +223,16 @@ def _how_much_better(d: Diagnosis) -> tuple[str, ...]:
 
 
 def _cannot_be_seen(d: Diagnosis) -> tuple[str, ...]:
-    if not d.unseen:
-        return ()
-    names = list(dict.fromkeys(one.mechanism for one in d.unseen))
-    more = f" and {len(names) - MOST_UNSEEN} more" if len(names) > MOST_UNSEEN else ""
-    return (f"{', '.join(names[:MOST_UNSEEN])}{more}: silence about them means nothing.",)
+    def first(names: list[str]) -> str:
+        more = f" and {len(names) - MOST_UNSEEN} more" if len(names) > MOST_UNSEEN else ""
+        return f"{', '.join(names[:MOST_UNSEEN])}{more}"
+
+    names, lines = list(dict.fromkeys(one.mechanism for one in d.unseen)), []
+    if names:
+        lines.append(f"{first(names)}: silence about them means nothing.")
+    if d.not_tried:
+        lines.append(f"Not tried, having no place in this machine and its recordings: {first([*d.not_tried])}.")
+    return tuple(lines)
 
 
 def values_told(finding: Finding) -> str:

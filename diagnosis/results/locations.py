@@ -24,7 +24,7 @@ GOOD_ENOUGH = 0.9  # of the intervals told rightly
 
 
 def locations_of(setup: InferenceSetup, posterior: Posterior) -> tuple[Location, ...]:
-    """Places by probability, over everything that was judged; what acts there as the best fit with it has it."""
+    """Places by probability, over everything that was judged; the first that acts there as the best fit has it."""
     weights: dict[str, float] = {}
     best: dict[str, Judged] = {}
     nodes: dict[str, str] = {}
@@ -43,15 +43,15 @@ def _place(
     setup: InferenceSetup, node: str, weight: float, judged: Judged | None, nodes: Mapping[str, str]
 ) -> Location:
     fit = None if judged is None else judged.fit
-    effects = () if judged is None else judged.effects
-    laws = [] if fit is None else [
-        heats for effect in effects if nodes[effect.label] == node and (heats := heats_of(fit, effect))
-    ]  # fmt: skip
-    if fit is None or not laws:
+    # Of two that act there, one may add heat and one take some away: their sum would be neither's.
+    effects = [effect for effect in (judged.effects if judged else ()) if nodes[effect.label] == node]
+    warm = [(effect, heats) for effect in effects if fit is not None and (heats := heats_of(fit, effect))]
+    if fit is None or not warm:
         return Location(node=node, probability=min(weight, 1.0), heat_mean_W=0.0, heat_max_W=0.0, when=(),
                         regime="always")  # fmt: skip
     tested = [i for i, one in enumerate(fit.trajectories) if one.piece.recording not in fit.experiment.healthy]
-    heats = [np.sum([law[i] for law in laws], axis=0) for i in tested]
+    here, heat = warm[0]
+    heats = [heat[i] for i in tested]
     trajectories = [fit.trajectories[i] for i in tested]
     pieces = [trajectory.piece for trajectory in trajectories]
     together, steps = np.concatenate(heats), np.concatenate([piece.steps for piece in pieces])
@@ -64,8 +64,7 @@ def _place(
     signals["time"] = (np.concatenate([piece.middle for piece in pieces]) / 3600.0, "h")
     signals = {name: signal for name, signal in signals.items() if np.ptp(signal[0]) > 0.0}
     acting = active(together, steps)
-    here = [effect for effect in effects if nodes[effect.label] == node]
-    dated = BETWEEN if here[0].name.endswith(WHILE) else FROM_DATE if here[0].how == "D" else ""
+    dated = BETWEEN if here.name.endswith(WHILE) else FROM_DATE if here.how == "D" else ""
     split = np.split(acting, np.cumsum([len(heat) for heat in heats])[:-1])
     when = [(piece.recording, a, b) for piece, acts in zip(pieces, split, strict=True)
             for a, b in windows(piece.middle, acts)]  # fmt: skip

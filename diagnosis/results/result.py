@@ -74,6 +74,8 @@ class Diagnosis:
     remaining_note : str
     ranking : tuple of Ranked
     unseen : tuple of NotDetectable
+    not_tried : tuple of str
+        Mechanisms that have no place in this definition and these recordings
     next_test : str
         What to measure next
     courses : tuple of PredictedRun
@@ -146,6 +148,7 @@ class Diagnosis:
     network: ThermalNetwork
     shapes: tuple[Term, ...]
     inputs: Mapping[str, Any]
+    not_tried: tuple[str, ...] = ()
     learnt: tuple[Term, ...] = ()
     notes: tuple[str, ...] = ()
     kinds: Mapping[str, float] = field(default_factory=dict)
@@ -218,6 +221,7 @@ class Diagnosis:
                  "probability": r.probability}
                 for r in self.ranking
             ],
+            "not_tried": list(self.not_tried),
             "not_visible": [asdict(one) | {"expected": or_none(one.expected)} for one in self.unseen],
             "next_test": self.next_test,
             "notes": list(self.notes),

@@ -302,12 +302,16 @@ def _inputs(definition: ParametricDefinition) -> Iterator[str]:
 
 def _factors(definition: ParametricDefinition) -> Iterator[str]:
     """Names that :func:`models.assembly.parametric.build_parametric_network` gives to factors and losses."""
-    yield from (f"C_{part.name}" for part in definition.part)
-    yield from (f"{kind}_{'_'.join(path.between)}" for path in definition.link for kind in ("G", "standstill"))
-    yield from (f"{heat.name}_gain" for heat in definition.heat)
-    kinds = ("no_load", "speed_exponent", "viscosity_exponent", "load", "torque_exponent")
-    yield from (f"{loss.name}_{kind}" for loss in definition.loss for kind in kinds)
-    yield from (f"P_{loss.name}_{kind}" for loss in definition.loss for kind in ("no_load", "load"))
+    # Tables of one name are told of as such.
+    yield from (f"C_{name}" for name in {part.name for part in definition.part})
+    yield from (
+        f"{kind}_{a}_{b}" for a, b in {path.between for path in definition.link} for kind in ("G", "standstill")
+    )
+    yield from (f"{name}_gain" for name in {heat.name for heat in definition.heat})
+    losses, kinds = {loss.name for loss in definition.loss}, ("no_load", "load")
+    exponents = ("speed_exponent", "viscosity_exponent", "torque_exponent")
+    yield from (f"{name}_{kind}" for name in losses for kind in (*kinds, *exponents))
+    yield from (f"P_{name}_{kind}" for name in losses for kind in kinds)
     if definition.torque is not None:
         yield "efficiency"
 

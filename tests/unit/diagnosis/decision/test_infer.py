@@ -22,12 +22,12 @@ from diagnosis.decision.infer import (
     infer,
 )
 from diagnosis.decision.posterior import KINDS, Judged, Posterior
-from diagnosis.decision.scanned import InClass, Scanned, in_best_classes, less_over_time, scan_in_classes
+from diagnosis.decision.scanned import InClass, Scanned, counts_less, in_best_classes, scan_in_classes
 from diagnosis.decision.settings import Settings
 from diagnosis.engine.calibration import Calibration, calibrate_with_error, recalibrate
 from diagnosis.engine.candidates import scan
 from diagnosis.engine.families import axis_of, changes, log_prior, parameters_outside
-from diagnosis.engine.fit import Fit, calibrate
+from diagnosis.engine.fit import Experiment, Fit, calibrate
 from diagnosis.engine.learnt import ErrorClass, error_classes, rule
 from diagnosis.engine.prepare import prepare_experiment
 from diagnosis.engine.unknown import TermParameter
@@ -51,9 +51,14 @@ def inferred(fzg: Gearbox, windage_W: float, in_baseline_W: float = 0.0, switche
     network = experiment.machine.model.network
     placed = [one for name in LOOKED_FOR for one in CATALOGUE[name].placed(network, setup.scale, setup.channels)]
     windage = [one for one in placed if one.label == "windage_oil"]
-    candidates = [*(hypothesis_of(one) for one in placed), *changes([], windage, axis_of(experiment), {}),
-                  *parameters_outside(experiment)]  # fmt: skip
-    return infer(calibrate_with_error(experiment, calibrate(experiment)), candidates, log_prior(candidates), Settings())
+
+    def candidates_in(there: Experiment) -> list[Hypothesis]:
+        return [*(hypothesis_of(one) for one in placed), *changes([], windage, axis_of(there), {}),
+                *parameters_outside(there)]  # fmt: skip
+
+    candidates = candidates_in(experiment)
+    return infer(calibrate_with_error(experiment, calibrate(experiment)), candidates, log_prior(candidates), Settings(),
+                 candidates_in=candidates_in)  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -89,6 +94,8 @@ def test_a_baseline_that_brings_evidence_raises_what_is_asked_for(fzg: Gearbox, 
     assert found.placebo.log_e > 10.0 and found.class_threshold == 5.0
     assert found.threshold == found.placebo.log_e
     assert not found.detected
+    less = {effect.label: effect.less for one in found.judged for effect in one.effects}
+    assert less["windage_step@oil"] > 10.0 and less["windage@oil"] == 0.0  # over time it counts only beyond that
 
 
 def test_a_baseline_shows_nothing_of_what_has_no_place_in_the_machine(fzg: Gearbox) -> None:
@@ -113,9 +120,9 @@ def test_a_change_over_time_counts_less_where_the_model_fits_badly_without_it_or
     small = next(one for one in error_classes() if one.name == "splits")
     always, dated = (Hypothesis(name="windage", place="oil", family="no-load loss", variants=np.ones((1, 1)), how=how)
                      for how in ("U", "D"))  # fmt: skip
-    assert less_over_time((always, dated), full, full).tolist() == [0.0, full.over_time] and full.over_time > 20.0
-    assert less_over_time((always, dated), full, small).tolist() == [0.0, 0.5 * full.over_time]
-    assert not less_over_time((always, dated), small, small).any()
+    assert counts_less((always, dated), full, full).tolist() == [0.0, full.over_time] and full.over_time > 20.0
+    assert counts_less((always, dated), full, small).tolist() == [0.0, 0.5 * full.over_time]
+    assert not counts_less((always, dated), small, small).any()
 
 
 def test_nothing_gets_the_evidence_that_it_has_from_the_point_of_an_explanation(fzg: Gearbox) -> None:

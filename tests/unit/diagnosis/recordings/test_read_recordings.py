@@ -115,6 +115,9 @@ def test_iso_times_and_their_start(tmp_path: Path, network: ThermalNetwork) -> N
     assert (part.start, len(part.time)) == (datetime(2017, 9, 1, 6, 1, 40, tzinfo=UTC), 10)
     parquet = source.assign(time_utc=pd.to_datetime(source["time_utc"]))
     assert read(write(tmp_path / "run.parquet", parquet), network).start == recording.start
+    assert not any("time zone" in note for note in recording.notes)
+    local = read(write(tmp_path / "local.csv", source.assign(time_utc=source["time_utc"].str[:-6])), network)
+    assert local.start == datetime(2017, 9, 1, 8, tzinfo=UTC) and any("time zone" in note for note in local.notes)
 
 
 @pytest.mark.parametrize(
@@ -432,6 +435,12 @@ def test_a_column_that_one_of_the_files_lacks_is_missing_there(tmp_path: Path, n
     joined = read(f"{first}+{write(tmp_path / 'b.csv', source[120:])}", network)
     assert np.isnan(channel(joined, "pinion")[:120]).all()
     assert np.isfinite(channel(joined, "pinion")[120:]).all()
+
+
+def test_air_that_is_hot_is_asked_about(tmp_path: Path, network: ThermalNetwork) -> None:
+    hot = read(write(tmp_path / "f.csv", table().assign(T_ambient_degC=71.6)), network)
+    assert any(note.startswith("T_ambient_degC: 72 degC on average is hot") for note in hot.notes)
+    assert not any("is hot" in note for note in read(write(tmp_path / "c.csv", table()), network).notes)
 
 
 @pytest.mark.parametrize("order", [("a", "b"), ("b", "a")])

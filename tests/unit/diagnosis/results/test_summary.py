@@ -37,6 +37,12 @@ def test_a_baseline_that_raises_the_threshold_is_told_with_it() -> None:
     assert "needed (false-alarm rate of 5 % asked for)" in told(little, "Is something missing?")
 
 
+def test_what_has_no_place_is_told() -> None:
+    none = replace(missing_physics(), unseen=(), not_tried=("bearing_preload",))
+    line = told(none, "What cannot be seen in these data?")
+    assert line == "Not tried, having no place in this machine and its recordings: bearing_preload."
+
+
 def test_of_an_instrument_and_a_place_with_heat_the_heat_is_told() -> None:
     place = missing_physics().location[0]
     torque = replace(place, node="torque", probability=0.99, heat_mean_W=0.0, heat_max_W=0.0)

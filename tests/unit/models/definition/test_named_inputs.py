@@ -86,7 +86,7 @@ def rig(text: str = RIG) -> Gearbox:
     ("default = 10.0", "default = 70.0", "input 'oil_flow': default is 70, outside the range 0 ... 60"),
     ('"oil_flow / 10.0"', '"oil_flw / 10.0"', "link #2.factor: 'oil_flw' is no input and no temperature of this "
      "definition; did you mean 'oil_flow'"),
-    ('"oil_flow / 10.0"', '"oil_flow / 10.0 - 1.0"', "link #2.factor: is -1 at oil_flow = 0; a conductance is never negative"),
+    ('"oil_flow / 10.0"', '"oil_flow / 10.0 - 1.0"', "link #2.factor: is -1 at oil_flow = 0; a conductance is"),
     ('"oil_flow / 10.0"', '"-1.0"', "link #2.factor: is -1; a conductance is never negative"),
     ('heat_W = "1000.0 * heater"', 'heat_W = "1000.0 * "', "heat 'heater'.heat_W: '1000.0 * ' is not an expression"),
     ('part = "body"', 'part = "bdy"', "heat 'heater'.part: there is no part 'bdy'; did you mean 'body'"),

@@ -1,0 +1,75 @@
+"""Evidence for the catalogue in baselines, where nothing is missing: it is model error, so it does not count."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from diagnosis.candidates.hypotheses import Hypothesis
+from diagnosis.decision.posterior import Placebo, name_of
+from diagnosis.decision.scanned import OVER_TIME, Scanned, scan_in_classes
+from diagnosis.engine.calibration import Calibration
+from diagnosis.engine.candidates import scan
+from diagnosis.engine.families import log_prior
+from diagnosis.engine.fit import Experiment
+from diagnosis.engine.sessions import sessions_of
+
+CandidatesIn = Callable[[Experiment], Sequence[Hypothesis]]
+
+
+def judge_baselines(calibration: Calibration, candidates_in: CandidatesIn) -> tuple[Placebo | None, dict[str, float]]:
+    """Evidence in every baseline, which takes the place of the tested recordings, as if it were as many hours.
+
+    Parameters
+    ----------
+    candidates_in : callable
+        Gives what may be missing, wrong or changed in an experiment
+
+    Returns
+    -------
+    placebo : Placebo or None
+        Of all laws that are always there together, in the baseline that brings most; None without baselines
+    over_time : dict of str to float
+        Of every law over time, in the baseline that brings most of it, [nat]
+    """
+    experiment, reached, over_time = calibration.fit.experiment, list[Placebo](), dict[str, float]()
+    hours = dict.fromkeys((piece.recording for piece in experiment.pieces), 0.0)
+    for piece in experiment.pieces:
+        hours[piece.recording] += float(piece.steps.sum())
+    tested = sum(value for name, value in hours.items() if name not in experiment.healthy)
+    for pieces in sessions_of(experiment):
+        starts, now = dict[str, float](), 0.0
+        for piece in map(experiment.pieces.__getitem__, pieces):
+            now = starts.setdefault(piece.recording, now) + float(piece.time[-1])
+        if not starts.keys() <= experiment.healthy:
+            continue
+        swapped = replace(experiment, healthy=frozenset(hours) - starts.keys(), starts_at=starts)
+        candidates = [
+            one for one in candidates_in(swapped) if one.term is None or swapped.scope_of(one.name) is not None
+        ]
+        terms = [one for one in candidates if one.term is not None]
+        if not any(one.how == "U" for one in terms):  # what is switched off has no place in this machine
+            continue
+        there = scan(replace(calibration.fit, experiment=swapped), terms, calibration.near.columns)
+        judged = scan_in_classes(calibration, there, candidates, log_prior(candidates))
+        longer = max(tested / sum(hours[name] for name in starts), 1.0)
+        always = _part(judged, [i for i, one in enumerate(judged.candidates) if one.how not in OVER_TIME])
+        best = next(one for one in map(always.candidates.__getitem__, always.order) if one.term is not None)
+        session = experiment.session_of.get(min(starts), "")
+        reached.append(Placebo(session=session, log_e=always.log_e * longer, best=best))
+        for one, value in zip(judged.candidates, judged.log_bayes.tolist(), strict=True):
+            if one.how in OVER_TIME:
+                over_time[name_of(one)] = max(value * longer, over_time.get(name_of(one), 0.0))
+    return max(reached, key=lambda one: one.log_e, default=None), over_time
+
+
+def _part(scanned: Scanned, at: Sequence[int]) -> Scanned:
+    return replace(scanned, candidates=tuple(scanned.candidates[i] for i in at), log_prior=scanned.log_prior[at],
+                   log_bayes=scanned.log_bayes[np.array(at)], best=tuple(scanned.best[i] for i in at))  # fmt: skip
+
+
+def counting_less(candidates: Sequence[Hypothesis], over_time: Mapping[str, float]) -> list[Hypothesis]:
+    """Candidates of which, if they change over time, only counts what goes beyond the baselines."""
+    return [replace(one, less=over_time.get(name_of(one), 0.0)) if one.how in OVER_TIME else one for one in candidates]

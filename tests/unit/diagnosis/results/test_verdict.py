@@ -1,0 +1,33 @@
+"""The verdict where nothing is detected."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from diagnosis.decision.posterior import Judged, Posterior
+from diagnosis.engine.learnt import error_classes, rule
+from diagnosis.results.assemble import verdict_of
+from diagnosis.results.first_screen import first_screen_of, verdict_text_of
+from tests.unit.diagnosis.diagnosis_example import consistent
+
+
+@pytest.mark.parametrize(("worse_K", "verdict"), [(-0.5, "consistent"), (0.1, "unexplained")])
+def test_a_model_that_calibration_makes_worse_is_not_consistent(worse_K: float, verdict: str) -> None:
+    nothing = Judged(effects=(), log_prior=0.0, log_bayes=0.0, error_class=error_classes()[0])
+    silent = Posterior(nothing=nothing, judged=(), log_e=-2.0, threshold=10.0, class_threshold=5.0, rule=rule())
+    assert verdict_of(silent, (), (), worse_K=worse_K) == verdict
+
+
+def test_what_to_check_then_is_told() -> None:
+    base = consistent()
+    swapped = replace(base, verdict="unexplained", train=replace(base.train, before=3.94, calibrated=8.53))
+    screen = dict(first_screen_of(swapped))
+    (told,) = screen["Is something missing?"]
+    assert "What?" not in screen and not any("nothing" in line for line in screen.get("How sure?", ()))
+    assert verdict_text_of(swapped).startswith("The model cannot be brought to fit")
+    assert told.startswith(
+        "Yes: calibrated, the model is further from what it was learnt from (8.53 K) than as delivered"
+    )
+    assert "swapped or wrong columns" in told
