@@ -27,6 +27,7 @@ A gearbox definition may contain one (table ``[recording]``), for recordings tha
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
@@ -44,6 +45,7 @@ from models.quantities.units import units_in_files
 SCHEMA = 1
 FOLDER_FILE = "mapping.toml"
 DEFINITION_KEYS = ("stage", "part")  # of a gearbox definition, which is TOML as well
+TIME_UNITS = ("s", "ms", "min", "h", "d", "iso8601")
 AUXILIARY, IGNORE = "auxiliary", "ignore"  # roles of columns that are no quantity
 KELVIN = (200.0, 600.0)  # no gearbox has such temperatures in degC all the time
 
@@ -103,10 +105,20 @@ class Column(Section):
 
 
 class Time(Section):
-    """``[time]``: the column with the time, and its unit."""
+    """``[time]``: the column with the time, and its unit, or the form of its dates as ``%d.%m.%Y %H:%M:%S``."""
 
     column: str
-    unit: Literal["s", "ms", "min", "h", "d", "iso8601"] = "s"
+    unit: str = "s"
+
+    @field_validator("unit")
+    @classmethod
+    def _known(cls, value: str) -> str:
+        if value in TIME_UNITS:
+            return value
+        if not re.search(r"%[Yy]", value) or "%d" not in value or not re.search(r"%[mbB]", value):
+            units = ", ".join(TIME_UNITS)
+            raise ValueError(f"{value!r} is none of {units}, and no form of dates, as '%d.%m.%Y %H:%M:%S'")
+        return value
 
 
 class Csv(Section):

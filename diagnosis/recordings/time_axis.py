@@ -134,7 +134,7 @@ class Clock:
     Attributes
     ----------
     unit : str
-        Of numbers; ``iso8601`` for texts and for the time stamps of a Parquet file
+        Of numbers; ``iso8601`` for texts and for the time stamps of a Parquet file, or the form of other dates
     """
 
     column: str
@@ -143,7 +143,7 @@ class Clock:
     @property
     def is_date(self) -> bool:
         """True for dates."""
-        return self.unit == ISO
+        return self.unit == ISO or "%" in self.unit
 
     def lacks_zone(self, values: pd.Series) -> bool:
         """True for dates without a time zone, which are taken as UTC."""
@@ -151,6 +151,8 @@ class Clock:
             return False
         if pd.api.types.is_datetime64_any_dtype(values.dtype):
             return values.dt.tz is None
+        if self.unit != ISO:
+            return "%z" not in self.unit
         found = _ISO.fullmatch(str(values.iloc[0]).strip())
         return found is not None and found["zone"] is None
 
@@ -160,6 +162,8 @@ class Clock:
             return _numbers(values) * units_in_files("time", "s")[self.unit][0]
         if pd.api.types.is_datetime64_any_dtype(values.dtype):
             stamps = pd.to_datetime(values, utc=True)
+        elif self.unit != ISO:
+            stamps = pd.to_datetime(values.astype(str).str.strip(), format=self.unit, utc=True, errors="coerce")
         else:
             texts = values.astype(str).str.strip().str.replace(",", ".")
             stamps = pd.to_datetime(
@@ -262,13 +266,14 @@ def check_time(values: pd.Series, seconds: Array, clock: Clock, problems: Proble
     if len(wrong):
         cell = values.iloc[int(wrong[0])]
         shown = "empty" if pd.isna(cell) else repr(str(cell)[:40])
-        needed = "an ISO 8601 time as 2017-09-01T08:00:00Z" if clock.is_date else "a number"
+        needed = "an ISO 8601 time as 2017-09-01T08:00:00Z" if clock.unit == ISO else f"a date as {clock.unit}"
+        needed = needed if clock.is_date else "a number"
         problems.add(
             f"{name} is {shown} at row {rows[wrong[0]]}; {len(wrong)} of {len(rows)} rows hold no time, each needs "
             + needed
         )
         return
-    if clock.is_date:
+    if clock.unit == ISO:
         _check_zones(values, name, rows, problems)
     steps = np.diff(seconds)
     back, same = np.flatnonzero(steps < 0.0), np.flatnonzero(steps == 0.0)

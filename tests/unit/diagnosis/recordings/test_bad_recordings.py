@@ -148,6 +148,11 @@ MAPPINGS: list[tuple[str, tuple[str, ...]]] = [
     ("schema = 1\n[constants]\nT_ambient = 293.15\n", ("T_ambient", "looks like kelvin", "write 20")),
     ("schema = 1\n[constants]\nair_speed = -2.0\n", ("air_speed = -2 m/s is not possible; 0 to 200 m/s is",)),
     ('schema = 1\ntime = { column = "zeit" }', ("column zeit of [time]", "missing")),
+    (
+        'schema = 1\ntime = { column = "time_s", unit = "%H:%M" }',
+        ("'%H:%M' is none of s, ms, min, h, d, iso8601, and no",),
+    ),
+    ('schema = 1\ntime = { column = "time_s", unit = "%d.%m.%Y" }', ("each needs a date as %d.%m.%Y",)),
     ('schema = 1\ntime = { column = "time_s", unit = "iso8601" }', ("time_s is '0.0' at row 1",)),
     ('schema = 1\ncsv = { decimal = "," }', ("mapping.toml: csv", "same sign")),
     ('schema = 1\ncsv = { separator = "x" }', ("csv.separator", "'x'")),
@@ -321,3 +326,11 @@ def test_mdf_files_that_lack_a_channel(tmp_path: Path, network: ThermalNetwork) 
     for missing in ("speed_rpm", "torque_Nm"):
         save(missing)
         assert f"{missing} is missing" in message_of(path, network)
+
+
+def test_air_that_is_hot_is_asked_about(tmp_path: Path, network: ThermalNetwork) -> None:
+    (tmp_path / "f.csv").write_text(with_column("T_ambient_degC", 71.6))
+    (tmp_path / "c.csv").write_text(text())
+    hot, sound_one = read_recordings([tmp_path / "f.csv", tmp_path / "c.csv"], network)
+    assert any(note.startswith("T_ambient_degC: 72 degC on average is hot") for note in hot.notes)
+    assert not any("is hot" in note for note in sound_one.notes)

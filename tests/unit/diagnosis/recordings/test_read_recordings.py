@@ -118,6 +118,11 @@ def test_iso_times_and_their_start(tmp_path: Path, network: ThermalNetwork) -> N
     assert not any("time zone" in note for note in recording.notes)
     local = read(write(tmp_path / "local.csv", source.assign(time_utc=source["time_utc"].str[:-6])), network)
     assert local.start == datetime(2017, 9, 1, 8, tzinfo=UTC) and any("time zone" in note for note in local.notes)
+    (tmp_path / "de.toml").write_text('schema = 1\ntime = { column = "time_utc", unit = "%d.%m.%Y %H:%M:%S" }\n')
+    german = read(
+        write(tmp_path / "de.csv", source.assign(time_utc=[f"{s:%d.%m.%Y %H:%M:%S}" for s in stamps])), network
+    )
+    assert german.start == local.start and german.time[-1] == 1990.0
 
 
 @pytest.mark.parametrize(
@@ -435,12 +440,6 @@ def test_a_column_that_one_of_the_files_lacks_is_missing_there(tmp_path: Path, n
     joined = read(f"{first}+{write(tmp_path / 'b.csv', source[120:])}", network)
     assert np.isnan(channel(joined, "pinion")[:120]).all()
     assert np.isfinite(channel(joined, "pinion")[120:]).all()
-
-
-def test_air_that_is_hot_is_asked_about(tmp_path: Path, network: ThermalNetwork) -> None:
-    hot = read(write(tmp_path / "f.csv", table().assign(T_ambient_degC=71.6)), network)
-    assert any(note.startswith("T_ambient_degC: 72 degC on average is hot") for note in hot.notes)
-    assert not any("is hot" in note for note in read(write(tmp_path / "c.csv", table()), network).notes)
 
 
 @pytest.mark.parametrize("order", [("a", "b"), ("b", "a")])
