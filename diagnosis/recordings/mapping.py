@@ -117,7 +117,7 @@ class Time(Section):
             return value
         if not re.search(r"%[Yy]", value) or "%d" not in value or not re.search(r"%[mbB]", value):
             units = ", ".join(TIME_UNITS)
-            raise ValueError(f"{value!r} is none of {units}, and no form of dates, as '%d.%m.%Y %H:%M:%S'")
+            raise ValueError(f"{value!r} is not one of {units}, nor a form of dates, as '%d.%m.%Y %H:%M:%S'")
         return value
 
 

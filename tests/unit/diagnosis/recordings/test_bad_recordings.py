@@ -150,7 +150,7 @@ MAPPINGS: list[tuple[str, tuple[str, ...]]] = [
     ('schema = 1\ntime = { column = "zeit" }', ("column zeit of [time]", "missing")),
     (
         'schema = 1\ntime = { column = "time_s", unit = "%H:%M" }',
-        ("'%H:%M' is none of s, ms, min, h, d, iso8601, and no",),
+        ("'%H:%M' is not one of s, ms, min, h, d, iso8601, nor",),
     ),
     ('schema = 1\ntime = { column = "time_s", unit = "%d.%m.%Y" }', ("each needs a date as %d.%m.%Y",)),
     ('schema = 1\ntime = { column = "time_s", unit = "iso8601" }', ("time_s is '0.0' at row 1",)),
