@@ -25,6 +25,7 @@ PLACES: dict[type[Section], list[str]] = {
     Bearing: [f"bearing.{i}" for i in EVERY_BEARING],
 }
 PRINTED = "Churning.model niemann_printed"
+WRITTEN_OUT = "of_the_law"  # the rig's file names the roughness that this is
 # Every choice that a definition offers and the rig's file does not make.
 OPTIONS: dict[str, Mapping[str, Any]] = {
     "default": {},
@@ -36,7 +37,7 @@ OPTIONS: dict[str, Mapping[str, Any]] = {
         for key, field in section.model_fields.items()
         if get_origin(field.annotation) is Literal
         for choice in get_args(field.annotation)
-        if choice != FZG.leaves[f"{places[0]}.{key}"]
+        if choice not in (FZG.leaves[f"{places[0]}.{key}"], WRITTEN_OUT)
     },
 }
 

@@ -15,7 +15,6 @@ from diagnosis.proof.plant.effect import Concealed
 from diagnosis.proof.plant.instruments import record
 from diagnosis.proof.plant.plant import Plant
 from diagnosis.proof.plant.plant_run import Outcome, factor_sd
-from diagnosis.recordings.cleaning import runs
 from models.base.types import Array
 
 SCHEMA = 1
@@ -197,7 +196,8 @@ def _heat(case: ConcealedCase, heat: Sequence[Mapping[str, Array]]) -> dict[str,
 
 def spans_of(active: NDArray[np.bool_], row_s: float) -> list[list[float]]:
     """Begin and end [s] of all stretches of rows in which something acts."""
-    return [[row_s * first, row_s * end] for first, end in runs(active)]
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], active, [False]]).astype(int)))
+    return [[row_s * float(a), row_s * float(b)] for a, b in edges.reshape(-1, 2)]
 
 
 def _felt(with_it: Sequence[Outcome], without: Sequence[Outcome], effect: Concealed) -> dict[str, Any]:

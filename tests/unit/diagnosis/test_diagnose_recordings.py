@@ -31,7 +31,7 @@ def test_all_is_judged_once_more_from_a_better_basin(
         return SimpleNamespace(name=given.name, elsewhere="there" if given.name in seen_from else None)
 
     stages: dict[str, Any] = {
-        "prepare_experiment": lambda *_, **__: (None, SimpleNamespace(pieces=[0])),
+        "prepare_experiment": lambda *_, **__: (None, SimpleNamespace(pieces=[SimpleNamespace(recording="made")])),
         "calibrate": lambda *_: None,
         "calibrate_apart": lambda *_: (None, ()),
         "calibrate_with_error": lambda *_: calibration("first", 0.0),
