@@ -114,7 +114,7 @@ def diagnose(
         outside = outside_of(setup, experiment)
         posterior = weigh(calibration, outside=outside)
         if posterior.elsewhere is not None:
-            progress("calibrating again in the better basin that was seen")
+            progress("calibrating again from a better start that was seen")
             again = recalibrate(calibration, posterior.elsewhere)
             if again.chosen.log_evidence > calibration.chosen.log_evidence:
                 calibration = again

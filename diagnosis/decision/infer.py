@@ -96,7 +96,7 @@ def infer(
         if not best.of_parameters:  # else the wider prior would stay in what is called nothing
             there = judge_alone(calibration, best, second, first.in_class(best.error_class).ahead)
             alone |= {label: min(alone[label], value) for label, value in there.items()}
-        progress("fitting nothing from there")
+        progress("fitting the machine without an effect from there")
         gained, elsewhere = _nothing_gains(calibration, best)
     for index, candidate in enumerate(first.candidates):
         judged.setdefault(candidate.label, _by_scan(first, index, alone[candidate.label]))
