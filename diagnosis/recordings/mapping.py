@@ -29,9 +29,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Mapping
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
+import pandas as pd
 from pydantic import Field, field_validator, model_validator
 
 from models.base.errors import InputError, did_you_mean
@@ -45,6 +47,7 @@ from models.quantities.units import units_in_files
 SCHEMA = 1
 FOLDER_FILE = "mapping.toml"
 DEFINITION_KEYS = ("stage", "part")  # of a gearbox definition, which is TOML as well
+SOME_DATE = datetime(2017, 9, 21, 8, 30, 15, tzinfo=UTC)  # a form of dates gives it back
 TIME_UNITS = ("s", "ms", "min", "h", "d", "iso8601")
 AUXILIARY, IGNORE = "auxiliary", "ignore"  # roles of columns that are no quantity
 KELVIN = (200.0, 600.0)  # no gearbox has such temperatures in degC all the time
@@ -115,7 +118,11 @@ class Time(Section):
     def _known(cls, value: str) -> str:
         if value in TIME_UNITS:
             return value
-        if not re.search(r"%[Yy]", value) or "%d" not in value or not re.search(r"%[mbB]", value):
+        try:
+            read = pd.to_datetime(SOME_DATE.strftime(value), format=value)
+        except (ValueError, re.error):
+            read = None
+        if read is None or read.date() != SOME_DATE.date():
             units = ", ".join(TIME_UNITS)
             raise ValueError(f"{value!r} is not one of {units}, nor a form of dates, as '%d.%m.%Y %H:%M:%S'")
         return value

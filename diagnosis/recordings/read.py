@@ -275,12 +275,12 @@ def _remove_spikes(found: RecordedRows, network: RecordedMachine, gap: float) ->
 def _note_hot_air(found: RecordedRows) -> None:
     """A note on an ambient temperature that is more likely in another unit."""
     ambient = found.values.get("T_ambient", np.zeros(0))
-    mean = float(np.mean(ambient[np.isfinite(ambient)])) if np.isfinite(ambient).any() else 0.0
-    if mean > HOT_AIR:
+    ambient = ambient[np.isfinite(ambient)]
+    if len(ambient) and ambient.mean() > HOT_AIR:
         name = found.names.get("T_ambient", "T_ambient")
         found.notes.append(
-            f"{name}: {mean:.0f} degC on average is hot for ambient air; another unit is named in a mapping "
-            '(unit = "degF")'
+            f"{name}: {ambient.mean():.0f} degC on average is hot for ambient air; if the file has another unit, name it "
+            'in a mapping (unit = "degF")'
         )
 
 

@@ -266,8 +266,8 @@ def check_time(values: pd.Series, seconds: Array, clock: Clock, problems: Proble
     if len(wrong):
         cell = values.iloc[int(wrong[0])]
         shown = "empty" if pd.isna(cell) else repr(str(cell)[:40])
-        needed = "an ISO 8601 time as 2017-09-01T08:00:00Z" if clock.unit == ISO else f"a date as {clock.unit}"
-        needed = needed if clock.is_date else "a number"
+        of_date = "an ISO 8601 time as 2017-09-01T08:00:00Z" if clock.unit == ISO else f"a date as {clock.unit}"
+        needed = of_date if clock.is_date else "a number"
         problems.add(
             f"{name} is {shown} at row {rows[wrong[0]]}; {len(wrong)} of {len(rows)} rows hold no time, each needs "
             + needed

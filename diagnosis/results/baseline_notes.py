@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from diagnosis.candidates.hypotheses import Hypothesis
 from diagnosis.decision.answer import Answer
 from diagnosis.decision.posterior import Placebo, Posterior
 from diagnosis.engine.baselines import effects_in_baselines, sessions_apart
@@ -20,14 +21,20 @@ def baseline_notes(experiment: Experiment, posterior: Posterior, answers: Sequen
     effects = [answer.effect for answer in answers[:1] if answer.effect.term is not None]
     acting = effects_in_baselines(nothing, effects) if effects else [0.0]
     best = (answers[0].best.fit if answers else None) or nothing
+    single = [one for one in posterior.judged if len(one.effects) == 1]
+    ahead = max(single, key=lambda one: one.log_bayes + one.log_prior + one.effects[0].less, default=None)
     placebo = posterior.placebo
     raised = placebo is not None and posterior.threshold == placebo.log_e
     return baselines_told(float(acting[0]), sessions_apart(best), effects[0].name if effects else "",
-                          placebo if raised else None)  # fmt: skip
+                          placebo if raised else None, ahead.effects[0] if ahead else None)  # fmt: skip
 
 
 def baselines_told(
-    acting: float, apart: Mapping[str, float], effect: str = "", placebo: Placebo | None = None
+    acting: float,
+    apart: Mapping[str, float],
+    effect: str = "",
+    placebo: Placebo | None = None,
+    ahead: Hypothesis | None = None,
 ) -> tuple[str, ...]:
     """Notes for a report on baselines that are not as they should be.
 
@@ -41,6 +48,8 @@ def baselines_told(
         Its name for people
     placebo : Placebo or None
         Where it raises what the recordings have to bring
+    ahead : Hypothesis or None
+        What would be ahead if baselines took nothing from it
     """
     notes = []
     if effect and acting > NOTED_FROM:
@@ -58,5 +67,10 @@ def baselines_told(
             f"In the baseline '{placebo.session}' nothing is wrong, but the same test finds {placebo.log_e:.0f} nat in "
             f"it ({placebo.best.name} at {placebo.best.place}; for as many hours as are tested). So much is model "
             "error: the recordings have to bring more. If that effect may have acted there, leave the session out."
+        )
+    if ahead is not None and ahead.less > NOTED_FROM:
+        notes.append(
+            f"A baseline, in which nothing changed, seems to show {ahead.name} as well: {ahead.less:.0f} nat of it (for "
+            "as many hours as are tested) do not count. If it may have changed there, leave the session out."
         )
     return tuple(notes)

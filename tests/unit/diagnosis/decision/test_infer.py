@@ -94,8 +94,10 @@ def test_a_baseline_that_brings_evidence_raises_what_is_asked_for(fzg: Gearbox, 
     assert found.placebo.log_e > 10.0 and found.class_threshold == 5.0
     assert found.threshold == found.placebo.log_e
     assert not found.detected
-    less = {effect.label: effect.less for one in found.judged for effect in one.effects}
-    assert less["windage_step@oil"] > 10.0 and less["windage@oil"] == 0.0  # over time it counts only beyond that
+    judged = {one.label: one for one in found.judged if len(one.effects) == 1}
+    dated, always = judged["windage_step@oil"], judged["windage@oil"]
+    assert dated.effects[0].less > 10.0 and always.effects[0].less == 0.0  # over time it counts only beyond that
+    assert dated.log_bayes < -dated.effects[0].less + 5.0
 
 
 def test_a_baseline_shows_nothing_of_what_has_no_place_in_the_machine(fzg: Gearbox) -> None:
@@ -123,6 +125,7 @@ def test_a_change_over_time_counts_less_where_the_model_fits_badly_without_it_or
     assert counts_less((always, dated), full, full).tolist() == [0.0, full.over_time] and full.over_time > 20.0
     assert counts_less((always, dated), full, small).tolist() == [0.0, 0.5 * full.over_time]
     assert not counts_less((always, dated), small, small).any()
+    assert counts_less((always, replace(dated, less=40.0)), small, small).tolist() == [0.0, 40.0]  # of a baseline
 
 
 def test_nothing_gets_the_evidence_that_it_has_from_the_point_of_an_explanation(fzg: Gearbox) -> None:

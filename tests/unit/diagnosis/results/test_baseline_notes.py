@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from diagnosis.candidates.hypotheses import Hypothesis
@@ -26,3 +28,10 @@ def test_a_baseline_that_brings_evidence_is_noted() -> None:
     assert note.startswith(
         "In the baseline 'april' nothing is wrong, but the same test finds 51 nat in it (bearing_damage"
     )
+
+
+def test_what_a_baseline_takes_from_a_change_is_noted() -> None:
+    step = Hypothesis(name="air_cooling_step", place="air", family="heat", variants=np.ones((1, 1)), how="D", less=95.0)
+    (note,) = baselines_told(0.0, {}, ahead=step)
+    assert note.startswith("A baseline, in which nothing changed, seems to show air_cooling_step as well: 95 nat of it")
+    assert baselines_told(0.0, {}, ahead=replace(step, less=4.0)) == ()
