@@ -279,8 +279,8 @@ def _note_hot_air(found: RecordedRows) -> None:
     if len(ambient) and ambient.mean() > HOT_AIR:
         name = found.names.get("T_ambient", "T_ambient")
         found.notes.append(
-            f"{name}: {ambient.mean():.0f} degC on average is hot for ambient air; if the file has another unit, name it "
-            'in a mapping (unit = "degF")'
+            f"{name}: {ambient.mean():.0f} degC on average is hot for ambient air; if the file has another unit, "
+            'name it in a mapping (unit = "degF")'
         )
 
 

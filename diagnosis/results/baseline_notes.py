@@ -70,7 +70,7 @@ def baselines_told(
         )
     if ahead is not None and ahead.less > NOTED_FROM:
         notes.append(
-            f"A baseline, in which nothing changed, seems to show {ahead.name} as well: {ahead.less:.0f} nat of it (for "
-            "as many hours as are tested) do not count. If it may have changed there, leave the session out."
+            f"A baseline, in which nothing changed, seems to show {ahead.name} as well: {ahead.less:.0f} nat of it "
+            "(for as many hours as are tested) do not count. If it may have changed there, leave the session out."
         )
     return tuple(notes)

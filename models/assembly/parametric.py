@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from itertools import product
 from typing import Any
 
 import numpy as np
@@ -16,7 +15,7 @@ from models.base.types import Array
 from models.definition.parametric_sections import Heat, Loss, ParametricDefinition, Path, TorqueFromPower
 from models.formulas.oil import T_HIGHEST, T_LOWEST, kinematic_viscosity_d341
 from models.network.expressions import parse_expression
-from models.network.laws import Parameter, symbol
+from models.network.laws import Parameter, compile_each, symbol
 from models.quantities.units import find_unit
 from models.simulation.thermal_network import Link, Node, Source, ThermalNetwork
 
@@ -145,13 +144,14 @@ def _negative(factor: sp.Expr, definition: ParametricDefinition) -> Iterator[str
     names = sorted(s.name for s in factor.free_symbols)
     warm = COLD_DEGC, definition.operation.temperature_degC
     levels = [np.linspace(*ranges.get(name, warm), 3) for name in names]
-    for point in product(*(level[np.isfinite(level)] for level in levels)):
-        value = complex(factor.xreplace({symbol(n): sp.Float(v) for n, v in zip(names, point, strict=True)}))
-        if value.imag == 0.0 and value.real < 0.0:
-            where = ", ".join(f"{name} = {at:g}" for name, at in zip(names, point, strict=True))
-            at = f" at {where}" if where else ""
-            yield f"is {value.real:.3g}{at}; a conductance is never negative: keep it above 0, with Max(0, ...)"
-            return
+    points = [grid.ravel() for grid in np.meshgrid(*(level[np.isfinite(level)] for level in levels))]
+    with np.errstate(all="ignore"):  # what is no real number there is no fault of its sign
+        (values,) = compile_each(names, [factor])(*points)
+    values = np.broadcast_to(np.asarray(values, dtype=float), points[0].shape if points else (1,))
+    if (below := np.flatnonzero(values < 0.0)).size:
+        where = ", ".join(f"{name} = {point[below[0]]:g}" for name, point in zip(names, points, strict=True))
+        at = f" at {where}" if where else ""
+        yield f"is {values[below[0]]:.3g}{at}; a conductance is never negative: keep it above 0, with Max(0, ...)"
 
 
 def with_losses_as_laws(network: ThermalNetwork, definition: ParametricDefinition) -> ThermalNetwork:

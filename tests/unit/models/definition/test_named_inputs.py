@@ -104,6 +104,12 @@ def test_faults_of_inputs_are_named(old: str, new: str, message: str) -> None:
         rig(RIG.replace(old, new, 1))
 
 
+def test_a_factor_may_have_no_value_where_it_is_tried() -> None:
+    """Division by nothing and roots of negative numbers are no fault of the sign."""
+    for law in ("10.0 / oil_flow", "(oil_flow - 30.0)**0.7", "Max(0, oil_flow / 10.0 - 1.0)"):
+        assert rig(RIG.replace('"oil_flow / 10.0"', f'"{law}"', 1)).is_parametric
+
+
 def test_laws_boundaries_and_parameters_use_them() -> None:
     """At rest: 2 kW = leak (T - 20) + 3 flow (T - coolant), by hand."""
     machine = rig()
