@@ -10,6 +10,7 @@ import numpy as np
 from diagnosis.candidates.hypotheses import Hypothesis
 from diagnosis.decision.posterior import Placebo, name_of
 from diagnosis.decision.scanned import OVER_TIME, Scanned, scan_in_classes
+from diagnosis.engine.baselines import baselines_of
 from diagnosis.engine.calibration import Calibration
 from diagnosis.engine.candidates import scan
 from diagnosis.engine.families import log_prior
@@ -20,7 +21,9 @@ CandidatesIn = Callable[[Experiment], Sequence[Hypothesis]]
 
 
 def judge_baselines(calibration: Calibration, candidates_in: CandidatesIn) -> tuple[Placebo | None, dict[str, float]]:
-    """Evidence in every baseline, which takes the place of the tested recordings, as if it were as many hours.
+    """Evidence in every baseline, tested against the others alone, as if it were as many hours as those tested.
+
+    The tested recordings have no say in it: beside an effect in them a baseline would seem to have the opposite one.
 
     Parameters
     ----------
@@ -34,25 +37,26 @@ def judge_baselines(calibration: Calibration, candidates_in: CandidatesIn) -> tu
     over_time : dict of str to float
         Of every law over time, in the baseline that brings most of it, [nat]
     """
-    experiment, reached, over_time = calibration.fit.experiment, list[Placebo](), dict[str, float]()
-    hours = dict.fromkeys((piece.recording for piece in experiment.pieces), 0.0)
-    for piece in experiment.pieces:
+    whole, reached, over_time = calibration.fit.experiment, list[Placebo](), dict[str, float]()
+    if not whole.healthy:
+        return None, over_time
+    hours = dict.fromkeys((piece.recording for piece in whole.pieces), 0.0)
+    for piece in whole.pieces:
         hours[piece.recording] += float(piece.steps.sum())
-    tested = sum(value for name, value in hours.items() if name not in experiment.healthy)
+    tested = sum(value for name, value in hours.items() if name not in whole.healthy)
+    at, fit = baselines_of(calibration.fit)
+    calibration = replace(calibration, chosen=replace(calibration.chosen, fit=fit))
+    experiment, columns = fit.experiment, [calibration.near.columns[i] for i in at]
     for pieces in sessions_of(experiment):
         starts, now = dict[str, float](), 0.0
         for piece in map(experiment.pieces.__getitem__, pieces):
             now = starts.setdefault(piece.recording, now) + float(piece.time[-1])
-        if not starts.keys() <= experiment.healthy:
-            continue
-        swapped = replace(experiment, healthy=frozenset(hours) - starts.keys(), starts_at=starts)
-        candidates = [
-            one for one in candidates_in(swapped) if one.term is None or swapped.scope_of(one.name) is not None
-        ]
+        swapped = replace(experiment, healthy=whole.healthy - starts.keys(), starts_at=starts)
+        candidates = [one for one in candidates_in(swapped) if one.term is None or whole.scope_of(one.name) is not None]
         terms = [one for one in candidates if one.term is not None]
         if not any(one.how == "U" for one in terms):  # what is switched off has no place in this machine
             continue
-        there = scan(replace(calibration.fit, experiment=swapped), terms, calibration.near.columns)
+        there = scan(replace(fit, experiment=swapped), terms, columns)
         judged = scan_in_classes(calibration, there, candidates, log_prior(candidates))
         longer = max(tested / sum(hours[name] for name in starts), 1.0)
         always = _part(judged, [i for i, one in enumerate(judged.candidates) if one.how not in OVER_TIME])

@@ -29,8 +29,7 @@ def effects_in_baselines(fit: Fit, candidates: Sequence[Hypothesis]) -> Array:
     Array, shape (candidates,)
         Mean over the variants, against a baseline without it, [nat]
     """
-    alone = _baselines_of(fit)
-    return scan(alone, candidates).log_bayes
+    return scan(baselines_of(fit)[1], candidates).log_bayes
 
 
 def sessions_apart(fit: Fit) -> dict[str, float]:
@@ -65,8 +64,8 @@ def sessions_apart(fit: Fit) -> dict[str, float]:
     return found
 
 
-def _baselines_of(fit: Fit) -> Fit:
-    """Part of a fit that is about the baselines, in which everything may act."""
+def baselines_of(fit: Fit) -> tuple[list[int], Fit]:
+    """Places of the baselines' pieces, and the part of a fit that is about them, in which everything may act."""
     experiment = fit.experiment
     at = [i for i, piece in enumerate(experiment.pieces) if piece.recording in experiment.healthy]
     alone = replace(
@@ -84,4 +83,4 @@ def _baselines_of(fit: Fit) -> Fit:
             courses=tuple(metric.courses[i] for i in at if metric.courses),
         ))  # fmt: skip
     parts = [fit.parts[i] for i in at]
-    return Fit(experiment=alone, z=fit.z, linearised=Linearised.of(parts, alone.metric))
+    return at, Fit(experiment=alone, z=fit.z, linearised=Linearised.of(parts, alone.metric))

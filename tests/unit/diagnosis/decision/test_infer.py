@@ -43,11 +43,17 @@ LOOKED_FOR = ("windage", "air_cooling_change", "sensor_bias", "hot_neighbour")
 WINDAGE_W, AT_RPM, HOURS = 150.0, 3300.0, 1.5
 
 
-def inferred(fzg: Gearbox, windage_W: float, in_baseline_W: float = 0.0, switched_off: Sequence[str] = ()) -> Posterior:
-    """A ride with windage in the oil, or without it, and a baseline of another day."""
+def inferred(
+    fzg: Gearbox, windage_W: float, in_baselines_W: Sequence[float] = (0.0,), switched_off: Sequence[str] = (),
+    bias_K: float = 0.0,
+) -> Posterior:  # fmt: skip
+    """A ride with windage in the oil, or without it, and a biased thermometer, and baselines of other days."""
     train = recorded(fzg, "train", windage_W=windage_W, hours=HOURS)
-    april = recorded(fzg, "april", seed=2, hours=HOURS, windage_W=in_baseline_W)
-    setup, experiment = prepare_experiment(fzg, [train], [train], [april], switched_off=switched_off)
+    train = replace(train, channels=tuple(
+        replace(one, values=one.values + bias_K * (one.name == "oil")) for one in train.channels))  # fmt: skip
+    healthy = [recorded(fzg, name, seed=2 + at, hours=HOURS, windage_W=windage)
+               for at, (name, windage) in enumerate(zip(("april", "may"), in_baselines_W, strict=False))]  # fmt: skip
+    setup, experiment = prepare_experiment(fzg, [train], [train], healthy, switched_off=switched_off)
     network = experiment.machine.model.network
     placed = [one for name in LOOKED_FOR for one in CATALOGUE[name].placed(network, setup.scale, setup.channels)]
     windage = [one for one in placed if one.label == "windage_oil"]
@@ -88,7 +94,7 @@ def test_a_concealed_effect_is_detected_and_first(concealed: Posterior) -> None:
 def test_a_baseline_that_brings_evidence_raises_what_is_asked_for(fzg: Gearbox, concealed: Posterior) -> None:
     """Windage acts in the baseline alone: nothing is missing in the recordings, whatever has to be explained."""
     assert concealed.placebo is not None and concealed.placebo.log_e < 10.0 == concealed.threshold
-    found = inferred(fzg, 0.0, in_baseline_W=WINDAGE_W)
+    found = inferred(fzg, 0.0, in_baselines_W=(WINDAGE_W, 0.0))
     assert found.placebo is not None
     assert (found.placebo.session, found.placebo.best.label) == ("april", "windage@oil")
     assert found.placebo.log_e > 10.0 and found.class_threshold == 5.0
@@ -98,6 +104,13 @@ def test_a_baseline_that_brings_evidence_raises_what_is_asked_for(fzg: Gearbox, 
     dated, always = judged["windage_step@oil"], judged["windage@oil"]
     assert dated.effects[0].less > 10.0 and always.effects[0].less == 0.0  # over time it counts only beyond that
     assert dated.log_bayes < -dated.effects[0].less + 5.0
+
+
+def test_an_effect_in_the_recordings_raises_nothing(fzg: Gearbox) -> None:
+    """Beside a thermometer that reads too high in the recordings, those of the baselines would read too low."""
+    found = inferred(fzg, 0.0, in_baselines_W=(0.0, 0.0), bias_K=3.0)
+    assert found.placebo is not None and found.placebo.log_e < 10.0 == found.threshold
+    assert found.detected and found.explanations[0].names == ("sensor_bias",)
 
 
 def test_a_baseline_shows_nothing_of_what_has_no_place_in_the_machine(fzg: Gearbox) -> None:
