@@ -53,6 +53,8 @@ class Experiment:
         In which residuals are judged, if there is more than noise; of whitened readings under `filters`
     random_heat : RandomHeat
         Factors on those assumed, which `noise` has
+    most_deviation : float
+        Of a session, in prior standard deviations
     """
 
     machine: Machine
@@ -67,6 +69,7 @@ class Experiment:
     switched_off: frozenset[str] = frozenset()
     metric: Metric | None = None
     random_heat: RandomHeat = AS_ASSUMED
+    most_deviation: float = np.inf
 
     @property
     def slow(self) -> bool:

@@ -67,6 +67,8 @@ class Rule:
         Of the evidence of a second effect, [nat] and [-]
     nearest : float
         How often a name was right, or its law at its place, where that much was left, [-]
+    repeats : float
+        Deviation between sessions that every machine is granted, in prior standard deviations
     wider : float
         Prior of a parameter outside its prior, in its own standard deviations
     """
@@ -80,6 +82,7 @@ class Rule:
     alike: float
     much_left: tuple[float, float]
     nearest: float
+    repeats: float
     wider: float
 
     def thresholds(self, nothing: ErrorClass, best: ErrorClass, rate: float) -> tuple[float, float]:

@@ -50,6 +50,11 @@ class OverSessions:
         """Mean deviation that the readings support, in prior standard deviations."""
         return float(np.exp(self.weights - self.log_evidence) @ self.deviations)
 
+    def quantile(self, probability: float) -> float:
+        """Deviation that is not exceeded with some probability, in prior standard deviations."""
+        below = np.cumsum(np.exp(self.weights - self.log_evidence))
+        return float(self.deviations[min(np.searchsorted(below, probability), len(below) - 1)])
+
     @property
     def most_probable(self) -> int:
         """Place of the deviation with the largest weight."""
@@ -74,7 +79,7 @@ def over_sessions(
     Parameters
     ----------
     experiment : Experiment
-        Says which recordings are one session
+        Says which recordings are one session, and how far sessions may differ
     unknowns : sequence of int
         Columns with prior N(0, 1) that may differ between sessions
     fixed : sequence of int
@@ -89,7 +94,10 @@ def over_sessions(
         matrix = np.sum([one.matrix for one in own], axis=0)
         whole = Given(matrix=matrix, log_determinant=sum(one.log_determinant for one in own))
         found.append(whole.given(every))
-    return OverSessions(deviations=np.array(list(prior)), log_priors=np.log(list(prior.values())), given=tuple(found))
+    deviations, log_priors = np.array(list(prior)), np.log(list(prior.values()))
+    possible = deviations <= experiment.most_deviation
+    log_priors = np.where(possible, log_priors - logsumexp(log_priors[possible]), -np.inf)
+    return OverSessions(deviations=deviations, log_priors=log_priors, given=tuple(found))
 
 
 def fit_over_sessions(fit: Fit, base: int) -> OverSessions:

@@ -81,8 +81,9 @@ def test_leading_directions_keep_what_columns_do():
 
 def test_deviations_between_sessions_equal_the_normal_density(columns):
     experiment = SimpleNamespace(
-        pieces=[SimpleNamespace(recording=name) for name in "abc"], session_of={"a": "one", "b": "two", "c": "one"}
-    )
+        pieces=[SimpleNamespace(recording=name) for name in "abc"], session_of={"a": "one", "b": "two", "c": "one"},
+        most_deviation=np.inf,
+    )  # fmt: skip
     gram = Gram(of_recording={name: W.T @ W for name, W in zip("abc", columns, strict=True)},
                 log_determinants=dict.fromkeys("abc", 1.0))  # fmt: skip
     found = over_sessions(gram, experiment, range(3), [3])
@@ -94,3 +95,13 @@ def test_deviations_between_sessions_equal_the_normal_density(columns):
     weights = np.log(list(deviation_priors().values())) + [given.log_evidence for given in found.given]
     assert found.log_evidence == pytest.approx(np.logaddexp.reduce(weights))
     assert 0.0 <= found.mean <= 0.4
+    experiment.most_deviation = 0.1
+    limited = over_sessions(gram, experiment, range(3), [3])
+    possible = found.deviations <= 0.1
+    prior = np.array(list(deviation_priors().values()))[possible]
+    assert np.isneginf(limited.weights[~possible]).all()
+    assert limited.weights[possible] == pytest.approx(weights[possible] - np.log(prior.sum()))
+    assert limited.quantile(1.0) == 0.1 and limited.mean <= 0.1
+    share = np.exp(limited.weights - limited.log_evidence)
+    assert share[limited.deviations <= limited.quantile(0.5)].sum() >= 0.5
+    assert share[limited.deviations < limited.quantile(0.5)].sum() < 0.5
