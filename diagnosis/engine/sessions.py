@@ -53,7 +53,7 @@ class OverSessions:
     def quantile(self, probability: float) -> float:
         """Deviation that is not exceeded with some probability, in prior standard deviations."""
         below = np.cumsum(np.exp(self.weights - self.log_evidence))
-        return float(self.deviations[min(np.searchsorted(below, probability), len(below) - 1)])
+        return float(self.deviations[min(int(np.searchsorted(below, probability)), len(below) - 1)])
 
     @property
     def most_probable(self) -> int:
