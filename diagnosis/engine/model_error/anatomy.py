@@ -100,6 +100,12 @@ class Anatomy:
         return max(count, key=lambda name: count[name], default=None)
 
     @cached_property
+    def outer(self) -> tuple[str, ...]:
+        """Parts with a heat path to the surroundings."""
+        near = {node for link in self.conducting if self.ambient in link.nodes for node in link.nodes}
+        return tuple(part for part in self.parts if part in near)
+
+    @cached_property
     def warm(self) -> tuple[str, ...]:
         """The oil, or the parts that sources heat."""
         heated = tuple(dict.fromkeys(source.node for source in self.network.sources))

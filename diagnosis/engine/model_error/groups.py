@@ -39,6 +39,7 @@ FINE_DEGREES = (4, 5)
 FEW = 3  # links of a family that have a law each
 SENSOR_LAGS_S = (150.0, 600.0)
 CORE_TIMES_S = (150.0, 600.0, 2400.0)
+MASS_TIMES_S = (9_600.0, 38_400.0)
 CONSTANT = Constant()
 
 
@@ -169,6 +170,13 @@ def slow_cores(machine: Anatomy) -> Iterator[Change]:
             yield HeatChange(place=f"core of {part}, {time:g} s", heat=partial(heats.core_heat, part=part, time=time))
 
 
+def slow_masses(machine: Anatomy) -> Iterator[Change]:
+    """A mass behind a part that gives heat to the surroundings: a frame, a bed, a foundation."""
+    for part in machine.outer:
+        for time in MASS_TIMES_S:
+            yield HeatChange(place=f"mass at {part}, {time:g} s", heat=partial(heats.mass_heat, part=part, time=time))
+
+
 def missing_links(machine: Anatomy) -> Iterator[Change]:
     """A heat path between nodes that have none, as a share of the machine's conductance."""
     for pair in machine.unlinked:
@@ -248,7 +256,7 @@ def splits_by_temperature(machine: Anatomy) -> Iterator[Change]:
 
 GROUPS: Mapping[str, Callable[[Anatomy], Iterator[Change]]] = {
     "a_loss": loss_laws, "a_link": link_laws, "b_split": heat_splits, "c_sensor": sensor_places,
-    "c_lag": slow_sensors, "d_sub": slow_cores, "e_link": missing_links, "f_input": input_errors,
+    "c_lag": slow_sensors, "d_sub": slow_cores, "mass": slow_masses, "e_link": missing_links, "f_input": input_errors,
     "g_cap": capacities, "p_zero": loss_zero,
     "law_deg5": fine_loss_laws, "loss_own": losses_by_own_temperature, "link_nT": links_by_operation,
     "link_dT": links_by_difference, "lag": memories, "hours": ageing, "split_T": splits_by_temperature,

@@ -86,6 +86,14 @@ def core_heat(view: View, *, part: str, time: float) -> Heat:
     return _into_part(view, index, _stored(view, index, T - lagged(T, view.trajectory.piece.steps, time)))
 
 
+def mass_heat(view: View, *, part: str, time: float) -> Heat:
+    """Heat from a mass that follows a part with a time constant [s], through the mean conductance of the machine."""
+    index = view.model.parts.index(part)
+    T = view.trajectory.T[:, index]
+    ahead = T - lagged(T, view.trajectory.piece.steps, time)
+    return _into_part(view, index, -0.5 * view.standard.conductance * (ahead[1:] + ahead[:-1]))
+
+
 def torque_heat(view: View) -> Heat:
     """Heat per offset of the torque while the machine turns, as a share of the largest torque."""
     samples, inputs = np.array(view.trajectory.piece.samples), view.point.machine.inputs

@@ -19,7 +19,7 @@ from models.assembly.gearbox import load_gearbox
 from tests.unit.diagnosis.inference_example import recording_of
 
 DATA = Path(__file__).parents[5] / "examples" / "data"
-BASE = ("a_loss", "a_link", "b_split", "c_sensor", "c_lag", "d_sub", "e_link", "f_input", "g_cap", "p_zero")
+BASE = ("a_loss", "a_link", "b_split", "c_sensor", "c_lag", "d_sub", "mass", "e_link", "f_input", "g_cap", "p_zero")
 FINER = ("law_deg5", "loss_own", "link_nT", "link_dT", "lag", "hours", "split_T")
 
 

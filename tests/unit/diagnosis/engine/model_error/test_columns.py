@@ -210,6 +210,17 @@ def test_slow_core(case: Case) -> None:
     case.check("d_sub: core of housing_lower, 600 s, constant", read - case.point.read, step)
 
 
+def test_slow_mass(case: Case) -> None:
+    """A further part that is linked with one only, by a share of the machine's conductance."""
+    experiment, part, time, step = case.experiment, "housing_lower", 9600.0, 0.02
+    at, G = experiment.machine.model.parts.index(part), step * case.error.standard.conductance
+    with_mass = experiment.machine.model.network.with_node("mass", G * time).with_link(part, "mass", lambda _: G)
+    model = NetworkOnGrid(with_mass, experiment.machine.model.losses)
+    starts = (np.append(experiment.starts[0], experiment.starts[0][at]),)
+    read = case.simulated(replace(experiment, machine=Machine(model), starts=starts)).read
+    case.check("mass: mass at housing_lower, 9600 s, constant", read - case.point.read, step)
+
+
 @pytest.mark.parametrize(("label", "index", "at"), [("offset of torque", 1, 0.01), ("gain of speed", 0, 0.01)])
 def test_inputs(case: Case, label: str, index: int, at: float) -> None:
     piece = case.experiment.pieces[0]
