@@ -9,18 +9,18 @@ from functools import cache
 import numpy as np
 
 from diagnosis.engine.fit import FIRST_ITERATIONS, ITERATIONS, Experiment, Fit, Linear
-from diagnosis.engine.learnt import ErrorClass, error_classes, rule
+from diagnosis.engine.gram import Gram
+from diagnosis.engine.learnt import ErrorClass, error_classes
 from diagnosis.engine.metric import Metric, leading_directions
 from diagnosis.engine.model_error import ModelError
 from diagnosis.engine.products import gram_of, whitened_base
-from diagnosis.engine.sessions import fit_over_sessions, over_sessions, sessions_of
+from diagnosis.engine.sessions import fit_over_sessions, most_deviation, over_sessions, sessions_of
 from diagnosis.engine.set_apart import without_channels
 from diagnosis.forward.whitening import RandomHeat, Whitening
 from models.base.types import Array
 
 TURNS = 3  # with the chosen class: point, columns of model error and deviation between sessions settle together
 LONGEST = 16.0  # times as long as assumed, random heats may last where only the form of the laws is known
-SURE = 0.95  # probability that machines do not repeat worse
 WORTH = 1.0  # nats that another random heat has to bring
 WIDEST_CLASS = "full"  # the point is calibrated with it: no parameter has to stand in for what the model cannot know
 
@@ -82,34 +82,15 @@ class Near:
         directions[there] = amplitudes[there, None] * leading
         return directions
 
+    def gram(self, one: ErrorClass, z: Array) -> Gram:
+        """Of residual, unknowns and model error of a class, where the unknowns are `z`."""
+        directions = self.directions(one)
+        return gram_of(self.parts, whitened_base(self.parts, z, [N @ directions for N in self.columns]))
+
     def log_evidence(self, one: ErrorClass, z: Array) -> float:
         """Log evidence of a class where the unknowns are `z`, its prior included, all deviations weighed."""
-        directions = self.directions(one)
-        gram = gram_of(self.parts, whitened_base(self.parts, z, [N @ directions for N in self.columns]))
+        gram = self.gram(one, z)
         return float(np.log(one.prior)) + over_sessions(gram, self.experiment, range(gram.count)).log_evidence
-
-    def most_deviation(self, one: ErrorClass, z: Array) -> float:
-        """Deviation between sessions that the baselines alone do not exceed, at least the one that all are granted.
-
-        The tested recordings have no say in it: a machine that has changed would pass for one that does not repeat.
-
-        Parameters
-        ----------
-        z : Array, shape (unknowns,)
-            Where everything is linearised
-
-        Returns
-        -------
-        float
-            In prior standard deviations
-        """
-        experiment, directions = self.experiment, self.directions(one)
-        if not experiment.healthy:
-            return np.inf
-        gram = gram_of(self.parts, whitened_base(self.parts, z, [N @ directions for N in self.columns]))
-        healthy = tuple(piece for piece in experiment.pieces if piece.recording in experiment.healthy)
-        over = over_sessions(gram, replace(experiment, pieces=healthy), range(gram.count))
-        return max(rule().repeats, over.quantile(SURE))
 
     def likely_random_heat(self, one: ErrorClass, z: Array) -> RandomHeat:
         """Factors on the assumed random heats that make the readings most probable with model error of a class.
@@ -262,7 +243,9 @@ def _calibrated(experiment: Experiment, error: ModelError, start: Fit) -> Calibr
     near = Near.of(experiment, error, fit)
     experiment = experiment.with_random_heat(near.likely_random_heat(widest, fit.z))
     fit = Near.of(experiment, error, fit).fitted(widest, fit, iterations=ITERATIONS).fit
-    experiment = replace(experiment, most_deviation=Near.of(experiment, error, fit).most_deviation(widest, fit.z))
+    experiment = replace(
+        experiment, most_deviation=most_deviation(Near.of(experiment, error, fit).gram(widest, fit.z), experiment)
+    )
     return _settled(experiment, error, fit)
 
 

