@@ -102,9 +102,8 @@ def _answer(posterior: Posterior, best: Judged, effect: Hypothesis, enough: floa
     if own >= enough:
         return answer if vague else replace(answer, grade="claim")
     names = _best_of_names(posterior, effect)
-    # Further effects in explanations with the effect's own name do not stand in its place.
-    further = {one for each in posterior.explanations if name in each.names for one in each.names if one != name}
-    rivals = [one for other, one in names.items() if other not in further]
+    rivals = [one for other, one in names.items()
+              if other == name or not (other in best.names or _comes_along(posterior, name, other))]  # fmt: skip
     for count in range(2, MOST_TIED + 1):
         joint = posterior.of_names([name_of(one) for one in rivals[:count]])
         if joint >= enough:
@@ -115,6 +114,13 @@ def _answer(posterior: Posterior, best: Judged, effect: Hypothesis, enough: floa
     alike += [other for other, one in names.items() if act_on_the_same(effect, one)]
     joint = posterior.of_names([name, *alike])
     return replace(answer, joint=sure * joint, acts_like=True) if joint >= enough else None
+
+
+def _comes_along(posterior: Posterior, name: str, other: str) -> bool:
+    """True if another name is a further effect beside a name, rather than one that stands in its place."""
+    theirs = [one for one in posterior.explanations if other in one.names]
+    beside = [one.probability for one in theirs if name in one.names]
+    return bool(beside) and 2.0 * sum(beside) >= sum(one.probability for one in theirs)
 
 
 def _best_of_names(posterior: Posterior, effect: Hypothesis) -> dict[str, Hypothesis]:

@@ -10,7 +10,7 @@ import pytest
 
 from diagnosis.candidates.hypotheses import Hypothesis
 from diagnosis.decision.answer import Answer, decide, withdraw_claim
-from diagnosis.decision.posterior import KINDS, Judged, Likeness, Posterior
+from diagnosis.decision.posterior import KINDS, Judged, Likeness, Posterior, name_of
 from diagnosis.decision.settings import Settings
 from diagnosis.engine.fit import Fit
 from diagnosis.engine.learnt import ErrorClass, error_classes, rule
@@ -357,3 +357,15 @@ def test_an_answer_is_read_off_the_fit_with_most_evidence_for_its_name() -> None
     assert [(one.best, one.effect) for one in answers] == [(pair, fan)]
     fitted = replace(unfitted, fit=fit)
     assert [one.best for one in decide(posterior(fitted, weak, pair), Settings())] == [fitted]
+
+
+@pytest.mark.parametrize(("gain", "stands"), [(0.0, True), (30.0, False)])
+def test_a_name_that_mostly_stands_alone_stands_in_place_of_another_one(gain: float, stands: bool) -> None:
+    """Also where both together are one of the explanations, if that is less probable."""
+    first, second, third = effect("first"), effect("second", "mesh"), effect("third", "mesh")
+    found = posterior(judged(STRONG, first), judged(STRONG - 1.0, second), judged(STRONG - 8.0, third),
+                      judged(STRONG + gain, first, second), remainder=15.0)  # fmt: skip
+    both = sum(one.probability for one in found.explanations if one.names == ("first", "second"))
+    assert (0.0 < both < chances(found)["second"]) == stands
+    (answer, *_) = decide(found, Settings())
+    assert ("second" in [name_of(one) for one, _ in answer.tied]) == stands
