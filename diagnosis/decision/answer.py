@@ -56,7 +56,8 @@ def decide(posterior: Posterior, settings: Settings) -> tuple[Answer, ...]:
     are one answer: it "acts like" the best of them. So does what leaves much unexplained, and what only has a course
     over the hours: the nearest name is found, not the cause. Where much is left, what is stated of it is only the
     share :attr:`Rule.nearest` of its probability, because most names that were nearest turned out wrong. The same holds
-    of a parameter outside its prior if model error is large: it stands in for another structure of the machine.
+    if model error is large, of a parameter outside its prior, which stands in for another structure of the machine, and
+    of every name with less evidence than :attr:`Rule.named_if_large`.
     """
     if not posterior.detected and not posterior.parameter_outside:
         return ()
@@ -94,7 +95,8 @@ def _best_fitted(posterior: Posterior) -> Judged:
 def _answer(posterior: Posterior, best: Judged, effect: Hypothesis, enough: float) -> Answer | None:
     """The narrowest set of names that holds enough probability."""
     name = name_of(effect)
-    much = posterior.leaves_much(best) or (effect.term is None and best.error_class.is_large)
+    doubtful = effect.term is None or posterior.log_e < posterior.rule.named_if_large
+    much = posterior.leaves_much(best) or (doubtful and best.error_class.is_large)
     vague = effect.how == "W" or effect.is_open or much
     sure = posterior.rule.nearest if much else 1.0
     own = posterior.of_names([name])

@@ -67,6 +67,8 @@ class Rule:
         Of the evidence of a second effect, [nat] and [-]
     nearest : float
         How often a name was right, or its law at its place, where that much was left, [-]
+    named_if_large : float
+        Evidence from which a name counts where model error is large, [nat]
     repeats : float
         Deviation between sessions that every machine is granted, in prior standard deviations
     wider : float
@@ -82,6 +84,7 @@ class Rule:
     alike: float
     much_left: tuple[float, float]
     nearest: float
+    named_if_large: float
     repeats: float
     wider: float
 

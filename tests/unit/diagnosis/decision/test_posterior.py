@@ -359,6 +359,15 @@ def test_an_answer_is_read_off_the_fit_with_most_evidence_for_its_name() -> None
     assert [one.best for one in decide(posterior(fitted, weak, pair), Settings())] == [fitted]
 
 
+@pytest.mark.parametrize(("more", "grade"), [(0.1, "claim"), (-0.1, "likely")])
+def test_where_model_error_is_large_a_claim_needs_more_evidence(more: float, grade: str) -> None:
+    large = next(one for one in error_classes() if one.is_large)
+    best = replace(judged(STRONG, effect("law")), error_class=large)
+    (answer,) = decide(posterior(best, log_e=rule().named_if_large + more), Settings())
+    assert (answer.grade, answer.acts_like) == (grade, more < 0.0)
+    assert answer.probability == pytest.approx((1.0 if more > 0.0 else rule().nearest), abs=1e-6)
+
+
 @pytest.mark.parametrize(("gain", "stands"), [(0.0, True), (30.0, False)])
 def test_a_name_that_mostly_stands_alone_stands_in_place_of_another_one(gain: float, stands: bool) -> None:
     """Also where both together are one of the explanations, if that is less probable."""
