@@ -119,7 +119,7 @@ def _answer(posterior: Posterior, best: Judged, effect: Hypothesis, enough: floa
 
 
 def _comes_along(posterior: Posterior, name: str, other: str) -> bool:
-    """True if another name is a further effect beside a name, rather than one that stands in its place."""
+    """True if another name is a further effect next to a name, rather than one that stands in its place."""
     theirs = [one for one in posterior.explanations if other in one.names]
     beside = [one.probability for one in theirs if name in one.names]
     return bool(beside) and 2.0 * sum(beside) >= sum(one.probability for one in theirs)

@@ -23,7 +23,7 @@ CandidatesIn = Callable[[Experiment], Sequence[Hypothesis]]
 def judge_baselines(calibration: Calibration, candidates_in: CandidatesIn) -> tuple[Placebo | None, dict[str, float]]:
     """Evidence in every baseline, tested against the others alone, as if it were as many hours as those tested.
 
-    The tested recordings have no say in it: beside an effect in them a baseline would seem to have the opposite one.
+    The tested recordings have no say in it: next to an effect in them a baseline would seem to have the opposite one.
 
     Parameters
     ----------
