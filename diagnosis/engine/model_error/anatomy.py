@@ -65,6 +65,7 @@ class Anatomy:
         self.steps = np.concatenate([point.trajectory.piece.steps for point in points])
         self.inputs = np.concatenate([point.trajectory.piece.inputs for point in points])
         self.names = experiment.machine.inputs
+        self.random_heat_lasts = experiment.noise[0].goes_with_capacity
         self.conducting = [link for link in self.network.links if not link.conductance.is_zero]
 
     # ------------------------------------------------------------------ sizes

@@ -171,8 +171,11 @@ def slow_cores(machine: Anatomy) -> Iterator[Change]:
 
 
 def slow_masses(machine: Anatomy) -> Iterator[Change]:
-    """A mass behind a part that gives heat to the surroundings: a frame, a bed, a foundation."""
-    for part in machine.outer:
+    """A mass behind a part that gives heat to the surroundings: a frame, a bed, a foundation.
+
+    Where random heat may last for hours, it stands for them.
+    """
+    for part in () if machine.random_heat_lasts else machine.outer:
         for time in MASS_TIMES_S:
             yield HeatChange(place=f"mass at {part}, {time:g} s", heat=partial(heats.mass_heat, part=part, time=time))
 
