@@ -173,7 +173,7 @@ def slow_cores(machine: Anatomy) -> Iterator[Change]:
 def slow_masses(machine: Anatomy) -> Iterator[Change]:
     """A mass behind a part that gives heat to the surroundings: a frame, a bed, a foundation.
 
-    Where random heat may last for hours, it stands for them.
+    Where random heat may last for hours, it represents them.
     """
     for part in () if machine.random_heat_lasts else machine.outer:
         for time in MASS_TIMES_S:
