@@ -227,7 +227,8 @@ def calibrate_with_error(experiment: Experiment, start: Fit, apart: Collection[s
     found = _calibrated(without_channels(experiment, apart) if apart else experiment, error, start)
     if not apart:
         return found
-    whole, others = experiment.with_random_heat(found.near.experiment.random_heat), found.chosen
+    sound, others = found.near.experiment, found.chosen
+    whole = replace(experiment.with_random_heat(sound.random_heat), most_deviation=sound.most_deviation)
     near = Near.of(whole, error, found.fit)
     chosen = near.fitted(others.error_class, found.fit, others.deviation, iterations=0)
     return replace(found, chosen=chosen, near=near, of_others=found)

@@ -19,7 +19,7 @@ from diagnosis.engine.learnt import deviation_priors, rule
 from diagnosis.engine.products import base_of, gram_of
 from models.base.types import Array
 
-SURE = 0.95  # probability that a machine does not repeat worse
+SURE, ROUNDING = 0.95, 1e-9  # probability that a machine does not repeat worse
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -120,7 +120,7 @@ def most_deviation(gram: Gram, experiment: Experiment) -> float:
     repeated = len(sessions_of(alone)) > 1
     weights = over_sessions(gram, alone, range(gram.count)).weights if repeated else np.log(list(prior.values()))
     below = np.cumsum(np.exp(weights - logsumexp(weights)))
-    return max(rule().repeats, float(np.array(list(prior))[np.searchsorted(below, SURE)]))
+    return max(rule().repeats, float(np.array(list(prior))[np.searchsorted(below, SURE - ROUNDING)]))
 
 
 def fit_over_sessions(fit: Fit, base: int) -> OverSessions:
