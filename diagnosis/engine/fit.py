@@ -54,7 +54,7 @@ class Experiment:
     random_heat : RandomHeat
         Factors on those assumed, which `noise` has
     most_deviation : float
-        Of a session, in prior standard deviations
+        Largest one that a session may have from the others, in prior standard deviations
     """
 
     machine: Machine

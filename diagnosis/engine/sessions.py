@@ -107,6 +107,8 @@ def most_deviation(gram: Gram, experiment: Experiment) -> float:
     ----------
     gram : Gram
         Of residual, unknowns and model error
+    experiment : Experiment
+        Says which recordings are baselines, and which are one session
 
     Returns
     -------
