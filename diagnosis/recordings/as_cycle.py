@@ -90,7 +90,7 @@ def _is_recording(text: Path, needed: Set[str], usual: RecordingMapping) -> bool
     own = mapping_beside(text, name_parts(text)[1])
     if own is not None:
         # The mapping may be there for other files of the folder.
-        as_it_splits = column_names(text, own.csv.separator)
+        as_it_splits = column_names(text, own.text_form)
         is_meant = not (_named(own) or needed).isdisjoint(as_it_splits)
         return is_meant or not names.issuperset(needed)
     has_dates = STANDARD not in names and not names.isdisjoint(ISO_NAMES)

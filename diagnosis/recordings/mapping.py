@@ -7,7 +7,7 @@ session = "before the overhaul"        # of its test; between sessions the machi
 rows = ["2017-08-01..2018-01-12"]     # seconds or ISO 8601; by default all
 missing = ["---", "Bad"]              # further texts for a missing value
 time = { column = "time_utc", unit = "iso8601" }
-csv = { separator = ";", decimal = "," }
+csv = { separator = ";", decimal = ",", encoding = "cp1252", skip_lines = [2] }
 constants = { T_ambient = 20.0 }      # inputs that were not recorded, in the unit of their standard column
 
 [columns.Gost_avg]
@@ -27,6 +27,7 @@ A gearbox definition may contain one (table ``[recording]``), for recordings tha
 
 from __future__ import annotations
 
+import codecs
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from datetime import UTC, datetime
@@ -40,7 +41,7 @@ from models.base.errors import InputError, did_you_mean
 from models.definition.messages import validate_section
 from models.definition.sections import Name, Section, Text
 from models.files import toml_file
-from models.files.table_file import TextForm
+from models.files.table_file import UTF_8, TextForm
 from models.quantities.quantities import SENSOR, Quantity, quantity_of
 from models.quantities.units import units_in_files
 
@@ -133,6 +134,17 @@ class Csv(Section):
 
     separator: Annotated[str, Field(min_length=1, max_length=1)] = ","
     decimal: Literal[".", ","] = "."
+    encoding: str = UTF_8
+    skip_lines: tuple[Annotated[int, Field(ge=1)], ...] = ()
+
+    @field_validator("encoding")
+    @classmethod
+    def _known(cls, value: str) -> str:
+        try:
+            "".encode(value)
+        except LookupError:
+            raise ValueError(f"{value!r} is no encoding of text; utf-8, cp1252, latin-1 and utf-16 are usual") from None
+        return UTF_8 if codecs.lookup(value).name == "utf-8" else value
 
     @field_validator("separator")
     @classmethod
@@ -191,7 +203,11 @@ class RecordingMapping(Section):
     @property
     def text_form(self) -> TextForm:
         """Form of its CSV files."""
-        return TextForm(separator=self.csv.separator, decimal=self.csv.decimal, missing=self.missing, by_mapping=True)
+        csv = self.csv
+        return TextForm(
+            separator=csv.separator, decimal=csv.decimal, missing=self.missing, encoding=csv.encoding,
+            skip_lines=csv.skip_lines, by_mapping=True,
+        )  # fmt: skip
 
 
 def looks_like_kelvin(quantity: Quantity, lowest: float, highest: float) -> bool:

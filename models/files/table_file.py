@@ -21,6 +21,7 @@ KINDS = (".csv", ".csv.gz", ".parquet")
 CHUNK_ROWS = 100_000
 CHUNK_LINES = 1_000
 MOST_ROWS = 5_000_000  # of a table in memory
+UTF_8 = "utf-8-sig"  # with or without the mark of UTF-8 at its begin
 SHOWN = 3  # cells of a row of units in a message
 # Texts that head a column ("s", "1/min", "m3/h") have no two digits in a row; dates, times and misspelt numbers do.
 _DIGITS = re.compile(r"\d{2}|\d[.,]\d")
@@ -37,6 +38,10 @@ class TextForm:
         Between columns, and in numbers
     missing : tuple of str
         Further texts for a missing value
+    encoding : str
+        Of its text, by a name that Python knows
+    skip_lines : tuple of int
+        Lines that are no table, counted from 1, such as names of units below the header
     by_mapping : bool
         True if a mapping file can state all this, which messages then advise
     """
@@ -44,6 +49,8 @@ class TextForm:
     separator: str = ","
     decimal: str = "."
     missing: tuple[str, ...] = ()
+    encoding: str = UTF_8
+    skip_lines: tuple[int, ...] = ()
     by_mapping: bool = False
 
 
@@ -104,7 +111,7 @@ def check_file(path: Path) -> None:
         raise InputError(f"{path}: {_EMPTY}")
 
 
-def column_names(path: Path, separator: str = PLAIN.separator) -> tuple[str, ...]:
+def column_names(path: Path, form: TextForm = PLAIN) -> tuple[str, ...]:
     """Return the names of the columns without reading rows; none if they cannot be read (reading reports why)."""
     try:
         check_file(path)
@@ -112,8 +119,8 @@ def column_names(path: Path, separator: str = PLAIN.separator) -> tuple[str, ...
             from pyarrow import parquet
 
             return tuple(parquet.read_schema(path).names)
-        with _open_text(path) as text:
-            return tuple(_fields(_Lines(path, text).next_filled(), separator))
+        with _open_text(path, form) as text:
+            return tuple(_fields(_Lines(path, text, form).next_filled(), form.separator))
     except (InputError, ImportError, csv.Error, *UNREADABLE):
         return ()
 
@@ -179,16 +186,16 @@ def _check_names(path: Path, names: list[str]) -> None:
 _EMPTY = "is empty; a header line with column names and rows are needed"
 
 
-def _open_text(path: Path) -> io.TextIOWrapper:
+def _open_text(path: Path, form: TextForm) -> io.TextIOWrapper:
     file = gzip.open(path, "rb") if kind_of(path) == ".csv.gz" else path.open("rb")  # noqa: SIM115  closed with the text
-    return io.TextIOWrapper(cast(IO[bytes], file), encoding="utf-8-sig", errors="surrogateescape")
+    return io.TextIOWrapper(cast(IO[bytes], file), encoding=form.encoding, errors="surrogateescape")
 
 
 class _Lines:
-    """Lines of a text for pandas: remarks are blank, and what is no UTF-8 is refused with its line number."""
+    """Lines of a text for pandas: what is no table is blank, and foreign bytes are refused with their line number."""
 
-    def __init__(self, path: Path, text: io.TextIOWrapper) -> None:
-        self.path, self.number = path, 0
+    def __init__(self, path: Path, text: io.TextIOWrapper, form: TextForm) -> None:
+        self.path, self.number, self.form = path, 0, form
         self._text = text
         self._waiting: list[str] = []
 
@@ -205,19 +212,23 @@ class _Lines:
         line = next(self._text, "")
         self.number += 1
         if self.number == 1 and line.startswith(("\udcff\udcfe", "\udcfe\udcff")):
-            raise InputError(f"{self.path}: is UTF-16 text; save it as UTF-8")
+            raise InputError(f"{self.path}: is UTF-16 text; {self._advice('utf-16')}")
         if "\0" in line:
             raise InputError(f"{self.path}: a NUL byte in line {self.number}; it is no text, or damaged")
         if not line.isascii():
             try:
                 line.encode()
             except UnicodeEncodeError as error:
-                byte = ord(line[error.start]) - 0xDC00
+                byte, encoding = ord(line[error.start]) - 0xDC00, self.form.encoding.removesuffix("-sig").upper()
                 raise InputError(
-                    f"{self.path}: byte 0x{byte:02x} in line {self.number} is not UTF-8; save the file as UTF-8"
+                    f"{self.path}: byte 0x{byte:02x} in line {self.number} is not {encoding}; {self._advice('cp1252')}"
                 ) from error
         # A '#' within a row is a cell such as '#REF!', so that pandas' own option for remarks cannot be used.
-        return "\n" if line.startswith("#") else line
+        return "\n" if line.startswith("#") or self.number in self.form.skip_lines else line
+
+    def _advice(self, encoding: str) -> str:
+        other = f'give csv = {{ encoding = "{encoding}" }} in a mapping file, or ' if self.form.by_mapping else ""
+        return f"{other}save the file as UTF-8"
 
     def next_filled(self) -> str:
         """Return the next line that is not blank; pandas will read it again. Empty at the end."""
@@ -237,8 +248,8 @@ def _fields(line: str, separator: str) -> list[str]:
 
 
 def _text_chunks(path: Path, form: TextForm) -> Iterator[pd.DataFrame]:
-    with _open_text(path) as text:
-        lines = _Lines(path, text)
+    with _open_text(path, form) as text:
+        lines = _Lines(path, text, form)
         _check_head(path, lines, form)
         try:
             for chunk in pd.read_csv(
@@ -274,7 +285,8 @@ def _check_head(path: Path, lines: _Lines, form: TextForm) -> None:
         shown = ", ".join(repr(cell[:20]) for cell in cells[:SHOWN]) + (", ..." if len(cells) > SHOWN else "")
         raise InputError(
             f"{path}: line {lines.number} (below the header) holds units or texts ({shown}) and no number; remove it, "
-            "or begin it with '#'"
+            + (f"give csv = {{ skip_lines = [{lines.number}] }} in a mapping file, " if form.by_mapping else "")
+            + "or begin it with '#'"
         )
 
 

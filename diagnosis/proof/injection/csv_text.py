@@ -27,7 +27,7 @@ class CsvText:
     Attributes
     ----------
     head : tuple of str
-        Lines up to the header, which is the last of them
+        Lines up to the first row
     names : tuple of str
         Columns
     lines : tuple of str
@@ -76,7 +76,8 @@ class CsvText:
     @property
     def compressed(self) -> bytes:
         """The file as gzip; neither name nor time go into the archive, so that the same text gives the same bytes."""
-        return gzip.compress("".join((*self.head, *self.lines)).encode(), compresslevel=6, mtime=0)
+        text, encoding = "".join((*self.head, *self.lines)), self.form.encoding.removesuffix("-sig")
+        return gzip.compress(text.encode(encoding), compresslevel=6, mtime=0)
 
 
 def read_csv_text(path: Path, form: TextForm) -> CsvText:
@@ -89,14 +90,20 @@ def read_csv_text(path: Path, form: TextForm) -> CsvText:
     """
     try:
         raw = path.read_bytes()
-        text = (gzip.decompress(raw) if path.name.lower().endswith(".gz") else raw).decode("utf-8-sig")
+        text = (gzip.decompress(raw) if path.name.lower().endswith(".gz") else raw).decode(form.encoding)
     except (OSError, EOFError, zlib.error, UnicodeDecodeError) as error:
         raise InputError(f"{path}: cannot be read as a text ({error})") from error
     head: list[str] = []
     rows: list[str] = []
     names: tuple[str, ...] = ()
-    for line in io.StringIO(text, newline=""):
-        if not line.strip() or line.startswith("#"):
+    for number, line in enumerate(io.StringIO(text, newline=""), start=1):
+        if number in form.skip_lines:
+            if rows:
+                raise InputError(
+                    f"{path}: line {number} of skip_lines is among the rows; remove it from file and mapping"
+                )
+            head.append(line)
+        elif not line.strip() or line.startswith("#"):
             if not names:
                 head.append(line)
         elif not names:

@@ -237,6 +237,24 @@ def test_semicolons_decimal_commas_and_texts_for_missing(tmp_path: Path, network
     np.testing.assert_array_equal(channel(recording, "oil"), source["T_oil_degC"])
 
 
+@pytest.mark.parametrize("encoding", ["cp1252", "utf-16"])
+def test_another_encoding_a_preamble_and_a_line_of_units(
+    tmp_path: Path, network: ThermalNetwork, encoding: str
+) -> None:
+    source = table().rename(columns={"T_oil_degC": "Öl [°C]"})
+    header, *rows = source.to_csv(index=False, lineterminator="\n").splitlines()
+    units = ",".join("x" for _ in source.columns)
+    path = tmp_path / "run.csv"
+    path.write_bytes("\n".join(["Prüfstand 3, 20 °C", "", header, units, *rows, ""]).encode(encoding))
+    mapping = f"""csv = {{ encoding = "{encoding}", skip_lines = [1, 4] }}
+        [columns."Öl [°C]"]
+        quantity = "T_oil"
+        """
+    recording = read(path, network, mapping)
+    np.testing.assert_allclose(channel(recording, "oil"), source["Öl [°C]"])
+    assert list(recording.rows[:2]) == [1, 2]
+
+
 def test_rows_and_valid_range_of_a_mapping(tmp_path: Path, network: ThermalNetwork) -> None:
     mapping = """rows = ["0..500", "1000.."]
         [columns.T_oil_degC]

@@ -32,6 +32,16 @@ def test_decimals_are_those_of_the_column(tmp_path: Path) -> None:
     assert shifted.lines == ("0,20.5\n", "1,\n", "2,20.25\n")
 
 
+def test_encoding_and_skipped_lines_are_kept(tmp_path: Path) -> None:
+    file = tmp_path / "a.csv"
+    file.write_bytes("t,Öl\ns,°C\n0,20.5\n1,20.5\n".encode("cp1252"))
+    text = read_csv_text(file, TextForm(encoding="cp1252", skip_lines=(2,)))
+    changed = text.with_shifts({"Öl": np.array([1.0, 0.0])})
+    assert gzip.decompress(changed.compressed) == "t,Öl\ns,°C\n0,21.5\n1,20.5\n".encode("cp1252")
+    with pytest.raises(InputError, match="line 4 of skip_lines is among the rows"):
+        read_csv_text(file, TextForm(encoding="cp1252", skip_lines=(1, 4)))
+
+
 def test_rows_across_lines_are_refused(tmp_path: Path) -> None:
     file = tmp_path / "a.csv"
     file.write_text('t,a\n0,"x\ny"\n')
