@@ -121,7 +121,7 @@ FILES: list[tuple[str | bytes, tuple[str, ...]]] = [
     (text().encode("utf-16"), ("is UTF-16", 'encoding = "utf-16"')),
     ("# a remark\n" + text().replace(LONG, LONG + ","), ("line 22 has 9 fields, but the header names 8 columns",)),
     (text().replace("\n", ",1\n").replace("W,1", "W"), ("line 2 has 9 fields",)),
-    (below_header("s,1/min,Nm,degC,degC,degC,degC,W"), 
+    (below_header("s,1/min,Nm,degC,degC,degC,degC,W"),
      ("line 2 (below the header) holds units", "'s', '1/min'", "skip_lines = [2]")),
     (text().replace("\n20.0,", '\n"20.0,'), ("cannot be read as csv",)),
     ("<html><body>504 Gateway Timeout</body></html>", ("column time_s is missing",)),
