@@ -10,6 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from threadpoolctl import threadpool_limits
 
 from builder.__main__ import main
 from builder.base.cache import CACHE_VARIABLE
@@ -22,6 +23,13 @@ from models.assembly.gearbox import Gearbox, load_gearbox
 from models.simulation.thermal_network import ThermalNetwork
 
 QUICK = replace(PRESETS["default"], samples=400, max_iter=60, starts=1, judged=200)
+
+
+def pytest_configure() -> None:
+    """Several workers share the processor: threads of BLAS would wait for each other, for most of the time."""
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        os.environ["OPENBLAS_NUM_THREADS"] = "1"  # of the programs that tests start
+        threadpool_limits(1)
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -6,7 +6,7 @@ import os
 from collections.abc import Iterator
 
 import pytest
-from threadpoolctl import threadpool_info
+from threadpoolctl import threadpool_info, threadpool_limits
 
 from models.base.errors import InputError
 from models.base.parallel import iterate_parallel, one_thread, run_parallel
@@ -76,8 +76,10 @@ def _threads() -> int:
 
 
 @pytest.mark.parametrize("jobs", [1, 2])
-def test_every_call_has_one_blas_thread(jobs: int) -> None:
-    assert run_parallel(_threads, [(), ()], jobs=jobs) == [1, 1]
+def test_every_call_has_one_blas_thread(jobs: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("OPENBLAS_NUM_THREADS", "2")
+    with threadpool_limits(2):
+        assert run_parallel(_threads, [(), ()], jobs=jobs) == [1, 1]
     assert one_thread()(_threads)() == 1
 
 
