@@ -132,7 +132,8 @@ def assemble(
     verdict = verdict_of(posterior, answers, unseen, worse_K=train_fits.calibrated - train_fits.before - setup.noise_K)
     location = locations_of(setup, posterior) if posterior.detected else ()
     inputs = setup.gearbox.network().inputs
-    model = _calibrated(final, plain, inputs, best.effects if best else ())
+    believed = None if best is None else best.fit
+    model = _calibrated(final, believed or calibration.fit, plain, inputs, best.effects if best else ())
     assumed = {name for r in (*train, *held_out) for name in r.assumed}
     return Diagnosis(
         verdict=verdict,
@@ -150,7 +151,7 @@ def assemble(
         terms=_terms(best, final),
         sensors=model.sensors,
         true_inputs=model.true_inputs,
-        alone=_calibrated(plain, plain, inputs),
+        alone=_calibrated(plain, calibration.fit, plain, inputs),
         joint=joint_estimate_of(final),
         starts_at=experiment.starts_at,
         noise_K=setup.noise_K,
@@ -382,22 +383,29 @@ def _courses(setup: InferenceSetup, predicted: Predicted) -> tuple[PredictedRun,
     return tuple(result)
 
 
-def _calibrated(fit: Fit, plain: Fit, inputs: Collection[str], effects: Sequence[Hypothesis] = ()) -> CalibratedModel:
+def _calibrated(
+    fit: Fit, believed: Fit, plain: Fit, inputs: Collection[str], effects: Sequence[Hypothesis] = ()
+) -> CalibratedModel:
     """Every usual parameter, the sensors and the inputs of a fit, without those of effects.
 
     How far a parameter is from its prior is that of the definition: that of one found is wider.
+
+    Parameters
+    ----------
+    believed : Fit
+        With model error in place
     """
     stated = {unknown.parameter.name: unknown for unknown in plain.experiment.unknowns}
     terms = [effect.term for effect in effects if effect.term is not None]
     found = {p.name for term in terms for p in term.parameters}
     usual = [one.parameter for one in fit.experiment.unknowns if one.parameter.name in {*stated} - found]
-    estimates = estimates_of(fit)
+    values, estimates = estimates_of(fit), estimates_of(believed)
     sensors, true_inputs = sensors_and_inputs_of(fit, findings=[term.label for term in terms], inputs=inputs)
     return CalibratedModel(
         calibration=tuple(
-            Calibrated(parameter=p.name, prior=p.start, value=value, stderr=stderr,
-                       shift_in_sd=stated[p.name].z_of(value), unit=p.unit)
-            for p in usual for value, stderr in [estimates[p.name]]
+            Calibrated(parameter=p.name, prior=p.start, value=value, stderr=stderr, estimate=estimate,
+                       estimate_stderr=sd, shift_in_sd=stated[p.name].z_of(estimate), unit=p.unit)
+            for p in usual for (value, stderr), (estimate, sd) in [(values[p.name], estimates[p.name])]
         ),
         sensors=sensors, true_inputs=true_inputs,
     )  # fmt: skip

@@ -173,7 +173,7 @@ def _how_sure(d: Diagnosis) -> tuple[str, ...]:
     far = sorted((c for c in d.calibration if abs(c.shift_in_sd) > FAR_SD), key=lambda c: -abs(c.shift_in_sd))
     if far:
         deviations = {p.name for p in d.network.parameters if p.start == 0.0}  # from what the definition assumes
-        told = [f"{c.parameter} {'off by' if c.parameter in deviations else '='} {c.value:.3g}{_unit(c.unit)} "
+        told = [f"{c.parameter} {'off by' if c.parameter in deviations else '='} {c.estimate:.3g}{_unit(c.unit)} "
                 f"({abs(c.shift_in_sd):.1f} sd)" for c in far[:MOST_FAR]]  # fmt: skip
         lines.append(f"Far from what the definition expects: {', '.join(told)}.")
     if d.remaining_note:

@@ -335,12 +335,24 @@ class Fits:
 
 @dataclass(frozen=True, kw_only=True)
 class Calibrated:
-    """A parameter of the model as calibrated."""
+    """A parameter of the machine.
+
+    Attributes
+    ----------
+    value, stderr : float
+        In the model that predicts: without model error, so that parameters stand in for it
+    estimate, estimate_stderr : float
+        With model error in place: what the recordings say of it
+    shift_in_sd : float
+        From the prior to the estimate, in its standard deviations
+    """
 
     parameter: str
     prior: float
     value: float
     stderr: float
+    estimate: float
+    estimate_stderr: float
     shift_in_sd: float
     unit: str = "1"
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import asdict, fields
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 
-from diagnosis.results.result_parts import Fits, PredictedRun, named
+from diagnosis.results.result_parts import Calibrated, Fits, PredictedRun, named
 from models.base.errors import InputError, did_you_mean
 from models.base.types import Array
 from models.columns.columns import Columns
@@ -38,8 +39,9 @@ def table_of(diagnosis: Diagnosis, what: Table) -> pd.DataFrame:
         rows = [(r.mechanism, r.place, r.family, r.log_bayes, r.probability) for r in diagnosis.ranking]
         return pd.DataFrame(rows, columns=["mechanism", "place", "family", "log_bayes_nat", "probability"])
     if what == "calibration":
-        calibrated = [(c.parameter, c.prior, c.value, c.stderr, c.unit, c.shift_in_sd) for c in diagnosis.calibration]
-        return pd.DataFrame(calibrated, columns=["parameter", "prior", "value", "stderr", "unit", "shift_in_sd"])
+        return pd.DataFrame(
+            [asdict(one) for one in diagnosis.calibration], columns=[one.name for one in fields(Calibrated)]
+        )
     errors = [*_error_rows("train", diagnosis.train), *_error_rows("holdout", diagnosis.holdout)]
     return pd.DataFrame(errors, columns=["recordings", "channel", "unit", *(f"rmse_{model}" for model in MODELS)])
 

@@ -207,7 +207,7 @@ def _diagnosis(**given: object) -> Diagnosis:
         "findings": (),
         "calibration": tuple(
             Calibrated(parameter=p.name, prior=p.start, value=p.start + 0.08 * shift, stderr=0.05,
-                       shift_in_sd=shift)
+                       estimate=p.start + 0.1 * shift, estimate_stderr=0.06, shift_in_sd=shift)
             for p, shift in zip(PARAMETERS, SHIFTS.tolist(), strict=True)
         ),
         "noise_K": NOISE,
