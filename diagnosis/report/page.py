@@ -129,7 +129,7 @@ def _calibrated(diagnosis: Diagnosis, one: Calibrated) -> dict[str, Any]:
         "of": one,
         "value": numbers.with_error(one.value, one.stderr),
         "estimate": numbers.with_error(one.estimate, one.estimate_stderr),
-        "unit": wording.unit(parameter.unit) if parameter else "",
+        "unit": wording.unit(one.unit),
         "description": parameter.description if parameter else "",
         "left": 50.0 + 50.0 * min(shift, 0.0) / BAR_SD,
         "width": 50.0 * abs(shift) / BAR_SD,

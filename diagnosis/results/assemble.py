@@ -132,8 +132,10 @@ def assemble(
     verdict = verdict_of(posterior, answers, unseen, worse_K=train_fits.calibrated - train_fits.before - setup.noise_K)
     location = locations_of(setup, posterior) if posterior.detected else ()
     inputs = setup.gearbox.network().inputs
-    believed = None if best is None else best.fit
-    model = _calibrated(final, believed or calibration.fit, plain, inputs, best.effects if best else ())
+    believed = best.fit if best and best.fit else calibration.fit
+    if others is not None:
+        believed = others.posterior.nothing.fit or believed
+    model = _calibrated(final, believed, plain, inputs, best.effects if best else ())
     assumed = {name for r in (*train, *held_out) for name in r.assumed}
     return Diagnosis(
         verdict=verdict,
@@ -393,13 +395,14 @@ def _calibrated(
     Parameters
     ----------
     believed : Fit
-        With model error in place
+        With model error in place; what it does not have is as in `fit`
     """
     stated = {unknown.parameter.name: unknown for unknown in plain.experiment.unknowns}
     terms = [effect.term for effect in effects if effect.term is not None]
     found = {p.name for term in terms for p in term.parameters}
     usual = [one.parameter for one in fit.experiment.unknowns if one.parameter.name in {*stated} - found]
-    values, estimates = estimates_of(fit), estimates_of(believed)
+    values = estimates_of(fit)
+    estimates = {**values, **estimates_of(believed)}
     sensors, true_inputs = sensors_and_inputs_of(fit, findings=[term.label for term in terms], inputs=inputs)
     return CalibratedModel(
         calibration=tuple(
