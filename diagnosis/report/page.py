@@ -14,7 +14,7 @@ from diagnosis.report.chart import Chart
 from diagnosis.results import number_format as numbers
 from diagnosis.results.first_screen import date_told, values_told
 from diagnosis.results.result import Diagnosis
-from diagnosis.results.result_parts import LEAST_RIVAL, NO_CLAIM, Calibrated, Finding, Fits
+from diagnosis.results.result_parts import LEAST_RIVAL, NO_CLAIM, Calibrated, Finding, Fits, title_of
 
 PACKAGE = "diagnosis.report"
 PLOTLY = "plotly-basic.min.js"  # npm: plotly.js-basic-dist-min, of the version that the plotly of Python brings
@@ -47,7 +47,7 @@ def page(diagnosis: Diagnosis) -> str:
         verdict_text=diagnosis.verdict_text,
         claims=diagnosis.verdict not in NO_CLAIM,
         evidence=_evidence(diagnosis),
-        items=[[_finding(finding) for finding in item] for item in diagnosis.items],
+        items=[(wording.plain(title_of(item)), [_finding(finding) for finding in item]) for item in diagnosis.items],
         stages=course_charts.stages_of(diagnosis),
         told=network_chart.marks(diagnosis).told(network_chart.corrected(diagnosis)),
         fits=[("Held out", _rows(diagnosis.holdout)), ("Learned from", _rows(diagnosis.train))],

@@ -14,6 +14,7 @@ from diagnosis.results.result_parts import (
     NO_CLAIM,
     Finding,
     named,
+    title_of,
 )
 from diagnosis.results.robustness import repeating_told, robustness_told
 from models.mechanisms import OPEN_FORM
@@ -135,8 +136,10 @@ def _where(d: Diagnosis) -> tuple[str, ...]:
 def _what(d: Diagnosis) -> tuple[str, ...]:
     lines: list[str] = []
     for item in d.items:
-        lines.append(f"{item[0].grade.capitalize()}: {item[0].says} [{item[0].title}]")
-        lines += [f"  {line}" for finding in item for line in (values_told(finding), date_told(finding)) if line]
+        lines.append(f"{item[0].grade.capitalize()}: {item[0].says} [{title_of(item)}]")
+        for finding in item:
+            says = "" if finding.says == item[0].says else f"with it: {finding.says}"
+            lines += [f"  {line}" for line in (says, values_told(finding), date_told(finding)) if line]
     if d.nearest:
         told = ", ".join(f"{named(one.mechanism, one.place)} ({one.probability:.2f})" for one in d.nearest)
         lines.append(f"No name is certain enough to be reported; most like: {told}.")
@@ -147,11 +150,12 @@ def _what(d: Diagnosis) -> tuple[str, ...]:
 
 def _how_sure(d: Diagnosis) -> tuple[str, ...]:
     lines = []
-    for finding, *_ in d.items:
+    for item in d.items:
+        finding = item[0]
         of = "of this name, the nearest one," if finding.acts_like else "of one of these" if finding.tie_set else ""
         if finding.acts_like and finding.sureness > finding.probability:
             of = f"of this name {share(finding.probability)}, of all that act alike"
-        title = f"{finding.title}: " if len(d.items) > 1 else ""
+        title = f"{title_of(item)}: " if len(d.items) > 1 else ""
         line = " ".join(filter(None, (f"{title}{finding.grade}, probability", of, share(finding.sureness))))
         others = [r for r in finding.confusable_with
                   if r.probability >= LEAST_RIVAL and r.law not in finding.tie_set]  # fmt: skip

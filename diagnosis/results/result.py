@@ -251,9 +251,9 @@ class Diagnosis:
 
     @property
     def items(self) -> tuple[tuple[Finding, ...], ...]:
-        """Findings by their titles: several laws of one name at one place, with other courses in time, are one item."""
-        titles = dict.fromkeys(finding.title for finding in self.findings)
-        return tuple(tuple(finding for finding in self.findings if finding.title == title) for title in titles)
+        """Findings that are told together, see :attr:`Finding.told_as`."""
+        told = dict.fromkeys(finding.told_as for finding in self.findings)
+        return tuple(tuple(finding for finding in self.findings if finding.told_as == one) for one in told)
 
     @property
     def further_helps(self) -> bool:

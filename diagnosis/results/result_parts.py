@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -179,6 +179,16 @@ class Finding:
             at.setdefault(places.get(name, self.place), []).append(name)
         between = " or " if len(at) == len(tied) else ", or "
         return between.join(named(" or ".join(names), place) for place, names in at.items())
+
+    @property
+    def told_as(self) -> tuple[str, ...]:
+        """What findings that are told together share.
+
+        Several laws of one name at one place, with other courses in time, are one item; so are the nearest names of one
+        kind at one place, whose cause was not found.
+        """
+        alone = not self.acts_like or self.mechanism == PARAMETER
+        return (self.title,) if alone else (self.place, self.kind)
 
     @property
     def sureness(self) -> float:
@@ -407,6 +417,12 @@ def named(mechanism: str, place: str) -> str:
     ('windage at oil', 'parameter h_air')
     """
     return f"{mechanism} {place}" if mechanism == PARAMETER else f"{mechanism} at {place}"
+
+
+def title_of(item: Sequence[Finding]) -> str:
+    """One title of findings that are told together."""
+    first, names = item[0], dict.fromkeys(finding.mechanism for finding in item)
+    return first.title if len(names) == 1 else f"acts like {named(' with '.join(names), first.place)}"
 
 
 def law_of(mechanism: str, place: str) -> str:

@@ -73,6 +73,18 @@ def test_names_that_only_act_like_it_are_told_as_such() -> None:
     assert "likely, probability of this name, the nearest one, 0.91" in told(found, "How sure?")
 
 
+def test_nearest_names_of_one_kind_at_one_place_are_told_together() -> None:
+    (finding,) = missing_physics().findings
+    near = replace(finding, grade="likely", acts_like=True)
+    other, elsewhere = replace(near, mechanism="pump_heat", says="A pump heats."), replace(near, place="pinion")
+    found = replace(missing_physics(), findings=(near, elsewhere, other))
+    assert found.items == ((near, other), (elsewhere,))
+    what = told(found, "What?")
+    assert "[acts like windage with pump_heat at oil]" in what and "[acts like windage at pinion]" in what
+    assert "\n  with it: A pump heats." in what
+    assert "acts like windage with pump_heat at oil: likely" in told(found, "How sure?")
+
+
 def test_dates_and_switches() -> None:
     (finding,) = missing_physics().findings
     change = Change(recording="train_1", from_s=20634.0, band_s=(20100.0, 21100.0))
