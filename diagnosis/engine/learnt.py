@@ -56,7 +56,7 @@ class Rule:
     temper : (float, float)
         a [nat] and b [-]
     detection : float
-        Evidence without which nothing is missing at the usual rate, whatever the class, [nat]
+        Times the threshold of the class that are asked for before something is missing, [-]
     doubt : float
         Width about the threshold, [nat]
     pair : float
@@ -105,7 +105,7 @@ class Rule:
         """
         of_class = 0.5 * (nothing.threshold + best.threshold)
         stricter = self.temper[0] * float(np.log(self.rate / rate))
-        return max(of_class, self.detection) + stricter, max(of_class + stricter, 0.0)
+        return self.detection * of_class + stricter, max(of_class + stricter, 0.0)
 
 
 @cache
