@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from diagnosis.engine.calibration import calibrate_with_error
 from diagnosis.engine.fit import Experiment, Fit, calibrate
 from diagnosis.engine.prepare import prepare_experiment
 from diagnosis.engine.set_apart import calibrate_apart, calibrate_without_error, without_channels
@@ -43,6 +44,16 @@ def test_sound_sensors_are_not_set_apart() -> None:
     fit, apart = calibrate_apart(sound, plain)
     assert apart == ()
     assert fit is plain
+
+
+def test_how_far_a_session_may_deviate_the_sound_channels_say_for_all() -> None:
+    gearbox = load_gearbox("heated_rod")
+    path = DATA / "heated_rod.csv.gz"
+    train, healthy = read_recordings([f"{path}@0..5400", f"{path}@14400..19800"], gearbox.network())
+    experiment = prepare_experiment(gearbox, [train], [train], [healthy])[1]
+    found = calibrate_with_error(experiment, calibrate(without_channels(experiment, [BROKEN])), [BROKEN])
+    assert found.of_others is not None and found.of_others.near.experiment.most_deviation == 0.2  # of one baseline
+    assert found.near.experiment.most_deviation == 0.2 < experiment.most_deviation
 
 
 def test_a_fit_without_error_keeps_the_values_of_faulty_sensors_and_has_the_assumed_random_heat() -> None:
