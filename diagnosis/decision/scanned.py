@@ -22,7 +22,7 @@ WORSE, LEAST_DEVIATION = 2.0, 0.05  # times the deviation between sessions; prio
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class InClass:
+class ScanInClass:
     """Everything judged by straight lines with model error of one class: terms in the order of the scan, parameters."""
 
     error_class: ErrorClass
@@ -40,8 +40,8 @@ class Scanned:
     candidates: tuple[Hypothesis, ...]
     log_prior: Array
     log_bayes: Array
-    classes: tuple[InClass, ...]
-    best: tuple[InClass, ...]
+    classes: tuple[ScanInClass, ...]
+    best: tuple[ScanInClass, ...]
 
     @property
     def order(self) -> list[int]:
@@ -60,7 +60,7 @@ class Scanned:
         parameter = np.array([one.how == "P" for one in self.candidates], dtype=bool)
         return log_sum(log[~parameter]) - log_sum([0.0, *log[parameter]])
 
-    def in_class(self, error_class: ErrorClass) -> InClass:
+    def in_class(self, error_class: ErrorClass) -> ScanInClass:
         """Everything with model error of one class."""
         return next(one for one in self.classes if one.error_class == error_class)
 
@@ -108,16 +108,16 @@ def judge_alone(calibration: Calibration, best: Judged, second: Scanned, ahead: 
 def _in_class(
     error_class: ErrorClass, found: Scan, parameters: Sequence[Hypothesis], over: OverSessions, ahead: float,
     nothing: ErrorClass,
-) -> InClass:  # fmt: skip
+) -> ScanInClass:  # fmt: skip
     """Candidates in one class; `nothing`: that without any effect."""
     strengths = _strengths(found, parameters, over.given[over.most_probable])
     less = counts_less((*found.candidates, *parameters), nothing, error_class)
-    return InClass(error_class=error_class, ahead=ahead, scan=found, over=over,
+    return ScanInClass(error_class=error_class, ahead=ahead, scan=found, over=over,
                     log_bayes=_weighed(found, parameters, over) + ahead - less, strengths=strengths)  # fmt: skip
 
 
 def in_best_classes(
-    classes: Sequence[InClass], candidates: Sequence[Hypothesis], log_prior: Array, parameters: Sequence[Hypothesis]
+    classes: Sequence[ScanInClass], candidates: Sequence[Hypothesis], log_prior: Array, parameters: Sequence[Hypothesis]
 ) -> Scanned:
     """Every candidate in the class that suits it best."""
     known = {one.label: value for one, value in zip(candidates, log_prior.tolist(), strict=True)}

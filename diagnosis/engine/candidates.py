@@ -15,7 +15,7 @@ from diagnosis.candidates.hypotheses import Hypothesis, chunks
 from diagnosis.engine.fit import Experiment, Fit, Linear
 from diagnosis.engine.gram import Given, Gram, Strengths, strengths
 from diagnosis.engine.metric import Metric
-from diagnosis.engine.point import AT_ONCE, Point
+from diagnosis.engine.point import Point, columns_at_once
 from diagnosis.engine.products import base_of, gram_of, whitened_base
 from diagnosis.engine.unknown import Scope
 from diagnosis.forward.network_on_grid import NetworkOnGrid
@@ -27,7 +27,6 @@ from models.terms.term import Term
 
 SHAPES_TRIED = 3  # of what has a memory: its set-points may have several optima
 Starts = tuple[tuple[int, float], ...]  # variants and strengths
-VALUES_AT_ONCE = 800_000  # of heats that are held together, per part: bounds the memory of long recordings
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -101,7 +100,7 @@ def scan(fit: Fit, candidates: Sequence[Hypothesis], error: Sequence[Array] = ()
     warm = [not is_total_loss(name) for name in fit.parts[0].point.sensors.channels]
     everything, residuals = _with_unknowns(fit), [W[:, 0] for W in base]
     intervals = max(len(part.point.trajectory.T) for part in fit.parts)
-    for chunk in chunks([c for c, _ in placed], max(16, min(AT_ONCE, VALUES_AT_ONCE // intervals))):
+    for chunk in chunks([c for c, _ in placed], columns_at_once(intervals)):
         some = placed[len(shapes) : len(shapes) + len(chunk)]
         raw, heats = zip(*(columns_of(fit.experiment, part, some) for part in fit.parts), strict=True)
         peaks_K, peaks_W = np.max([np.abs(X[:, warm]).max(axis=(0, 1)) for X in raw], axis=0), np.max(heats, axis=0)

@@ -37,13 +37,10 @@ class Outside:
         With one variant: its most probable shape
     log_bayes : float
         Against nothing, shape and size marginalised
-    strength : float
-        Most probable one of that shape, [W]
     """
 
     hypothesis: Hypothesis
     log_bayes: float
-    strength: float
 
 
 def judge_outside(fit: Fit, hypotheses: Sequence[Hypothesis]) -> list[Outside]:
@@ -66,8 +63,7 @@ def judge_outside(fit: Fit, hypotheses: Sequence[Hypothesis]) -> list[Outside]:
         each = [judged_together(given, columns, one.term.strength.sd) for given in over.given]
         log_bayes = over.weighed([np.array([value]) for value, _ in each])
         weights = each[over.most_probable][1]
-        judged.append(Outside(hypothesis=shaped(one, weights), log_bayes=float(log_bayes[0]),
-                              strength=float(np.linalg.norm(weights))))  # fmt: skip
+        judged.append(Outside(hypothesis=shaped(one, weights), log_bayes=float(log_bayes[0])))
         first = columns.stop
     return judged
 

@@ -20,8 +20,14 @@ from models.correction.instruments import Mix
 from models.quantities.quantities import is_total_loss
 from models.terms.term import Term
 
-AT_ONCE = 256  # columns that go through the network and the filter together
+FEWEST_AT_ONCE, AT_ONCE = 16, 256  # columns that go through the network and the filter together
+VALUES_AT_ONCE = 800_000  # of heats that are held together, per part: bounds the memory of long recordings
 MEMORY_STEP = 0.02  # of a prior sd, for parameters that decide on switches and memories
+
+
+def columns_at_once(intervals: int) -> int:
+    """How many columns of so many intervals are held together."""
+    return max(FEWEST_AT_ONCE, min(AT_ONCE, VALUES_AT_ONCE // intervals))
 
 
 class Machine:

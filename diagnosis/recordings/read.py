@@ -43,7 +43,6 @@ def read_recordings(
     machine: RecordedMachine | MachineDefinition,
     *,
     mapping: Path | None = None,
-    max_gap_s: float | None = None,
 ) -> tuple[Recording, ...]:
     r"""Read recordings of one gearbox.
 
@@ -59,8 +58,6 @@ def read_recordings(
         Mapping file for all of them (see :mod:`diagnosis.recordings.mapping`); by default ``<stem>.toml`` or
         ``mapping.toml``
         next to each, else the table ``[recording]`` of the network's definition
-    max_gap_s : float or None
-        Longest gap that is bridged, [s]; by default as the mapping states, else 60 s or three usual steps
 
     Returns
     -------
@@ -93,7 +90,7 @@ def read_recordings(
     problems: list[str] = []
     for path, name in zip(paths, _names(paths), strict=True):
         try:
-            recordings.append(read_recording(path, network, name=name, mapping=mapping, max_gap_s=max_gap_s))
+            recordings.append(read_recording(path, network, name=name, mapping=mapping))
         except InputError as error:
             problems.append(str(error))
     if problems:
@@ -144,7 +141,6 @@ def read_recording(
     *,
     name: str = "",
     mapping: Path | None = None,
-    max_gap_s: float | None = None,
     to_compare: bool = True,
 ) -> Recording:
     """Read one recording; see :func:`read_recordings`.
@@ -173,9 +169,8 @@ def read_recording(
         rows = len(found.seconds) or "no"
         raise InputError(f"{found.path}: has {rows} rows{where}; a recording has {FEWEST_ROWS} or more")
     _add_unrecorded(found, network)
-    stated = max_gap_s if max_gap_s is not None else files[0].mapping.max_gap_s
-    usual = GAP_STEPS * float(np.median(np.diff(found.seconds)))
-    gap = stated if stated is not None else max(SHORTEST_GAP_S, usual)
+    stated, usual = files[0].mapping.max_gap_s, GAP_STEPS * float(np.median(np.diff(found.seconds)))
+    gap = max(SHORTEST_GAP_S, usual) if stated is None else stated
     resolutions = {quantity: resolution_of(found.values[quantity]) for quantity in found.measured(network)}
     _remove_spikes(found, network, gap)
     _note_stuck(found, network)

@@ -14,11 +14,8 @@ from diagnosis.engine.metric import ErrorCourses
 from diagnosis.engine.model_error.anatomy import Anatomy
 from diagnosis.engine.model_error.courses import Standard, View
 from diagnosis.engine.model_error.groups import GROUPS, Change, HeatChange
-from diagnosis.engine.point import AT_ONCE, Point
+from diagnosis.engine.point import Point, columns_at_once
 from models.base.types import Array
-
-VALUES_AT_ONCE = 800_000  # of heats that are held together, per part: bounds the memory of long recordings
-FEWEST_AT_ONCE = 16
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -129,7 +126,7 @@ class ModelError:
 
     def _chunks(self, point: Point, first: int, last: int) -> Iterator[tuple[int, int]]:
         """Ranges of so many unknowns as memory allows at once."""
-        size = max(FEWEST_AT_ONCE, min(AT_ONCE, VALUES_AT_ONCE // len(point.trajectory.piece.steps)))
+        size = columns_at_once(len(point.trajectory.piece.steps))
         return ((begin, min(begin + size, last)) for begin in range(first, last, size))
 
     def between(self, first: int, last: int) -> Iterator[tuple[Change, int, int]]:

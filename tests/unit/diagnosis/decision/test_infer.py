@@ -22,7 +22,7 @@ from diagnosis.decision.infer import (
     infer,
 )
 from diagnosis.decision.posterior import KINDS, Judged, Posterior
-from diagnosis.decision.scanned import InClass, Scanned, counts_less, in_best_classes, scan_in_classes
+from diagnosis.decision.scanned import ScanInClass, Scanned, counts_less, in_best_classes, scan_in_classes
 from diagnosis.decision.settings import Settings
 from diagnosis.engine.calibration import Calibration, calibrate_with_error, recalibrate
 from diagnosis.engine.candidates import scan
@@ -263,9 +263,9 @@ def test_every_candidate_is_judged_in_the_class_that_suits_it() -> None:
     candidates = [Hypothesis(name=name, place="oil", family="heat", variants=np.ones((1, 1))) for name in "ab"]
     scanned = SimpleNamespace(candidates=tuple(candidates))
 
-    def in_class(name: str, log_bayes: list[float]) -> InClass:
+    def in_class(name: str, log_bayes: list[float]) -> ScanInClass:
         error = ErrorClass(name=name, prior=0.5, threshold=5.0, amplitudes={})
-        return cast(InClass, SimpleNamespace(error_class=error, scan=scanned, log_bayes=np.array(log_bayes)))
+        return cast(ScanInClass, SimpleNamespace(error_class=error, scan=scanned, log_bayes=np.array(log_bayes)))
 
     found = in_best_classes(
         [in_class("full", [18.0, 4.0]), in_class("small", [78.0, -500.0])], candidates, np.zeros(2), []

@@ -201,8 +201,8 @@ def test_an_unknown_heat_is_seen_where_it_acts(prepared: tuple[InferenceSetup, E
     of_place = {one.hypothesis.place: one.log_bayes for one in found}
     best = max(found, key=lambda one: one.log_bayes)
     assert best.log_bayes > 20.0
-    assert best.log_bayes > of_place["shaft_1"]
-    refitted = refit(fit, best.hypothesis, 0, best.strength)
+    assert best.log_bayes > of_place["shaft_1"] and best.hypothesis.term is not None
+    refitted = refit(fit, best.hypothesis, 0, best.hypothesis.term.strength.sd)
     assert refitted.log_evidence - fit.log_evidence > 0.7 * best.log_bayes
 
 

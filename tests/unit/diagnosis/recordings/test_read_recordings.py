@@ -320,7 +320,7 @@ def test_gaps_split_and_short_holes_are_bridged(tmp_path: Path, network: Thermal
     assert all(np.isfinite(values).all() for values in recording.inputs.values())
     assert any("torque_Nm is missing in 21 of 180 rows" in n and "rows 51-71" in n for n in recording.notes)
     assert any("bridged where shorter than 60 s (max_gap_s)" in n for n in recording.notes)
-    longer = read(tmp_path / "run.csv", network, max_gap_s=600.0)
+    longer = read(tmp_path / "run.csv", network, "max_gap_s = 600\n")
     assert longer.segments == (slice(0, 180),)
 
 
