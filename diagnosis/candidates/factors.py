@@ -17,6 +17,7 @@ from models.terms.term import Kind
 NO_LOAD, LOAD = "no-load loss", "load-dependent loss"
 INSIDE, OUTSIDE, HEAT = "heat inside the gearbox", "heat to the surroundings", "heat from outside"
 WITHOUT_LOAD = ("churning", "seal", "no_load", "windage")
+SHAPE = "shape_"  # begins the names of tilts of a law, see :mod:`diagnosis.setup.shapes`
 BEARINGS, AIR, OIL = "bearings", "air", "oil"
 FACTOR_SD, GAIN_SD, OFFSET_SD_K, LOSS_OFFSET = 0.3, 0.05, 2.0, 0.05
 LOWEST, HIGHEST = -0.95, 30.0
@@ -38,7 +39,7 @@ def _losses(network: ThermalNetwork, scale: Scale) -> Iterator[Placed]:
     known = {p.name for p in network.parameters}
     groups: dict[tuple[str, ...], list[Source]] = {}
     for source in network.sources:
-        own = sorted(s.name for s in source.heat.free_symbols if s.name in known)
+        own = sorted(s.name for s in source.heat.free_symbols if s.name in known and not s.name.startswith(SHAPE))
         if not source.is_loss:
             name = source.name.replace("_", " ")
             yield _placed(scale, "source", f"{source.name}_heat", source.node, (source.node,), HEAT,

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from diagnosis.candidates.factors import SHAPE
 from diagnosis.recordings.recording import Recording
 from diagnosis.results.result import Diagnosis
 from models.assembly.gearbox import Gearbox
@@ -16,7 +17,6 @@ from models.correction.correction import MODEL_ERROR, Correction, Estimate, Find
 from models.quantities.quantities import is_total_loss
 from models.terms.term import Term
 
-SHAPE = "shape_"
 UNNAMED, IMPROVES = "without a name", "It improves the prediction; what it is, the data do not say."
 REPORT, NUMBERS, CORRECTION, ALONE, POSTERIOR = (
     "report.html", "diagnosis.json", "correction.toml", "calibrated.toml", "posterior.npz"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from diagnosis.candidates.factors import SHAPE
 from diagnosis.candidates.hypotheses import Hypothesis
 from models.simulation.thermal_network import ThermalNetwork
 
@@ -25,7 +26,7 @@ def node_in(network: ThermalNetwork, h: Hypothesis) -> str:
 
 
 def _node_of_parameter(network: ThermalNetwork, name: str) -> str:
-    bare = name.removeprefix("shape_")
+    bare = name.removeprefix(SHAPE)
     for source in network.sources:
         if any(s.name == name or bare.startswith(f"{s.name}_") for s in source.heat.free_symbols):
             return source.node

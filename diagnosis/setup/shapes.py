@@ -11,6 +11,7 @@ from collections.abc import Mapping
 
 import sympy as sp
 
+from diagnosis.candidates.factors import SHAPE
 from models.losses.loss_model import law_errors
 from models.mechanisms import Scale
 from models.network.laws import Parameter, symbol
@@ -58,7 +59,7 @@ def _term(
     kind: Kind, factor: str, variable: str, sd: float, targets: list[Source] | list[Link], network: ThermalNetwork,
     scale: Scale,
 ) -> Term:  # fmt: skip
-    label = f"shape_{factor}_{variable.replace(' ', '_')}"
+    label = f"{SHAPE}{factor}_{variable.replace(' ', '_')}"
     if variable == "rise":
         label += f"_{targets[0].name.split('-')[0]}"
     parameter = Parameter(

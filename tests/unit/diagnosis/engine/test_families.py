@@ -206,6 +206,12 @@ def test_an_unknown_heat_is_seen_where_it_acts(prepared: tuple[InferenceSetup, E
     assert refitted.log_evidence - fit.log_evidence > 0.7 * best.log_bayes
 
 
+def test_a_loss_that_changes_has_the_name_of_its_parameter(candidates: tuple[Hypothesis, ...]) -> None:
+    """Not those of its tilts too, which multiply it as well."""
+    losses = {one.name.removesuffix("_loss_step") for one in candidates if one.name.endswith("_loss_step")}
+    assert losses == {"mesh", "churning", "seal", "bearing"}
+
+
 def test_prior_of_families(candidates: tuple[Hypothesis, ...]) -> None:
     """Shares of the families; names in a family are alike, and so are places of a name."""
     prior = np.exp(log_prior(candidates))
