@@ -84,15 +84,14 @@ def _is_recording(text: Path, needed: Set[str], usual: RecordingMapping) -> bool
     """
     if not text.name.lower().endswith(KINDS) or len(files_of(text)) > 1:
         return True
-    names = set(column_names(text))
-    if not names:  # the reader of plain cycles reports why
-        return False
-    own = mapping_beside(text, name_parts(text)[1])
+    names, own = set(column_names(text)), mapping_beside(text, name_parts(text)[1])
     if own is not None:
         # The mapping may be there for other files of the folder.
-        as_it_splits = column_names(text, own.text_form)
-        is_meant = not (_named(own) or needed).isdisjoint(as_it_splits)
+        as_it_reads = column_names(text, own.text_form)
+        is_meant = not (_named(own) or needed).isdisjoint(as_it_reads)
         return is_meant or not names.issuperset(needed)
+    if not names:  # the reader of plain cycles reports why
+        return False
     has_dates = STANDARD not in names and not names.isdisjoint(ISO_NAMES)
     return has_dates or not names.isdisjoint(_named(usual))
 

@@ -183,6 +183,7 @@ def _check_names(path: Path, names: list[str]) -> None:
 
 # ---------------------------------------------------------------------- text
 
+_STATED = "or state in a mapping file (--mapping) how it is written"
 _EMPTY = "is empty; a header line with column names and rows are needed"
 
 
@@ -227,8 +228,10 @@ class _Lines:
         return "\n" if line.startswith("#") or self.number in self.form.skip_lines else line
 
     def _advice(self, encoding: str) -> str:
-        other = f'give csv = {{ encoding = "{encoding}" }} in a mapping file, or ' if self.form.by_mapping else ""
-        return f"{other}save the file as UTF-8"
+        plain = "save the file as UTF-8"
+        if not self.form.by_mapping:
+            return f"{plain}, {_STATED}"
+        return f'give csv = {{ encoding = "{encoding}" }} in a mapping file, or {plain}'
 
     def next_filled(self) -> str:
         """Return the next line that is not blank; pandas will read it again. Empty at the end."""
@@ -301,7 +304,7 @@ def _advice(separator: str, form: TextForm) -> str:
     """Return what to do with a file of another separator."""
     plain = "write it with ',' and decimal points"
     if not form.by_mapping:
-        return f"{plain}, or state in a mapping file (--mapping) how it is written"
+        return f"{plain}, {_STATED}"
     if separator == ",":
         return 'the mapping file in use states others: give csv = { separator = "," } there, or name another --mapping'
     shown = "\\t" if separator == "\t" else separator

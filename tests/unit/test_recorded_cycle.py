@@ -60,6 +60,16 @@ def german(path: Path) -> Path:
     return path
 
 
+def test_a_recording_of_another_encoding_below_remarks(tmp_path: Path, network: ThermalNetwork) -> None:
+    plainly = table()
+    text = "Prüfstand 3\n" + plainly.rename(columns={"T_oil_degC": "Öl"}).to_csv(index=False)
+    (tmp_path / "run.csv").write_bytes(text.encode("cp1252"))
+    mapping = 'schema = 1\ncsv = { encoding = "cp1252", skip_lines = [1] }\n[columns."Öl"]\nquantity = "T_oil"\n'
+    (tmp_path / "mapping.toml").write_text(mapping, encoding="utf-8")
+    cycle, start, _ = read_cycle_or_recording(tmp_path / "run.csv", network)
+    assert len(cycle) == ROWS and start.columns["oil"] == "Öl"
+
+
 # ---------------------------------------------------------------------- plain cycles
 
 
