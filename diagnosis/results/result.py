@@ -251,9 +251,9 @@ class Diagnosis:
 
     @property
     def items(self) -> tuple[tuple[Finding, ...], ...]:
-        """Findings that are told together, see :attr:`Finding.told_as`."""
-        told = dict.fromkeys(finding.told_as for finding in self.findings)
-        return tuple(tuple(finding for finding in self.findings if finding.told_as == one) for one in told)
+        """Findings by item, see :attr:`Finding.item`."""
+        items = dict.fromkeys(finding.item for finding in self.findings)
+        return tuple(tuple(finding for finding in self.findings if finding.item == one) for one in items)
 
     @property
     def further_helps(self) -> bool:

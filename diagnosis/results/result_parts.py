@@ -181,8 +181,8 @@ class Finding:
         return between.join(named(" or ".join(names), place) for place, names in at.items())
 
     @property
-    def told_as(self) -> tuple[str, ...]:
-        """What findings that are told together share.
+    def item(self) -> tuple[str, ...]:
+        """Key of the item that a report shows it in.
 
         Several laws of one name at one place, with other courses in time, are one item; so are the nearest names of one
         kind at one place, whose cause was not found.
@@ -420,7 +420,7 @@ def named(mechanism: str, place: str) -> str:
 
 
 def title_of(item: Sequence[Finding]) -> str:
-    """One title of findings that are told together."""
+    """One title of the findings of an item."""
     first, names = item[0], dict.fromkeys(finding.mechanism for finding in item)
     return first.title if len(names) == 1 else f"acts like {named(' with '.join(names), first.place)}"
 

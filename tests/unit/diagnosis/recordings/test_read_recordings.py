@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import re
-import subprocess
-import sys
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -13,7 +11,6 @@ import numpy as np
 import pandas as pd
 import pytest
 
-import diagnosis
 from diagnosis.recordings.read import named_apart, read_by_role, read_recordings
 from diagnosis.recordings.recording import Recording
 from diagnosis.recordings.shared_rows import check_shared_rows
@@ -228,30 +225,16 @@ def test_a_mapping_names_converts_and_describes(tmp_path: Path, network: Thermal
     np.testing.assert_allclose(channel(recording, "P_loss"), source["P_loss_W"])
 
 
-def test_semicolons_decimal_commas_and_texts_for_missing(tmp_path: Path, network: ThermalNetwork) -> None:
-    source = table()
-    source.loc[5, "T_oil_degC"] = np.nan
-    path = tmp_path / "run.csv"
-    source.to_csv(path, index=False, sep=";", decimal=",", na_rep="Bad")
-    recording = read(path, network, 'csv = { separator = ";", decimal = "," }\nmissing = ["Bad"]\n')
-    np.testing.assert_array_equal(channel(recording, "oil"), source["T_oil_degC"])
-
-
-@pytest.mark.parametrize("encoding", ["cp1252", "utf-16"])
-def test_another_encoding_a_preamble_and_a_line_of_units(
-    tmp_path: Path, network: ThermalNetwork, encoding: str
-) -> None:
-    source = table().rename(columns={"T_oil_degC": "Öl [°C]"})
-    header, *rows = source.to_csv(index=False, lineterminator="\n").splitlines()
-    units = ",".join("x" for _ in source.columns)
-    path = tmp_path / "run.csv"
-    path.write_bytes("\n".join(["Prüfstand 3, 20 °C", "", header, units, *rows, ""]).encode(encoding))
-    mapping = f"""csv = {{ encoding = "{encoding}", skip_lines = [1, 4] }}
-        [columns."Öl [°C]"]
-        quantity = "T_oil"
-        """
-    recording = read(path, network, mapping)
-    np.testing.assert_allclose(channel(recording, "oil"), source["Öl [°C]"])
+def test_a_text_of_another_logger(tmp_path: Path, network: ThermalNetwork) -> None:
+    """Semicolons, decimal commas, texts for missing values, another encoding, a remark, a line of units."""
+    source = table().rename(columns={"T_oil_degC": "Öl"})
+    source.loc[5, "Öl"] = np.nan
+    header, *rows = source.to_csv(index=False, sep=";", decimal=",", na_rep="Bad", lineterminator="\n").splitlines()
+    text = "\n".join(["Prüfstand 3, 20 °C", "", header, ";".join("x" for _ in source.columns), *rows, ""])
+    (tmp_path / "run.csv").write_bytes(text.encode("cp1252"))
+    form = 'csv = { separator = ";", decimal = ",", encoding = "cp1252", skip_lines = [1, 4] }\nmissing = ["Bad"]\n'
+    recording = read(tmp_path / "run.csv", network, f'{form}columns."\\u00d6l".quantity = "T_oil"\n')
+    np.testing.assert_array_equal(channel(recording, "oil"), source["Öl"])
     assert list(recording.rows[:2]) == [1, 2]
 
 
@@ -494,23 +477,3 @@ def test_files_of_two_clocks_are_refused(tmp_path: Path, network: ThermalNetwork
 def test_a_file_whose_name_has_a_plus_or_an_at_is_a_file(tmp_path: Path, network: ThermalNetwork) -> None:
     for name in ("a.csv+b.csv", "run@rig.csv"):
         assert read(write(tmp_path / name, table()), network).files == (tmp_path / name,)
-
-
-def test_reading_does_not_load_the_inference() -> None:
-    code = (
-        "import sys; from diagnosis.recordings.read import read_recordings; import diagnosis;"
-        "print(*sorted(m for m in sys.modules if m.startswith('diagnosis.') or m in ('joblib', 'sympy', 'sklearn')))"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert all(name.startswith("diagnosis.recordings") for name in done.stdout.split()), done.stdout
-
-
-def test_diagnose_is_a_function_whatever_is_imported_first() -> None:
-    code = "import diagnosis.diagnose_recordings; from diagnosis import diagnose, Diagnosis; print(callable(diagnose))"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == "True"
-
-
-def test_a_wrong_name_of_the_package_is_an_attribute_error() -> None:
-    with pytest.raises(AttributeError, match="no attribute 'diagnos'"):
-        diagnosis.diagnos  # noqa: B018
