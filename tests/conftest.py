@@ -26,7 +26,7 @@ QUICK = replace(PRESETS["default"], samples=400, max_iter=60, starts=1, judged=2
 
 
 def pytest_configure() -> None:
-    """Several workers share the processor: threads of BLAS would wait for each other, for most of the time."""
+    """Several workers share the processor: threads of BLAS would wait for each other."""
     if "PYTEST_XDIST_WORKER" in os.environ:
         os.environ["OPENBLAS_NUM_THREADS"] = "1"  # of the programs that tests start
         threadpool_limits(1)
