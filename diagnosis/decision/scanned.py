@@ -113,7 +113,7 @@ def _in_class(
     strengths = _strengths(found, parameters, over.given[over.most_probable])
     less = counts_less((*found.candidates, *parameters), nothing, error_class)
     return ScanInClass(error_class=error_class, ahead=ahead, scan=found, over=over,
-                    log_bayes=_weighed(found, parameters, over) + ahead - less, strengths=strengths)  # fmt: skip
+                       log_bayes=_weighed(found, parameters, over) + ahead - less, strengths=strengths)  # fmt: skip
 
 
 def in_best_classes(

@@ -132,9 +132,8 @@ def assemble(
     verdict = verdict_of(posterior, answers, unseen, worse_K=train_fits.calibrated - train_fits.before - setup.noise_K)
     location = locations_of(setup, posterior) if posterior.detected else ()
     inputs = setup.gearbox.network().inputs
-    believed = best.fit if best and best.fit else calibration.fit
-    if others is not None:
-        believed = others.posterior.nothing.fit or believed
+    most_probable = best if others is None else others.posterior.nothing
+    believed = (most_probable.fit if most_probable else None) or calibration.fit
     model = _calibrated(final, believed, plain, inputs, best.effects if best else ())
     assumed = {name for r in (*train, *held_out) for name in r.assumed}
     return Diagnosis(

@@ -350,7 +350,7 @@ class Calibrated:
     Attributes
     ----------
     value, stderr : float
-        In the model that predicts: without model error, so that parameters stand in for it
+        In the model that predicts: they stand in for model error that it does not know
     estimate, estimate_stderr : float
         With model error in place: what the recordings say of it
     shift_in_sd : float

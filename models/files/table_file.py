@@ -285,10 +285,11 @@ def _check_head(path: Path, lines: _Lines, form: TextForm) -> None:
         raise InputError(f"{path}: {_too_many_fields(lines.number, len(first), len(names), form)}")
     cells = [cell for cell in first if cell]
     if cells and not any(_is_number(cell) or _DIGITS.search(cell) for cell in cells):
+        skipped = [*form.skip_lines, lines.number]
         shown = ", ".join(repr(cell[:20]) for cell in cells[:SHOWN]) + (", ..." if len(cells) > SHOWN else "")
         raise InputError(
             f"{path}: line {lines.number} (below the header) holds units or texts ({shown}) and no number; remove it, "
-            + (f"give csv = {{ skip_lines = [{lines.number}] }} in a mapping file, " if form.by_mapping else "")
+            + (f"give csv = {{ skip_lines = {skipped} }} in a mapping file, " if form.by_mapping else "")
             + "or begin it with '#'"
         )
 

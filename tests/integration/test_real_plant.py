@@ -17,3 +17,5 @@ def test_the_broken_thermistor_is_found_and_the_fmu_predicts(run_cli: RunCli, tm
         "broken_found": True, "ratio": False, "fmu_less_report_K": True,  # the sound channels leave nothing to find
     }  # fmt: skip
     assert result["rmse_K"]["without_broken"]["after"] < 0.2
+    parameters = json.loads((tmp_path / "diagnosis.json").read_text())["calibration"]
+    assert all(abs(one["shift_in_sd"]) < 2.0 for one in parameters)  # the broken one has no say: with it 52

@@ -236,6 +236,8 @@ def test_a_text_of_another_logger(tmp_path: Path, network: ThermalNetwork) -> No
     recording = read(tmp_path / "run.csv", network, f'{form}columns."\\u00d6l".quantity = "T_oil"\n')
     np.testing.assert_array_equal(channel(recording, "oil"), source["Öl"])
     assert list(recording.rows[:2]) == [1, 2]
+    with pytest.raises(InputError, match=r"line 4 \(below the header\) .* skip_lines = \[1, 4\]"):
+        read(tmp_path / "run.csv", network, form.replace("[1, 4]", "[1]"))
 
 
 def test_rows_and_valid_range_of_a_mapping(tmp_path: Path, network: ThermalNetwork) -> None:
