@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from importlib import resources
 from typing import Any
 
@@ -50,7 +51,8 @@ def page(diagnosis: Diagnosis) -> str:
         items=[(wording.plain(title_of(item)), [_finding(finding) for finding in item]) for item in diagnosis.items],
         stages=course_charts.stages_of(diagnosis),
         told=network_chart.marks(diagnosis).told(network_chart.corrected(diagnosis)),
-        fits=[("Held out", _rows(diagnosis.holdout)), ("Learned from", _rows(diagnosis.train))],
+        fits=[(title, _rows(fits), _each(fits))
+              for title, fits in (("Held out", diagnosis.holdout), ("Learned from", diagnosis.train))],
         has_noise=diagnosis.noise_K > 0.0,
         learnt=[
             {"description": size.description, "size": numbers.with_error(size.start, size.sd)}
@@ -119,6 +121,11 @@ def _rows(fits: Fits) -> list[tuple[str, str, tuple[float, float, float]]]:
         return []
     total = ("all temperatures", "K", (fits.before, fits.calibrated, fits.after))
     return [total, *((c, "W" if c == wording.LOSS else "K", errors) for c, errors in fits.sensors.items())]
+
+
+def _each(fits: Fits) -> Mapping[str, tuple[float, float, float]]:
+    """Errors of every recording over all temperatures; nothing where one recording is all."""
+    return fits.recordings if len(fits.recordings) > 1 else {}
 
 
 def _calibrated(diagnosis: Diagnosis, one: Calibrated) -> dict[str, Any]:

@@ -356,11 +356,19 @@ def _fits(setup: InferenceSetup, predictions: Predictions, counting: Collection[
         for state, found in predictions.items()
     }  # fmt: skip
     overall = {state: overall_rmse(found, columns) for state, found in predictions.items()}
+
+    def alone(recording: str, state: str) -> float:
+        return overall_rmse([p for p in predictions[state] if p.piece.recording == recording], columns)
+
+    recordings = {
+        name: (alone(name, "before"), alone(name, "calibrated"), alone(name, "after"))
+        for name in dict.fromkeys(p.piece.recording for p in predictions["before"])
+    }
     sensors = {
         name: (float(each["before"][i]), float(each["calibrated"][i]), float(each["after"][i]))
         for i, name in enumerate(setup.channels)
     }
-    return Fits(**overall, sensors=sensors)
+    return Fits(**overall, sensors=sensors, recordings=recordings)
 
 
 def _courses(setup: InferenceSetup, predicted: Predicted) -> tuple[PredictedRun, ...]:

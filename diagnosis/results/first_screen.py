@@ -209,6 +209,7 @@ def _how_much_better(d: Diagnosis) -> tuple[str, ...]:
         lines.append(
             "Held-out temperatures are not closer than with the calibrated model: predict with calibrated.toml"
         )
+    lines += _worse_recordings(d)
     named_terms = {finding.term.label for finding in d.findings if finding.term is not None}
     further = len([term for term in d.terms if term.label not in named_terms])
     if d.findings and further:
@@ -225,6 +226,18 @@ def _how_much_better(d: Diagnosis) -> tuple[str, ...]:
         by = "less probable readings" if d.holdout_gain < 0.0 else "larger error of temperatures"
         lines.append(f"So the held-out recordings contradict the findings ({by}): no name is a claim")
     return tuple(lines)
+
+
+def _worse_recordings(d: Diagnosis) -> list[str]:
+    """Held-out recordings that the correction misses by more than the calibrated model, where all together gain."""
+    fits = d.holdout
+    if not d.has_correction or fits.after > fits.calibrated:
+        return []
+    return [
+        f"{name} alone is not closer: {calibrated:.2f} K calibrated, {after:.2f} K corrected"
+        for name, (_, calibrated, after) in fits.recordings.items()
+        if after - calibrated > d.noise_K
+    ]
 
 
 def _cannot_be_seen(d: Diagnosis) -> tuple[str, ...]:

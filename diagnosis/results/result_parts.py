@@ -314,6 +314,8 @@ class Fits:
         error too, [K]; NaN without recordings
     sensors : mapping of channel to (before, calibrated, after)
         [K], or [W] for ``P_loss``
+    recordings : mapping of recording to (before, calibrated, after)
+        Over all temperatures of each, [K]
     """
 
     before: float
@@ -321,6 +323,7 @@ class Fits:
     found: float
     after: float
     sensors: Mapping[str, tuple[float, float, float]]
+    recordings: Mapping[str, tuple[float, float, float]]
 
     def contradict(self, gain: float, noise_K: float) -> bool:
         """True if these recordings contradict the findings: a lower log score, or an error larger by the noise.
@@ -336,9 +339,12 @@ class Fits:
             "rmse_calibrated_K": or_none(self.calibrated),
             "rmse_findings_K": or_none(self.found),
             "rmse_after_K": or_none(self.after),
-            "sensors": {
-                name: dict(zip(("before", "calibrated", "after"), map(or_none, errors), strict=True))
-                for name, errors in self.sensors.items()
+            **{
+                what: {
+                    name: dict(zip(("before", "calibrated", "after"), map(or_none, errors), strict=True))
+                    for name, errors in of.items()
+                }
+                for what, of in (("sensors", self.sensors), ("recordings", self.recordings))
             },
         }
 

@@ -143,7 +143,7 @@ def insufficient_data() -> Diagnosis:
         p_value=0.9,
         courses=(_course("short", lacking=0.2, duration=600.0, held_out=False),),
         train=_fits(0.4, 0.21, 0.21),
-        holdout=Fits(before=nothing, calibrated=nothing, found=nothing, after=nothing, sensors={}),
+        holdout=Fits(before=nothing, calibrated=nothing, found=nothing, after=nothing, sensors={}, recordings={}),
         remaining_p_value=nothing,
         remaining_note="",
         ranking=(),
@@ -240,7 +240,8 @@ def _fits(before: float, calibrated: float, after: float) -> Fits:
         channel: ((40.0, 22.0, 6.0) if channel == "P_loss" else (before * k, calibrated * k, after * k))
         for k, channel in zip(np.linspace(1.3, 0.7, len(CHANNELS)).tolist(), CHANNELS, strict=True)
     }
-    return Fits(before=before, calibrated=calibrated, found=after, after=after, sensors=sensors)
+    recordings = {f"{name}_1": (before, calibrated, after) for name in ("morning", "evening")}
+    return Fits(before=before, calibrated=calibrated, found=after, after=after, sensors=sensors, recordings=recordings)
 
 
 def _speed(time: Array, duration: float) -> Array:

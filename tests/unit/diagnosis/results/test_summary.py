@@ -187,12 +187,21 @@ def test_a_larger_held_out_error_is_not_called_better() -> None:
     assert "log score" not in told(replace(base, holdout_gain=0.0), "How much better?")  # nothing was fitted
 
 
+def test_a_held_out_recording_that_loses_is_named() -> None:
+    base = missing_physics()
+    recordings = {"run_7": (3.0, 0.5, 0.3), "run_8": (3.0, 0.5, 0.5 + 2.0 * base.noise_K)}
+    mixed = replace(base, holdout=replace(base.holdout, recordings=recordings))
+    lines = told(mixed, "How much better?")
+    assert "run_8 alone is not closer: 0.50 K calibrated" in lines and "run_7" not in lines
+    assert "alone" not in told(base, "How much better?")
+
+
 @pytest.mark.parametrize(("gain", "more_K", "contradicted"), [
     (3.0, -0.2, False), (-3.0, -0.2, True), (3.0, 0.09, False), (3.0, 0.11, True), (0.0, 0.0, False),
     (np.nan, np.nan, False),
 ])  # fmt: skip
 def test_what_held_out_recordings_contradict(gain: float, more_K: float, contradicted: bool) -> None:
-    fits = Fits(before=3.0, calibrated=0.5, found=0.5, after=0.5 + more_K, sensors={})
+    fits = Fits(before=3.0, calibrated=0.5, found=0.5, after=0.5 + more_K, sensors={}, recordings={})
     assert fits.contradict(gain, noise_K=0.1) is contradicted
 
 
