@@ -29,10 +29,10 @@ from sklearn.preprocessing import StandardScaler
 
 from benchmarks.latent_heat import latent_heat
 from diagnosis.candidates.hypotheses import Hypothesis, hypothesis_of
-from diagnosis.engine.candidates import scan
 from diagnosis.engine.fit import Experiment, Fit, Linearised, calibrate
 from diagnosis.engine.predict import Prediction, predict
 from diagnosis.engine.prepare import held_out_experiment, prepare_experiment
+from diagnosis.engine.scan import scan
 from diagnosis.forward.term_on_grid import TermOnGrid
 from diagnosis.proof.scoring.lines import Task
 from diagnosis.proof.scoring.outcome import outcome

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
-from diagnosis.candidates.hypotheses import How, Hypothesis, hypothesis_of
+from diagnosis.candidates.hypotheses import How, Hypothesis, hypothesis_of, law_of
 from models.base.types import Array
 from models.mechanisms import Placed
 from models.mechanisms.forms import EDGE_S, steps
@@ -25,8 +25,7 @@ HOUR_S = 3600.0
 LINEAR_S, SETTLING_S = 20.0 * HOUR_S, 3.0 * HOUR_S  # of the courses over the hours
 DATE_SD = 0.4  # of the time axis: nearly a uniform prior
 RISES, LENGTHS = (3.0,), (1.5, 4.0)  # of a slow step and of a change for a while, in distances between dates
-STEP, WHILE, HOURS = "step", "for_a_while", "over_hours"  # endings of names
-CHANGED = ("_change", "_error")  # endings of names that a change at a date has no use for
+STEP, WHILE, HOURS, CARRIED_ON = "step", "for_a_while", "over_hours", "carried_on"  # endings of labels
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -100,7 +99,7 @@ def step(axis: Axis, *, slow: bool = True) -> Course:
     rises = axis.distance * np.array(RISES)
     at_once, slowly = _products(axis.dates, [axis.edge_s]), _products([0.0, *axis.dates[::2]], rises)
     return Course(
-        ending=STEP, how="D", sentence="From a date on",
+        ending=STEP, how="from_date", sentence="From a date on",
         parameters=(axis.moment("since"), _span("within", axis.edge_s, rises[-1])),
         variants=np.concatenate([at_once, slowly]) if slow else at_once,
         law=sp.Min(sp.Max((NOW - since) / rise, 0), 1),
@@ -112,7 +111,7 @@ def for_a_while(axis: Axis) -> Course:
     since, length = symbol("since"), symbol("lasting")
     lengths = axis.distance * np.array(LENGTHS)
     return Course(
-        ending=WHILE, how="D", sentence="From one date to another",
+        ending=WHILE, how="from_date", sentence="From one date to another",
         parameters=(axis.moment("since"), _span("lasting", *lengths)), variants=_products(axis.dates[::2], lengths),
         law=steps(NOW, at=since, width=0.5 * axis.edge_s) - steps(NOW, at=since + length, width=0.5 * axis.edge_s),
     )  # fmt: skip
@@ -127,7 +126,7 @@ def over_hours(axis: Axis) -> Course:
     )  # fmt: skip
     decay = sp.exp(-NOW / SETTLING_S)
     return Course(
-        ending=HOURS, how="W", sentence="Slowly over the hours", parameters=parameters, variants=np.eye(3),
+        ending=HOURS, how="over_hours", sentence="Slowly over the hours", parameters=parameters, variants=np.eye(3),
         law=linear * NOW / max(LINEAR_S, axis.end) + settling * (1 - decay) + fading * decay,
     )  # fmt: skip
 
@@ -164,7 +163,8 @@ def changing(placed: Placed, course: Course, axis: Axis, *, sd: float | None = N
     along = renamed(course.along, {p.name: f"{label}_{p.name}" for p in course.parameters} | {START: clock.name})
     mechanism = placed.mechanism
     says = f"{course.sentence}: {mechanism.says[:1].lower()}{mechanism.says[1:]}"
-    name = f"{base_name(placed)}_{course.ending}"
+    law = law_of(placed.name)
+    name = f"{law}_{course.ending}"
     term = replace(
         term,
         mechanism=replace(mechanism, name=name, says=says),
@@ -174,8 +174,8 @@ def changing(placed: Placed, course: Course, axis: Axis, *, sd: float | None = N
     )
     middle = [p.grid[len(p.grid) // 2] if p.grid else p.start for p in shapes]
     rows = [[1.0, *middle, *variant, clock.start] for variant in course.variants.tolist()]
-    return Hypothesis(name=name, place=placed.place, family=placed.family, term=term, variants=np.array(rows),
-                      how=course.how, clock=clock.name)  # fmt: skip
+    return Hypothesis(name=name, place=placed.place, family=placed.family, term=term, law=law, variants=np.array(rows),
+                      how=course.how, ending=course.ending, clock=clock.name)  # fmt: skip
 
 
 def carried_on(placed: Placed, axis: Axis) -> Hypothesis:
@@ -186,7 +186,7 @@ def carried_on(placed: Placed, axis: Axis) -> Hypothesis:
     placed : Placed
         Without memories
     """
-    label = f"{placed.label}_carried_on"
+    label = f"{placed.label}_{CARRIED_ON}"
     term, clock, base = _renamed(placed, label), _clock(label, axis), hypothesis_of(placed)
     now = {symbol("time"): symbol("time") + symbol(clock.name)}
     other = term.boundary_temperature
@@ -198,7 +198,7 @@ def carried_on(placed: Placed, axis: Axis) -> Hypothesis:
         parameters=(*term.parameters, clock),
     )  # fmt: skip
     variants = np.column_stack([base.variants, np.full(len(base.variants), clock.start)])
-    return replace(base, term=term, variants=variants, how="C", clock=clock.name)
+    return replace(base, term=term, variants=variants, how="carried_on", ending=CARRIED_ON, clock=clock.name)
 
 
 def _clock(label: str, axis: Axis) -> Parameter:
@@ -234,25 +234,9 @@ def _renamed(placed: Placed, label: str) -> Placed:
     )  # fmt: skip
 
 
-def base_name(placed: Placed) -> str:
-    """Name of a law without the ending for a difference from its nominal value."""
-    for ending in CHANGED:
-        if placed.name.endswith(ending):
-            return placed.name.removesuffix(ending)
-    return placed.name
-
-
 def has_clock(placed: Placed) -> bool:
     """True if a law depends on the time, and on nothing that it remembers."""
     return placed.form in (None, "shift") and not placed.states and symbol("time") in placed.expression.free_symbols
-
-
-def changed_law(h: Hypothesis) -> str:
-    """Name of the law that a hypothesis changes, whatever its course in time; the name itself of one without."""
-    for ending in (STEP, WHILE, HOURS):
-        if h.clock is not None and h.name.endswith(f"_{ending}"):
-            return h.name.removesuffix(f"_{ending}")
-    return h.name
 
 
 def may_change(placed: Placed) -> bool:

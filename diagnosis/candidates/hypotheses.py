@@ -14,7 +14,7 @@ from models.mechanisms import OPEN_FORM, Placed
 from models.terms.term import Term
 
 MOST_VARIANTS = 24
-How = Literal["U", "D", "C", "W", "P"]
+How = Literal["always", "from_date", "carried_on", "over_hours", "parameter"]
 CLOCK_SIZES = (-2.0, -1.0, -0.3, 0.3, 1.0, 2.0)  # of the typical one
 
 
@@ -30,12 +30,17 @@ class Hypothesis:
         What is added; None for a parameter out of its prior
     unknown : int or None
         Index of that parameter among the unknowns
+    law : str
+        Name whatever its place and its course in time; of a parameter its own
+    known_as : str or None
+        The mechanism of the catalogue that has this law; None: the catalogue has none
     variants : Array, shape (V, parameters)
         Values of the term's parameters that are tried, the strength 1
     how : str
-        ``U``: a mechanism of the catalogue; ``D``: from a date on; ``C``: a law of time that goes on in the next
-        recording; ``W``: over the hours; ``P``: a parameter outside
-        its prior
+        ``always``: as the law has it; ``from_date``: from a date on, or between two; ``carried_on``: a law of time that
+        goes on in the next recording; ``over_hours``: slowly; ``parameter``: one outside its prior
+    ending : str
+        What the course in time adds to the label of the law
     clock : str or None
         Parameter of the term that is the start of the recording on the time axis that all recordings share, [s]
     less : float
@@ -47,15 +52,23 @@ class Hypothesis:
     family: str
     term: Term | None = None
     unknown: int | None = None
+    law: str
+    known_as: str | None = None
     variants: Array
-    how: How = "U"
+    how: How = "always"
+    ending: str = ""
     clock: str | None = None
     less: float = 0.0
 
     @property
     def label(self) -> str:
         """Name and place, and whether a memory goes on in the next recording."""
-        return f"{self.name}@{self.place}" + (" (carried on)" if self.how == "C" else "")
+        return f"{self.name}@{self.place}" + (" (carried on)" if self.how == "carried_on" else "")
+
+    @property
+    def mechanism(self) -> str:
+        """Name in the catalogue, of a law with a date or a course too; else its own."""
+        return self.known_as or self.name
 
     @property
     def is_open(self) -> bool:
@@ -76,6 +89,17 @@ class Hypothesis:
         return self.term is not None and self.term.kind not in ("sensor", "signal")
 
 
+def law_of(name: str) -> str:
+    """Name of a law without the ending for a difference from its nominal value: a change of it has no use for that.
+
+    Examples
+    --------
+    >>> law_of("air_cooling_change"), law_of("radiation_error"), law_of("windage")
+    ('air_cooling', 'radiation', 'windage')
+    """
+    return name.removesuffix("_change").removesuffix("_error")
+
+
 def hypothesis_of(placed: Placed) -> Hypothesis:
     """A mechanism at a place, with the grid of its shape parameters."""
     grids = [parameter.grid or (parameter.start,) for parameter in placed.parameters[1:]]
@@ -83,7 +107,7 @@ def hypothesis_of(placed: Placed) -> Hypothesis:
     if len(grid) > MOST_VARIANTS:
         grid = grid[np.unique(np.linspace(0, len(grid) - 1, MOST_VARIANTS).round().astype(int))]
     return Hypothesis(
-        name=placed.name, place=placed.place, family=placed.family, term=placed,
+        name=placed.name, place=placed.place, family=placed.family, term=placed, law=law_of(placed.name),
         variants=_both_ways(placed, np.concatenate([np.ones((len(grid), 1)), grid], axis=1)),
     )  # fmt: skip
 

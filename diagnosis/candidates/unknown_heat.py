@@ -91,4 +91,4 @@ def _unknown(network: ThermalNetwork, scale: Scale, axis: Axis, node: str, is_lo
     )  # fmt: skip
     count = len(shares)
     variants = np.column_stack([np.ones(count), np.eye(count), np.full(count, clock.start)])
-    return Hypothesis(name=name, place=node, family=OPEN_FORM, term=term, variants=variants, clock=clock.name)
+    return Hypothesis(name=name, place=node, family=OPEN_FORM, term=term, law=name, variants=variants, clock=clock.name)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from diagnosis.candidates.hypotheses import Hypothesis
-from diagnosis.decision.posterior import Judged, Posterior, name_of
+from diagnosis.decision.posterior import Judged, Posterior
 from diagnosis.decision.settings import Settings
 from diagnosis.engine.learnt import Rule
 from models.terms.term import Term
@@ -94,10 +94,10 @@ def _best_fitted(posterior: Posterior) -> Judged:
 
 def _answer(posterior: Posterior, best: Judged, effect: Hypothesis, enough: float) -> Answer | None:
     """The narrowest set of names that holds enough probability."""
-    name = name_of(effect)
+    name = effect.law
     doubtful = effect.term is None or posterior.log_e < posterior.rule.named_if_large
     much = posterior.leaves_much(best) or (doubtful and best.error_class.is_large)
-    vague = effect.how == "W" or effect.is_open or much
+    vague = effect.how == "over_hours" or effect.is_open or much
     sure = posterior.rule.nearest if much else 1.0
     own = posterior.of_names([name])
     answer = Answer(best=best, effect=effect, grade="likely", probability=sure * own, joint=sure * own, acts_like=vague)
@@ -107,12 +107,12 @@ def _answer(posterior: Posterior, best: Judged, effect: Hypothesis, enough: floa
     rivals = [one for other, one in names.items()
               if other == name or not (other in best.names or _comes_along(posterior, name, other))]  # fmt: skip
     for count in range(2, MOST_TIED + 1):
-        joint = posterior.of_names([name_of(one) for one in rivals[:count]])
+        joint = posterior.of_names([one.law for one in rivals[:count]])
         if joint >= enough:
-            tied = tuple((one, sure * posterior.of_names([name_of(one)])) for one in rivals[:count])
+            tied = tuple((one, sure * posterior.of_names([one.law])) for one in rivals[:count])
             return replace(answer, tied=tied, joint=sure * joint)
     least, likeness = posterior.rule.alike, posterior.likeness
-    alike = [name_of(one) for one in rivals if likeness.of(effect, one) >= least]
+    alike = [one.law for one in rivals if likeness.of(effect, one) >= least]
     alike += [other for other, one in names.items() if act_on_the_same(effect, one)]
     joint = posterior.of_names([name, *alike])
     return replace(answer, joint=sure * joint, acts_like=True) if joint >= enough else None
@@ -127,10 +127,10 @@ def _comes_along(posterior: Posterior, name: str, other: str) -> bool:
 
 def _best_of_names(posterior: Posterior, effect: Hypothesis) -> dict[str, Hypothesis]:
     """Best effect of every name, that of one effect's own name first, then the most probable first."""
-    found = {name_of(effect): effect}
+    found = {effect.law: effect}
     for judged, _ in posterior.ranked:
         for one in judged.effects:
-            found.setdefault(name_of(one), one)
+            found.setdefault(one.law, one)
     return found
 
 

@@ -17,7 +17,7 @@ from scipy.special import log_ndtr
 
 from diagnosis.candidates.hypotheses import Hypothesis
 from diagnosis.decision.placebo import CandidatesIn, counting_less, judge_baselines
-from diagnosis.decision.posterior import Judged, Posterior, name_of
+from diagnosis.decision.posterior import Judged, Posterior
 from diagnosis.decision.scanned import (
     Scanned,
     counts_less,
@@ -32,11 +32,11 @@ from diagnosis.decision.scanned import (
 )
 from diagnosis.decision.settings import Settings
 from diagnosis.engine.calibration import Calibration
-from diagnosis.engine.candidates import scan
 from diagnosis.engine.fit import Fit
 from diagnosis.engine.learnt import ErrorClass, rule
 from diagnosis.engine.outside import judge_outside
 from diagnosis.engine.refit import refit
+from diagnosis.engine.scan import scan
 from diagnosis.engine.sessions import fit_over_sessions
 from models.base.errors import InputError
 from models.base.progress import Progress, silent
@@ -84,7 +84,7 @@ def infer(
     best = max(judged.values(), key=_weight, default=None)
     error_class = chosen.error_class if best is None else best.error_class
     detection, of_class = rule().thresholds(chosen.error_class, error_class, settings.false_alarm_rate)
-    least = -np.inf if placebo is None else placebo.log_e
+    least = -np.inf if placebo is None else placebo.log_e_value
     if best is not None and best.fit is not None and best.log_bayes > 0.0:
         progress(f"scanning again, given {best.label}")
         second = scan_given(calibration, best, candidates, log_prior)
@@ -244,7 +244,7 @@ def _judged(calibration: Calibration, one: Judged, spread: float) -> Judged:
 
 def _spread(found: Scanned, index: int) -> float:
     """Nats that the best course over the hours is ahead of the mean over all; other shapes are fitted."""
-    if found.candidates[index].how != "W":
+    if found.candidates[index].how != "over_hours":
         return 0.0
     return float(found.best[index].scan.spread[index])
 
@@ -258,7 +258,7 @@ def _pairs(calibration: Calibration, best: Judged, second: Scanned) -> list[Judg
     """The best explanation with the best second effects of other names, fitted."""
     fit, pairs = best.fit, []
     assert fit is not None  # noqa: S101
-    others = [index for index in second.order if name_of(second.candidates[index]) not in best.names]
+    others = [index for index in second.order if second.candidates[index].law not in best.names]
     for index in others[:SECONDS]:
         one = _refitted(fit, second, index, RACE_STEPS + 2)
         if one.fit is None:

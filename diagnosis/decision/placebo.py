@@ -8,13 +8,13 @@ from dataclasses import replace
 import numpy as np
 
 from diagnosis.candidates.hypotheses import Hypothesis
-from diagnosis.decision.posterior import Placebo, name_of
+from diagnosis.decision.posterior import Placebo
 from diagnosis.decision.scanned import OVER_TIME, Scanned, scan_in_classes
 from diagnosis.engine.baselines import baselines_of
 from diagnosis.engine.calibration import Calibration
-from diagnosis.engine.candidates import scan
 from diagnosis.engine.families import log_prior
 from diagnosis.engine.fit import Experiment
+from diagnosis.engine.scan import scan
 from diagnosis.engine.sessions import sessions_of
 
 CandidatesIn = Callable[[Experiment], Sequence[Hypothesis]]
@@ -54,7 +54,7 @@ def judge_baselines(calibration: Calibration, candidates_in: CandidatesIn) -> tu
         swapped = replace(experiment, healthy=whole.healthy - starts.keys(), starts_at=starts)
         candidates = [one for one in candidates_in(swapped) if one.term is None or whole.scope_of(one.name) is not None]
         terms = [one for one in candidates if one.term is not None]
-        if not any(one.how == "U" for one in terms):  # what is switched off has no place in this machine
+        if not any(one.how == "always" for one in terms):  # what is switched off has no place in this machine
             continue
         there = scan(replace(fit, experiment=swapped), terms, columns)
         judged = scan_in_classes(calibration, there, candidates, log_prior(candidates))
@@ -62,11 +62,13 @@ def judge_baselines(calibration: Calibration, candidates_in: CandidatesIn) -> tu
         always = _part(judged, [i for i, one in enumerate(judged.candidates) if one.how not in OVER_TIME])
         best = next(one for one in map(always.candidates.__getitem__, always.order) if one.term is not None)
         session = experiment.session_of.get(min(starts), "")
-        reached.append(Placebo(session=session, log_e=always.log_e * longer, best=best))
+        reached.append(
+            Placebo(session=session, log_e_value=always.log_e * longer, mechanism=best.mechanism, place=best.place)
+        )
         for one, value in zip(judged.candidates, judged.log_bayes.tolist(), strict=True):
             if one.how in OVER_TIME:
-                over_time[name_of(one)] = max(value * longer, over_time.get(name_of(one), 0.0))
-    return max(reached, key=lambda one: one.log_e, default=None), over_time
+                over_time[one.law] = max(value * longer, over_time.get(one.law, 0.0))
+    return max(reached, key=lambda one: one.log_e_value, default=None), over_time
 
 
 def _part(scanned: Scanned, at: Sequence[int]) -> Scanned:
@@ -76,4 +78,4 @@ def _part(scanned: Scanned, at: Sequence[int]) -> Scanned:
 
 def counting_less(candidates: Sequence[Hypothesis], over_time: Mapping[str, float]) -> list[Hypothesis]:
     """Candidates of which, if they change over time, only counts what goes beyond the baselines."""
-    return [replace(one, less=over_time.get(name_of(one), 0.0)) if one.how in OVER_TIME else one for one in candidates]
+    return [replace(one, less=over_time.get(one.law, 0.0)) if one.how in OVER_TIME else one for one in candidates]

@@ -20,7 +20,6 @@ from typing import Literal, get_args
 import numpy as np
 from scipy.special import expit, logsumexp, softmax
 
-from diagnosis.candidates.dated import CHANGED, changed_law
 from diagnosis.candidates.hypotheses import Hypothesis
 from diagnosis.engine.fit import Fit
 from diagnosis.engine.learnt import ErrorClass, Rule
@@ -77,7 +76,7 @@ class Judged:
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the laws, whatever their places and courses."""
-        return tuple(sorted(name_of(effect) for effect in self.effects))
+        return tuple(sorted(effect.law for effect in self.effects))
 
     @property
     def label(self) -> str:
@@ -122,22 +121,23 @@ class Expected:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ScaledError:
-    """Evidence of the scan if all amplitudes of model error are larger or smaller than assumed.
+    """Evidence of the scan if all amplitudes of model error are larger or smaller than assumed; nothing is fitted.
 
     Attributes
     ----------
     factor : float
         On the amplitudes; 1: as assumed
-    log_e, threshold : float
+    log_e_value, threshold : float
         Evidence that something is missing, and what it has to reach, [nat]
-    best : Hypothesis
+    mechanism, place : str
         The candidate ahead
     """
 
     factor: float
-    log_e: float
+    log_e_value: float
     threshold: float
-    best: Hypothesis
+    mechanism: str
+    place: str
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -146,17 +146,18 @@ class Repeating:
 
     Attributes
     ----------
-    deviation : float
-        In prior standard deviations
-    log_e : float
+    deviation_in_sd : float
+        In standard deviations of the priors
+    log_e_value : float
         Evidence that something is missing, [nat]
-    best : Hypothesis
+    mechanism, place : str
         The candidate ahead
     """
 
-    deviation: float
-    log_e: float
-    best: Hypothesis
+    deviation_in_sd: float
+    log_e_value: float
+    mechanism: str
+    place: str
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -167,15 +168,16 @@ class Placebo:
     ----------
     session : str
         Of the baseline that holds most
-    log_e : float
+    log_e_value : float
         As if it were as many hours as the tested recordings, [nat]
-    best : Hypothesis
+    mechanism, place : str
         The law ahead
     """
 
     session: str
-    log_e: float
-    best: Hypothesis
+    log_e_value: float
+    mechanism: str
+    place: str
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -378,11 +380,3 @@ class Posterior:
         return min(
             float(sum(one.probability for one in self.explanations if not set(names).isdisjoint(one.names))), 1.0
         )
-
-
-def name_of(effect: Hypothesis) -> str:
-    """Name of the law of an effect, whatever its place and course; of a parameter its own name."""
-    if effect.unknown is not None:
-        return f"parameter {effect.place}"
-    law = changed_law(effect)
-    return next((law.removesuffix(ending) for ending in CHANGED if law.endswith(ending)), law)

@@ -11,13 +11,13 @@ from diagnosis.candidates.hypotheses import Hypothesis
 from diagnosis.decision.posterior import Expected, Judged, Likeness, Repeating, ScaledError
 from diagnosis.decision.settings import Settings
 from diagnosis.engine.calibration import Calibration
-from diagnosis.engine.candidates import Scan, scan
 from diagnosis.engine.gram import Given, Strengths
 from diagnosis.engine.learnt import ErrorClass, rule
+from diagnosis.engine.scan import Scan, scan
 from diagnosis.engine.sessions import OverSessions, over_sessions
 from models.base.types import Array
 
-OVER_TIME = ("D", "C", "W")  # families whose effects change over time
+OVER_TIME = ("from_date", "carried_on", "over_hours")  # effects that change over time
 WORSE, LEAST_DEVIATION = 2.0, 0.05  # times the deviation between sessions; prior standard deviations
 
 
@@ -57,7 +57,7 @@ class Scanned:
     def log_e(self) -> float:
         """Log odds of all effects to none, parameters as they may be, [nat]."""
         log = self.log_prior + self.log_bayes
-        parameter = np.array([one.how == "P" for one in self.candidates], dtype=bool)
+        parameter = np.array([one.how == "parameter" for one in self.candidates], dtype=bool)
         return log_sum(log[~parameter]) - log_sum([0.0, *log[parameter]])
 
     def in_class(self, error_class: ErrorClass) -> ScanInClass:
@@ -179,7 +179,8 @@ def repeating_of(found: Scanned, error_class: ErrorClass) -> tuple[Repeating, ..
         log_bayes = _log_bayes(here.scan, parameters, here.over.given[at]) - [one.less for one in found.candidates]
         judged = replace(found, log_bayes=log_bayes)
         best = judged.candidates[judged.order[0]]
-        every.append(Repeating(deviation=float(deviations[at]), log_e=judged.log_e, best=best))
+        every.append(Repeating(deviation_in_sd=float(deviations[at]), log_e_value=judged.log_e,
+                               mechanism=best.mechanism, place=best.place))  # fmt: skip
     return tuple(every)
 
 
@@ -197,9 +198,11 @@ def with_scaled_error(
     there = first if factor == 1.0 else scan_in_classes(calibration, found, candidates, log_prior, factor)
     nothing = max(there.classes, key=lambda one: one.ahead)
     there = replace(there, log_bayes=there.log_bayes - nothing.ahead)
-    best = there.order[0]
-    detection, _ = rule().thresholds(nothing.error_class, there.best[best].error_class, rate)
-    return ScaledError(factor=factor, log_e=there.log_e, threshold=max(detection, least), best=there.candidates[best])
+    index = there.order[0]
+    best = there.candidates[index]
+    detection, _ = rule().thresholds(nothing.error_class, there.best[index].error_class, rate)
+    return ScaledError(factor=factor, log_e_value=there.log_e, threshold=max(detection, least),
+                       mechanism=best.mechanism, place=best.place)  # fmt: skip
 
 
 def likeness_of(found: Scanned, error_class: ErrorClass) -> Likeness:

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from diagnosis.candidates.hypotheses import Hypothesis
-from diagnosis.engine.candidates import scan
 from diagnosis.engine.fit import Fit, Linearised
 from diagnosis.engine.products import base_of, gram_of
+from diagnosis.engine.scan import scan
 from diagnosis.engine.sessions import over_sessions, sessions_of
 from diagnosis.forward.grid import Piece
 from models.base.types import Array

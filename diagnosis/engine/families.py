@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -19,7 +20,7 @@ from diagnosis.candidates.dated import (
     without_repeats,
 )
 from diagnosis.candidates.factors import factors_of
-from diagnosis.candidates.hypotheses import Hypothesis, hypothesis_of
+from diagnosis.candidates.hypotheses import Hypothesis, hypothesis_of, law_of
 from diagnosis.engine.fit import Experiment
 from diagnosis.engine.learnt import family_priors
 from diagnosis.engine.unknown import NetworkParameter, SensorBias
@@ -45,19 +46,23 @@ def candidates_of(
     Returns
     -------
     tuple of Hypothesis
-        Mechanisms of the catalogue (U), changes at a date (D) and over hours (W), laws of time that go on in the next
-        recording (C), parameters outside their priors (P)
+        Mechanisms of the catalogue, changes at a date and over hours, laws of time that go on in the next recording,
+        parameters outside their priors
     """
     network = experiment.machine.model.network
     placed = [one for m in catalogue.values() for one in m.placed(network, setup.scale, setup.channels)]
     factors = factors_of(network, setup.scale, setup.channels)
     axis = axis_of(experiment)
     several = len({piece.recording for piece in experiment.pieces} - experiment.healthy) > 1
-    return (
-        *(hypothesis_of(one) for one in placed),
-        *changes(factors, placed, axis, _sensor_sd(experiment)),
-        *(carried_on(one, axis) for one in placed if several and has_clock(one)),
-        *parameters_outside(experiment),
+    known = {law_of(name): name for name in catalogue} | {name: name for name in catalogue}
+    return tuple(
+        replace(one, known_as=known.get(one.name, known.get(one.law)))
+        for one in (
+            *(hypothesis_of(one) for one in placed),
+            *changes(factors, placed, axis, _sensor_sd(experiment)),
+            *(carried_on(one, axis) for one in placed if several and has_clock(one)),
+            *parameters_outside(experiment),
+        )
     )
 
 
@@ -94,8 +99,8 @@ def _sensor_sd(experiment: Experiment) -> dict[str, float]:
 def parameters_outside(experiment: Experiment) -> list[Hypothesis]:
     """Every parameter of the network outside its prior."""
     return [
-        Hypothesis(name="parameter", place=unknown.parameter.name, family="parameter", unknown=index, how="P",
-                   variants=np.ones((1, 1)))
+        Hypothesis(name="parameter", place=unknown.parameter.name, family="parameter", unknown=index,
+                   law=f"parameter {unknown.parameter.name}", how="parameter", variants=np.ones((1, 1)))
         for index, unknown in enumerate(experiment.unknowns)
         if isinstance(unknown, NetworkParameter)
     ]  # fmt: skip

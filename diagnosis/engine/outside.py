@@ -9,10 +9,10 @@ import numpy as np
 
 from diagnosis.candidates.hypotheses import Hypothesis
 from diagnosis.candidates.unknown_heat import shaped, unknown_heats
-from diagnosis.engine.candidates import scan
 from diagnosis.engine.families import axis_of
 from diagnosis.engine.fit import Experiment, Fit
 from diagnosis.engine.gram import Given, Index
+from diagnosis.engine.scan import scan
 from diagnosis.engine.sessions import over_sessions
 from diagnosis.setup.inference_setup import InferenceSetup
 from models.base.types import Array

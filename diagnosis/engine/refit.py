@@ -8,9 +8,9 @@ from functools import cache
 import numpy as np
 
 from diagnosis.candidates.hypotheses import Hypothesis
-from diagnosis.engine.candidates import Starts, columns_of, scope_of, term_on_grid
 from diagnosis.engine.fit import Experiment, Fit, Linearised
 from diagnosis.engine.point import Machine
+from diagnosis.engine.scan import Starts, columns_of, scope_of, term_on_grid
 from diagnosis.engine.unknown import TERM_STEP, Held, NetworkParameter, TermParameter, Unknown
 from diagnosis.forward.network_on_grid import NetworkOnGrid
 from models.base.types import Array

@@ -16,6 +16,7 @@ from diagnosis.results import number_format as numbers
 from diagnosis.results.first_screen import date_told, values_told
 from diagnosis.results.result import Diagnosis
 from diagnosis.results.result_parts import LEAST_RIVAL, NO_CLAIM, Calibrated, Finding, Fits, title_of
+from diagnosis.results.robustness import ahead_in, size_of
 
 PACKAGE = "diagnosis.report"
 PLOTLY = "plotly-basic.min.js"  # npm: plotly.js-basic-dist-min, of the version that the plotly of Python brings
@@ -63,6 +64,8 @@ def page(diagnosis: Diagnosis) -> str:
         shown_ranks=SHOWN_RANKS,
         windows=wording.windows,
         headline=wording.headline,
+        size_of=size_of,
+        ahead_in=ahead_in,
         recordings=len({course.recording for course in diagnosis.courses}),
         loss=wording.LOSS,
         provenance=wording.provenance(diagnosis.inputs),

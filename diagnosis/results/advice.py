@@ -28,7 +28,7 @@ def without_sensor(network: ThermalNetwork, channels: Sequence[str]) -> frozense
 
 def separation(
     own: Hypothesis, other: Hypothesis, catalogue: Mapping[str, Mechanism], network: ThermalNetwork,
-    free: Collection[str], *, names: tuple[str, str],
+    free: Collection[str],
 ) -> str:  # fmt: skip
     """The experiment, or the sensor, that distinguishes two effects.
 
@@ -36,13 +36,12 @@ def separation(
     ----------
     free : collection of str
         Parts that can have a sensor, see :func:`without_sensor`
-    names : (str, str)
-        Of the two in the catalogue, whatever their course in time
     """
     if own.name == other.name:
         node = node_in(network, other)
         return f"a temperature sensor at {node.replace('_', ' ')}" if node in free else OTHER_OPERATION
-    known = [(catalogue[a], b) for a, b in (names, names[::-1]) if a in catalogue]
+    known = [(catalogue[a], b) for a, b in ((own.mechanism, other.mechanism), (other.mechanism, own.mechanism))
+             if a in catalogue]  # fmt: skip
     for mechanism, rival in known:
         if rival in mechanism.separate_by:
             return mechanism.separate_by[rival]

@@ -9,7 +9,7 @@ import numpy as np
 
 from diagnosis.candidates.hypotheses import Hypothesis
 from diagnosis.decision.answer import Answer, act_on_the_same, withdraw_claim
-from diagnosis.decision.posterior import KINDS, Expected, Judged, Placebo, Posterior
+from diagnosis.decision.posterior import KINDS, Expected, Judged, Posterior
 from diagnosis.decision.settings import Settings
 from diagnosis.engine.calibration import Calibration
 from diagnosis.engine.fit import Experiment, Fit
@@ -22,7 +22,7 @@ from diagnosis.recordings.recording import Recording
 from diagnosis.results.advice import next_test, without_sensor
 from diagnosis.results.baseline_notes import baseline_notes
 from diagnosis.results.calibrated_model import CalibratedModel
-from diagnosis.results.findings import estimates_of, finding_of, joint_estimate_of, name_in
+from diagnosis.results.findings import estimates_of, finding_of, joint_estimate_of
 from diagnosis.results.instruments import sensors_and_inputs_of
 from diagnosis.results.locations import locations_of
 from diagnosis.results.predictions import Predicted, Predictions, predict_recordings, temperatures
@@ -37,7 +37,6 @@ from diagnosis.results.result_parts import (
     Ranked,
     law_of,
 )
-from diagnosis.results.robustness import PlaceboEvidence, Repeating, ScaledError
 from diagnosis.setup.inference_setup import InferenceSetup
 from diagnosis.setup.noise import HEAT_FRACTION, HEAT_TIME_S, PARAMETRIC_FRACTION, PARAMETRIC_K, WANDER
 from models.base.types import Array
@@ -160,7 +159,7 @@ def assemble(
         misfit=_misfit(final),
         remaining_p_value=_bound_on_chance(posterior.left_by(best)),
         remaining_note=_remaining(posterior, others, best),
-        ranking=_ranking(posterior, catalogue),
+        ranking=_ranking(posterior),
         unseen=unseen,
         not_tried=tuple(sorted(catalogue.keys() - {one.effect.name for one in posterior.expected})),
         next_test=next_test(
@@ -188,18 +187,10 @@ def assemble(
         settings=settings,
         error_class=posterior.error_class,
         error_evidence=posterior.error_evidence,
-        scaled_error=tuple(
-            ScaledError(factor=one.factor, log_e_value=one.log_e, threshold=one.threshold,
-                        mechanism=name_in(catalogue, one.best), place=one.best.place)
-            for one in posterior.scaled
-        ),
+        scaled_error=posterior.scaled,
         session_s=posterior.session_s,
-        repeating=tuple(
-            Repeating(deviation_in_sd=one.deviation, log_e_value=one.log_e, mechanism=name_in(catalogue, one.best),
-                      place=one.best.place)
-            for one in posterior.repeating
-        ),
-        placebo=_placebo(posterior.placebo, catalogue),
+        repeating=posterior.repeating,
+        placebo=posterior.placebo,
         holdout_gain=predicted.holdout_gain,
         contradicted=contradicted,
     )  # fmt: skip
@@ -277,7 +268,7 @@ def verdict_of(
     if not posterior.detected and worse_K > 0.0:
         return "unexplained"
     if not posterior.detected:
-        asked = {one.effect.name for one in posterior.expected if one.effect.how == "U"}
+        asked = {one.effect.name for one in posterior.expected if one.effect.how == "always"}
         visible = 1.0 - len({one.mechanism for one in unseen}) / max(len(asked), 1)
         return "insufficient_data" if asked and visible < ENOUGH_VISIBLE else "consistent"
     terms = [answer.effect.term for answer in answers if answer.effect.term is not None]
@@ -287,13 +278,6 @@ def verdict_of(
     if all(term.of_measurement or term.kind == "sensor" for term in (*terms, *tied)):
         return "sensor_fault"
     return "missing_physics"
-
-
-def _placebo(found: Placebo | None, catalogue: Mapping[str, Mechanism]) -> PlaceboEvidence | None:
-    if found is None:
-        return None
-    return PlaceboEvidence(session=found.session, log_e_value=found.log_e, mechanism=name_in(catalogue, found.best),
-                           place=found.best.place)  # fmt: skip
 
 
 def _unseen(posterior: Posterior, catalogue: Mapping[str, Mechanism]) -> tuple[NotDetectable, ...]:
@@ -421,7 +405,7 @@ def _calibrated(
     )  # fmt: skip
 
 
-def _ranking(posterior: Posterior, catalogue: Mapping[str, Mechanism]) -> tuple[Ranked, ...]:
+def _ranking(posterior: Posterior) -> tuple[Ranked, ...]:
     """Everything that was judged, most probable first; of a pair both names."""
     return tuple(
         Ranked(
@@ -429,7 +413,7 @@ def _ranking(posterior: Posterior, catalogue: Mapping[str, Mechanism]) -> tuple[
             place=" + ".join(effect.place for effect in one.effects),
             family=" + ".join(dict.fromkeys(effect.family for effect in one.effects)), log_bayes=one.log_bayes,
             probability=probability,
-            laws=tuple(law_of(name_in(catalogue, effect), effect.place) for effect in one.effects),
+            laws=tuple(law_of(effect.mechanism, effect.place) for effect in one.effects),
         )
         for one, probability in posterior.ranked[:MOST_RANKED]
     )  # fmt: skip

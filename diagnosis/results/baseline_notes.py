@@ -24,7 +24,7 @@ def baseline_notes(experiment: Experiment, posterior: Posterior, answers: Sequen
     single = [one for one in posterior.judged if len(one.effects) == 1]
     ahead = max(single, key=lambda one: one.log_bayes + one.log_prior + one.effects[0].less, default=None)
     placebo = posterior.placebo
-    raised = placebo is not None and posterior.threshold == placebo.log_e
+    raised = placebo is not None and posterior.threshold == placebo.log_e_value
     return baselines_told(float(acting[0]), sessions_apart(best), effects[0].name if effects else "",
                           placebo if raised else None, ahead.effects[0] if ahead else None)  # fmt: skip
 
@@ -64,9 +64,10 @@ def baselines_told(
     ]  # fmt: skip
     if placebo is not None:
         notes.append(
-            f"In the baseline '{placebo.session}' nothing is wrong, but the same test finds {placebo.log_e:.0f} nat in "
-            f"it ({placebo.best.name} at {placebo.best.place}; for as many hours as are tested). So much is model "
-            "error: the recordings have to bring more. If that effect may have acted there, leave the session out."
+            f"In the baseline '{placebo.session}' nothing is wrong, but the same test finds "
+            f"{placebo.log_e_value:.0f} nat in it ({placebo.mechanism} at {placebo.place}; for as many hours as are "
+            "tested). So much is model error: the recordings have to bring more. If that effect may have acted there, "
+            "leave the session out."
         )
     if ahead is not None and ahead.less > NOTED_FROM:
         notes.append(

@@ -9,7 +9,6 @@ from datetime import UTC, timedelta
 import numpy as np
 import sympy as sp
 
-from diagnosis.candidates.dated import CHANGED, HOURS, STEP, WHILE, changed_law
 from diagnosis.candidates.hypotheses import Hypothesis
 from diagnosis.decision.answer import Answer
 from diagnosis.decision.posterior import Posterior
@@ -29,7 +28,6 @@ from models.terms.term import Term
 
 # In sentences about a change, whose strength shows which.
 EITHER = (("smaller or greater", "smaller", "greater"), ("more or less", "less", "more"))
-ENDINGS = (STEP, WHILE, HOURS, "carried_on")
 FORM_ERROR = 0.1  # of a strength and its heat: laws of the literature are hardly known better
 SLOPE_STEP = 1e-4  # of a prior standard deviation
 BAND_SD = 2.0  # 95 %
@@ -59,7 +57,7 @@ def finding_of(
     units = {p.name: p.unit for p in (setup.nominal.parameters if term is None else term.parameters)}
     prefix = "" if term is None else f"{term.label}_"
     return Finding(
-        mechanism=name_in(catalogue, effect),
+        mechanism=effect.mechanism,
         family=effect.family,
         place=effect.place,
         node=node_in(setup.nominal, effect),
@@ -80,18 +78,12 @@ def finding_of(
         heat=heat_over_time(pieces, heats) if heats else {},
         term=None if term is None else term.with_values(found),
         grade=answer.grade,
-        tie_set=tuple(dict.fromkeys(law_of(name_in(catalogue, one), one.place) for one, _ in answer.tied)),
+        tie_set=tuple(dict.fromkeys(law_of(one.mechanism, one.place) for one, _ in answer.tied)),
         joint_probability=answer.joint,
         acts_like=answer.acts_like,
         date=change_of(values, effect, fit.experiment, recordings),
         switching=switching_of(values, effect),
     )  # fmt: skip
-
-
-def name_in(catalogue: Mapping[str, Mechanism], effect: Hypothesis) -> str:
-    """Name of the law in the catalogue, for one with a date or a course too; else the name of the effect."""
-    law = changed_law(effect)
-    return next((name for name in (law, *(law + ending for ending in CHANGED)) if name in catalogue), effect.name)
 
 
 def _says(answer: Answer, found: Mapping[str, float]) -> str:
@@ -123,7 +115,7 @@ def _equation(effect: Hypothesis, found: Mapping[str, float]) -> str:
         return ""
     local = {name.removeprefix(f"{term.label}_"): 0.0 if name == effect.clock else value
              for name, value in found.items()}  # fmt: skip
-    before = next((term.label.removesuffix(f"_{end}") for end in ENDINGS if term.label.endswith(f"_{end}")), term.label)
+    before = term.label.removesuffix(f"_{effect.ending}")
     known = {**found, **local, **{f"{before}_{name}": value for name, value in local.items()}}
     return term.with_values(found).equation(known)
 
@@ -134,7 +126,7 @@ def _rivals(
     """Other names at their most probable places: those of the tie set with its probabilities, then everything else."""
 
     def key(effect: Hypothesis) -> str:
-        return effect.label if effect.term is None else name_in(catalogue, effect)
+        return effect.label if effect.term is None else effect.mechanism
 
     own, free = answer.effect, without_sensor(setup.nominal, setup.channels)
     others = {effect.label for effect in answer.best.effects}
@@ -155,9 +147,8 @@ def _rivals(
             where[key(other)] = other
     return tuple(
         Rival(
-            mechanism=name_in(catalogue, where[name]), place=where[name].place, probability=probability,
-            separate_by=separation(own, where[name], catalogue, setup.nominal, free,
-                                   names=(name_in(catalogue, own), name_in(catalogue, where[name]))),
+            mechanism=where[name].mechanism, place=where[name].place, probability=probability,
+            separate_by=separation(own, where[name], catalogue, setup.nominal, free),
             instead=name in tied or alone[name] >= LEAST_RIVAL,
         )
         for name, probability in sorted({**odds, **tied}.items(), key=lambda one: (one[0] not in tied, -one[1]))

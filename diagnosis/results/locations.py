@@ -64,7 +64,7 @@ def _place(
     signals["time"] = (np.concatenate([piece.middle for piece in pieces]) / 3600.0, "h")
     signals = {name: signal for name, signal in signals.items() if np.ptp(signal[0]) > 0.0}
     acting = active(together, steps)
-    dated = BETWEEN if here.name.endswith(WHILE) else FROM_DATE if here.how == "D" else ""
+    dated = BETWEEN if here.ending == WHILE else FROM_DATE if here.how == "from_date" else ""
     split = np.split(acting, np.cumsum([len(heat) for heat in heats])[:-1])
     when = [(piece.recording, a, b) for piece, acts in zip(pieces, split, strict=True)
             for a, b in windows(piece.middle, acts)]  # fmt: skip

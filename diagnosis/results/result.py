@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Literal
 
+from diagnosis.decision.posterior import Placebo, Repeating, ScaledError
 from diagnosis.decision.settings import Settings
 from diagnosis.results.calibrated_model import CalibratedModel
 from diagnosis.results.first_screen import first_screen_of, verdict_text_of
@@ -25,7 +26,6 @@ from diagnosis.results.result_parts import (
     Ranked,
     or_none,
 )
-from diagnosis.results.robustness import PlaceboEvidence, Repeating, ScaledError
 from diagnosis.results.tables import Table, draw_explanations, table_of
 from models.correction.instruments import InputCorrection, SensorCorrection
 from models.simulation.thermal_network import ThermalNetwork
@@ -102,7 +102,7 @@ class Diagnosis:
         Deviation between sessions that the data support, in prior standard deviations
     repeating : tuple of Repeating
         Evidence of the scan if sessions differ as the data support, and by twice as much or more; else empty
-    placebo : PlaceboEvidence or None
+    placebo : Placebo or None
         What a healthy session brings, if there is one
     holdout_gain : float
         Log predictive density of the held-out readings: final model less the calibrated one, [nat]; NaN without any
@@ -158,7 +158,7 @@ class Diagnosis:
     scaled_error: tuple[ScaledError, ...] = ()
     session_s: float = 0.0
     repeating: tuple[Repeating, ...] = ()
-    placebo: PlaceboEvidence | None = None
+    placebo: Placebo | None = None
     holdout_gain: float = math.nan
     contradicted: bool = False
     faulty: tuple[str, ...] = ()

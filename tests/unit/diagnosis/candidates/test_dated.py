@@ -8,7 +8,6 @@ import pytest
 from diagnosis.candidates.dated import (
     Axis,
     carried_on,
-    changed_law,
     changing,
     for_a_while,
     has_clock,
@@ -62,7 +61,7 @@ def test_for_a_while_ends(air: Placed) -> None:
 def test_courses_over_hours_go_on_in_the_next_recording(air: Placed) -> None:
     hypothesis = changing(air, over_hours(AXIS), AXIS)
     assert isinstance(hypothesis.term, Placed)
-    assert hypothesis.how == "W"
+    assert hypothesis.how == "over_hours"
     names = [p.name.removeprefix(f"{hypothesis.term.label}_") for p in hypothesis.term.parameters]
     for variant, expected in zip(hypothesis.variants, (0.1, 1 - np.exp(-2 / 3), np.exp(-2 / 3)), strict=True):
         own = {name: v for name, v in zip(names, variant.tolist(), strict=True) if name != "start"}
@@ -102,7 +101,7 @@ def test_a_law_of_time_is_carried_on(fzg: Gearbox) -> None:
     assert has_clock(placed)
     assert not may_change(placed)
     hypothesis = carried_on(placed, AXIS)
-    assert (hypothesis.name, hypothesis.how) == ("oil_loss", "C")
+    assert (hypothesis.name, hypothesis.how) == ("oil_loss", "carried_on")
     assert hypothesis.label != f"{placed.name}@{placed.place}"
     assert isinstance(hypothesis.term, Placed)
     own = {"strength": -0.3, "life": 1000.0}
@@ -117,7 +116,7 @@ def test_every_definition_has_changes_of_its_own_laws(name: str) -> None:
     factors = factors_of(network, scale, [part.name for part in network.parts])
     changes = [changing(one, step(AXIS), AXIS) for one in factors]
     assert len({one.label for one in changes}) == len(changes)
-    assert {changed_law(one) for one in changes} == {one.name for one in factors}
+    assert {one.law for one in changes} == {one.name for one in factors}
     targets = {target for one in factors for target in one.target}
     assert {link.name for link in network.links if not link.conductance.is_zero} <= targets
     assert {source.name for source in network.sources if source.is_loss} <= targets

@@ -25,11 +25,11 @@ from diagnosis.decision.posterior import KINDS, Judged, Posterior
 from diagnosis.decision.scanned import ScanInClass, Scanned, counts_less, in_best_classes, scan_in_classes
 from diagnosis.decision.settings import Settings
 from diagnosis.engine.calibration import Calibration, calibrate_with_error, recalibrate
-from diagnosis.engine.candidates import scan
 from diagnosis.engine.families import axis_of, changes, log_prior, parameters_outside
 from diagnosis.engine.fit import Experiment, Fit, calibrate
 from diagnosis.engine.learnt import ErrorClass, error_classes, rule
 from diagnosis.engine.prepare import prepare_experiment
+from diagnosis.engine.scan import scan
 from diagnosis.engine.unknown import TermParameter
 from diagnosis.results.findings import values_of
 from models.assembly.gearbox import Gearbox
@@ -95,12 +95,12 @@ def test_a_concealed_effect_is_detected_and_first(concealed: Posterior) -> None:
 
 def test_a_baseline_that_brings_evidence_raises_what_is_asked_for(fzg: Gearbox, concealed: Posterior) -> None:
     """Windage acts in the baseline alone: nothing is missing in the recordings, whatever has to be explained."""
-    assert concealed.placebo is not None and concealed.placebo.log_e < 10.0 == concealed.threshold
+    assert concealed.placebo is not None and concealed.placebo.log_e_value < 10.0 == concealed.threshold
     found = inferred(fzg, 0.0, in_baselines_W=(WINDAGE_W, 0.0))
     assert found.placebo is not None
-    assert (found.placebo.session, found.placebo.best.label) == ("april", "windage@oil")
-    assert found.placebo.log_e > 10.0 and found.class_threshold == 5.0
-    assert found.threshold == found.placebo.log_e
+    assert (found.placebo.session, found.placebo.mechanism, found.placebo.place) == ("april", "windage", "oil")
+    assert found.placebo.log_e_value > 10.0 and found.class_threshold == 5.0
+    assert found.threshold == found.placebo.log_e_value
     assert not found.detected
     judged = {one.label: one for one in found.judged if len(one.effects) == 1}
     dated, always = judged["windage_step@oil"], judged["windage@oil"]
@@ -111,7 +111,7 @@ def test_a_baseline_that_brings_evidence_raises_what_is_asked_for(fzg: Gearbox, 
 def test_an_effect_in_the_recordings_raises_nothing(fzg: Gearbox) -> None:
     """Beside a thermometer that reads too high in the recordings, those of the baselines would read too low."""
     found = inferred(fzg, 0.0, in_baselines_W=(0.0, 0.0), bias_K=3.0)
-    assert found.placebo is not None and found.placebo.log_e < 5.0
+    assert found.placebo is not None and found.placebo.log_e_value < 5.0
     assert found.detected and found.explanations[0].names == ("sensor_bias",)
     assert found.nothing.fit is not None  # the baselines repeat, so the recordings do not say otherwise
     assert found.nothing.fit.experiment.most_deviation == rule().repeats >= found.session_s
@@ -124,9 +124,9 @@ def test_a_baseline_shows_nothing_of_what_has_no_place_in_the_machine(fzg: Gearb
 
 def test_a_parameter_outside_its_prior_is_no_sign_that_something_is_missing() -> None:
     """What an effect explains less well than a parameter does is no evidence for it."""
-    mechanism = Hypothesis(name="windage", place="oil", family="no-load loss", variants=np.ones((1, 1)))
+    mechanism = Hypothesis(name="windage", place="oil", family="no-load loss", law="windage", variants=np.ones((1, 1)))
     parameter = Hypothesis(name="parameter", place="h_air", family="parameter", unknown=0, variants=np.ones((1, 1)),
-                           how="P")  # fmt: skip
+                           law="parameter h_air", how="parameter")  # fmt: skip
     found = Scanned(candidates=(mechanism, parameter), log_prior=np.log([0.9, 0.1]), log_bayes=np.array([60.0, 80.0]),
                     classes=(), best=())  # fmt: skip
     assert found.log_e == pytest.approx(60.0 - 80.0 + np.log(9.0))
@@ -137,8 +137,8 @@ def test_a_parameter_outside_its_prior_is_no_sign_that_something_is_missing() ->
 def test_a_change_over_time_counts_less_where_the_model_fits_badly_without_it_or_with_it() -> None:
     full = next(one for one in error_classes() if one.name == "full")
     small = next(one for one in error_classes() if one.name == "splits")
-    always, dated = (Hypothesis(name="windage", place="oil", family="no-load loss", variants=np.ones((1, 1)), how=how)
-                     for how in ("U", "D"))  # fmt: skip
+    always = named("windage", "oil")
+    dated = replace(always, how="from_date")
     assert counts_less((always, dated), full, full).tolist() == [0.0, full.over_time] and full.over_time > 20.0
     assert counts_less((always, dated), full, small).tolist() == [0.0, 0.5 * full.over_time]
     assert not counts_less((always, dated), small, small).any()
@@ -164,17 +164,17 @@ def test_nothing_gets_the_evidence_that_it_has_from_the_point_of_an_explanation(
 def test_the_scan_is_told_for_a_machine_that_repeats_worse(concealed: Posterior) -> None:
     """With sessions that may differ by more, less of the difference between them is evidence."""
     supported, worse = concealed.repeating
-    assert worse.deviation >= 2.0 * supported.deviation and worse.deviation > 0.0
-    assert {one.best.label for one in concealed.repeating} == {"windage@oil"}
-    assert worse.log_e < supported.log_e and supported.log_e > 5.0
+    assert worse.deviation_in_sd >= 2.0 * supported.deviation_in_sd and worse.deviation_in_sd > 0.0
+    assert {(one.mechanism, one.place) for one in concealed.repeating} == {("windage", "oil")}
+    assert worse.log_e_value < supported.log_e_value and supported.log_e_value > 5.0
 
 
 def test_the_scan_is_told_for_less_and_more_model_error(concealed: Posterior, healthy: Posterior) -> None:
     half, assumed, twice = concealed.scaled
     assert (half.factor, assumed.factor, twice.factor) == (0.5, 1.0, 2.0)
-    assert {one.best.label for one in concealed.scaled} == {"windage@oil"}
-    assert all(one.log_e > one.threshold for one in concealed.scaled)
-    assert all(one.log_e < one.threshold for one in healthy.scaled)
+    assert {(one.mechanism, one.place) for one in concealed.scaled} == {("windage", "oil")}
+    assert all(one.log_e_value > one.threshold for one in concealed.scaled)
+    assert all(one.log_e_value < one.threshold for one in healthy.scaled)
 
 
 def test_scaled_model_error_is_that_of_a_class_with_such_amplitudes(fzg: Gearbox) -> None:
@@ -211,7 +211,7 @@ def test_its_size_is_found(concealed: Posterior) -> None:
 def test_a_change_at_a_date_competes_under_the_name_of_its_law(concealed: Posterior) -> None:
     members = {one.label: one for one in concealed.explanations[0].members}
     dated = members["windage_step@oil"]
-    assert dated.effects[0].how == "D" and dated.names == ("windage",)
+    assert dated.effects[0].how == "from_date" and dated.names == ("windage",)
     # It was there from the first row on: a date brings nothing.
     assert dated.log_bayes < members["windage@oil"].log_bayes + 1.0
 
@@ -230,7 +230,7 @@ def test_every_candidate_is_judged_and_the_best_are_fitted(healthy: Posterior, c
 
 
 def named(name: str, place: str) -> Hypothesis:
-    return Hypothesis(name=name, place=place, family="heat", variants=np.ones((1, 1)))
+    return Hypothesis(name=name, place=place, family="heat", law=name, variants=np.ones((1, 1)))
 
 
 def scanned_as(candidates: list[Hypothesis], log_bayes: Array) -> Scanned:
@@ -260,7 +260,9 @@ def test_names_share_the_race() -> None:
 
 def test_every_candidate_is_judged_in_the_class_that_suits_it() -> None:
     """A small class is far behind without an effect; the effect that explains the readings brings it to the front."""
-    candidates = [Hypothesis(name=name, place="oil", family="heat", variants=np.ones((1, 1))) for name in "ab"]
+    candidates = [
+        Hypothesis(name=name, place="oil", family="heat", law=name, variants=np.ones((1, 1))) for name in "ab"
+    ]
     scanned = SimpleNamespace(candidates=tuple(candidates))
 
     def in_class(name: str, log_bayes: list[float]) -> ScanInClass:
@@ -281,7 +283,7 @@ def test_a_share_of_a_swap_is_refused_with_a_number(
     strength = Parameter(name="swap", start=0.0, sd=1.0, lower=-2.0, upper=2.0, log=False)
     term = Term(label="swap", kind="sensor", target=("oil", "pinion"), expression=symbol("swap"), form="swapped",
                 parameters=(strength,))  # fmt: skip
-    swap = Hypothesis(name="swapped_channels", place="oil_pinion", family="measurement", term=term,
+    swap = Hypothesis(name="swapped_channels", place="oil_pinion", family="measurement", term=term, law="swap",
                       variants=np.ones((1, 1)))  # fmt: skip
     unknown = TermParameter(parameter=strength, label="swap", names=("swap",))
     experiment = SimpleNamespace(unknowns=[unknown])

@@ -10,7 +10,7 @@ import pytest
 
 from diagnosis.candidates.hypotheses import Hypothesis
 from diagnosis.decision.answer import Answer, decide, withdraw_claim
-from diagnosis.decision.posterior import KINDS, Judged, Likeness, Posterior, name_of
+from diagnosis.decision.posterior import KINDS, Judged, Likeness, Posterior
 from diagnosis.decision.settings import Settings
 from diagnosis.engine.fit import Fit
 from diagnosis.engine.learnt import ErrorClass, error_classes, rule
@@ -33,8 +33,17 @@ def effect(
     strength = Parameter(name=f"{label}_strength", unit="W", start=0.0, sd=10.0, lower=-100.0, upper=100.0, log=False)
     term = Term(label=label, kind=kind, target=target or (place,), expression=symbol(strength.name),
                 parameters=(strength,))  # fmt: skip
-    return Hypothesis(**({"name": name, "place": place, "family": "heat", "term": term, "variants": np.ones((1, 1))}
-                         | given))  # fmt: skip
+    return Hypothesis(**({"name": name, "place": place, "family": "heat", "term": term, "law": name,
+                          "variants": np.ones((1, 1))} | given))  # fmt: skip
+
+
+def outside(parameter: str) -> Hypothesis:
+    """A parameter outside its prior."""
+    return effect("parameter", parameter, term=None, unknown=0, law=f"parameter {parameter}", how="parameter")
+
+
+def over_hours(law: str) -> Hypothesis:
+    return effect(f"{law}_over_hours", law=law, how="over_hours", clock="start")
 
 
 def judged(log_bayes: float, *effects: Hypothesis, log_prior: float | None = None) -> Judged:
@@ -80,8 +89,8 @@ def test_places_weigh_in_the_mean_by_their_priors() -> None:
 
 
 def test_a_law_and_its_change_at_a_date_are_one_name() -> None:
-    always, dated = effect("windage"), effect("windage_step", how="D", clock="start")
-    hours = effect("windage_over_hours", how="W", clock="start")
+    always, dated = effect("windage"), effect("windage_step", law="windage", how="from_date", clock="start")
+    hours = over_hours("windage")
     (found,) = posterior(judged(20.0, always), judged(STRONG, dated), judged(0.0, hours)).explanations
     assert found.names == ("windage",) and found.members[0].effects == (dated,)
 
@@ -106,7 +115,7 @@ def test_names_that_explain_too_little_are_refuted() -> None:
 
 
 def test_probabilities_sum_to_one_with_nothing() -> None:
-    parameter = effect("parameter", "h_air", term=None, unknown=0, how="P")
+    parameter = outside("h_air")
     sensor = effect("sensor_bias", kind="sensor")
     pair = judged(STRONG + 8.0, effect("first"), effect("second"))
     every = [judged(STRONG, effect("first")), judged(STRONG, sensor), judged(50.0, parameter), pair,
@@ -194,7 +203,10 @@ def test_it_acts_like_names_that_act_on_the_same(kind: Kind, target: tuple[str, 
 
 
 def test_a_course_over_the_hours_is_never_a_claim() -> None:
-    (answer,) = decide(posterior(judged(STRONG, effect("windage_over_hours", how="W", clock="start"))), Settings())
+    (answer,) = decide(
+        posterior(judged(STRONG, over_hours("windage"))),
+        Settings(),
+    )
     assert answer.probability > ENOUGH and (answer.grade, answer.acts_like) == ("likely", True)
 
 
@@ -302,7 +314,10 @@ def test_a_fit_at_the_best_place_goes_before_others() -> None:
 
 
 def test_a_parameter_outside_its_prior_is_answered_by_its_name() -> None:
-    h_air, h_oil = (effect("parameter", name, term=None, unknown=i, how="P") for i, name in enumerate(("air", "oil")))
+    h_air, h_oil = (
+        effect("parameter", name, term=None, unknown=i, law=f"parameter {name}", how="parameter")
+        for i, name in enumerate(("air", "oil"))
+    )
     found = posterior(judged(STRONG, h_air), judged(0.0, h_oil), log_e=-1.0, log_parameter=100.0)
     (answer,) = decide(found, Settings())
     assert answer.effect is h_air and answer.grade == "claim"
@@ -316,13 +331,12 @@ def test_a_parameter_outside_its_prior_is_answered_by_its_name() -> None:
 
 def test_a_parameter_outside_its_prior_goes_behind_something_that_is_missing() -> None:
     """Next to an effect that is detected a parameter has only what that leaves."""
-    parameter = judged(STRONG + 20.0, effect("parameter", "air", term=None, unknown=0, how="P"))
+    parameter = judged(STRONG + 20.0, outside("air"))
     found = posterior(judged(STRONG, effect("windage")), parameter, log_e=9.0, log_parameter=100.0)
     (answer,) = decide(found, Settings())
     assert answer.effect.name == "windage" and found.evidence == 9.0
     assert found.of("parameter") == pytest.approx(1.0 - found.something)
-    two = judged(STRONG + 40.0, *(effect("parameter", name, term=None, unknown=i, how="P")
-                                  for i, name in enumerate(("air", "oil"))))  # fmt: skip
+    two = judged(STRONG + 40.0, *map(outside, ("air", "oil")))
     (answer,) = decide(replace(found, judged=(replace(found.judged[0], left=50.0), parameter, two)), Settings())
     assert answer.effect.name == "windage"  # two of them are no effect either
     silent = replace(found, log_e=4.0)
@@ -377,4 +391,4 @@ def test_a_name_that_mostly_stands_alone_stands_in_place_of_another_one(gain: fl
     both = sum(one.probability for one in found.explanations if one.names == ("first", "second"))
     assert (0.0 < both < chances(found)["second"]) == stands
     (answer, *_) = decide(found, Settings())
-    assert ("second" in [name_of(one) for one, _ in answer.tied]) == stands
+    assert ("second" in [one.law for one, _ in answer.tied]) == stands

@@ -10,11 +10,11 @@ import pytest
 from diagnosis.candidates.hypotheses import Hypothesis, hypothesis_of
 from diagnosis.engine.baselines import effects_in_baselines, sessions_apart
 from diagnosis.engine.calibration import calibrate_with_error
-from diagnosis.engine.candidates import scan
 from diagnosis.engine.fit import Experiment, Fit, calibrate
 from diagnosis.engine.outside import SIZES, judge_outside, outside_of
 from diagnosis.engine.prepare import prepare_experiment
 from diagnosis.engine.refit import refit
+from diagnosis.engine.scan import scan
 from diagnosis.engine.sessions import over_sessions
 from diagnosis.recordings.recording import Recording
 from diagnosis.setup.inference_setup import InferenceSetup

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from diagnosis.candidates.hypotheses import Hypothesis, hypothesis_of
-from diagnosis.engine.candidates import scan
 from diagnosis.engine.fit import Experiment, Fit, calibrate
 from diagnosis.engine.prepare import prepare_experiment
 from diagnosis.engine.refit import refit
+from diagnosis.engine.scan import scan
 from diagnosis.engine.unknown import ClockOffset, InputGain, SensorBias
 from diagnosis.recordings.recording import Recording
 from diagnosis.setup.inference_setup import InferenceSetup

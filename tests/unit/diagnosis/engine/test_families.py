@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import get_args
 
 import numpy as np
 import pytest
 import sympy as sp
 
 from diagnosis.candidates.dated import Axis
-from diagnosis.candidates.hypotheses import Hypothesis
-from diagnosis.engine.candidates import Scan, columns_of, scan, term_on_grid
+from diagnosis.candidates.hypotheses import How, Hypothesis
 from diagnosis.engine.families import axis_of, candidates_of, log_prior
 from diagnosis.engine.fit import Experiment, Fit, calibrate
 from diagnosis.engine.outside import judge_outside, outside_of
 from diagnosis.engine.prepare import prepare_experiment
 from diagnosis.engine.refit import refit, with_candidate
+from diagnosis.engine.scan import Scan, columns_of, scan, term_on_grid
 from diagnosis.recordings.recording import Recording
 from diagnosis.setup.inference_setup import InferenceSetup
 from models.assembly.gearbox import Gearbox
@@ -110,7 +111,7 @@ def test_the_change_wins_in_the_scan(fit: Fit, found: Scan, axis: Axis) -> None:
     assert found.candidates[best].name in ("air_cooling_step", "radiation_step")
     at = [c.label for c in found.candidates].index(AIR)
     assert single.log_bayes[best] - single.log_bayes[at] < 5.0
-    undated = [x for c, x in zip(found.candidates, single.log_bayes, strict=True) if c.how == "U"]
+    undated = [x for c, x in zip(found.candidates, single.log_bayes, strict=True) if c.how == "always"]
     assert single.log_bayes[at] > max(undated) + 20.0
 
 
@@ -216,12 +217,12 @@ def test_prior_of_families(candidates: tuple[Hypothesis, ...]) -> None:
     """Shares of the families; names in a family are alike, and so are places of a name."""
     prior = np.exp(log_prior(candidates))
     assert prior.sum() == pytest.approx(1.0)
-    share = {how: sum(p for p, h in zip(prior, candidates, strict=True) if h.how == how) for how in "UDWP"}
-    assert share["D"] / share["U"] == pytest.approx(0.2 / 0.6)
-    assert share["W"] / share["U"] == pytest.approx(0.1 / 0.6)
-    assert share["P"] / share["U"] == pytest.approx(0.05)
-    of_name = {h.name: 0.0 for h in candidates if h.how == "U"}
+    share = {how: sum(p for p, h in zip(prior, candidates, strict=True) if h.how == how) for how in get_args(How)}
+    assert share["from_date"] / share["always"] == pytest.approx(0.2 / 0.6)
+    assert share["over_hours"] / share["always"] == pytest.approx(0.1 / 0.6)
+    assert share["parameter"] / share["always"] == pytest.approx(0.05)
+    of_name = {h.name: 0.0 for h in candidates if h.how == "always"}
     for p, h in zip(prior, candidates, strict=True):
-        if h.how == "U":
+        if h.how == "always":
             of_name[h.name] += p
     assert np.ptp(list(of_name.values())) < 1e-12

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from diagnosis.candidates.hypotheses import hypothesis_of
-from diagnosis.engine.candidates import SHAPES_TRIED, Scan, scan
 from diagnosis.engine.fit import Experiment, Fit, calibrate
 from diagnosis.engine.refit import refit
+from diagnosis.engine.scan import SHAPES_TRIED, Scan, scan
 from models.assembly.gearbox import Gearbox
 from models.mechanisms import CATALOGUE, Placed, Scale
 from tests.unit.diagnosis.inference_example import CHANNELS, acting, with_measured

@@ -141,7 +141,7 @@ def assembled(prepared: Prepared, calibration: Calibration, recordings: tuple[Re
 def claimed(assembled: Assemble, prepared: Prepared, windage: Judged) -> Diagnosis:
     """Windage, 30 nat ahead of foaming oil."""
     far = judged_of(prepared, "hot_neighbour", "housing_lower", 82.0)
-    placebo = Placebo(session="april", log_e=2.5, best=windage.effects[0])
+    placebo = Placebo(session="april", log_e_value=2.5, mechanism="windage", place="oil")
     posterior = posterior_of(prepared[2], windage, far, session_s=0.2, error_class="no-load losses", remainder=1.5,
                              placebo=placebo)  # fmt: skip
     probability = float(posterior.ranked[0][1])
@@ -361,7 +361,13 @@ def test_a_parameter(assembled: Assemble, prepared: Prepared) -> None:
     z[index] = wide.z_of(value)
     fit = replace(plain.experiment, unknowns=unknowns).fit(z, iterations=0)
     effect = Hypothesis(
-        name="parameter", place=name, family="parameter", unknown=index, variants=np.ones((1, 1)), how="P"
+        name="parameter",
+        place=name,
+        family="parameter",
+        unknown=index,
+        law=f"parameter {name}",
+        variants=np.ones((1, 1)),
+        how="parameter",
     )
     judged = Judged(effects=(effect,), log_prior=-3.0, log_bayes=40.0, fit=fit, error_class=error_classes()[0])
     answer = Answer(best=judged, effect=effect, grade="claim", probability=0.95, joint=0.95)

@@ -23,15 +23,16 @@ def test_a_session_of_another_machine_is_noted() -> None:
 
 
 def test_a_baseline_that_brings_evidence_is_noted() -> None:
-    damage = Hypothesis(name="bearing_damage", place="bearing_1", family="bearing", variants=np.ones((1, 1)))
-    (note,) = baselines_told(0.0, {}, placebo=Placebo(session="april", log_e=50.6, best=damage))
+    damage = Placebo(session="april", log_e_value=50.6, mechanism="bearing_damage", place="bearing_1")
+    (note,) = baselines_told(0.0, {}, placebo=damage)
     assert note.startswith(
         "In the baseline 'april' nothing is wrong, but the same test finds 51 nat in it (bearing_damage"
     )
 
 
 def test_what_a_baseline_takes_from_a_change_is_noted() -> None:
-    step = Hypothesis(name="air_cooling_step", place="air", family="heat", variants=np.ones((1, 1)), how="D", less=95.0)
+    step = Hypothesis(name="air_cooling_step", place="air", family="heat", law="air_cooling",
+                      variants=np.ones((1, 1)), how="from_date", less=95.0)  # fmt: skip
     (note,) = baselines_told(0.0, {}, ahead=step)
     assert note.startswith("A baseline, in which nothing changed, seems to show air_cooling_step as well: 95 nat of it")
     assert baselines_told(0.0, {}, ahead=replace(step, less=4.0)) == ()

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from diagnosis.decision.posterior import Placebo
 from diagnosis.report import finding_charts, page
 from diagnosis.results.first_screen import EITHER, VERDICT_TEXT
 from diagnosis.results.result import Diagnosis
 from diagnosis.results.result_parts import Change, Fits, Ranked, Rival, Switching
-from diagnosis.results.robustness import PlaceboEvidence
 from tests.unit.diagnosis.diagnosis_example import consistent, missing_physics, two_effects, unexplained
 
 
@@ -30,7 +30,7 @@ def test_the_verdict_stands_first_then_the_questions_in_order() -> None:
 
 
 def test_a_baseline_that_raises_the_threshold_is_told_with_it() -> None:
-    healthy = PlaceboEvidence(session="march", log_e_value=38.0, mechanism="windage", place="oil")
+    healthy = Placebo(session="march", log_e_value=38.0, mechanism="windage", place="oil")
     raised = replace(missing_physics(), placebo=healthy, threshold=38.0)
     assert "38.0 needed (as much as the baseline 'march' brings)" in told(raised, "Is something missing?")
     little = replace(raised, threshold=raised.further_threshold)
