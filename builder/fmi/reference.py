@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from builder.fmi.reference_cycle import reference_cycle
-from builder.fmi.signals import START_TEMPERATURE, Signal, SignalTable
+from builder.fmi.signals import Signal, SignalTable, start_temperature
 from models.assembly.gearbox import Gearbox
 from models.base.types import Array
 from models.portable import solver
 from models.portable.evaluation import NoLosses
-from models.portable.surrogate import KELVIN, SurrogateLosses
+from models.portable.surrogate import SurrogateLosses
 from models.simulation.result import Result
 from models.simulation.simulate import advance, evaluate, initial_states, input_table, network_system
 from models.simulation.thermal_network import ThermalNetwork
@@ -47,7 +47,7 @@ def reference_run(
     losses = NoLosses() if surrogate is None else surrogate
     rows = input_table(network, cycle)
     system = network_system(network, losses)
-    starts = initial_states(network, START_TEMPERATURE - KELVIN)
+    starts = initial_states(network, start_temperature(network))
     held = np.concatenate((rows[:1], rows[:-1]))  # at the end of a step its inputs still hold
     states = [solver.start(starts, system.n_boundaries)]
     for begin, end, row in zip(cycle.time[:-1], cycle.time[1:], rows[:-1], strict=True):

@@ -19,12 +19,12 @@ import sympy as sp
 
 from models.base.errors import InputError, did_you_mean
 from models.network.laws import symbol
-from models.portable.surrogate import SurrogateLosses
+from models.portable.surrogate import KELVIN, SurrogateLosses
 from models.quantities.quantities import GEARBOX_INPUTS, TYPES, quantity_of_signal
 from models.quantities.units import UNITS, Unit, conversion, find_unit, fmi_symbol
 from models.simulation.thermal_network import ThermalNetwork
 
-START_TEMPERATURE = 293.15  # K
+START_DEGC = 20.0  # of a network without an ambient temperature
 INITIAL = ("initial.uniform", "initial.T")
 HEADER = ("signal", "kind", "unit", "shown in", "column of files", "start", "range", "trained on", "meaning")
 LOWEST_START, HIGHEST_START = 173.15, 773.15  # K; what lies outside is most likely degC
@@ -258,6 +258,12 @@ def signal_table(network: ThermalNetwork, losses: SurrogateLosses | None = None)
     return SignalTable(list(_Table(network, losses).signals()))
 
 
+def start_temperature(network: ThermalNetwork) -> float:
+    """Temperature at which an FMU starts unless it is told another one: the ambient one of its definition, [degC]."""
+    ambient = network.inputs.get("T_ambient")
+    return START_DEGC if ambient is None else ambient.default
+
+
 def _convert(unit: Unit, to: Unit, value: float) -> float:
     """Convert a value to another unit, to 12 digits."""
     factor, offset = conversion(to, unit)
@@ -438,9 +444,11 @@ class _Table:
         )  # fmt: skip
 
     def _initial(self) -> Iterator[Signal]:
+        start = start_temperature(self.network) + KELVIN
+
         def fixed(name: str, role: Role, text: str, of: str = "") -> Signal:
             return Signal(
-                name=name, role=role, of=of, description=text, type="Temperature", unit="K", start=START_TEMPERATURE,
+                name=name, role=role, of=of, description=text, type="Temperature", unit="K", start=start,
                 causality="parameter", variability="fixed", initial="exact", minimum=LOWEST_START,
                 maximum=HIGHEST_START, nominal=TYPES["Temperature"].nominal,
             )  # fmt: skip
@@ -448,7 +456,8 @@ class _Table:
         yield Signal(name="initial.uniform", role="initial_uniform", causality="parameter", variability="fixed",
                      initial="exact", start=True,
                      description="True: all nodes start at initial.T; false: each at its T_start")  # fmt: skip
-        yield fixed("initial.T", "initial_temperature", "Temperature of all nodes at the start, if initial.uniform")
+        text = "Temperature of all nodes at the start, if initial.uniform; it does not follow T_ambient"
+        yield fixed("initial.T", "initial_temperature", text)
         for part in self.network.parts:
             text = f"Temperature of {part.name.replace('_', ' ')} at the start, unless initial.uniform"
             yield fixed(f"{fmi_name(part.name)}.T_start", "start_temperature", text, part.name)

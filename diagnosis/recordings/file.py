@@ -139,7 +139,7 @@ def _clock(table: pd.DataFrame, mapping: RecordingMapping) -> Clock:
         known = did_you_mean(time.column, [str(column) for column in table.columns])
         raise InputError(f"column {time.column} of [time] in its mapping file is missing{known}")
     is_stamp = pd.api.types.is_datetime64_any_dtype(table[time.column].dtype)
-    return Clock(column=time.column, unit=ISO if is_stamp else time.unit)
+    return Clock(column=time.column, unit=ISO if is_stamp else time.unit, zone=time.zone)
 
 
 def set_to_one_clock(files: Sequence[RecordingFile]) -> None:

@@ -33,6 +33,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
+from zoneinfo import ZoneInfo
 
 import pandas as pd
 from pydantic import Field, field_validator, model_validator
@@ -109,10 +110,23 @@ class Column(Section):
 
 
 class Time(Section):
-    """``[time]``: the column with the time, and its unit, or the form of its dates as ``%d.%m.%Y %H:%M:%S``."""
+    """``[time]``: the column with the time, and its unit, or the form of its dates as ``%d.%m.%Y %H:%M:%S``.
+
+    ``zone`` is the time zone of dates that state none, as ``Europe/Berlin``; without it they are taken as UTC.
+    """
 
     column: str
     unit: str = "s"
+    zone: str | None = None
+
+    @field_validator("zone")
+    @classmethod
+    def _is_zone(cls, value: str) -> str:
+        try:
+            ZoneInfo(value)
+        except (KeyError, ValueError, OSError):
+            raise ValueError(f"{value!r} is no time zone; write it as 'Europe/Berlin' or 'UTC'") from None
+        return value
 
     @field_validator("unit")
     @classmethod

@@ -135,10 +135,13 @@ class Clock:
     ----------
     unit : str
         Of numbers; ``iso8601`` for texts and for the time stamps of a Parquet file, or the form of other dates
+    zone : str or None
+        Time zone of dates that state none; None: UTC
     """
 
     column: str
     unit: str
+    zone: str | None = None
 
     @property
     def is_date(self) -> bool:
@@ -147,6 +150,9 @@ class Clock:
 
     def lacks_zone(self, values: pd.Series) -> bool:
         """True for dates without a time zone, which are taken as UTC."""
+        return self.zone is None and self._lacks_zone(values)
+
+    def _lacks_zone(self, values: pd.Series) -> bool:
         if not self.is_date or values.empty:
             return False
         if pd.api.types.is_datetime64_any_dtype(values.dtype):
@@ -160,20 +166,27 @@ class Clock:
         """Convert a time column, shape (rows,), to [s], dates since 1970; NaN for a cell that is no time."""
         if not self.is_date:
             return _numbers(values) * units_in_files("time", "s")[self.unit][0]
+        zone = self.zone if self._lacks_zone(values) else None
         if pd.api.types.is_datetime64_any_dtype(values.dtype):
-            stamps = pd.to_datetime(values, utc=True)
+            stamps = values if zone else pd.to_datetime(values, utc=True)
         elif self.unit != ISO:
-            stamps = pd.to_datetime(values.astype(str).str.strip(), format=self.unit, utc=True, errors="coerce")
+            stamps = pd.to_datetime(values.astype(str).str.strip(), format=self.unit, utc=zone is None, errors="coerce")
         else:
             texts = values.astype(str).str.strip().str.replace(",", ".")
-            stamps = pd.to_datetime(
-                texts.where(texts.map(lambda text: bool(_ISO.fullmatch(text)))),
-                format="ISO8601",
-                utc=True,
-                errors="coerce",
-            )
+            known = texts.where(texts.map(lambda text: bool(_ISO.fullmatch(text))))
+            stamps = pd.to_datetime(known, format="ISO8601", utc=zone is None, errors="coerce")
+        if zone:
+            stamps = _local(stamps, zone)
         seconds = (stamps - pd.Timestamp(0, tz="UTC").as_unit("s")) / pd.Timedelta(seconds=1)
         return np.asarray(seconds.to_numpy(dtype=np.float64, na_value=np.nan), dtype=np.float64)
+
+
+def _local(stamps: pd.Series, zone: str) -> pd.Series:
+    """Local time with its zone; NaT where it does not exist, or comes twice and the rows do not tell which it is."""
+    try:
+        return stamps.dt.tz_localize(zone, ambiguous="infer", nonexistent="NaT")
+    except ValueError:
+        return stamps.dt.tz_localize(zone, ambiguous="NaT", nonexistent="NaT")
 
 
 def _numbers(values: pd.Series) -> Array:
@@ -277,7 +290,7 @@ def check_time(values: pd.Series, seconds: Array, clock: Clock, problems: Proble
         _check_zones(values, name, rows, problems)
     steps = np.diff(seconds)
     back, same = np.flatnonzero(steps < 0.0), np.flatnonzero(steps == 0.0)
-    hint = "; local time that is set back in autumn needs a zone, e.g. +02:00" if clock.is_date else ""
+    hint = "; local time that is set back in autumn needs its zone in a mapping (time.zone)" if clock.is_date else ""
     if len(back):
         row = int(back[0])
         problems.add(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from importlib import resources
 from typing import Any
 
@@ -52,7 +52,7 @@ def page(diagnosis: Diagnosis) -> str:
         items=[(wording.plain(title_of(item)), [_finding(finding) for finding in item]) for item in diagnosis.items],
         stages=course_charts.stages_of(diagnosis),
         told=network_chart.marks(diagnosis).told(network_chart.corrected(diagnosis)),
-        fits=[(title, _rows(fits), _each(fits))
+        fits=[(title, _rows(fits, diagnosis.faulty), _each(fits))
               for title, fits in (("Held out", diagnosis.holdout), ("Learned from", diagnosis.train))],
         has_noise=diagnosis.noise_K > 0.0,
         learnt=[
@@ -118,11 +118,15 @@ def _finding(finding: Finding) -> dict[str, Any]:
     }
 
 
-def _rows(fits: Fits) -> list[tuple[str, str, tuple[float, float, float]]]:
+def _rows(fits: Fits, faulty: Sequence[str]) -> list[tuple[str, str, tuple[float, float, float]]]:
     """Sensor, unit and errors; nothing without recordings."""
     if not math.isfinite(fits.before):
         return []
-    total = ("all temperatures", "K", (fits.before, fits.calibrated, fits.after))
+    total = (
+        f"all but {', '.join(faulty)}" if faulty else "all temperatures",
+        "K",
+        (fits.before, fits.calibrated, fits.after),
+    )
     return [total, *((c, "W" if c == wording.LOSS else "K", errors) for c, errors in fits.sensors.items())]
 
 

@@ -31,7 +31,8 @@ WORDS: Mapping[str, str] = {
     "loss counts too.",
     "free-running": "Simulated from the start temperatures on with the recorded inputs alone, never corrected by a "
     "measurement on the way.",
-    "RMSE": "Root mean square of simulated less measured: the typical size of the error.",
+    "RMSE": "Root mean square of simulated less measured: the typical size of the error. Readings are means over 20 s "
+    "or longer where rows lie closer; what a recording begins with, to find its start temperatures, does not count.",
     "probability": "Share of the belief among all explanations that were compared, weighed before by how usual each "
     "is; not the chance that a thing of this name is in the gearbox if the true cause is not among them.",
     "evidence": "Natural logarithm of how many times better the data are predicted with the effect than without it, "
@@ -52,7 +53,8 @@ WORDS: Mapping[str, str] = {
     "prior": "What the definition states about a parameter before any recording: a value, and how far off it may be.",
     "shift": "How far the calibration moved a parameter, in standard deviations of its prior. Beyond ±2 "
     "something else probably pulls at it.",
-    "noise": "Scatter of a temperature reading from row to row; no model can be closer to single rows than this.",
+    "noise": "Scatter of a temperature reading from row to row; no model can be closer to single rows than this, but "
+    "to means over several.",
     "floor": "Random heat that even a model without faults is granted, because a real gearbox is finer than any "
     "network of few nodes; mismatches below it are not claimed.",
     "not ruled out": "Explanations that these data leave possible, with their probabilities.",

@@ -52,7 +52,7 @@ def separation(
 
 def next_test(
     verdict: Verdict, findings: Sequence[Finding], location: Sequence[Location], unseen: Sequence[NotDetectable],
-    catalogue: Mapping[str, Mechanism], *, assumed: Collection[str], free: Collection[str],
+    catalogue: Mapping[str, Mechanism], *, assumed: Collection[str], free: Collection[str], missed: Sequence[str],
 ) -> str:  # fmt: skip
     """The next measurement; empty if there is nothing to ask for.
 
@@ -64,7 +64,12 @@ def next_test(
         Inputs that were not recorded
     free : collection of str
         Parts that can have a sensor
+    missed : sequence of str
+        Held-out recordings that are missed, worst first
     """
+    if verdict == "consistent" and missed:
+        return (f"diagnose {missed[0]} with the recordings that agree as baselines (--baseline): it shows what changed "
+                "between them")  # fmt: skip
     if verdict == "unexplained" and "T_ambient" in assumed:
         return "record T_ambient_degC: it is taken as constant, so changes of the air look like heat at other parts"
     for finding in findings:

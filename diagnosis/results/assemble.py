@@ -165,6 +165,7 @@ def assemble(
         next_test=next_test(
             verdict, findings, location, unseen, catalogue, assumed=assumed,
             free=without_sensor(setup.nominal, setup.channels),
+            missed=holdout.far_beyond(train_fits, settings.matters_K),
         ),
         courses=_courses(setup, predicted),
         network=setup.nominal,

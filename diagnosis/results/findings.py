@@ -28,6 +28,7 @@ from models.terms.term import Term
 
 # In sentences about a change, whose strength shows which.
 EITHER = (("smaller or greater", "smaller", "greater"), ("more or less", "less", "more"))
+UNIT_SLIP = 8.0  # times its value or less that a parameter rarely is; units differ by 9.5, 60, 1000
 FORM_ERROR = 0.1  # of a strength and its heat: laws of the literature are hardly known better
 SLOPE_STEP = 1e-4  # of a prior standard deviation
 BAND_SD = 2.0  # 95 %
@@ -62,7 +63,7 @@ def finding_of(
         place=effect.place,
         node=node_in(setup.nominal, effect),
         kind="parameter" if term is None else "sensor" if term.of_measurement else term.kind,
-        says=_says(answer, found),
+        says=_says(answer, found, {parameter.name: parameter.start for parameter in setup.nominal.parameters}),
         reference=term.mechanism.reference if isinstance(term, Placed) else "",
         equation=_equation(effect, found),
         probability=answer.probability,
@@ -86,14 +87,20 @@ def finding_of(
     )  # fmt: skip
 
 
-def _says(answer: Answer, found: Mapping[str, float]) -> str:
+def _says(answer: Answer, found: Mapping[str, float], stated: Mapping[str, float]) -> str:
+    """A sentence; `found` and `stated` are values of parameters by name."""
     effect = answer.effect
     if effect.is_open:
         says = f"A heat at {effect.place.replace('_', ' ')} that is like no law of the catalogue."
     elif isinstance(effect.term, Placed):
         says = effect.term.says
     elif effect.term is None:
-        says = f"The parameter {effect.place} is {found[names_of(effect)[0]]:.3g}, far from what the definition allows."
+        value, before = found[names_of(effect)[0]], stated.get(effect.place, 0.0)
+        says = f"The parameter {effect.place} is {value:.3g}, far from what the definition allows."
+        if not 1.0 / UNIT_SLIP < abs(value / before if before else 1.0) < UNIT_SLIP:
+            says += (
+                f" It has {before:.3g}: look first for a wrong unit of an input, such as N m where kN m are recorded."
+            )
     else:
         says = f"{effect.name.replace('_', ' ').capitalize()} at {effect.place.replace('_', ' ')}."
     for either, less, more in EITHER:

@@ -38,6 +38,7 @@ LIKELY_TEXT: Mapping[str, str] = {  # of the same verdicts where no name is a cl
     "sensor_fault": "A sensor, clock or recorded input is probably at fault, not the machine.",
 }
 EITHER = "The measurement is at fault, or the model leaves out physics: these data do not separate the two."
+MISSED = "What was learnt from agrees with the model; held-out {names} not."
 UNFIT = "The model cannot be brought to fit these recordings, and why has no name."
 LARGEST_ERROR = "full"  # class of model error
 FAR_SD, MOST_FAR = 3.0, 3  # standard deviations of a prior, beyond which the summary tells of a parameter; how many
@@ -52,6 +53,8 @@ def verdict_text_of(d: Diagnosis) -> str:
     """The verdict in a sentence."""
     if _cannot_be_fitted(d):
         return UNFIT
+    if d.verdict == "consistent" and d.missed:
+        return MISSED.format(names=f"{', '.join(d.missed)} {'does' if len(d.missed) == 1 else 'do'}")
     if d.verdict == "unexplained" and any(f.family != OPEN_FORM for f in d.findings):
         return PARTLY
     if any(finding.grade == "claim" for finding in d.findings):
@@ -92,7 +95,8 @@ def _missing(d: Diagnosis) -> str:
             f"delivered ({d.train.before:.2f} K), and no effect explains that ({reached}). Look first for swapped or "
             "wrong columns, other units, and a wrong definition."
         )
-    return f"Nothing that these data show: {reached}."
+    where = " in what was learnt from" if d.missed else ""
+    return f"Nothing that these data show{where}: {reached}."
 
 
 def _cannot_be_fitted(d: Diagnosis) -> bool:
@@ -195,20 +199,24 @@ def _sessions_told(d: Diagnosis) -> list[str]:
 
 
 def _how_much_better(d: Diagnosis) -> tuple[str, ...]:
-    lines = []
+    lines, without = [], f" without {', '.join(d.faulty)}" if d.faulty else ""
     for name, fits in (("held-out", d.holdout), ("training", d.train)):
         if fits.before == fits.before:
             what = "the findings" if d.findings else "what was fitted"
             found = f", {fits.found:.2f} K with {what}" if d.findings or d.terms else ""
             learnt = f", {fits.after:.2f} K with what was learnt of model error" if d.learnt else ""
             lines.append(
-                f"RMSE {name}: {fits.before:.2f} K as delivered, {fits.calibrated:.2f} K calibrated{found}{learnt} "
-                f"(noise {d.noise_K:.2f} K)"
+                f"RMSE {name}{without}: {fits.before:.2f} K as delivered, {fits.calibrated:.2f} K calibrated"
+                f"{found}{learnt} (noise {d.noise_K:.2f} K)"
             )
     if d.has_correction and d.holdout.after > d.holdout.calibrated:
         lines.append(
             "Held-out temperatures are not closer than with the calibrated model: predict with calibrated.toml"
         )
+    lines += [
+        f"{name} is missed: {d.holdout.recordings[name][2]:.2f} K, where it was learnt from {d.train.after:.2f} K"
+        for name in d.missed
+    ]
     lines += _worse_recordings(d)
     named_terms = {finding.term.label for finding in d.findings if finding.term is not None}
     further = len([term for term in d.terms if term.label not in named_terms])

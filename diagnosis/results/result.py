@@ -199,7 +199,8 @@ class Diagnosis:
             "calibration": [asdict(one) for one in self.calibration],
             "fit": {"train": self.train.to_dict(),
                     "holdout": self.holdout.to_dict() | {"log_score_gain": or_none(self.holdout_gain),
-                                                           "contradicts_findings": self.contradicted},
+                                                           "contradicts_findings": self.contradicted,
+                                                           "missed": list(self.missed)},
                     "faulty_channels": list(self.faulty), "noise_K": self.noise_K, "floor": self.floor},
             "kinds": dict(self.kinds),
             "settings": asdict(self.settings),
@@ -243,6 +244,11 @@ class Diagnosis:
     def verdict_text(self) -> str:
         """The verdict in a sentence."""
         return verdict_text_of(self)
+
+    @property
+    def missed(self) -> tuple[str, ...]:
+        """Held-out recordings that the model misses far beyond what it was learnt from, worst first."""
+        return self.holdout.far_beyond(self.train, self.settings.matters_K)
 
     @property
     def places(self) -> tuple[Location, ...]:

@@ -303,6 +303,9 @@ class PredictedRun:
         return draw_channel(self, channel, ax)
 
 
+MISSED = 3.0  # times the error of the recordings learnt from, beyond which a held-out one is missed
+
+
 @dataclass(frozen=True, kw_only=True)
 class Fits:
     """Root mean square errors of one set of recordings.
@@ -331,6 +334,14 @@ class Fits:
         The gain in log score is in nat, the white noise of a temperature row in K.
         """
         return gain < 0.0 or self.after - self.calibrated > noise_K
+
+    def far_beyond(self, train: Fits, matters_K: float) -> tuple[str, ...]:
+        """Recordings whose error is several times that of those learnt from and larger by what matters, worst first."""
+        far = {
+            name: after for name, (_, _, after) in self.recordings.items()
+            if after > MISSED * train.after and after - train.after > matters_K
+        }  # fmt: skip
+        return tuple(sorted(far, key=lambda name: -far[name]))
 
     def to_dict(self) -> dict[str, Any]:
         """The errors as they are in ``diagnosis.json``."""

@@ -10,6 +10,7 @@ from typing import Any
 from models.assembly.definition_schema import definition_schema, table_classes
 from models.assembly.gearbox import FOLDER
 from models.assembly.gearbox_definition import Definition
+from models.definition.definition_file import OIL_OF_SEAL
 from models.definition.key_texts import TEXTS
 from models.definition.parametric_sections import KEY, ParametricDefinition
 from models.files.toml_file import packaged, parse, read_text
@@ -65,6 +66,8 @@ def commented_definition(like: str, *, name: str, file: str, schema: str) -> str
             written += [*before, line]
         elif match := ASSIGNMENT.match(line):
             key = match[1]
+            if key == OIL_OF_SEAL:  # by default it follows the oil, which is soon another one
+                continue
             written += comments.of(key)
             at_root = comments.path == "" and key in own
             written.append(f"{key} = {json.dumps(own[key], ensure_ascii=False)}" if at_root else line)

@@ -25,7 +25,7 @@ from models.assembly.parametric import (
     with_losses_as_laws,
 )
 from models.base.errors import InputError, did_you_mean
-from models.definition.definition_file import fault_lines, placed, read_values, refuse
+from models.definition.definition_file import fault_lines, placed, read_values, refilled, refuse
 from models.definition.messages import validate_section
 from models.definition.nested_values import leaves_of, plain, with_value
 from models.definition.parametric_sections import KEY, ParametricDefinition
@@ -222,10 +222,13 @@ class Gearbox:
     def with_values(self, changes: Mapping[str, Any]) -> Gearbox:
         """Return a new, validated gearbox with some values changed; sources and priors stay.
 
+        Another ``oil.named`` changes the whole oil, another ``bearing.N.designation`` the sizes and constants of that
+        bearing.
+
         Parameters
         ----------
         changes : Mapping of str to value
-            New values by dotted path, in the unit of the key
+            New values by dotted path, in the unit of the key; names count before what is changed of a named one
 
         Raises
         ------
@@ -237,18 +240,24 @@ class Gearbox:
         >>> gearbox = load_gearbox("fzg").with_values({"stage.0.friction.mu_solid": 0.07, "factors.h_air": 1.1})
         >>> gearbox.stage[0].friction.mu_solid, gearbox.factors["h_air"]
         (0.07, 1.1)
+        >>> round(float(gearbox.with_values({"oil.named": "ISO_VG_220"}).lubricant().kinematic_viscosity(40.0)))
+        220
         """
         values: Any = self.values
-        for path, value in changes.items():
+        notes = Annotations(sources=dict(self.sources), priors=dict(self.priors))
+        changed: list[str] = []
+        for path, value in sorted(changes.items(), key=lambda item: not item[0].endswith((".named", ".designation"))):
             try:
                 values = with_value(values, path.split("."), plain(value))
             except LookupError:
                 hint = did_you_mean(path, self.leaves)
                 raise InputError(f"{self.file}: {path} is not a value of this gearbox{hint}") from None
+            values, whole = refilled(values, path, notes)
+            changed.append(whole)
+        refuse(notes.faults, values, file=self.file)
         definition = _validate(values, file=self.file)
-        changed = dict.fromkeys(changes, CHANGED_SOURCE)
-        notes = Annotations(sources={**self.sources, **changed}, priors=dict(self.priors))
-        given = {leaf for leaf, _ in leaves_of(values) if any(f"{leaf}.".startswith(f"{path}.") for path in changes)}
+        notes.sources.update(dict.fromkeys(changes, CHANGED_SOURCE))
+        given = {leaf for leaf, _ in leaves_of(values) if any(f"{leaf}.".startswith(f"{path}.") for path in changed)}
         return Gearbox(definition, notes, self.given | given, self.file)
 
     @property

@@ -6,14 +6,17 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, TypeVar
 
 from models.base.errors import InputError, did_you_mean, shown
-from models.definition.known_bearings import filled_by_designation
+from models.definition.known_bearings import NEEDED, filled_by_designation
 from models.definition.messages import place_in
 from models.definition.named_oils import read_oil
+from models.definition.nested_values import with_value
+from models.definition.sections import Fluid
 from models.definition.values_with_source import Annotations, strip
 from models.files.toml_file import parse_schema_1
 
 T = TypeVar("T")
 
+OIL_OF_SEAL = "nu_40_mm2_s"  # grade of the oil in a seal's law; by default that of the oil
 LIKE_KEYS = ("bearing", "seal")  # tables that may have ``like = "<name of an earlier one>"`` and only what differs
 # Giving one of these in a gearbox file also replaces the other in the named oil.
 ALTERNATIVES = {"viscosity_points": "d341", "d341": "viscosity_points"}
@@ -51,6 +54,45 @@ def read_values(text: str, *, file: str) -> tuple[dict[str, Any], Annotations]:
             for index, own in enumerate(bearings)
         )
     return values, notes
+
+
+def refilled(values: Mapping[str, Any], path: str, notes: Annotations) -> tuple[Mapping[str, Any], str]:
+    """Values in which the oil, or a bearing, got another name: what follows from a name follows from the new one.
+
+    Parameters
+    ----------
+    path : str
+        Dotted path of what was changed
+    notes : Annotations
+        Gets the sources and standard deviations of what follows, and a fault where the name is not known
+
+    Returns
+    -------
+    values : mapping
+    changed : str
+        Path of all that changed: the whole oil; else `path`
+    """
+    table, _, key = path.rpartition(".")
+    if path == "oil.named":
+        own = {key: value for key, value in values["oil"].items() if key not in Fluid.model_fields}
+        for of_oil in Fluid.model_fields:
+            _forget(notes, f"oil.{of_oil}")
+        seals = tuple({k: v for k, v in seal.items() if k != OIL_OF_SEAL} for seal in values["seal"])
+        return {**values, "oil": _filled_from_named_oil(own, notes), "seal": seals}, table
+    if table.startswith("bearing.") and key == "designation":
+        bearing = values["bearing"][int(table.removeprefix("bearing."))]
+        own = {key: value for key, value in bearing.items() if key not in NEEDED}
+        for needed in NEEDED:
+            _forget(notes, f"{table}.{needed}")
+        return with_value(values, table.split("."), filled_by_designation(own, notes, table)), table
+    return values, path
+
+
+def _forget(notes: Annotations, start: str) -> None:
+    """Drop sources and standard deviations of all paths that begin so."""
+    for kept in (notes.sources, notes.priors):
+        for path in [path for path in kept if path.startswith(start)]:
+            del kept[path]
 
 
 def refuse(faults: Iterable[tuple[str, str]], values: Any, *, file: str) -> None:

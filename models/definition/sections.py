@@ -267,7 +267,7 @@ class Stage(Section):
     z: tuple[Teeth, Teeth]
     module_mm: Annotated[float, between(0.2, 50.0)]
     pressure_angle_deg: Annotated[float, between(10.0, 35.0)]
-    helix_angle_deg: Annotated[float, between(-60.0, 60.0)] = 0.0
+    helix_angle_deg: float = 0.0
     face_width_mm: Annotated[float, between(1.0, 1000.0)]
     center_distance_mm: Annotated[float, between(5.0, 5000.0)]
     profile_shift: tuple[Annotated[float, between(-2.0, 3.0)], Annotated[float, between(-2.0, 3.0)]]
@@ -322,7 +322,8 @@ class Stage(Section):
     def _gears_are_possible(self) -> Self:
         if self.helix_angle_deg != 0.0:
             raise ValueError(
-                f"helix_angle_deg = {self.helix_angle_deg:g}: helical gears are not supported yet; only 0 (spur) is"
+                f"helix_angle_deg = {self.helix_angle_deg:g}: helical gears are not supported yet; only 0 (spur) is. "
+                "Describe such a machine without geometry: python -m builder new FILE --like reducer"
             )
         for name, bore, r_f in zip(self.names, self.bore_mm, self.pair().r_f, strict=True):
             if bore >= 2e3 * r_f:

@@ -238,7 +238,7 @@ def test_fixed_parameters_and_booleans(host: Host3) -> None:
     slave.setBoolean([uniform], [False])
     host.set(**{"oil.T_start": 350.0})
     host.start()
-    assert host.get("oil.T", "pinion.T") == [350.0, 293.15]
+    assert host.get("oil.T", "pinion.T") == [350.0, 300.15]
 
 
 def test_functions_without_use_return_an_error_and_one_message(host: Host3, fmu: Unpacked) -> None:

@@ -76,7 +76,7 @@ def test_fixed_parameters_cannot_be_set_after_the_start(host: Host, illegal: Ill
         host.set_all({"initial.T": 400.0})
     (said,) = host.said
     assert said[0] == ERROR
-    assert host.get("oil.T")[0] == pytest.approx(293.15)
+    assert host.get("oil.T")[0] == pytest.approx(300.15)
 
 
 @pytest.mark.parametrize("duration", [100.0, 1.0])
@@ -118,7 +118,7 @@ def test_start_temperatures_that_are_not_used_are_reported_once(path: Path) -> N
 
 @pytest.mark.parametrize(
     "values",
-    [{"initial.T": 350.0}, {"oil.T_start": 350.0, "initial.T": 350.0}, {"oil.T_start": 293.15},
+    [{"initial.T": 350.0}, {"oil.T_start": 350.0, "initial.T": 350.0}, {"oil.T_start": 300.15},
      {"oil.T_start": 350.0, "initial.uniform": 0.0}],
 )  # fmt: skip
 def test_start_temperatures_that_change_nothing_are_not_reported(path: Path, values: dict[str, float]) -> None:

@@ -106,7 +106,7 @@ FILES: list[tuple[str | bytes, tuple[str, ...]]] = [
     (text(lambda t: t[:2]), ("has 2 rows",)),
     (dated(lambda s: [*s[:30], "29.10.2017 00:05", *s[31:]]), ("time_utc", "row 31", "ISO 8601")),
     (dated(lambda s: [*s[:30], *(t.removesuffix("Z") for t in s[30:])]), ("time zone", "rows 1 and 31")),
-    (dated(lambda s: [*s[:30], *s[20:50]]), ("time_utc goes back", "row 31", "needs a zone")),
+    (dated(lambda s: [*s[:30], *s[20:50]]), ("time_utc goes back", "row 31", "needs its zone")),
     (with_column("torque_Nm", sound()["torque_Nm"].where(W < 2)), ("only 4 of rows 1-60 have torque_Nm",)),
     (text(lambda t: t.assign(speed_rpm=t["speed_rpm"].where(W < 25), torque_Nm=t["torque_Nm"].where(W > 45))),
      ("only 0 of rows 1-60 have speed_rpm and torque_Nm",)),

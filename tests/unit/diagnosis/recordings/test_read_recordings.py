@@ -101,6 +101,25 @@ def test_an_mdf_file_with_slow_channels(tmp_path: Path, network: ThermalNetwork)
     assert recording.start is not None
 
 
+@pytest.mark.parametrize("unit", ["iso8601", "%d.%m.%Y %H:%M:%S"])
+def test_local_time_with_its_zone(tmp_path: Path, network: ThermalNetwork, unit: str) -> None:
+    """Through the night in which clocks are set back: the rows tell the first of the two hours from the second."""
+    source = table(count=60).drop(columns="time_s")
+    utc = pd.date_range("2017-10-28T22:00Z", periods=len(source), freq="10min")
+    form = "%Y-%m-%dT%H:%M:%S" if unit == "iso8601" else unit
+    (tmp_path / "run.toml").write_text(
+        f'schema = 1\ntime = {{ column = "local", unit = "{unit}", zone = "Europe/Berlin" }}\n'
+    )
+    local = source.assign(local=utc.tz_convert("Europe/Berlin").strftime(form))
+    recording = read(write(tmp_path / "run.csv", local), network)
+    assert recording.start == datetime(2017, 10, 28, 22, tzinfo=UTC)
+    np.testing.assert_allclose(recording.time, 600.0 * np.arange(len(source)))
+    assert not any("time zone" in note for note in recording.notes)
+    (tmp_path / "run.toml").write_text('schema = 1\ntime = { column = "local", zone = "Berlin" }\n')
+    with pytest.raises(InputError, match="'Berlin' is no time zone; write it as 'Europe/Berlin'"):
+        read(tmp_path / "run.csv", network)
+
+
 def test_iso_times_and_their_start(tmp_path: Path, network: ThermalNetwork) -> None:
     source = table()
     stamps = pd.Timestamp("2017-09-01T08:00:00", tz="+02:00") + pd.to_timedelta(source["time_s"], unit="s")

@@ -360,15 +360,8 @@ def test_a_parameter(assembled: Assemble, prepared: Prepared) -> None:
     z = np.array(plain.z)
     z[index] = wide.z_of(value)
     fit = replace(plain.experiment, unknowns=unknowns).fit(z, iterations=0)
-    effect = Hypothesis(
-        name="parameter",
-        place=name,
-        family="parameter",
-        unknown=index,
-        law=f"parameter {name}",
-        variants=np.ones((1, 1)),
-        how="parameter",
-    )
+    effect = Hypothesis(name="parameter", place=name, family="parameter", unknown=index, law=f"parameter {name}",
+                        variants=np.ones((1, 1)), how="parameter")  # fmt: skip
     judged = Judged(effects=(effect,), log_prior=-3.0, log_bayes=40.0, fit=fit, error_class=error_classes()[0])
     answer = Answer(best=judged, effect=effect, grade="claim", probability=0.95, joint=0.95)
     raised = replace(posterior_of(plain, judged, log_e=1.0, log_parameter=40.0), threshold=238.0)  # by a baseline

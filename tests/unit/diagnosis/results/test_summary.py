@@ -196,6 +196,19 @@ def test_a_held_out_recording_that_loses_is_named() -> None:
     assert "alone" not in told(base, "How much better?")
 
 
+def test_a_held_out_recording_of_a_machine_that_changed_is_no_agreement() -> None:
+    base = consistent()
+    assert base.missed == () and "missed" not in told(base, "How much better?")
+    far = base.train.after + 2.0 * base.settings.matters_K + 3.0 * base.train.after
+    recordings = {"good": (1.0, 0.4, 0.4), "moved": (1.0, far, far), "worse": (1.0, far + 1.0, far + 1.0)}
+    changed = replace(base, holdout=replace(base.holdout, recordings=recordings))
+    assert changed.missed == ("worse", "moved")
+    assert changed.verdict_text == "What was learnt from agrees with the model; held-out worse, moved do not."
+    assert "in what was learnt from" in told(changed, "Is something missing?")
+    assert f"moved is missed: {far:.2f} K" in told(changed, "How much better?")
+    assert replace(changed, settings=replace(base.settings, matters_K=2.0 * far)).missed == ()
+
+
 @pytest.mark.parametrize(("gain", "more_K", "contradicted"), [
     (3.0, -0.2, False), (-3.0, -0.2, True), (3.0, 0.09, False), (3.0, 0.11, True), (0.0, 0.0, False),
     (np.nan, np.nan, False),

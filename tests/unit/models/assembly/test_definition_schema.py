@@ -12,6 +12,7 @@ import pytest
 from models.assembly.commented_definition import commented_definition
 from models.assembly.definition_schema import ROOTS, definition_schema, table_classes
 from models.assembly.gearbox import known_gearboxes, load_gearbox, read_gearbox
+from models.definition.definition_file import OIL_OF_SEAL
 from models.definition.key_texts import TEXTS
 from models.files.toml_file import packaged, read_text
 
@@ -91,7 +92,8 @@ def test_a_commented_definition_is_the_machine_that_it_began_from(like: str) -> 
     text = commented_definition(like, name="mine", file="mine.toml", schema="definition.schema.json")
     own, begun_from = read_gearbox(text, file="mine.toml"), load_gearbox(like)
     assert own.name == "mine"
-    assert own.values | {"name": ""} == begun_from.values | {"name": ""}
+    seals = {f"seal.{index}.{OIL_OF_SEAL}" for index in range(2)}  # left out: it follows the oil
+    assert {**own.leaves, "name": ""} == {k: v for k, v in begun_from.leaves.items() if k not in seals} | {"name": ""}
     assert own.priors == begun_from.priors
     assert faults(text) == []
     assert text.startswith("#:schema definition.schema.json\n")

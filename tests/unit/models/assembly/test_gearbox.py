@@ -13,6 +13,7 @@ import pytest
 
 from models.assembly.gearbox import Gearbox, known_gearboxes, load_gearbox, read_gearbox
 from models.base.errors import InputError
+from models.definition.named_oils import named_oil
 from models.files.toml_file import packaged, read_text
 from models.quantities.definition_units import UNITS, unit_of
 
@@ -94,7 +95,7 @@ def test_conveyor_differs_and_loads() -> None:
 
 
 def test_bundled_names_and_files(tmp_path: Path, fzg: Gearbox) -> None:
-    assert known_gearboxes() == ("conveyor", "fzg", "heated_rod", "la_haute_borne")
+    assert known_gearboxes() == ("conveyor", "fzg", "heated_rod", "la_haute_borne", "reducer")
     path = tmp_path / "mine.toml"
     path.write_text(FZG, encoding="utf-8")
     assert load_gearbox(path).hash == load_gearbox(str(path)).hash == fzg.hash
@@ -238,3 +239,23 @@ def test_hash_is_the_same_in_another_process(fzg: Gearbox) -> None:
 def test_a_definition_is_frozen(fzg: Gearbox) -> None:
     with pytest.raises(ValueError, match="frozen"):
         fzg.stage[0].friction.mu_solid = 0.1
+
+
+def test_another_oil_is_another_oil_in_all_that_follows_from_its_name(fzg: Gearbox) -> None:
+    """As a file that names it, with the level and the volume of the machine; what is given with it counts."""
+    other = fzg.with_values({"oil.volume_l": 2.0, "oil.named": "ISO_VG_220"})
+    oil = named_oil("ISO_VG_220")
+    assert other.oil.model_dump(include=set(type(oil).model_fields)) == oil.model_dump()
+    assert (other.oil.volume_l, other.oil.level_below_axis_mm) == (2.0, fzg.oil.level_below_axis_mm)
+    assert [seal.nu_40_mm2_s for seal in other.seal] == [None, None]  # the grade of the oil
+    assert other.source_of("oil.density_kg_m3") != fzg.source_of("oil.density_kg_m3")
+    with pytest.raises(InputError, match="there is no oil named 'VG'"):
+        fzg.with_values({"oil.named": "VG"})
+
+
+def test_another_designation_changes_the_bearing(fzg: Gearbox) -> None:
+    other = fzg.with_values({"bearing.0.mass_kg": 9.0, "bearing.0.designation": "NU 211"}).bearing
+    assert (other[0].bore_mm, other[0].mass_kg, other[0].shaft) == (55.0, 9.0, fzg.bearing[0].shaft)
+    assert other[1] == fzg.bearing[1]
+    with pytest.raises(InputError, match="sizes of 'NU 999' are not known"):
+        fzg.with_values({"bearing.0.designation": "NU 999"})
