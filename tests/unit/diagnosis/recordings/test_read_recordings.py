@@ -104,7 +104,7 @@ def test_an_mdf_file_with_slow_channels(tmp_path: Path, network: ThermalNetwork)
 @pytest.mark.parametrize("unit", ["iso8601", "%d.%m.%Y %H:%M:%S"])
 def test_local_time_with_its_zone(tmp_path: Path, network: ThermalNetwork, unit: str) -> None:
     """Through the night in which clocks are set back: the rows tell the first of the two hours from the second."""
-    source = table(count=60).drop(columns="time_s")
+    source = table(rows=60).drop(columns="time_s")
     utc = pd.date_range("2017-10-28T22:00Z", periods=len(source), freq="10min")
     form = "%Y-%m-%dT%H:%M:%S" if unit == "iso8601" else unit
     (tmp_path / "run.toml").write_text(
