@@ -107,7 +107,7 @@ def diagnose(
     with progress(LOADING):
         from diagnosis import diagnose as run
         from diagnosis.recordings.read import read_by_role
-        from diagnosis.report.write import names_of_files, write_files
+        from diagnosis.report.write import left_from_earlier, names_of_files, write_files
         from models.base.atomic_write import atomic_folder
         from models.mechanisms import CATALOGUE
         from models.mechanisms.user_files import check_placeable, load_mechanisms
@@ -141,13 +141,15 @@ def diagnose(
     ]
     refuse_to_replace(given, [output / name for name in names_of_files((*train, *held))])
     _print_notes((*train, *held, *healthy))
+    old = [path for path in left_from_earlier(output, (*train, *held)) if path not in given]
     with atomic_folder(output) as stage, progress("starting") as tell:
         found = run(train, definition, holdout=held, baseline=healthy, switched_off=switched_off,
                     settings=settings, catalogue=catalogue, jobs=jobs, progress=tell)  # fmt: skip
         tell("writing the report")
         names = [path.name for path in write_files(found, definition, [*train, *held], stage)]
-    for line in found.summary():
-        console.out.print(line)
+    for path in old:
+        path.unlink()
+    console.out.print("\n".join(found.summary()))
     console.out.print()
     for name in names:
         console.out.print(f"wrote {output / name}")

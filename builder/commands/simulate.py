@@ -30,6 +30,7 @@ from models.simulation.start_temperatures import start_temperatures
 
 RECORDED = "recorded"  # --initial: as the cycle's own file says
 PLOTS = (".png", ".pdf", ".svg")
+HOTTEST_DEGC = 250.0  # of a part
 COLD_START_K = 5.0  # that a start differs from what was recorded, and a warning says so
 
 Initial = float | Mapping[str, float] | None
@@ -233,6 +234,7 @@ def simulate(
     _show(columns, model.inputs)
     _print_assumed_inputs(columns, cycle, model.inputs)
     _warn_of_domain(columns, model.domain)
+    _warn_of_heat(columns)
     if initial is None:
         _warn_of_start(columns, recorded, model.nodes)
     for file in (output, plot):
@@ -299,6 +301,14 @@ def _warn_of_domain(columns: Mapping[str, Array], domain: str) -> None:
     outside = int((~columns["in_domain"].astype(bool)).sum()) if "in_domain" in columns else 0
     if outside:
         _warn(f"{outside} of {len(columns['time_s'])} rows are outside {domain}; in_domain shows which")
+
+
+def _warn_of_heat(columns: Mapping[str, Array]) -> None:
+    """Warn of a temperature that no gearbox survives: more likely an input has another unit."""
+    highest = {name: float(values.max()) for name, values in columns.items() if name.startswith("T_")}
+    hottest = max(highest, key=lambda name: highest[name])
+    if highest[hottest] > HOTTEST_DEGC:
+        _warn(f"{hottest} reaches {highest[hottest]:.0f}, which no gearbox survives; check the units of the cycle")
 
 
 def _warn_of_start(columns: Mapping[str, Array], recorded: RecordedStart, nodes: tuple[str, ...]) -> None:

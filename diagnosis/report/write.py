@@ -28,6 +28,17 @@ def names_of_files(recordings: Sequence[Recording]) -> tuple[str, ...]:
     return REPORT, NUMBERS, CORRECTION, ALONE, POSTERIOR, *(f"{recording.name}.csv" for recording in recordings)
 
 
+def left_from_earlier(folder: Path, recordings: Sequence[Recording]) -> list[Path]:
+    """Predictions of recordings that an earlier diagnosis wrote into a folder and this one does not replace."""
+    try:
+        inputs = json.loads((folder / NUMBERS).read_text(encoding="utf-8"))["inputs"]
+        names = [*inputs["recordings"], *inputs["held_out"]]
+    except (OSError, ValueError, LookupError, TypeError):
+        return []  # no diagnosis, or not one of ours
+    now = names_of_files(recordings)
+    return [folder / f"{name}.csv" for name in names if f"{name}.csv" not in now and (folder / f"{name}.csv").is_file()]
+
+
 def correction_of(diagnosis: Diagnosis, gearbox: Gearbox) -> Correction:
     """A diagnosis as a correction of the definition: the model that predicts, and how it was recorded."""
     nominal = {p.name: p for p in gearbox.network().parameters}

@@ -221,6 +221,18 @@ def test_what_lies_outside_the_range_is_told(
     assert pd.read_csv(out)["in_domain"].tolist() == [True, False, False]
 
 
+def test_a_heat_that_nothing_survives_is_told(
+    run_cli: RunCli, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Torque in N mm, say: a machine without geometry has no range of training that would show it."""
+    cycle = tmp_path / "cycle.csv"
+    for torque, told in ((290, False), (29000, True)):
+        cycle.write_text(f"time_s,speed_rpm,torque_Nm\n0,1480,{torque}\n20000,1480,{torque}\n")
+        assert run_cli("simulate", "--gearbox", "reducer", cycle, "--output", tmp_path / f"{torque}.csv") == 0
+        said = " ".join(capsys.readouterr().err.split())
+        assert ("which no gearbox survives; check the units of the cycle" in said) is told
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_an_interrupted_build_leaves_nothing(number: signal.Signals, tmp_path: Path) -> None:
