@@ -97,6 +97,21 @@ def moved(effect: ZooEffect, plant: ZooPlant, outcome: Outcome, run: int) -> flo
     return float(abs(rise) if changed.sign == 0 else changed.sign * rise)
 
 
+def test_effects_keep_their_order_by_which_seeds_draw_them() -> None:
+    order = """
+    windage pocketing churning_swirl churning_load oil_level_thermal splash_starvation misalignment bearing_preload
+    bearing_additive brake_drag pump_heat run_in_flanks run_in_seals oil_ageing oil_loss gear_wear bearing_damage
+    torque_decay aeration oil_housing_speed oil_mist bearing_seat_contact radiation_error air_cooling_change
+    fan_thermostat foundation_conduction hot_neighbour motor_flange shaft_ends_to_air water_jacket cooler_thermostat
+    cooler_proportional cooler_air_thermostat cooler_air_proportional cooler_constant cooler_shaft_driven oil_jet
+    oil_tank heater_thermostat pump_fast_stage solar_soak rain_on_housing ambient_swing ambient_drift
+    bearing_torque_square resonance stick_slip eddy_brake stiff_grease sludge water_evaporation growing_insulation
+    opening_gap timed_neighbour timed_heat door_draught melting_wax heat_pipe wet_floor loss_changes heat_changes
+    link_changes capacity_changes heat_appears link_appears set_point_changes
+    """
+    assert list(ALL) == order.split()
+
+
 def test_every_effect_acts_in_the_direction_of_its_truth(setting: Setting, drawn: Drawn) -> None:
     rng, effects = np.random.default_rng(2), []
     for name, maker in ALL.items():
