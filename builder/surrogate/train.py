@@ -11,9 +11,9 @@ import numpy as np
 from sklearn.model_selection import train_test_split
 
 from builder.surrogate.doe import latin_hypercube, mixed_hypercube, random_points, sample_losses
+from builder.surrogate.fit import fit_network, joined_network
 from builder.surrogate.levenberg_marquardt import LevenbergMarquardtRegressor
 from builder.surrogate.networks import OTHER_HIDDEN, Domain, NetworkSpec, Preset, network_specs, preset_named
-from builder.surrogate.pipeline import joined_network, plain_network, reduced_target, surrogate_pipeline
 from models.base.errors import InputError
 from models.base.parallel import run_parallel
 from models.base.progress import Progress, silent
@@ -56,10 +56,9 @@ class ErrorReport:
 
 @dataclass(frozen=True, kw_only=True)
 class TrainedNetwork:
-    """A network, the scikit-learn estimators that it was folded from, and what their training shows."""
+    """A network, and how long its training took, [s]."""
 
     network: Network
-    estimators: tuple[Any, ...]
     seconds: float
 
 
@@ -269,7 +268,7 @@ def _train(
     x, _, y, _ = train_test_split(points, losses, test_size=TEST_SHARE, random_state=seed)
     apart = all(output.removesuffix("_W") in preset.hidden for output in spec.outputs)
     parts = [[column] for column in range(len(spec.outputs))] if apart else [list(range(len(spec.outputs)))]
-    estimators, networks = [], []
+    networks = []
     for columns in parts:
         outputs = [spec.outputs[column] for column in columns]
         powers = spec.powers[columns] if preset.transforms else None
@@ -283,16 +282,7 @@ def _train(
             tolerance=preset.tolerance,
             random_state=seed,
         )
-        estimator = surrogate_pipeline(
-            features=spec.features(transforms=preset.transforms),
-            viscosity=viscosity,
-            standardised=preset.transforms,
-            network=regressor,
-        ).fit(x, y[:, columns] if powers is None else reduced_target(x, y[:, columns], powers))
-        estimators.append(estimator)
-        networks.append(plain_network(estimator, spec, outputs, powers))
-    return TrainedNetwork(
-        network=joined_network(networks),
-        estimators=tuple(estimators),
-        seconds=time.perf_counter() - begin,
-    )
+        networks.append(
+            fit_network(regressor, x, y[:, columns], spec=spec, outputs=outputs, powers=powers, viscosity=viscosity)
+        )
+    return TrainedNetwork(network=joined_network(networks), seconds=time.perf_counter() - begin)
