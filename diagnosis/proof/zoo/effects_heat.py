@@ -81,7 +81,7 @@ def fan_thermostat(s: Setting, rng: np.random.Generator) -> Draft:
     """A fan cools one wall, faster the warmer its feeler is."""
     walls = s.group("housing")
     wall = walls[int(rng.integers(len(walls)))]
-    T_on, tau = s.quantile(wall, float(rng.uniform(0.4, 0.8))), s.lag(rng, 60.0, 300.0)
+    T_on, tau = s.quantile(wall, float(rng.uniform(0.4, 0.8))), s.lag(rng, 300.0)
     act = s.link_factor(s.link_between((wall,), (AIR,)), lambda m: soft((m.T["fan feeler"] - T_on) / 1.0))
     act = act + Act(parts=s.follower("fan feeler", wall, tau))
     return Draft(act=act, law="conductance of one wall to air (1 + a s((T_feeler - T_on) / 1 K))", unit="1", cap=4.0,
@@ -170,7 +170,7 @@ def cooler_air_proportional(s: Setting, rng: np.random.Generator) -> Draft:
 
 
 def _cooler(s: Setting, rng: np.random.Generator, *, width: float, power: float, water: bool) -> Draft:
-    T_on, tau = s.quantile("oil", float(rng.uniform(0.4, 0.8))), s.lag(rng, 60.0, 400.0)
+    T_on, tau = s.quantile("oil", float(rng.uniform(0.4, 0.8))), s.lag(rng, 400.0)
     parts = s.follower("valve feeler", "oil", tau)
     cold = _below_air(s, rng)
 
