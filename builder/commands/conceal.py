@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 
@@ -11,10 +11,10 @@ import click
 from builder.base import console
 from builder.base.example import example
 from builder.base.progress import LOADING, progress
-from builder.commands.conceal_in_zoo import conceal_in_zoo
-from builder.commands.conceal_into import conceal_into
 from models.assembly.gearbox import load_gearbox
 from models.base.errors import InputError
+
+Make = Callable[..., list[str]]  # of the folders for recordings and truth; writes cases and returns their names
 
 
 def _list_effects(context: click.Context, _: click.Parameter, asked: bool) -> None:
@@ -102,23 +102,37 @@ def conceal(
     of_zoo = {"--machine": machine, "--families": families, "--group": group, "--baselines": baselines or None,
               "--session-deviation": session_deviation}  # fmt: skip
     of_injection = {"--into": into, "--place": place, "--date": date, "--control": control or None}
+    recordings, truth, number = output / "recordings", truth or output / "truth", cases or 1
     if plant == "zoo":
         own = {"--effect": effect, "--random": random or None, "--strength": strength}
         _refuse({**own, **of_injection}, "do not go with --plant zoo, where effects are drawn; see --group")
-        conceal_in_zoo(seed=seed, output=output, truth=truth, cases=cases, machine=machine, families=families,
-                       group=group, baselines=baselines, session_deviation=session_deviation)  # fmt: skip
-        return
-    _refuse(of_zoo, "go with --plant zoo only; the own plant takes --gearbox and records no baselines")
-    if into is not None:
-        if random or strength is not None:
-            raise InputError("--into draws effect and size; leave out --random and --strength")
-        conceal_into(into, gearbox, effect=effect, place=place, date=date, control=control, cases=cases, seed=seed,
-                     output=output, truth=truth)  # fmt: skip
-        return
-    if control or place is not None or date is not None:
-        raise InputError("--control, --place and --date go with --into")
+        what, make = "concealing", _in_zoo(seed, number, machine=machine, families=families, group=group)
+        make = partial(make, baselines=baselines, session_deviation=session_deviation)
+    else:
+        _refuse(of_zoo, "go with --plant zoo only; the own plant takes --gearbox and records no baselines")
+        if into is not None:
+            if random or strength is not None:
+                raise InputError("--into draws effect and size; leave out --random and --strength")
+            make = _into(into, gearbox, recordings, effect=effect, place=place, date=date, control=control)
+            what, make = "injecting", partial(make, number=number, seed=seed)
+        else:
+            if control or place is not None or date is not None:
+                raise InputError("--control, --place and --date go with --into")
+            what = "simulating the recordings, percent"
+            make = _in_own_plant(gearbox, seed, number, effect=effect, random=random, strength=strength)
+
+    from diagnosis.proof.cases.case_files import staged_folders
+
+    with staged_folders(recordings, truth) as (stage, truth_stage), progress(what) as told:
+        names = make(recordings=stage, truth=truth_stage, flat=cases is None, progress=partial(told, what))
+    for name in names:
+        console.out.print(f"wrote {recordings / ('' if cases is None else name)}, {truth / name}.json")
+
+
+def _in_own_plant(
+    gearbox: str, seed: int, number: int, *, effect: str | None, random: bool, strength: float | None
+) -> Make:
     with progress(LOADING):
-        from diagnosis.proof.cases.case_files import staged_folders
         from diagnosis.proof.cases.conceal import conceal_set, random_plans  # imports scipy.signal
         from diagnosis.proof.cases.concealed_case import Plan
 
@@ -126,23 +140,39 @@ def conceal(
         raise InputError("conceal takes either --effect NAME or --random")
     if random and strength is not None:
         raise InputError("--strength goes with --effect; --random draws it")
-    number = 1 if cases is None else cases
     if effect is None:
         plans = random_plans(seed, number)
     else:
         plans = [Plan(group="single", effects=(effect,), strength=strength)] * number
-    definition = load_gearbox(gearbox)
-    recordings, truth = output / "recordings", truth or output / "truth"
-    with (
-        staged_folders(recordings, truth) as (stage, truth_stage),
-        progress("concealing") as told,
-    ):
-        names = conceal_set(
-            definition, plans, seed=seed, recordings=stage, truth=truth_stage, flat=cases is None,
-            progress=partial(told, "simulating the recordings, percent"),
-        )  # fmt: skip
-    for name in names:
-        console.out.print(f"wrote {recordings / ('' if cases is None else name)}, {truth / name}.json")
+    return partial(conceal_set, load_gearbox(gearbox), plans, seed=seed)
+
+
+def _in_zoo(seed: int, number: int, *, machine: str | None, families: str | None, group: str | None) -> Make:
+    with progress(LOADING):
+        from diagnosis.proof.zoo.conceal_zoo import conceal_zoo, random_zoo_plans, zoo_plans
+
+    names = None if families is None else [name.strip() for name in families.split(",")]
+    if group is None:
+        return partial(conceal_zoo, random_zoo_plans(seed, number, families=names, machine=machine))
+    return partial(conceal_zoo, zoo_plans(seed, {group: number}, families=names, machine=machine))
+
+
+def _into(
+    recording: str, gearbox: str, recordings: Path, *, effect: str | None, place: str | None, date: str | None,
+    control: bool,
+) -> Make:  # fmt: skip
+    with progress(LOADING):
+        from diagnosis.proof.injection.inject import Injector, Wish, inject_set  # imports scipy
+
+    if control and (effect is not None or place is not None or date is not None):
+        raise InputError("--control injects nothing; leave out --effect, --place and --date")
+    with progress("reading the recording"):
+        injector = Injector(load_gearbox(gearbox), recording)
+    # A mapping file among the cases would change their meaning.
+    for file in sorted(path for path in recordings.rglob("*") if path.is_file()):
+        if file.name not in injector.written:
+            raise InputError(f"{recordings}: holds other files ({file.name}); choose another output")
+    return partial(inject_set, injector, Wish(kind=effect, place=place, date=date, control=control))
 
 
 def _refuse(options: Mapping[str, object], why: str) -> None:

@@ -185,12 +185,13 @@ def _diagnose_fleet(
         members_of(folder, without=output), gearbox, output, mapping=mapping, catalogue=catalogue,
         switched_off=switched_off, settings=settings, jobs=jobs, dask=dask,
     )  # fmt: skip
-    show_summary([outcome.row for outcome in outcomes])
+    rows = [outcome.row for outcome in outcomes]
+    show_summary(rows)
     console.out.print(f"wrote {output / SUMMARY}, and a folder for each that was diagnosed")
-    faults = [f"{outcome.row.gearbox}:\n{outcome.fault}" for outcome in outcomes if outcome.fault]
+    faults = [f"{outcome.row['gearbox']}:\n{outcome.fault}" for outcome in outcomes if outcome.fault]
     for fault in faults:
         console.err.print(fault, style="red")
-    failed = [f"{outcome.row.gearbox}: {outcome.row.error}" for outcome in outcomes if outcome.row.error]
+    failed = [f"{row['gearbox']}: {row['error']}" for row in rows if row["error"]]
     if failed:
         message = "\n".join([f"{len(failed)} of {len(outcomes)} gearboxes could not be diagnosed:", *failed])
         if faults:

@@ -40,7 +40,6 @@ def plot_cycle(
     groups: Mapping[str, tuple[str, ...]],
     inputs: Mapping[str, Input] = GEARBOX_INPUTS,
     reference: Mapping[str, Array] | None = None,
-    reference_name: str = "full model",
 ) -> None:
     """Draw a cycle with its losses and temperatures into a PNG, PDF or SVG.
 
@@ -56,8 +55,7 @@ def plot_cycle(
     inputs : mapping of str to Input
         Of the machine; the first two that drive it are drawn
     reference : mapping of column name to Array, or None
-        A second result, drawn as small circles
-    reference_name : str
+        The result of the full model, drawn as small circles
     """
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(8.0, 8.5), layout="constrained")
@@ -85,7 +83,7 @@ def plot_cycle(
         temperatures.set_xlim(time[0], time[-1])
         if reference is not None:
             named = between[0] if between else temperatures
-            named.plot([], [], **DOTS, label=reference_name)
+            named.plot([], [], **DOTS, label="full model")
             named.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
         kind = path.suffix.removeprefix(".").lower() or "png"
         figure.savefig(path, format=kind, dpi=150, metadata={"Software": None} if kind == "png" else None)

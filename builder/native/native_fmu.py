@@ -195,7 +195,7 @@ def build_native_archive(
     sources["linker_names.h"] = linker_names(sources, identity.model_identifier)
     names = sorted(name for name in [*sources, "model_variables.c"] if name.endswith(".c"))
     identity = replace(identity, source_files=tuple(names), flags=FLAGS[fmi])
-    digest = hashlib.sha256(json.dumps(dict(sorted(sources.items()))).encode()).digest()
+    digest = hashlib.sha256(json.dumps(sources, sort_keys=True).encode()).digest()
     describe = model_description if fmi == 2 else model_description3
     xml = describe(table, identity, content=digest)
     sources["model_variables.c"] = variables_source(table, guid_of(xml))

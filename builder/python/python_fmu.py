@@ -111,7 +111,7 @@ def build_python_fmu(
     )
     onnx = {path.name: path.read_bytes() for path in networks}
     code = python_code(parts.table, parts.network, parts.losses, onnx)
-    digest = hashlib.sha256(json.dumps(dict(sorted(code.items()))).encode()).hexdigest()
+    digest = hashlib.sha256(json.dumps(code, sort_keys=True).encode()).hexdigest()
     xml = model_description(parts.table, parts.identity, content=digest.encode())
     identifier = parts.identity.model_identifier
     # Both names carry the digest: Python keeps one module per name in a process, so that a second FMU with modules of
@@ -130,18 +130,7 @@ def build_python_fmu(
 def python_code(
     table: SignalTable, network: ThermalNetwork, losses: SurrogateLosses | None, onnx: Mapping[str, bytes]
 ) -> dict[str, str]:
-    """The Python package inside an FMU: name of the file to text.
-
-    Parameters
-    ----------
-    table : SignalTable
-    network : ThermalNetwork
-        Without numeric laws
-    losses : SurrogateLosses or None
-        None for a network without loss components
-    onnx : mapping of file name to bytes
-        The ONNX networks of `losses`, one ``<network>.onnx`` each
-    """
+    """The Python package inside an FMU, name of file to text; `onnx` has ``<network>.onnx`` for each of `losses`."""
     laws, functions = compile_laws(network, vector=False), law_source(network, vector=False)
     structure = {f.name: _literal(getattr(laws, f.name)) for f in fields(Laws) if f.name not in functions}
     arguments = {name: name for name in functions} | structure

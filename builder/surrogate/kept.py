@@ -55,7 +55,7 @@ def kept_or_trained(
     Returns
     -------
     TrainingResult
-        Its `origin` states which; kept ones are the same to the last bit, without their estimators
+        Its `origin` states which; kept ones are the same to the last bit
 
     Raises
     ------

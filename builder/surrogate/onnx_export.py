@@ -143,13 +143,13 @@ def onnx_evaluator(content: bytes) -> Evaluator:
     return lambda rows: np.asarray(session.run(["Y"], {"X": np.ascontiguousarray(rows, dtype=float)})[0])
 
 
-def largest_deviation(evaluator: Evaluator, network: Network, *, count: int = 500) -> float:
+def largest_deviation(evaluator: Evaluator, network: Network) -> float:
     """Largest relative difference of an evaluator from the network in numpy, over its bounds and 20 % beyond, [-].
 
     If an output is not a logarithm the difference is relative to the output's largest value.
     """
     low, high = np.array(network.lower), np.array(network.upper)
-    rows = random_points(count, low - 0.2 * (high - low), high + 0.2 * (high - low), seed=0)
+    rows = random_points(500, low - 0.2 * (high - low), high + 0.2 * (high - low), seed=0)
     expected = network(rows)
     scale = expected if network.log_output else np.abs(expected).max(axis=0)
     return float((np.abs(evaluator(rows) - expected) / np.maximum(scale, np.finfo(float).tiny)).max())

@@ -10,8 +10,9 @@ import math
 import tempfile
 import traceback
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from builder.base import console
 from builder.base.progress import progress
@@ -56,34 +57,13 @@ class Member:
     fault: str = ""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Row:
-    """One gearbox in the summary.
-
-    Attributes
-    ----------
-    gearbox, verdict : str
-        Name of its folder; see :class:`diagnosis.results.result.Diagnosis`, or ``error``
-    found : str
-        Mechanisms with place and probability, the first one first
-    heat_W : float
-        Mean heat of all findings, or of the unknown heat if unexplained, [W]
-    p_value : float
-    rmse_before_K, rmse_calibrated_K, rmse_after_K : float
-        Of held-out temperatures, free-running, [K]
-    error : str
-        Reason why there is no diagnosis, or ``""``
-    """
-
-    gearbox: str
-    verdict: str = ERROR
-    found: str = ""
-    heat_W: float = NAN
-    p_value: float = NAN
-    rmse_before_K: float = NAN
-    rmse_calibrated_K: float = NAN
-    rmse_after_K: float = NAN
-    error: str = ""
+# Row of a gearbox in the summary, as it is without a diagnosis: name of its folder, verdict, mechanisms with place and
+# probability, their mean heat or the unknown one, errors of held-out temperatures (free-running), why there is none.
+Row = dict[str, Any]
+NO_DIAGNOSIS: Mapping[str, Any] = {
+    "gearbox": "", "verdict": ERROR, "found": "", "heat_W": NAN, "p_value": NAN, "rmse_before_K": NAN,
+    "rmse_calibrated_K": NAN, "rmse_after_K": NAN, "error": "",
+}  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -226,7 +206,7 @@ def diagnose_fleet(
         show("diagnosing the fleet", 0, len(members))
         try:
             for outcome in iterate_parallel(_diagnose, readable(), jobs=min(jobs, len(members)), dask=dask):
-                outcomes[outcome.row.gearbox] = _write(outcome, output)
+                outcomes[outcome.row["gearbox"]] = _write(outcome, output)
                 show("diagnosing the fleet", len(outcomes), len(members))
         except InputError:
             raise
@@ -234,7 +214,7 @@ def diagnose_fleet(
             for member in members:
                 outcomes.setdefault(member.name, _without_diagnosis(member.name, error))
         rows = [outcomes[member.name].row for member in members]
-        write_table(stage / SUMMARY, {f.name: [getattr(row, f.name) for row in rows] for f in fields(Row)})
+        write_table(stage / SUMMARY, {key: [row[key] for row in rows] for key in NO_DIAGNOSIS})
     return [outcomes[member.name] for member in members]
 
 
@@ -254,37 +234,36 @@ def _diagnose(
 
 
 def _without_diagnosis(name: str, error: Exception) -> Outcome:
-    if isinstance(error, InputError):
-        return Outcome(row=Row(gearbox=name, error=str(error)))
-    fault = "".join(traceback.format_exception(error))
-    return Outcome(row=Row(gearbox=name, error=f"a fault of this program: {fault.splitlines()[-1]}"), fault=fault)
+    fault = "" if isinstance(error, InputError) else "".join(traceback.format_exception(error))
+    text = f"a fault of this program: {fault.splitlines()[-1]}" if fault else str(error)
+    return Outcome(row={**NO_DIAGNOSIS, "gearbox": name, "error": text}, fault=fault)
 
 
 def _write(outcome: Outcome, output: Path) -> Outcome:
     if not outcome.files:
         return outcome
     try:
-        with atomic_folder(output / outcome.row.gearbox) as stage:
+        with atomic_folder(output / outcome.row["gearbox"]) as stage:
             for name, content in outcome.files.items():
                 (stage / name).write_bytes(content)
     except InputError as error:
-        return _without_diagnosis(outcome.row.gearbox, error)
+        return _without_diagnosis(outcome.row["gearbox"], error)
     return outcome
 
 
 def _row(name: str, found: Diagnosis) -> Row:
     unknown = found.location[0].heat_mean_W if found.verdict == "unexplained" and found.location else 0.0
-    heat = sum(f.heat_mean_W for f in found.findings) if found.findings else unknown
-    return Row(
-        gearbox=name,
-        verdict=found.verdict,
-        found="; ".join(f"{f.grade}: {f.title} ({f.sureness:.2f})" for f in found.findings),
-        heat_W=heat,
-        p_value=found.p_value,
-        rmse_before_K=found.holdout.before,
-        rmse_calibrated_K=found.holdout.calibrated,
-        rmse_after_K=found.holdout.after,
-    )
+    return {
+        **NO_DIAGNOSIS,
+        "gearbox": name,
+        "verdict": found.verdict,
+        "found": "; ".join(f"{f.grade}: {f.title} ({f.sureness:.2f})" for f in found.findings),
+        "heat_W": sum(f.heat_mean_W for f in found.findings) if found.findings else unknown,
+        "p_value": found.p_value,
+        "rmse_before_K": found.holdout.before,
+        "rmse_calibrated_K": found.holdout.calibrated,
+        "rmse_after_K": found.holdout.after,
+    }
 
 
 def show_summary(rows: Sequence[Row]) -> None:
@@ -293,8 +272,8 @@ def show_summary(rows: Sequence[Row]) -> None:
         "Fleet; errors of held-out temperatures in K",
         ["gearbox", "verdict", "found", "heat W", "as delivered", "calibrated", "with findings"],
         [
-            [r.gearbox, r.verdict.replace("_", " "), r.found, _number(r.heat_W, 1),
-             *(_number(v, 2) for v in (r.rmse_before_K, r.rmse_calibrated_K, r.rmse_after_K))]
+            [r["gearbox"], r["verdict"].replace("_", " "), r["found"], _number(r["heat_W"], 1),
+             *(_number(r[key], 2) for key in ("rmse_before_K", "rmse_calibrated_K", "rmse_after_K"))]
             for r in rows
         ],
         text_columns=3,

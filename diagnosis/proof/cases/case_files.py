@@ -99,13 +99,21 @@ def write_case(
     InputError
         If something cannot be written.
     """
+    # Neither name nor time go into the archive, so that the same case gives the same bytes.
+    files = {
+        f"{name}.csv.gz": gzip.compress(_csv(columns), compresslevel=6, mtime=0) for name, columns in recordings.items()
+    }
+    if stated is not None:
+        files[MAPPING] = _mapping(recordings, stated).encode()
+    write_files(folder, files, truth_file, truth)
+
+
+def write_files(folder: Path, files: Mapping[str, bytes], truth_file: Path | None, truth: Mapping[str, Any]) -> None:
+    """Write files of a case, by name, into a folder and the truth into a file outside it; as :func:`write_case`."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        for name, columns in recordings.items():
-            # Neither name nor time go into the archive, so that the same case gives the same bytes.
-            (folder / f"{name}.csv.gz").write_bytes(gzip.compress(_csv(columns), compresslevel=6, mtime=0))
-        if stated is not None:
-            (folder / MAPPING).write_bytes(_mapping(recordings, stated).encode())
+        for name, content in files.items():
+            (folder / name).write_bytes(content)
         if truth_file is not None:
             truth_file.parent.mkdir(parents=True, exist_ok=True)
             truth_file.write_bytes((json.dumps(truth, indent=1, sort_keys=True, allow_nan=False) + "\n").encode())

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import shutil
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
@@ -12,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from diagnosis.proof.cases.case_files import write_files
 from diagnosis.proof.cases.truth import size_of_heat
 from diagnosis.proof.injection.calibrated_model import CalibratedModel, calibrate
 from diagnosis.proof.injection.instrument_faults import (
@@ -233,17 +232,10 @@ def inject_set(
         found = None if wish.control else injector.draw(wish, rng)
         columns = {} if found is None else {q: values[found[1]] for q, values in found[0].columns.items()}
         facts = truth_of(injector, found) | {"case": name, "seed": [seed, k]}
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            (folder / f"{injector.real.stem}.csv.gz").write_bytes(injector.real.with_shifts(columns).compressed)
-            if injector.real.mapping is not None:
-                shutil.copyfile(injector.real.mapping, folder / injector.real.mapping.name)
-            truth.mkdir(parents=True, exist_ok=True)
-            (truth / f"{name}.json").write_text(json.dumps(facts, indent=1, sort_keys=True, allow_nan=False) + "\n")
-        except OSError as error:
-            raise InputError(
-                f"{error.filename}: cannot be written ({error.strerror}); choose another output"
-            ) from error
+        files = {f"{injector.real.stem}.csv.gz": injector.real.with_shifts(columns).compressed}
+        if injector.real.mapping is not None:
+            files[injector.real.mapping.name] = injector.real.mapping.read_bytes()
+        write_files(folder, files, truth / f"{name}.json", facts)
         names.append(name)
         if progress is not None:
             progress(k + 1, number)

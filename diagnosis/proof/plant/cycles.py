@@ -67,11 +67,11 @@ def programmes(gearbox: Gearbox, rng: np.random.Generator) -> tuple[Programme, .
     """
     n, M = top_speed(gearbox), reference_torque(gearbox)
     return (
-        _staircase("train_1", STAIRS, rng, n, M),
+        _staircase(rng, n, M),
         _random("train_2", rng, n, M, warm=False),
         _random("train_3", rng, n, M, warm=True),
         _random("hold_1", rng, n, M, warm=True),
-        _hold_staircase("hold_2", rng, n, M),
+        _hold_staircase(rng, n, M),
     )
 
 
@@ -88,23 +88,21 @@ def ornstein_uhlenbeck(rows: int, rng: np.random.Generator, *, sd: float, tau_s:
     return np.asarray(lfilter([1.0], [1.0, -keep], kicks))
 
 
-def _staircase(
-    name: str, stairs: tuple[tuple[float, float], ...], rng: np.random.Generator, n: float, M: float
-) -> Programme:
+def _staircase(rng: np.random.Generator, n: float, M: float) -> Programme:
     """Every stair at its torque with two excursions, in random order, then standstill."""
     speed, torque = [], []
-    for index in rng.permutation(len(stairs)):
-        level, load = stairs[index]
+    for index in rng.permutation(len(STAIRS)):
+        level, load = STAIRS[index]
         marks = np.sort(rng.uniform(0.25, 0.95, 4))
         loads = (1.0, rng.uniform(0.3, 0.7), 1.0, rng.uniform(1.15, 1.6), 1.0)
         at = np.arange(0.0, STAIR_S, ROW_S) / STAIR_S
         speed.append(np.full(len(at), level * n))
         torque.append(np.choose(np.searchsorted(marks, at, side="right"), loads) * load * M)
     rest = np.zeros(round(STANDSTILL_S / ROW_S))
-    return Programme(name=name, speed=np.concatenate([*speed, rest]), torque=np.concatenate([*torque, rest]))
+    return Programme(name="train_1", speed=np.concatenate([*speed, rest]), torque=np.concatenate([*torque, rest]))
 
 
-def _hold_staircase(name: str, rng: np.random.Generator, n: float, M: float) -> Programme:
+def _hold_staircase(rng: np.random.Generator, n: float, M: float) -> Programme:
     speed, torque = [], []
     chosen = rng.permutation(len(HOLD_STAIRS))[:4]
     rows = round(HOLD_STAIRCASE_S / ROW_S / len(chosen))
@@ -112,7 +110,7 @@ def _hold_staircase(name: str, rng: np.random.Generator, n: float, M: float) -> 
         level, load = HOLD_STAIRS[index]
         speed.append(np.full(rows, level * n * rng.uniform(0.95, 1.05)))
         torque.append(np.full(rows, load * M * rng.uniform(0.8, 1.2)))
-    return Programme(name=name, speed=np.concatenate(speed), torque=np.concatenate(torque))
+    return Programme(name="hold_2", speed=np.concatenate(speed), torque=np.concatenate(torque))
 
 
 def _random(name: str, rng: np.random.Generator, n: float, M: float, *, warm: bool) -> Programme:

@@ -132,14 +132,10 @@ def worn_film(g: Grip) -> None:
     g.factor(ROLLING, g.p["a"] * hot)
 
 
-def _on_a_stair(nominal: float) -> Draw:
+def _on_a_stair(plant: Plant, rng: np.random.Generator, strength: float) -> Mapping[str, float]:
     """Strength and the speed of one of the stairs, missed by up to 2 %."""
-
-    def draw(plant: Plant, rng: np.random.Generator, strength: float) -> Mapping[str, float]:
-        level = STAIRS[int(rng.integers(2, len(STAIRS) - 1))][0]
-        return {"a": nominal * plant.loss_ref * strength, "x": level * float(rng.uniform(0.98, 1.02))}
-
-    return draw
+    level = STAIRS[int(rng.integers(2, len(STAIRS) - 1))][0]
+    return {"a": 0.20 * plant.loss_ref * strength, "x": level * float(rng.uniform(0.98, 1.02))}
 
 
 def _wax(plant: Plant, rng: np.random.Generator, strength: float) -> Mapping[str, float]:
@@ -158,7 +154,7 @@ def _outside(name: str, kind: Kind, places: Places, draw: Draw, law: str, after:
 OUTSIDE_EFFECTS = (
     _outside("limit_cycle_pump", "source", at(OIL), share_of_loss(0.25, period_min=(35.0, 80.0)),
              "a W for 45 % of every period", limit_cycle_pump),
-    _outside("resonance_loss", "source", output_shaft, _on_a_stair(0.20), "a / (1 + ((x - x0) / (0.05 x0))^2) W",
+    _outside("resonance_loss", "source", output_shaft, _on_a_stair, "a / (1 + ((x - x0) / (0.05 x0))^2) W",
              resonance_loss),
     _outside("grease_plug", "source", input_shaft, share_of_loss(0.15), "a r(t) exp(-(T - 25) / 14) x^0.4 W",
              grease_plug),

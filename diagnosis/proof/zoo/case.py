@@ -21,7 +21,6 @@ TRAIN, HOLD, BASELINE = "train", "hold", "baseline"
 SEEN_NATS = 3.0
 
 NatsOf = Callable[[Sequence[Mapping[str, Array]]], OracleNats]
-Oracle = Callable[[ZooPlant, Sequence[Programme], ZooInstruments], NatsOf]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

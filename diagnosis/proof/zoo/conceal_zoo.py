@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from diagnosis.proof.cases.case_files import DEFINITION, write_case
-from diagnosis.proof.zoo.case import BASELINE, CONTROLS, GROUPS, Oracle, ZooCase
-from diagnosis.proof.zoo.draw import draw_case, oracle_of
+from diagnosis.proof.zoo.case import BASELINE, CONTROLS, GROUPS, ZooCase
+from diagnosis.proof.zoo.draw import draw_case
 from diagnosis.proof.zoo.families import FAMILIES, find_family
 from diagnosis.proof.zoo.recorder import measure, record
 from diagnosis.proof.zoo.truth import truth_of
@@ -106,7 +106,6 @@ def conceal_zoo(
     flat: bool = False,
     baselines: int = 0,
     session_deviation: float | None = None,
-    oracle: Oracle = oracle_of,
     progress: Callable[[int, int], None] | None = None,
 ) -> list[str]:
     """Draw, simulate and record cases of the zoo.
@@ -140,7 +139,7 @@ def conceal_zoo(
     for i, plan in enumerate(plans):
         case = draw_case(
             plan.family, plan.machine, plan.seed, plan.group, name=f"case_{i + 1:0{digits}d}", kind=plan.kind,
-            baselines=baselines, session_deviation=session_deviation, oracle=oracle,
+            baselines=baselines, session_deviation=session_deviation,
         )  # fmt: skip
         write_zoo_case(case, recordings if flat else recordings / case.name, truth / f"{case.name}.json")
         names.append(case.name)

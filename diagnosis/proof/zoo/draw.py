@@ -14,7 +14,6 @@ from diagnosis.proof.zoo.case import (
     HOLD,
     TRAIN,
     NatsOf,
-    Oracle,
     ZooCase,
     deviating,
     nats_of_case,
@@ -29,10 +28,10 @@ from diagnosis.proof.zoo.effects_outside import OUTSIDE_MAKERS
 from diagnosis.proof.zoo.families import find_family
 from diagnosis.proof.zoo.faults import AMBIENT, INPUT_FAULTS, SENSOR_FAULTS, Fault, FaultMaker, input_of
 from diagnosis.proof.zoo.oracle_columns import design_of
-from diagnosis.proof.zoo.recorder import ZooInstruments, draw_instruments, with_slow_sensors
+from diagnosis.proof.zoo.recorder import draw_instruments, with_slow_sensors
 from diagnosis.proof.zoo.setting import Setting, UnfitError, either
 from diagnosis.proof.zoo.simulate import simulate
-from diagnosis.proof.zoo.structure import Programme, Variant, ZooPlant
+from diagnosis.proof.zoo.structure import Variant
 from diagnosis.proof.zoo.time_course import ALWAYS, Course
 from models.assembly.gearbox import Gearbox, load_gearbox
 from models.base.errors import InputError, did_you_mean
@@ -51,11 +50,6 @@ MOST_TRIES = 200
 DRIFT_K = 15.0  # greatest drift over a session
 
 
-def oracle_of(plant: ZooPlant, programmes: Sequence[Programme], instruments: ZooInstruments) -> NatsOf:
-    """The oracle of a plant with these instruments."""
-    return design_of(plant, programmes, instruments).nats_of
-
-
 def draw_case(
     family_name: str,
     machine: str,
@@ -66,7 +60,6 @@ def draw_case(
     kind: str | None = None,
     baselines: int = 0,
     session_deviation: float | None = None,
-    oracle: Oracle = oracle_of,
 ) -> ZooCase:
     """Draw a case and simulate its recordings.
 
@@ -86,8 +79,6 @@ def draw_case(
         Number of healthy recordings of the same plant
     session_deviation : float or None
         Standard deviation of the logarithm of every parameter between sessions; drawn if None
-    oracle : callable
-        Evidence for a difference of readings, by which strengths are drawn
 
     Raises
     ------
@@ -98,12 +89,12 @@ def draw_case(
         raise InputError(f"{group!r} is not a group of cases of the zoo{did_you_mean(group, GROUPS)}")
     drawn = draw_plant(find_family(family_name), machine, seed, baselines=baselines)
     return draw_case_of(drawn, load_gearbox(machine), machine, seed, group, name=name, kind=kind,
-                        session_deviation=session_deviation, oracle=oracle)  # fmt: skip
+                        session_deviation=session_deviation)  # fmt: skip
 
 
 def draw_case_of(
     drawn: Drawn, gearbox: Gearbox, machine: str, seed: int, group: str, *, name: str, kind: str | None,
-    session_deviation: float | None, oracle: Oracle,
+    session_deviation: float | None,
 ) -> ZooCase:  # fmt: skip
     """Draw what is concealed in a plant, and simulate its recordings; arguments as of :func:`draw_case`."""
     effects_rng, strength_rng, session_rng, instruments_rng = (np.random.default_rng([seed, 7, k]) for k in range(4))
@@ -131,7 +122,7 @@ def draw_case_of(
     warm = case.recordings(TRAIN)[-1]
     setting = Setting(plant, case.programmes, simulate(plant, warm, [Variant()]), gearbox.network().groups)
     case = with_effects(case, draw_effects(group, setting, effects_rng))
-    nats_of = oracle(plant, drawn.programmes, instruments)
+    nats_of = design_of(plant, drawn.programmes, instruments).nats_of
     case = with_effects(case, draw_strengths(case, nats_of, strength_rng))
     runs = run_case(case, TRAIN, HOLD, BASELINE)
     nats, of_effects = nats_of_case(case, runs, nats_of)

@@ -42,6 +42,9 @@ class Draft:
     parameters: Mapping[str, float] = field(default_factory=dict)
 
 
+Draw = Callable[[Setting, np.random.Generator], Draft]
+
+
 @dataclass(frozen=True, kw_only=True)
 class Maker:
     """Kind of effect.
@@ -56,7 +59,17 @@ class Maker:
 
     family: str
     kind: str
-    draw: Callable[[Setting, np.random.Generator], Draft]
+    draw: Draw
+
+
+def makes(kind: str, family: str, *, table: dict[str, Maker]) -> Callable[[Draw], Draw]:
+    """Enter the decorated function into a table of makers, under its own name."""
+
+    def enter(draw: Draw) -> Draw:
+        table[draw.__name__] = Maker(family=family, kind=kind, draw=draw)
+        return draw
+
+    return enter
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

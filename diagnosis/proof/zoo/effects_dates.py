@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from functools import partial
 
 import numpy as np
 
+from diagnosis.proof.zoo import effects
 from diagnosis.proof.zoo.effects import Draft, Maker
 from diagnosis.proof.zoo.setting import Setting, UnfitError, either
 from diagnosis.proof.zoo.structure import constant
 from diagnosis.proof.zoo.time_course import Course
 
-DATED_FAMILY = "change at a date"
+DATED_MAKERS: dict[str, Maker] = {}
+makes = partial(effects.makes, family="change at a date", table=DATED_MAKERS)
 DOWN, UP = 0.9, 2.0  # greatest relative changes
 
 
+@makes("loss_factor")
 def loss_changes(s: Setting, rng: np.random.Generator) -> Draft:
     """One loss grows or falls."""
     if not s.losses_all:
@@ -22,6 +25,7 @@ def loss_changes(s: Setting, rng: np.random.Generator) -> Draft:
     return _relative(s, rng, "loss", s.losses_all)
 
 
+@makes("source")
 def heat_changes(s: Setting, rng: np.random.Generator) -> Draft:
     """A heat that is no loss grows or falls."""
     names = [n for one in s.plant.sources if not one.is_loss for n in one.part_of.split("+") if n]
@@ -30,22 +34,26 @@ def heat_changes(s: Setting, rng: np.random.Generator) -> Draft:
     return _relative(s, rng, "heat", tuple(dict.fromkeys(names)))
 
 
+@makes("link_factor")
 def link_changes(s: Setting, rng: np.random.Generator) -> Draft:
     """One link conducts more or less."""
     return _relative(s, rng, "link", s.links)
 
 
+@makes("capacity")
 def capacity_changes(s: Setting, rng: np.random.Generator) -> Draft:
     """One node stores more or less."""
     return _relative(s, rng, "capacity", s.nodes)
 
 
+@makes("source")
 def heat_appears(s: Setting, rng: np.random.Generator) -> Draft:
     """A constant heat into one node."""
     node = s.nodes[int(rng.integers(len(s.nodes)))]
     return Draft(act=s.heat(node, constant(1.0)), law=f"a into {node}", unit="W", cap=0.3 * s.loss)
 
 
+@makes("link")
 def link_appears(s: Setting, rng: np.random.Generator) -> Draft:
     """A further way from one node to the air."""
     node = s.nodes[int(rng.integers(len(s.nodes)))]
@@ -53,6 +61,7 @@ def link_appears(s: Setting, rng: np.random.Generator) -> Draft:
     return Draft(act=act, law=f"a between {node} and air", unit="W/K", cap=0.4 * s.shed)
 
 
+@makes("signal")
 def set_point_changes(s: Setting, rng: np.random.Generator) -> Draft:
     """A control that misses: the true input is larger or smaller than the recorded one."""
     names = [name for name in ("torque", "speed", "heater_power") if name in s.plant.inputs]
@@ -87,14 +96,3 @@ def draw_course(s: Setting, rng: np.random.Generator) -> Course:
         return Course(kind="step", from_h=from_h)
     lasts = float(rng.uniform(0.1, 0.6)) * s.hours
     return Course(kind="ramp" if kind == "ramp" else "from_to", from_h=from_h, to_h=from_h + lasts)
-
-
-DATED_MAKERS: Mapping[str, Maker] = {
-    "loss_changes": Maker(family=DATED_FAMILY, kind="loss_factor", draw=loss_changes),
-    "heat_changes": Maker(family=DATED_FAMILY, kind="source", draw=heat_changes),
-    "link_changes": Maker(family=DATED_FAMILY, kind="link_factor", draw=link_changes),
-    "capacity_changes": Maker(family=DATED_FAMILY, kind="capacity", draw=capacity_changes),
-    "heat_appears": Maker(family=DATED_FAMILY, kind="source", draw=heat_appears),
-    "link_appears": Maker(family=DATED_FAMILY, kind="link", draw=link_appears),
-    "set_point_changes": Maker(family=DATED_FAMILY, kind="signal", draw=set_point_changes),
-}

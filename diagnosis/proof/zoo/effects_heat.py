@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from functools import partial
 
 import numpy as np
 
+from diagnosis.proof.zoo import effects
 from diagnosis.proof.zoo.effects import Draft, Maker
-from diagnosis.proof.zoo.setting import Act, Parts, Setting, soft
+from diagnosis.proof.zoo.setting import Act, Setting, soft
 from diagnosis.proof.zoo.structure import Law, Moment, constant
 from models.base.types import Array
 from models.formulas.heat_transfer import KELVIN
 
+HEAT_MAKERS: dict[str, Maker] = {}
+makes = partial(effects.makes, table=HEAT_MAKERS)
+INSIDE, OUT, CIRCUIT, AROUND = "heat inside the gearbox", "heat to the surroundings", "oil circuit", "surroundings"
 AIR = "air"
 WATER, COOLANT = "water", "coolant"
 
 
+@makes("link_factor", INSIDE)
 def aeration(s: Setting, rng: np.random.Generator) -> Draft:
     """Foam lowers what gears give to the oil, by a logistic function of speed."""
     x, x0 = s.speed(), float(rng.uniform(0.3, 0.6))
@@ -24,6 +29,7 @@ def aeration(s: Setting, rng: np.random.Generator) -> Draft:
                  parameters={"x0": x0})  # fmt: skip
 
 
+@makes("link_factor", INSIDE)
 def oil_housing_speed(s: Setting, _: np.random.Generator) -> Draft:
     """The film on the walls grows with the logarithm of speed."""
     x = s.speed()
@@ -31,6 +37,7 @@ def oil_housing_speed(s: Setting, _: np.random.Generator) -> Draft:
     return Draft(act=act, law="conductance oil-housing (1 + a log(1 + 8 x) / log(9))", unit="1", cap=3.0)
 
 
+@makes("link_factor", INSIDE)
 def oil_mist(s: Setting, _: np.random.Generator) -> Draft:
     """Mist wets the uppermost housing part, saturating with speed."""
     x = s.speed()
@@ -39,6 +46,7 @@ def oil_mist(s: Setting, _: np.random.Generator) -> Draft:
     return Draft(act=act, law="conductance oil-upper housing (1 + a (1 - exp(-3 x)))", unit="1", cap=3.0)
 
 
+@makes("link_factor", INSIDE)
 def bearing_seat_contact(s: Setting, rng: np.random.Generator) -> Draft:
     """A loose seat, tighter while the bearing is warmer than the wall."""
     bearings = s.group("bearings")
@@ -49,6 +57,7 @@ def bearing_seat_contact(s: Setting, rng: np.random.Generator) -> Draft:
     return Draft(act=act, law="conductance bearing-housing (1 - a exp(-dT+ / 20 K))", unit="1", cap=0.9)
 
 
+@makes("link_factor", OUT)
 def radiation_error(s: Setting, _: np.random.Generator) -> Draft:
     """Walls radiate less: the part of their conductance that grows with the cube of the absolute temperature."""
     wall = s.temperature(s.group("housing")[0])
@@ -57,6 +66,7 @@ def radiation_error(s: Setting, _: np.random.Generator) -> Draft:
     return Draft(act=act, law="conductance housing-air (1 - a (T / 330 K)^3)", unit="1", cap=0.35)
 
 
+@makes("link_factor", OUT)
 def air_cooling_change(s: Setting, rng: np.random.Generator) -> Draft:
     """A fan cools one wall less than it did."""
     walls = s.group("housing")
@@ -66,17 +76,19 @@ def air_cooling_change(s: Setting, rng: np.random.Generator) -> Draft:
     return Draft(act=act, law="conductance of one wall to air (1 - a)", unit="1", cap=0.8)
 
 
+@makes("link_factor", AROUND)
 def fan_thermostat(s: Setting, rng: np.random.Generator) -> Draft:
     """A fan cools one wall, faster the warmer its feeler is."""
     walls = s.group("housing")
     wall = walls[int(rng.integers(len(walls)))]
-    T_on, tau = s.quantile(wall, float(rng.uniform(0.4, 0.8))), s.lag(rng, 60.0, 300.0)
+    T_on, tau = s.quantile(wall, float(rng.uniform(0.4, 0.8))), s.lag(rng, 300.0)
     act = s.link_factor(s.link_between((wall,), (AIR,)), lambda m: soft((m.T["fan feeler"] - T_on) / 1.0))
-    act = act + _with(s.follower("fan feeler", wall, tau))
+    act = act + Act(parts=s.follower("fan feeler", wall, tau))
     return Draft(act=act, law="conductance of one wall to air (1 + a s((T_feeler - T_on) / 1 K))", unit="1", cap=4.0,
                  parameters={"T_on": T_on, "tau_s": tau})  # fmt: skip
 
 
+@makes("link", OUT)
 def foundation_conduction(s: Setting, rng: np.random.Generator) -> Draft:
     """The lowest part stands on a plinth that stores heat."""
     part = s.group("housing")[0]
@@ -86,6 +98,7 @@ def foundation_conduction(s: Setting, rng: np.random.Generator) -> Draft:
                  parameters={"capacity_J_K": mass})  # fmt: skip
 
 
+@makes("link", OUT)
 def hot_neighbour(s: Setting, rng: np.random.Generator) -> Draft:
     """A warm machine at one shaft or housing part, which itself follows the air."""
     node = s.group("shafts" if s.groups.get("shafts") else "housing")[-1]
@@ -96,6 +109,7 @@ def hot_neighbour(s: Setting, rng: np.random.Generator) -> Draft:
                  parameters={"dT": rise})  # fmt: skip
 
 
+@makes("link", OUT)
 def motor_flange(s: Setting, rng: np.random.Generator) -> Draft:
     """A motor at the input whose warmth follows the root of its power."""
     node = s.group("shafts" if s.groups.get("shafts") else "housing")[0]
@@ -106,6 +120,7 @@ def motor_flange(s: Setting, rng: np.random.Generator) -> Draft:
                  parameters={"dT": rise})  # fmt: skip
 
 
+@makes("link", OUT)
 def shaft_ends_to_air(s: Setting, _: np.random.Generator) -> Draft:
     """Shaft ends in the air, with the root of speed."""
     x, air = s.speed(), s.air()
@@ -117,6 +132,7 @@ def shaft_ends_to_air(s: Setting, _: np.random.Generator) -> Draft:
     return Draft(act=act, law="a (0.1 + x^0.5) from every shaft to air", unit="W/K", cap=0.2 * s.shed)
 
 
+@makes("link", CIRCUIT)
 def water_jacket(s: Setting, rng: np.random.Generator) -> Draft:
     """Water whose flow falls off as it warms the valve."""
     part, cold = s.group("housing")[0], _below_air(s, rng)
@@ -129,28 +145,32 @@ def water_jacket(s: Setting, rng: np.random.Generator) -> Draft:
 # ---------------------------------------------------------------------- oil circuit
 
 
+@makes("link", CIRCUIT)
 def cooler_thermostat(s: Setting, rng: np.random.Generator) -> Draft:
     """A water cooler that a slow thermostat opens within a kelvin."""
     return _cooler(s, rng, width=0.4, power=1.0, water=True)
 
 
+@makes("link", CIRCUIT)
 def cooler_proportional(s: Setting, rng: np.random.Generator) -> Draft:
     """A water cooler with a proportional valve behind a lag."""
     return _cooler(s, rng, width=5.0, power=0.7, water=True)
 
 
+@makes("link", CIRCUIT)
 def cooler_air_thermostat(s: Setting, rng: np.random.Generator) -> Draft:
     """An air cooler that a slow thermostat opens within a kelvin."""
     return _cooler(s, rng, width=0.4, power=1.0, water=False)
 
 
+@makes("link", CIRCUIT)
 def cooler_air_proportional(s: Setting, rng: np.random.Generator) -> Draft:
     """An air cooler with a proportional valve behind a lag."""
     return _cooler(s, rng, width=5.0, power=0.7, water=False)
 
 
 def _cooler(s: Setting, rng: np.random.Generator, *, width: float, power: float, water: bool) -> Draft:
-    T_on, tau = s.quantile("oil", float(rng.uniform(0.4, 0.8))), s.lag(rng, 60.0, 400.0)
+    T_on, tau = s.quantile("oil", float(rng.uniform(0.4, 0.8))), s.lag(rng, 400.0)
     parts = s.follower("valve feeler", "oil", tau)
     cold = _below_air(s, rng)
 
@@ -158,13 +178,14 @@ def _cooler(s: Setting, rng: np.random.Generator, *, width: float, power: float,
         return np.asarray(soft((m.T["valve feeler"] - T_on) / width) ** power)
 
     if water:
-        act = s.bridge("oil", COOLANT, opening, parts=s.boundary(COOLANT, constant(cold))) + _with(parts)
+        act = s.bridge("oil", COOLANT, opening, parts=s.boundary(COOLANT, constant(cold))) + Act(parts=parts)
     else:
         act = s.bridge("oil", s.air(), opening, called=AIR, parts=parts)
     return Draft(act=act, law=f"a s((T_feeler - T_on) / {width:g} K)^{power:g} to the coolant", unit="W/K",
                  cap=1.5 * s.shed, parameters={"T_on": T_on, "tau_s": tau, "T_water": cold})  # fmt: skip
 
 
+@makes("link", CIRCUIT)
 def cooler_constant(s: Setting, rng: np.random.Generator) -> Draft:
     """A water cooler that always runs, a little better with thin oil."""
     T, T0, cold = s.temperature("oil"), s.quantile("oil", 0.5), _below_air(s, rng)
@@ -174,6 +195,7 @@ def cooler_constant(s: Setting, rng: np.random.Generator) -> Draft:
                  parameters={"T0": T0, "T_water": cold})  # fmt: skip
 
 
+@makes("link", CIRCUIT)
 def cooler_shaft_driven(s: Setting, rng: np.random.Generator) -> Draft:
     """An air cooler whose fan sits on the shaft and stalls."""
     x, x0 = s.speed(), float(rng.uniform(0.2, 0.6))
@@ -181,6 +203,7 @@ def cooler_shaft_driven(s: Setting, rng: np.random.Generator) -> Draft:
     return Draft(act=act, law="a x / (x + x0) to air", unit="W/K", cap=1.0 * s.shed, parameters={"x0": x0})
 
 
+@makes("link", CIRCUIT)
 def oil_jet(s: Setting, rng: np.random.Generator) -> Draft:
     """Oil of fixed temperature is injected as long as the shaft turns."""
     x, T = s.speed(), s.air_mean + float(rng.uniform(0.2, 0.6)) * s.rise
@@ -188,6 +211,7 @@ def oil_jet(s: Setting, rng: np.random.Generator) -> Draft:
     return Draft(act=act, law="a tanh(x / 0.05) to oil of T_jet", unit="W/K", cap=1.0 * s.shed, parameters={"T_jet": T})
 
 
+@makes("link", CIRCUIT)
 def oil_tank(s: Setting, rng: np.random.Generator) -> Draft:
     """A tank outside with a pump whose flow follows the root of speed."""
     x, size = s.speed(), float(rng.uniform(1.0, 4.0)) * _capacity(s, "oil")
@@ -197,6 +221,7 @@ def oil_tank(s: Setting, rng: np.random.Generator) -> Draft:
                  parameters={"capacity_J_K": size, "to_air_W_K": to_air})  # fmt: skip
 
 
+@makes("source", CIRCUIT)
 def heater_thermostat(s: Setting, rng: np.random.Generator) -> Draft:
     """A heater at rest whose power falls smoothly as the oil warms."""
     x, T = s.speed(), s.temperature("oil")
@@ -206,6 +231,7 @@ def heater_thermostat(s: Setting, rng: np.random.Generator) -> Draft:
                  parameters={"T_off": T_off})  # fmt: skip
 
 
+@makes("link_factor", CIRCUIT)
 def pump_fast_stage(s: Setting, rng: np.random.Generator) -> Draft:
     """The circulation runs smoothly faster when the oil is warm."""
     T, T_on = s.temperature("oil"), s.quantile("oil", float(rng.uniform(0.4, 0.8)))
@@ -218,6 +244,7 @@ def pump_fast_stage(s: Setting, rng: np.random.Generator) -> Draft:
 # ---------------------------------------------------------------------- surroundings
 
 
+@makes("source", AROUND)
 def solar_soak(s: Setting, rng: np.random.Generator) -> Draft:
     """Sun on the uppermost part: a bell over the hours of the day."""
     start, width = float(rng.uniform(0.0, 24.0)), float(rng.uniform(2.0, 3.5))
@@ -231,6 +258,7 @@ def solar_soak(s: Setting, rng: np.random.Generator) -> Draft:
                  parameters={"start_hour": start, "width_h": width})  # fmt: skip
 
 
+@makes("link", AROUND)
 def rain_on_housing(s: Setting, rng: np.random.Generator) -> Draft:
     """Showers of an hour that rise and fall smoothly, on one part."""
     every, first = float(rng.uniform(3.0, 7.0)), float(rng.uniform(0.5, 2.5))
@@ -243,6 +271,7 @@ def rain_on_housing(s: Setting, rng: np.random.Generator) -> Draft:
                  parameters={"every_h": every, "first_h": first})  # fmt: skip
 
 
+@makes("signal", AROUND)
 def ambient_swing(s: Setting, rng: np.random.Generator) -> Draft:
     """The air at the machine swings like a triangle, the probe's does not."""
     period = float(rng.uniform(3.0, 10.0))
@@ -251,6 +280,7 @@ def ambient_swing(s: Setting, rng: np.random.Generator) -> Draft:
                  parameters={"period_h": period})  # fmt: skip
 
 
+@makes("signal", AROUND)
 def ambient_drift(s: Setting, rng: np.random.Generator) -> Draft:
     """The air at the machine warms to a new temperature, the probe's does not."""
     tau = float(rng.uniform(0.02, 0.2)) * s.span
@@ -258,10 +288,6 @@ def ambient_drift(s: Setting, rng: np.random.Generator) -> Draft:
     return Draft(
         act=act, law="air at the machine + a (1 - exp(-t / tau))", unit="K", cap=6.0, parameters={"tau_h": tau}
     )
-
-
-def _with(parts: Parts) -> Act:
-    return Act(parts=parts)
 
 
 def _below_air(s: Setting, rng: np.random.Generator) -> float:
@@ -276,34 +302,3 @@ def _capacity(s: Setting, node: str) -> float:
 
 def _maker(family: str, kind: str, draw: object) -> Maker:
     return Maker(family=family, kind=kind, draw=draw)  # type: ignore[arg-type]
-
-
-INSIDE, OUT, CIRCUIT, AROUND = "heat inside the gearbox", "heat to the surroundings", "oil circuit", "surroundings"
-HEAT_MAKERS: Mapping[str, Maker] = {
-    "aeration": _maker(INSIDE, "link_factor", aeration),
-    "oil_housing_speed": _maker(INSIDE, "link_factor", oil_housing_speed),
-    "oil_mist": _maker(INSIDE, "link_factor", oil_mist),
-    "bearing_seat_contact": _maker(INSIDE, "link_factor", bearing_seat_contact),
-    "radiation_error": _maker(OUT, "link_factor", radiation_error),
-    "air_cooling_change": _maker(OUT, "link_factor", air_cooling_change),
-    "fan_thermostat": _maker(AROUND, "link_factor", fan_thermostat),
-    "foundation_conduction": _maker(OUT, "link", foundation_conduction),
-    "hot_neighbour": _maker(OUT, "link", hot_neighbour),
-    "motor_flange": _maker(OUT, "link", motor_flange),
-    "shaft_ends_to_air": _maker(OUT, "link", shaft_ends_to_air),
-    "water_jacket": _maker(CIRCUIT, "link", water_jacket),
-    "cooler_thermostat": _maker(CIRCUIT, "link", cooler_thermostat),
-    "cooler_proportional": _maker(CIRCUIT, "link", cooler_proportional),
-    "cooler_air_thermostat": _maker(CIRCUIT, "link", cooler_air_thermostat),
-    "cooler_air_proportional": _maker(CIRCUIT, "link", cooler_air_proportional),
-    "cooler_constant": _maker(CIRCUIT, "link", cooler_constant),
-    "cooler_shaft_driven": _maker(CIRCUIT, "link", cooler_shaft_driven),
-    "oil_jet": _maker(CIRCUIT, "link", oil_jet),
-    "oil_tank": _maker(CIRCUIT, "link", oil_tank),
-    "heater_thermostat": _maker(CIRCUIT, "source", heater_thermostat),
-    "pump_fast_stage": _maker(CIRCUIT, "link_factor", pump_fast_stage),
-    "solar_soak": _maker(AROUND, "source", solar_soak),
-    "rain_on_housing": _maker(AROUND, "link", rain_on_housing),
-    "ambient_swing": _maker(AROUND, "signal", ambient_swing),
-    "ambient_drift": _maker(AROUND, "signal", ambient_drift),
-}

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from functools import partial
 
 import numpy as np
 
+from diagnosis.proof.zoo import effects
 from diagnosis.proof.zoo.effects import Draft, Maker
 from diagnosis.proof.zoo.setting import Setting, UnfitError, soft
 from diagnosis.proof.zoo.structure import Law, constant
 
+LOSS_MAKERS: dict[str, Maker] = {}
+makes = partial(effects.makes, table=LOSS_MAKERS)
+NO_LOAD, LOAD, CIRCUIT, AGEING = "no-load loss", "load-dependent loss", "oil circuit", "ageing and running-in"
 SLIDING, CHURNING = ("mesh_sliding", "gears_load"), ("churning", "gears_no_load")
 
 
+@makes("source", NO_LOAD)
 def windage(s: Setting, rng: np.random.Generator) -> Draft:
     """Between the square and the cube of speed, half of it into the oil."""
     x, p = s.speed(), float(rng.uniform(1.8, 2.3))
@@ -21,6 +26,7 @@ def windage(s: Setting, rng: np.random.Generator) -> Draft:
     return Draft(act=act, law="a x^p (1 + x) / 2 into the oil", unit="W", cap=0.3 * s.loss, parameters={"p": p})
 
 
+@makes("source", NO_LOAD)
 def pocketing(s: Setting, rng: np.random.Generator) -> Draft:
     """Exponential in speed."""
     x, k = s.speed(), float(rng.uniform(2.0, 3.5))
@@ -29,6 +35,7 @@ def pocketing(s: Setting, rng: np.random.Generator) -> Draft:
                  parameters={"k": k})  # fmt: skip
 
 
+@makes("source", NO_LOAD)
 def churning_swirl(s: Setting, rng: np.random.Generator) -> Draft:
     """Above a soft threshold with the power 1.4 of speed."""
     x, x0 = s.speed(), float(rng.uniform(0.35, 0.7))
@@ -37,6 +44,7 @@ def churning_swirl(s: Setting, rng: np.random.Generator) -> Draft:
                  parameters={"x0": x0})  # fmt: skip
 
 
+@makes("source", LOAD)
 def churning_load(s: Setting, rng: np.random.Generator) -> Draft:
     """Grows with the root of torque."""
     x, y, p = s.speed(), s.load(), float(rng.uniform(0.8, 1.2))
@@ -44,6 +52,7 @@ def churning_load(s: Setting, rng: np.random.Generator) -> Draft:
     return Draft(act=act, law="a y^0.5 x^p into the oil", unit="W", cap=0.5 * s.loss, parameters={"p": p})
 
 
+@makes("loss_factor", NO_LOAD)
 def oil_level_thermal(s: Setting, rng: np.random.Generator) -> Draft:
     """Saturating function of the oil's temperature."""
     T, T0 = s.temperature("oil"), s.quantile("oil", 0.1)
@@ -53,6 +62,7 @@ def oil_level_thermal(s: Setting, rng: np.random.Generator) -> Draft:
                  parameters={"T0": T0, "width": width})  # fmt: skip
 
 
+@makes("loss_factor", LOAD)
 def splash_starvation(s: Setting, rng: np.random.Generator) -> Draft:
     """A soft step of sliding friction at a speed."""
     x, x0 = s.speed(), float(rng.uniform(0.4, 0.7))
@@ -60,6 +70,7 @@ def splash_starvation(s: Setting, rng: np.random.Generator) -> Draft:
     return Draft(act=act, law="mesh sliding (1 + a s((x - x0) / 0.08))", unit="1", cap=2.0, parameters={"x0": x0})
 
 
+@makes("loss_factor", LOAD)
 def misalignment(s: Setting, _: np.random.Generator) -> Draft:
     """Teeth wind straight under load: less at high torque; a bearing of the input shaft feels half of it."""
     y = s.load()
@@ -68,9 +79,10 @@ def misalignment(s: Setting, _: np.random.Generator) -> Draft:
     return Draft(act=act, law="mesh sliding (1 + a / (0.5 + y)), first bearing (1 + a / 2)", unit="1", cap=0.5)
 
 
+@makes("loss_factor", LOAD)
 def bearing_preload(s: Setting, rng: np.random.Generator) -> Draft:
     """A bearing warmer than its housing closes its clearance softly."""
-    bearing = _one(s, "bearings", rng)
+    bearing = _bearing(s, rng)
     T, wall = s.temperature(bearing), s.temperature(s.group("housing")[0])
     dT = float(rng.uniform(1.0, 4.0))
     act = s.loss_factor(s.losses(bearing), lambda m: 0.2 * np.logaddexp(0.0, (T(m) - wall(m) - dT) / 0.8))
@@ -78,6 +90,7 @@ def bearing_preload(s: Setting, rng: np.random.Generator) -> Draft:
                  parameters={"dT": dT})  # fmt: skip
 
 
+@makes("loss_factor", LOAD)
 def bearing_additive(s: Setting, rng: np.random.Generator) -> Draft:
     """Less friction of all bearings at low speed."""
     x, x0 = s.speed(), float(rng.uniform(0.2, 0.5))
@@ -85,6 +98,7 @@ def bearing_additive(s: Setting, rng: np.random.Generator) -> Draft:
     return Draft(act=act, law="bearing losses (1 - a / (1 + (x / x0)^2))", unit="1", cap=0.8, parameters={"x0": x0})
 
 
+@makes("source", NO_LOAD)
 def brake_drag(s: Setting, _: np.random.Generator) -> Draft:
     """Heat in the output shaft that falls off from proportional to speed."""
     x = s.speed()
@@ -92,6 +106,7 @@ def brake_drag(s: Setting, _: np.random.Generator) -> Draft:
     return Draft(act=act, law="a x (1.4 - 0.4 x) into the output shaft", unit="W", cap=0.5 * s.loss)
 
 
+@makes("source", CIRCUIT)
 def pump_heat(s: Setting, rng: np.random.Generator) -> Draft:
     """A pump whose relief valve opens: constant above a speed."""
     x, x0 = s.speed(), float(rng.uniform(0.2, 0.5))
@@ -99,6 +114,7 @@ def pump_heat(s: Setting, rng: np.random.Generator) -> Draft:
     return Draft(act=act, law="a tanh(x / x0) into the oil", unit="W", cap=0.3 * s.loss, parameters={"x0": x0})
 
 
+@makes("loss_factor", AGEING)
 def run_in_flanks(s: Setting, rng: np.random.Generator) -> Draft:
     """Falls hyperbolically with the hours."""
     life = float(rng.uniform(0.03, 0.2)) * s.span
@@ -106,6 +122,7 @@ def run_in_flanks(s: Setting, rng: np.random.Generator) -> Draft:
     return Draft(act=act, law="mesh sliding (1 + a / (1 + t / life))", unit="1", cap=1.0, parameters={"life_h": life})
 
 
+@makes("loss_factor", AGEING)
 def run_in_seals(s: Setting, rng: np.random.Generator) -> Draft:
     """Falls with the square root of the hours."""
     names = tuple(n for n in s.losses_all if "seal" in n)
@@ -116,6 +133,7 @@ def run_in_seals(s: Setting, rng: np.random.Generator) -> Draft:
     return Draft(act=act, law="seals (1 + a exp(-(t / life)^0.5))", unit="1", cap=1.5, parameters={"life_h": life})
 
 
+@makes("loss_factor", AGEING)
 def oil_ageing(s: Setting, _: np.random.Generator) -> Draft:
     """Churning and bearings grow with the root of the hours."""
     law: Law = lambda m: np.sqrt(m.hours / s.span)  # noqa: E731
@@ -123,6 +141,7 @@ def oil_ageing(s: Setting, _: np.random.Generator) -> Draft:
     return Draft(act=act, law="churning and bearing losses (1 + a (t / span)^0.5)", unit="1", cap=0.6)
 
 
+@makes("loss_factor", AGEING)
 def oil_loss(s: Setting, rng: np.random.Generator) -> Draft:
     """The level sinks to a lower one: less churning, less to warm, drier gears."""
     tau = float(rng.uniform(0.1, 0.4)) * s.span
@@ -133,21 +152,24 @@ def oil_loss(s: Setting, rng: np.random.Generator) -> Draft:
                  parameters={"tau_h": tau})  # fmt: skip
 
 
+@makes("loss_factor", AGEING)
 def gear_wear(s: Setting, _: np.random.Generator) -> Draft:
     """Grows with the square of the hours."""
     act = s.loss_factor(s.losses(*SLIDING), lambda m: (m.hours / s.span) ** 2)
     return Draft(act=act, law="mesh sliding (1 + a (t / span)^2)", unit="1", cap=0.8)
 
 
+@makes("source", AGEING)
 def bearing_damage(s: Setting, rng: np.random.Generator) -> Draft:
     """One bearing grinds from a moment on, in proportion to speed."""
-    bearing, x = _one(s, "bearings", rng), s.speed()
+    bearing, x = _bearing(s, rng), s.speed()
     at_h = s.date(rng, 0.05, 0.7)
     act = s.heat(bearing, lambda m: x(m) * soft((m.hours - at_h) / 0.05), is_loss=True)
     return Draft(act=act, law="a x s((t - at) / 0.05 h) into the bearing", unit="W", cap=0.4 * s.loss,
                  parameters={"at_h": at_h})  # fmt: skip
 
 
+@makes("signal", AGEING)
 def torque_decay(s: Setting, _: np.random.Generator) -> Draft:
     """The torque that is set is reached less and less, with the root of the hours."""
     s.load()
@@ -155,28 +177,6 @@ def torque_decay(s: Setting, _: np.random.Generator) -> Draft:
     return Draft(act=act, law="true torque = recorded (1 - a (t / span)^0.5)", unit="1", cap=0.3)
 
 
-def _one(s: Setting, group: str, rng: np.random.Generator) -> str:
-    names = s.group(group)
+def _bearing(s: Setting, rng: np.random.Generator) -> str:
+    names = s.group("bearings")
     return names[int(rng.integers(len(names)))]
-
-
-LOSS_MAKERS: Mapping[str, Maker] = {
-    "windage": Maker(family="no-load loss", kind="source", draw=windage),
-    "pocketing": Maker(family="no-load loss", kind="source", draw=pocketing),
-    "churning_swirl": Maker(family="no-load loss", kind="source", draw=churning_swirl),
-    "churning_load": Maker(family="load-dependent loss", kind="source", draw=churning_load),
-    "oil_level_thermal": Maker(family="no-load loss", kind="loss_factor", draw=oil_level_thermal),
-    "splash_starvation": Maker(family="load-dependent loss", kind="loss_factor", draw=splash_starvation),
-    "misalignment": Maker(family="load-dependent loss", kind="loss_factor", draw=misalignment),
-    "bearing_preload": Maker(family="load-dependent loss", kind="loss_factor", draw=bearing_preload),
-    "bearing_additive": Maker(family="load-dependent loss", kind="loss_factor", draw=bearing_additive),
-    "brake_drag": Maker(family="no-load loss", kind="source", draw=brake_drag),
-    "pump_heat": Maker(family="oil circuit", kind="source", draw=pump_heat),
-    "run_in_flanks": Maker(family="ageing and running-in", kind="loss_factor", draw=run_in_flanks),
-    "run_in_seals": Maker(family="ageing and running-in", kind="loss_factor", draw=run_in_seals),
-    "oil_ageing": Maker(family="ageing and running-in", kind="loss_factor", draw=oil_ageing),
-    "oil_loss": Maker(family="ageing and running-in", kind="loss_factor", draw=oil_loss),
-    "gear_wear": Maker(family="ageing and running-in", kind="loss_factor", draw=gear_wear),
-    "bearing_damage": Maker(family="ageing and running-in", kind="source", draw=bearing_damage),
-    "torque_decay": Maker(family="ageing and running-in", kind="signal", draw=torque_decay),
-}

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from functools import partial
 
 import numpy as np
 
+from diagnosis.proof.zoo import effects
 from diagnosis.proof.zoo.effects import Draft, Maker
 from diagnosis.proof.zoo.setting import Setting, soft
 from diagnosis.proof.zoo.structure import Law, Moment, constant
 from models.base.types import Array
 
-OUTSIDE_FAMILY = "outside the catalogue"
+OUTSIDE_MAKERS: dict[str, Maker] = {}
+makes = partial(effects.makes, family="outside the catalogue", table=OUTSIDE_MAKERS)
 
 
+@makes("source")
 def bearing_torque_square(s: Setting, rng: np.random.Generator) -> Draft:
     """A bearing that bends loses power with the square of torque."""
     x, y, node = s.speed(), s.load(), _any(s.group("bearings"), rng)
@@ -21,6 +24,7 @@ def bearing_torque_square(s: Setting, rng: np.random.Generator) -> Draft:
     return Draft(act=act, law="a y^2 x into the bearing", unit="W", cap=0.4 * s.loss)
 
 
+@makes("source")
 def resonance(s: Setting, rng: np.random.Generator) -> Draft:
     """A narrow band of speed shakes one node."""
     x, x0, node = s.speed(), float(rng.uniform(0.2, 0.8)), _any(s.group("bearings"), rng)
@@ -28,6 +32,7 @@ def resonance(s: Setting, rng: np.random.Generator) -> Draft:
     return Draft(act=act, law="a / (1 + ((x - x0) / (0.06 x0))^2)", unit="W", cap=0.5 * s.loss, parameters={"x0": x0})
 
 
+@makes("source")
 def stick_slip(s: Setting, rng: np.random.Generator) -> Draft:
     """A support creaks below a speed and slides above it."""
     x, x0, node = s.speed(), float(rng.uniform(0.1, 0.3)), _any(s.group("bearings"), rng)
@@ -35,6 +40,7 @@ def stick_slip(s: Setting, rng: np.random.Generator) -> Draft:
     return Draft(act=act, law="a while 0 < x < x0", unit="W", cap=0.5 * s.loss, parameters={"x0": x0})
 
 
+@makes("source")
 def eddy_brake(s: Setting, rng: np.random.Generator) -> Draft:
     """A stray field brakes a turning part: rises, then saturates."""
     x, x0 = s.speed(), float(rng.uniform(0.2, 0.5))
@@ -43,6 +49,7 @@ def eddy_brake(s: Setting, rng: np.random.Generator) -> Draft:
     return Draft(act=act, law="a x^2 / (x^2 + x0^2)", unit="W", cap=0.4 * s.loss, parameters={"x0": x0})
 
 
+@makes("source")
 def stiff_grease(s: Setting, rng: np.random.Generator) -> Draft:
     """Grease that stiffens at rest is sheared soft in every recording."""
     x, tau, node = s.speed(), float(rng.uniform(0.4, 2.0)), _any(s.group("bearings"), rng)
@@ -51,6 +58,7 @@ def stiff_grease(s: Setting, rng: np.random.Generator) -> Draft:
                  parameters={"tau_h": tau})  # fmt: skip
 
 
+@makes("source")
 def sludge(s: Setting, rng: np.random.Generator) -> Draft:
     """Sludge brakes below a temperature of the oil."""
     x, T, T0 = s.speed(), s.temperature("oil"), s.quantile("oil", float(rng.uniform(0.2, 0.6)))
@@ -58,6 +66,7 @@ def sludge(s: Setting, rng: np.random.Generator) -> Draft:
     return Draft(act=act, law="a x^0.5 below T0 into the oil", unit="W", cap=0.4 * s.loss, parameters={"T0": T0})
 
 
+@makes("source")
 def water_evaporation(s: Setting, _: np.random.Generator) -> Draft:
     """Water boils out of the oil, steeply with its temperature."""
     T = s.temperature("oil")
@@ -66,6 +75,7 @@ def water_evaporation(s: Setting, _: np.random.Generator) -> Draft:
     return Draft(act=act, law="-a exp((T_oil - T0) / 14 K)", unit="W", cap=0.4 * s.loss, parameters={"T0": T0})
 
 
+@makes("link_factor")
 def growing_insulation(s: Setting, rng: np.random.Generator) -> Draft:
     """A layer that grows with the hours covers one way to the air."""
     tau, names = float(rng.uniform(0.05, 0.3)) * s.span, _way_to_air(s, rng)
@@ -74,6 +84,7 @@ def growing_insulation(s: Setting, rng: np.random.Generator) -> Draft:
                  parameters={"tau_h": tau})  # fmt: skip
 
 
+@makes("link_factor")
 def opening_gap(s: Setting, rng: np.random.Generator) -> Draft:
     """A gap opens in one link inside as it warms."""
     inside = [n for n in s.links if all(node in s.nodes for node in n.split("-"))]
@@ -85,6 +96,7 @@ def opening_gap(s: Setting, rng: np.random.Generator) -> Draft:
                  parameters={"T0": T0})  # fmt: skip
 
 
+@makes("link")
 def timed_neighbour(s: Setting, rng: np.random.Generator) -> Draft:
     """A machine next to it runs by a timer."""
     node, on = _outer(s, rng), _timer(rng)
@@ -95,6 +107,7 @@ def timed_neighbour(s: Setting, rng: np.random.Generator) -> Draft:
                  parameters={"rise_K": rise, **on.parameters})  # fmt: skip
 
 
+@makes("source")
 def timed_heat(s: Setting, rng: np.random.Generator) -> Draft:
     """An auxiliary gives its heat to one part for a share of every period."""
     node, on = _outer(s, rng), _timer(rng)
@@ -102,6 +115,7 @@ def timed_heat(s: Setting, rng: np.random.Generator) -> Draft:
     return Draft(act=act, law="a for 40 % of every period", unit="W", cap=0.4 * s.loss, parameters=on.parameters)
 
 
+@makes("link_factor")
 def door_draught(s: Setting, rng: np.random.Generator) -> Draft:
     """A door opens by the clock: one way to the air conducts more."""
     names, on = _way_to_air(s, rng), _timer(rng)
@@ -110,6 +124,7 @@ def door_draught(s: Setting, rng: np.random.Generator) -> Draft:
                  parameters=on.parameters)  # fmt: skip
 
 
+@makes("capacity")
 def melting_wax(s: Setting, rng: np.random.Generator) -> Draft:
     """A filling melts: capacity around its melting point."""
     node = _outer(s, rng)
@@ -119,6 +134,7 @@ def melting_wax(s: Setting, rng: np.random.Generator) -> Draft:
                  parameters={"T0": T0, "width_K": width})  # fmt: skip
 
 
+@makes("link")
 def heat_pipe(s: Setting, rng: np.random.Generator) -> Draft:
     """A wet crack leads heat between two nodes that touch nowhere, once one is warm."""
     pairs = [
@@ -135,6 +151,7 @@ def heat_pipe(s: Setting, rng: np.random.Generator) -> Draft:
                  parameters={"T0": T0})  # fmt: skip
 
 
+@makes("link")
 def wet_floor(s: Setting, rng: np.random.Generator) -> Draft:
     """The lowest part stands on a floor that swings between day and night."""
     node, phase, T0 = s.nodes[0], float(rng.uniform(0.0, 1.0)), s.air_mean - float(rng.uniform(2.0, 8.0))
@@ -170,25 +187,3 @@ def _outer(s: Setting, rng: np.random.Generator) -> str:
 
 def _way_to_air(s: Setting, rng: np.random.Generator) -> tuple[str, ...]:
     return (_any(s.link_between(s.nodes, ("air",)), rng),)
-
-
-OUTSIDE_MAKERS: Mapping[str, Maker] = {
-    name: Maker(family=OUTSIDE_FAMILY, kind=kind, draw=draw)
-    for name, kind, draw in (
-        ("bearing_torque_square", "source", bearing_torque_square),
-        ("resonance", "source", resonance),
-        ("stick_slip", "source", stick_slip),
-        ("eddy_brake", "source", eddy_brake),
-        ("stiff_grease", "source", stiff_grease),
-        ("sludge", "source", sludge),
-        ("water_evaporation", "source", water_evaporation),
-        ("growing_insulation", "link_factor", growing_insulation),
-        ("opening_gap", "link_factor", opening_gap),
-        ("timed_neighbour", "link", timed_neighbour),
-        ("timed_heat", "source", timed_heat),
-        ("door_draught", "link_factor", door_draught),
-        ("melting_wax", "capacity", melting_wax),
-        ("heat_pipe", "link", heat_pipe),
-        ("wet_floor", "link", wet_floor),
-    )
-}

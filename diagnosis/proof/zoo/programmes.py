@@ -129,7 +129,7 @@ def _machine_recording(
             inputs[boundary.input] = cycles.ambient(rows, rng)
         elif boundary.input == "T_ambient" and len(definition.boundary) > 1:
             # The air of a nacelle: warmer than outdoors, more so under load of the last hours.
-            warmed = _mean_of_last(load, 3.0, plant.row_s)
+            warmed = _mean_of_three_hours(load, plant.row_s)
             inputs["T_ambient"] = weather + rng.uniform(3.0, 7.0) + rng.uniform(5.0, 10.0) * warmed
         else:
             inputs[boundary.input] = weather
@@ -197,7 +197,7 @@ def _wander(rows: int, row_s: float, rng: np.random.Generator, *, sd: float, tau
     return cycles.ornstein_uhlenbeck(rows, rng, sd=sd, tau_s=3600.0 * tau_h * cycles.ROW_S / row_s)
 
 
-def _mean_of_last(values: Array, hours: float, row_s: float) -> Array:
-    count = max(1, round(3600.0 * hours / row_s))
+def _mean_of_three_hours(values: Array, row_s: float) -> Array:
+    count = max(1, round(3.0 * 3600.0 / row_s))
     padded = np.concatenate([np.full(count - 1, values[0]), values])
     return np.convolve(padded, np.full(count, 1.0 / count), mode="valid")

@@ -373,9 +373,9 @@ class Setting:
             like={name: ""},
         )
 
-    def lag(self, rng: np.random.Generator, low_s: float, high_s: float) -> float:
-        """Time constant, drawn evenly; at least a row, [s]."""
-        return max(float(rng.uniform(low_s, high_s)), self.plant.row_s)
+    def lag(self, rng: np.random.Generator, longest_s: float) -> float:
+        """Time constant, drawn evenly from a minute on; at least a row, [s]."""
+        return max(float(rng.uniform(60.0, longest_s)), self.plant.row_s)
 
 
 def either(rng: np.random.Generator) -> int:

@@ -344,7 +344,7 @@ class _Gearbox:
             T = (1.0 - bulk) * m.T[sump] + bulk * 0.5 * (m.T[rims[0]] + m.T[rims[1]])
             nu = oil.kinematic_viscosity(T)
             contact = losses.Contact(
-                w=torque / pair.r_b[0] / pair.b, v_t=v_t, v_s=H * v_t, v_r=2.0 * v_t * sin,
+                w=torque / pair.r_b[0] / pair.b, v_s=H * v_t, v_r=2.0 * v_t * sin,
                 eta=nu * 1e-6 * oil.density(T), nu=nu, R=R, Ra_um=Ra, E_red=sizes.E_red,
             )  # fmt: skip
             return np.asarray(torque * omega * H * design.friction(contact))

@@ -26,8 +26,8 @@ class Contact:
     ----------
     w : Array
         Normal force per face width, [N/m]
-    v_t, v_s, v_r : Array
-        Pitch line velocity, mean sliding speed and sum of the rolling speeds at the pitch point, [m/s]
+    v_s, v_r : Array
+        Mean sliding speed and sum of the rolling speeds at the pitch point, [m/s]
     eta : Array
         Dynamic viscosity, [Pa s]
     nu : Array
@@ -41,7 +41,6 @@ class Contact:
     """
 
     w: Array
-    v_t: Array
     v_s: Array
     v_r: Array
     eta: Array

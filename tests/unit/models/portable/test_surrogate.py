@@ -9,12 +9,18 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from sklearn.base import clone
+from sklearn.compose import TransformedTargetRegressor
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import FunctionTransformer, MinMaxScaler, StandardScaler
 
+from builder.surrogate.fit import fit_network, reduced_target
+from builder.surrogate.levenberg_marquardt import LevenbergMarquardtRegressor
 from builder.surrogate.networks import PRESETS, network_specs
 from builder.surrogate.train import train_surrogate
 from models.assembly.gearbox import load_gearbox
 from models.base.errors import InputError
-from models.portable.surrogate import SurrogateLosses
+from models.portable.surrogate import SurrogateLosses, feature_matrix
 
 SMALL = {
     "samples": 300,
@@ -121,15 +127,24 @@ def test_block_diagonal_form_is_the_networks_one_by_one(losses):
     assert separate.power(100.0, 10.0, WARM).shape == (9,)
 
 
-def test_plain_networks_are_what_scikit_learn_fitted(trained):
-    specs = network_specs(load_gearbox("fzg").losses(), PRESETS["paper"].domain)
-    for one, spec in zip(trained.networks, specs, strict=True):
-        low, high = np.array(one.network.lower), np.array(one.network.upper)
-        rows = np.random.default_rng(2).uniform(low, high, (100, len(low)))
-        fitted = np.concatenate([e.predict(rows).reshape(100, -1) for e in one.estimators], axis=1)
-        if one.network.log_output:  # of losses divided by powers of the inputs
-            fitted = np.exp(fitted) * np.prod(rows[:, None] ** np.where(spec.powers, spec.powers, 0.0), axis=-1)
-        np.testing.assert_allclose(one.network(rows), np.maximum(fitted, 0.0), rtol=1e-9, atol=1e-9)
+@pytest.mark.parametrize("transforms", [True, False])
+def test_plain_networks_are_what_scikit_learn_fits(transforms):
+    gearbox = load_gearbox("fzg")
+    viscosity = gearbox.viscosity_constants
+    for spec in network_specs(gearbox.losses(), PRESETS["paper"].domain):
+        rows = np.random.default_rng(2).uniform(spec.lower, spec.upper, (200, len(spec.lower)))
+        losses, powers = spec.losses(rows), spec.powers if transforms else None
+        regressor = LevenbergMarquardtRegressor((4, 3), max_iter=15, starts=1)
+        features = {"features": spec.features(transforms=transforms), "viscosity": viscosity}
+        scaler = StandardScaler() if transforms else MinMaxScaler(feature_range=(-1.0, 1.0))
+        steps = make_pipeline(FunctionTransformer(feature_matrix, kw_args=features), scaler, clone(regressor))
+        pipeline = TransformedTargetRegressor(steps, transformer=clone(scaler), check_inverse=False)
+        fitted = pipeline.fit(rows, reduced_target(rows, losses, powers) if transforms else losses).predict(rows)
+        if transforms:
+            fitted = np.exp(fitted) * np.prod(rows[:, None] ** np.where(powers, powers, 0.0), axis=-1)
+        network = fit_network(regressor, rows, losses, spec=spec, outputs=spec.outputs, powers=powers,
+                              viscosity=viscosity)  # fmt: skip
+        np.testing.assert_allclose(network(rows), np.maximum(fitted, 0.0), rtol=1e-9, atol=1e-9)
 
 
 def test_round_trip_through_json(losses):

@@ -6,6 +6,7 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -24,7 +25,7 @@ from diagnosis.proof.zoo.oracle import OracleNats
 from diagnosis.proof.zoo.programmes import programmes
 from diagnosis.proof.zoo.setting import Setting, UnfitError
 from diagnosis.proof.zoo.simulate import simulate
-from diagnosis.proof.zoo.structure import Outcome, Programme, Variant, ZooPlant
+from diagnosis.proof.zoo.structure import Outcome, Variant, ZooPlant
 from diagnosis.proof.zoo.time_course import ALWAYS, Course
 from diagnosis.proof.zoo.truth import truth_of
 from models.assembly.gearbox import Gearbox
@@ -36,9 +37,16 @@ NO_SUCH_NODE = {"pump_fast_stage"}  # the rig has no oil return
 
 
 @pytest.fixture(scope="module", autouse=True)
-def short_programmes() -> Iterator[None]:
-    """A twentieth of the usual hours."""
+def quick_cases() -> Iterator[None]:
+    """A twentieth of the usual hours, and an oracle of independent rows of 0.5 K and 20 W."""
+
+    def nats_of(x: Sequence[Mapping[str, Array]]) -> OracleNats:
+        size = {"P_loss": 20.0}
+        D = sum(float(np.sum((v / size.get(n, 0.5)) ** 2)) for one in x for n, v in one.items())
+        return OracleNats(plant=0.5 * D, tool=0.25 * D)
+
     with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(draw, "design_of", lambda *_: SimpleNamespace(nats_of=nats_of))
         for name in ("STAIR_S", "STANDSTILL_S", "RANDOM_S", "HOLD_STAIRCASE_S", "WARM_UP_S"):
             patch.setattr(cycles, name, 0.05 * getattr(cycles, name))
         yield
@@ -57,22 +65,11 @@ def setting(fzg: Gearbox, drawn: Drawn) -> Setting:
     return Setting(drawn.plant, drawn.programmes, simulate(drawn.plant, warm, [Variant()]), fzg.network().groups)
 
 
-def squares(_: ZooPlant, __: Sequence[Programme], ___: object) -> draw.NatsOf:
-    """An oracle of independent rows of 0.5 K and 20 W."""
-
-    def nats(x: Sequence[Mapping[str, Array]]) -> OracleNats:
-        size = {"P_loss": 20.0}
-        D = sum(float(np.sum((v / size.get(n, 0.5)) ** 2)) for one in x for n, v in one.items())
-        return OracleNats(plant=0.5 * D, tool=0.25 * D)
-
-    return nats
-
-
 def case_of(
     drawn: Drawn, fzg: Gearbox, group: str, *effects: ZooEffect, seed: int = 4, kind: str | None = None
 ) -> ZooCase:
     """A case with given effects, or with drawn ones."""
-    name = {"name": "case_001", "kind": None, "session_deviation": 0.03, "oracle": squares}
+    name = {"name": "case_001", "kind": None, "session_deviation": 0.03}
     if not effects:
         return draw.draw_case_of(drawn, fzg, "fzg", 4, group, **name)
     healthy = draw.draw_case_of(drawn, fzg, "fzg", 4, "control", **{**name, "kind": "clean"})
@@ -95,6 +92,21 @@ def moved(effect: ZooEffect, plant: ZooPlant, outcome: Outcome, run: int) -> flo
         return float(changed.sign * (rates[:, 0] - rates[:, run]).mean())
     rise = np.mean([outcome.T[body][run] - outcome.T[body][0] for body in bodies])
     return float(abs(rise) if changed.sign == 0 else changed.sign * rise)
+
+
+def test_effects_keep_their_order_by_which_seeds_draw_them() -> None:
+    order = """
+    windage pocketing churning_swirl churning_load oil_level_thermal splash_starvation misalignment bearing_preload
+    bearing_additive brake_drag pump_heat run_in_flanks run_in_seals oil_ageing oil_loss gear_wear bearing_damage
+    torque_decay aeration oil_housing_speed oil_mist bearing_seat_contact radiation_error air_cooling_change
+    fan_thermostat foundation_conduction hot_neighbour motor_flange shaft_ends_to_air water_jacket cooler_thermostat
+    cooler_proportional cooler_air_thermostat cooler_air_proportional cooler_constant cooler_shaft_driven oil_jet
+    oil_tank heater_thermostat pump_fast_stage solar_soak rain_on_housing ambient_swing ambient_drift
+    bearing_torque_square resonance stick_slip eddy_brake stiff_grease sludge water_evaporation growing_insulation
+    opening_gap timed_neighbour timed_heat door_draught melting_wax heat_pipe wet_floor loss_changes heat_changes
+    link_changes capacity_changes heat_appears link_appears set_point_changes
+    """
+    assert list(ALL) == order.split()
 
 
 def test_every_effect_acts_in_the_direction_of_its_truth(setting: Setting, drawn: Drawn) -> None:
@@ -190,7 +202,7 @@ def test_same_seed_same_bytes_and_healthy_baselines(
     monkeypatch.setattr(draw, "draw_plant", lambda *_, **__: drawn)
     plans = zoo_plans(5, {"sensor": 1}, families=["walls"], machine="fzg")
     for copy in ("a", "b"):
-        conceal_zoo(plans, recordings=tmp_path / copy / "r", truth=tmp_path / copy / "t", baselines=1, oracle=squares)
+        conceal_zoo(plans, recordings=tmp_path / copy / "r", truth=tmp_path / copy / "t", baselines=1)
     files = sorted(path.relative_to(tmp_path / "a") for path in (tmp_path / "a").rglob("*.*"))
     assert "baseline_1.csv.gz" in {path.name for path in files}
     assert all((tmp_path / "a" / path).read_bytes() == (tmp_path / "b" / path).read_bytes() for path in files)

@@ -1,4 +1,4 @@
-"""From physical inputs to scaled targets as a scikit-learn pipeline, and from a fitted one to a plain network."""
+"""Fitting of one network: from physical inputs to scaled targets, and back to a network of plain weights."""
 
 from __future__ import annotations
 
@@ -8,14 +8,12 @@ from dataclasses import replace
 import numpy as np
 from scipy.linalg import block_diag
 from sklearn.base import clone
-from sklearn.compose import TransformedTargetRegressor
-from sklearn.pipeline import Pipeline
-from sklearn.preprocessing import FunctionTransformer, MinMaxScaler, StandardScaler
+from sklearn.preprocessing import MinMaxScaler, StandardScaler
 
 from builder.surrogate.levenberg_marquardt import LevenbergMarquardtRegressor
 from builder.surrogate.networks import NetworkSpec
 from models.base.types import Array
-from models.portable.surrogate import Feature, Network, feature_matrix
+from models.portable.surrogate import Network, feature_matrix
 
 # If a reduced loss vanishes (a dry gear does not churn) its logarithm is held this far below the largest one.
 LOWEST_FRACTION = 1e-6
@@ -46,46 +44,46 @@ def reduced_target(x: Array, losses: Array, powers: Array) -> Array:
     return np.asarray(np.log(np.maximum(reduced, floor)))
 
 
-def surrogate_pipeline(
+def fit_network(
+    regressor: LevenbergMarquardtRegressor,
+    x: Array,
+    losses: Array,
     *,
-    features: Sequence[tuple[Feature, int]],
+    spec: NetworkSpec,
+    outputs: Sequence[str],
+    powers: Array | None,
     viscosity: tuple[float, float],
-    standardised: bool,
-    network: LevenbergMarquardtRegressor,
-) -> TransformedTargetRegressor:
-    """Return an unfitted estimator: features, their scaling, the network, and the scaling of its targets.
-
-    Everything is scaled to zero mean and unit variance if `standardised`, else to [-1, 1].
-    """
-    scaler = StandardScaler() if standardised else MinMaxScaler(feature_range=(-1.0, 1.0))
-    chosen = FunctionTransformer(feature_matrix, kw_args={"features": features, "viscosity": viscosity})
-    steps = [("features", chosen), ("scaler", scaler), ("network", network)]
-    return TransformedTargetRegressor(Pipeline(steps), transformer=clone(scaler), check_inverse=False)
-
-
-def plain_network(
-    fitted: TransformedTargetRegressor, spec: NetworkSpec, outputs: Sequence[str], powers: Array | None
 ) -> Network:
-    """Return a fitted :func:`surrogate_pipeline` as plain weights, its scalings folded into them.
+    """Fit a network to losses, and return it as plain weights with all scalings folded into them.
 
     Parameters
     ----------
-    fitted : estimator
+    regressor : LevenbergMarquardtRegressor
+        Not fitted yet
+    x : Array, shape (N, inputs)
+    losses : Array, shape (N, outputs)
+        [W]
     spec : NetworkSpec
-        Name, inputs and bounds
+        Name, inputs, features and bounds
     outputs : sequence of str
     powers : Array, shape (outputs, inputs), or None
-        If given, the targets were those of :func:`reduced_target`, which is reversed: a linear part from the features
-        to the outputs, and an exponential. Else the targets were the losses
+        If given, the targets are those of :func:`reduced_target`, which is reversed: a linear part from the features to
+        the outputs, and an exponential; all is scaled to zero mean and unit variance. Else the targets are the losses,
+        and all is scaled to [-1, 1]
+    viscosity : (float, float)
+        Constants of the oil
 
     Returns
     -------
     Network
     """
-    features, scaler, net = (step for _, step in fitted.regressor_.steps)
-    kinds, viscosity = features.kw_args["features"], features.kw_args["viscosity"]
+    kinds = spec.features(transforms=powers is not None)
+    scaler = MinMaxScaler(feature_range=(-1.0, 1.0)) if powers is None else StandardScaler()
+    back = clone(scaler)
+    rows = scaler.fit_transform(feature_matrix(x, features=kinds, viscosity=viscosity))
+    net = regressor.fit(rows, back.fit_transform(losses if powers is None else reduced_target(x, losses, powers)))
     slope, offset = _affine(scaler)
-    back_slope, back_offset = _affine(fitted.transformer_)
+    back_slope, back_offset = _affine(back)
     w_1, w_2, w_3 = net.coefs_
     b_1, b_2, b_3 = net.intercepts_
     passed = np.zeros((len(kinds), len(outputs)))
@@ -99,8 +97,8 @@ def plain_network(
         outputs=tuple(outputs),
         lower=tuple(map(float, spec.lower)),
         upper=tuple(map(float, spec.upper)),
-        features=tuple(kinds),
-        viscosity=tuple(viscosity),
+        features=kinds,
+        viscosity=viscosity,
         weights=(slope[:, None] * w_1, w_2, w_3 / back_slope),
         biases=(b_1 + offset @ w_1, b_2, (b_3 - back_offset) / back_slope),
         passed=passed,
