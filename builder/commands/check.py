@@ -9,12 +9,13 @@ import click
 from builder.base import console
 from builder.base.example import example
 from builder.base.progress import LOADING, progress
-from models.assembly.gearbox import known_gearboxes, load_gearbox, names_a_file
+from models.assembly.gearbox import known_gearboxes, load_gearbox
 from models.base.atomic_write import atomic_file
 from models.base.errors import InputError
 from models.definition.known_bearings import known_bearings
 from models.definition.named_oils import known_oils, named_oil
 from models.files.output_files import refuse_to_replace
+from models.files.toml_file import names_a_file
 
 PICTURES = (".svg", ".png", ".pdf")
 

@@ -259,7 +259,7 @@ def signal_table(network: ThermalNetwork, losses: SurrogateLosses | None = None)
 
 
 def start_temperature(network: ThermalNetwork) -> float:
-    """Temperature at which an FMU starts unless it is told another one: the ambient one of its definition, [degC]."""
+    """Temperature at which an FMU starts unless it is given another one: the ambient one of its definition, [degC]."""
     ambient = network.inputs.get("T_ambient")
     return START_DEGC if ambient is None else ambient.default
 

@@ -19,11 +19,12 @@ from builder.workflows.proof_cases import add_evidence, keep_to_one_set, make_ca
 from diagnosis.proof.cases.case_files import DEFINITION
 from diagnosis.proof.scoring import lines
 from diagnosis.proof.scoring.lines import Task
-from models.assembly.gearbox import load_gearbox, names_a_file
+from models.assembly.gearbox import load_gearbox
 from models.base.atomic_write import atomic_file
 from models.base.errors import InputError
 from models.base.parallel import iterate_parallel
 from models.base.progress import Progress, silent
+from models.files.toml_file import names_a_file
 
 # Start of a diagnosis: an import of the plant, or of anything else of the proof, is an ImportError there.
 BLIND = "import sys; sys.modules['diagnosis.proof'] = None; from builder.__main__ import main; main()"

@@ -182,11 +182,12 @@ class Clock:
 
 
 def _local(stamps: pd.Series, zone: str) -> pd.Series:
-    """Local time with its zone; NaT where it does not exist, or comes twice and the rows do not tell which it is."""
+    """Local time with its zone; NaT where it does not exist, or comes twice and the rows do not show which it is."""
     try:
-        return stamps.dt.tz_localize(zone, ambiguous="infer", nonexistent="NaT")
+        known: pd.Series = stamps.dt.tz_localize(zone, ambiguous="infer", nonexistent="NaT")
     except ValueError:
-        return stamps.dt.tz_localize(zone, ambiguous="NaT", nonexistent="NaT")
+        known = stamps.dt.tz_localize(zone, ambiguous="NaT", nonexistent="NaT")
+    return known
 
 
 def _numbers(values: pd.Series) -> Array:

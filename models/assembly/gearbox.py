@@ -32,7 +32,7 @@ from models.definition.parametric_sections import KEY, ParametricDefinition
 from models.definition.sections import Ambient, Bearing, Housing, Node, Oil, Seal, Shaft, Stage, Training
 from models.definition.values_with_source import Annotations
 from models.files.cycle import Cycle
-from models.files.toml_file import known_names, packaged, read_text
+from models.files.toml_file import known_names, names_a_file, packaged, read_text
 from models.formulas.oil import Oil as Lubricant
 from models.losses.breakdown import Breakdown, break_down
 from models.losses.loss_model import LossModel
@@ -308,6 +308,7 @@ class Gearbox:
         cycle: Cycle | Mapping[str, ArrayLike],
         *,
         initial: float | Mapping[str, float] | None = None,
+        parameters: Mapping[str, ArrayLike] | None = None,
         network: ThermalNetwork | None = None,
     ) -> Result:
         """Simulate a cycle with the full model.
@@ -318,13 +319,15 @@ class Gearbox:
             ``time_s``, ``speed_rpm``, ``torque_Nm`` ...; straight lines between the rows
         initial : float, mapping of node name to float, or None
             Temperatures at the first row, [degC]; by default the first ambient temperature
+        parameters : mapping of name to ArrayLike, shape () or (B,), or None
+            Other values of the network's parameters; arrays simulate B variants at once
         network : ThermalNetwork or None
             An extended or corrected one; by default :meth:`network`
 
         Raises
         ------
         InputError
-            For a faulty cycle or initial temperatures.
+            For a faulty cycle, initial temperatures, or an unknown parameter.
 
         Examples
         --------
@@ -332,15 +335,30 @@ class Gearbox:
         >>> result = load_gearbox("fzg").simulate(cycle, initial=20.0)
         >>> result.temperatures["oil"].round(1)
         array([20. , 30.1])
+        >>> load_gearbox("fzg").simulate(cycle, parameters={"h_air": [0.5, 2.0]}).temperatures["oil"].shape
+        (2, 2)
         """
         return (network or self.network()).simulate(
-            cycle, losses=self.loss_laws(), initial=initial, trained=None if self.is_parametric else self.training
-        )
+            cycle, losses=self.loss_laws(), initial=initial, parameters=parameters,
+            trained=None if self.is_parametric else self.training,
+        )  # fmt: skip
 
     def losses_at(
         self, *, speed: ArrayLike, torque: ArrayLike, temperatures: Mapping[str, ArrayLike] | ArrayLike
     ) -> Breakdown:
-        """Return the loss of every component at operating points; see :func:`models.losses.breakdown.break_down`.
+        """Return the loss of every component, [W], at operating points, with the full model.
+
+        Parameters
+        ----------
+        speed, torque : ArrayLike, shape () or (N,)
+            Of the input shaft, [1/min] and [N m]
+        temperatures : ArrayLike, shape () or (N,), or mapping of node to ArrayLike
+            Of all nodes, or of each, [degC]
+
+        Raises
+        ------
+        InputError
+            If a node is missing or unknown.
 
         Examples
         --------
@@ -419,18 +437,6 @@ def known_gearboxes() -> tuple[str, ...]:
     True
     """
     return known_names(FOLDER)
-
-
-def names_a_file(name_or_path: str | Path) -> bool:
-    """Return True if a definition file is named (by its ending or a folder), False for a gearbox of the package.
-
-    Examples
-    --------
-    >>> names_a_file("fzg"), names_a_file("fzg.toml"), names_a_file("mine/fzg")
-    (False, True, True)
-    """
-    path = Path(name_or_path)
-    return not isinstance(name_or_path, str) or path.name != name_or_path or bool(path.suffix)
 
 
 def load_gearbox(name_or_path: str | Path) -> Gearbox:

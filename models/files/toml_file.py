@@ -82,3 +82,15 @@ def parse_schema_1(text: str, *, file: str, kind: str) -> dict[str, Any]:
     if number != 1 or isinstance(number, bool):
         raise InputError(f"{file}: schema is {shown(number)}; this program reads {kind} of schema 1")
     return document
+
+
+def names_a_file(name_or_path: str | Path) -> bool:
+    """Return True if a definition file is named (by its ending or a folder), False for a gearbox of the package.
+
+    Examples
+    --------
+    >>> names_a_file("fzg"), names_a_file("fzg.toml"), names_a_file("mine/fzg")
+    (False, True, True)
+    """
+    path = Path(name_or_path)
+    return not isinstance(name_or_path, str) or path.name != name_or_path or bool(path.suffix)

@@ -14,10 +14,10 @@ from diagnosis.proof.zoo.draw import draw_case
 from diagnosis.proof.zoo.families import FAMILIES, find_family
 from diagnosis.proof.zoo.recorder import measure, record
 from diagnosis.proof.zoo.truth import truth_of
-from models.assembly.gearbox import FOLDER, load_gearbox, names_a_file
+from models.assembly.gearbox import FOLDER, load_gearbox
 from models.base.errors import InputError, did_you_mean
 from models.base.types import Array
-from models.files.toml_file import packaged, read_text
+from models.files.toml_file import names_a_file, packaged, read_text
 
 # Shares of a set in which nothing else is asked for.
 ZOO_MIX = {"control": 0.3, "single": 0.2, "date": 0.15, "sensor": 0.1, "pair": 0.1, "outside": 0.1, "messy": 0.05}
