@@ -75,7 +75,9 @@ INLINED void find_features(double speed, double torque, const double *T, double 
 INLINED void find_power(double speed, double torque, const double *restrict T, double *restrict power) {
     double features[N_FEATURES + 3], first[N_FIRST], second[N_SECOND], raw[N_NETS] = {0.0}, net[N_NETS];
     const double n = fabs(speed), moment = fabs(torque);
-    const double slow = smaller(n / SPEED_LOW, 1.0), light = smaller(moment / TORQUE_LOW, 1.0);
+    /* 1 within the range of training, beyond it in proportion. */
+    const double speed_share = smaller(n / SPEED_LOW, 1.0) * larger(n / SPEED_HIGH, 1.0);
+    const double torque_share = smaller(moment / TORQUE_LOW, 1.0) * larger(moment / TORQUE_HIGH, 1.0);
     char repeated[N_BLOCKS];
     int n_first = 0, n_second = 0, from_first = 0, from_second = 0;
     find_features(n, moment, T, features);
@@ -111,7 +113,7 @@ INLINED void find_power(double speed, double torque, const double *restrict T, d
     for (int i = 0; i < N_COMPONENTS; i++) {
         const int from = COMPONENT_FROM[i];
         const double loss = COMPONENT_IS_LOG[i] ? net[from] : larger(raw[from], 0.0);
-        power[i] = loss * slow * (COMPONENT_DRIVEN[i] ? light : 1.0);
+        power[i] = loss * speed_share * (COMPONENT_DRIVEN[i] ? torque_share : 1.0);
     }
 }
 

@@ -107,7 +107,7 @@ static ModelStatus excursion(Model *model, double time, const LossPoint *point) 
         append(text, "%s%s %.1f degC (%g to %g)", separator, LOSS_NODE_NAME[i], point->T[i], T_LOW, T_HIGH);
         separator = ", ";
     }
-    append(text, ". Losses are held at the edge of the range; in_domain and domain_distance show how long");
+    append(text, ". Losses are extrapolated; in_domain and domain_distance show how long");
     return MODEL_WARNING;
 }
 

@@ -59,6 +59,12 @@ def range_distance(
     return np.asarray(np.maximum(np.maximum(np.maximum(fast, heavy), off), 0.0))
 
 
+def share_beyond(value: Array, bounds: tuple[float, float]) -> Array:
+    """1 within bounds; below and above them the value as a share of the bound."""
+    low, high = bounds
+    return np.minimum(value / low, 1.0) * np.maximum(value / high, 1.0)
+
+
 def feature_values(kind: Feature, x: Array, viscosity: tuple[float, float]) -> Array:
     r"""Return one kind of feature of physical inputs.
 
@@ -353,6 +359,9 @@ class SurrogateLosses:
     def power(self, speed: ArrayLike, torque: ArrayLike, temperatures: ArrayLike) -> Array:
         """Loss of every component.
 
+        Outside the range of training the networks are held at its bounds; their losses go on in proportion to the
+        speed, and those that vanish with the torque in proportion to that.
+
         Parameters
         ----------
         speed : ArrayLike, shape (...)
@@ -379,10 +388,9 @@ class SurrogateLosses:
         rows *= factors
         order, driven = self._scatter
         losses = self._evaluate(rows).take(order, axis=-1)
-        # Both factors differ from 1 only below the lowest trained speed and torque.
-        slow = np.minimum(point[..., :1] / self.speed_bounds[0], 1.0)
-        light = np.minimum(point[..., 1:2] / self.torque_bounds[0], 1.0)
-        losses *= slow * (driven * light + (1.0 - driven))
+        speed_share = share_beyond(point[..., :1], self.speed_bounds)
+        torque_share = share_beyond(point[..., 1:2], self.torque_bounds)
+        losses *= speed_share * (driven * torque_share + (1.0 - driven))
         return losses
 
     def domain_distance(self, speed: ArrayLike, torque: ArrayLike, temperatures: ArrayLike) -> Array:
