@@ -146,8 +146,8 @@ class GearboxSlave(Fmi2Slave):  # type: ignore[misc,unused-ignore]
         self.log(
             f"at {self._time:g} s the operating point is outside the range that the networks were trained on: speed "
             f"{speed:g} 1/min (to {losses.speed_bounds[1]:g}), torque {torque:g} N m (to {losses.torque_bounds[1]:g}), "
-            f"temperatures {T.min():.1f} to {T.max():.1f} degC ({low:g} to {high:g}). Losses are held at the edge of "
-            "the range; in_domain and domain_distance show how long",
+            f"temperatures {T.min():.1f} to {T.max():.1f} degC ({low:g} to {high:g}). Losses are extrapolated; "
+            "in_domain and domain_distance show how long",
             Fmi2Status.warning,
         )
 
