@@ -76,7 +76,7 @@ def _missed_by(experiment: Experiment, fit: Fit, apart: Collection[str]) -> dict
     return {name: value / middle for name, value in found.items()}
 
 
-def calibrate_without_error(fit: Fit, plain: Fit, apart: Collection[str] = ()) -> Fit:
+def refit_to_predict(fit: Fit, plain: Fit, apart: Collection[str] = ()) -> Fit:
     """An explanation calibrated as the nominal machine is, by noise alone: what predicts, and what an FMU holds.
 
     Parameters

@@ -15,7 +15,7 @@ from diagnosis.engine.calibration import Calibration
 from diagnosis.engine.fit import Experiment, Fit
 from diagnosis.engine.predict import overall_rmse, rmse
 from diagnosis.engine.prepare import held_out_experiment
-from diagnosis.engine.set_apart import calibrate_without_error
+from diagnosis.engine.set_apart import refit_to_predict
 from diagnosis.forward.grid import too_short
 from diagnosis.forward.whitening import RandomHeat
 from diagnosis.recordings.recording import Recording
@@ -226,7 +226,7 @@ def _final(best: Judged | None, plain: Fit, faulty: Sequence[str]) -> Fit:
     if first is None:
         return plain
     try:
-        return calibrate_without_error(first, plain, faulty)
+        return refit_to_predict(first, plain, faulty)
     except ArithmeticError:  # no solution without what model error allows
         return first
 

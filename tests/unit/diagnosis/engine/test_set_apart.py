@@ -11,7 +11,7 @@ import pytest
 from diagnosis.engine.calibration import calibrate_with_error
 from diagnosis.engine.fit import Experiment, Fit, calibrate
 from diagnosis.engine.prepare import prepare_experiment
-from diagnosis.engine.set_apart import calibrate_apart, calibrate_without_error, without_channels
+from diagnosis.engine.set_apart import calibrate_apart, refit_to_predict, without_channels
 from diagnosis.engine.unknown import SensorBias
 from diagnosis.forward.whitening import AS_ASSUMED, RandomHeat
 from diagnosis.recordings.read import read_recordings
@@ -64,7 +64,7 @@ def test_a_fit_without_error_keeps_the_values_of_faulty_sensors_and_has_the_assu
     z[at] = 9.0
     less = experiment.with_random_heat(RandomHeat(heat=0.25, wander=0.25))
     given = less.with_filters(plain.parts).fit(z, iterations=0)
-    found = calibrate_without_error(given, fit, apart)
+    found = refit_to_predict(given, fit, apart)
     assert found.z[at] == 9.0
     assert found.experiment.noise == experiment.noise and found.experiment.random_heat == AS_ASSUMED
     assert np.delete(found.z, at) == pytest.approx(np.delete(fit.z, at), abs=0.3)
