@@ -292,7 +292,7 @@ def _unknown(calibration: Calibration, error_class: ErrorClass, outside: Sequenc
     names, here = Counter(one.name for one in outside), calibration.in_class(error_class)
     ahead = here.log_evidence - calibration.chosen.log_evidence
     return [
-        Judged(effects=(one.hypothesis,), log_prior=-float(np.log(names[one.hypothesis.name])),
-               log_bayes=one.log_bayes + ahead, error_class=error_class)
-        for one in judge_outside(here.fit, outside)
+        Judged(effects=(heat,), log_prior=-float(np.log(names[heat.name])), log_bayes=log_bayes + ahead,
+               error_class=error_class)
+        for heat, log_bayes in judge_outside(here.fit, outside)
     ]  # fmt: skip

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -27,23 +27,7 @@ def outside_of(setup: InferenceSetup, experiment: Experiment) -> list[Hypothesis
                          losses=TOTAL_LOSS in setup.channels)  # fmt: skip
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Outside:
-    """Evidence of an unknown heat.
-
-    Attributes
-    ----------
-    hypothesis : Hypothesis
-        With one variant: its most probable shape
-    log_bayes : float
-        Against nothing, shape and size marginalised
-    """
-
-    hypothesis: Hypothesis
-    log_bayes: float
-
-
-def judge_outside(fit: Fit, hypotheses: Sequence[Hypothesis]) -> list[Outside]:
+def judge_outside(fit: Fit, hypotheses: Sequence[Hypothesis]) -> list[tuple[Hypothesis, float]]:
     """Judge unknown heats: all functions of each are marginalised together.
 
     Parameters
@@ -52,6 +36,12 @@ def judge_outside(fit: Fit, hypotheses: Sequence[Hypothesis]) -> list[Outside]:
         Its unknowns and the model error in its metric are marginalised too, over deviations between sessions
     hypotheses : sequence of Hypothesis
         See :func:`outside_of`
+
+    Returns
+    -------
+    list of (Hypothesis, float)
+        Each with one variant, its most probable shape; and its log Bayes factor against nothing, shape and size
+        marginalised, [nat]
     """
     functions = [replace(one, variants=row[None, :]) for one in hypotheses for row in one.variants]
     found = scan(fit, functions)
@@ -63,7 +53,7 @@ def judge_outside(fit: Fit, hypotheses: Sequence[Hypothesis]) -> list[Outside]:
         each = [judged_together(given, columns, one.term.strength.sd) for given in over.given]
         log_bayes = over.weighed([np.array([value]) for value, _ in each])
         weights = each[over.most_probable][1]
-        judged.append(Outside(hypothesis=shaped(one, weights), log_bayes=float(log_bayes[0])))
+        judged.append((shaped(one, weights), float(log_bayes[0])))
         first = columns.stop
     return judged
 

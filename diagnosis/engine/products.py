@@ -26,7 +26,7 @@ def whitened_base(parts: Sequence[Linear], z: Array, error: Sequence[Array] = ()
 
 
 def base_of(fit: Fit) -> list[Array]:
-    """Inner products of a fit, with the model error of its metric."""
+    """Whitened columns of a fit, with the model error of its metric."""
     metric = fit.experiment.metric
     return whitened_base(fit.parts, fit.z, () if metric is None else metric.shared_columns)
 

@@ -21,7 +21,6 @@ from diagnosis.forward.whitening import RandomHeat
 from diagnosis.recordings.recording import Recording
 from diagnosis.results.advice import next_test, without_sensor
 from diagnosis.results.baseline_notes import baseline_notes
-from diagnosis.results.calibrated_model import CalibratedModel
 from diagnosis.results.findings import estimates_of, finding_of, joint_estimate_of
 from diagnosis.results.instruments import sensors_and_inputs_of
 from diagnosis.results.locations import locations_of
@@ -30,6 +29,7 @@ from diagnosis.results.ratios_only import ratio_notes
 from diagnosis.results.result import Diagnosis, Verdict
 from diagnosis.results.result_parts import (
     Calibrated,
+    CalibratedModel,
     Finding,
     Fits,
     NotDetectable,

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from diagnosis.decision.posterior import Placebo, Repeating, ScaledError
 from diagnosis.decision.settings import Settings
-from diagnosis.results.calibrated_model import CalibratedModel
 from diagnosis.results.first_screen import first_screen_of, verdict_text_of
 from diagnosis.results.joint_estimate import JointEstimate
 from diagnosis.results.result_parts import (
@@ -18,6 +17,7 @@ from diagnosis.results.result_parts import (
     NEAREST,
     NO_CLAIM,
     Calibrated,
+    CalibratedModel,
     Finding,
     Fits,
     Location,

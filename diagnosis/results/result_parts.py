@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from diagnosis.decision.answer import Grade
 from models.base.types import Array
+from models.correction.instruments import InputCorrection, SensorCorrection
 from models.terms.term import Term
 
 if TYPE_CHECKING:
@@ -382,6 +383,24 @@ class Calibrated:
     estimate_stderr: float
     shift_in_sd: float
     unit: str = "1"
+
+
+@dataclass(frozen=True, kw_only=True)
+class CalibratedModel:
+    """Parameters, sensors and inputs of a fit.
+
+    Attributes
+    ----------
+    calibration : tuple of Calibrated
+    sensors : tuple of SensorCorrection
+        How its sensors differ from the machine
+    true_inputs : tuple of InputCorrection
+        What it took the inputs to be
+    """
+
+    calibration: tuple[Calibrated, ...] = ()
+    sensors: tuple[SensorCorrection, ...] = ()
+    true_inputs: tuple[InputCorrection, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
