@@ -50,8 +50,8 @@ class ParametricLosses:
 
     @property
     def components(self) -> tuple[str, ...]:
-        """Two per loss: ``<name>_no_load`` and ``<name>_load``."""
-        return tuple(f"{loss.name}_{kind}" for loss in self.definition.loss for kind in ("no_load", "load"))
+        """``<name>_no_load`` and ``<name>_load`` of every loss that has such a part."""
+        return tuple(f"{loss.name}_{kind}" for loss in self.definition.loss for kind in kinds_of(loss))
 
     @property
     def temperature_nodes(self) -> tuple[str, ...]:
@@ -61,7 +61,7 @@ class ParametricLosses:
     @property
     def reads(self) -> tuple[frozenset[str], ...]:
         """Nodes that each component reads: the part that it warms."""
-        return tuple(frozenset({loss.part}) for loss in self.definition.loss for _ in ("no_load", "load"))
+        return tuple(frozenset({loss.part}) for loss in self.definition.loss for _ in kinds_of(loss))
 
     def power(self, speed: ArrayLike, torque: ArrayLike, temperatures: ArrayLike) -> Array:
         """Losses [W], shape (..., components), at speed [1/min], torque [N m] and temperatures [degC]."""
@@ -75,16 +75,21 @@ class ParametricLosses:
         for loss in self.definition.loss:
             T_here = np.clip(T[..., nodes.index(loss.part)], T_LOWEST, T_HIGHEST)
             nu = kinematic_viscosity_d341(T_here, *constants) / nu_ref
-            # At standstill nothing is lost, whatever the exponent.
-            turning = n > 0.0
             no_load, load = _parts_of(loss, n, m, nu)
-            found += [np.where(turning, no_load, 0.0), load + 0.0 * T_here]
+            # At standstill nothing is lost, whatever the exponent.
+            either = {"no_load": np.where(n > 0.0, no_load, 0.0), "load": load + 0.0 * T_here}
+            found += [either[kind] for kind in kinds_of(loss)]
         return np.stack(np.broadcast_arrays(*found), axis=-1)
 
     def domain_distance(self, speed: ArrayLike, torque: ArrayLike, temperatures: ArrayLike) -> Array:
         """Zero everywhere, shape (...): the laws hold as well, or as badly, at any operating point."""
         T = np.asarray(temperatures, dtype=float)[..., 0]
         return np.zeros(np.broadcast_shapes(np.shape(speed), np.shape(torque), T.shape))
+
+
+def kinds_of(loss: Loss) -> tuple[str, ...]:
+    """Parts of a loss: ``no_load``, ``load``, or both; one that is zero at the reference is zero everywhere."""
+    return tuple(kind for kind, size in (("no_load", loss.no_load_W), ("load", loss.load_W)) if size > 0.0)
 
 
 def _parts_of(loss: Loss, n: Any, m: Any, nu: Any) -> tuple[Any, Any]:
@@ -170,8 +175,8 @@ def with_losses_as_laws(network: ThermalNetwork, definition: ParametricDefinitio
         T = sp.Min(sp.Max(symbol(f"T_{loss.part}"), T_LOWEST), T_HIGHEST)
         nu = kinematic_viscosity_d341(T, *constants, xp=sp) / nu_ref
         no_load, load = _parts_of(loss, n, m, nu)
-        laws[symbol(f"P_{loss.name}_no_load")] = sp.Piecewise((no_load, n > 0), (sp.Float(0.0), True))
-        laws[symbol(f"P_{loss.name}_load")] = load
+        either = {"no_load": sp.Piecewise((no_load, n > 0), (sp.Float(0.0), True)), "load": load}
+        laws |= {symbol(f"P_{loss.name}_{kind}"): either[kind] for kind in kinds_of(loss)}
     # Losses see a shifted speed or torque (a fault of an instrument); as laws they contain the shift.
     seen = {symbol(name): law for name, law in network.operating.items()}
     laws = {name: law.xreplace(seen) for name, law in laws.items()}
@@ -269,13 +274,13 @@ class _Builder:
         T = sp.Min(sp.Max(symbol(f"T_{loss.part}"), T_LOWEST), T_HIGHEST)
         nu_ref = kinematic_viscosity_d341(self.definition.operation.temperature_degC, *constants)
         nu = kinematic_viscosity_d341(T, *constants, xp=sp) / nu_ref
-        no_load = self._factor(f"{loss.name}_no_load", f"{path}.no_load_W", loss.no_load_W, f"no-load loss {loss.name}")
-        no_load *= self._tilt(f"{loss.name}_speed_exponent", f"{path}.speed_exponent", self.n)
-        no_load *= self._tilt(f"{loss.name}_viscosity_exponent", f"{path}.viscosity_exponent", nu)
-        load = self._factor(f"{loss.name}_load", f"{path}.load_W", loss.load_W, f"load-dependent loss {loss.name}")
-        load *= self._tilt(f"{loss.name}_torque_exponent", f"{path}.torque_exponent", self.m)
-        for kind, law in (("no_load", no_load), ("load", load)):
-            name = f"{loss.name}_{kind}"
+        tilts = {"no_load": (("speed", self.n), ("viscosity", nu)), "load": (("torque", self.m),)}
+        sizes = {"no_load": (loss.no_load_W, "no-load"), "load": (loss.load_W, "load-dependent")}
+        for kind in kinds_of(loss):
+            name, (size, text) = f"{loss.name}_{kind}", sizes[kind]
+            law = self._factor(name, f"{path}.{kind}_W", size, f"factor on the {text} loss {loss.name}")
+            for of, ratio in tilts[kind]:
+                law *= self._tilt(f"{loss.name}_{of}_exponent", f"{path}.{of}_exponent", ratio)
             # The loss as assumed, times what a recording made of it; its name is the parameter's, so apart from it.
             yield Source(name=name, node=loss.part, heat=symbol(f"P_{name}") * law, is_loss=True)
 

@@ -12,9 +12,10 @@ import pytest
 from diagnosis import diagnose
 from diagnosis.engine.fit import calibrate
 from diagnosis.engine.prepare import prepare_experiment
+from diagnosis.engine.scale import scale_direction
 from diagnosis.recordings.read import read_recordings
 from diagnosis.recordings.recording import Recording
-from diagnosis.results.ratios_only import ratio_notes, scale_direction
+from diagnosis.results.ratios_only import ratio_notes
 from diagnosis.results.result import Diagnosis
 from diagnosis.results.result_parts import PredictedRun
 from models.assembly.gearbox import load_gearbox
@@ -49,7 +50,7 @@ def test_calibration_knows_that_it_has_no_scale(farm):
     base = calibrate(prepare_experiment(gearbox, recordings)[1])
     (note,) = ratio_notes(base)
     assert "only ratios are identified" in note
-    direction = scale_direction(base)
+    direction = scale_direction(base.experiment.machine.model.network, base.experiment.unknowns)
     common = direction / (direction @ direction)  # the mean logarithm of all sizes, as the priors weigh them
     posterior = float(np.sqrt(common @ base.covariance @ common))
     assert posterior > 0.6 / float(np.sqrt(direction @ direction))
