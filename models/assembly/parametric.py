@@ -170,7 +170,7 @@ def with_losses_as_laws(network: ThermalNetwork, definition: ParametricDefinitio
     operation, constants = definition.operation, definition.viscosity_constants
     n, m = sp.Abs(symbol("speed")) / operation.speed_rpm, sp.Abs(symbol("torque")) / operation.torque_Nm
     nu_ref = kinematic_viscosity_d341(operation.temperature_degC, *constants)
-    laws = {}
+    laws: dict[sp.Symbol, sp.Expr] = {}
     for loss in definition.loss:
         T = sp.Min(sp.Max(symbol(f"T_{loss.part}"), T_LOWEST), T_HIGHEST)
         nu = kinematic_viscosity_d341(T, *constants, xp=sp) / nu_ref
