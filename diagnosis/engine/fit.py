@@ -11,14 +11,12 @@ from scipy.linalg import solve_triangular
 
 from diagnosis.engine.metric import Metric
 from diagnosis.engine.point import Column, Machine, Point, Setting
-from diagnosis.engine.scale import all_sizes_are_unknown, scale_direction
 from diagnosis.engine.unknown import Scope, Unknown, in_scope
 from diagnosis.forward.grid import ErrorCourse, Piece
 from diagnosis.forward.trajectory import ROUNDS, Trajectory, simulate
 from diagnosis.forward.whitening import AS_ASSUMED, Noise, RandomHeat, Whitening
 from models.base.errors import InputError
 from models.base.types import Array
-from models.quantities.quantities import is_total_loss
 
 FIRST_ITERATIONS, ITERATIONS = 4, 8
 SETTLED = 0.05  # of a prior standard deviation
@@ -98,18 +96,6 @@ class Experiment:
         lower, upper = zip(*(unknown.bounds() for unknown in self.unknowns), strict=True)
         return np.array(lower), np.array(upper)
 
-    @cached_property
-    def common_factor(self) -> Array | None:
-        """Direction of the unknowns, shape (unknowns,) and length 1, that no temperature depends on; None: no such one.
-
-        See :mod:`diagnosis.engine.scale`.
-        """
-        network, channels = self.machine.model.network, self.pieces[0].channels
-        if any(map(is_total_loss, channels)) or not all_sizes_are_unknown(network, self.unknowns):
-            return None
-        direction = scale_direction(network, self.unknowns)
-        return direction / float(np.linalg.norm(direction))
-
     def setting(self, index: int, z: Array) -> Setting:
         """Values with which a piece is simulated."""
         piece = self.pieces[index]
@@ -150,13 +136,11 @@ class Experiment:
 
     def columns(self, point: Point, z: Array) -> Array:
         """Derivatives of the readings of a piece, shape (K + 1, channels, unknowns); 0 outside an unknown's scope."""
-        recording, common = point.trajectory.piece.recording, self.common_factor
-        columns = point.responses([
+        recording = point.trajectory.piece.recording
+        return point.responses([
             unknown.column(point, value) if in_scope(unknown, recording) else Column()
             for unknown, value in zip(self.unknowns, z.tolist(), strict=True)
         ])  # fmt: skip
-        # Assumed heats of model error do not grow with the machine: without this a smaller one would need less of them.
-        return columns if common is None else columns - (columns @ common)[..., None] * common
 
     def linearise_piece(
         self, index: int, z: Array, guess: Guess, *, rounds: int = 1, kept: Linear | None = None,

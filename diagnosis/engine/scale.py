@@ -1,21 +1,22 @@
 """The unidentifiable direction of temperatures alone: all heats, conductances and capacities times one factor.
 
 ``C dT/dt = P + sum G dT`` keeps its solution when C, P and G grow together. Where nothing in watts is measured and the
-definition does not fix a size, recordings identify ratios only (heat over capacity, conductance over capacity). The
-common factor then stays as the definition has it: whatever seems to speak for another one is model error, whose size is
-stated in watts, and which would be larger in a smaller machine.
+definition does not fix a size, recordings identify ratios only (heat over capacity, conductance over capacity).
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 import sympy as sp
 
+from diagnosis.engine.fit import Fit
 from diagnosis.engine.unknown import NetworkParameter, Unknown
 from models.base.types import Array
 from models.network.laws import symbol
+from models.quantities.quantities import is_total_loss
 from models.simulation.thermal_network import ThermalNetwork
 
 
@@ -33,6 +34,19 @@ def scale_direction(network: ThermalNetwork, unknowns: Sequence[Unknown]) -> Arr
         if isinstance(unknown, NetworkParameter) and unknown.parameter.name in names else 0.0
         for unknown in unknowns
     ])  # fmt: skip
+
+
+def at_stated_size(fit: Fit) -> Fit:
+    """A fit with the common factor as the definition has it, where temperatures do not know it.
+
+    Model error, whose size is stated in watts, may have moved it: it is larger in a smaller machine.
+    """
+    experiment = fit.experiment
+    network, channels = experiment.machine.model.network, experiment.pieces[0].channels
+    if any(map(is_total_loss, channels)) or not all_sizes_are_unknown(network, experiment.unknowns):
+        return fit
+    direction = scale_direction(network, experiment.unknowns)
+    return replace(fit, z=fit.z - direction * float(fit.z @ direction) / float(direction @ direction))
 
 
 def all_sizes_are_unknown(network: ThermalNetwork, unknowns: Sequence[Unknown]) -> bool:

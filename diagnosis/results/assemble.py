@@ -15,6 +15,7 @@ from diagnosis.engine.calibration import Calibration
 from diagnosis.engine.fit import Experiment, Fit
 from diagnosis.engine.predict import overall_rmse, rmse
 from diagnosis.engine.prepare import held_out_experiment
+from diagnosis.engine.scale import at_stated_size
 from diagnosis.engine.set_apart import refit_to_predict
 from diagnosis.forward.grid import too_short
 from diagnosis.forward.whitening import RandomHeat
@@ -128,7 +129,10 @@ def assemble(
     told |= {rival.mechanism for finding in findings for rival in finding.confusable_with}
     unseen = tuple(one for one in _unseen(posterior, catalogue) if one.mechanism not in told)
     train_fits = _fits(setup, predicted.train, counting)
-    verdict = verdict_of(posterior, answers, unseen, worse_K=train_fits.calibrated - train_fits.before - setup.noise_K)
+    baselines, least_K = [r.name for r in healthy], settings.matters_K + setup.noise_K
+    unfit = train_fits.calibrated - train_fits.before > setup.noise_K
+    unfit |= bool(train_fits.spoiled(baselines, least_K) or holdout.spoiled((), least_K))
+    verdict = verdict_of(posterior, answers, unseen, unfit=unfit)
     location = locations_of(setup, posterior) if posterior.detected else ()
     inputs = setup.gearbox.network().inputs
     most_probable = best if others is None else others.posterior.nothing
@@ -258,15 +262,15 @@ def _distinct(found: Sequence[tuple[Answer, Finding]]) -> tuple[Finding, ...]:
 
 
 def verdict_of(
-    posterior: Posterior, answers: Sequence[Answer], unseen: Sequence[NotDetectable], *, worse_K: float
+    posterior: Posterior, answers: Sequence[Answer], unseen: Sequence[NotDetectable], *, unfit: bool
 ) -> Verdict:
-    """The verdict; `worse_K`: error of the calibrated model less that as delivered and the noise, when learning, [K].
+    """The verdict; `unfit`: calibration made the model worse, of all or of some recordings.
 
-    Above 0 no calibration was found that suits the recordings, so that silence means nothing.
+    No calibration was found that suits them then, so that silence means nothing.
     """
     if posterior.parameter_outside:
         return "parameter_error"
-    if not posterior.detected and worse_K > 0.0:
+    if not posterior.detected and unfit:
         return "unexplained"
     if not posterior.detected:
         asked = {one.effect.name for one in posterior.expected if one.effect.how == "always"}
@@ -394,7 +398,7 @@ def _calibrated(
     found = {p.name for term in terms for p in term.parameters}
     usual = [one.parameter for one in fit.experiment.unknowns if one.parameter.name in {*stated} - found]
     values = estimates_of(fit)
-    estimates = {**values, **estimates_of(believed)}
+    estimates = {**values, **estimates_of(at_stated_size(believed))}
     sensors, true_inputs = sensors_and_inputs_of(fit, findings=[term.label for term in terms], inputs=inputs)
     return CalibratedModel(
         calibration=tuple(

@@ -89,6 +89,13 @@ def _missing(d: Diagnosis) -> str:
         return f"No physics, but a parameter is outside its prior: {reached}."
     if d.log_e_value > d.threshold:
         return f"Yes{_in_what(d)}: {reached}."
+    if _cannot_be_fitted(d) and d.train.calibrated <= d.train.before:
+        worse = ", ".join(f"{name} ({after:.2f} K, {before:.2f} K as delivered)"
+                          for name, (before, after) in d.spoiled.items())  # fmt: skip
+        return (
+            f"Yes: calibrated, the model is further from {worse}, closer to others. They do not fit one machine, and "
+            f"no effect explains that ({reached}). Look first for what was changed between them, and for wrong columns."
+        )
     if _cannot_be_fitted(d):
         return (
             f"Yes: calibrated, the model is further from what it was learnt from ({d.train.calibrated:.2f} K) than as "

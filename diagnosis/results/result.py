@@ -251,6 +251,12 @@ class Diagnosis:
         return self.holdout.far_beyond(self.train, self.settings.matters_K)
 
     @property
+    def spoiled(self) -> dict[str, tuple[float, float]]:
+        """Tested recordings that calibration made worse by what matters: errors as delivered and calibrated, [K]."""
+        least_K = self.settings.matters_K + self.noise_K
+        return self.train.spoiled(self.inputs.get("baselines", ()), least_K) | self.holdout.spoiled((), least_K)
+
+    @property
     def places(self) -> tuple[Location, ...]:
         """The most probable place, and every other one that is likely: several effects have several."""
         return (*self.location[:1], *(place for place in self.location[1:] if place.probability >= LIKELY))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -343,6 +343,13 @@ class Fits:
             if after > MISSED * train.after and after - train.after > matters_K
         }  # fmt: skip
         return tuple(sorted(far, key=lambda name: -far[name]))
+
+    def spoiled(self, but: Collection[str], least_K: float) -> dict[str, tuple[float, float]]:
+        """Errors as delivered and calibrated of recordings that calibration made worse by more than `least_K`, [K]."""
+        return {
+            name: (before, calibrated) for name, (before, calibrated, _) in self.recordings.items()
+            if name not in but and calibrated - before > least_K
+        }  # fmt: skip
 
     def to_dict(self) -> dict[str, Any]:
         """The errors as they are in ``diagnosis.json``."""

@@ -13,11 +13,11 @@ from diagnosis.results.first_screen import first_screen_of, verdict_text_of
 from tests.unit.diagnosis.diagnosis_example import consistent
 
 
-@pytest.mark.parametrize(("worse_K", "verdict"), [(-0.5, "consistent"), (0.1, "unexplained")])
-def test_a_model_that_calibration_makes_worse_is_not_consistent(worse_K: float, verdict: str) -> None:
+@pytest.mark.parametrize(("unfit", "verdict"), [(False, "consistent"), (True, "unexplained")])
+def test_a_model_that_calibration_makes_worse_is_not_consistent(unfit: bool, verdict: str) -> None:
     nothing = Judged(effects=(), log_prior=0.0, log_bayes=0.0, error_class=error_classes()[0])
     silent = Posterior(nothing=nothing, judged=(), log_e=-2.0, threshold=10.0, class_threshold=5.0, rule=rule())
-    assert verdict_of(silent, (), (), worse_K=worse_K) == verdict
+    assert verdict_of(silent, (), (), unfit=unfit) == verdict
 
 
 def test_what_to_check_then_is_told() -> None:
@@ -31,3 +31,18 @@ def test_what_to_check_then_is_told() -> None:
         "Yes: calibrated, the model is further from what it was learnt from (8.53 K) than as delivered"
     )
     assert "swapped or wrong columns" in told
+
+
+def test_recordings_that_do_not_fit_one_machine_are_named() -> None:
+    """As after a change: calibration makes those after it worse, and those before it better."""
+    base = consistent()
+    least = base.settings.matters_K + base.noise_K
+    recordings = {"before": (3.0, 1.0, 1.0), "after": (1.0, 1.1 + least, 1.1 + least), "april": (1.0, 9.0, 9.0)}
+    train = replace(base.train, before=2.2, calibrated=1.9, recordings=recordings)
+    changed = replace(base, verdict="unexplained", train=train, inputs={**base.inputs, "baselines": {"april": ""}})
+    assert list(changed.spoiled) == ["after"]
+    (told,) = dict(first_screen_of(changed))["Is something missing?"]
+    assert told.startswith(
+        f"Yes: calibrated, the model is further from after ({1.1 + least:.2f} K, 1.00 K as delivered)"
+    )
+    assert "They do not fit one machine" in told and "before (" not in told
