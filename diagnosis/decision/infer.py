@@ -48,7 +48,7 @@ REFITTED, SECONDS = 6, 2
 SETTLED_NAT, MOST_TURNS = 0.1, 5  # gain at which a fit has ended; how often it goes on at most
 IMPOSSIBLE = -1e3  # nats
 FAR_BETTER = 10.0  # nats, from which the calibration was in the wrong basin
-WHOLE = 0.3  # off 1, up to which two channels count as swapped
+WHOLE = 0.3  # off 1, up to which two channels count as swapped; of a reading at least, that is held by a stuck channel
 SCALED = (0.5, 1.0, 2.0)  # of the amplitudes of model error: what the scan says with each
 WORTH, WORTH_SHARE = 1.0, 0.1  # nats, and share of the best, from which a candidate is worth a fit
 
@@ -234,8 +234,11 @@ def _judged(calibration: Calibration, one: Judged, spread: float) -> Judged:
         if effect.term is None:
             continue  # a parameter is not further
         z = float(fit.z[at])
-        if effect.term.form == "swapped" and abs(fit.experiment.unknowns[at].value(z) - 1.0) > WHOLE:
-            log_bayes = IMPOSSIBLE  # a share of a swap is no fault of an instrument
+        share = fit.experiment.unknowns[at].value(z)
+        if (effect.term.form == "swapped" and abs(share - 1.0) > WHOLE) or (
+            effect.term.form == "stuck" and share < WHOLE
+        ):
+            log_bayes = IMPOSSIBLE  # a share of a swap, or of a held reading, is no fault of an instrument
         if effect.sign:  # only the half of the normal distribution with this sign is possible, with twice the prior
             log_bayes += float(np.log(2.0) + log_ndtr(effect.sign * z / np.sqrt(fit.covariance[at, at])))
         at += len(effect.term.parameters)

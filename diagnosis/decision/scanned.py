@@ -17,6 +17,7 @@ from diagnosis.engine.scan import Scan, scan
 from diagnosis.engine.sessions import OverSessions, over_sessions
 from models.base.types import Array
 
+LEAST_SHARE = 0.1  # of a reading that a stuck channel holds, or of a swap, by a straight line: less is none
 OVER_TIME = ("from_date", "carried_on", "over_hours")  # effects that change over time
 WORSE, LEAST_DEVIATION = 2.0, 0.05  # times the deviation between sessions; prior standard deviations
 
@@ -112,8 +113,12 @@ def _in_class(
     """Candidates in one class; `nothing`: that without any effect."""
     strengths = _strengths(found, parameters, over.given[over.most_probable])
     less = counts_less((*found.candidates, *parameters), nothing, error_class)
-    return ScanInClass(error_class=error_class, ahead=ahead, scan=found, over=over,
-                       log_bayes=_weighed(found, parameters, over) + ahead - less, strengths=strengths)  # fmt: skip
+    log_bayes = _weighed(found, parameters, over) - less
+    partial = [one.term is not None and one.term.form in ("stuck", "swapped") for one in found.candidates]
+    hardly = np.flatnonzero(partial & (np.abs(strengths.value[: len(partial)]) < LEAST_SHARE))
+    log_bayes[hardly] = np.minimum(log_bayes[hardly], 0.0)  # no fault of an instrument
+    return ScanInClass(error_class=error_class, ahead=ahead, scan=found, over=over, log_bayes=log_bayes + ahead,
+                       strengths=strengths)  # fmt: skip
 
 
 def in_best_classes(

@@ -36,7 +36,7 @@ from models.assembly.gearbox import Gearbox
 from models.base.types import Array
 from models.mechanisms import CATALOGUE, Placed
 from models.network.laws import Parameter, symbol
-from models.terms.term import Term
+from models.terms.term import Form, Term
 from tests.unit.diagnosis.inference_example import recorded
 
 LOOKED_FOR = ("windage", "air_cooling_change", "sensor_bias", "hot_neighbour")
@@ -276,12 +276,15 @@ def test_every_candidate_is_judged_in_the_class_that_suits_it() -> None:
     np.testing.assert_array_equal(found.log_bayes, [78.0, 4.0])
 
 
-@pytest.mark.parametrize(("share", "possible"), [(0.95, True), (0.2, False)])
-def test_a_share_of_a_swap_is_refused_with_a_number(
-    share: float, possible: bool, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(("form", "share", "possible"), [
+    ("swapped", 0.95, True), ("swapped", 0.2, False),
+    ("stuck", 0.95, True), ("stuck", 0.5, True), ("stuck", 0.004, False),
+])  # fmt: skip
+def test_a_share_of_a_swap_or_of_a_held_reading_is_refused_with_a_number(
+    form: Form, share: float, possible: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     strength = Parameter(name="swap", start=0.0, sd=1.0, lower=-2.0, upper=2.0, log=False)
-    term = Term(label="swap", kind="sensor", target=("oil", "pinion"), expression=symbol("swap"), form="swapped",
+    term = Term(label="swap", kind="sensor", target=("oil", "pinion"), expression=symbol("swap"), form=form,
                 parameters=(strength,))  # fmt: skip
     swap = Hypothesis(name="swapped_channels", place="oil_pinion", family="measurement", term=term, law="swap",
                       variants=np.ones((1, 1)))  # fmt: skip
