@@ -8,7 +8,7 @@ from typing import Any
 from tests.unit.diagnosis.diagnosis_example import missing_physics
 
 PAGE = Path(__file__).resolve().parents[3] / "docs" / "reference" / "diagnosis_json.md"
-BY_NAME = ("sensors", "kinds", "evidence", "inputs")  # their keys are names of channels, kinds, classes and files
+BY_NAME = ("sensors", "recordings", "kinds", "evidence", "inputs")  # keys: channels, recordings, kinds, classes, files
 
 
 def keys(node: Any) -> set[str]:
