@@ -19,6 +19,7 @@ from diagnosis.candidates.hypotheses import Hypothesis
 from diagnosis.decision.placebo import CandidatesIn, counting_less, judge_baselines
 from diagnosis.decision.posterior import Judged, Posterior
 from diagnosis.decision.scanned import (
+    WHOLE,
     Scanned,
     counts_less,
     expected_of,
@@ -48,7 +49,6 @@ REFITTED, SECONDS = 6, 2
 SETTLED_NAT, MOST_TURNS = 0.1, 5  # gain at which a fit has ended; how often it goes on at most
 IMPOSSIBLE = -1e3  # nats
 FAR_BETTER = 10.0  # nats, from which the calibration was in the wrong basin
-WHOLE = 0.3  # off 1, up to which two channels count as swapped; of a reading at least, that is held by a stuck channel
 SCALED = (0.5, 1.0, 2.0)  # of the amplitudes of model error: what the scan says with each
 WORTH, WORTH_SHARE = 1.0, 0.1  # nats, and share of the best, from which a candidate is worth a fit
 
@@ -234,10 +234,8 @@ def _judged(calibration: Calibration, one: Judged, spread: float) -> Judged:
         if effect.term is None:
             continue  # a parameter is not further
         z = float(fit.z[at])
-        share = fit.experiment.unknowns[at].value(z)
-        if (effect.term.form == "swapped" and abs(share - 1.0) > WHOLE) or (
-            effect.term.form == "stuck" and share < WHOLE
-        ):
+        least, most = WHOLE.get(effect.term.form or "", (-np.inf, np.inf))
+        if not least <= fit.experiment.unknowns[at].value(z) <= most:
             log_bayes = IMPOSSIBLE  # a share of a swap, or of a held reading, is no fault of an instrument
         if effect.sign:  # only the half of the normal distribution with this sign is possible, with twice the prior
             log_bayes += float(np.log(2.0) + log_ndtr(effect.sign * z / np.sqrt(fit.covariance[at, at])))

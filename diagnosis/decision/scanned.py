@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from diagnosis.candidates.hypotheses import Hypothesis
 from diagnosis.decision.posterior import Expected, Judged, Likeness, Repeating, ScaledError
@@ -17,7 +18,8 @@ from diagnosis.engine.scan import Scan, scan
 from diagnosis.engine.sessions import OverSessions, over_sessions
 from models.base.types import Array
 
-LEAST_SHARE = 0.1  # of a reading that a stuck channel holds, or of a swap, by a straight line: less is none
+WHOLE = {"swapped": (0.7, 1.3), "stuck": (0.3, np.inf)}  # share that a fault has which an instrument has or has not
+LEAST_SHARE = 0.1  # the least of these by a straight line, which may be far off
 OVER_TIME = ("from_date", "carried_on", "over_hours")  # effects that change over time
 WORSE, LEAST_DEVIATION = 2.0, 0.05  # times the deviation between sessions; prior standard deviations
 
@@ -114,11 +116,18 @@ def _in_class(
     strengths = _strengths(found, parameters, over.given[over.most_probable])
     less = counts_less((*found.candidates, *parameters), nothing, error_class)
     log_bayes = _weighed(found, parameters, over) - less
-    partial = [one.term is not None and one.term.form in ("stuck", "swapped") for one in found.candidates]
-    hardly = np.flatnonzero(partial & (np.abs(strengths.value[: len(partial)]) < LEAST_SHARE))
-    log_bayes[hardly] = np.minimum(log_bayes[hardly], 0.0)  # no fault of an instrument
+    hardly = hardly_there(found.candidates, strengths.value)
+    log_bayes[hardly] = np.minimum(log_bayes[hardly], 0.0)
     return ScanInClass(error_class=error_class, ahead=ahead, scan=found, over=over, log_bayes=log_bayes + ahead,
                        strengths=strengths)  # fmt: skip
+
+
+def hardly_there(candidates: Sequence[Hypothesis], strengths: Array) -> NDArray[np.intp]:
+    """Places of faults of which an instrument would have a small share only; a strength per candidate, or more."""
+    return np.array([
+        index for index, (one, value) in enumerate(zip(candidates, strengths.tolist(), strict=False))
+        if one.term is not None and one.term.form in WHOLE and abs(value) < LEAST_SHARE
+    ], dtype=np.intp)  # fmt: skip
 
 
 def in_best_classes(

@@ -37,6 +37,7 @@ from diagnosis.results.result_parts import (
     PredictedRun,
     Ranked,
     law_of,
+    spoiled_in,
 )
 from diagnosis.setup.inference_setup import InferenceSetup
 from diagnosis.setup.noise import HEAT_FRACTION, HEAT_TIME_S, PARAMETRIC_FRACTION, PARAMETRIC_K, WANDER
@@ -129,9 +130,9 @@ def assemble(
     told |= {rival.mechanism for finding in findings for rival in finding.confusable_with}
     unseen = tuple(one for one in _unseen(posterior, catalogue) if one.mechanism not in told)
     train_fits = _fits(setup, predicted.train, counting)
-    baselines, least_K = [r.name for r in healthy], settings.matters_K + setup.noise_K
-    unfit = train_fits.calibrated - train_fits.before > setup.noise_K
-    unfit |= bool(train_fits.spoiled(baselines, least_K) or holdout.spoiled((), least_K))
+    spoiled = spoiled_in(train_fits, holdout, baselines=[r.name for r in healthy],
+                         least_K=settings.matters_K + setup.noise_K)  # fmt: skip
+    unfit = bool(spoiled) or train_fits.calibrated - train_fits.before > setup.noise_K
     verdict = verdict_of(posterior, answers, unseen, unfit=unfit)
     location = locations_of(setup, posterior) if posterior.detected else ()
     inputs = setup.gearbox.network().inputs
@@ -198,6 +199,7 @@ def assemble(
         placebo=posterior.placebo,
         holdout_gain=predicted.holdout_gain,
         contradicted=contradicted,
+        spoiled=spoiled,
     )  # fmt: skip
 
 

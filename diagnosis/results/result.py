@@ -108,6 +108,8 @@ class Diagnosis:
         Log predictive density of the held-out readings: final model less the calibrated one, [nat]; NaN without any
     contradicted : bool
         True if held-out recordings contradict the findings, see :meth:`Fits.contradict`: none is a claim
+    spoiled : mapping of recording to (before, calibrated)
+        Tested recordings that calibration made worse by more than noise and what matters, [K]
     faulty : tuple of str
         Channels that neither the calibration nor the errors over all temperatures count, because their sensors fail
     terms : tuple of Term
@@ -161,6 +163,7 @@ class Diagnosis:
     placebo: Placebo | None = None
     holdout_gain: float = math.nan
     contradicted: bool = False
+    spoiled: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     faulty: tuple[str, ...] = ()
     terms: tuple[Term, ...] = ()
     sensors: tuple[SensorCorrection, ...] = ()
@@ -249,12 +252,6 @@ class Diagnosis:
     def missed(self) -> tuple[str, ...]:
         """Held-out recordings that the model misses far beyond what it was learnt from, worst first."""
         return self.holdout.far_beyond(self.train, self.settings.matters_K)
-
-    @property
-    def spoiled(self) -> dict[str, tuple[float, float]]:
-        """Tested recordings that calibration made worse by what matters: errors as delivered and calibrated, [K]."""
-        least_K = self.settings.matters_K + self.noise_K
-        return self.train.spoiled(self.inputs.get("baselines", ()), least_K) | self.holdout.spoiled((), least_K)
 
     @property
     def places(self) -> tuple[Location, ...]:

@@ -327,7 +327,7 @@ class Fits:
     found: float
     after: float
     sensors: Mapping[str, tuple[float, float, float]]
-    recordings: Mapping[str, tuple[float, float, float]]
+    recordings: dict[str, tuple[float, float, float]]
 
     def contradict(self, gain: float, noise_K: float) -> bool:
         """True if these recordings contradict the findings: a lower log score, or an error larger by the noise.
@@ -344,13 +344,6 @@ class Fits:
         }  # fmt: skip
         return tuple(sorted(far, key=lambda name: -far[name]))
 
-    def spoiled(self, but: Collection[str], least_K: float) -> dict[str, tuple[float, float]]:
-        """Errors as delivered and calibrated of recordings that calibration made worse by more than `least_K`, [K]."""
-        return {
-            name: (before, calibrated) for name, (before, calibrated, _) in self.recordings.items()
-            if name not in but and calibrated - before > least_K
-        }  # fmt: skip
-
     def to_dict(self) -> dict[str, Any]:
         """The errors as they are in ``diagnosis.json``."""
         return {
@@ -366,6 +359,19 @@ class Fits:
                 for what, of in (("sensors", self.sensors), ("recordings", self.recordings))
             },
         }
+
+
+def spoiled_in(
+    train: Fits, holdout: Fits, *, baselines: Collection[str], least_K: float
+) -> dict[str, tuple[float, float]]:
+    """Errors as delivered and calibrated, [K], of tested recordings that calibration made worse by more than `least_K`.
+
+    What is both learnt from and held out counts by its held-out part.
+    """
+    tested = {name: errors for name, errors in train.recordings.items() if name not in baselines} | holdout.recordings
+    return {
+        name: (before, calibrated) for name, (before, calibrated, _) in tested.items() if calibrated - before > least_K
+    }
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -203,6 +203,12 @@ class Loss(Section):
     load_W: Annotated[float, between(0.0, 1e7)]
     torque_exponent: Annotated[float, between(0.0, 3.0)] = 1.0
 
+    @model_validator(mode="after")
+    def _is_a_loss(self) -> Self:
+        if self.no_load_W == self.load_W == 0.0:
+            raise ValueError(f"no_load_W and load_W of '{self.name}' are both 0; give one, or leave the loss out")
+        return self
+
 
 class ParametricDefinition(Section):
     """The whole file of a machine whose geometry is not known."""

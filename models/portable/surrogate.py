@@ -60,7 +60,10 @@ def range_distance(
 
 
 def share_beyond(value: Array, bounds: tuple[float, float]) -> Array:
-    """1 within bounds; below and above them the value as a share of the bound."""
+    """1 within bounds; below and above them the value as a share of the bound, shape (...).
+
+    A loss is a force times a speed: with a constant coefficient of friction it is in proportion to both.
+    """
     low, high = bounds
     return np.minimum(value / low, 1.0) * np.maximum(value / high, 1.0)
 

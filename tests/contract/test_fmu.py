@@ -260,8 +260,9 @@ def test_the_reference_run_is_what_fmpy_finds(path: Path, tmp_path: Path) -> Non
 def test_native_and_python_fmu_agree(fzg_fmu: Path, fzg_native: Path) -> None:
     """At held inputs, inside and outside the range of training."""
     with hosted(fzg_fmu, {"factor.bearing": 1.7}) as python, hosted(fzg_native, {"factor.bearing": 1.7}) as native:
-        for speed, duration in ((300.0, 1.0), (310.0, 60.0), (-20.0, 0.3), (0.0, 30.0), (1000.0, 200.0)):
+        for speed, torque, duration in ((300.0, 150.0, 1.0), (310.0, 150.0, 60.0), (-20.0, 150.0, 0.3),
+                                        (0.0, 150.0, 30.0), (1000.0, 150.0, 200.0), (200.0, 700.0, 5.0)):  # fmt: skip
             for host in (python, native):
-                host.set(speed=speed)
+                host.set(speed=speed, torque=torque)
                 host.step(duration)
             assert python.outputs() == pytest.approx(native.outputs(), rel=1e-9, abs=1e-9)

@@ -35,6 +35,10 @@ def diagnosed(
 ) -> tuple[Path, Path]:
     """Folder of the recordings and folder of the diagnosis."""
     folder = tmp_path_factory.mktemp("cooled")
+    (folder / "out").mkdir()
+    (folder / "out" / "diagnosis.json").write_text('{"inputs": {"recordings": {"old": ""}, "held_out": {}}}')
+    for name in ("old", "mine"):
+        (folder / "out" / f"{name}.csv").write_text("time_s\n")
     off = {"mesh": 1.1, "h_air": 0.85, "h_oil_housing": 1.2, "seal": 0.9}
     record(cooled, fzg, folder / "train.csv", seed=1, hours=5.0, parameters=off)
     record(cooled, fzg, folder / "hold.csv", seed=2, hours=2.5, parameters=off)
@@ -58,6 +62,10 @@ def test_hidden_cooler_is_named_located_and_measured(diagnosed: tuple[Path, Path
     assert found["significance"]["p_value"] < 1e-6
     # The cooler takes at most 5 W/K times the rise over the water.
     assert 100.0 < first["heat_W"]["max"] < 500.0
+
+
+def test_what_an_earlier_diagnosis_left_is_removed_and_nothing_else(diagnosed: tuple[Path, Path]) -> None:
+    assert {path.stem for path in diagnosed[1].glob("*.csv")} == {"train", "hold", "mine"}
 
 
 def test_held_out_error_is_halved_against_the_calibrated_model(diagnosed: tuple[Path, Path]) -> None:

@@ -22,7 +22,7 @@ from diagnosis.decision.infer import (
     infer,
 )
 from diagnosis.decision.posterior import KINDS, Judged, Posterior
-from diagnosis.decision.scanned import ScanInClass, Scanned, counts_less, in_best_classes, scan_in_classes
+from diagnosis.decision.scanned import ScanInClass, Scanned, counts_less, hardly_there, in_best_classes, scan_in_classes
 from diagnosis.decision.settings import Settings
 from diagnosis.engine.calibration import Calibration, calibrate_with_error, recalibrate
 from diagnosis.engine.families import axis_of, changes, log_prior, parameters_outside
@@ -274,6 +274,17 @@ def test_every_candidate_is_judged_in_the_class_that_suits_it() -> None:
     )
     assert [one.error_class.name for one in found.best] == ["small", "full"]
     np.testing.assert_array_equal(found.log_bayes, [78.0, 4.0])
+
+
+def test_a_small_share_of_a_held_reading_counts_nothing_in_the_scan() -> None:
+    def of_form(form: Form | None) -> Hypothesis:
+        strength = Parameter(name="share", start=0.0, sd=1.0, lower=0.0, upper=2.0, log=False)
+        term = Term(label="fault", kind="sensor", target=("oil",), expression=symbol("share"), form=form,
+                    parameters=(strength,))  # fmt: skip
+        return replace(named("fault", "oil"), term=term)
+
+    candidates = [*map(of_form, ("stuck", "stuck", "swapped", "shift", None)), named("windage", "oil")]
+    assert hardly_there(candidates, np.array([0.004, 0.5, -0.05, 0.004, 0.004, 0.004, 3.0])).tolist() == [0, 2]
 
 
 @pytest.mark.parametrize(("form", "share", "possible"), [

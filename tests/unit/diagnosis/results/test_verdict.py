@@ -10,6 +10,7 @@ from diagnosis.decision.posterior import Judged, Posterior
 from diagnosis.engine.learnt import error_classes, rule
 from diagnosis.results.assemble import verdict_of
 from diagnosis.results.first_screen import first_screen_of, verdict_text_of
+from diagnosis.results.result_parts import spoiled_in
 from tests.unit.diagnosis.diagnosis_example import consistent
 
 
@@ -34,15 +35,14 @@ def test_what_to_check_then_is_told() -> None:
 
 
 def test_recordings_that_do_not_fit_one_machine_are_named() -> None:
-    """As after a change: calibration makes those after it worse, and those before it better."""
+    """As after a change: calibration makes those after it worse, and those before it better; baselines do not count."""
     base = consistent()
-    least = base.settings.matters_K + base.noise_K
-    recordings = {"before": (3.0, 1.0, 1.0), "after": (1.0, 1.1 + least, 1.1 + least), "april": (1.0, 9.0, 9.0)}
-    train = replace(base.train, before=2.2, calibrated=1.9, recordings=recordings)
-    changed = replace(base, verdict="unexplained", train=train, inputs={**base.inputs, "baselines": {"april": ""}})
-    assert list(changed.spoiled) == ["after"]
+    train = replace(base.train, before=2.2, calibrated=1.9, recordings={
+        "before": (3.0, 1.0, 1.0), "after": (1.0, 2.2, 2.2), "april": (1.0, 9.0, 9.0)})  # fmt: skip
+    holdout = replace(base.holdout, recordings={"held": (1.0, 2.0, 2.0), "near": (1.0, 1.9, 1.9)})
+    spoiled = spoiled_in(train, holdout, baselines=["april"], least_K=0.95)
+    assert spoiled == {"after": (1.0, 2.2), "held": (1.0, 2.0)}
+    changed = replace(base, verdict="unexplained", train=train, spoiled=spoiled)
     (told,) = dict(first_screen_of(changed))["Is something missing?"]
-    assert told.startswith(
-        f"Yes: calibrated, the model is further from after ({1.1 + least:.2f} K, 1.00 K as delivered)"
-    )
-    assert "They do not fit one machine" in told and "before (" not in told
+    assert "further from after (2.20 K, 1.00 K as delivered), held (2.00 K, 1.00 K as delivered), closer" in told
+    assert "They do not fit one machine" in told

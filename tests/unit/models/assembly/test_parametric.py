@@ -66,6 +66,19 @@ def test_faults_of_a_definition_are_named(old, new, fault):
         read_gearbox(TEXT.replace(old, new), file="mine.toml")
 
 
+def test_a_part_of_a_loss_that_is_zero_is_none(gearbox):
+    """Neither a component nor a parameter; a loss without any part is refused."""
+    only = gearbox.with_values({"loss.0.no_load_W": 0.0})
+    gone = {"gears_no_load", "gears_speed_exponent", "gears_viscosity_exponent"}
+    assert {p.name for p in gearbox.network().parameters} - {p.name for p in only.network().parameters} == gone
+    point = {"speed": 1500.0, "torque": 5000.0, "temperatures": 60.0}
+    before, after = gearbox.losses_at(**point), only.losses_at(**point)
+    assert "gears_no_load" in before and "gears_no_load" not in after
+    assert after["total"] == pytest.approx(before["total"] - before["gears_no_load"], rel=1e-12)
+    with pytest.raises(InputError, match="no_load_W and load_W of 'gears' are both 0"):
+        only.with_values({"loss.0.load_W": 0.0})
+
+
 def test_changed_values_are_checked_as_the_file_is(gearbox):
     changed = gearbox.with_values({"loss.0.load_W": 10000.0})
     assert changed.definition.loss[0].load_W == 10000.0
