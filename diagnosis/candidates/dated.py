@@ -175,7 +175,8 @@ def changing(placed: Placed, course: Course, axis: Axis, *, sd: float | None = N
     middle = [p.grid[len(p.grid) // 2] if p.grid else p.start for p in shapes]
     rows = [[1.0, *middle, *variant, clock.start] for variant in course.variants.tolist()]
     return Hypothesis(name=name, place=placed.place, family=placed.family, term=term, law=law, variants=np.array(rows),
-                      how=course.how, ending=course.ending, clock=clock.name)  # fmt: skip
+                      how=course.how, ending=course.ending, clock=clock.name,
+                      date=f"{label}_since" if course.how == "from_date" else None)  # fmt: skip
 
 
 def carried_on(placed: Placed, axis: Axis) -> Hypothesis:

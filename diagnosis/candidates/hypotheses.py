@@ -43,8 +43,12 @@ class Hypothesis:
         What the course in time adds to the label of the law
     clock : str or None
         Parameter of the term that is the start of the recording on the time axis that all recordings share, [s]
+    date : str or None
+        Parameter of the term that is the moment at which it begins, on that time axis, [s]
     less : float
-        By how much its evidence counts less: baselines bring as much of its law, [nat]
+        What baselines bring of its law over time, which does not count, [nat]
+    trusted : bool
+        True if baselines alone say how much of a change over time counts, not also the class of model error
     """
 
     name: str
@@ -58,7 +62,9 @@ class Hypothesis:
     how: How = "always"
     ending: str = ""
     clock: str | None = None
+    date: str | None = None
     less: float = 0.0
+    trusted: bool = False
 
     @property
     def label(self) -> str:
@@ -82,6 +88,11 @@ class Hypothesis:
             return 0
         p = self.term.strength
         return int(p.lower >= 0.0) - int(p.upper <= 0.0)
+
+    @property
+    def of_measurement(self) -> bool:
+        """True if it is a fault of a thermometer or of a recorded input."""
+        return self.term is not None and (self.term.of_measurement or self.term.kind == "sensor")
 
     @property
     def in_network(self) -> bool:

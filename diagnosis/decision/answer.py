@@ -35,8 +35,10 @@ class Answer:
         Names of a tie set with their probabilities, `effect` first; empty of a claim
     acts_like : bool
         True if this is only the nearest name: by names that look alike or act on the same thing, by what remains, by
-        the kind of the effect (a course over the hours, a parameter where model error is large), or because held-out
-        recordings contradict it
+        the kind of the effect (a course over the hours, a parameter where model error is large), because it begins
+        together with another one, or because held-out recordings contradict it
+    one_event : bool
+        True if another effect begins at the same time: one cause is more probable than two
     """
 
     best: Judged
@@ -46,6 +48,7 @@ class Answer:
     joint: float
     tied: tuple[tuple[Hypothesis, float], ...] = ()
     acts_like: bool = False
+    one_event: bool = False
 
 
 def decide(posterior: Posterior, settings: Settings) -> tuple[Answer, ...]:
@@ -57,7 +60,8 @@ def decide(posterior: Posterior, settings: Settings) -> tuple[Answer, ...]:
     over the hours: the nearest name is found, not the cause. Where much is left, what is stated of it is only the
     share :attr:`Rule.nearest` of its probability, because most names that were nearest turned out wrong. The same holds
     if model error is large, of a parameter outside its prior, which stands in for another structure of the machine, and
-    of every name with less evidence than :attr:`Rule.named_if_large`.
+    of every name with less evidence than :attr:`Rule.named_if_large`; and of two that begin at the same time, because
+    they are probably one cause that has another name.
     """
     if not posterior.detected and not posterior.parameter_outside:
         return ()
@@ -96,11 +100,13 @@ def _answer(posterior: Posterior, best: Judged, effect: Hypothesis, enough: floa
     """The narrowest set of names that holds enough probability."""
     name = effect.law
     doubtful = effect.term is None or posterior.log_e < posterior.rule.named_if_large
-    much = posterior.leaves_much(best) or (doubtful and best.error_class.is_large)
+    together = _begin_together(best, posterior.rule.one_event)
+    much = posterior.leaves_much(best) or (doubtful and best.error_class.is_large) or together
     vague = effect.how == "over_hours" or effect.is_open or much
     sure = posterior.rule.nearest if much else 1.0
     own = posterior.of_names([name])
-    answer = Answer(best=best, effect=effect, grade="likely", probability=sure * own, joint=sure * own, acts_like=vague)
+    answer = Answer(best=best, effect=effect, grade="likely", probability=sure * own, joint=sure * own, acts_like=vague,
+                    one_event=together)  # fmt: skip
     if own >= enough:
         return answer if vague else replace(answer, grade="claim")
     names = _best_of_names(posterior, effect)
@@ -116,6 +122,20 @@ def _answer(posterior: Posterior, best: Judged, effect: Hypothesis, enough: floa
     alike += [other for other, one in names.items() if act_on_the_same(effect, one)]
     joint = posterior.of_names([name, *alike])
     return replace(answer, joint=sure * joint, acts_like=True) if joint >= enough else None
+
+
+def _begin_together(best: Judged, chance: float) -> bool:
+    """True if the two effects of a pair begin closer together than two dates would by such a chance."""
+    names = [effect.date for effect in best.effects if effect.date is not None]
+    if best.fit is None or len(names) < 2:
+        return False
+    experiment = best.fit.experiment
+    first, second = (
+        unknown.value(z) for unknown, z in zip(experiment.unknowns, best.fit.z.tolist(), strict=True)
+        if unknown.parameter.name in names
+    )  # fmt: skip
+    tested = sum(float(piece.steps.sum()) for piece in experiment.pieces if piece.recording not in experiment.healthy)
+    return abs(first - second) < 0.5 * chance * tested
 
 
 def _comes_along(posterior: Posterior, name: str, other: str) -> bool:

@@ -16,7 +16,7 @@ import numpy as np
 from scipy.special import log_ndtr
 
 from diagnosis.candidates.hypotheses import Hypothesis
-from diagnosis.decision.placebo import CandidatesIn, counting_less, judge_baselines
+from diagnosis.decision.placebo import CandidatesIn, judge_baselines
 from diagnosis.decision.posterior import Judged, Posterior
 from diagnosis.decision.scanned import (
     WHOLE,
@@ -73,8 +73,7 @@ def infer(
     base, chosen = calibration.fit, calibration.chosen
     if base.experiment.healthy:
         progress("judging the baselines as if they were tested")
-    placebo, over_time = judge_baselines(calibration, candidates_in)
-    candidates = counting_less(candidates, over_time)
+    placebo, candidates = judge_baselines(calibration, candidates, candidates_in)
     progress(f"scanning {len(candidates)} candidates")
     found = scan(base, [one for one in candidates if one.term is not None], calibration.near.columns)
     first = scan_in_classes(calibration, found, candidates, log_prior)

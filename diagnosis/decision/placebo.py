@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from diagnosis.candidates.hypotheses import Hypothesis
 from diagnosis.decision.posterior import Placebo
-from diagnosis.decision.scanned import OVER_TIME, Scanned, scan_in_classes
+from diagnosis.decision.scanned import OVER_TIME, Scanned, counts_less, scan_in_classes
 from diagnosis.engine.baselines import baselines_of
 from diagnosis.engine.calibration import Calibration
 from diagnosis.engine.families import log_prior
@@ -18,15 +18,20 @@ from diagnosis.engine.scan import scan
 from diagnosis.engine.sessions import sessions_of
 
 CandidatesIn = Callable[[Experiment], Sequence[Hypothesis]]
+TRUSTED_FROM = 2  # baselines
 
 
-def judge_baselines(calibration: Calibration, candidates_in: CandidatesIn) -> tuple[Placebo | None, dict[str, float]]:
+def judge_baselines(
+    calibration: Calibration, candidates: Sequence[Hypothesis], candidates_in: CandidatesIn
+) -> tuple[Placebo | None, tuple[Hypothesis, ...]]:
     """Evidence in every baseline, tested against the others alone, as if it were as many hours as those tested.
 
     The tested recordings have no say in it: next to an effect in them a baseline would seem to have the opposite one.
 
     Parameters
     ----------
+    candidates : sequence of Hypothesis
+        Of the tested recordings
     candidates_in : callable
         Gives what may be missing, wrong or changed in an experiment
 
@@ -34,12 +39,14 @@ def judge_baselines(calibration: Calibration, candidates_in: CandidatesIn) -> tu
     -------
     placebo : Placebo or None
         Of all laws that are always there together, in the baseline that brings most; None without baselines
-    over_time : dict of str to float
-        Of every law over time, in the baseline that brings most of it, [nat]
+    candidates : tuple of Hypothesis
+        Of those that change over time only counts what goes beyond the baselines. Two baselines are trusted to show
+        what a wrong model makes of changes of the machine; not of those of a channel, which pick what the model has of
+        that channel alone: a healthy rig has 72 nat of a loss meter that steps
     """
     whole, reached, over_time = calibration.fit.experiment, list[Placebo](), dict[str, float]()
     if not whole.healthy:
-        return None, over_time
+        return None, tuple(candidates)
     hours = dict.fromkeys((piece.recording for piece in whole.pieces), 0.0)
     for piece in whole.pieces:
         hours[piece.recording] += float(piece.steps.sum())
@@ -47,17 +54,18 @@ def judge_baselines(calibration: Calibration, candidates_in: CandidatesIn) -> tu
     at, fit = baselines_of(calibration.fit)
     calibration = replace(calibration, chosen=replace(calibration.chosen, fit=fit))
     experiment, columns = fit.experiment, [calibration.near.columns[i] for i in at]
-    for pieces in sessions_of(experiment):
+    sessions = sessions_of(experiment)
+    for pieces in sessions:
         starts, now = dict[str, float](), 0.0
         for piece in map(experiment.pieces.__getitem__, pieces):
             now = starts.setdefault(piece.recording, now) + float(piece.time[-1])
         swapped = replace(experiment, healthy=whole.healthy - starts.keys(), starts_at=starts)
-        candidates = [one for one in candidates_in(swapped) if one.term is None or whole.scope_of(one.name) is not None]
-        terms = [one for one in candidates if one.term is not None]
+        tried = [one for one in candidates_in(swapped) if one.term is None or whole.scope_of(one.name) is not None]
+        terms = [one for one in tried if one.term is not None]
         if not any(one.how == "always" for one in terms):  # what is switched off has no place in this machine
             continue
         there = scan(replace(fit, experiment=swapped), terms, columns)
-        judged = scan_in_classes(calibration, there, candidates, log_prior(candidates))
+        judged = scan_in_classes(calibration, there, tried, log_prior(tried))
         longer = max(tested / sum(hours[name] for name in starts), 1.0)
         always = _part(judged, [i for i, one in enumerate(judged.candidates) if one.how not in OVER_TIME])
         best = next(one for one in map(always.candidates.__getitem__, always.order) if one.term is not None)
@@ -65,17 +73,19 @@ def judge_baselines(calibration: Calibration, candidates_in: CandidatesIn) -> tu
         reached.append(
             Placebo(session=session, log_e_value=always.log_e * longer, mechanism=best.mechanism, place=best.place)
         )
-        for one, value in zip(judged.candidates, judged.log_bayes.tolist(), strict=True):
+        for one, value, here in zip(judged.candidates, judged.log_bayes.tolist(), judged.best, strict=True):
             if one.how in OVER_TIME:
-                over_time[one.law] = max(value * longer, over_time.get(one.law, 0.0))
-    return max(reached, key=lambda one: one.log_e_value, default=None), over_time
+                taken = float(counts_less([one], calibration.chosen.error_class, here.error_class)[0])
+                over_time[one.law] = max((value + taken) * longer, over_time.get(one.law, 0.0))
+    trusted = len(sessions) >= TRUSTED_FROM
+    less = tuple(
+        replace(one, less=over_time.get(one.law, 0.0), trusted=trusted and not one.of_measurement)
+        if one.how in OVER_TIME else one
+        for one in candidates
+    )  # fmt: skip
+    return max(reached, key=lambda one: one.log_e_value, default=None), less
 
 
 def _part(scanned: Scanned, at: Sequence[int]) -> Scanned:
     return replace(scanned, candidates=tuple(scanned.candidates[i] for i in at), log_prior=scanned.log_prior[at],
                    log_bayes=scanned.log_bayes[np.array(at)], best=tuple(scanned.best[i] for i in at))  # fmt: skip
-
-
-def counting_less(candidates: Sequence[Hypothesis], over_time: Mapping[str, float]) -> list[Hypothesis]:
-    """Candidates of which, if they change over time, only counts what goes beyond the baselines."""
-    return [replace(one, less=over_time.get(one.law, 0.0)) if one.how in OVER_TIME else one for one in candidates]

@@ -66,7 +66,7 @@ class Judged:
             return "outside"
         if effect.term is None:
             return "parameter"
-        return "measurement" if effect.term.of_measurement or effect.term.kind == "sensor" else "mechanism"
+        return "measurement" if effect.of_measurement else "mechanism"
 
     @property
     def of_parameters(self) -> bool:

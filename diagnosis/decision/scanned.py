@@ -144,9 +144,15 @@ def in_best_classes(
 
 
 def counts_less(candidates: Sequence[Hypothesis], nothing: ErrorClass, here: ErrorClass) -> Array:
-    """Nats that changes over time count less: what baselines bring of them, and the mean of both classes."""
-    over_time = 0.5 * (nothing.over_time + here.over_time)
-    return np.array([one.less + over_time * (one.how in OVER_TIME) for one in candidates])
+    """Nats that changes over time count less: the mean of both classes, or what baselines bring if that is more.
+
+    Both are about a model that is wrong in the very hours that a change over time can pick. Of what is trusted only
+    counts less what baselines bring beyond the mean of both classes.
+    """
+    of_class = 0.5 * (nothing.over_time + here.over_time)
+    return np.array([
+        max(one.less, of_class) - of_class * one.trusted if one.how in OVER_TIME else 0.0 for one in candidates
+    ])  # fmt: skip
 
 
 def _parameters(candidates: Sequence[Hypothesis]) -> list[Hypothesis]:
@@ -190,7 +196,8 @@ def repeating_of(found: Scanned, error_class: ErrorClass) -> tuple[Repeating, ..
     every = []
     for at in (supported, worse):
         parameters = found.candidates[len(here.scan.candidates) :]
-        log_bayes = _log_bayes(here.scan, parameters, here.over.given[at]) - [one.less for one in found.candidates]
+        log_bayes = _log_bayes(here.scan, parameters, here.over.given[at])
+        log_bayes -= counts_less(found.candidates, error_class, error_class)
         judged = replace(found, log_bayes=log_bayes)
         best = judged.candidates[judged.order[0]]
         every.append(Repeating(deviation_in_sd=float(deviations[at]), log_e_value=judged.log_e,
@@ -242,6 +249,6 @@ def expected_of(scanned: Scanned, error_class: ErrorClass, settings: Settings) -
         size[reached] = np.minimum(size[reached], matters / peak[reached])
     size = np.where(np.isfinite(size), size, sd)
     log_bayes = 0.5 * np.square(b * size) / (b + 1.0 / np.square(sd)) - 0.5 * np.log1p(b * np.square(sd))
-    log_bayes -= [one.less for one in terms.candidates]
+    log_bayes -= counts_less(terms.candidates, error_class, error_class)
     each = zip(terms.candidates, log_bayes.tolist(), scanned.log_prior.tolist(), strict=False)  # terms come first
     return tuple(Expected(effect=one, log_bayes=value, log_prior=prior) for one, value, prior in each)

@@ -71,6 +71,8 @@ class Rule:
         Evidence from which a name counts where model error is large, [nat]
     repeats : float
         Deviation between sessions that every machine is granted, in prior standard deviations
+    one_event : float
+        Chance that two dates fall as close together, below which two effects are one event, [-]
     wider : float
         Prior of a parameter outside its prior, in its own standard deviations
     """
@@ -86,6 +88,7 @@ class Rule:
     nearest: float
     named_if_large: float
     repeats: float
+    one_event: float
     wider: float
 
     def thresholds(self, nothing: ErrorClass, best: ErrorClass, rate: float) -> tuple[float, float]:

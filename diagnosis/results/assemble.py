@@ -278,11 +278,11 @@ def verdict_of(
         asked = {one.effect.name for one in posterior.expected if one.effect.how == "always"}
         visible = 1.0 - len({one.mechanism for one in unseen}) / max(len(asked), 1)
         return "insufficient_data" if asked and visible < ENOUGH_VISIBLE else "consistent"
-    terms = [answer.effect.term for answer in answers if answer.effect.term is not None]
-    if not terms or any(answer.best.kind == "outside" or answer.effect.is_open for answer in answers):
+    effects = [answer.effect for answer in answers if answer.effect.term is not None]
+    if not effects or any(answer.best.kind == "outside" or answer.effect.is_open for answer in answers):
         return "unexplained"
-    tied = [effect.term for answer in answers for effect, _ in answer.tied if effect.term is not None]
-    if all(term.of_measurement or term.kind == "sensor" for term in (*terms, *tied)):
+    tied = [effect for answer in answers for effect, _ in answer.tied if effect.term is not None]
+    if all(effect.of_measurement for effect in (*effects, *tied)):
         return "sensor_fault"
     return "missing_physics"
 

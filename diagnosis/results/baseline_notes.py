@@ -26,7 +26,8 @@ def baseline_notes(experiment: Experiment, posterior: Posterior, answers: Sequen
     placebo = posterior.placebo
     raised = placebo is not None and posterior.threshold == placebo.log_e_value
     return baselines_told(float(acting[0]), sessions_apart(best), effects[0].name if effects else "",
-                          placebo if raised else None, ahead.effects[0] if ahead else None)  # fmt: skip
+                          placebo if raised else None, ahead.effects[0] if ahead else None,
+                          posterior.class_threshold)  # fmt: skip
 
 
 def baselines_told(
@@ -35,6 +36,7 @@ def baselines_told(
     effect: str = "",
     placebo: Placebo | None = None,
     ahead: Hypothesis | None = None,
+    counts_from: float = NOTED_FROM,
 ) -> tuple[str, ...]:
     """Notes for a report on baselines that are not as they should be.
 
@@ -50,6 +52,8 @@ def baselines_told(
         Where it raises what the recordings have to bring
     ahead : Hypothesis or None
         What would be ahead if baselines took nothing from it
+    counts_from : float
+        What they may bring of it by chance, [nat]
     """
     notes = []
     if effect and acting > NOTED_FROM:
@@ -69,7 +73,7 @@ def baselines_told(
             "tested). So much is model error: the recordings have to bring more. If that effect may have acted there, "
             "leave the session out."
         )
-    if ahead is not None and ahead.less > NOTED_FROM:
+    if ahead is not None and ahead.less > counts_from:
         notes.append(
             f"A baseline, in which nothing changed, seems to show {ahead.name} as well: {ahead.less:.0f} nat of it "
             "(for as many hours as are tested) do not count. If it may have changed there, leave the session out."

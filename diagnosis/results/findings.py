@@ -32,7 +32,6 @@ UNIT_SLIP = 8.0  # times its value or less that a parameter rarely is; units dif
 FORM_ERROR = 0.1  # of a strength and its heat: laws of the literature are hardly known better
 SLOPE_STEP = 1e-4  # of a prior standard deviation
 BAND_SD = 2.0  # 95 %
-SINCE, LASTING = "_since", "_lasting"  # see diagnosis.candidates.dated
 HOT_DEGC = 1e6
 Values = Mapping[str, tuple[float, float]]
 
@@ -108,6 +107,8 @@ def _says(answer: Answer, found: Mapping[str, float], stated: Mapping[str, float
             says = says.replace(either, less if found[effect.term.strength.name] < 0.0 else more)
     says = " ".join(says.split())
     inside = f"{says[:1].lower()}{says[1:]}"
+    if answer.one_event:
+        return f"One of two effects that begin together, so probably of one cause; this one acts like this: {inside}"
     if answer.acts_like:
         return f"Something acts like this, its cause was not found: {inside}"
     if len(answer.tied) > 1:
@@ -294,14 +295,14 @@ def change_of(
     values: Values, effect: Hypothesis, experiment: Experiment, recordings: Sequence[Recording]
 ) -> Change | None:
     """When an effect begins, by the time of the recording in which it does; None if it has no date."""
-    if effect.term is None or f"{effect.term.label}{SINCE}" not in values:
+    if effect.date is None:
         return None
-    since, error = values[f"{effect.term.label}{SINCE}"]
+    since, error = values[effect.date]
     starts = {r.name: experiment.starts_at.get(r.name, 0.0) for r in recordings}
     begun = [name for name, start in starts.items() if start <= since] or [min(starts, key=lambda name: starts[name])]
     recording = next(r for r in recordings if r.name == max(begun, key=lambda name: starts[name]))
     at = since - starts[recording.name]
-    lasting = values.get(f"{effect.term.label}{LASTING}")
+    lasting = values.get(effect.date.removesuffix("since") + "lasting")
     return Change(
         recording=recording.name, from_s=at,
         band_s=(at - BAND_SD * error, at + BAND_SD * error) if 0.0 < error < np.inf else None,

@@ -56,10 +56,10 @@ def inferred(
     setup, experiment = prepare_experiment(fzg, [train], [train], healthy, switched_off=switched_off)
     network = experiment.machine.model.network
     placed = [one for name in LOOKED_FOR for one in CATALOGUE[name].placed(network, setup.scale, setup.channels)]
-    windage = [one for one in placed if one.label == "windage_oil"]
+    dated = [one for one in placed if one.label in ("windage_oil", "sensor_bias_oil")]
 
     def candidates_in(there: Experiment) -> list[Hypothesis]:
-        return [*(hypothesis_of(one) for one in placed), *changes([], windage, axis_of(there), {}),
+        return [*(hypothesis_of(one) for one in placed), *changes([], dated, axis_of(there), {}),
                 *parameters_outside(there)]  # fmt: skip
 
     candidates = candidates_in(experiment)
@@ -103,7 +103,14 @@ def test_a_baseline_that_brings_evidence_raises_what_is_asked_for(fzg: Gearbox, 
     assert found.threshold == found.placebo.log_e_value
     assert not found.detected
     judged = {one.label: one for one in found.judged if len(one.effects) == 1}
-    dated, always = judged["windage_step@oil"], judged["windage@oil"]
+    dated, always, step = judged["windage_step@oil"], judged["windage@oil"], judged["sensor_bias_step@oil"]
+    assert [one.effects[0].trusted for one in (dated, always, step)] == [
+        True,
+        False,
+        False,
+    ]  # a channel may be the model
+    (alone,) = [one for one in concealed.judged if one.label == "windage_step@oil"]
+    assert not alone.effects[0].trusted  # by one baseline
     assert dated.effects[0].less > 10.0 and always.effects[0].less == 0.0  # over time it counts only beyond that
     assert dated.log_bayes < -dated.effects[0].less + 5.0
 
@@ -142,7 +149,17 @@ def test_a_change_over_time_counts_less_where_the_model_fits_badly_without_it_or
     assert counts_less((always, dated), full, full).tolist() == [0.0, full.over_time] and full.over_time > 20.0
     assert counts_less((always, dated), full, small).tolist() == [0.0, 0.5 * full.over_time]
     assert not counts_less((always, dated), small, small).any()
-    assert counts_less((always, replace(dated, less=40.0)), small, small).tolist() == [0.0, 40.0]  # of a baseline
+    seen = replace(dated, less=40.0)  # in a baseline
+    assert counts_less((always, seen), small, small).tolist() == [0.0, 40.0]
+    assert counts_less((dated, seen), full, full).tolist() == [full.over_time, 40.0]  # not both
+
+
+def test_of_what_is_trusted_only_counts_less_what_baselines_bring() -> None:
+    full = next(one for one in error_classes() if one.name == "full")
+    cooling, probe = (replace(named(name, "oil"), how="from_date", trusted=trusted)
+                      for name, trusted in (("air_cooling_step", True), ("sensor_bias_step", False)))  # fmt: skip
+    assert counts_less((cooling, probe), full, full).tolist() == [0.0, full.over_time]
+    assert counts_less((replace(cooling, less=40.0),), full, full).tolist() == [40.0 - full.over_time]
 
 
 def test_nothing_gets_the_evidence_that_it_has_from_the_point_of_an_explanation(fzg: Gearbox) -> None:

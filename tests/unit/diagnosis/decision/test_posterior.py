@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
@@ -253,6 +254,24 @@ def test_both_effects_of_a_pair_are_answered() -> None:
     answers = decide(found, Settings())
     assert [one.effect for one in answers] == [first, second] and found.of("pair") > ENOUGH
     assert [one.grade for one in answers] == ["claim", "claim"]
+
+
+@pytest.mark.parametrize(("apart_s", "grade"), [(2400.0, "likely"), (2600.0, "claim")])
+def test_two_that_begin_at_the_same_time_are_no_claims(apart_s: float, grade: str) -> None:
+    """In 100 000 s two dates are less than 2500 s apart in one of twenty cases: one cause is more probable."""
+    pair = [effect(name, how="from_date", clock="start", date=f"{name}_since") for name in ("first", "second")]
+    unknowns = [SimpleNamespace(parameter=SimpleNamespace(name=name), value=float)
+                for name in ("first_since", "other", "second_since")]  # fmt: skip
+    pieces = [SimpleNamespace(recording=name, steps=np.full(100, 1000.0)) for name in ("tested", "healthy")]
+    experiment = SimpleNamespace(unknowns=unknowns, pieces=pieces, healthy={"healthy"})
+    fit = cast(Fit, SimpleNamespace(experiment=experiment, z=np.array([1000.0, 3.0, 1000.0 + apart_s])))
+    both = replace(judged(2.0 * STRONG, *pair), fit=fit, left=0.0)
+    found = posterior(*(judged(STRONG, one) for one in pair), both, remainder=10.0)
+    answers = decide(found, Settings())
+    assert [(one.grade, one.acts_like, one.one_event) for one in answers] == [
+        (grade, grade == "likely", grade == "likely")
+    ] * 2
+    assert (answers[0].probability < 0.5) == (grade == "likely")
 
 
 @pytest.mark.parametrize(("left", "grade"), [(None, "likely"), (1.0, "claim"), (STRONG, "likely")])

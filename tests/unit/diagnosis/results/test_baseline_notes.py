@@ -36,3 +36,4 @@ def test_what_a_baseline_takes_from_a_change_is_noted() -> None:
     (note,) = baselines_told(0.0, {}, ahead=step)
     assert note.startswith("A baseline, in which nothing changed, seems to show air_cooling_step as well: 95 nat of it")
     assert baselines_told(0.0, {}, ahead=replace(step, less=4.0)) == ()
+    assert baselines_told(0.0, {}, ahead=step, counts_from=100.0) == ()  # as much comes by chance
