@@ -18,7 +18,7 @@ from diagnosis.engine.scan import scan
 from diagnosis.engine.sessions import sessions_of
 
 CandidatesIn = Callable[[Experiment], Sequence[Hypothesis]]
-TRUSTED_FROM = 2  # baselines
+TRUSTED_FROM, TRUSTED_SHARE = 2, 0.5  # baselines, and their time to that of the tested recordings
 
 
 def judge_baselines(
@@ -40,9 +40,10 @@ def judge_baselines(
     placebo : Placebo or None
         Of all laws that are always there together, in the baseline that brings most; None without baselines
     candidates : tuple of Hypothesis
-        Of those that change over time only counts what goes beyond the baselines. Two baselines are trusted to show
-        what a wrong model makes of changes of the machine; not of those of a channel, which pick what the model has of
-        that channel alone: a healthy rig has 72 nat of a loss meter that steps
+        Of those that change over time only counts what goes beyond the baselines. Two that are long enough are trusted
+        to show what a wrong model makes of changes of the machine (baselines of 2 and 4 h were not, of a healthy one
+        that was tested for 22 h); not of those of a channel, which pick what the model has of that channel alone: a
+        healthy rig has 72 nat of a loss meter that steps
     """
     whole, reached, over_time = calibration.fit.experiment, list[Placebo](), dict[str, float]()
     if not whole.healthy:
@@ -77,13 +78,18 @@ def judge_baselines(
             if one.how in OVER_TIME:
                 taken = float(counts_less([one], calibration.chosen.error_class, here.error_class)[0])
                 over_time[one.law] = max((value + taken) * longer, over_time.get(one.law, 0.0))
-    trusted = len(sessions) >= TRUSTED_FROM
+    trusted = are_trusted(len(sessions), sum(hours[name] for name in whole.healthy), tested)
     less = tuple(
         replace(one, less=over_time.get(one.law, 0.0), trusted=trusted and not one.of_measurement)
         if one.how in OVER_TIME else one
         for one in candidates
     )  # fmt: skip
     return max(reached, key=lambda one: one.log_e_value, default=None), less
+
+
+def are_trusted(sessions: int, lasting: float, tested: float) -> bool:
+    """True if so many sessions of baselines, which last so long together, show what goes wrong in such a time [s]."""
+    return sessions >= TRUSTED_FROM and lasting >= TRUSTED_SHARE * tested
 
 
 def _part(scanned: Scanned, at: Sequence[int]) -> Scanned:

@@ -21,6 +21,7 @@ from diagnosis.decision.infer import (
     _worth_a_fit,
     infer,
 )
+from diagnosis.decision.placebo import are_trusted
 from diagnosis.decision.posterior import KINDS, Judged, Posterior
 from diagnosis.decision.scanned import ScanInClass, Scanned, counts_less, hardly_there, in_best_classes, scan_in_classes
 from diagnosis.decision.settings import Settings
@@ -104,11 +105,8 @@ def test_a_baseline_that_brings_evidence_raises_what_is_asked_for(fzg: Gearbox, 
     assert not found.detected
     judged = {one.label: one for one in found.judged if len(one.effects) == 1}
     dated, always, step = judged["windage_step@oil"], judged["windage@oil"], judged["sensor_bias_step@oil"]
-    assert [one.effects[0].trusted for one in (dated, always, step)] == [
-        True,
-        False,
-        False,
-    ]  # a channel may be the model
+    # By two baselines; not of a channel, which may show what the model has of it alone.
+    assert [one.effects[0].trusted for one in (dated, always, step)] == [True, False, False]
     (alone,) = [one for one in concealed.judged if one.label == "windage_step@oil"]
     assert not alone.effects[0].trusted  # by one baseline
     assert dated.effects[0].less > 10.0 and always.effects[0].less == 0.0  # over time it counts only beyond that
@@ -160,6 +158,11 @@ def test_of_what_is_trusted_only_counts_less_what_baselines_bring() -> None:
                       for name, trusted in (("air_cooling_step", True), ("sensor_bias_step", False)))  # fmt: skip
     assert counts_less((cooling, probe), full, full).tolist() == [0.0, full.over_time]
     assert counts_less((replace(cooling, less=40.0),), full, full).tolist() == [40.0 - full.over_time]
+
+
+def test_two_baselines_are_trusted_if_they_are_long_enough() -> None:
+    assert are_trusted(2, 10.0, 20.0) and are_trusted(3, 40.0, 20.0)
+    assert not are_trusted(2, 9.0, 20.0) and not are_trusted(1, 40.0, 20.0)
 
 
 def test_nothing_gets_the_evidence_that_it_has_from_the_point_of_an_explanation(fzg: Gearbox) -> None:
