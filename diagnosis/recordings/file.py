@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from diagnosis.recordings.mapping import Column, RecordingMapping, mapping_beside, read_mapping, reduced_to
+from diagnosis.recordings.mapping import TIME_UNITS, Column, RecordingMapping, mapping_beside, read_mapping, reduced_to
 from diagnosis.recordings.mdf import read_mdf
 from diagnosis.recordings.time_axis import ISO, RECORDING_KINDS, Clock, Part, clock_of, inside, part_of
 from models.base.errors import InputError, Problems, did_you_mean
@@ -139,7 +139,13 @@ def _clock(table: pd.DataFrame, mapping: RecordingMapping) -> Clock:
         known = did_you_mean(time.column, [str(column) for column in table.columns])
         raise InputError(f"column {time.column} of [time] in its mapping file is missing{known}")
     is_stamp = pd.api.types.is_datetime64_any_dtype(table[time.column].dtype)
-    return Clock(column=time.column, unit=ISO if is_stamp else time.unit, zone=time.zone)
+    unit = ISO if is_stamp else time.unit
+    if time.zone is not None and unit in TIME_UNITS and unit != ISO:
+        raise InputError(
+            f"column {time.column} counts {unit}, which have no time zone: give the form of its dates as unit, or "
+            "leave zone out of its mapping file"
+        )
+    return Clock(column=time.column, unit=unit, zone=time.zone)
 
 
 def set_to_one_clock(files: Sequence[RecordingFile]) -> None:

@@ -7,6 +7,7 @@ Discard (``False``) or, for an exception, Fatal, after which the instance is dea
 from __future__ import annotations
 
 import hashlib
+import json
 import sys
 from collections.abc import Mapping
 from dataclasses import fields
@@ -26,6 +27,7 @@ from models.portable.surrogate import Evaluator, SurrogateLosses
 
 BOUND_TOLERANCE = 1e-9  # a bound converted from another unit, or reached by a ramp, is a rounding off
 UNUSABLE = (ValueError, ArithmeticError)  # of the values, or of a heat balance that cannot be solved
+LOST = "the state that was to be restored is damaged, or of another FMU: restore another one, or reset"
 ERRORS_ONLY = 3
 
 
@@ -83,7 +85,7 @@ class GearboxSlave(Fmi2Slave):  # type: ignore[misc,unused-ignore]
         self._state: solver.State | None = None  # None before the first step: start temperatures can still be set
         self._flows: Array | None = None  # to the boundaries, [W], mean over the last step
         self._time = self._distance = 0.0  # distance from the range of training, at the calculated values
-        self._outside = self._fresh = False
+        self._outside = self._fresh = self._lost = False
 
     # ------------------------------------------------------------------ simulation
 
@@ -118,6 +120,8 @@ class GearboxSlave(Fmi2Slave):  # type: ignore[misc,unused-ignore]
 
     def _present(self) -> tuple[NetworkSystem, Array, solver.State]:
         """System, inputs and state at the present values, in the network's units; ValueError if one is unusable."""
+        if self._lost:
+            raise ValueError(LOST)
         values = self._values[self._given_at]
         usable = np.isfinite(values) & (values >= self._lowest) & (values <= self._highest)
         if not usable.all():
@@ -226,16 +230,26 @@ class GearboxSlave(Fmi2Slave):  # type: ignore[misc,unused-ignore]
             "flows": None if self._flows is None else self._flows.tolist(),
         }
 
+    @staticmethod
+    def _fmu_state_from_bytes(state: bytes) -> dict[str, Any]:
+        """A state that was saved; empty if it is damaged. An exception would end the host, here and in the next."""
+        try:
+            return dict(json.loads(state))
+        except (TypeError, ValueError):
+            return {}
+
     def _set_fmu_state(self, state: Mapping[str, Any]) -> None:
-        if state["fmu"] != type(self).__module__:
-            raise ValueError("the state was saved by another FMU; it cannot be restored here")
+        """Restore a state; after one that is damaged, or of another FMU, no step is done until another is restored."""
+        self._lost, self._fresh = state.get("fmu") != type(self).__module__, False
+        if self._lost:
+            self.log(LOST, Fmi2Status.error)
+            return
         saved = state["state"]
         # [()] makes a number of an array without dimensions and leaves others alone.
         restored: dict[str, Any] = {name: np.array(value)[()] for name, value in (saved or {}).items()}
         self._state = None if saved is None else solver.State(**restored)
         self._flows = None if state["flows"] is None else np.array(state["flows"])
         self._values, self._time, self._outside = np.array(state["values"]), state["time"], state["outside"]
-        self._fresh = False
 
     def log(
         self, msg: str, status: Fmi2Status = Fmi2Status.ok, category: str | None = None, debug: bool | None = None

@@ -55,7 +55,10 @@ kelvin are meant, give 20
             )
         temperatures = {name: float(initial[name]) for name in nodes if name in initial}
     else:
-        temperatures = dict.fromkeys(nodes, float(initial))
+        try:
+            temperatures = dict.fromkeys(nodes, float(initial))
+        except (TypeError, ValueError):
+            raise InputError(f"the start temperature is {initial!r}; give a number in degC, or one per node") from None
     for name, T in temperatures.items():
         if not ABSOLUTE_ZERO < T < math.inf:
             faults.append(

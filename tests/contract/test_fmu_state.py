@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from fmpy.fmi1 import FMICallException
 
 from tests.contract.fmu_host import LOADED, Host, hosted
 
@@ -51,6 +52,19 @@ def test_serialized_state_continues_in_another_instance(path: Path, host: Host) 
         other.slave.setFMUstate(restored)
         other.time = time
         assert run(other) == first
+
+
+def test_a_damaged_state_is_refused_and_the_host_goes_on(host: Host) -> None:
+    host.step(12.3)
+    state = host.slave.getFMUstate()
+    content = host.slave.serializeFMUstate(state)
+    host.slave.freeFMUstate(state)
+    for damaged in (content[: len(content) // 2], b"\xff" + content[1:], b"[1, 2]"):
+        with pytest.raises(FMICallException):  # the native FMU when it is read, the Python FMU at the next step
+            host.slave.setFMUstate(host.slave.deSerializeFMUstate(damaged))
+            host.step(1.0)
+    host.slave.setFMUstate(host.slave.deSerializeFMUstate(content))
+    host.step(1.0)
 
 
 def test_state_saved_in_initialization_can_be_restored(path: Path) -> None:

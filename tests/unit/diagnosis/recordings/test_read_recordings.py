@@ -118,6 +118,9 @@ def test_local_time_with_its_zone(tmp_path: Path, network: ThermalNetwork, unit:
     (tmp_path / "run.toml").write_text('schema = 1\ntime = { column = "local", zone = "Berlin" }\n')
     with pytest.raises(InputError, match="'Berlin' is no time zone; write it as 'Europe/Berlin'"):
         read(tmp_path / "run.csv", network)
+    (tmp_path / "run.toml").write_text('schema = 1\ntime = { column = "speed_rpm", zone = "Europe/Berlin" }\n')
+    with pytest.raises(InputError, match="column speed_rpm counts s, which have no time zone: give the form of"):
+        read(tmp_path / "run.csv", network)
 
 
 def test_iso_times_and_their_start(tmp_path: Path, network: ThermalNetwork) -> None:
