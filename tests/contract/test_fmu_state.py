@@ -59,12 +59,15 @@ def test_a_damaged_state_is_refused_and_the_host_goes_on(host: Host) -> None:
     state = host.slave.getFMUstate()
     content = host.slave.serializeFMUstate(state)
     host.slave.freeFMUstate(state)
+
+    def go_on_from(serialized: bytes) -> None:
+        host.slave.setFMUstate(host.slave.deSerializeFMUstate(serialized))
+        host.step(1.0)
+
     for damaged in (content[: len(content) // 2], b"\xff" + content[1:], b"[1, 2]"):
         with pytest.raises(FMICallException):  # the native FMU when it is read, the Python FMU at the next step
-            host.slave.setFMUstate(host.slave.deSerializeFMUstate(damaged))
-            host.step(1.0)
-    host.slave.setFMUstate(host.slave.deSerializeFMUstate(content))
-    host.step(1.0)
+            go_on_from(damaged)
+    go_on_from(content)
 
 
 def test_state_saved_in_initialization_can_be_restored(path: Path) -> None:

@@ -54,6 +54,7 @@ def silent(task: Task, files: Any, *_: Any) -> tuple[Task, dict[str, Any]]:
                   "answer": {"verdict": "consistent"}, "message": ""}  # fmt: skip
 
 
+@pytest.mark.slow  # 90 s; the proofs below go the same way with answers that are made up
 def test_a_proof_of_the_own_plant(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """One real diagnosis, an interruption, and the order of hashes and truth."""
     file, output = tmp_path / "77.jsonl", tmp_path / "out"
