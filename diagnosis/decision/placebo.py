@@ -14,11 +14,11 @@ from diagnosis.engine.baselines import baselines_of
 from diagnosis.engine.calibration import Calibration
 from diagnosis.engine.families import log_prior
 from diagnosis.engine.fit import Experiment
+from diagnosis.engine.learnt import rule
 from diagnosis.engine.scan import scan
 from diagnosis.engine.sessions import sessions_of
 
 CandidatesIn = Callable[[Experiment], Sequence[Hypothesis]]
-TRUSTED_FROM, TRUSTED_SHARE = 2, 0.5  # baselines, and their time to that of the tested recordings
 
 
 def judge_baselines(
@@ -89,7 +89,8 @@ def judge_baselines(
 
 def are_trusted(sessions: int, lasting: float, tested: float) -> bool:
     """True if so many sessions of baselines, which last so long together, show what goes wrong in such a time [s]."""
-    return sessions >= TRUSTED_FROM and lasting >= TRUSTED_SHARE * tested
+    least, share = rule().trusted
+    return sessions >= least and lasting >= share * tested
 
 
 def _part(scanned: Scanned, at: Sequence[int]) -> Scanned:

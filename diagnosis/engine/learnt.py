@@ -73,6 +73,8 @@ class Rule:
         Deviation between sessions that every machine is granted, in prior standard deviations
     one_event : float
         Chance that two dates fall as close together, below which two effects are one event, [-]
+    trusted : (int, float)
+        Baselines, and their time to that of the tested recordings, that show what a wrong model makes of a change, [-]
     wider : float
         Prior of a parameter outside its prior, in its own standard deviations
     """
@@ -89,6 +91,7 @@ class Rule:
     named_if_large: float
     repeats: float
     one_event: float
+    trusted: tuple[int, float]
     wider: float
 
     def thresholds(self, nothing: ErrorClass, best: ErrorClass, rate: float) -> tuple[float, float]:
@@ -126,7 +129,7 @@ def error_classes() -> tuple[ErrorClass, ...]:
 def rule() -> Rule:
     """Numbers of the rule of decision."""
     found = dict(_document()["decision"])
-    return Rule(**found | {name: tuple(found[name]) for name in ("temper", "much_left")})
+    return Rule(**found | {name: tuple(found[name]) for name in ("temper", "much_left", "trusted")})
 
 
 @cache

@@ -232,7 +232,10 @@ class GearboxSlave(Fmi2Slave):  # type: ignore[misc,unused-ignore]
 
     @staticmethod
     def _fmu_state_from_bytes(state: bytes) -> dict[str, Any]:
-        """A state that was saved; empty if it is damaged. An exception would end the host, here and in the next."""
+        """A state that was saved; empty if it is damaged.
+
+        An exception would end the host, here as in :meth:`_set_fmu_state`: pythonfmu lets it through.
+        """
         try:
             return dict(json.loads(state))
         except (TypeError, ValueError):
@@ -240,16 +243,21 @@ class GearboxSlave(Fmi2Slave):  # type: ignore[misc,unused-ignore]
 
     def _set_fmu_state(self, state: Mapping[str, Any]) -> None:
         """Restore a state; after one that is damaged, or of another FMU, no step is done until another is restored."""
-        self._lost, self._fresh = state.get("fmu") != type(self).__module__, False
-        if self._lost:
+        self._lost, self._fresh = True, False
+        try:
+            if state["fmu"] != type(self).__module__:
+                raise ValueError(LOST)
+            saved = state["state"]
+            # [()] makes a number of an array without dimensions and leaves others alone.
+            restored: dict[str, Any] = {name: np.array(value)[()] for name, value in (saved or {}).items()}
+            present = None if saved is None else solver.State(**restored)
+            flows = None if state["flows"] is None else np.array(state["flows"])
+            values, time, outside = np.array(state["values"]), float(state["time"]), bool(state["outside"])
+        except (KeyError, TypeError, ValueError):
             self.log(LOST, Fmi2Status.error)
             return
-        saved = state["state"]
-        # [()] makes a number of an array without dimensions and leaves others alone.
-        restored: dict[str, Any] = {name: np.array(value)[()] for name, value in (saved or {}).items()}
-        self._state = None if saved is None else solver.State(**restored)
-        self._flows = None if state["flows"] is None else np.array(state["flows"])
-        self._values, self._time, self._outside = np.array(state["values"]), state["time"], state["outside"]
+        self._state, self._flows, self._values, self._time, self._outside = present, flows, values, time, outside
+        self._lost = False
 
     def log(
         self, msg: str, status: Fmi2Status = Fmi2Status.ok, category: str | None = None, debug: bool | None = None

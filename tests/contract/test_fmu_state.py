@@ -64,7 +64,8 @@ def test_a_damaged_state_is_refused_and_the_host_goes_on(host: Host) -> None:
         host.slave.setFMUstate(host.slave.deSerializeFMUstate(serialized))
         host.step(1.0)
 
-    for damaged in (content[: len(content) // 2], b"\xff" + content[1:], b"[1, 2]"):
+    without_values = content.replace(b'"values"', b'"valuex"')  # of the Python FMU; the native one has no names
+    for damaged in (content[: len(content) // 2], b"\xff" + content[1:], b"[1, 2]", without_values[:-1] + b"}"):
         with pytest.raises(FMICallException):  # the native FMU when it is read, the Python FMU at the next step
             go_on_from(damaged)
     go_on_from(content)
