@@ -17,9 +17,10 @@ import sympy as sp
 
 from diagnosis.candidates.hypotheses import How, Hypothesis, hypothesis_of, law_of
 from models.base.types import Array
+from models.formulas.extremes import Max, Min
 from models.mechanisms import Placed
 from models.mechanisms.forms import EDGE_S, steps
-from models.network.laws import Parameter, renamed, symbol
+from models.network.laws import Parameter, symbol
 
 HOUR_S = 3600.0
 LINEAR_S, SETTLING_S = 20.0 * HOUR_S, 3.0 * HOUR_S  # of the courses over the hours
@@ -102,7 +103,7 @@ def step(axis: Axis, *, slow: bool = True) -> Course:
         ending=STEP, how="from_date", sentence="From a date on",
         parameters=(axis.moment("since"), _span("within", axis.edge_s, rises[-1])),
         variants=np.concatenate([at_once, slowly]) if slow else at_once,
-        law=sp.Min(sp.Max((NOW - since) / rise, 0), 1),
+        law=Min(Max((NOW - since) / rise, 0), 1),
     )  # fmt: skip
 
 
@@ -160,7 +161,8 @@ def changing(placed: Placed, course: Course, axis: Axis, *, sd: float | None = N
     term, clock = _renamed(placed, label), _clock(label, axis)
     strength, *shapes = term.parameters
     added = tuple(replace(p, name=f"{label}_{p.name}") for p in course.parameters)
-    along = renamed(course.along, {p.name: f"{label}_{p.name}" for p in course.parameters} | {START: clock.name})
+    own = {symbol(p.name): symbol(f"{label}_{p.name}") for p in course.parameters}
+    along = course.along.xreplace(own | {symbol(START): symbol(clock.name)})
     mechanism = placed.mechanism
     says = f"{course.sentence}: {mechanism.says[:1].lower()}{mechanism.says[1:]}"
     law = law_of(placed.name)
@@ -222,15 +224,15 @@ def _renamed(placed: Placed, label: str) -> Placed:
     if placed.boundary_temperature is not None:
         end = placed.target[-1]
         names |= {end: new(end), f"T_{end}": f"T_{new(end)}"}
-    other = placed.boundary_temperature
+    other, given = placed.boundary_temperature, {symbol(old): symbol(new) for old, new in names.items()}
     return replace(
         placed, label=label, target=tuple(names.get(one, one) for one in placed.target),
         written={" ".join(names.get(word, word) for word in key.split()): law for key, law in placed.written.items()},
-        expression=renamed(placed.expression, names),
-        boundary_temperature=None if other is None else renamed(other, names),
+        expression=placed.expression.xreplace(given),
+        boundary_temperature=None if other is None else other.xreplace(given),
         parameters=tuple(replace(p, name=names[p.name]) for p in placed.parameters),
         states=tuple(
-            replace(s.with_laws(lambda law: renamed(law, names)), name=names[s.name]) for s in placed.states
+            replace(s.with_laws(lambda law: law.xreplace(given)), name=names[s.name]) for s in placed.states
         ),
     )  # fmt: skip
 

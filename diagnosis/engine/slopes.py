@@ -16,6 +16,7 @@ import sympy as sp
 from diagnosis.forward.network_on_grid import Balance, NetworkOnGrid
 from diagnosis.forward.trajectory import Trajectory
 from models.base.types import Array
+from models.formulas.extremes import Max, Min
 from models.network.laws import compile_function, function_source, symbol
 
 
@@ -145,22 +146,22 @@ def _function(arguments: Sequence[str], laws: Sequence[sp.Expr]) -> Callable[...
 
 def _apart(law: sp.Expr, extremes: dict[sp.Expr, sp.Symbol]) -> sp.Expr:
     """The law with a symbol for every minimum and maximum; these are added to `extremes`, inner ones first."""
-    if not law.has(sp.Min, sp.Max):
+    if not law.has(Min, Max):
         return law
     args = [_apart(arg, extremes) for arg in law.args]
-    if not isinstance(law, sp.Min | sp.Max):
+    if not isinstance(law, Min | Max):
         return law.func(*args)
-    return extremes.setdefault(law.func(*args, evaluate=False), symbol(f"_extreme_{len(extremes)}"))
+    return extremes.setdefault(law.func(*args), symbol(f"_extreme_{len(extremes)}"))
 
 
 def _extreme_slopes(
     extreme: sp.Expr, names: Sequence[str], slopes_of: Mapping[sp.Symbol, Sequence[sp.Expr]]
 ) -> list[sp.Expr]:  # fmt: skip
     """Derivatives of a minimum or maximum: those of the argument that it is; half of each where two are equal."""
-    sign, result = (1 if isinstance(extreme, sp.Max) else -1), [sp.Integer(0)] * len(names)
+    sign, result = (1 if isinstance(extreme, Max) else -1), [sp.Integer(0)] * len(names)
     for index, arg in enumerate(extreme.args):
         others = extreme.args[:index] + extreme.args[index + 1 :]
-        other = others[0] if len(others) == 1 else extreme.func(*others, evaluate=False)
+        other = others[0] if len(others) == 1 else extreme.func(*others)
         here = sp.Heaviside(sign * (arg - other), evaluate=False)
         result = [one + here * slope for one, slope in zip(result, _chained(arg, names, slopes_of), strict=True)]
     return result

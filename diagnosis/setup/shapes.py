@@ -12,6 +12,7 @@ from collections.abc import Mapping
 import sympy as sp
 
 from diagnosis.candidates.factors import SHAPE
+from models.formulas.extremes import Max
 from models.losses.loss_model import law_errors
 from models.mechanisms import Scale
 from models.network.laws import Parameter, symbol
@@ -68,7 +69,7 @@ def _term(
     )  # fmt: skip
     tilt = symbol(label) * sp.Mul(*(sp.log(_ratio(v, targets, network, scale)) for v in variable.split()))
     return Term(
-        label=label, kind=kind, target=tuple(t.name for t in targets), expression=sp.Max(tilt, LOWEST_CHANGE),
+        label=label, kind=kind, target=tuple(t.name for t in targets), expression=Max(tilt, LOWEST_CHANGE),
         parameters=(parameter,),
     )  # fmt: skip
 
@@ -86,4 +87,4 @@ def _ratio(variable: str, targets: list[Source] | list[Link], network: ThermalNe
         assert isinstance(target, Link)  # noqa: S101 - only links have a rise
         a, b = (symbol(f"T_{node}") for node in target.nodes)
         value = sp.Abs(a - b) / (scale.temperature - scale.ambient)
-    return sp.Max(value, LOWEST_RATIO)
+    return Max(value, LOWEST_RATIO)

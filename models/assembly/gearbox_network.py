@@ -17,6 +17,7 @@ from models.assembly.gearbox_definition import Definition
 from models.definition.sections import Bearing, Shaft
 from models.formulas import heat_transfer as ht
 from models.formulas.ehl import reduced_modulus
+from models.formulas.extremes import Max, Min
 from models.formulas.oil import (
     T_HIGHEST,
     T_LOWEST,
@@ -220,7 +221,7 @@ class _Builder:
         gives 10.0 and 16.0.
         """
         oil, pair = self.gearbox.lubricant(), self.pair
-        T = sp.Min(sp.Max(symbol(f"T_{OIL}"), T_LOWEST), T_HIGHEST)  # as the losses do
+        T = Min(Max(symbol(f"T_{OIL}"), T_LOWEST), T_HIGHEST)  # as the losses do
         nu = kinematic_viscosity_d341(T, oil.m, oil.n, xp=sp) * 1e-6
         rho = density_linear(T, oil.rho_ref, oil.T_ref, oil.expansion)
         c = specific_heat_cragoe(T, oil.rho_15) if oil.specific_heat_constant is None else oil.specific_heat_constant
@@ -238,8 +239,8 @@ class _Builder:
     def _striction(self) -> sp.Expr:
         """Inverse of the mean rise under a fast band source at the pitch point, the law of the flash temperature."""
         steel, pair = self.stage.material, self.pair
-        torque = sp.Max(sp.Abs(symbol("torque")), TORQUE_FLOOR_NM)
-        omega = sp.Max(self.speed, SPEED_FLOOR_RPM) * RPM
+        torque = Max(sp.Abs(symbol("torque")), TORQUE_FLOOR_NM)
+        omega = Max(self.speed, SPEED_FLOOR_RPM) * RPM
         E_red = reduced_modulus(steel.youngs_modulus, steel.poisson, steel.youngs_modulus, steel.poisson)
         b_H = sp.sqrt(8.0 * torque / (pair.r_b[0] * pair.b) * pair.rho_red_C / (np.pi * E_red))
         k, chi = steel.conductivity_W_mK, steel.conductivity_W_mK / (steel.density_kg_m3 * steel.specific_heat_J_kgK)
@@ -262,7 +263,7 @@ class _Builder:
         omega = self.speed * RPM * self.gearbox.speed_ratio[shaft.name]
         Re = omega * shaft.diameter**2 / (2.0 * nu)
         h = 0.133 * Re ** sp.Float(2 / 3) * ht.PRANDTL_AIR ** (1 / 3) * k / shaft.diameter
-        return sp.Max(h, 5.0) * np.pi * shaft.diameter * shaft.length_in_air
+        return Max(h, 5.0) * np.pi * shaft.diameter * shaft.length_in_air
 
     def _bearing_links(self) -> Iterator[Link]:
         for bearing in self.gearbox.bearing:

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from models.base.errors import InputError, did_you_mean
 from models.base.types import Array
 from models.definition.parametric_sections import Heat, Loss, ParametricDefinition, Path, TorqueFromPower
+from models.formulas.extremes import Max, Min
 from models.formulas.oil import T_HIGHEST, T_LOWEST, kinematic_viscosity_d341
 from models.network.expressions import parse_expression
 from models.network.laws import Parameter, compile_each, symbol
@@ -172,7 +173,7 @@ def with_losses_as_laws(network: ThermalNetwork, definition: ParametricDefinitio
     nu_ref = kinematic_viscosity_d341(operation.temperature_degC, *constants)
     laws: dict[sp.Symbol, sp.Expr] = {}
     for loss in definition.loss:
-        T = sp.Min(sp.Max(symbol(f"T_{loss.part}"), T_LOWEST), T_HIGHEST)
+        T = Min(Max(symbol(f"T_{loss.part}"), T_LOWEST), T_HIGHEST)
         nu = kinematic_viscosity_d341(T, *constants, xp=sp) / nu_ref
         no_load, load = _parts_of(loss, n, m, nu)
         either = {"no_load": sp.Piecewise((no_load, n > 0), (sp.Float(0.0), True)), "load": load}
@@ -256,7 +257,7 @@ class _Builder:
             f"factor on the efficiency from {given.power} to torque",
         )
         unit = find_unit(self.definition.inputs[given.power].quantity.unit, "power")
-        omega = sp.Max(sp.Abs(symbol("speed")), SLOWEST_RPM) * RPM
+        omega = Max(sp.Abs(symbol("speed")), SLOWEST_RPM) * RPM
         return efficiency * unit.factor * symbol(given.power) / omega
 
     def _heats(self, index: int, heat: Heat) -> Iterator[Source]:
@@ -271,7 +272,7 @@ class _Builder:
     def _sources(self, index: int, loss: Loss) -> Iterator[Source]:
         path = f"loss.{index}"
         constants = self.definition.viscosity_constants
-        T = sp.Min(sp.Max(symbol(f"T_{loss.part}"), T_LOWEST), T_HIGHEST)
+        T = Min(Max(symbol(f"T_{loss.part}"), T_LOWEST), T_HIGHEST)
         nu_ref = kinematic_viscosity_d341(self.definition.operation.temperature_degC, *constants)
         nu = kinematic_viscosity_d341(T, *constants, xp=sp) / nu_ref
         tilts = {"no_load": (("speed", self.n), ("viscosity", nu)), "load": (("torque", self.m),)}
@@ -301,4 +302,4 @@ class _Builder:
         self.parameters.append(Parameter(
             name=name, start=0.0, lower=-2.0, upper=2.0, sd=sd, log=False, description="deviation from what is assumed",
         ))  # fmt: skip
-        return sp.Min(sp.Max(ratio, RATIOS[0]), RATIOS[1]) ** symbol(name)
+        return Min(Max(ratio, RATIOS[0]), RATIOS[1]) ** symbol(name)

@@ -10,6 +10,8 @@ from typing import Any
 
 import sympy as sp
 
+from models.formulas.extremes import Max, Min
+
 KELVIN = 273.15
 STEFAN_BOLTZMANN = 5.670374e-8  # W/(m^2 K^4)
 GRAVITY = 9.80665
@@ -134,7 +136,7 @@ def convection_flat_plate(*, v_air: Value, T: Value, T_a: Value, length: Value) 
     """
     T_film = _film(T, T_a)
     # Below 1 mm/s the turbulent form's Re^-0.1 would divide by zero; free convection rules there anyway.
-    Re = sp.Max(v_air, 1e-3) * length / air_kinematic_viscosity(T_film)
+    Re = Max(v_air, 1e-3) * length / air_kinematic_viscosity(T_film)
     laminar = 0.664 * Re**0.5 * PRANDTL_AIR ** (1 / 3)
     turbulent = 0.037 * Re**0.8 * PRANDTL_AIR / (1.0 + 2.443 * Re**-0.1 * (PRANDTL_AIR ** (2 / 3) - 1.0))
     forced = sp.sqrt(laminar**2 + turbulent**2) * air_conductivity(T_film) / length
@@ -190,7 +192,7 @@ def rotating_disk(*, omega: Value, radius: Value, nu: Value, k: Value, prandtl: 
     Re = omega * radius**2 / nu
     laminar = 0.585 * sp.sqrt(Re) / (0.6 / prandtl + 0.95 / prandtl ** sp.Float(1 / 3))
     turbulent = 0.021 * Re**0.8 * prandtl ** sp.Float(1 / 3)
-    share = sp.Min(sp.Max((Re - RE_DISK_LAMINAR) / (RE_DISK_TURBULENT - RE_DISK_LAMINAR), 0.0), 1.0)
+    share = Min(Max((Re - RE_DISK_LAMINAR) / (RE_DISK_TURBULENT - RE_DISK_LAMINAR), 0.0), 1.0)
     return ((1.0 - share) * laminar + share * turbulent) * k / radius
 
 

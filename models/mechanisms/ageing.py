@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sympy as sp
 
+from models.formulas.extremes import Max
 from models.mechanisms.forms import EDGE_S, RUNNING, moment, plain, positive, steps, strength
 from models.mechanisms.mechanism import Mechanism, Memory
 from models.mechanisms.scale import Scale
@@ -105,7 +106,7 @@ gear_wear = Mechanism(
         plain("speed_exponent", 0.5, sd=0.4, lower=0.0, upper=1.5, grid=(0.0, 1.0)),
     ),
     states=(Memory(name="worn", rate=lambda s: _wear_rate(s.n, s.speed_exponent) * s.m / s.duration_ref),),
-    law=lambda s: s.strength * sp.Max(s.worn, 0.0) ** s.exponent,
+    law=lambda s: s.strength * Max(s.worn, 0.0) ** s.exponent,
     says="The flanks wear or pit: sliding friction grows with the work done.",
     reference="Archard: wear ~ load times sliding distance; its effect on friction is a hypothesis, and so is that it "
     "goes with a power of speed between loaded hours (0) and loaded revolutions (1)",

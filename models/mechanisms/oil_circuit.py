@@ -6,6 +6,7 @@ from typing import Any
 
 import sympy as sp
 
+from models.formulas.extremes import Max, Min
 from models.mechanisms.forms import (
     EDGE_S,
     RUNNING,
@@ -86,7 +87,7 @@ cooler_proportional = Mechanism(
         positive("band", 10.0, sd=0.6, unit="K", grid=(5.0, 15.0)),
         _coolant(scale),
     ),
-    law=lambda s: s.strength * sp.Min(sp.Max((s.T_oil - s.set_point) / s.band, 0.0), 1.0),
+    law=lambda s: s.strength * Min(Max((s.T_oil - s.set_point) / s.band, 0.0), 1.0),
     says="A valve opens in proportion above a set temperature and sends the oil through a cooler.",
     reference="wax thermostat: opens over 10 to 15 K",
     experiment=PAST_SET_POINT + " two loads beyond it: the oil temperature hardly rises",
@@ -282,7 +283,7 @@ cooler_air_proportional = Mechanism(
         _set_point(scale),
         positive("band", 10.0, sd=0.6, unit="K", grid=(5.0, 15.0)),
     ),
-    law=lambda s: s.strength * sp.Min(sp.Max((s.T_oil - s.set_point) / s.band, 0.0), 1.0),
+    law=lambda s: s.strength * Min(Max((s.T_oil - s.set_point) / s.band, 0.0), 1.0),
     says="A wax valve opens with the oil temperature and sends the returning oil through an air cooler ({place}).",
     reference="wax thermostat: opens over 10 to 15 K",
     experiment=PAST_SET_POINT + " two loads beyond it: the oil temperature hardly rises",

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import sympy as sp
-
+from models.formulas.extremes import Max
 from models.mechanisms.forms import plain, positive, rises, strength
 from models.mechanisms.mechanism import Mechanism
 
@@ -111,7 +110,7 @@ splash_starvation = Mechanism(
         strength(0.3, description="relative change of sliding loss per reference speed beyond the onset"),
         positive("onset", 0.5, sd=0.6, grid=(0.2, 0.5, 0.9, 1.4)),
     ),
-    law=lambda s: s.strength * sp.Max(s.n - s.onset, 0.0),
+    law=lambda s: s.strength * Max(s.n - s.onset, 0.0),
     says="At high speed the splashed oil no longer fills the mesh: the film is thinner and sliding friction higher.",
     reference="Navet et al. 2020: film over (1 + 0.67 (v - 5) / 15), v in m/s; from memory, the friction's answer ours",
     experiment="hold a high speed at two torques with and without an oil jet into the mesh",
@@ -143,7 +142,7 @@ bearing_preload = Mechanism(
         strength(0.3, description="relative change of the bearing loss per 10 K beyond the threshold"),
         plain("threshold", 15.0, sd=12.0, lower=-10.0, upper=80.0, unit="K", grid=(0.0, 8.0, 16.0, 24.0, 32.0)),
     ),
-    law=lambda s: s.strength * sp.Max(s.T_shafts - s.T_housing - s.threshold, 0.0) / 10.0,
+    law=lambda s: s.strength * Max(s.T_shafts - s.T_housing - s.threshold, 0.0) / 10.0,
     says="The shaft is warmer than the housing, the bearing's clearance is used up and it runs preloaded ({place}).",
     reference="Harris, Rolling Bearing Analysis; clearance 20 to 45 um, 0.7 um/K, so 25 to 35 K on the FZG rig",
     experiment="start cold at high load: the loss rises while the housing is still cold, then falls",

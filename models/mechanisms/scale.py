@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import sympy as sp
 
+from models.formulas.extremes import Max, Min
 from models.formulas.oil import TYPICAL_OIL, kinematic_viscosity_d341
 from models.network.laws import symbol
 
@@ -70,7 +71,7 @@ class Scale:
 
     def viscosity_at(self, T: sp.Expr) -> sp.Expr:
         """Kinematic viscosity [mm^2/s] at a temperature [degC], from -40 to 200 and held there beyond."""
-        return kinematic_viscosity_d341(sp.Min(sp.Max(T, -40.0), 200.0), self.oil_m, self.oil_n, xp=sp)
+        return kinematic_viscosity_d341(Min(Max(T, -40.0), 200.0), self.oil_m, self.oil_n, xp=sp)
 
     @classmethod
     def of(

@@ -6,6 +6,7 @@ from typing import Any
 
 import sympy as sp
 
+from models.formulas.extremes import Max, Min
 from models.mechanisms.forms import (
     length,
     moment,
@@ -44,7 +45,7 @@ solar_soak = Mechanism(
 def _wet(s: Any) -> sp.Expr:
     """Share of the housing that is wet: all of it soon after a shower begins, until that ends and the housing dries."""
     since = sp.Mod(s.time - s.onset, s.every)  # the last one began
-    return sp.Min(since / WETTED_S, 1.0) * sp.exp(-sp.Max(since - s.length, 0.0) / s.drying)
+    return Min(since / WETTED_S, 1.0) * sp.exp(-Max(since - s.length, 0.0) / s.drying)
 
 
 rain_on_housing = Mechanism(

@@ -17,13 +17,14 @@ from pydantic import PlainSerializer, PlainValidator
 from sympy.printing.str import StrPrinter
 
 from models.base.errors import InputError
+from models.formulas.extremes import Max, Min
 from models.network.laws import symbol
 
 LARGEST_EXACT_POWER = 4  # larger powers of two numbers are taken as floating ones: 9**9**9 would fill the memory
 FUNCTIONS: Mapping[str, Callable[..., Any]] = {
     "Abs": sp.Abs, "abs": sp.Abs, "sign": sp.sign, "sqrt": sp.sqrt, "exp": sp.exp, "log": sp.log,
     "sin": sp.sin, "cos": sp.cos, "tan": sp.tan, "atan": sp.atan, "sinh": sp.sinh, "cosh": sp.cosh, "tanh": sp.tanh,
-    "Min": sp.Min, "min": sp.Min, "Max": sp.Max, "max": sp.Max, "Mod": sp.Mod,
+    "Min": Min, "min": Min, "Max": Max, "max": Max, "Mod": sp.Mod,
 }  # fmt: skip
 
 

@@ -22,6 +22,7 @@ from sympy.printing.pycode import PythonCodePrinter
 
 from models.base.errors import InputError, did_you_mean
 from models.base.types import Array
+from models.formulas.extremes import Max, Min
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,34 +60,6 @@ class Parameter:
 def symbol(name: str) -> sp.Symbol:
     """The symbol of a signal or parameter: real, so that powers and magnitudes simplify."""
     return sp.Symbol(name, real=True)
-
-
-def renamed(law: sp.Expr, names: Mapping[str, str]) -> sp.Expr:
-    """A law with other names of some signals or parameters.
-
-    What sympy finds out when it builds an expression does not depend on names: it is not looked for again, which takes
-    long for minima and maxima.
-
-    Parameters
-    ----------
-    names : mapping of str to str
-        New name by old one; no two of the new law's names become one
-    """
-    given = {symbol(old): symbol(new) for old, new in names.items()}
-    done: dict[sp.Basic, sp.Basic] = {}
-
-    def replaced(one: sp.Basic) -> sp.Basic:
-        if not one.args:
-            return given.get(one, one)
-        if one not in done:
-            args = [replaced(arg) for arg in one.args]
-            if all(new is old for new, old in zip(args, one.args, strict=True)):
-                done[one] = one
-            else:
-                done[one] = one.func(*args, evaluate=False) if isinstance(one, sp.Min | sp.Max) else one.func(*args)
-        return done[one]
-
-    return replaced(law)
 
 
 class Signals:
@@ -201,6 +174,7 @@ def _agrees(expression: sp.Expr, law: Callable[[Signals], Any], known: Mapping[s
 def _check_expression(expression: sp.Expr, known: Mapping[str, sp.Symbol], name: str) -> sp.Expr:
     # A sympy expression may come with plain symbols; they mean the signals of the same name.
     expression = expression.subs({s: known[s.name] for s in expression.free_symbols if s.name in known})
+    expression = expression.replace(sp.Max, Max).replace(sp.Min, Min)
     for free in sorted(s.name for s in expression.free_symbols - set(known.values())):
         raise InputError(f"the law of {name!r} uses {free!r}, not a signal of this network{did_you_mean(free, known)}")
     for piecewise in expression.atoms(sp.Piecewise):

@@ -27,6 +27,7 @@ from diagnosis.engine.point import Point
 from diagnosis.forward.observation import boundary_temperatures, total_at_points
 from diagnosis.forward.recurrence import lagged
 from models.base.types import Array
+from models.formulas.extremes import Max, Min
 from models.network.laws import symbol
 
 SPEED, TORQUE, TEMPERATURE = "speed", "torque", "temperature"
@@ -59,8 +60,8 @@ class Coordinate:
 
     def law(self, raw: sp.Expr) -> sp.Expr:
         """The standardised coordinate as an expression."""
-        value = sp.log(sp.Max(sp.Abs(raw), self.floor)) if self.floor > 0.0 else raw
-        return sp.Min(sp.Max((value - self.mean) / self.sd, -FARTHEST), FARTHEST) / WIDTH
+        value = sp.log(Max(sp.Abs(raw), self.floor)) if self.floor > 0.0 else raw
+        return Min(Max((value - self.mean) / self.sd, -FARTHEST), FARTHEST) / WIDTH
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

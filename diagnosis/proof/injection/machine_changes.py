@@ -11,6 +11,7 @@ import sympy as sp
 from diagnosis.proof.injection.calibrated_model import AMPLITUDE, SEEN, CalibratedModel, Differences
 from diagnosis.proof.injection.trial import Course, Trial, ladder
 from models.base.types import Array
+from models.formulas.extremes import Max, Min
 from models.network.laws import symbol
 from models.simulation.thermal_network import ThermalNetwork
 
@@ -82,7 +83,7 @@ def thermostat(model: CalibratedModel, name: str, course: Course, rng: np.random
     T, seen = model.base.temperatures[node], model.seen(node)
     opens = float(np.quantile(T + seen, rng.uniform(*VALVE_QUANTILES))) - rng.uniform() * VALVE_OPENS_K
     network = model.prepared().with_input(SEEN, 0.0)
-    opening = sp.Min(sp.Max((symbol(f"T_{node}") + symbol(SEEN) - opens) / VALVE_OPENS_K, 0.0), 1.0)
+    opening = Min(Max((symbol(f"T_{node}") + symbol(SEEN) - opens) / VALVE_OPENS_K, 0.0), 1.0)
     changed = network.with_link(node, boundary, model.size_and_course * opening, name="injected")
     difference = abs(float(np.mean(T - model.base.temperatures[boundary])))
     cap = 2.0 * PATH_SHARE * model.heat_W / max(difference, LEAST_DIFFERENCE_K)

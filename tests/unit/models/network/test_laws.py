@@ -11,7 +11,7 @@ import pytest
 import sympy as sp
 
 from models.base.errors import InputError
-from models.network.laws import Signals, compile_function, function_source, renamed, symbol, trace
+from models.network.laws import Signals, compile_function, function_source, symbol, trace
 
 NAMES = ["speed", "T_oil", "k"]
 x, y = symbol("x"), symbol("y")
@@ -103,10 +103,3 @@ def test_a_remainder_keeps_its_parentheses() -> None:
         source = function_source("law", ["x", "y"], [law], vector=vector)
         assert float(compile_function(source, "law")(8.5, 4.0)[0]) == pytest.approx(2.0 * (11.5 % 4.0) / 4.0)
         assert float(compile_function(source, "law")(-8.5, 4.0)[0]) == pytest.approx(2.0 * (-5.5 % 4.0) / 4.0)
-
-
-def test_a_renamed_law_is_the_law_of_the_other_names() -> None:
-    a, b = symbol("a"), symbol("b")
-    law = sp.Min(sp.Max((x - y) / 3, 0), 1) * sp.exp(-x) + sp.Piecewise((x, y > 1), (0, True))
-    assert renamed(law, {"x": "a", "y": "b"}) == law.xreplace({x: a, y: b})
-    assert renamed(law, {"z": "a"}) is law
