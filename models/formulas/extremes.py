@@ -37,5 +37,13 @@ class Min(sp.Min):  # type: ignore[misc]
         return sp.Min(*args) if _are_numbers(args) else super().__new__(cls, *args, evaluate=False)
 
 
+def with_these(expression: sp.Basic) -> sp.Basic:
+    """An expression with these in place of those of sympy."""
+    if not expression.has(sp.Max, sp.Min):
+        return expression
+    own = {sp.Max: Max, sp.Min: Min}.get(expression.func, expression.func)
+    return own(*map(with_these, expression.args))
+
+
 def _are_numbers(args: tuple[Any, ...]) -> bool:
     return all(sp.sympify(arg).is_Number for arg in args)

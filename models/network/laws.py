@@ -22,7 +22,7 @@ from sympy.printing.pycode import PythonCodePrinter
 
 from models.base.errors import InputError, did_you_mean
 from models.base.types import Array
-from models.formulas.extremes import Max, Min
+from models.formulas.extremes import with_these
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -174,7 +174,7 @@ def _agrees(expression: sp.Expr, law: Callable[[Signals], Any], known: Mapping[s
 def _check_expression(expression: sp.Expr, known: Mapping[str, sp.Symbol], name: str) -> sp.Expr:
     # A sympy expression may come with plain symbols; they mean the signals of the same name.
     expression = expression.subs({s: known[s.name] for s in expression.free_symbols if s.name in known})
-    expression = expression.replace(sp.Max, Max).replace(sp.Min, Min)
+    expression = with_these(expression)
     for free in sorted(s.name for s in expression.free_symbols - set(known.values())):
         raise InputError(f"the law of {name!r} uses {free!r}, not a signal of this network{did_you_mean(free, known)}")
     for piecewise in expression.atoms(sp.Piecewise):
