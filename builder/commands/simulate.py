@@ -8,6 +8,7 @@ from contextlib import nullcontext
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 import numpy as np
@@ -22,11 +23,13 @@ from models.base.types import Array
 from models.correction.correction import Correction, parse_correction, read_correction
 from models.definition.sections import Training
 from models.files.cycle import Cycle
-from models.files.cycle_file import RecordedStart, read_initial
 from models.files.output_files import refuse_to_replace, write_table
-from models.files.table_file import kind_of
+from models.files.paths import kind_of
 from models.quantities.quantities import Input
 from models.simulation.start_temperatures import start_temperatures
+
+if TYPE_CHECKING:
+    from models.files.cycle_file import RecordedStart
 
 RECORDED = "recorded"  # --initial: as the cycle's own file says
 PLOTS = (".png", ".pdf", ".svg")
@@ -207,6 +210,8 @@ def simulate(
     _check_usage(files, gearbox, correction, claims_only=claims_only)
     named = [Path(name) for name in (gearbox, initial, mapping, correction) if name is not None]
     _check_outputs(output, plot, inputs=[*_read_as_files(files, gearbox), *named])
+    from models.files.cycle_file import read_initial
+
     given = None if initial in (None, RECORDED) else read_initial(str(initial))
     model_of = partial(_fmu, files[0]) if gearbox is None else partial(_full_model, gearbox)
     model = model_of(correction, mapping, claims_only=claims_only)

@@ -14,7 +14,8 @@ from models.base.errors import InputError
 from models.base.types import Array
 from models.files.cycle import Cycle
 from models.files.cycle_file import RecordedStart, read_cycle_and_start
-from models.files.table_file import KINDS, column_names
+from models.files.paths import KINDS
+from models.files.table_file import column_names
 from models.quantities.quantities import is_total_loss, node_of_channel
 
 MOST_SHOWN = 3  # pieces of a recording with gaps

@@ -17,7 +17,8 @@ from diagnosis.recordings.mdf import read_mdf
 from diagnosis.recordings.time_axis import ISO, RECORDING_KINDS, Clock, Part, clock_of, inside, part_of
 from models.base.errors import InputError, Problems, did_you_mean
 from models.base.types import Array
-from models.files.table_file import check_file, kind_of, read_chunks, together
+from models.files.paths import check_file, kind_of
+from models.files.table_file import read_chunks, together
 
 
 @dataclass(kw_only=True, eq=False)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from models.base.errors import InputError, Problems
 from models.base.types import Array
-from models.files.table_file import KINDS, is_file
+from models.files.paths import KINDS, is_file
 from models.quantities.units import units_in_files
 
 RECORDING_KINDS = (*KINDS, ".mf4", ".mdf")

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from models.base.errors import InputError
 from models.base.types import Array
 from models.files.cycle import Cycle
-from models.files.table_file import KINDS, read_table
+from models.files.paths import KINDS
+from models.files.table_file import read_table
 from models.quantities.quantities import GEARBOX_INPUTS, Input
 
 

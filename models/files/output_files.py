@@ -6,12 +6,11 @@ import gzip
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
-import pandas as pd
 from numpy.typing import ArrayLike
 
 from models.base.atomic_write import atomic_file
 from models.base.errors import InputError
-from models.files.table_file import is_folder, kind_of
+from models.files.paths import is_folder, kind_of
 
 DECIMALS = 6  # of results: a millionth of a kelvin or a watt
 
@@ -51,6 +50,8 @@ def write_table(path: Path, columns: Mapping[str, ArrayLike]) -> None:
         If the ending is another one or the folder cannot be written to.
     """
     kind = kind_of(path)
+    import pandas as pd
+
     table = pd.DataFrame(dict(columns))
     with atomic_file(path) as partial:
         if kind == ".parquet":

@@ -16,8 +16,8 @@ from typing import IO, Any, cast
 import pandas as pd
 
 from models.base.errors import InputError
+from models.files.paths import EMPTY, check_file, kind_of
 
-KINDS = (".csv", ".csv.gz", ".parquet")
 CHUNK_ROWS = 100_000
 CHUNK_LINES = 1_000
 MOST_ROWS = 5_000_000  # of a table in memory
@@ -57,58 +57,6 @@ class TextForm:
 PLAIN = TextForm()
 # What gzip, pandas and pyarrow raise on damaged files.
 UNREADABLE = (ValueError, LookupError, ArithmeticError, OSError, EOFError, MemoryError, RuntimeError, zlib.error)
-
-
-def kind_of(path: Path, kinds: tuple[str, ...] = KINDS) -> str:
-    """Return the ending of a file, one of `kinds`.
-
-    Raises
-    ------
-    InputError
-        If it is another one, or a folder.
-    """
-    if is_folder(path):
-        raise InputError(f"{path}: is not a file but a folder; name a file in it ({', '.join(kinds)})")
-    for kind in kinds:
-        if path.name.lower().endswith(kind):
-            return kind
-    raise InputError(f"{path}: unknown file ending; use one of {', '.join(kinds)}")
-
-
-def is_folder(path: Path) -> bool:
-    """Return True for a folder; False for names that no file can have (opening them reports that)."""
-    try:
-        return path.is_dir()
-    except (OSError, ValueError):  # too long, or with NUL in it
-        return False
-
-
-def is_file(path: Path) -> bool:
-    """Return True for a file; False for names that no file can have."""
-    try:
-        return path.is_file()
-    except (OSError, ValueError):
-        return False
-
-
-def check_file(path: Path) -> None:
-    """Refuse what is not a file, or is empty.
-
-    Raises
-    ------
-    InputError
-    """
-    try:
-        exists, file, folder = path.exists(), path.is_file(), path.is_dir()
-        size = path.stat().st_size if file else 0
-    except (OSError, ValueError) as error:  # a name that is too long, or holds NUL
-        raise InputError(f"{path}: cannot be read ({getattr(error, 'strerror', None) or error})") from error
-    if not exists:
-        raise InputError(f"{path}: no such file")
-    if not file:
-        raise InputError(f"{path}: is not a file but {'a folder' if folder else 'a device or pipe'}")
-    if size == 0:
-        raise InputError(f"{path}: {_EMPTY}")
 
 
 def column_names(path: Path, form: TextForm = PLAIN) -> tuple[str, ...]:
@@ -184,7 +132,6 @@ def _check_names(path: Path, names: list[str]) -> None:
 # ---------------------------------------------------------------------- text
 
 _STATED = "or state in a mapping file (--mapping) how it is written"
-_EMPTY = "is empty; a header line with column names and rows are needed"
 
 
 def _open_text(path: Path, form: TextForm) -> io.TextIOWrapper:
@@ -272,7 +219,7 @@ def _check_head(path: Path, lines: _Lines, form: TextForm) -> None:
     """Refuse another separator, no header, repeated names, and rows of units or too many fields below the header."""
     header = lines.next_filled()
     if not header:
-        raise InputError(f"{path}: {_EMPTY}")
+        raise InputError(f"{path}: {EMPTY}")
     names = _fields(header, form.separator)
     for other, word in ((";", "';'"), ("\t", "tabs"), (",", "','")):
         if len(names) == 1 and other in names[0]:

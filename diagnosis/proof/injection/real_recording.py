@@ -21,7 +21,7 @@ from diagnosis.recordings.time_axis import part_of, split_path
 from models.assembly.gearbox import Gearbox
 from models.base.errors import InputError
 from models.base.types import Array
-from models.files.table_file import KINDS
+from models.files.paths import KINDS
 from models.quantities.quantities import is_total_loss
 from models.quantities.units import units_in_files
 
