@@ -119,7 +119,11 @@ def assemble(
         jobs=jobs,
     )  # fmt: skip
     final, holdout = predicted.final, _fits(setup, predicted.holdout, counting)
-    contradicted = bool(answers) and not faulty and holdout.contradict(predicted.holdout_gain, setup.noise_K)
+    contradicted = (
+        bool(answers)
+        and not faulty
+        and holdout.contradict(predicted.holdout_gain, setup.noise_K, posterior.class_threshold)
+    )
     if contradicted:
         answers = [withdraw_claim(answer, posterior.rule) for answer in answers]
     findings = _distinct([

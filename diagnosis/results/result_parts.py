@@ -329,12 +329,13 @@ class Fits:
     sensors: Mapping[str, tuple[float, float, float]]
     recordings: dict[str, tuple[float, float, float]]
 
-    def contradict(self, gain: float, noise_K: float) -> bool:
-        """True if these recordings contradict the findings: a lower log score, or an error larger by the noise.
+    def contradict(self, gain: float, noise_K: float, needed: float) -> bool:
+        """True if these recordings contradict the findings: by the log score, or by an error larger by the noise.
 
-        The gain in log score is in nat, the white noise of a temperature row in K.
+        The gain in log score and the evidence that an effect needs are in nat, the white noise of a temperature row
+        in K.
         """
-        return gain < 0.0 or self.after - self.calibrated > noise_K
+        return gain < -needed or self.after - self.calibrated > noise_K
 
     def far_beyond(self, train: Fits, matters_K: float) -> tuple[str, ...]:
         """Recordings whose error is several times that of those learnt from and larger by what matters, worst first."""

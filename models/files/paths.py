@@ -1,4 +1,4 @@
-"""What a path names: a file of a known kind, a folder, or nothing."""
+"""Kinds of files, and whether a path is a file or a folder."""
 
 from __future__ import annotations
 

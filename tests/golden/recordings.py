@@ -16,9 +16,9 @@ NOISE_K = 0.15
 
 
 def staircase(seed: int, hours: float) -> dict[str, np.ndarray]:
-    """Speed and torque in steps of 12 min, a standstill in between, every 20 s."""
+    """Speed and torque in steps of 12 min, a standstill in between, every 30 s."""
     rng = np.random.default_rng(seed)
-    time = np.arange(0.0, hours * 3600.0 + 1.0, 20.0)
+    time = np.arange(0.0, hours * 3600.0 + 1.0, 30.0)
     step = (time // 720.0).astype(int)
     count = step.max() + 1
     speed, torque = rng.uniform(300.0, 4000.0, count), rng.uniform(20.0, 250.0, count)

@@ -5,9 +5,12 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import pytest
+
 from tests.conftest import RunCli
 
 
+@pytest.mark.slow  # a notebook of the documentation does it with every 30th row
 def test_the_broken_thermistor_is_found_and_the_fmu_predicts(run_cli: RunCli, tmp_path: Path) -> None:
     assert run_cli("prove", "--real", "rod", "--jobs", "1", "--output", tmp_path) == 0
     result = json.loads((tmp_path / "real.json").read_text())

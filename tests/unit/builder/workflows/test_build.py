@@ -61,7 +61,7 @@ def test_a_corrected_fmu_of_kept_networks_has_the_bytes_of_a_trained_one(
     fzg: Gearbox, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     correction = Correction.of(fzg, calibration=[Estimate(name="mesh", value=1.07, stderr=0.02)])
-    quick: dict[str, Any] = {"name": "fzg", "preset": "paper", "samples": 60}
+    quick: dict[str, Any] = {"name": "fzg", "preset": "paper", "samples": 60, "target": "native"}
     build(fzg, tmp_path / "nominal", **quick).show()
     assert "networks: trained now, kept in " in capsys.readouterr().out
     taken = build(fzg, tmp_path / "corrected", correction=correction, **quick)

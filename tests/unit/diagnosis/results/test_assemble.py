@@ -183,7 +183,8 @@ def test_held_out_readings_that_are_predicted_worse_take_the_claim_away(
 ) -> None:
     posterior = posterior_of(prepared[2], windage, remainder=1.5)
     claim = Answer(best=windage, effect=windage.effects[0], grade="claim", probability=0.95, joint=0.95)
-    for gain, grade, probability in ((3.0, "claim", 0.95), (-3.0, "likely", 0.95 * rule().nearest)):
+    less = posterior.class_threshold
+    for gain, grade, probability in ((0.9 * -less, "claim", 0.95), (1.1 * -less, "likely", 0.95 * rule().nearest)):
         monkeypatch.setattr(predictions, "log_score_gain", lambda *_, gain=gain: gain)
         found = assembled(posterior, [claim])
         (finding,) = found.findings

@@ -182,8 +182,10 @@ def test_a_larger_held_out_error_is_not_called_better() -> None:
     better = told(worse, "How much better?")
     assert "by 93 nat of log score\nSo the held-out recordings contradict the findings (larger error of" in better
     assert "contradict" not in told(base, "How much better?")
-    unconfirmed = told(replace(base, holdout_gain=-3.0, contradicted=True), "How much better?")
-    assert "predicted worse than by the calibrated model, by 3 nat of log score\nSo" in unconfirmed
+    unconfirmed = told(replace(base, holdout_gain=-30.0, contradicted=True), "How much better?")
+    assert "predicted worse than by the calibrated model, by 30 nat of log score\nSo" in unconfirmed
+    assert "contradict the findings (less probable readings)" in unconfirmed
+    assert "by less than one nat of log score" in told(replace(base, holdout_gain=-0.3), "How much better?")
     assert "log score" not in told(replace(base, holdout_gain=0.0), "How much better?")  # nothing was fitted
 
 
@@ -210,12 +212,12 @@ def test_a_held_out_recording_of_a_machine_that_changed_is_no_agreement() -> Non
 
 
 @pytest.mark.parametrize(("gain", "more_K", "contradicted"), [
-    (3.0, -0.2, False), (-3.0, -0.2, True), (3.0, 0.09, False), (3.0, 0.11, True), (0.0, 0.0, False),
+    (3.0, -0.2, False), (-4.9, -0.2, False), (-5.1, -0.2, True), (3.0, 0.09, False), (3.0, 0.11, True),
     (np.nan, np.nan, False),
 ])  # fmt: skip
 def test_what_held_out_recordings_contradict(gain: float, more_K: float, contradicted: bool) -> None:
     fits = Fits(before=3.0, calibrated=0.5, found=0.5, after=0.5 + more_K, sensors={}, recordings={})
-    assert fits.contradict(gain, noise_K=0.1) is contradicted
+    assert fits.contradict(gain, noise_K=0.1, needed=5.0) is contradicted
 
 
 def test_laws_of_one_name_at_one_place_are_one_item() -> None:
