@@ -260,7 +260,7 @@ TEXTS: Mapping[str, Mapping[str, KeyText]] = {
     ),
     "TorqueFromPower": _texts(
         power="Name of the [[input]] with the power",
-        efficiency=("Mechanical over measured power", "0.85 to 0.97 (electrical)"),
+        efficiency=("Mechanical over measured power", "motor 0.85 to 0.97; generator 1.03 to 1.18"),
     ),
     "Loss": _texts(
         name="Name of the loss",

@@ -251,6 +251,9 @@ class Rolling(Section):
     constant_N_m2: Annotated[float, between(1e6, 1e9)] = 9.0e7
 
 
+MAUZ_WIDEST_MM = 60.0  # at 100 mm its loss would be ten times all others of the rig
+
+
 class Churning(Section):
     """``[stage.churning]``: the gears in the oil bath; ``C_Sp`` is the splash factor of the Mauz formula."""
 
@@ -316,6 +319,15 @@ class Stage(Section):
     def _joins_two_shafts(self) -> Self:
         if self.driver == self.driven:
             raise ValueError(f"driver and driven are both '{self.driver}'; a stage joins two shafts")
+        return self
+
+    @model_validator(mode="after")
+    def _churning_formula_holds(self) -> Self:
+        if self.churning.model == "mauz" and self.face_width_mm > MAUZ_WIDEST_MM:
+            raise ValueError(
+                f"churning.model = 'mauz' with face_width_mm = {self.face_width_mm:g}: its torque goes with the cube "
+                f"of the face width and is refused beyond {MAUZ_WIDEST_MM:g} mm; take 'changenet_velex'"
+            )
         return self
 
     @model_validator(mode="after")

@@ -177,8 +177,9 @@ class ChurningLaw:
 
     @property
     def immersion(self) -> tuple[float, float]:
-        """Immersion depths of pinion and wheel, [m]; not positive if the gear is dry."""
-        return self.pair.r_a[0] - self.level_below_axis, self.pair.r_a[1] - self.level_below_axis
+        """Immersion depths of both gears, [m], at most their diameters; not positive if the gear is dry."""
+        first, second = (min(r - self.level_below_axis, 2.0 * r) for r in self.pair.r_a)
+        return first, second
 
     def power(self, x: Array) -> Array:
         """Churning loss [W], shape (N, 1), at speed [1/min] and oil temperature [degC], shape (N, 2)."""
@@ -195,13 +196,14 @@ class ChurningLaw:
                 for e, w in zip(self.immersion, omega, strict=True)
             ]
         elif self.model == "mauz":
-            per_gear = [churning_mauz(e=self.immersion, b=pair.b, v_t=v_t, omega_2=omega[1], C_Sp=self.C_Sp)]
+            wheel = omega_1 / max(1.0, pair.u)  # the gear with more teeth, whichever drives
+            per_gear = [churning_mauz(e=self.immersion, b=pair.b, v_t=v_t, omega_2=wheel, C_Sp=self.C_Sp)]
         else:
             nu, rho = self.oil.kinematic_viscosity(T_oil), self.oil.density(T_oil)
             per_gear = [
                 churning_changenet_velex(
                     # Measured at the pitch circle, as theta and D are; the tooth flanks are a separate area.
-                    h=pair.r_w[i] - self.level_below_axis,
+                    h=min(pair.r_w[i] - self.level_below_axis, 2.0 * pair.r_w[i]),
                     r_p=pair.r_w[i],
                     b=pair.b,
                     z=pair.z[i],

@@ -6,6 +6,9 @@ import numpy as np
 import pytest
 
 from models.assembly.gearbox import load_gearbox
+from models.base.errors import InputError
+from models.formulas.geometry import GearPair, gear_pair
+from models.losses.churning import ChurningLaw
 
 GEARBOX = load_gearbox("fzg").with_values({"oil.volume_l": 1.0})
 PAIR = GEARBOX.stage[0].pair()
@@ -31,3 +34,34 @@ def test_changenet_velex_on_the_rig() -> None:
     losses = GEARBOX.with_values({"stage.0.churning.model": "changenet_velex", "oil.volume_l": 0.9}).losses()
     loss = losses.breakdown(speed=SPEED[[0, 2, 3, 4, 5]], torque=94.0, temperatures=60.0)["churning"]
     assert loss == pytest.approx([0.49, 6.3, 21.1, 57.8, 82.6], rel=0.01)
+
+
+MODELS = ("niemann", "niemann_printed", "mauz", "changenet_velex")
+
+
+def churning(pair: GearPair, model: str, speed: float, level_below_axis: float) -> float:
+    """Loss in W at a speed in 1/min of the first gear."""
+    law = ChurningLaw(
+        pair=pair, oil=GEARBOX.lubricant(), model=model, level_below_axis=level_below_axis, oil_volume=1e-3
+    )
+    return float(law.power(np.array([[speed, 60.0]]))[0, 0])
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_which_gear_drives_does_not_matter(model: str) -> None:
+    turned = gear_pair(z=PAIR.z[::-1], m_n=PAIR.m_n, alpha_n=PAIR.alpha_n, b=PAIR.b, a=PAIR.a, x=PAIR.x[::-1])
+    here = churning(PAIR, model, 2000.0, 0.02)
+    assert churning(turned, model, 2000.0 / PAIR.u, 0.02) == pytest.approx(here, rel=1e-12) and here > 1.0
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_a_gear_under_oil_is_under_oil(model: str) -> None:
+    """Above the tip circles a level changes nothing."""
+    full = -2.0 * max(PAIR.r_a)
+    assert churning(PAIR, model, 2000.0, full) == churning(PAIR, model, 2000.0, 1.5 * full)
+    assert churning(PAIR, model, 2000.0, full) > churning(PAIR, model, 2000.0, 0.0)
+
+
+def test_mauz_is_refused_for_wide_gears() -> None:
+    with pytest.raises(InputError, match="cube of the face width and is refused beyond 60 mm; take 'changenet_velex'"):
+        GEARBOX.with_values({"stage.0.churning.model": "mauz", "stage.0.face_width_mm": 61.0})
