@@ -233,8 +233,8 @@ def _how_much_better(d: Diagnosis) -> tuple[str, ...]:
         )
     if d.has_correction and math.isfinite(d.holdout_gain) and d.holdout_gain != 0.0:  # 0: nothing was fitted
         way = "better than" if d.holdout_gain > 0.0 else "worse than"
-        by = f"by {abs(d.holdout_gain):.0f} nat" if abs(d.holdout_gain) >= 1.0 else "by less than one nat"
-        lines.append(f"Held-out readings are predicted {way} by the calibrated model, {by} of log score")
+        nat = f"{abs(d.holdout_gain):.0f} nat" if abs(d.holdout_gain) >= 1.0 else "less than one nat"
+        lines.append(f"Held-out readings are predicted {way} by the calibrated model, by {nat} of log score")
     if d.contradicted:
         by = "less probable readings" if d.holdout_gain < -d.further_threshold else "larger error of temperatures"
         lines.append(f"So the held-out recordings contradict the findings ({by}): no name is a claim")

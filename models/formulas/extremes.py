@@ -1,7 +1,8 @@
 """Minimum and maximum of expressions.
 
 Those of sympy look for arguments that can never be the extreme one, each time that an expression with them is rebuilt:
-milliseconds for the laws here, where nothing is found.
+milliseconds for the laws here, where nothing is found. They refuse what has no order, such as conditions; these do not,
+so texts are read with those of sympy.
 """
 
 from __future__ import annotations

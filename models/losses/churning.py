@@ -178,8 +178,10 @@ class ChurningLaw:
     @property
     def immersion(self) -> tuple[float, float]:
         """Immersion depths of both gears, [m], at most their diameters; not positive if the gear is dry."""
-        first, second = (min(r - self.level_below_axis, 2.0 * r) for r in self.pair.r_a)
-        return first, second
+        return self._depth(self.pair.r_a[0]), self._depth(self.pair.r_a[1])
+
+    def _depth(self, radius: float) -> float:
+        return min(radius - self.level_below_axis, 2.0 * radius)
 
     def power(self, x: Array) -> Array:
         """Churning loss [W], shape (N, 1), at speed [1/min] and oil temperature [degC], shape (N, 2)."""
@@ -203,7 +205,7 @@ class ChurningLaw:
             per_gear = [
                 churning_changenet_velex(
                     # Measured at the pitch circle, as theta and D are; the tooth flanks are a separate area.
-                    h=min(pair.r_w[i] - self.level_below_axis, 2.0 * pair.r_w[i]),
+                    h=self._depth(pair.r_w[i]),
                     r_p=pair.r_w[i],
                     b=pair.b,
                     z=pair.z[i],

@@ -17,14 +17,14 @@ from pydantic import PlainSerializer, PlainValidator
 from sympy.printing.str import StrPrinter
 
 from models.base.errors import InputError
-from models.formulas.extremes import Max, Min
+from models.formulas.extremes import with_these
 from models.network.laws import symbol
 
 LARGEST_EXACT_POWER = 4  # larger powers of two numbers are taken as floating ones: 9**9**9 would fill the memory
 FUNCTIONS: Mapping[str, Callable[..., Any]] = {
     "Abs": sp.Abs, "abs": sp.Abs, "sign": sp.sign, "sqrt": sp.sqrt, "exp": sp.exp, "log": sp.log,
     "sin": sp.sin, "cos": sp.cos, "tan": sp.tan, "atan": sp.atan, "sinh": sp.sinh, "cosh": sp.cosh, "tanh": sp.tanh,
-    "Min": Min, "min": Min, "Max": Max, "max": Max, "Mod": sp.Mod,
+    "Min": sp.Min, "min": sp.Min, "Max": sp.Max, "max": sp.Max, "Mod": sp.Mod,
 }  # fmt: skip
 
 
@@ -90,7 +90,7 @@ def parse_expression(text: str) -> sp.Expr:
         raise InputError(f"{_shown(text)} is a condition, not a number")
     if value.has(sp.nan, sp.zoo, sp.oo, -sp.oo, sp.I):
         raise InputError(f"{_shown(text)} is not a finite real expression")
-    return value
+    return with_these(value)
 
 
 def _read(node: ast.expr) -> Any:

@@ -213,7 +213,7 @@ def test_a_held_out_recording_of_a_machine_that_changed_is_no_agreement() -> Non
 
 @pytest.mark.parametrize(("gain", "more_K", "contradicted"), [
     (3.0, -0.2, False), (-4.9, -0.2, False), (-5.1, -0.2, True), (3.0, 0.09, False), (3.0, 0.11, True),
-    (np.nan, np.nan, False),
+    (0.0, 0.0, False), (np.nan, np.nan, False),
 ])  # fmt: skip
 def test_what_held_out_recordings_contradict(gain: float, more_K: float, contradicted: bool) -> None:
     fits = Fits(before=3.0, calibrated=0.5, found=0.5, after=0.5 + more_K, sensors={}, recordings={})

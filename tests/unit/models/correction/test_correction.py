@@ -324,6 +324,7 @@ def test_text_of_a_law_gives_the_same_law(law: sp.Expr) -> None:
         ("exp(1, 2)", "cannot be used"),
         ("speed > 1", "is a condition, not a number"),
         ("speed + (torque > 1)", "cannot be used"),
+        ("Max(speed > 1, 2)", "cannot be used"),
         ("speed == 1", "compare with <"),
         ("Piecewise((1, speed))", "takes pairs"),
         ("Piecewise(speed)", "takes pairs"),
