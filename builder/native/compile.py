@@ -194,8 +194,8 @@ def plan_for(platforms: str) -> Plan:
     Parameters
     ----------
     platforms : str
-        As :func:`chosen_platforms` takes it. ``host`` is for use on this machine: its own compiler is preferred, where
-        there is one; all others are compiled by ziglang
+        As :func:`chosen_platforms` takes it. ziglang compiles, where it is installed: for the oldest systems that are
+        supported; else this machine's own compiler does, for a C library as new as this machine's
 
     Raises
     ------
@@ -204,9 +204,10 @@ def plan_for(platforms: str) -> Plan:
     InputError
         If a platform is not known, or only ziglang can compile for it.
     """
-    wanted, host, zig, own = chosen_platforms(platforms), host_platform(), _zig(), _own_compiler()
-    if zig is not None and not (platforms == "host" and own is not None):
+    wanted, host, zig = chosen_platforms(platforms), host_platform(), _zig()
+    if zig is not None:
         return Plan(zig, wanted)
+    own = _own_compiler()
     if own is None:
         raise NoCompilerError(f"a native FMU needs a C compiler, and no cc, gcc or clang works here; {GET_ZIG}")
     if host is None or host not in wanted:

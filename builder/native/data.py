@@ -192,7 +192,7 @@ def _links(network: ThermalNetwork) -> tuple[list[tuple[str, str]], list[tuple[s
 
 
 def _laws_header() -> str:
-    laws = [f"void law_{name}(const double *restrict s, double *restrict y)" for name in LAW_NAMES]
+    laws = [f"void law_{name}(const double *RESTRICT s, double *RESTRICT y)" for name in LAW_NAMES]
     return LAWS_HEADER.format(functions="\n".join(f"INTERNAL {line};" for line in (*laws, *Structure.signatures())))
 
 

@@ -67,10 +67,10 @@ class Structure:
     @staticmethod
     def signatures() -> tuple[str, str, str, str]:
         """C declarations of the functions, without semicolon."""
-        gain = "(const double *g, const double *T, const double *T_boundary, const double *heat, double *restrict gain)"
-        outflow = "(const double *g, const double *T, const double *T_boundary, double *restrict flow)"
-        factorize = "(const double *g, const double *capacity, double scale, double *restrict f)"
-        solve = "(const double *restrict f, const double *q, double *x)"
+        gain = "(const double *g, const double *T, const double *T_boundary, const double *heat, double *RESTRICT gain)"
+        outflow = "(const double *g, const double *T, const double *T_boundary, double *RESTRICT flow)"
+        factorize = "(const double *g, const double *capacity, double scale, double *RESTRICT f)"
+        solve = "(const double *RESTRICT f, const double *q, double *x)"
         return (
             f"void structure_gain{gain}",
             f"void structure_outflow{outflow}",

@@ -34,7 +34,7 @@ static inline uint64_t to_bits(double x) {
 }
 
 /* exp(x) = scale * above / below for |x| <= 700: reduction by ln 2 in two parts and the rational function of Moshier's
-   Cephes library (exp.c). */
+   Cephes library (exp.c; Copyright 1984, 1987, 1989, 2000 by Stephen L. Moshier). */
 typedef struct {
     double above, below, scale;
 } Quotient;
@@ -65,7 +65,14 @@ static inline double sigmoid_of_negative(double y) {
     return e.below / (e.below + e.scale * e.above);
 }
 
-/* The logarithm of FreeBSD's msun (e_log.c) for positive normal numbers. */
+/* The logarithm of FreeBSD's msun (e_log.c) for positive normal numbers, changed: without branches.
+
+   Copyright (C) 1993 by Sun Microsystems, Inc. All rights reserved.
+
+   Developed at SunPro, a Sun Microsystems, Inc. business.
+   Permission to use, copy, modify, and distribute this
+   software is freely granted, provided that this notice
+   is preserved. */
 static inline double normal_log(double x) {
     const uint64_t root_half = 0x3fe6a09e00000000u, one = 0x3ff0000000000000u;
     const uint64_t moved = to_bits(x) + (one - root_half);

@@ -4,6 +4,7 @@
 
 #include "fmi2Functions.h"
 
+#include <math.h>
 #include <stdlib.h>
 
 /* ---------------------------------------------------------------------------------------------------- log and life */
@@ -57,9 +58,7 @@ fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean toleranceDefined, fm
                                fmi2Boolean stopTimeDefined, fmi2Real stopTime) {
     (void)toleranceDefined; /* the tolerance of the inner steps is fixed */
     (void)tolerance;
-    (void)stopTimeDefined;
-    (void)stopTime;
-    return (fmi2Status)instance_set_up(c, startTime, __func__);
+    return (fmi2Status)instance_set_up(c, startTime, stopTimeDefined ? stopTime : INFINITY, __func__);
 }
 
 fmi2Status fmi2EnterInitializationMode(fmi2Component c) {

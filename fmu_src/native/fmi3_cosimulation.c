@@ -5,6 +5,7 @@
 
 #include "fmi3Functions.h"
 
+#include <math.h>
 #include <stdlib.h>
 
 /* ---------------------------------------------------------------------------------------------------- log and life */
@@ -79,11 +80,9 @@ fmi3Status fmi3SetDebugLogging(fmi3Instance instance, fmi3Boolean loggingOn, siz
 
 fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, fmi3Boolean toleranceDefined, fmi3Float64 tolerance,
                                        fmi3Float64 startTime, fmi3Boolean stopTimeDefined, fmi3Float64 stopTime) {
-    const Status status = instance_set_up(instance, startTime, __func__);
+    const Status status = instance_set_up(instance, startTime, stopTimeDefined ? stopTime : INFINITY, __func__);
     (void)toleranceDefined; /* the tolerance of the inner steps is fixed */
     (void)tolerance;
-    (void)stopTimeDefined;
-    (void)stopTime;
     if (status != STATUS_OK) return (fmi3Status)status;
     return (fmi3Status)instance_enter_initialization(instance, __func__);
 }

@@ -77,7 +77,7 @@ Status instance_set_logging(Instance *self, int on, size_t count, const char *co
                                    categories[i] ? categories[i] : "NULL");
         chosen |= found;
     }
-    self->logged = on ? self->logged | chosen : self->logged & ~chosen;
+    self->logged = on ? chosen : self->logged & ~chosen;
     return STATUS_OK;
 }
 
@@ -142,6 +142,7 @@ static void to_start(Instance *self) {
     self->model.changed = 1;
     self->mode = INSTANTIATED;
     self->set_up = 0;
+    self->stop = INFINITY;
     self->fresh = 0;
     self->blank = 0;
     self->ramping = 0;
@@ -192,12 +193,13 @@ void instance_free(Instance *self) {
     if (self) self->host.release(self);
 }
 
-Status instance_set_up(Instance *self, double start, const char *function) {
+Status instance_set_up(Instance *self, double start, double stop, const char *function) {
     if (!instance_allows(self, ONLY(INSTANTIATED), function)) return STATUS_ERROR;
     if (!isfinite(start))
         return instance_report(self, STATUS_ERROR, "the simulation cannot start at %g s; a finite time is needed",
                                start);
     self->model.time = start;
+    self->stop = stop;
     self->set_up = 1;
     return STATUS_OK;
 }
@@ -316,7 +318,6 @@ Status instance_prepare_set(Instance *self, const unsigned references[], size_t 
 /* A value is judged when it is used, not here: a host may set several that only fit together. */
 void instance_put(Instance *self, unsigned reference, double value) {
     const Variable *variable = &model_variables[reference];
-    self->slopes[reference] = 0.0;
     if (value == self->values[reference]) return;
     if (!usable(variable, self->values[reference])) self->faults--;
     if (!usable(variable, value)) self->faults++;
@@ -391,6 +392,9 @@ static Status try_step(Instance *self, double time, double duration) {
 
 Status instance_step(Instance *self, double time, double duration, const char *function) {
     if (!instance_allows(self, STEPPING, function)) return STATUS_ERROR;
+    if (time + duration > self->stop + CLOCK_SLIP * duration + CLOCK_ROUNDING * fabs(self->stop))
+        return instance_report(self, STATUS_ERROR, "%s: the step would end at %.15g s, past the stop time of %.15g s",
+                               function, time + duration, self->stop);
     self->last_step = try_step(self, time, duration);
     self->mode = self->last_step == STATUS_DISCARD ? STEP_FAILED : STEP_COMPLETE;
     return self->last_step;

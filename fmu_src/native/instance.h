@@ -45,6 +45,7 @@ typedef struct {
     const char *name;
     unsigned logged;  /* bit ONLY(status): messages of that status are passed on */
     int set_up;       /* the start time is known */
+    double stop;      /* no step may end later; infinite if the host named none */
     unsigned faults;  /* how many settable values cannot be used */
     int fresh;        /* the calculated values belong to the present moment */
     int blank;        /* there are none, so they are NaN */
@@ -68,7 +69,7 @@ INTERNAL Instance *instance_create(const Host *host, const char *name, const cha
 INTERNAL void instance_free(Instance *self);
 INTERNAL Status instance_set_logging(Instance *self, int on, size_t count, const char *const categories[],
                                      const char *function);
-INTERNAL Status instance_set_up(Instance *self, double start, const char *function);
+INTERNAL Status instance_set_up(Instance *self, double start, double stop, const char *function);
 INTERNAL Status instance_enter_initialization(Instance *self, const char *function);
 INTERNAL Status instance_exit_initialization(Instance *self, const char *function);
 INTERNAL Status instance_terminate(Instance *self, const char *function);
@@ -88,7 +89,7 @@ INTERNAL void instance_put(Instance *self, unsigned reference, double value);
 /* Get or set variables of a type that no model has. */
 INTERNAL Status instance_without(Instance *self, size_t count, const char *type, const char *function);
 
-/* Rates of inputs during the next step, 1/s; setting an input holds it again. */
+/* Rates of inputs during the next step that is not refused, 1/s; then they are held again. */
 INTERNAL Status instance_set_rates(Instance *self, const unsigned references[], size_t count, const int orders[],
                                    const double rates[], const char *function);
 

@@ -20,8 +20,8 @@
 #endif
 
 /* y = b + x W for `width` columns (a constant where it is called), W by rows: their sums stay in registers. */
-INLINED void columns(const double *restrict w, const double *restrict b, const double *restrict x, int n_in,
-                     double *restrict y, const int width) {
+INLINED void columns(const double *RESTRICT w, const double *RESTRICT b, const double *RESTRICT x, int n_in,
+                     double *RESTRICT y, const int width) {
     double sum[LARGEST_WIDTH];
     for (int k = 0; k < width; k++) sum[k] = b[k];
     for (int i = 0; i < n_in; i += 2)
@@ -72,7 +72,7 @@ INLINED void find_features(double speed, double torque, const double *T, double 
     for (int i = N_FEATURES; i < N_FEATURES + 3; i++) features[i] = 0.0;
 }
 
-INLINED void find_power(double speed, double torque, const double *restrict T, double *restrict power) {
+INLINED void find_power(double speed, double torque, const double *RESTRICT T, double *RESTRICT power) {
     double features[N_FEATURES + 3], first[N_FIRST], second[N_SECOND], raw[N_NETS] = {0.0}, net[N_NETS];
     const double n = fabs(speed), moment = fabs(torque);
     /* 1 within the range of training, beyond it in proportion. */
@@ -117,15 +117,15 @@ INLINED void find_power(double speed, double torque, const double *restrict T, d
     }
 }
 
-void loss_power_portable(double speed, double torque, const double *restrict T, double *restrict power) {
+void loss_power_portable(double speed, double torque, const double *RESTRICT T, double *RESTRICT power) {
     find_power(speed, torque, T, power);
 }
 
 #if HAS_AVX2_VARIANT
 #include <cpuid.h>
 
-__attribute__((target("avx2,fma"))) void loss_power_avx2(double speed, double torque, const double *restrict T,
-                                                         double *restrict power) {
+__attribute__((target("avx2,fma"))) void loss_power_avx2(double speed, double torque, const double *RESTRICT T,
+                                                         double *RESTRICT power) {
     find_power(speed, torque, T, power);
 }
 

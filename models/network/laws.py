@@ -348,7 +348,9 @@ LARGEST_PRODUCT = 16  # exponent up to which a whole power is a product
 
 
 def c_function_source(name: str, arguments: Mapping[str, str], expressions: Sequence[sp.Expr]) -> str:
-    """C99 source of ``void law_<name>(const double *s, double *y)``; needs ``elementary.h`` of the native FMU.
+    """C99 source of ``void law_<name>(const double *s, double *y)``.
+
+    It needs ``elementary.h`` and the macro ``RESTRICT`` of the native FMU.
 
     Parameters
     ----------
@@ -360,7 +362,7 @@ def c_function_source(name: str, arguments: Mapping[str, str], expressions: Sequ
     Examples
     --------
     >>> print(c_function_source("heat", {"speed": "s[1]"}, [symbol("speed") ** 3 / 2]))
-    void law_heat(const double *restrict s, double *restrict y) {
+    void law_heat(const double *RESTRICT s, double *RESTRICT y) {
         y[0] = ((1.0/2.0))*whole_power(s[1], 3);
     }
     <BLANKLINE>
@@ -379,4 +381,4 @@ def c_function_source(name: str, arguments: Mapping[str, str], expressions: Sequ
         raise InputError(f"a law of {name!r} cannot be written in C: {error}") from error
     lines += [f"(void){unused};" for unused in ("s", "y") if not any(f"{unused}[" in line for line in lines)]
     body = "".join(f"    {line}\n" for line in lines)
-    return f"void law_{name}(const double *restrict s, double *restrict y) {{\n{body}}}\n"
+    return f"void law_{name}(const double *RESTRICT s, double *RESTRICT y) {{\n{body}}}\n"

@@ -90,6 +90,7 @@ def test_fmpy_finds_no_problem_and_the_archive_is_complete(fzg_native3: Path) ->
     assert {f"sources/{file}" for file in re.findall(r'SourceFile name="(.*?)"', build)} == {
         name for name in names if name.endswith(".c")
     }
+    assert "terminalsAndIcons/icon.png" in names and "model.png" not in names
     assert "Modelica Association" in licence and not [name for name in names if "fmi2" in name]
     (processor,) = {name.split("/")[1] for name in names if name.startswith("binaries/")}
     assert processor in PLATFORMS[str(host_platform())].targets
@@ -206,6 +207,17 @@ def test_states_are_restored_and_serialized(host: Host3, fmu: Unpacked, fzg_nati
     with pytest.raises(FMICallException, match="error"):
         slave.deserializeFMUState(foreign)
     assert "cannot be read" in host.messages[-1][1]
+
+
+def test_no_step_goes_past_the_stop_time(host: Host3) -> None:
+    host.slave.reset()
+    host.slave.enterInitializationMode(startTime=0.0, stopTime=1.0)
+    host.set(**LOADED)
+    host.slave.exitInitializationMode()
+    with pytest.raises(FMICallException, match="error"):
+        host.step(0.0, 1.5)
+    assert "past the stop time of 1 s" in host.messages[-1][1]
+    assert host.step(0.0, 1.0)[-1] == 1.0
 
 
 def test_values_that_cannot_be_used_are_refused_until_they_are_corrected(host: Host3) -> None:

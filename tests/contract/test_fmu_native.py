@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import re
 import shutil
 import struct
 import subprocess
@@ -21,7 +22,7 @@ from fmpy import read_model_description
 from fmpy.fmi1 import FMICallException
 
 from builder.base.cache import CACHE_VARIABLE
-from builder.drive.driver import drive_fmu
+from builder.drive.driver import drive_fmu, loaded
 from builder.fmi.reference_cycle import reference_cycle
 from builder.native import compile as native_compile
 from builder.native.compile import PLATFORMS, compile_libraries, plan_for
@@ -98,11 +99,13 @@ def test_inputs_go_along_their_rates_for_one_step(fzg_native: Path) -> None:
         assert ramped.get("speed")[0] == LOADED["speed"] + 400.0  # held again
 
 
-def test_a_set_input_is_held_and_a_refused_step_keeps_the_rates(host: Host) -> None:
+def test_value_and_rate_may_be_set_in_any_order_and_a_refused_step_keeps_the_rates(host: Host) -> None:
     set_rates(host, speed=20.0)
-    host.set(speed=300.0)
+    host.set(speed=290.0)
     host.step(1.0)
-    assert host.get("speed")[0] == 300.0
+    assert host.get("speed")[0] == 310.0
+    host.step(1.0)
+    assert host.get("speed")[0] == 310.0  # a rate is good for one step
     set_rates(host, T_ambient=-10.0)
     text = host.refused(60.0)  # it would end far below what is possible
     assert "T_ambient is -306.85 K" in text
@@ -276,8 +279,25 @@ def test_log_categories_can_be_chosen(host: Host) -> None:
     assert host.refused(-1.0)
     slave.fmi2SetDebugLogging(component, 1, 1, (c_char_p * 1)(b"logAll"))
     assert excursions() == 1
+    slave.fmi2SetDebugLogging(component, 1, 1, (c_char_p * 1)(b"logStatusError"))  # this category and no other
+    assert excursions() == 0
+    slave.fmi2SetDebugLogging(component, 1, 0, None)
+    assert excursions() == 1
     slave.fmi2SetDebugLogging(component, 0, 0, None)
     assert excursions() == 0
+
+
+def test_no_step_goes_past_the_stop_time(fzg_native: Path) -> None:
+    with loaded(fzg_native) as fmu:
+        host = Host(fmu)
+        fmu.slave.setupExperiment(startTime=0.0, stopTime=2.0)
+        fmu.slave.enterInitializationMode()
+        host.set_all(LOADED)
+        fmu.slave.exitInitializationMode()
+        host.step(1.0)
+        assert "the step would end at 2.5 s, past the stop time of 2 s" in host.refused(1.5, status=ERROR)
+        host.step(1.0)  # an error changed nothing
+        assert host.time == 2.0
 
 
 # ---------------------------------------------------------------------- packaging
@@ -298,6 +318,7 @@ def test_archive_is_complete(fzg_native: Path) -> None:
     } <= set(names)  # fmt: skip
     assert [name for name in names if name.startswith("resources/")] == ["resources/recording.json"]
     assert not [name for name in names if "pythonfmu" in name]
+    assert "documentation/licenses/elementary.txt" in names
     assert "Modelica Association" in licence
     for text in ("loss.mesh_sliding", "fmi2SetRealInputDerivatives", "fmpy compile FILE.fmu", "in_domain"):
         assert text in page
@@ -317,10 +338,12 @@ def test_only_fmi_functions_are_exported_and_only_libc_is_needed(fzg_native: Pat
     assert len([name for name in exported if name.startswith("fmi2")]) == 34
     needed = {line[-1].partition("@")[0] for line in lines if line[-2] == "U"}
     known = {
-        "calloc", "free", "malloc", "memcmp", "memcpy", "memset", "pow", "exp", "fmax", "snprintf", "vsnprintf",
+        "bcmp", "calloc", "free", "malloc", "memcmp", "memcpy", "memset", "pow", "exp", "fmax", "snprintf", "vsnprintf",
         "strcmp", "strcpy", "strlen", "strncmp", "strncpy", "__stack_chk_fail", "__snprintf_chk", "__vsnprintf_chk",
     }  # fmt: skip
     assert needed <= known
+    if HAS_ZIG:
+        assert max(tuple(map(int, v.split("."))) for v in re.findall(r"@GLIBC_([\d.]+)", listed)) <= (2, 17)
 
 
 def test_same_content_gives_the_same_bytes_with_and_without_cache(
@@ -356,12 +379,29 @@ def test_a_faulty_source_is_refused_with_the_compilers_words() -> None:
 
 
 def test_compiler_of_the_environment_is_taken_or_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(native_compile, "_zig", lambda: None)
     monkeypatch.setenv("CC", "no-such-compiler -m64")
     with pytest.raises(InputError, match="no-such-compiler"):
         plan_for("host")
     monkeypatch.setenv("CC", "gcc 'x")
     with pytest.raises(InputError, match="cannot be read .*correct it or unset it"):
         plan_for("host")
+
+
+@pytest.mark.skipif(native_compile._own_compiler() is None, reason="no C compiler")
+def test_without_ziglang_the_machines_own_compiler_is_taken(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(native_compile, "_zig", lambda: None)
+    assert not plan_for("host").compiler.is_zig
+    assert compile_libraries(SOURCE, "host").libraries
+    with pytest.raises(InputError, match="own compiler cannot build for win32"):
+        plan_for("win32")
+
+
+def test_restrict_is_written_as_microsofts_compiler_knows_it(fzg_native: Path) -> None:
+    with zipfile.ZipFile(fzg_native) as archive:
+        names = [name for name in archive.namelist() if re.match(r"sources/.*\.[ch]$", name)]
+        users = {name for name in names if re.search(rb"\brestrict\b", archive.read(name))}
+    assert users == {"sources/linker_names.h"}  # which defines RESTRICT
 
 
 @pytest.mark.slow

@@ -40,8 +40,8 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> Library:
 
     def compiled(text: str, files: Mapping[str, str] | None = None, *, beside: tuple[str, ...] = ()) -> ctypes.CDLL:
         folder = tmp_path_factory.mktemp("c")
-        headers = {"elementary.h": native_source("elementary.h")}
-        for name, content in {**headers, **(files or {}), "test.c": text}.items():
+        headers = {"elementary.h": native_source("elementary.h"), "linker_names.h": linker_names(files or {}, "test")}
+        for name, content in {**headers, **(files or {}), "test.c": f'#include "linker_names.h"\n{text}'}.items():
             (folder / name).write_text(content)
         options = [option for option in OPTIONS if option != "-fvisibility=hidden"]
         command = [
@@ -180,7 +180,6 @@ def generated(network: ThermalNetwork, fzg: Gearbox, surrogate: SurrogateLosses)
 def model(generated: dict[str, str], library: Library) -> ctypes.CDLL:
     """Laws, structure and losses of a network, with functions that a test can call."""
     files = {name: native_source(name) for name in THERMAL_MODEL + LOSS_NETWORKS} | generated
-    files["linker_names.h"] = linker_names(files, "test")
     text = """
         #include "laws.h"
         #include "loss_networks.h"
@@ -229,7 +228,7 @@ def test_elimination_solves_any_structure(library: Library, seed: int) -> None:
     sources = rng.integers(0, n_parts, 3).tolist()
     links = tuple((a, b) for a, b in ends)
     structure = Structure(n_parts=n_parts, n_boundaries=n_boundaries, links=links, sources=tuple(sources))
-    header = "".join(f"{line};\n" for line in structure.signatures())
+    header = '#include "linker_names.h"\n' + "".join(f"{line};\n" for line in structure.signatures())
     text = f"""
         #include "structure.c"
         void gain(const double *g, const double *T, const double *heat, double *y) {{
