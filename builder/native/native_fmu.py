@@ -151,7 +151,10 @@ def build_native_fmu(
         identity=parts.identity,
         sources={name: native_source(name) for name in written}
         | model_sources(parts.table, parts.network, parts.losses),
-        pages={**parts.pages, "documentation/licenses/elementary.txt": native_source("elementary_license.txt").encode()},
+        pages={
+            **parts.pages,
+            "documentation/licenses/elementary.txt": native_source("elementary_license.txt").encode(),
+        },
         platforms=platforms,
         fmi=fmi,
         progress=progress,
