@@ -42,6 +42,7 @@ def test_importing_costs_nothing() -> None:
     assert (run.returncode, run.stdout.strip()) == (0, "")
 
 
+@pytest.mark.slow  # CI builds an FMU in the project's own folder with what was installed
 @pytest.mark.skipif(not COMMAND.exists(), reason="the command is not installed in this environment")
 def test_the_command_works_next_to_packages_of_the_same_names(crowded: Path) -> None:
     quick = ("--target", "python", "--preset", "paper", "--samples", "50")

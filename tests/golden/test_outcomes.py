@@ -35,7 +35,10 @@ OUTCOMES = {
 }
 
 
-@pytest.mark.parametrize("name", OUTCOMES)
+# Those that take a minute are slow: the fleet of tests/integration has a sound machine and a biased sensor too.
+@pytest.mark.parametrize(
+    "name", ["ten minutes", *(pytest.param(name, marks=pytest.mark.slow) for name in ("consistent", "sensor bias"))]
+)
 def test_outcome(name: str, fzg: Gearbox, tmp_path: Path) -> None:
     case = OUTCOMES[name]
     values = {"mesh": 0.9, "h_air": 1.15, "bearing": 1.2, "C_oil": 1.08}

@@ -234,7 +234,7 @@ def test_a_heat_that_nothing_survives_is_told(
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.slow)])
 def test_an_interrupted_build_leaves_nothing(number: signal.Signals, tmp_path: Path) -> None:
     # A test run in the background inherits an ignored SIGINT; a user's terminal does not.
     start = (

@@ -94,6 +94,7 @@ def test_a_concealed_effect_is_detected_and_first(concealed: Posterior) -> None:
     assert [one.effect.label for one in answers] == ["windage@oil"]
 
 
+@pytest.mark.slow
 def test_a_baseline_that_brings_evidence_raises_what_is_asked_for(fzg: Gearbox, concealed: Posterior) -> None:
     """Windage acts in the baseline alone: nothing is missing in the recordings, whatever has to be explained."""
     assert concealed.placebo is not None and concealed.placebo.log_e_value < 10.0 == concealed.threshold
@@ -113,6 +114,7 @@ def test_a_baseline_that_brings_evidence_raises_what_is_asked_for(fzg: Gearbox, 
     assert dated.log_bayes < -dated.effects[0].less + 5.0
 
 
+@pytest.mark.slow
 def test_an_effect_in_the_recordings_raises_nothing(fzg: Gearbox) -> None:
     """Beside a thermometer that reads too high in the recordings, those of the baselines would read too low."""
     found = inferred(fzg, 0.0, in_baselines_W=(0.0, 0.0), bias_K=3.0)
