@@ -18,7 +18,7 @@ from diagnosis.recordings.time_axis import ISO, RECORDING_KINDS, Clock, Part, cl
 from models.base.errors import InputError, Problems, did_you_mean
 from models.base.types import Array
 from models.files.paths import check_file, kind_of
-from models.files.table_file import read_chunks, together
+from models.files.table_file import read_chunks, together, without
 
 
 @dataclass(kw_only=True, eq=False)
@@ -30,8 +30,8 @@ class RecordingFile:
     chunks : iterator of DataFrame
     clock : Clock or None
         None, and a problem, if there is none
-    first_s, shift_s : float
-        Time of its first row; seconds to add to its time column
+    first_s, last_s, shift_s : float
+        Time of its first row, and the latest among those read; seconds to add to its time column
     start : float or None
         Start of an MDF file since 1970, [s]
     units : mapping of column to str
@@ -44,6 +44,7 @@ class RecordingFile:
     chunks: Iterator[pd.DataFrame]
     clock: Clock | None
     first_s: float
+    last_s: float = -np.inf
     shift_s: float = 0.0
     start: float | None
     units: Mapping[str, str]
@@ -70,9 +71,14 @@ class RecordingFile:
             if self.clock is None or not parts:
                 return chunk
             seconds = self.seconds(chunk)
+            self.last_s = float(np.nanmax(seconds, initial=self.last_s))
             try:
-                # A cell that is no time is a problem of the file, not a row to skip.
-                return chunk[inside(seconds, parts, self.clock, first_s) | np.isnan(seconds)]
+                # A cell that is no time is a problem of the part that it lies in, not a row to skip.
+                around = pd.Series(seconds).ffill(), pd.Series(seconds).bfill()
+                earlier, later = (
+                    inside(np.asarray(side, dtype=np.float64), parts, self.clock, first_s) for side in around
+                )
+                return chunk[earlier | later if np.isnan(seconds).any() else earlier]
             except InputError as error:
                 raise InputError(f"{self.path}: {error}") from error
 
@@ -113,7 +119,7 @@ def open_recording(path: Path, mapping: Path | None, usual: RecordingMapping) ->
     if kind in (".mf4", ".mdf"):
         base = next((name for name, column in found.columns.items() if column.quantity == "speed"), "speed_rpm")
         mdf = read_mdf(path, base=base)
-        chunks, start, units = iter([mdf.table]), mdf.start, mdf.units
+        chunks, start, units = iter([without(found.missing, mdf.table)]), mdf.start, mdf.units
     else:
         chunks = read_chunks(path, found.text_form)
     head = next(chunks)

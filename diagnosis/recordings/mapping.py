@@ -220,6 +220,7 @@ class RecordingMapping(Section):
         csv = self.csv
         return TextForm(
             separator=csv.separator, decimal=csv.decimal, missing=self.missing, encoding=csv.encoding,
+            texts=(self.time.column,) if self.time is not None and "%" in self.time.unit else (),
             skip_lines=csv.skip_lines, by_mapping=True,
         )  # fmt: skip
 

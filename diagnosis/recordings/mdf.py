@@ -85,14 +85,16 @@ def _on_rows_of(base: str, groups: list[pd.DataFrame], path: Path) -> pd.DataFra
     if len(time) == 0:
         raise InputError(f"{path}: channel {base} has no samples")
     middles = 0.5 * (time[1:] + time[:-1])
-    reach = FARTHEST_STEPS * float(np.median(np.diff(time))) if len(time) > 1 else np.inf
+    steps = np.diff(time)
+    shorter = np.minimum(np.append(steps, np.inf), np.insert(steps, 0, np.inf))  # of the two next to a row
+    reach = FARTHEST_STEPS * shorter  # rows of another raster may come together; nobody fills a hole
     columns = []
     for frame in groups:
         values = frame.astype(np.float64)
         if not np.array_equal(values.index, time):
             at = values.index.to_numpy(dtype=np.float64)
             row = np.searchsorted(middles, at)
-            near = np.abs(at - time[row]) <= reach
+            near = np.abs(at - time[row]) <= reach[row]
             values = values[near].groupby(row[near]).mean().reindex(range(len(time)))
         columns.append(values.set_axis(range(len(time))))
     return pd.concat([pd.DataFrame({STANDARD: time}), *columns], axis=1)

@@ -26,7 +26,7 @@ from diagnosis.recordings.machine import MachineDefinition, RecordedMachine
 from diagnosis.recordings.mapping import mapping_of_definition
 from diagnosis.recordings.recording import Channel, Recording
 from diagnosis.recordings.rows import RecordedRows, joined, read_rows
-from diagnosis.recordings.time_axis import split_path
+from diagnosis.recordings.time_axis import moment_text, split_path
 from models.base.errors import InputError, Problems
 from models.quantities.quantities import is_total_loss, node_of_channel
 
@@ -35,6 +35,10 @@ SHORTEST_GAP_S, GAP_STEPS = 60.0, 3.0  # a gap is longer than both, unless state
 SLOW_GAPS = 10.0  # ambient temperature and air speed change slowly: holes so many times longer are bridged
 HOT_AIR = 50.0  # degC on average, from which ambient air is more likely in another unit
 LEAST_USABLE = 0.1  # share of the rows
+USUAL_SHARE, FAR_TIMES = (
+    0.99,
+    10.0,
+)  # rows of an input that are more than so many times beyond this share of all are far
 ByRole: TypeAlias = tuple[tuple[Recording, ...], tuple[Recording, ...], tuple[Recording, ...]]
 
 
@@ -167,7 +171,12 @@ def read_recording(
     if len(found.seconds) < FEWEST_ROWS:
         where = " in the part that is named" if parts else ""
         rows = len(found.seconds) or "no"
-        raise InputError(f"{found.path}: has {rows} rows{where}; a recording has {FEWEST_ROWS} or more")
+        last_s = max(file.last_s for file in files)
+        clock = files[0].clock
+        span = (
+            f"; it goes from {moment_text(first_s, clock)} to {moment_text(last_s, clock)}" if last_s >= first_s else ""
+        )
+        raise InputError(f"{found.path}: has {rows} rows{where}{span}; a recording has {FEWEST_ROWS} or more")
     _add_unrecorded(found, network)
     stated, usual = files[0].mapping.max_gap_s, GAP_STEPS * float(np.median(np.diff(found.seconds)))
     gap = max(SHORTEST_GAP_S, usual) if stated is None else stated
@@ -175,6 +184,7 @@ def read_recording(
     _remove_spikes(found, network, gap)
     _note_stuck(found, network)
     _note_hot_air(found)
+    _note_far_rows(found, network)
     found = _with_known_inputs(found, network, gap)
     segments = _segments(found, gap)
     seconds, clock = found.seconds, files[0].clock
@@ -277,6 +287,21 @@ def _note_hot_air(found: RecordedRows) -> None:
             f"{name}: {ambient.mean():.0f} degC on average is hot for ambient air; if the file has another unit, "
             'name it in a mapping (unit = "degF")'
         )
+
+
+def _note_far_rows(found: RecordedRows, network: RecordedMachine) -> None:
+    """A note on few rows of an input far beyond all others, which may be codes of a logger."""
+    for name, given in network.inputs.items():
+        size = np.abs(found.values[name])
+        usual = float(np.nanquantile(size, USUAL_SHARE, method="lower")) if np.isfinite(size).any() else np.nan
+        far = size > FAR_TIMES * usual
+        if usual > 0.0 and far.any():
+            first = int(np.flatnonzero(far)[0])
+            found.notes.append(
+                f"{found.names.get(name, name)}: {found.values[name][first]:g} {given.quantity.unit} and the like in "
+                f"{rows_text(found.rows[far])}; {USUAL_SHARE:.0%} of the rows are within {usual:.3g}; a code of the "
+                "logger is named under 'missing' in a mapping, or excluded by 'valid'"
+            )
 
 
 def _note_stuck(found: RecordedRows, network: RecordedMachine) -> None:

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from math import floor
 from pathlib import Path
+from typing import cast
+from zoneinfo import ZoneInfo
 
 import numpy as np
 import pandas as pd
@@ -29,6 +31,7 @@ _ISO = re.compile(
 SHORTEST_STEP = 1e-3  # s; no temperature is recorded faster, so smaller steps are another unit
 LONGEST_STEP = 1800.0  # s; a gearbox warms within an hour or two
 LONGEST_TIME = 1e11  # s since 1970 or since the start: 3000 years
+LAST_YEAR = 2200  # later is the date of a clock that was not set
 LONGEST_DATES = 3e9  # s from the first to the last: a century
 
 
@@ -37,12 +40,12 @@ class Part:
     """A part of a file's time, from `start` up to but without `end`; None is the first or the last row.
 
     Numbers are seconds: of a time column in seconds as it stands there, else since the first row. A date without a time
-    of day includes that day.
+    of day includes that day. Dates without a zone are those of the clock of the file, UTC unless it states another one.
 
     Examples
     --------
     >>> part_of("0..36000"), part_of("2017-09-01..").start
-    (Part(start=0.0, end=36000.0), datetime.datetime(2017, 9, 1, 0, 0, tzinfo=datetime.timezone.utc))
+    (Part(start=0.0, end=36000.0), datetime.datetime(2017, 9, 1, 0, 0))
     """
 
     start: float | datetime | None
@@ -112,7 +115,6 @@ def _moment(text: str, *, end: bool) -> float | datetime | None:
             moment = datetime.fromisoformat(text)
         except ValueError as error:
             raise InputError(f"{text!r} is no date: {error}") from error
-        moment = moment.replace(tzinfo=UTC) if moment.tzinfo is None else moment
         return moment + timedelta(days=1) if end and re.fullmatch(_DATE, text) else moment
     try:
         number = float(text)
@@ -123,8 +125,11 @@ def _moment(text: str, *, end: bool) -> float | datetime | None:
     return number
 
 
-def _seconds(moment: float | datetime) -> float:
-    return moment.timestamp() if isinstance(moment, datetime) else moment
+def _seconds(moment: float | datetime, zone: str | None = None) -> float:
+    """Seconds, of a date since 1970; `zone` is that of a date that states none, UTC for None."""
+    if not isinstance(moment, datetime):
+        return moment
+    return (moment if moment.tzinfo else moment.replace(tzinfo=ZoneInfo(zone or "UTC"))).timestamp()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -166,33 +171,46 @@ class Clock:
         """Convert a time column, shape (rows,), to [s], dates since 1970; NaN for a cell that is no time."""
         if not self.is_date:
             return _numbers(values) * units_in_files("time", "s")[self.unit][0]
-        zone = self.zone if self._lacks_zone(values) else None
         if pd.api.types.is_datetime64_any_dtype(values.dtype):
-            stamps = values if zone else pd.to_datetime(values, utc=True)
+            stamps = self._zoned(values)
         elif self.unit != ISO:
-            stamps = pd.to_datetime(values.astype(str).str.strip(), format=self.unit, utc=zone is None, errors="coerce")
+            texts, has_zone = values.astype(str).str.strip(), "%z" in self.unit
+            stamps = self._zoned(pd.to_datetime(texts, format=self.unit, utc=has_zone, errors="coerce"))
         else:
             texts = values.astype(str).str.strip().str.replace(",", ".")
-            known = texts.where(texts.map(lambda text: bool(_ISO.fullmatch(text))))
-            stamps = pd.to_datetime(known, format="ISO8601", utc=zone is None, errors="coerce")
-        if zone:
-            stamps = _local(stamps, zone)
+            found = [_ISO.fullmatch(text) for text in texts]
+            aware = np.array([match is not None and match["zone"] is not None for match in found], dtype=bool)
+            naive = np.array([match is not None and match["zone"] is None for match in found], dtype=bool)
+            stamps = pd.to_datetime(texts.where(aware), format="ISO8601", utc=True, errors="coerce")
+            if naive.any():
+                local = pd.to_datetime(texts.where(naive), format="ISO8601", errors="coerce")
+                stamps = stamps.where(aware, self._zoned(local))
         seconds = (stamps - pd.Timestamp(0, tz="UTC").as_unit("s")) / pd.Timedelta(seconds=1)
         return np.asarray(seconds.to_numpy(dtype=np.float64, na_value=np.nan), dtype=np.float64)
 
-
-def _local(stamps: pd.Series, zone: str) -> pd.Series:
-    """Local time with its zone; NaT where it does not exist, or comes twice and the rows do not show which it is."""
-    try:
-        known: pd.Series = stamps.dt.tz_localize(zone, ambiguous="infer", nonexistent="NaT")
-    except ValueError:
-        known = stamps.dt.tz_localize(zone, ambiguous="NaT", nonexistent="NaT")
-    return known
+    def _zoned(self, stamps: pd.Series) -> pd.Series:
+        """UTC; NaT where a local time does not exist, or comes twice and the rows do not show which it is."""
+        if stamps.dt.tz is not None:
+            return cast("pd.Series", stamps.dt.tz_convert("UTC"))
+        stamps = stamps.where(stamps.dt.year < LAST_YEAR)
+        zone = self.zone or "UTC"
+        once = stamps.dt.tz_localize(zone, ambiguous="NaT", nonexistent="NaT")
+        summer = stamps.dt.tz_localize(zone, ambiguous=np.ones(len(stamps), dtype=bool), nonexistent="NaT")
+        twice = once.isna() & summer.notna()
+        if twice.any():
+            set_back = (stamps.ffill().diff() < pd.Timedelta(0)) & twice
+            before = set_back[::-1].groupby(stamps.dt.date).cumsum()[::-1] - set_back.astype(int) > 0
+            resolved = set_back.groupby(stamps.dt.date).transform("any")
+            winter = stamps.dt.tz_localize(zone, ambiguous=np.zeros(len(stamps), dtype=bool), nonexistent="NaT")
+            once = once.where(~(twice & resolved), summer.where(before, winter))
+        return cast("pd.Series", once.dt.tz_convert("UTC"))
 
 
 def _numbers(values: pd.Series) -> Array:
     if not (pd.api.types.is_numeric_dtype(values.dtype) or pd.api.types.is_string_dtype(values.dtype)):
         values = values.astype(str)
+    if not pd.api.types.is_numeric_dtype(values.dtype):
+        values = values.str.replace(",", ".")  # one cell that is no number leaves the others as texts
     return np.asarray(pd.to_numeric(values, errors="coerce").to_numpy(dtype=np.float64, na_value=np.nan))
 
 
@@ -258,7 +276,7 @@ def inside(seconds: Array, parts: Sequence[Part], clock: Clock, first: float) ->
                 continue
             if isinstance(moment, datetime) and not clock.is_date:
                 raise InputError(f"a part is named by date, but column {clock.column} holds seconds; name seconds")
-            at = _seconds(moment) + (first if clock.is_date and not isinstance(moment, datetime) else 0.0)
+            at = _seconds(moment, clock.zone) + (first if clock.is_date and not isinstance(moment, datetime) else 0.0)
             with np.errstate(invalid="ignore"):
                 within &= (seconds < at) if is_end else (seconds >= at)
         chosen |= within

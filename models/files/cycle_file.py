@@ -4,18 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from math import isfinite
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from models.base.errors import InputError
+from models.base.errors import InputError, Problems
 from models.base.types import Array
 from models.files.cycle import Cycle
 from models.files.paths import KINDS
 from models.files.table_file import read_table
-from models.quantities.quantities import GEARBOX_INPUTS, Input
+from models.quantities.quantities import GEARBOX_INPUTS, NODE_TEMPERATURE, Input
 
 
 @dataclass(frozen=True)
@@ -46,11 +47,11 @@ class RecordedStart:
         ----------
         path : Path
         measured : iterable of (node, column, Array of shape (rows,))
-            [degC]; NaN where missing
+            [degC]; NaN where missing, infinite where a cell is a misspelt number
         rows : array of int, shape (rows,)
             Row numbers
         """
-        known = [(node, name, v, i[0]) for node, name, v in measured if len(i := np.flatnonzero(np.isfinite(v)))]
+        known = [(node, name, v, i[0]) for node, name, v in measured if len(i := np.flatnonzero(~np.isnan(v)))]
         return cls(
             path,
             temperatures={node: float(values[row]) for node, _, values, row in known},
@@ -64,7 +65,7 @@ class RecordedStart:
         Raises
         ------
         InputError
-            If no node of these was recorded.
+            If no node of these was recorded, or a first value is no possible temperature.
         """
         nodes = tuple(nodes)
         known = {name: T for name, T in self.temperatures.items() if name in nodes}
@@ -73,6 +74,16 @@ class RecordedStart:
                 f"{self.path}: --initial recorded needs a column T_<node>_degC with a temperature, of the nodes "
                 f"{', '.join(nodes)}; give a temperature (--initial 20) or another file instead"
             )
+        low, high = NODE_TEMPERATURE.low, NODE_TEMPERATURE.high
+        problems = Problems(self.path)
+        for name, T in known.items():
+            if not low <= T <= high:
+                said = f"{T:g} degC" if isfinite(T) else "no number"
+                problems.add(
+                    f"{self.columns[name]} is {said} at row {self.rows[name]}; --initial recorded needs {low:g} to "
+                    f"{high:g} degC there"
+                )
+        problems.stop_if_any()
         mean = sum(known.values()) / len(known)
         return {name: known.get(name, mean) for name in nodes}
 
@@ -93,11 +104,17 @@ def read_cycle_and_start(path: Path, inputs: Mapping[str, Input] = GEARBOX_INPUT
     table = read_table(path)
     cycle = Cycle.from_columns({str(c): table[c].to_numpy() for c in table.columns}, name=str(path), inputs=inputs)
     measured = (
-        (name[2:-5], name, pd.to_numeric(table[name], errors="coerce").to_numpy(dtype=np.float64, na_value=np.nan))
+        (name[2:-5], name, _temperatures(table[name]))
         for name in _temperature_columns(table)
         if name not in {given.column for given in inputs.values()}
     )
     return cycle, RecordedStart.first_of(path, measured, np.asarray(table.index) + 1)
+
+
+def _temperatures(cells: pd.Series) -> Array:
+    """A column, shape (rows,), [degC]; NaN where a cell is empty or a word, infinite where it is a misspelt number."""
+    values = pd.to_numeric(cells, errors="coerce").to_numpy(dtype=np.float64, na_value=np.nan)
+    return np.where(np.isnan(values) & cells.astype(str).str.contains(r"\d").to_numpy(dtype=bool), np.inf, values)
 
 
 def read_initial(value: str) -> float | dict[str, float]:

@@ -7,7 +7,7 @@ import gzip
 import io
 import re
 import zlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -37,7 +37,9 @@ class TextForm:
     separator, decimal : str
         Between columns, and in numbers
     missing : tuple of str
-        Further texts for a missing value
+        Further texts or numbers for a missing value
+    texts : tuple of str
+        Columns that stay as they are written: dates without signs, whose zeros count
     encoding : str
         Of its text, by a name that Python knows
     skip_lines : tuple of int
@@ -49,6 +51,7 @@ class TextForm:
     separator: str = ","
     decimal: str = "."
     missing: tuple[str, ...] = ()
+    texts: tuple[str, ...] = ()
     encoding: str = UTF_8
     skip_lines: tuple[int, ...] = ()
     by_mapping: bool = False
@@ -113,7 +116,8 @@ def read_chunks(path: Path, form: TextForm) -> Iterator[pd.DataFrame]:
     kind = kind_of(path)
     check_file(path)
     try:
-        yield from _parquet_chunks(path) if kind == ".parquet" else _text_chunks(path, form)
+        for chunk in _parquet_chunks(path) if kind == ".parquet" else _text_chunks(path, form):
+            yield without(form.missing, chunk)
     except InputError:
         raise
     except ImportError as error:
@@ -121,6 +125,20 @@ def read_chunks(path: Path, form: TextForm) -> Iterator[pd.DataFrame]:
     except UNREADABLE as error:
         text = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
         raise InputError(f"{path}: cannot be read as {kind.removeprefix('.')}: {text}") from error
+
+
+def without(missing: Collection[str], table: pd.DataFrame) -> pd.DataFrame:
+    """Return a table whose cells of certain texts or numbers are missing."""
+    if not missing:
+        return table
+    numbers = [float(text) for text in missing if _is_number(text)]
+
+    def marked(cells: pd.Series) -> pd.Series:
+        if pd.api.types.is_numeric_dtype(cells.dtype):
+            return cells.isin(numbers)
+        return cells.map(lambda cell: isinstance(cell, str) and cell.strip() in missing).astype(bool)
+
+    return table.mask(table.apply(marked)) if len(table) else table
 
 
 def _check_names(path: Path, names: list[str]) -> None:
@@ -200,23 +218,27 @@ def _fields(line: str, separator: str) -> list[str]:
 def _text_chunks(path: Path, form: TextForm) -> Iterator[pd.DataFrame]:
     with _open_text(path, form) as text:
         lines = _Lines(path, text, form)
-        _check_head(path, lines, form)
+        names = _check_head(path, lines, form)
         try:
             for chunk in pd.read_csv(
                 cast(Any, lines), sep=form.separator, decimal=form.decimal, na_values=list(form.missing),
-                skipinitialspace=True, index_col=False, chunksize=CHUNK_ROWS, low_memory=False,
+                dtype={name: str for name in names if name.strip() in form.texts}, skipinitialspace=True,
+                index_col=False, chunksize=CHUNK_ROWS, low_memory=False,
             ):  # fmt: skip
                 yield chunk.rename(columns=lambda name: str(name).strip())
         except pd.errors.ParserError as error:
             uneven = _PANDAS_UNEVEN.search(str(error))
             if uneven is None:
                 raise
-            names, line, count = map(int, uneven.groups())
-            raise InputError(f"{path}: {_too_many_fields(line, count, names, form)}") from error
+            expected, line, count = map(int, uneven.groups())
+            raise InputError(f"{path}: {_too_many_fields(line, count, expected, form)}") from error
 
 
-def _check_head(path: Path, lines: _Lines, form: TextForm) -> None:
-    """Refuse another separator, no header, repeated names, and rows of units or too many fields below the header."""
+def _check_head(path: Path, lines: _Lines, form: TextForm) -> list[str]:
+    """Return the names of the columns as they stand there.
+
+    Refused are another separator, no header, repeated names, and rows of units or too many fields below the header.
+    """
     header = lines.next_filled()
     if not header:
         raise InputError(f"{path}: {EMPTY}")
@@ -239,9 +261,16 @@ def _check_head(path: Path, lines: _Lines, form: TextForm) -> None:
             + (f"give csv = {{ skip_lines = {skipped} }} in a mapping file, " if form.by_mapping else "")
             + "or begin it with '#'"
         )
+    return next(csv.reader([header], delimiter=form.separator, skipinitialspace=True))
 
 
 def _too_many_fields(line: int, count: int, names: int, form: TextForm) -> str:
+    if names == 1:
+        return (
+            f"line {line} has {count} fields, but the first line names one column; if that is a title, remove it or "
+            + (f"give csv = {{ skip_lines = {[*form.skip_lines, 1]} }} in a mapping file, " if form.by_mapping else "")
+            + "or begin it with '#'"
+        )
     return (
         f"line {line} has {count} fields, but the header names {names} columns; remove what is too much, e.g. a "
         f"{form.separator!r} at its end or within a number"

@@ -125,6 +125,7 @@ QUANTITIES: tuple[Quantity, ...] = (
 )  # fmt: skip
 _BY_NAME = {quantity.name: quantity for quantity in QUANTITIES}
 _FAMILIES = [quantity for quantity in QUANTITIES if "{}" in quantity.name]
+NODE_TEMPERATURE = _BY_NAME["T_{}"]
 TOTAL_LOSS = next(quantity.name for quantity in QUANTITIES if quantity.observed == "total loss")
 # What an input of a definition may be: dimension and FMI type by the word for it.
 INPUT_KINDS: Mapping[str, tuple[str, str]] = {

@@ -75,7 +75,13 @@ _ENERGY = {"kg": 1, "m": 2, "s": -2}
 TABLE: tuple[Unit, ...] = (
     Unit(symbol="rad/s", dimension="speed", base={"rad": 1, "s": -1}, display=("rpm", 30.0 / pi, 0.0)),
     Unit(symbol="N.m", aliases=("N m", "Nm"), dimension="torque", base=_ENERGY),
-    Unit(symbol="K", dimension="temperature", base={"K": 1}, display=("degC", 1.0, -KELVIN)),
+    Unit(
+        symbol="K",
+        aliases=("degK", "°K", "Kelvin", "kelvin"),
+        dimension="temperature",
+        base={"K": 1},
+        display=("degC", 1.0, -KELVIN),
+    ),
     Unit(symbol="m/s", dimension="air speed", base={"m": 1, "s": -1}),
     Unit(symbol="W", dimension="power", base=_POWER, display=("kW", 1e-3, 0.0)),
     Unit(symbol="1", aliases=("-", ""), dimension="ratio", base={}),
@@ -95,7 +101,13 @@ TABLE: tuple[Unit, ...] = (
     Unit(symbol="J/K", base=_ENERGY | {"K": -1}),
     Unit(symbol="1/K", base={"K": -1}),
     Unit(symbol="degC", aliases=("°C", "C"), dimension="temperature", offset=KELVIN, base={"K": 1}),
-    Unit(symbol="1/min", aliases=("rpm", "min^-1"), dimension="speed", factor=pi / 30.0, base={"rad": 1, "s": -1}),
+    Unit(
+        symbol="1/min",
+        aliases=("rpm", "min^-1", "U/min", "RPM", "r/min"),
+        dimension="speed",
+        factor=pi / 30.0,
+        base={"rad": 1, "s": -1},
+    ),
     # Only of files.
     Unit(symbol="Hz", aliases=("1/s",), dimension="speed", factor=2.0 * pi),
     Unit(symbol="deg/s", dimension="speed", factor=pi / 180.0),

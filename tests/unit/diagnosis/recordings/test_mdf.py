@@ -18,3 +18,13 @@ def test_samples_far_from_a_row_are_in_none() -> None:
     oil = pd.DataFrame({"T_oil_degC": 20.0 + 0.1 * every}, index=every)
     table = _on_rows_of("speed_rpm", [speed, oil], Path("run.mf4"))
     np.testing.assert_allclose(table["T_oil_degC"], 20.0 + 0.1 * time, atol=0.1)
+
+
+def test_rows_at_changes_of_speed_take_what_was_measured_between_them() -> None:
+    """Speed is logged when it changes: often at first, then every 50 s."""
+    time = np.concatenate([np.arange(0.0, 60.0, 0.1), np.arange(100.0, 1000.0, 50.0)])
+    speed = pd.DataFrame({"speed_rpm": np.full(len(time), 1000.0)}, index=time)
+    oil = pd.DataFrame({"T_oil_degC": 20.0 + 0.01 * np.arange(0.0, 1000.0, 10.0)}, index=np.arange(0.0, 1000.0, 10.0))
+    table = _on_rows_of("speed_rpm", [speed, oil], Path("run.mf4"))
+    late = table[table["time_s"] > 100.0]
+    np.testing.assert_allclose(late["T_oil_degC"], 20.0 + 0.01 * late["time_s"], atol=0.11)

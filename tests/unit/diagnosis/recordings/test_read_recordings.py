@@ -182,8 +182,7 @@ def test_parts_of_a_file(tmp_path: Path, network: ThermalNetwork) -> None:
 
 
 def test_a_date_as_the_end_of_a_part_includes_its_day() -> None:
-    part = part_of("2017-09-01..2017-09-02")
-    assert (part.start, part.end) == (datetime(2017, 9, 1, tzinfo=UTC), datetime(2017, 9, 3, tzinfo=UTC))
+    assert part_of("2017-09-01..2017-09-02") == part_of("2017-09-01T00:00..2017-09-03T00:00")
 
 
 @pytest.mark.parametrize("name", ["run.csv", "run.parquet"])
@@ -289,11 +288,12 @@ def test_the_own_mapping_comes_before_that_of_the_folder_and_a_definition_is_non
 # What a number of 10 in each unit is inside: s, 1/min, N m, degC, m/s, W.
 TEN = {
     "time": {"s": 10.0, "ms": 0.01, "min": 600.0, "h": 36_000.0, "d": 864_000.0},
-    "speed": {"1/min": 10.0, "rpm": 10.0, "min^-1": 10.0, "rad/s": 95.492965855, "1/s": 600.0, "Hz": 600.0,
-              "deg/s": 1.6666666667},
+    "speed": {"1/min": 10.0, "rpm": 10.0, "RPM": 10.0, "r/min": 10.0, "U/min": 10.0, "min^-1": 10.0,
+              "rad/s": 95.492965855, "1/s": 600.0, "Hz": 600.0, "deg/s": 1.6666666667},
     "torque": {"N m": 10.0, "N.m": 10.0, "Nm": 10.0, "kN m": 1e4, "kN.m": 1e4, "kNm": 1e4, "N mm": 0.01,
                "lbf ft": 13.558179483, "lbf in": 1.1298482903},
-    "temperature": {"degC": 10.0, "°C": 10.0, "C": 10.0, "K": -263.15, "degF": -12.222222222, "°F": -12.222222222,
+    "temperature": {"degC": 10.0, "°C": 10.0, "C": 10.0, "K": -263.15, "degK": -263.15, "°K": -263.15,
+                    "Kelvin": -263.15, "kelvin": -263.15, "degF": -12.222222222, "°F": -12.222222222,
                     "F": -12.222222222},
     "air speed": {"m/s": 10.0, "km/h": 2.7777777778, "mph": 4.4704, "ft/s": 3.048},
     "power": {"W": 10.0, "kW": 1e4, "MW": 1e7, "mW": 0.01, "hp": 7456.9987},

@@ -150,6 +150,14 @@ def test_a_recorded_start_is_the_first_temperature_of_every_node(tmp_path: Path)
     assert start.of(["pinion", "wheel", "oil"]) == {"pinion": 70.0, "wheel": 65.0, "oil": 60.0}
 
 
+def test_a_recorded_start_that_cannot_be_is_refused_with_its_cell(tmp_path: Path) -> None:
+    path = recorded(tmp_path / "run.csv", T_oil_degC=["80,0", 60.0, 61.0], T_mesh_degC=[None, -99.0, 80.0])
+    with pytest.raises(InputError) as raised:
+        read_cycle_and_start(path)[1].of(["oil", "mesh"])
+    assert "T_oil_degC is no number at row 1; --initial recorded needs -90 to 250 degC" in str(raised.value)
+    assert "T_mesh_degC is -99 degC at row 2" in str(raised.value)
+
+
 def test_a_recorded_start_that_is_missing(tmp_path: Path) -> None:
     path = recorded(tmp_path / "run.csv", T_ambient_degC=[10.0] * 3, T_air_degC=[10.0] * 3)
     with pytest.raises(InputError, match="run.csv: --initial recorded needs a column T_<node>_degC .* oil, mesh; give"):
