@@ -61,6 +61,8 @@ class Model:
         Nodes that are drawn together
     correction : Correction or None
         Whose physics it holds
+    memories : tuple of str
+        Of its laws, as wear or the switch of a fan; a result does not contain them
     """
 
     title: str
@@ -71,6 +73,7 @@ class Model:
     run: Callable[[Cycle, Initial, Count], dict[str, Array]]
     groups: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     correction: Correction | None = None
+    memories: tuple[str, ...] = ()
 
 
 def _full_model(name_or_file: str, correction: Path | None, mapping: Path | None, *, claims_only: bool) -> Model:
@@ -97,6 +100,7 @@ def _full_model(name_or_file: str, correction: Path | None, mapping: Path | None
         run=run,
         groups=network.groups,
         correction=found,
+        memories=tuple(state.name for state in network.states),
     )
 
 
@@ -109,11 +113,8 @@ def _range_of(trained: Training) -> str:
 
 
 def _fmu(path: Path, correction: Path | None, mapping: Path | None, *, claims_only: bool) -> Model:
-    from builder.drive.driver import (  # imports fmpy; the full model need not wait for it
-        drive_fmu,
-        fmu_machine,
-        refuse_other_correction,
-    )
+    from builder.drive.driver import drive_fmu  # imports fmpy; the full model need not wait for it
+    from builder.drive.machine_of_fmu import fmu_machine, fmu_memories, fmu_nodes, refuse_other_correction
     from diagnosis.recordings.as_cycle import read_cycle_or_recording
 
     machine, found = fmu_machine(path), None
@@ -122,7 +123,7 @@ def _fmu(path: Path, correction: Path | None, mapping: Path | None, *, claims_on
         found = found.claims_only() if claims_only else found
         refuse_other_correction(path, found, source=str(correction))
         try:
-            found.check_instruments([part.name for part in machine.parts], machine.inputs)
+            found.check_instruments(fmu_nodes(path), machine.inputs)
         except InputError as error:
             raise InputError("\n".join(f"{correction}: {line}" for line in str(error).splitlines())) from error
 
@@ -137,6 +138,7 @@ def _fmu(path: Path, correction: Path | None, mapping: Path | None, *, claims_on
         domain="the surrogate's training domain",
         run=run,
         correction=found,
+        memories=fmu_memories(path),
     )
 
 
@@ -221,6 +223,11 @@ def simulate(
     recorded = _without_biases(recorded, model.correction)
     start = recorded.of(model.nodes) if initial == RECORDED else given
     if start is not None:
+        if isinstance(given, Mapping) and model.memories:
+            console.err.print(
+                f"note: {initial}: the memories of laws ({', '.join(model.memories)}) are no columns of a result and "
+                "start again from their beginning; simulate in one piece where they count"
+            )
         if isinstance(start, Mapping):  # a result also has temperatures of boundaries
             start = {name: T for name, T in start.items() if name in model.nodes}
         source = str(recorded.path) if initial == RECORDED else f"--initial {initial}"

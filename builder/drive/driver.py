@@ -14,7 +14,7 @@ import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from ctypes import byref
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
@@ -27,24 +27,29 @@ from fmpy.fmi1 import FMICallException
 from fmpy.fmi3 import FMU3Slave
 from numpy.typing import ArrayLike
 
-from builder.fmi.recorded import recorded_columns
+from builder.drive.machine_of_fmu import (
+    damage_reported,
+    description_of,
+    fmu_machine,
+    start_variables,
+    to_column,
+    to_column_factors,
+)
 from builder.fmi.signals import input_name, result_column
 from builder.native.compile import host_platform
-from diagnosis.recordings.machine import DescribedMachine, Part
 from models.base.errors import InputError, did_you_mean
 from models.base.types import Array
 from models.columns.columns import Columns
-from models.correction.correction import Correction
 from models.files.cycle import Cycle
-from models.quantities.quantities import GEARBOX_INPUTS, INPUT_KINDS, Input, column_of_input, named_input
-from models.quantities.units import UNITS, conversion, find_unit
+from models.quantities.quantities import column_of_input
+from models.quantities.units import UNITS
 from models.simulation.start_temperatures import start_temperatures
 
 logger = logging.getLogger(__name__)
 
 LONGEST_HELD_S = 0.5  # a piece in which an input changes
+LONGEST_RAMP_S = 10.0  # a piece of any ramp, however slow
 LARGEST_CHANGE = {"speed": 25.0, "torque": 5.0}  # [1/min], [N m]: a slower ramp is held longer
-NEEDED = {"initial.uniform": "parameter", "initial.T": "parameter"}  # of every FMU of this project
 WARNING, DISCARD = 1, 2
 PROGRESS_ROWS = 50
 
@@ -107,56 +112,6 @@ def _binary_folders() -> tuple[str, ...]:
     return f"binaries/{fmpy.platform_tuple}", f"binaries/{host_platform()}"
 
 
-def fmu_machine(path: Path) -> DescribedMachine:
-    """Return what an FMU knows of recordings: inputs, nodes with a start temperature, the usual mapping.
-
-    Raises
-    ------
-    InputError
-        If the file is not an FMU of this project.
-    """
-    variables = _description(path).modelVariables
-    with _damage_reported(path):
-        recorded = recorded_columns(path)
-    inputs = [_input(v, recorded.required) for v in variables if v.causality == "input"]
-    return DescribedMachine(
-        inputs={given.name: given for given in inputs},
-        parts=tuple(Part(name) for name in _starts({v.name: v for v in variables})),
-        recording=recorded.mapping,
-    )
-
-
-def refuse_other_correction(path: Path, correction: Correction, *, source: str) -> None:
-    """Refuse a correction that changes the machine if the FMU was not built with it.
-
-    Raises
-    ------
-    InputError
-    """
-    if correction.has_physics and correction.words not in (_description(path).description or ""):
-        raise InputError(
-            f"{path}: was not built with {source}, which changes the physics; build it again with build-fmu "
-            f"--correction {source}"
-        )
-
-
-def _input(variable: Any, required: Sequence[str]) -> Input:
-    """An input of an FMU: of the table of quantities, else named, in the unit that tools show."""
-    name = input_name(variable.name)
-    if name in GEARBOX_INPUTS:
-        known = GEARBOX_INPUTS[name]
-        return replace(known, default=_to_column(variable, float(variable.start)))
-    dimension = UNITS[variable.unit].dimension if variable.unit in UNITS else "ratio"
-    kind = next(kind for kind, (own, _) in INPUT_KINDS.items() if own == dimension)
-    bounds = (variable.min, variable.max, variable.start)
-    low, high, start = (_to_column(variable, float(text)) if text is not None else None for text in bounds)
-    return named_input(
-        name, kind, unit=variable.displayUnit or variable.unit or "", low=-np.inf if low is None else low,
-        high=np.inf if high is None else high, default=start or 0.0, required=name in required,
-        description=variable.description or "",
-    )  # fmt: skip
-
-
 @dataclass
 class LoadedFmu:
     """An FMU that is instantiated, its variables by their meaning, and the messages that it has logged.
@@ -189,11 +144,11 @@ class LoadedFmu:
         self._reals = [v.valueReference for v in self._outputs if v.type != "Boolean"]
         self._input_references = [v.valueReference for v in self._inputs]
         self._orders = [1] * len(self._inputs)
-        self._to_si = [_affine(v) for v in self._inputs]
+        self._to_si = [to_column_factors(v) for v in self._inputs]
 
     def defaults(self) -> list[float]:
         """Start values of the inputs in the units of file columns."""
-        return [_to_column(v, float(v.start)) for v in self._inputs]
+        return [to_column(v, float(v.start)) for v in self._inputs]
 
     def set_inputs(self, values: Sequence[float]) -> None:
         """Set all inputs, given in the units of file columns."""
@@ -219,7 +174,7 @@ class LoadedFmu:
         return {
             str(result_column(v.name)): next(booleans).astype(bool)
             if v.type == "Boolean"
-            else _to_column(v, next(reals))
+            else to_column(v, next(reals))
             for v in self._outputs
         }
 
@@ -235,7 +190,7 @@ class LoadedFmu:
 
     def set_initial(self, initial: float | Mapping[str, float]) -> None:
         """Set start temperatures, [degC]: one for all nodes, or all parts by name."""
-        starts = _starts(self.variables)
+        starts = start_variables(self.variables)
         nodes = [v.name.removesuffix(".T").strip("'") for v in self._outputs if v.name.endswith(".T")]
         temperatures = start_temperatures(initial, list(starts), known=nodes, source=str(self.path))
         self.slave.setBoolean([self.variables["initial.uniform"].valueReference], [not isinstance(initial, Mapping)])
@@ -247,11 +202,11 @@ class LoadedFmu:
 
     def surroundings(self) -> float:
         """Return the ambient temperature, else that of the first boundary, at the inputs that are set, [degC]."""
-        starts = _starts(self.variables)
+        starts = start_variables(self.variables)
         temperatures = [v for v in self._outputs if v.name.endswith(".T")]
         boundaries = (v for v in temperatures if v.name.removesuffix(".T").strip("'") not in starts)
         variable = self.variables.get("T_ambient") or next(boundaries)
-        return float(_to_column(variable, self.slave.getReal([variable.valueReference])[0]))
+        return float(to_column(variable, self.slave.getReal([variable.valueReference])[0]))
 
     def _set_real(self, variable: Any, value: float) -> None:
         scale, offset = UNITS[variable.unit].column[1:]
@@ -304,9 +259,9 @@ def loaded(path: Path) -> Iterator[LoadedFmu]:
         refuses a call.
     """
     path = Path(path)
-    fmu = LoadedFmu(path, _description(path))
+    fmu = LoadedFmu(path, description_of(path))
     with tempfile.TemporaryDirectory(prefix="twin-fmu-") as folder, _logged_to(fmu.messages) as callbacks:
-        with _damage_reported(path):
+        with damage_reported(path):
             fmpy.extract(str(path), folder)
         identifier = fmu.description.coSimulation.modelIdentifier
         names = [Path(folder, name, identifier + fmpy.sharedLibraryExtension) for name in _binary_folders()]
@@ -391,10 +346,12 @@ def _simulate_table(
 
 
 def _pieces(names: Sequence[str], duration: float, begin: Array, end: Array) -> int:
-    """Into how many pieces a row is cut: of 0.5 s where an input ramps, longer where it changes little; 0 at rest."""
+    """Into how many pieces a row is cut: of 0.5 s where an input ramps, of 10 s where it changes little; 0 at rest."""
     changes = (abs(b - a) / LARGEST_CHANGE.get(n, 1.0) for n, a, b in zip(names, begin, end, strict=True))
     change = max(changes, default=0.0)
-    return min(int(np.ceil(duration / LONGEST_HELD_S)), int(np.ceil(change)))
+    if change == 0.0:
+        return 0
+    return min(int(np.ceil(duration / LONGEST_HELD_S)), int(np.ceil(max(change, duration / LONGEST_RAMP_S))))
 
 
 def _input_table(fmu: LoadedFmu, cycle: Cycle) -> Array:
@@ -402,46 +359,6 @@ def _input_table(fmu: LoadedFmu, cycle: Cycle) -> Array:
     starts = zip(fmu.inputs, fmu.defaults(), strict=True)
     columns = [cycle.inputs.get(name, np.full(len(cycle), start)) for name, start in starts]
     return np.reshape(columns, (len(columns), len(cycle))).T
-
-
-def _starts(variables: Mapping[str, Any]) -> dict[str, Any]:
-    """Variables of start temperatures by node."""
-    return {n.removesuffix(".T_start").strip("'"): v for n, v in variables.items() if n.endswith(".T_start")}
-
-
-def _description(path: Path) -> Any:
-    """The model description of an FMU of this project."""
-    try:
-        if path.is_dir():
-            inside = sorted(path.glob("*.fmu"))
-            raise InputError(f"{path}: is not a file but a folder; name an FMU{f', as {inside[0]}' if inside else ''}")
-        if not path.is_file():
-            raise InputError(f"{path}: no such file")
-    except OSError as error:  # a name that is too long, a folder that may not be read
-        raise InputError(f"{path}: cannot be read ({error.strerror})") from error
-    with _damage_reported(path), path.open("rb") as file:  # which fmpy would leave open where it fails
-        description = fmpy.read_model_description(file, validate=False)
-    if not description.fmiVersion.startswith(("2.", "3.")) or description.coSimulation is None:
-        raise InputError(
-            f"{path}: is an FMU of FMI {description.fmiVersion}; FMI 2.0 or 3.0 for co-simulation, as of build-fmu, is "
-            "needed"
-        )
-    names = {v.name: v.causality for v in description.modelVariables}
-    missing = [name for name, causality in NEEDED.items() if names.get(name) != causality]
-    if missing:
-        raise InputError(
-            f"{path}: is an FMU of another model: it has no {', '.join(missing)}; give one that build-fmu made"
-        )
-    return description
-
-
-@contextmanager
-def _damage_reported(path: Path) -> Iterator[None]:
-    try:
-        yield
-    except Exception as error:  # whatever zipfile, json, lxml or fmpy find, it is not an FMU
-        first = next(iter(str(error).splitlines()), type(error).__name__)
-        raise InputError(f"{path}: is not an FMU, or is damaged ({first}); build it again with build-fmu") from error
 
 
 def _uri(resources: Path) -> bytes:
@@ -479,18 +396,3 @@ def _logged_to(messages: list[tuple[int, str]]) -> Iterator[Any]:
         yield callbacks
     finally:
         del _messages[callbacks.componentEnvironment]
-
-
-def _to_column(variable: Any, value: Any) -> Any:
-    scale, offset = _affine(variable)
-    return value * scale + offset
-
-
-def _affine(variable: Any) -> tuple[float, float]:
-    """Factor and offset from an FMU's own unit to that of file columns: that which tools show, for a named input."""
-    if variable.unit not in UNITS:
-        return 1.0, 0.0
-    unit = UNITS[variable.unit]
-    if variable.causality != "input" or variable.name in GEARBOX_INPUTS:
-        return unit.column[1:]
-    return conversion(unit, find_unit(variable.displayUnit or variable.unit, unit.dimension))

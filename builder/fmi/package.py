@@ -91,7 +91,9 @@ def common_parts(
     table = signal_table(network, losses)
     identity = gearbox_identity(gearbox, output, flags, correction)
     reference = reference_run(gearbox, network, table, losses)
-    pages = documentation(gearbox, table, identity, training, reference, kind=kind) | recorded_file(network)
+    pages = documentation(gearbox, table, identity, training, reference, kind=kind) | recorded_file(
+        network, gearbox.hash
+    )
     return CommonParts(network=network, losses=losses, table=table, identity=identity, pages=pages)
 
 
@@ -102,7 +104,7 @@ def gearbox_identity(
     version = project_version()
     model = "thermal network" if gearbox.is_parametric else "reduced-order twin of a detailed loss model"
     subject = "Temperatures" if isinstance(gearbox.loss_laws(), NoLosses) else "Power loss and temperatures"
-    model += "" if correction is None else f", {correction.words}"
+    model += f", {correction.words}" if correction is not None and correction.has_physics else ""
     return Identity(
         model_name=gearbox.name,
         model_identifier=model_identifier(output.stem),

@@ -237,7 +237,7 @@ def build(
     name = name or Path(gearbox.file).stem
     kinds, built_for, notes = _planned(target, platforms, fmi)
     network = corrected_network(gearbox, correction)
-    for boundary in couple:
+    for boundary in dict.fromkeys(couple):
         network = network.with_coupled_boundary(boundary)
     inside = gearbox.network_of_laws(network)
     seconds: dict[str, float] = {}

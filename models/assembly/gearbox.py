@@ -378,8 +378,8 @@ class Gearbox:
     def steady_state(
         self,
         *,
-        speed: ArrayLike = 0.0,
-        torque: ArrayLike = 0.0,
+        speed: ArrayLike | None = None,
+        torque: ArrayLike | None = None,
         inputs: Mapping[str, ArrayLike] | None = None,
         network: ThermalNetwork | None = None,
     ) -> SteadyState:

@@ -287,7 +287,7 @@ def _inputs(definition: ParametricDefinition) -> Iterator[str]:
     named = {given.name: given for given in definition.input}
     taken = Counter(["time", *(p.name for p in definition.parameter), *(f"T_{part.name}" for part in definition.part)])
     taken.update(f"T_{b.name}" for b in definition.boundary if b.input != f"T_{b.name}")
-    taken.update(given.name for given in definition.input)
+    taken.update({given.name for given in definition.input} | {b.input for b in definition.boundary})
     taken.update(_factors(definition))
     yield from (
         f"'{name}' names several inputs, parameters, factors or nodes" for name, count in taken.items() if count > 1

@@ -29,8 +29,8 @@ def steady_state(
     network: Network,
     *,
     losses: Losses,
-    speed: ArrayLike = 0.0,
-    torque: ArrayLike = 0.0,
+    speed: ArrayLike | None = None,
+    torque: ArrayLike | None = None,
     inputs: Mapping[str, ArrayLike] | None = None,
     parameters: Mapping[str, ArrayLike] | None = None,
     max_iterations: int = 2000,
@@ -41,8 +41,8 @@ def steady_state(
     ----------
     network : Network
     losses : Losses
-    speed, torque : ArrayLike, shape () or (B,)
-        Of the input shaft, [1/min] and [N m], if the machine has these inputs
+    speed, torque : ArrayLike, shape () or (B,), or None
+        Of the input shaft, [1/min] and [N m], of a machine with these inputs; by default 0
     inputs : mapping of input name to ArrayLike, shape () or (B,), or None
         Further inputs, e.g. ``T_ambient``
     parameters : mapping of name to ArrayLike, shape () or (B,), or None
@@ -68,12 +68,7 @@ def steady_state(
     """
     if network.states:
         raise InputError("a network with laws that have a memory has no steady state; simulate a long cycle instead")
-    given = dict(inputs or {})
-    for name in given:
-        if name not in network.inputs:
-            raise InputError(f"{name!r} is not an input of this network{did_you_mean(name, network.inputs)}")
-    given = {"speed": speed, "torque": torque} | given
-    columns = [given.get(name, known.default) for name, known in network.inputs.items()]
+    columns = _inputs(network, speed, torque, inputs or {})
     shapes = [np.shape(c) for c in columns] + [np.shape(v) for v in (parameters or {}).values()]
     shape = np.broadcast_shapes(*shapes)
     if len(shape) > 1:
@@ -111,6 +106,22 @@ def steady_state(
         f"no steady state found (a node still moves by {moved:.3g} K): is there a node without cooling, or do losses "
         "rise with temperature faster than heat leaves?"
     )
+
+
+def _inputs(
+    network: Network, speed: ArrayLike | None, torque: ArrayLike | None, others: Mapping[str, ArrayLike]
+) -> list[ArrayLike]:
+    """Inputs in the order of the network, their defaults filled in."""
+    shaft = {"speed": speed, "torque": torque}
+    given = {name: value for name, value in shaft.items() if value is not None} | dict(others)
+    for name in given:
+        if name in network.derived:
+            sources = {s.name for s in network.derived[name].free_symbols} & set(network.inputs)
+            raise InputError(f"{name!r} follows from {', '.join(sorted(sources))} here; give that in its place")
+        if name not in network.inputs:
+            raise InputError(f"{name!r} is not an input of this network{did_you_mean(name, network.inputs)}")
+    given = {"speed": 0.0, "torque": 0.0} | given
+    return [given.get(name, known.default) for name, known in network.inputs.items()]
 
 
 def _at_points(result: Result, shape: tuple[int, ...]) -> SteadyState:

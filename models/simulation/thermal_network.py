@@ -79,7 +79,7 @@ class ThermalNetwork(Network):
         Raises
         ------
         InputError
-            If the network has no such boundary.
+            If the network has no such boundary, or it follows an input that nothing else uses.
 
         Examples
         --------
@@ -91,6 +91,14 @@ class ThermalNetwork(Network):
         laws = {node.name: node.temperature for node in self.nodes if node.temperature is not None}
         if name not in laws:
             raise InputError(f"{name!r} is not a boundary of this network{did_you_mean(name, laws)}")
+        elsewhere = (
+            *(node.temperature for node in self.nodes if node.temperature is not None and node.name != name),
+            *(link.conductance for link in self.links), *(source.heat for source in self.sources),
+            *self.derived.values(),
+        )  # fmt: skip
+        own = next((key for key in self.inputs if laws[name] == symbol(key)), None)
+        if own is not None and not any(symbol(own) in law.free_symbols for law in elsewhere):
+            raise InputError(f"boundary {name!r} follows the input {own!r} alone: that couples it with another model")
         values = {"time": 0.0} | {key: given.default for key, given in self.inputs.items()}
         values |= {parameter.name: parameter.start for parameter in self.parameters}
         law = laws[name].xreplace({symbol(key): expression for key, expression in self.derived.items()})
@@ -390,8 +398,8 @@ class ThermalNetwork(Network):
         self,
         *,
         losses: Losses,
-        speed: ArrayLike = 0.0,
-        torque: ArrayLike = 0.0,
+        speed: ArrayLike | None = None,
+        torque: ArrayLike | None = None,
         inputs: Mapping[str, ArrayLike] | None = None,
         parameters: Mapping[str, ArrayLike] | None = None,
     ) -> SteadyState:

@@ -68,14 +68,22 @@ def machine() -> ThermalNetwork:
 
 
 def coupled_rod() -> ThermalNetwork:
-    """The rod with the temperature of its surroundings as a heat port."""
-    return rod().with_coupled_boundary("air")
+    """The rod with the temperature of a room as a heat port."""
+    room = rod().with_link("cell_1", "room", 0.1, temperature=lambda s: s.T_ambient + 1.0)
+    return room.with_coupled_boundary("room")
 
 
 def cycle_of(network: ThermalNetwork) -> Cycle:
     """Every input between two values, one phase per input."""
     time = np.linspace(0.0, 900.0, 91)
-    far = {"speed": 1500.0, "torque": 80.0, "T_ambient": 10.0, "air_T_in": 60.0, "heater_power": 50.0, "fan_flow": 60.0}
+    far = {
+        "speed": 1500.0,
+        "torque": 80.0,
+        "T_ambient": 10.0,
+        "room_T_in": 60.0,
+        "heater_power": 50.0,
+        "fan_flow": 60.0,
+    }
     return Cycle(time, {
         name: given.default + (far[name] - given.default) * (1.0 + np.sin(time / (70.0 + 30.0 * phase))) / 2.0
         for phase, (name, given) in enumerate(network.inputs.items())

@@ -9,7 +9,8 @@ import pytest
 from fmpy import read_model_description
 from fmpy.validation import validate_fmu
 
-from builder.drive.driver import drive_fmu, fmu_machine
+from builder.drive.driver import drive_fmu
+from builder.drive.machine_of_fmu import fmu_machine
 from builder.native.native_fmu import build_native_fmu
 from builder.python.python_fmu import build_python_fmu
 from models.files.cycle import Cycle

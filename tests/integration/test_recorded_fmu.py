@@ -12,9 +12,9 @@ import pandas as pd
 import pytest
 
 from diagnosis.forward.recurrence import lagged
-from models.assembly.gearbox import Gearbox
+from models.assembly.gearbox import Gearbox, load_gearbox
 from models.correction.correction import Correction, Estimate, Finding, write_correction
-from models.correction.instruments import InputCorrection, SensorCorrection
+from models.correction.instruments import InputCorrection, Mix, SensorCorrection
 from models.files.cycle import Cycle
 from models.mechanisms import CATALOGUE
 from models.mechanisms.scale import Scale
@@ -95,6 +95,17 @@ def test_a_faulty_sensor_is_shown_next_to_the_truth_by_fmu_and_full_model(
         result = pd.read_csv(out)
         np.testing.assert_allclose(result["T_oil_degC_as_recorded"], result["T_oil_degC"] + 2.5, atol=2e-6)
         assert [name for name in result if name.endswith("_as_recorded")] == ["T_oil_degC_as_recorded"]
+    mixed = SensorCorrection(channel="oil", mix=(Mix(node="frame", share=0.1),))
+    write_correction(Correction.of(fzg, sensors=[mixed]), file)
+    for driver in ((fzg_native,), ("--gearbox", "fzg")):
+        assert run_cli("simulate", *driver, plain, "--output", out, "--correction", file) == 0
+        result = pd.read_csv(out)
+        expected = 0.9 * result["T_oil_degC"] + 0.1 * result["T_frame_degC"]
+        np.testing.assert_allclose(result["T_oil_degC_as_recorded"], expected, atol=2e-6)
+    write_correction(Correction.of(load_gearbox("conveyor"), sensors=[SensorCorrection(channel="oil", bias=1.0)]), file)
+    for driver in ((fzg_native,), ("--gearbox", "fzg")):
+        assert run_cli("simulate", *driver, plain, "--output", tmp_path / "no.csv", "--correction", file) == 2
+        assert "was made for" in " ".join(capsys.readouterr().err.split())
     calibrated = Correction.of(fzg, findings=[finding], calibration=[Estimate(name="churning", value=1.2, stderr=0.1)])
     write_correction(calibrated, file)
     assert run_cli("simulate", fzg_native, plain, "--output", tmp_path / "no.csv", "--correction", file) == 2

@@ -93,6 +93,8 @@ def rig(text: str = RIG) -> Gearbox:
     ('name = "heater"\nquantity', 'name = "T_body"\nquantity', "'T_body' names several inputs, parameters, factors or"),
     ('name = "heater"\nquantity', 'name = "C_body"\nquantity', "'C_body' names several inputs, parameters, factors or"),
     ('name = "heater"\nquantity', 'name = "heater_gain"\nquantity', "'heater_gain' names several inputs"),
+    ('input = "T_coolant"', 'input = "T_coolant"\n\n[[boundary]]\nname = "ambient"\ninput = "T_coolant"',
+     "'T_ambient' names several inputs, parameters, factors or nodes"),
     ('name = "heater"\nquantity', 'name = "lambda"\nquantity', "'lambda' has a meaning in formulas; give the input"),
     ('input = "T_coolant"', 'input = "T_cool"', "'T_cool' is no [[input]]; declare it, or give"),
     ('input = "T_coolant"', 'input = "heater"', "boundary 'coolant'.input: 'heater' is a power, not a temperature"),
@@ -181,6 +183,8 @@ def test_torque_from_an_electrical_power_is_that_torque() -> None:
         found = network.simulate(
             given | {"P_electrical": power}, losses=by_power.loss_laws(), initial=40.0, parameters={"efficiency": eta}
         )
+        with pytest.raises(InputError, match="'torque' follows from P_electrical, speed here; give that"):
+            network.steady_state(losses=by_power.loss_laws(), speed=1500.0, torque=290.0)
         # Power over speed is not straight between the rows where the torque is.
         assert found.temperatures["oil"] == pytest.approx(expected.temperatures["oil"], abs=0.01)
 

@@ -220,6 +220,10 @@ EXTENSIONS: list[tuple[Callable[[], object], str]] = [
         lambda: NETWORK.with_coupled_boundary("oil"),
         "'oil' is not a boundary of this network; known are: air, frame",
     ),
+    (
+        lambda: load_gearbox("heated_rod").network().with_coupled_boundary("air"),
+        "boundary 'air' follows the input 'T_ambient' alone: that couples it",
+    ),
     (lambda: NETWORK.with_input("speed", 1.0), "has a signal 'speed' already"),
     (lambda: NETWORK.with_input("lambda", 1.0), "'lambda' cannot be a signal"),
     (lambda: NETWORK.with_parameter(Parameter(name="h_air")), "has a signal 'h_air' already"),

@@ -1,0 +1,164 @@
+"""Reading the description of an FMU of this project: its machine, its nodes, the correction that it contains."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import fmpy
+import numpy as np
+
+from builder.fmi.recorded import recorded_columns
+from builder.fmi.signals import input_name
+from diagnosis.recordings.machine import DescribedMachine, Part
+from models.base.errors import InputError
+from models.correction.correction import Correction
+from models.quantities.quantities import GEARBOX_INPUTS, INPUT_KINDS, Input, named_input
+from models.quantities.units import UNITS, conversion, find_unit
+
+NEEDED = {"initial.uniform": "parameter", "initial.T": "parameter"}  # of every FMU of this project
+
+
+def fmu_machine(path: Path) -> DescribedMachine:
+    """Return what an FMU knows of recordings: inputs, nodes with a start temperature, the usual mapping.
+
+    Raises
+    ------
+    InputError
+        If the file is not an FMU of this project.
+    """
+    variables = description_of(path).modelVariables
+    with damage_reported(path):
+        recorded = recorded_columns(path)
+    inputs = [_input(v, recorded.required) for v in variables if v.causality == "input"]
+    return DescribedMachine(
+        inputs={given.name: given for given in inputs},
+        parts=tuple(Part(name) for name in start_variables({v.name: v for v in variables})),
+        recording=recorded.mapping,
+    )
+
+
+def fmu_nodes(path: Path) -> tuple[str, ...]:
+    """Return the nodes of an FMU, boundaries among them.
+
+    Raises
+    ------
+    InputError
+        If the file is not an FMU of this project.
+    """
+    names = (v.name for v in description_of(path).modelVariables if v.causality != "parameter")
+    return tuple(name.removesuffix(".T").strip("'") for name in names if name.endswith(".T"))
+
+
+def fmu_memories(path: Path) -> tuple[str, ...]:
+    """Return the memories of the laws of an FMU.
+
+    Raises
+    ------
+    InputError
+        If the file is not an FMU of this project.
+    """
+    names = (v.name for v in description_of(path).modelVariables)
+    return tuple(name.removeprefix("state.").strip("'") for name in names if name.startswith("state."))
+
+
+def refuse_other_correction(path: Path, correction: Correction, *, source: str) -> None:
+    """Refuse a correction of another machine, and one that changes the machine if the FMU was not built with it.
+
+    Raises
+    ------
+    InputError
+    """
+    made_for, own = correction.gearbox, recorded_columns(path).definition
+    if made_for is not None and own and made_for.sha256 != own:
+        raise InputError(
+            f"{path}: is of definition {own[:12]}, but {source} was made for {made_for.name!r} with definition "
+            f"{made_for.sha256[:12]}; use the FMU of that machine, or diagnose again"
+        )
+    if correction.has_physics and correction.words not in (description_of(path).description or ""):
+        raise InputError(
+            f"{path}: was not built with {source}, which changes the physics; build it again with build-fmu "
+            f"--correction {source}"
+        )
+
+
+def _input(variable: Any, required: Sequence[str]) -> Input:
+    """An input of an FMU: of the table of quantities, else named, in the unit that tools show."""
+    name = input_name(variable.name)
+    if name in GEARBOX_INPUTS:
+        known = GEARBOX_INPUTS[name]
+        return replace(known, default=to_column(variable, float(variable.start)))
+    dimension = UNITS[variable.unit].dimension if variable.unit in UNITS else "ratio"
+    kind = next(kind for kind, (own, _) in INPUT_KINDS.items() if own == dimension)
+    bounds = (variable.min, variable.max, variable.start)
+    low, high, start = (to_column(variable, float(text)) if text is not None else None for text in bounds)
+    return named_input(
+        name, kind, unit=variable.displayUnit or variable.unit or "", low=-np.inf if low is None else low,
+        high=np.inf if high is None else high, default=start or 0.0, required=name in required,
+        description=variable.description or "",
+    )  # fmt: skip
+
+
+def start_variables(variables: Mapping[str, Any]) -> dict[str, Any]:
+    """Variables of start temperatures by node."""
+    return {n.removesuffix(".T_start").strip("'"): v for n, v in variables.items() if n.endswith(".T_start")}
+
+
+def description_of(path: Path) -> Any:
+    """The model description of an FMU of this project."""
+    try:
+        if path.is_dir():
+            inside = sorted(path.glob("*.fmu"))
+            raise InputError(f"{path}: is not a file but a folder; name an FMU{f', as {inside[0]}' if inside else ''}")
+        if not path.is_file():
+            raise InputError(f"{path}: no such file")
+    except OSError as error:  # a name that is too long, a folder that may not be read
+        raise InputError(f"{path}: cannot be read ({error.strerror})") from error
+    with damage_reported(path), path.open("rb") as file:  # which fmpy would leave open where it fails
+        description = fmpy.read_model_description(file, validate=False)
+    if not description.fmiVersion.startswith(("2.", "3.")) or description.coSimulation is None:
+        raise InputError(
+            f"{path}: is an FMU of FMI {description.fmiVersion}; FMI 2.0 or 3.0 for co-simulation, as of build-fmu, is "
+            "needed"
+        )
+    names = {v.name: v.causality for v in description.modelVariables}
+    missing = [name for name, causality in NEEDED.items() if names.get(name) != causality]
+    if missing:
+        raise InputError(
+            f"{path}: is an FMU of another model: it has no {', '.join(missing)}; give one that build-fmu made"
+        )
+    return description
+
+
+@contextmanager
+def damage_reported(path: Path) -> Iterator[None]:
+    """Report whatever fails in the block as a damaged file.
+
+    Raises
+    ------
+    InputError
+    """
+    try:
+        yield
+    except Exception as error:  # whatever zipfile, json, lxml or fmpy find, it is not an FMU
+        first = next(iter(str(error).splitlines()), type(error).__name__)
+        raise InputError(f"{path}: is not an FMU, or is damaged ({first}); build it again with build-fmu") from error
+
+
+def to_column(variable: Any, value: Any) -> Any:
+    """Convert a value of an FMU to the unit of file columns."""
+    scale, offset = to_column_factors(variable)
+    return value * scale + offset
+
+
+def to_column_factors(variable: Any) -> tuple[float, float]:
+    """Factor and offset from an FMU's own unit to that of file columns: that which tools show, for a named input."""
+    if variable.unit not in UNITS:
+        return 1.0, 0.0
+    unit = UNITS[variable.unit]
+    if variable.causality != "input" or variable.name in GEARBOX_INPUTS:
+        return unit.column[1:]
+    return conversion(unit, find_unit(variable.displayUnit or variable.unit, unit.dimension))
