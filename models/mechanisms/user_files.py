@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from importlib.util import module_from_spec, spec_from_file_location
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -198,15 +197,13 @@ def _from_toml(path: Path) -> tuple[Mechanism, ...]:
 
 
 def _from_python(path: Path) -> tuple[Mechanism, ...]:
-    spec = spec_from_file_location(f"mechanisms_{path.stem}", path)
-    if not path.is_file() or spec is None or spec.loader is None:
+    if not path.is_file():
         raise InputError(f"{path}: cannot be read as a Python file")
-    module = module_from_spec(spec)
-    try:
-        spec.loader.exec_module(module)
+    content: dict[str, Any] = {"__name__": f"mechanisms_{path.stem}", "__file__": str(path)}
+    try:  # an import would leave a folder __pycache__ next to the file
+        exec(compile(path.read_bytes(), str(path), "exec"), content)  # noqa: S102 - the user's own file
     except (Exception, SystemExit) as error:
         raise InputError(f"{path}: fails with {type(error).__name__}: {error}") from error
-    content: Mapping[str, Any] = vars(module)
     found = content.get("MECHANISMS")
     if not isinstance(found, (list, tuple)) or not all(isinstance(entry, Mechanism) for entry in found):
         raise InputError(f"{path}: needs a list MECHANISMS of models.mechanisms.Mechanism")
