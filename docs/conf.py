@@ -1,6 +1,7 @@
 """Settings of the documentation site: ``python -m sphinx -W -j 2 -d out/doctrees docs out/site``.
 
-``DOCS_NOTEBOOKS=off`` leaves the notebooks unexecuted, which takes a build from minutes to seconds.
+``DOCS_NOTEBOOKS=off`` leaves the notebooks unexecuted, which takes a build from minutes to seconds; ``short`` only those
+that take minutes (``python -m pytest -m slow tests/unit/docs`` executes them).
 """
 
 from __future__ import annotations
@@ -50,9 +51,11 @@ numpydoc_show_class_members = False  # autodoc lists them
 # Markdown and notebooks. A notebook is committed without outputs and executed where it lies, see `spread_notebooks`.
 myst_enable_extensions = ["attrs_inline", "colon_fence", "deflist", "dollarmath", "fieldlist"]
 myst_heading_anchors = 3
-UNEXECUTED = os.environ.get("DOCS_NOTEBOOKS") == "off"
-nb_execution_mode = "off" if UNEXECUTED else "auto"
-suppress_warnings = ["misc.highlighting_failure"] if UNEXECUTED else []  # the kernel states the language of "!" lines
+LONG_NOTEBOOKS = ("concealed_effect", "could_it_have_shown", "wind_turbine")
+EXECUTED = os.environ.get("DOCS_NOTEBOOKS", "all")
+nb_execution_mode = "off" if EXECUTED == "off" else "auto"
+nb_execution_excludepatterns = [f"{name}.ipynb" for name in LONG_NOTEBOOKS if EXECUTED == "short"]
+suppress_warnings = [] if EXECUTED == "all" else ["misc.highlighting_failure"]  # the kernel states the language of "!"
 nb_execution_timeout = 240
 nb_execution_raise_on_error = True
 
