@@ -1,7 +1,7 @@
 """Settings of the documentation site: ``python -m sphinx -W -j 2 -d out/doctrees docs out/site``.
 
-``DOCS_NOTEBOOKS=off`` leaves the notebooks unexecuted, which takes a build from minutes to seconds; ``short`` leaves out
-those that take minutes (``python -m pytest -m slow tests/unit/docs`` executes them).
+``DOCS_NOTEBOOKS=off`` leaves the notebooks unexecuted, which takes a build from minutes to seconds; ``short`` leaves
+out those that take minutes (``python -m pytest -m slow tests/unit/docs`` executes them).
 """
 
 from __future__ import annotations
