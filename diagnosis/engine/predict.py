@@ -190,17 +190,20 @@ def with_pieces_of(experiment: Experiment, other: Experiment) -> Experiment:
     )  # fmt: skip
 
 
-def log_score_gain(final: Fit, plain: Fit, held_out: Experiment, guesses: Sequence[Sequence[Array | None]]) -> float:
+def log_score_gain(
+    final: Fit, plain: Fit, held_out: Experiment, runs: tuple[Sequence[Prediction], Sequence[Prediction]]
+) -> float:
     r"""Log predictive density of held-out readings of one fit, less that of another one, [nat].
 
-    What a fit is unsure of widens its prediction: ``r ~ N(0, 1 + J C J^T)`` in whitened units, with the posterior
-    covariance C of the unknowns. The noise filters of `plain` judge both. Switches follow what was measured, as in
-    learning.
+    What a fit is unsure of widens its prediction: ``r ~ N(0, S + J C J^T)`` with its own noise filter S and the
+    posterior covariance C of its unknowns. Each is judged by its nearer course of every recording: with switches that
+    follow what was measured, as in learning, or with its own. A set-point that readings nearly reach decides the first
+    by chance; the second falls out of step.
 
     Parameters
     ----------
-    guesses : (sequence of Array or None, same)
-        Temperatures of every piece to linearise about first, for `final` and `plain`
+    runs : (sequence of Prediction, same)
+        Of every piece, by `final` and by `plain`
 
     Returns
     -------
@@ -210,22 +213,27 @@ def log_score_gain(final: Fit, plain: Fit, held_out: Experiment, guesses: Sequen
     if not held_out.pieces:
         return float("nan")
     try:
-        there = with_pieces_of(plain.experiment, held_out)
-        parts = [there.linearise_piece(i, plain.z, guess, rounds=ROUNDS) for i, guess in enumerate(guesses[1])]
-        other = with_pieces_of(final.experiment, held_out).with_filters(parts)
-        linearised = replace(other, machine=final.parts[0].point.machine)
-        own = [linearised.linearise_piece(i, final.z, guess, rounds=ROUNDS) for i, guess in enumerate(guesses[0])]
-        if linearised.machine is not other.machine:  # model error is written into the one that predicts
-            own = [other.linearise_piece(i, final.z, guess, rounds=ROUNDS, kept=one)
-                   for i, (guess, one) in enumerate(zip(guesses[0], own, strict=True))]  # fmt: skip
+        return _log_density(final, held_out, runs[0]) - _log_density(plain, held_out, runs[1])
     except (ArithmeticError, np.linalg.LinAlgError):
         return float("nan")
-    return _log_density(own, final) - _log_density(parts, plain)
 
 
-def _log_density(parts: Sequence[Linear], fit: Fit) -> float:
-    residual = np.concatenate([part.residual for part in parts])
+def _log_density(fit: Fit, held_out: Experiment, runs: Sequence[Prediction]) -> float:
+    there = with_pieces_of(fit.experiment, held_out)
+    learnt = replace(there, machine=fit.parts[0].point.machine)
+    parts = [learnt.linearise_piece(i, fit.z, run.trajectory.T, rounds=ROUNDS) for i, run in enumerate(runs)]
+    if learnt.machine is not there.machine:  # model error is written into the one that predicts
+        parts = [there.linearise_piece(i, fit.z, run.trajectory.T, rounds=ROUNDS, kept=part)
+                 for i, (run, part) in enumerate(zip(runs, parts, strict=True))]  # fmt: skip
+    residual = np.concatenate([_nearer(part, run) for part, run in zip(parts, runs, strict=True)])
     X = solve_triangular(fit.root, np.concatenate([part.columns for part in parts]).T, lower=True).T
     inner, along = np.eye(X.shape[1]) + X.T @ X, X.T @ residual
     quadratic = float(residual @ residual - along @ np.linalg.solve(inner, along))
-    return -0.5 * (quadratic + float(np.linalg.slogdet(inner)[1]))
+    determinants = float(np.linalg.slogdet(inner)[1]) + sum(part.filter.log_determinant for part in parts)
+    return -0.5 * (quadratic + determinants)
+
+
+def _nearer(part: Linear, run: Prediction) -> Array:
+    """Innovations of the course that is nearer, shape (readings,)."""
+    own = part.filter((part.point.trajectory.piece.measured - run.read)[:, :, None])[:, 0]
+    return min((part.residual, own), key=lambda innovations: float(innovations @ innovations))

@@ -81,9 +81,9 @@ def predict_recordings(
         except ArithmeticError:
             pass  # no solution with what was learnt
     train["after"], holdout["after"] = after
-    guesses = [_courses(holdout[state]) for state in ("after", "calibrated")]
     faulty = set(experiment.pieces[0].channels) - set(counting)
-    gain = log_score_gain(final, plain, without_channels(judged, faulty), guesses)
+    runs = holdout["after"], holdout["calibrated"]
+    gain = log_score_gain(final, plain, without_channels(judged, faulty), runs)
     return Predicted(train=train, holdout=holdout, final=final, learnt=learnt, holdout_gain=gain)
 
 
