@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from diagnosis.engine.fit import Experiment
-from diagnosis.engine.predict import START_S, predict
+from diagnosis.engine.predict import ROUNDS, START_S, log_score_gain, predict
 from diagnosis.forward.grid import Piece
 from diagnosis.forward.network_on_grid import NetworkOnGrid
 from diagnosis.forward.observation import readings
@@ -81,3 +81,29 @@ def test_a_start_that_leads_nowhere_is_not_taken(monkeypatch: pytest.MonkeyPatch
     )
     with pytest.raises(ArithmeticError, match="away"):
         predict(moved, 0, z)
+
+
+@pytest.mark.parametrize(("shift_K", "own"), [(0.0, True), (-1.0, False)])
+def test_a_fit_is_judged_by_its_nearer_course(
+    fzg: Gearbox, piece: Piece, experiment: Experiment, shift_K: float, own: bool
+) -> None:
+    """With true readings noise makes a switch that follows them early or late; with biased ones its own course is."""
+    (placed,) = CATALOGUE["cooler_thermostat"].placed(fzg.network(), Scale.of(fzg, speed=2600.0, torque=150.0))
+    there = with_term(experiment, placed)
+    found, nothing = (
+        at(there, {placed.strength.name: strength * placed.strength.sd, f"{placed.label}_set_point": 43.0})
+        for strength in (4.0, 0.0)
+    )
+    noise = 0.1 * np.random.default_rng(0).standard_normal(piece.measured.shape)
+    temperatures = [channel != "P_loss" for channel in piece.channels]
+    held_out = with_measured(there, predict(there, 0, found).read + shift_K * np.array(temperatures) + noise)
+    fits = [held_out.fit(z, iterations=0) for z in (found, nothing)]
+    runs = [[predict(held_out, 0, z)] for z in (found, nothing)]
+    (run,) = runs[0]
+    follows = held_out.linearise_piece(0, found, run.trajectory.T, rounds=ROUNDS)
+    alone = follows.filter((held_out.pieces[0].measured - run.read)[:, :, None])[:, 0]
+    norms = [float(innovations @ innovations) for innovations in (follows.residual, alone)]
+    assert (norms[1] < 0.6 * norms[0]) if own else (norms[0] < 0.3 * norms[1])
+    gain = log_score_gain(fits[0], fits[1], held_out, (runs[0], runs[1]))
+    assert gain > 3000.0
+    assert log_score_gain(fits[1], fits[0], held_out, (runs[1], runs[0])) == pytest.approx(-gain)
