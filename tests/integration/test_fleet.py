@@ -113,6 +113,7 @@ def test_recordings_of_one_name_get_a_prediction_each(diagnosed: tuple[Path, int
     assert not judged.isna().to_numpy().any()
 
 
+@pytest.mark.slow
 def test_several_processes_give_the_bytes_of_one(diagnosed: tuple[Path, int], folder: Path, tmp_path: Path) -> None:
     """Each of a fleet is diagnosed by one process."""
     learnt, held = folder / "biased/train.csv", folder / "biased/holdout"

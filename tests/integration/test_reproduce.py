@@ -19,6 +19,7 @@ from models.assembly.gearbox import load_gearbox
 from models.base.errors import InputError
 from models.base.progress import silent
 
+SLOW = pytest.mark.slow  # the report takes a minute
 QUICK = Settings(
     jobs=1, samples=400, test_points=100, runs=1, longest_s=1.0, step_s=600.0, fine_step_s=300.0, trajectories=2
 )
@@ -111,6 +112,7 @@ def report(folder: Path) -> Report:
     return reproduce(folder, settings=QUICK)
 
 
+@SLOW
 def test_verdicts(report: Report, folder: Path) -> None:
     written = json.loads((folder / NUMBERS).read_text(encoding="utf-8"))
     lines = []
@@ -122,6 +124,7 @@ def test_verdicts(report: Report, folder: Path) -> None:
     assert sum(written["verdicts"].values()) == len(report.items)
 
 
+@SLOW
 def test_every_item_is_in_page_and_summary(report: Report, folder: Path) -> None:
     page, summary = ((folder / name).read_text(encoding="utf-8") for name in (PAGE, SUMMARY))
     for one in report.items:
@@ -130,6 +133,7 @@ def test_every_item_is_in_page_and_summary(report: Report, folder: Path) -> None
     assert page.count("<figure") == page.count('src="data:image/svg+xml;base64,') == len(FIGURE_NAMES)
 
 
+@SLOW
 def test_every_figure_is_there_as_png_and_csv(report: Report, folder: Path) -> None:
     assert [figure.name for one in report.items for figure in one.figures] == FIGURE_NAMES
     written = {path.name for path in (folder / FIGURES).iterdir()}
@@ -141,6 +145,7 @@ def test_every_figure_is_there_as_png_and_csv(report: Report, folder: Path) -> N
         assert len(pd.read_csv(folder / FIGURES / f"{name}.csv")) > 5, name
 
 
+@SLOW
 def test_the_page_refers_to_nothing_but_its_figures(report: Report, folder: Path) -> None:
     page = (folder / PAGE).read_text(encoding="utf-8")
     for link in re.findall(r"""(?:src|href)="([^"#]+)""", page):
@@ -149,6 +154,7 @@ def test_the_page_refers_to_nothing_but_its_figures(report: Report, folder: Path
     assert "@import" not in page
 
 
+@SLOW
 def test_other_files_of_the_folder_are_kept(report: Report, folder: Path) -> None:
     assert (folder / KEPT).read_text() == "keep me"
     assert not list(folder.glob(".unfinished-*"))

@@ -57,6 +57,7 @@ def test_an_fmu_that_cannot_run_here_is_built_and_that_is_told(
     ]
 
 
+@pytest.mark.slow
 def test_a_corrected_fmu_of_kept_networks_has_the_bytes_of_a_trained_one(
     fzg: Gearbox, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -78,7 +79,7 @@ def test_a_corrected_fmu_of_kept_networks_has_the_bytes_of_a_trained_one(
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="a script as compiler")
-@pytest.mark.parametrize("has_broken_compiler", [False, True])
+@pytest.mark.parametrize("has_broken_compiler", [pytest.param(False, marks=pytest.mark.slow), True])
 def test_without_a_compiler_the_python_fmu_is_built_and_one_line_says_how_to_get_the_native_one(
     fzg: Gearbox, fzg_training: TrainingResult, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
     has_broken_compiler: bool,

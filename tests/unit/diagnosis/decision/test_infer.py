@@ -124,6 +124,7 @@ def test_an_effect_in_the_recordings_raises_nothing(fzg: Gearbox) -> None:
     assert found.nothing.fit.experiment.most_deviation == rule().repeats >= found.session_s
 
 
+@pytest.mark.slow
 def test_a_baseline_shows_nothing_of_what_has_no_place_in_the_machine(fzg: Gearbox) -> None:
     found = inferred(fzg, 0.0, switched_off=["bearing_fed_by_return"])
     assert found.placebo is None and found.threshold == 10.0 == rule().detection * found.class_threshold

@@ -112,6 +112,7 @@ def test_an_effect_that_acts_in_the_baseline_is_seen_there(fzg: Gearbox, drift: 
     assert found[0.0] < 2.0 < 20.0 < found[3.0]
 
 
+@pytest.mark.slow
 def test_another_machine_is_told_apart(fzg: Gearbox) -> None:
     train = recorded(fzg, "train")
     found = {}

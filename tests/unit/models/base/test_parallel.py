@@ -36,6 +36,7 @@ def test_results_come_in_order(jobs: int | None) -> None:
         assert (os.getpid() not in {process for _, process in found}) == (jobs > 1)
 
 
+@pytest.mark.slow
 def test_a_cluster_does_the_work(scheduler: str) -> None:
     found = run_parallel(_worked, ITEMS, dask=scheduler)
     assert [result for result, _ in found] == [number**2 for number in range(7)]
