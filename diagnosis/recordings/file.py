@@ -152,7 +152,7 @@ def _clock(table: pd.DataFrame, mapping: RecordingMapping) -> Clock:
             f"column {time.column} counts {unit}, which have no time zone: give the form of its dates as unit, or "
             "leave zone out of its mapping file"
         )
-    return Clock(column=time.column, unit=unit, zone=time.zone)
+    return Clock(column=time.column, unit=unit, zone=time.zone, decimal=mapping.csv.decimal)
 
 
 def set_to_one_clock(files: Sequence[RecordingFile]) -> None:

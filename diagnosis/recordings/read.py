@@ -35,10 +35,8 @@ SHORTEST_GAP_S, GAP_STEPS = 60.0, 3.0  # a gap is longer than both, unless state
 SLOW_GAPS = 10.0  # ambient temperature and air speed change slowly: holes so many times longer are bridged
 HOT_AIR = 50.0  # degC on average, from which ambient air is more likely in another unit
 LEAST_USABLE = 0.1  # share of the rows
-USUAL_SHARE, FAR_TIMES = (
-    0.99,
-    10.0,
-)  # rows of an input that are more than so many times beyond this share of all are far
+USUAL_SHARE = 0.99  # of the rows of an input,
+FAR_TIMES = 10.0  # which others exceed so many times that they may be codes of a logger
 ByRole: TypeAlias = tuple[tuple[Recording, ...], tuple[Recording, ...], tuple[Recording, ...]]
 
 

@@ -142,11 +142,14 @@ class Clock:
         Of numbers; ``iso8601`` for texts and for the time stamps of a Parquet file, or the form of other dates
     zone : str or None
         Time zone of dates that state none; None: UTC
+    decimal : str
+        Sign in numbers that are texts
     """
 
     column: str
     unit: str
     zone: str | None = None
+    decimal: str = "."
 
     @property
     def is_date(self) -> bool:
@@ -155,10 +158,7 @@ class Clock:
 
     def lacks_zone(self, values: pd.Series) -> bool:
         """True for dates without a time zone, which are taken as UTC."""
-        return self.zone is None and self._lacks_zone(values)
-
-    def _lacks_zone(self, values: pd.Series) -> bool:
-        if not self.is_date or values.empty:
+        if self.zone is not None or not self.is_date or values.empty:
             return False
         if pd.api.types.is_datetime64_any_dtype(values.dtype):
             return values.dt.tz is None
@@ -170,7 +170,7 @@ class Clock:
     def seconds(self, values: pd.Series) -> Array:
         """Convert a time column, shape (rows,), to [s], dates since 1970; NaN for a cell that is no time."""
         if not self.is_date:
-            return _numbers(values) * units_in_files("time", "s")[self.unit][0]
+            return _numbers(values, self.decimal) * units_in_files("time", "s")[self.unit][0]
         if pd.api.types.is_datetime64_any_dtype(values.dtype):
             stamps = self._zoned(values)
         elif self.unit != ISO:
@@ -206,10 +206,10 @@ class Clock:
         return cast("pd.Series", once.dt.tz_convert("UTC"))
 
 
-def _numbers(values: pd.Series) -> Array:
+def _numbers(values: pd.Series, decimal: str) -> Array:
     if not (pd.api.types.is_numeric_dtype(values.dtype) or pd.api.types.is_string_dtype(values.dtype)):
         values = values.astype(str)
-    if not pd.api.types.is_numeric_dtype(values.dtype):
+    if decimal == "," and not pd.api.types.is_numeric_dtype(values.dtype):
         values = values.str.replace(",", ".")  # one cell that is no number leaves the others as texts
     return np.asarray(pd.to_numeric(values, errors="coerce").to_numpy(dtype=np.float64, na_value=np.nan))
 

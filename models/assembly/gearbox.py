@@ -387,8 +387,8 @@ class Gearbox:
 
         Parameters
         ----------
-        speed, torque : ArrayLike, shape () or (B,)
-            Of the input shaft, [1/min] and [N m]
+        speed, torque : ArrayLike, shape () or (B,), or None
+            Of the input shaft, [1/min] and [N m], of a machine with these inputs; by default 0
         inputs : mapping of input name to ArrayLike, shape () or (B,), or None
             Further inputs, e.g. ``T_ambient`` [degC]
         network : ThermalNetwork or None
@@ -397,7 +397,7 @@ class Gearbox:
         Raises
         ------
         InputError
-            If an input is unknown.
+            If an input is unknown, or the torque follows from a power.
         ArithmeticError
             If there is no steady state.
 

@@ -55,7 +55,7 @@ def steady_state(
     Raises
     ------
     InputError
-        If the network has laws with memory, or an input is unknown.
+        If the network has laws with memory, an input is unknown, or the torque follows from a power.
     ArithmeticError
         If no steady state is found (thermal runaway, or a node that nothing cools).
 

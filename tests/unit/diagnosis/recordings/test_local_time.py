@@ -122,3 +122,19 @@ def test_a_title_above_the_header_is_named(tmp_path: Path, network: ThermalNetwo
     with pytest.raises(InputError, match=r"first line names one column; if that is a title, .* skip_lines = \[1\]"):
         read(tmp_path / "run.csv", network, "")
     assert len(read(tmp_path / "run.csv", network, "csv = { skip_lines = [1] }").time) == 200
+
+
+def test_the_cell_that_is_no_time_is_named_also_with_decimal_commas(tmp_path: Path, network: ThermalNetwork) -> None:
+    rows = table().astype({"time_s": str}).assign(time_s=lambda t: t["time_s"].str.replace(".", ","))
+    rows.loc[5, "time_s"] = "xx"
+    rows.to_csv(tmp_path / "run.csv", index=False, sep=";", decimal=",")
+    with pytest.raises(InputError, match="time_s is 'xx' at row 6; 1 of 200 rows hold no time"):
+        read(tmp_path / "run.csv", network,
+             'time = { column = "time_s", unit = "s" }\ncsv = { separator = ";", decimal = "," }')  # fmt: skip
+
+
+def test_thousands_are_no_decimals(tmp_path: Path, network: ThermalNetwork) -> None:
+    rows = table().assign(time_s=lambda t: (t["time_s"] + 1000.0).map("{:,.0f}".format))
+    rows.to_csv(tmp_path / "run.csv", index=False)
+    with pytest.raises(InputError, match="time_s is '1,000' at row 1; 200 of 200 rows hold no time"):
+        read(tmp_path / "run.csv", network, "")
