@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from builder.fmi.package import gearbox_identity
 from diagnosis.forward.recurrence import lagged
 from models.assembly.gearbox import Gearbox, load_gearbox
 from models.correction.correction import Correction, Estimate, Finding, write_correction
@@ -96,7 +97,9 @@ def test_a_faulty_sensor_is_shown_next_to_the_truth_by_fmu_and_full_model(
         np.testing.assert_allclose(result["T_oil_degC_as_recorded"], result["T_oil_degC"] + 2.5, atol=2e-6)
         assert [name for name in result if name.endswith("_as_recorded")] == ["T_oil_degC_as_recorded"]
     mixed = SensorCorrection(channel="oil", mix=(Mix(node="frame", share=0.1),))
-    write_correction(Correction.of(fzg, sensors=[mixed]), file)
+    nominal = Correction.of(fzg, sensors=[mixed])
+    assert "corrected" not in gearbox_identity(fzg, Path("fzg.fmu"), {}, nominal).description  # its instruments are
+    write_correction(nominal, file)
     for driver in ((fzg_native,), ("--gearbox", "fzg")):
         assert run_cli("simulate", *driver, plain, "--output", out, "--correction", file) == 0
         result = pd.read_csv(out)
