@@ -135,17 +135,39 @@ static void ramp(const double *begin, const double *end, double share, double *i
     for (int i = 0; i < N_INPUTS; i++) inputs[i] = begin[i] + (end[i] - begin[i]) * share;
 }
 
+/* Update the memories; gives the largest change of a rate by that (K/s of a part, by its weight), 0 if none changed. */
+static double update_memory(Network *network, double time, const double *inputs, ThermalState *state) {
+    Balance *const now = &network->now;
+    double gain[N_PARTS], rate[AT_LEAST_ONE(N_MEMORY)], jump = 1e-12;
+    find_balance(network, now, time, inputs, state, NULL);
+    if (!memcmp(state->memory, now->heat + N_SOURCES + N_MEMORY, sizeof state->memory)) return 0.0;
+    find_gain(now);
+    memcpy(gain, now->gain, sizeof gain);
+    memcpy(rate, now->heat + N_SOURCES, sizeof rate);
+    memcpy(state->memory, now->heat + N_SOURCES + N_MEMORY, sizeof state->memory);
+    find_balance(network, now, time, inputs, state, NULL);
+    find_gain(now);
+    for (int i = 0; i < N_PARTS; i++)
+        jump = larger(jump, network->weight[i] * fabs(now->gain[i] - gain[i]) / network->capacity[i]);
+    for (int i = 0; i < N_MEMORY; i++) jump = larger(jump, fabs(now->heat[N_SOURCES + i] - rate[i]));
+    return jump;
+}
+
 const char *network_advance(Network *network, ThermalState *state, double time, double duration, const double *begin,
                             const double *end, Heat *exchanged, double *failed_at) {
     Balance *const now = &network->now, *const then = &network->then;
     const double *const capacity = network->capacity;
-    double elapsed = 0.0;
+    /* A switch acts before `switch_by`; a step of `narrow` that meets it is short enough. */
+    double elapsed = 0.0, switch_by = INFINITY, narrow = 0.0;
     int tried = 0;
     memset(exchanged, 0, sizeof *exchanged);
     while (elapsed < duration) {
         const double remaining = duration - elapsed, step = larger(state->step, SHORTEST_STEP_S);
         /* Two even steps instead of a full one and a sliver. */
-        const double h = step >= remaining ? remaining : smaller(step, 0.5 * remaining);
+        const double even = step >= remaining ? remaining : smaller(step, 0.5 * remaining);
+        const double to_switch = switch_by - elapsed;
+        const double h = smaller(even, to_switch <= narrow ? to_switch : 0.5 * to_switch);
+        const double end_of_step = h == remaining ? duration : h == to_switch ? switch_by : elapsed + h;
         double factors[N_FACTORS];
         double now_inputs[AT_LEAST_ONE(N_INPUTS)] = {0.0}, then_inputs[AT_LEAST_ONE(N_INPUTS)] = {0.0};
         double k_1[N_PARTS], k_2[N_PARTS], both[N_PARTS];
@@ -153,6 +175,7 @@ const char *network_advance(Network *network, ThermalState *state, double time, 
         const double early = elapsed + GAMMA * h, late = elapsed + (1.0 - GAMMA) * h;
         double error = 0.0, sum = 0.0, next_step;
         ThermalState later = *state;
+        Heat heat;
         *failed_at = time + elapsed;
         if (tried++ == MOST_STEPS) return "the communication step needs more than 100000 steps; make it shorter. They end";
         ramp(begin, end, early / duration, now_inputs);
@@ -190,17 +213,27 @@ const char *network_advance(Network *network, ThermalState *state, double time, 
             state->step = next_step;
             continue;
         }
-        elapsed = h == remaining ? duration : elapsed + h;
-        add_heat(exchanged, now, then, k_1, k_2, h);
-        for (int i = 0; i < N_PARTS; i++) state->T[i] += h * (1.5 * k_1[i] + 0.5 * k_2[i]);
-        for (int i = 0; i < N_MEMORY; i++) state->memory[i] += h * (1.5 * rate_1[i] + 0.5 * rate_2[i]);
-        /* A short communication step says nothing about the step that the network would allow. */
-        state->step = h < step ? larger(next_step, step) : next_step;
+        for (int i = 0; i < N_PARTS; i++) later.T[i] = state->T[i] + h * (1.5 * k_1[i] + 0.5 * k_2[i]);
+        for (int i = 0; i < N_MEMORY; i++)
+            later.memory[i] = state->memory[i] + h * (1.5 * rate_1[i] + 0.5 * rate_2[i]);
+        heat = *exchanged;
+        add_heat(&heat, now, then, k_1, k_2, h);
         if (LAWS_UPDATE) {
-            ramp(begin, end, elapsed / duration, now_inputs);
-            find_balance(network, now, time + elapsed, now_inputs, state, NULL);
-            memcpy(state->memory, now->heat + N_SOURCES + N_MEMORY, N_MEMORY * sizeof(double));
+            double jump;
+            ramp(begin, end, end_of_step / duration, now_inputs);
+            jump = update_memory(network, time + end_of_step, now_inputs, &later);
+            if (jump > 0.0) narrow = TOLERANCE_K / jump;
+            if (jump > 0.0 && h > larger(narrow, SHORTEST_STEP_S)) {
+                switch_by = end_of_step;
+                continue;
+            }
+            if (jump > 0.0 || end_of_step >= switch_by) switch_by = INFINITY;
         }
+        elapsed = end_of_step;
+        *exchanged = heat;
+        /* A short communication step says nothing about the step that the network would allow. */
+        later.step = h < step ? larger(next_step, step) : next_step;
+        *state = later;
     }
     return NULL;
 }

@@ -16,6 +16,9 @@ Losses are the dear part. Where speed and torque are constant and no temperature
 than 0.1 K from the first stage to the second, the second takes over the losses of the first: they would differ by about
 one part in a thousand, which is half as much over the step, and nothing in a steady state.
 
+A switch (a discrete update of an extra state) acts at the end of a step. Where it changes the heat balance so much that
+acting late matters, the step is halved around the moment of the switch until it does not.
+
 Heat is conserved by construction: the heat brought in and the heat given off are integrated by the same formula as the
 temperatures, so that stored = brought in - given off to rounding.
 """
@@ -175,6 +178,7 @@ def advance(system: System, state: State, time: float, duration: float, inputs: 
     elapsed = 0.0
     slope = (inputs_end - inputs) / duration if duration > 0.0 else np.zeros_like(inputs)
     identity = np.eye(state.states.shape[-1])
+    switch_by, narrow = np.inf, 0.0  # a switch acts before that moment; a step so long that meets it is short enough
     tried = 0
     while elapsed < duration:
         if tried == MOST_STEPS:
@@ -186,6 +190,8 @@ def advance(system: System, state: State, time: float, duration: float, inputs: 
         remaining = duration - elapsed
         # Two even steps instead of a full one and a sliver.
         h = remaining if state.step >= remaining else min(state.step, 0.5 * remaining)
+        to_switch = switch_by - elapsed
+        h = min(h, to_switch if to_switch <= narrow else 0.5 * to_switch)
         early, late = elapsed + GAMMA * h, elapsed + (1.0 - GAMMA) * h
         now = system.balance(time + early, inputs + slope * early, state.states)
         inverse = np.linalg.inv(identity - (GAMMA * h) * now.matrix)
@@ -203,12 +209,24 @@ def advance(system: System, state: State, time: float, duration: float, inputs: 
                 raise ArithmeticError(f"the step size fell below {SHORTEST_STEP_S:g} s at {time + elapsed:g} s")
             state = replace(state, step=next_step)
             continue
-        elapsed = duration if h == remaining else elapsed + h
+        end = duration if h == remaining else switch_by if h == to_switch else elapsed + h
+        at_end = (time + end, inputs + slope * end)
         later = state.states + h * (1.5 * k_1 + 0.5 * k_2)
+        switched = system.updated(*at_end, later)
+        switches = not np.array_equal(switched, later)
+        if switches:
+            jump = system.balance(*at_end, switched).derivative - system.balance(*at_end, later).derivative
+            narrow = TOLERANCE_K / max(float(np.max(system.error_weights * np.abs(jump))), 1e-12)
+            if h > max(narrow, SHORTEST_STEP_S):
+                switch_by = end
+                continue
+        if switches or end >= switch_by:
+            switch_by = np.inf
+        elapsed = end
         # The two stages with the weights of the temperatures, 3/2 and 1/2: what leaves the nodes arrives there.
         flow = 0.5 * (now.heat_out + then.heat_out + GAMMA * h * times(now.heat_out_slope, k_1 + k_2))
         state = State(
-            states=system.updated(time + elapsed, inputs + slope * elapsed, later),
+            states=switched,
             # A short communication step says nothing about the step that the network would allow.
             step=max(next_step, state.step) if h < state.step else next_step,
             heat_in=state.heat_in + 0.5 * h * (now.heat_in + then.heat_in),

@@ -310,12 +310,14 @@ def test_thermostat_with_hysteresis() -> None:
     result = long_run(network, end=4800.0, dt=20.0, initial=60.0)
     oil = result.temperatures["oil"]
     assert closed(result) < 1e-6
-    inside = oil[np.argmax(oil > 80.0) :]
-    assert inside.max() < 81.0
-    assert inside.min() > 69.0
-    turns = np.flatnonzero(np.diff(np.sign(np.diff(inside))) != 0)
+    assert oil.max() < 80.05
+    assert oil[np.argmax(oil) :].min() > 69.95
+    turns = np.flatnonzero(np.diff(np.sign(np.diff(oil))) != 0)
     assert len(turns) >= 4  # a limit cycle between both thresholds
-    assert set(np.round(inside[turns + 1][:4] / 10.0)) == {7.0, 8.0}
+    assert set(np.round(oil[turns + 1][:4] / 10.0)) == {7.0, 8.0}
+    # A switch acts at its moment, however long the communication steps are: late by one of 600 s it would be by 10 K.
+    coarse = long_run(network, end=4800.0, dt=600.0, initial=60.0).temperatures["oil"]
+    assert coarse == pytest.approx(oil[::30], abs=2.0)
     assert long_run(NETWORK, end=4800.0, initial=60.0).temperatures["oil"][-1] > 100.0
 
 
