@@ -25,7 +25,7 @@ from models.definition.sections import Training
 from models.files.cycle import Cycle
 from models.files.output_files import refuse_to_replace, write_table
 from models.files.paths import kind_of
-from models.quantities.quantities import Input
+from models.quantities.quantities import MEMORY, Input
 from models.simulation.start_temperatures import start_temperatures
 
 if TYPE_CHECKING:
@@ -61,8 +61,8 @@ class Model:
         Nodes that are drawn together
     correction : Correction or None
         Whose physics it holds
-    memories : tuple of str
-        Of its laws, as wear or the switch of a fan; a result does not contain them
+    memories : mapping of str to float
+        Of its laws, as wear or the switch of a fan, with their start values
     """
 
     title: str
@@ -73,7 +73,7 @@ class Model:
     run: Callable[[Cycle, Initial, Count], dict[str, Array]]
     groups: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     correction: Correction | None = None
-    memories: tuple[str, ...] = ()
+    memories: Mapping[str, float] = field(default_factory=dict)
 
 
 def _full_model(name_or_file: str, correction: Path | None, mapping: Path | None, *, claims_only: bool) -> Model:
@@ -100,7 +100,7 @@ def _full_model(name_or_file: str, correction: Path | None, mapping: Path | None
         run=run,
         groups=network.groups,
         correction=found,
-        memories=tuple(state.name for state in network.states),
+        memories={state.name: state.start for state in network.states},
     )
 
 
@@ -223,15 +223,14 @@ def simulate(
     recorded = _without_biases(recorded, model.correction)
     start = recorded.of(model.nodes) if initial == RECORDED else given
     if start is not None:
-        if isinstance(given, Mapping) and model.memories:
-            console.err.print(
-                f"note: {initial}: the memories of laws ({', '.join(model.memories)}) are no columns of a result and "
-                "start again from their beginning; simulate in one piece where they count"
-            )
+        memories = {}
         if isinstance(start, Mapping):  # a result also has temperatures of boundaries
+            memories = {MEMORY + name: start.get(MEMORY + name, value) for name, value in model.memories.items()}
+            if initial != RECORDED and (fresh := [name for name in memories if name not in start]):
+                console.err.print(f"note: {initial}: has no {', '.join(fresh)}; they start from their beginning")
             start = {name: T for name, T in start.items() if name in model.nodes}
         source = str(recorded.path) if initial == RECORDED else f"--initial {initial}"
-        start = start_temperatures(start, model.nodes, source=source)
+        start = start_temperatures(start, model.nodes, source=source) | memories
     if output_interval is not None:
         cycle = cycle.refined(output_interval)
     columns = _simulated(model, cycle, start, is_recording=bool(recorded.temperatures))

@@ -31,6 +31,7 @@ from builder.drive.machine_of_fmu import (
     damage_reported,
     description_of,
     fmu_machine,
+    memory_variables,
     start_variables,
     to_column,
     to_column_factors,
@@ -43,7 +44,7 @@ from models.columns.columns import Columns
 from models.files.cycle import Cycle
 from models.quantities.quantities import column_of_input
 from models.quantities.units import UNITS
-from models.simulation.start_temperatures import start_temperatures
+from models.simulation.start_temperatures import start_memories, start_temperatures
 
 logger = logging.getLogger(__name__)
 
@@ -139,7 +140,8 @@ class LoadedFmu:
         self.variables = {v.name: v for v in variables}
         self._inputs = [v for v in variables if v.causality == "input"]
         self.inputs = [input_name(v.name) for v in self._inputs]
-        self._outputs = [v for v in variables if v.causality == "output" and result_column(v.name) is not None]
+        shown = [v for v in variables if v.causality in ("output", "local")]
+        self._outputs = [v for v in shown if result_column(v.name) is not None]
         self._booleans = [v.valueReference for v in self._outputs if v.type == "Boolean"]
         self._reals = [v.valueReference for v in self._outputs if v.type != "Boolean"]
         self._input_references = [v.valueReference for v in self._inputs]
@@ -189,7 +191,7 @@ class LoadedFmu:
             self.slave.setReal([variable.valueReference], [float(value)])
 
     def set_initial(self, initial: float | Mapping[str, float]) -> None:
-        """Set start temperatures, [degC]: one for all nodes, or all parts by name."""
+        """Set start values: one temperature for all nodes, or all parts by name, and memories; [degC]."""
         starts = start_variables(self.variables)
         nodes = [v.name.removesuffix(".T").strip("'") for v in self._outputs if v.name.endswith(".T")]
         temperatures = start_temperatures(initial, list(starts), known=nodes, source=str(self.path))
@@ -199,6 +201,9 @@ class LoadedFmu:
             return
         for name, variable in starts.items():
             self._set_real(variable, temperatures[name])
+        memories = memory_variables(self.variables.values())
+        values = start_memories(initial, {name: float(v.start) for name, v in memories.items()})
+        self.slave.setReal([memories[name].valueReference for name in values], list(values.values()))
 
     def surroundings(self) -> float:
         """Return the ambient temperature, else that of the first boundary, at the inputs that are set, [degC]."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -53,16 +53,21 @@ def fmu_nodes(path: Path) -> tuple[str, ...]:
     return tuple(name.removesuffix(".T").strip("'") for name in names if name.endswith(".T"))
 
 
-def fmu_memories(path: Path) -> tuple[str, ...]:
-    """Return the memories of the laws of an FMU.
+def fmu_memories(path: Path) -> dict[str, float]:
+    """Return the memories of the laws of an FMU, with their start values.
 
     Raises
     ------
     InputError
         If the file is not an FMU of this project.
     """
-    names = (v.name for v in description_of(path).modelVariables)
-    return tuple(name.removeprefix("state.").strip("'") for name in names if name.startswith("state."))
+    return {name: float(v.start) for name, v in memory_variables(description_of(path).modelVariables).items()}
+
+
+def memory_variables(variables: Iterable[Any]) -> dict[str, Any]:
+    """Start variables of the memories, by the name of the memory."""
+    before = "initial.state."
+    return {v.name.removeprefix(before).strip("'"): v for v in variables if v.name.startswith(before)}
 
 
 def refuse_other_correction(path: Path, correction: Correction, *, source: str) -> None:

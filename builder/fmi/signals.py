@@ -20,7 +20,7 @@ import sympy as sp
 from models.base.errors import InputError, did_you_mean
 from models.network.laws import symbol
 from models.portable.surrogate import KELVIN, SurrogateLosses
-from models.quantities.quantities import GEARBOX_INPUTS, TYPES, quantity_of_signal
+from models.quantities.quantities import GEARBOX_INPUTS, MEMORY, TYPES, quantity_of_signal
 from models.quantities.units import UNITS, Unit, conversion, find_unit, fmi_symbol
 from models.simulation.thermal_network import ThermalNetwork
 
@@ -34,7 +34,7 @@ MAYBE_LINEAR = ("temperature", "total_loss", "loss", "heat")  # roles of outputs
 Role = Literal[
     "input", "temperature", "total_loss", "loss", "heat", "heat_flow", "heat_to_boundary",
     "heat_in", "heat_stored", "torque_loss", "efficiency", "in_domain", "domain_distance",
-    "initial_uniform", "initial_temperature", "start_temperature", "factor", "state", "other",
+    "initial_uniform", "initial_temperature", "start_temperature", "factor", "state", "start_state", "other",
 ]  # fmt: skip
 
 
@@ -212,13 +212,15 @@ def fmi_name(name: str) -> str:
 
 
 def result_column(name: str) -> str | None:
-    """Column of a result file for an output of an FMU; None for one that has no column.
+    """Column of a result file for an output or memory of an FMU; None for one that has no column.
 
     Examples
     --------
     >>> result_column("oil.T"), result_column("loss.total"), result_column("loss.seal_1"), result_column("heat.extra")
     ('T_oil_degC', 'P_loss_W', 'P_loss_seal_1_W', None)
     """
+    if name.startswith("state."):
+        return MEMORY + name.removeprefix("state.").strip("'")
     quantity = quantity_of_signal(name)
     return None if quantity is None else quantity.column
 
@@ -290,9 +292,13 @@ class _Table:
         yield from self._initial()
         yield from self._factors()
         for state in self.network.states:
-            yield Signal(name=f"state.{fmi_name(state.name)}", role="state", of=state.name, causality="local",
-                         variability="continuous", initial="calculated", nominal=max(abs(state.start), 1.0),
+            name, nominal = f"state.{fmi_name(state.name)}", max(abs(state.start), 1.0)
+            yield Signal(name=name, role="state", of=state.name, causality="local", column=result_column(name),
+                         variability="continuous", initial="calculated", nominal=nominal,
                          description=f"Memory {state.name} of the thermal network")  # fmt: skip
+            yield Signal(name=f"initial.{name}", role="start_state", of=state.name, causality="parameter",
+                         variability="fixed", initial="exact", start=state.start, nominal=nominal,
+                         description=f"Memory {state.name} at the start")  # fmt: skip
 
     def _domain(self, name: str) -> tuple[float, float] | None:
         """Range of training of an input or of the temperature of a node, in SI units."""
@@ -335,7 +341,8 @@ class _Table:
                 needs_state: bool = True) -> Signal:  # fmt: skip
         inputs, parameters = self._direct(expression)
         nodes = [of] if role == "temperature" else [part.name for part in self.network.parts]
-        starts = (*INITIAL, *(f"{fmi_name(node)}.T_start" for node in nodes)) if needs_state else ()
+        memories = [f"initial.state.{fmi_name(s.name)}" for s in self.network.states if role != "temperature"]
+        starts = (*INITIAL, *(f"{fmi_name(node)}.T_start" for node in nodes), *memories) if needs_state else ()
         return Signal(
             name=name, role=role, of=of, description=description, type=kind, unit=TYPES[kind].unit if kind else None,
             causality="output", variability="continuous" if kind else "discrete", initial="calculated", minimum=minimum,

@@ -176,7 +176,6 @@ def _network_data(data: _Data, network: ThermalNetwork) -> Structure:
     )
     data.define("N_FACTORS", structure.n_factors)
     data.array("char", "SOURCE_IS_LOSS", (int(source.is_loss) for source in network.sources))
-    data.array("double", "MEMORY_START", (float(state.start) for state in network.states))
     return structure
 
 
@@ -234,6 +233,7 @@ def _place_data(data: _Data, table: SignalTable, network: ThermalNetwork) -> Non
     places("BOUNDARY_TEMPERATURE", "temperature", boundaries)
     places("BOUNDARY_FLOW", "heat_flow", boundaries)
     places("BOUNDARY_HEAT", "heat_to_boundary", boundaries)
+    places("MEMORY_START", "start_state", (state.name for state in network.states))
     places("MEMORY_OUTPUT", "state", (state.name for state in network.states))
     heats = (by_role["loss" if source.is_loss else "heat", source.name] for source in network.sources)
     data.array("Place", "HEAT_OUTPUT", (_place(signal) for signal in heats))

@@ -58,7 +58,6 @@ from .evaluation import Laws
 
 
 LAWS = Laws({laws})
-MEMORY_START = {memory}
 VARIABLES = [
     {variables},
 ]
@@ -137,7 +136,6 @@ def python_code(
     generated = GENERATED.format(
         functions="\n\n".join(functions.values()).rstrip(),
         laws=", ".join(f"{name}={text}" for name, text in arguments.items()),
-        memory=[float(state.start) for state in network.states],
         variables=",\n    ".join(repr(_variable(signal)) for signal in table),
         losses=None if losses is None else _without_weights(losses).to_dict(),
         digests={Path(name).stem: hashlib.sha256(content).hexdigest() for name, content in sorted(onnx.items())},

@@ -34,7 +34,7 @@ static void show(Model *model, Place place, double value) {
 static void start_values(const Model *model, ThermalState *thermal) {
     const int uniform = model->values[INITIAL_UNIFORM] != 0.0;
     for (int i = 0; i < N_PARTS; i++) thermal->T[i] = inner(model, uniform ? INITIAL_TEMPERATURE : START[i]);
-    memcpy(thermal->memory, MEMORY_START, sizeof thermal->memory);
+    for (int i = 0; i < N_MEMORY; i++) thermal->memory[i] = inner(model, MEMORY_START[i]);
     thermal->step = FIRST_STEP_S;
 }
 

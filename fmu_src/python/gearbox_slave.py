@@ -77,6 +77,7 @@ class GearboxSlave(Fmi2Slave):  # type: ignore[misc,unused-ignore]
         self._inputs = [place["input", name] for name in laws.inputs]
         self._factors = [place["factor", name] for name in laws.parameters]
         self._starts = [place["start_temperature", name] for name in laws.parts]
+        self._memories = [place["start_state", name] for name in laws.states]
         self._loss_nodes = [laws.parts.index(name) for name in self._losses.temperature_nodes]
         self._uniform, self._common = place["initial_uniform", ""], place["initial_temperature", ""]
         self._calculated_scale, self._calculated_offset = np.array([(v.scale, v.offset) for v in self._calculated]).T
@@ -132,7 +133,7 @@ class GearboxSlave(Fmi2Slave):  # type: ignore[misc,unused-ignore]
             self._system = NetworkSystem(self.generated.LAWS, self._losses, factors, vector=False)
         state = self._state
         if state is None:
-            first = np.array([*self._start_temperatures(), *self.generated.MEMORY_START])
+            first = np.array([*self._start_temperatures(), *inner[self._memories]])
             state = solver.start(first, self._system.n_boundaries)
         return self._system, inner[self._inputs], state
 

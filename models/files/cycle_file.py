@@ -16,7 +16,7 @@ from models.base.types import Array
 from models.files.cycle import Cycle
 from models.files.paths import KINDS
 from models.files.table_file import read_table
-from models.quantities.quantities import GEARBOX_INPUTS, NODE_TEMPERATURE, Input
+from models.quantities.quantities import GEARBOX_INPUTS, MEMORY, NODE_TEMPERATURE, Input
 
 
 @dataclass(frozen=True)
@@ -118,11 +118,10 @@ def _temperatures(cells: pd.Series) -> Array:
 
 
 def read_initial(value: str) -> float | dict[str, float]:
-    """Read initial temperatures: a number in degC, or a file whose ``T_<node>_degC`` columns end with them.
+    """Read start values: a number in degC, or a file with ``T_<node>_degC`` (and ``state_<memory>``) columns.
 
     The last row counts, so that a result can be continued.
-    :func:`models.simulation.start_temperatures.start_temperatures` checks
-    the temperatures.
+    :mod:`models.simulation.start_temperatures` checks the values.
 
     Raises
     ------
@@ -142,11 +141,12 @@ def read_initial(value: str) -> float | dict[str, float]:
                 f"{value}: is no start; a temperature in degC, 'recorded', or a table ({', '.join(KINDS)}) is"
             ) from None
         table = read_table(Path(value))
-    last = {column: table[column].iloc[-1] for column in _temperature_columns(table) if len(table)}
-    if not last:
+    memories = [str(name) for name in table.columns if str(name).startswith(MEMORY)]
+    last = {column: table[column].iloc[-1] for column in _temperature_columns(table) + memories if len(table)}
+    if not last.keys() - set(memories):
         raise InputError(f"{value}: has no T_<node>_degC columns with values to start from")
     try:
-        return {column[2:-5]: float(T) for column, T in last.items() if pd.notna(T)}
+        return {name if name in memories else name[2:-5]: float(x) for name, x in last.items() if pd.notna(x)}
     except ValueError as error:
         texts = [f"{column} is {T!r}" for column, T in last.items() if isinstance(T, str)]
         raise InputError(f"{value}: {', '.join(texts)} in the last row; numbers are needed to start from") from error

@@ -279,6 +279,7 @@ def column_of(name: str) -> str:
     return name if quantity is None else quantity.column
 
 
+MEMORY = "state_"  # before the name of a memory of the laws, in results and start values
 SENSOR = "__"  # between the node and the name of one of several sensors at it
 
 

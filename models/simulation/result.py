@@ -11,7 +11,7 @@ import numpy as np
 from models.base.types import Array, Numeric
 from models.columns.columns import Columns, What
 from models.portable.evaluation import efficiency, torque_loss
-from models.quantities.quantities import TOTAL_LOSS, column_of, column_of_input
+from models.quantities.quantities import MEMORY, TOTAL_LOSS, column_of, column_of_input
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -115,6 +115,8 @@ class Result(Outcome):
     temperatures, losses, extra_heat : mapping of str to Array, shape (..., N)
         As in :class:`Outcome`
     domain_distance : Array, shape (..., N)
+    memories : mapping of str to Array, shape (..., N)
+        Memories of the laws (of a thermostat, of wear ...); with the temperatures they continue a simulation
     heat_to : mapping of boundary to Array, shape (..., N)
         Heat given to each boundary since the start, [J]
     heat_in, heat_stored : Array, shape (..., N)
@@ -140,6 +142,7 @@ class Result(Outcome):
     losses: Mapping[str, Array]
     extra_heat: Mapping[str, Array]
     domain_distance: Array
+    memories: Mapping[str, Array]
     heat_to: Mapping[str, Array]
     heat_in: Array
     heat_stored: Array
@@ -161,7 +164,8 @@ class Result(Outcome):
 
     def columns(self, *, ratio: float | None = None) -> Columns:
         """Return the columns of a file, time first; see :meth:`Outcome.columns`."""
-        return Columns(time_s=self.time) | super().columns(ratio=ratio)
+        memories = {f"{MEMORY}{name}": values for name, values in self.memories.items()}
+        return Columns(time_s=self.time) | super().columns(ratio=ratio) | memories
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)

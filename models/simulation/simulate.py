@@ -17,7 +17,7 @@ from models.portable import solver
 from models.portable.evaluation import NetworkSystem
 from models.portable.surrogate import range_distance
 from models.simulation.result import Result
-from models.simulation.start_temperatures import start_temperatures
+from models.simulation.start_temperatures import start_memories, start_temperatures
 
 
 def network_system(
@@ -58,7 +58,7 @@ def network_system(
 
 
 def initial_states(network: Network, initial: float | Mapping[str, float]) -> Array:
-    """States at the start, shape (n,); see :func:`models.simulation.start_temperatures.start_temperatures`.
+    """States at the start, shape (n,); see :mod:`models.simulation.start_temperatures`.
 
     Raises
     ------
@@ -66,7 +66,8 @@ def initial_states(network: Network, initial: float | Mapping[str, float]) -> Ar
     """
     parts = [part.name for part in network.parts]
     temperatures = start_temperatures(initial, parts, known=network.node_names)
-    return np.array([*temperatures.values(), *(state.start for state in network.states)])
+    memories = start_memories(initial, {state.name: state.start for state in network.states})
+    return np.array([*temperatures.values(), *memories.values()])
 
 
 def input_table(network: Network, cycle: Cycle) -> Array:
@@ -95,8 +96,9 @@ def simulate(
         Inputs; straight lines between the rows
     losses : Losses
         The full model or a surrogate
-    initial : float, mapping of node name to float, or None
-        Temperatures at the first row, [degC]; by default the first ambient temperature
+    initial : float, mapping of name to float, or None
+        Temperatures at the first row, [degC]; by default the first ambient temperature. A mapping has all nodes, and
+        may have memories of laws, as ``state_<name>``
     parameters : mapping of name to ArrayLike, shape () or (B,), or None
         Values of tunable parameters; arrays simulate B variants at once
     trained : Training or None
@@ -225,6 +227,7 @@ def evaluate(
         extra_heat={s.name: heats[..., i] for i, s in enumerate(network.sources) if not s.is_loss},
         domain_distance=distance,
         heat_to=dict(zip(system.laws.boundaries, np.moveaxis(heat_out, -1, 0), strict=True)),
+        memories=dict(zip(system.laws.states, np.moveaxis(states[..., n_parts:], -1, 0), strict=True)),
         heat_in=heat_in,
         heat_stored=((states - states[..., :1, :])[..., :n_parts] * system.capacities).sum(axis=-1),
     )

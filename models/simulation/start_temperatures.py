@@ -1,4 +1,4 @@
-"""Start temperatures of a simulation: one check for the full model, FMUs and the command line."""
+"""Start values of a simulation: one check for the full model, FMUs and the command line."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import math
 from collections.abc import Collection, Mapping, Sequence
 
 from models.base.errors import InputError, did_you_mean
+from models.quantities.quantities import MEMORY
 
 ABSOLUTE_ZERO = -273.15  # degC
 HOTTEST_START = 250.0  # degC, of the coldest node; above it kelvin are meant, or the gearbox is long destroyed
@@ -18,8 +19,8 @@ def start_temperatures(
 
     Parameters
     ----------
-    initial : float or mapping of node name to float
-        One temperature for all nodes, or one of each, [degC]
+    initial : float or mapping of name to float
+        One temperature for all nodes, or one of each, [degC]; memories (``state_<name>``) are left out
     nodes : sequence of str
         Nodes that need a start temperature
     known : collection of str
@@ -45,7 +46,7 @@ kelvin are meant, give 20
     faults = []
     if isinstance(initial, Mapping):
         for name in initial:
-            if name not in nodes and name not in known:
+            if name not in nodes and name not in known and not name.startswith(MEMORY):
                 faults.append(f"start temperature of an unknown node {name!r}{did_you_mean(name, [*nodes, *known])}")
         missing = [name for name in nodes if name not in initial]
         if missing:
@@ -73,3 +74,33 @@ kelvin are meant, give 20
     if faults:
         raise InputError("\n".join(f"{source}: {fault}" if source else fault for fault in faults))
     return temperatures
+
+
+def start_memories(initial: float | Mapping[str, float], memories: Mapping[str, float]) -> dict[str, float]:
+    """Start value of every memory of the laws (of a thermostat, of wear ...).
+
+    Parameters
+    ----------
+    initial : float or mapping of name to float
+        Start values; those of memories are called ``state_<name>``
+    memories : mapping of str to float
+        All memories, with the value that they have where `initial` has none
+
+    Raises
+    ------
+    InputError
+        If a memory is unknown, or its value is not finite.
+
+    Examples
+    --------
+    >>> start_memories({"oil": 60.0, "state_wear": 0.25}, {"wear": 0.0, "valve": 1.0})
+    {'wear': 0.25, 'valve': 1.0}
+    """
+    given = initial if isinstance(initial, Mapping) else {}
+    found = {name.removeprefix(MEMORY): float(value) for name, value in given.items() if name.startswith(MEMORY)}
+    for name, value in found.items():
+        if name not in memories:
+            raise InputError(f"start value of an unknown memory {name!r}{did_you_mean(name, memories)}")
+        if not math.isfinite(value):
+            raise InputError(f"the start value of the memory {name} is {value:g}; a finite number is needed")
+    return dict(memories) | found

@@ -5,6 +5,7 @@ from __future__ import annotations
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from builder.fmi.signals import signal_table
 from builder.native.native_fmu import build_native_fmu
 from builder.python.python_fmu import build_python_fmu
 from models.assembly.gearbox import load_gearbox
+from models.base.errors import InputError
 from models.files.cycle import Cycle
 from models.portable.evaluation import NoLosses
 from models.quantities.quantities import usual_inputs
@@ -147,3 +149,42 @@ def test_the_python_fmu_agrees_with_the_native_one(path: Path, network: ThermalN
     assert expected["time"][-1] == 900.0
     for name in expected.dtype.names:
         np.testing.assert_allclose(found[name], expected[name], rtol=1e-9, atol=1e-9, err_msg=name)
+
+
+def test_a_run_is_continued_with_its_memories(tmp_path: Path) -> None:
+    """The heater is on at 450 s although a new run would begin with it off; the wear of the first half is kept."""
+
+    def two_point(s: Any) -> sp.Expr:
+        return sp.Piecewise((1.0, s.T_oil < 40.0), (0.0, s.T_oil > 60.0), (s.on, True))
+
+    network = (
+        ThermalNetwork(nodes=(), inputs=usual_inputs(T_ambient=20.0))
+        .with_node("oil", 4000.0)
+        .with_state("on", start=0.0, update=two_point)
+        .with_state("wear", start=0.0, rate=lambda s: (1.0 - s.wear) / 600.0)
+        .with_source("oil", lambda s: 300.0 * s.on + 100.0 * s.wear, name="heat")
+        .with_link("oil", "air", 5.0, temperature=lambda s: s.T_ambient)
+    )  # fmt: skip
+    cycle = Cycle(np.linspace(0.0, 900.0, 91), {"T_ambient": np.full(91, 20.0)})
+    later = Cycle(cycle.time[45:], {"T_ambient": np.full(46, 20.0)})
+    targets = [tmp_path / "native.fmu", tmp_path / "python.fmu"]
+    build_native_fmu(ANY, None, (), targets[0], network=network, platforms="host")
+    build_python_fmu(ANY, None, (), targets[1], network=network)
+
+    def full(cycle: Cycle, initial: float | dict[str, float]) -> dict[str, np.ndarray]:
+        return network.simulate(cycle, losses=NoLosses(), initial=initial).columns()
+
+    runs = [full, *(lambda c, initial, fmu=fmu: drive_fmu(fmu, c, initial=initial) for fmu in targets)]
+    for run in runs:
+        whole = run(cycle, 20.0)
+        assert whole["state_on"][45] == 1.0
+        assert whole["state_wear"][45] == pytest.approx(1.0 - np.exp(-0.75), abs=1e-3)
+        start = {"oil": float(whole["T_oil_degC"][45])}
+        memories = {name: float(whole[name][45]) for name in ("state_on", "state_wear")}
+        rest = run(later, start | memories)
+        assert rest["T_oil_degC"] == pytest.approx(whole["T_oil_degC"][45:], abs=0.05)
+        assert np.abs(run(later, start)["T_oil_degC"] - whole["T_oil_degC"][45:]).max() > 1.0
+        with pytest.raises(InputError, match="unknown memory 'ware'; did you mean 'wear'"):
+            run(later, start | {"state_ware": 0.5})
+        with pytest.raises(InputError, match="memory wear is nan; a finite number is needed"):
+            run(later, start | {"state_wear": np.nan})
