@@ -27,6 +27,7 @@ SAMPLES = 5  # of the inputs per interval, at which losses are computed: they ar
 LONGEST = 5  # times INTERVAL_S: of an interval in which nothing happens
 CALM_SHARE = 0.5  # of the time since something happened, that an interval may last
 STEADY_INPUT, STEADY_AMBIENT_K = 0.01, 1.0  # range of the inputs inside an interval, of their usual size; and in K
+NOISE_SDS, MOST_NOISE = 6.0, 0.03  # noise of an input is no change: range that it may have, and at most of its size
 BEND_REACH = 3  # intervals to either side of a grid point, over which means are compared to see a temperature bend
 BEND_SDS, LEAST_BEND_K, LEAST_BEND_W = 6.0, 0.3, 2.0  # a bend that counts: of its noise, and at least
 SETTLING_S = 600.0  # after a jump of the inputs, in which temperatures bend because of it, and smoothly
@@ -221,11 +222,11 @@ def _pieces_of(recording: Recording, inputs: Sequence[str], channels: Sequence[s
         else:
             grid = np.arange(time[0], time[-1] + 0.5 * INTERVAL_S, INTERVAL_S)
             grid = grid[grid <= time[-1] + 1e-9]
-            if not even:
-                driven = {name: recording.inputs[name][rows] for name in inputs}
-                grid = _thinned(grid, time, driven, {n: values[n][rows] for n in channels if n in values})
-                if any(np.ptp(course[time >= grid[-1]]) > _steady(name, course) for name, course in driven.items()):
-                    grid = np.append(grid, time[-1])  # the machine stops, say, in what is left of an interval
+        if not even and native <= SLOW_S:
+            driven = {name: recording.inputs[name][rows] for name in inputs}
+            grid = _thinned(grid, time, driven, {n: values[n][rows] for n in channels if n in values})
+            if any(np.ptp(course[time >= grid[-1]]) > _steady(name, course) for name, course in driven.items()):
+                grid = np.append(grid, time[-1])  # the machine stops, say, in what is left of an interval
         if len(grid) < SHORTEST_PIECE:
             continue
         edges = grid[:-1, None] + np.diff(grid)[:, None] * np.linspace(0.0, 1.0, SAMPLES + 1)
@@ -302,29 +303,31 @@ def _thinned(even: Array, time: Array, inputs: Mapping[str, Array], values: Mapp
     Parameters
     ----------
     even : Array
-        Grid points :data:`INTERVAL_S` apart
+        Grid points :data:`INTERVAL_S` apart, or the rows
     time : Array, shape (rows,)
     values : mapping of str to Array
         What was measured, with gaps
     """
     if len(even) < SHORTEST_PIECE:
         return even
-    count = len(even) - 1
-    cell = np.clip(((time - time[0]) / INTERVAL_S).astype(int), 0, count - 1)
+    count, step = len(even) - 1, float(np.median(np.diff(even)))
+    cell = np.clip(np.searchsorted(even, time + 1e-9, side="right") - 1, 0, count - 1)
     happens = np.zeros(count, dtype=bool)
-    longest = np.full(count, LONGEST)  # of the interval that begins there
+    most = int(LONGEST * INTERVAL_S / step + 1e-9)
+    longest = np.full(count, most)  # of the interval that begins there
     for name, rows in inputs.items():
         means = _cell_means(rows, cell, count)
-        allowed = _steady(name, rows)
+        usual = _steady(name, rows)
+        allowed = max(usual, min(NOISE_SDS * white_sd(means), MOST_NOISE / STEADY_INPUT * usual))
         moved = np.abs(np.diff(means)) > allowed
         happens[1:] |= moved
         happens[:-1] |= moved
-        for length in range(LONGEST, 1, -1):
+        for length in range(most, 1, -1):
             windows = sliding_window_view(np.append(means, np.full(length - 1, means[-1])), length)
             longest[np.ptp(windows, axis=-1) > allowed] = length - 1  # the shortest is the last to say so
     at = np.arange(count)
     jumped = np.maximum.accumulate(np.where(happens, at, -count))
-    settled = (at - jumped) * INTERVAL_S > SETTLING_S
+    settled = (at - jumped) * step > SETTLING_S
     for name, rows in values.items():
         bends, turns = _bends(_cell_means(rows, cell, count), LEAST_BEND_W if is_total_loss(name) else LEAST_BEND_K)
         happens |= (settled & bends) | turns

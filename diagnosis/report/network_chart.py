@@ -84,8 +84,8 @@ def marks(diagnosis: Diagnosis) -> Marks:
             pointed += [(link.name, said) for link in network.links if link.name.startswith(label)]
             names |= {node: node.removeprefix(f"{label}_") for node in added & set(finding.term.target)}
     if diagnosis.verdict not in NO_CLAIM:
-        pointed += [(place.node, (LACKS if place.heat_max_W else MISREAD, place.probability))
-                    for place in diagnosis.location if place.probability >= LIKELY]  # fmt: skip
+        pointed += [(node, (LACKS if place.heat_max_W else MISREAD, place.probability))
+                    for place in diagnosis.location if place.probability >= LIKELY for node in place.nodes]  # fmt: skip
     for target, said in pointed:
         found_nodes, found_links = _meant(network, target)
         nodes |= {node: said for node in found_nodes if node not in nodes}
@@ -196,7 +196,9 @@ def _bent(a: tuple[float, float], b: tuple[float, float]) -> tuple[Array, Array]
 
 def _targets(finding: Finding) -> tuple[str, ...]:
     term = finding.term
-    return (finding.node,) if term is None or term.kind in ("link", "signal") else term.target
+    if term is None or term.kind == "signal":
+        return (finding.node,)
+    return term.target[:-1] if term.kind == "link" else term.target
 
 
 def _meant(network: ThermalNetwork, target: str) -> tuple[tuple[str, ...], tuple[str, ...]]:

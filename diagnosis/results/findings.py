@@ -208,10 +208,37 @@ def values_of(fit: Fit, effect: Hypothesis) -> Values:
     if effect.term is None:
         return found
     name = effect.term.strength.name
+    for parameter, error in _switch_errors(fit, effect.term).items():
+        found[parameter] = (found[parameter][0], math.hypot(found[parameter][1], error))
     if not effect.term.of_measurement:
         value, error = found[name]
         return {**found, name: (value, math.hypot(error, FORM_ERROR * value))}
     return {**found, name: _whole_bias(fit, effect.term)} if _is_bias(effect.term) else found
+
+
+def _switch_errors(fit: Fit, term: Term) -> dict[str, float]:
+    """Errors of set-point and band of a two-point control that a straight line does not have, [K].
+
+    Readings say between which two grid points it switched, so a switching temperature is known to about half of what
+    the temperature changes from one to the next.
+    """
+    state = next((s for s in term.states if s.update is not None), None)
+    set_point, band = f"{term.label}_set_point", f"{term.label}_band"
+    if state is None or state.update is None or not {set_point, band} <= {p.name for p in term.parameters}:
+        return {}
+    network = fit.parts[0].point.machine.model.network
+    index = [one.name for one in network.states].index(state.name)
+    read = {s.name for s in state.update.free_symbols}
+    nodes = [i for i, part in enumerate(network.parts) if f"T_{part.name}" in read]
+    changes: list[float] = []
+    for trajectory in fit.trajectories if nodes else ():
+        switched = np.flatnonzero(np.diff(trajectory.memory[:, index])) + 1
+        T = trajectory.seen[:, nodes].mean(axis=1)
+        changes += (T[switched] - T[switched - 1]).tolist()
+    if not changes:
+        return {}
+    half = 0.5 * float(np.sqrt(np.mean(np.square(changes))))
+    return {set_point: half / math.sqrt(2.0), band: half * math.sqrt(2.0)}
 
 
 def _places_of(fit: Fit, names: Sequence[str]) -> list[int]:

@@ -132,14 +132,14 @@ def _may_be_either(d: Diagnosis) -> bool:
 def _where(d: Diagnosis) -> tuple[str, ...]:
     if not d.location or d.verdict in NO_CLAIM:
         return ()
-    told = ", ".join(f"{place.node} ({share(place.probability)})" for place in d.places)
+    told = ", ".join(f"{' and '.join(place.nodes)} ({share(place.probability)})" for place in d.places)
     place = next((one for one in d.places if one.heat_max_W), None)
     if place is None:
         fault = d.verdict == "sensor_fault" or d.location[0].node not in d.network.node_names
         return (f"{told}: {'in a reading or an input; no heat' if fault else 'no heat was estimated there'}",)
     way = "taken away" if place.heat_mean_W < 0.0 else "added"
     mean, most = number(abs(place.heat_mean_W)), number(abs(place.heat_max_W))
-    where = "" if place is d.places[0] else f"in {place.node} "
+    where = "" if place is d.places[0] else f"in {' and '.join(place.nodes)} "
     heat = f"{where}{mean} W {way} on average, {most} W at most"
     return (f"{told}; {heat}; {place.regime}",)
 

@@ -11,7 +11,7 @@ from diagnosis.candidates.dated import WHILE
 from diagnosis.decision.posterior import Judged, Posterior
 from diagnosis.recordings.cleaning import runs
 from diagnosis.results.findings import heats_of
-from diagnosis.results.places import node_in
+from diagnosis.results.places import node_in, nodes_in
 from diagnosis.results.result_parts import Location
 from diagnosis.setup.inference_setup import InferenceSetup
 from models.base.types import Array
@@ -47,7 +47,7 @@ def _place(
     effects = [effect for effect in (judged.effects if judged else ()) if nodes[effect.label] == node]
     warm = [(effect, heats) for effect in effects if fit is not None and (heats := heats_of(fit, effect))]
     if fit is None or not warm:
-        return Location(node=node, probability=min(weight, 1.0), heat_mean_W=0.0, heat_max_W=0.0, when=(),
+        return Location(nodes=(node,), probability=min(weight, 1.0), heat_mean_W=0.0, heat_max_W=0.0, when=(),
                         regime="always")  # fmt: skip
     tested = [i for i, one in enumerate(fit.trajectories) if one.piece.recording not in fit.experiment.healthy]
     here, heat = warm[0]
@@ -69,7 +69,8 @@ def _place(
     when = [(piece.recording, a, b) for piece, acts in zip(pieces, split, strict=True)
             for a, b in windows(piece.middle, acts)]  # fmt: skip
     return Location(
-        node=node, probability=min(weight, 1.0), heat_mean_W=float(np.average(together, weights=steps)),
+        nodes=nodes_in(setup.nominal, here), probability=min(weight, 1.0),
+        heat_mean_W=float(np.average(together, weights=steps)),
         heat_max_W=float(together[np.argmax(np.abs(together))]), when=tuple(when),
         regime=dated or regime(acting, signals, steps),
     )  # fmt: skip

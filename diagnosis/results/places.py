@@ -25,6 +25,13 @@ def node_in(network: ThermalNetwork, h: Hypothesis) -> str:
     return term.target[0]
 
 
+def nodes_in(network: ThermalNetwork, h: Hypothesis) -> tuple[str, ...]:
+    """All parts that share the heat of a hypothesis, :func:`node_in` first; at most places it is one."""
+    term = h.term
+    shared = () if term is None else {"source": term.target, "link": term.target[:-1]}.get(term.kind, ())
+    return tuple(dict.fromkeys((node_in(network, h), *(node for node in shared if node in network.node_names))))
+
+
 def _node_of_parameter(network: ThermalNetwork, name: str) -> str:
     bare = name.removeprefix(SHAPE)
     for source in network.sources:

@@ -191,6 +191,7 @@ class Diagnosis:
             "location": [
                 {
                     "node": place.node,
+                    "nodes": list(place.nodes),
                     "probability": place.probability,
                     "heat_W": {"mean": place.heat_mean_W, "max": place.heat_max_W},
                     "when": [{"recording": r, "from_s": a, "to_s": b} for r, a, b in place.when],

@@ -222,21 +222,28 @@ class Location:
 
     Attributes
     ----------
-    node : str
+    nodes : tuple of str
+        That share the heat; the first stands for them
     probability : float
     heat_mean_W, heat_max_W : float
+        Of all of them together
     when : tuple of (recording, from_s, to_s)
         Windows in which it acts
     regime : str
         When it acts in words of speed, torque and temperature
     """
 
-    node: str
+    nodes: tuple[str, ...]
     probability: float
     heat_mean_W: float
     heat_max_W: float
     when: tuple[tuple[str, float, float], ...]
     regime: str
+
+    @property
+    def node(self) -> str:
+        """The node that stands for the place."""
+        return self.nodes[0]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)

@@ -79,6 +79,19 @@ def test_a_drift_is_followed() -> None:
     assert ranges[longer].max() < 0.0125 * np.percentile(speed, 95)  # means over cells are compared, not rows
 
 
+@pytest.mark.parametrize("step", [1.0, 10.0, 15.0, 30.0])
+def test_noise_of_the_inputs_and_slow_rows_leave_the_grid_coarse(step: float) -> None:
+    """The reading of a speed trembles by 1 %; rows up to a minute apart are merged in a calm, as shorter ones are."""
+    time = np.arange(0.0, 7201.0, step)
+    steps = np.where(time < 3000.0, 1500.0, 2500.0)
+    piece = piece_of(time, speed=steps * (1.0 + np.random.default_rng(0).normal(0.0, 0.003, len(time))))
+    calm = piece.steps[(piece.middle > 1000.0) & (piece.middle < 2900.0)]
+    assert calm.max() == LONGEST * INTERVAL_S // step * step
+    assert calm.mean() > 60.0
+    assert step_at(piece, 3005.0) == max(step, INTERVAL_S if step <= 10.0 else 0.0)
+    assert len(piece.steps) < 7200.0 / INTERVAL_S / 2
+
+
 def test_noise_is_no_event_and_a_corner_is_one() -> None:
     rng = np.random.default_rng(0)
     noise = rng.normal(0.0, 0.2, len(TIME))
