@@ -92,7 +92,7 @@ def mark_literals(_app: Sphinx, _context: object, lines: list[str]) -> None:
     """Set commands, options and addresses in the help of a command as literals."""
     for i, line in enumerate(lines):
         if not line.lstrip().startswith(".. "):
-            literal = r"(python -m builder .*|(?<![\w`-])--[a-z][a-zA-Z-]*|tcp://[\w.:]*\w)"
+            literal = r"(python -m builder .*|(?<![\w`-])--[a-z][a-zA-Z-]*|tcp://[\w.:]*\w|FILE@FROM\.\.TO)"
             lines[i] = re.sub(literal, r"``\1``", line)
 
 

@@ -100,7 +100,7 @@ def diagnose(
     Where they do not agree it names the part, the physics, and how strong that is.
 
     RECORDING is a table (.csv, .csv.gz, .parquet, .mf4) with the columns of a cycle and what was measured:
-    T_<node>_degC, P_loss_W. FILE+FILE joins files that follow each other in time; FILE@start..end is a part.
+    T_<node>_degC, P_loss_W. FILE+FILE joins files that follow each other in time; FILE@FROM..TO is a part.
 
     Of a fleet every gearbox gets its own report, and all together one table (summary.csv).
     """

@@ -206,7 +206,7 @@ def simulate(
 
     The full model is that of --gearbox. CYCLE is a table (.csv, .csv.gz, .parquet) with the columns time_s, speed_rpm,
     torque_Nm and, where known, T_ambient_degC and air_speed_m_s; or the inputs that the definition names. It may be
-    a recording that diagnose reads as well, or a part of one (FILE@start..end), or files that follow each other in
+    a recording that diagnose reads as well, or a part of one (FILE@FROM..TO), or files that follow each other in
     time (FILE+FILE).
     """
     _check_usage(files, gearbox, correction, claims_only=claims_only)

@@ -127,7 +127,8 @@ def measured_and_simulated(diagnosis: Diagnosis) -> Chart | None:
     return Chart(
         name="courses", title="Measured and simulated", figure=figure,
         note=f"Behind each name: the RMSE {order}. The solid line has the colour of its part. Grey ground: the first "
-             "minutes, from which the start temperatures come; they do not count.",
+             "minutes, from which the start temperatures come; they do not count. The model as delivered may leave the "
+             "panel.",
         alt=f"Measured readings and free-running simulations of {', '.join(map(name, channels))} over time, with "
             f"{', '.join(map(name, [*inputs, *airs]))}; first shown: {shown[0].title}. {_sizes_told(shown[0], stages)}",
     )  # fmt: skip

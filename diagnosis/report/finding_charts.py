@@ -187,7 +187,8 @@ def heat_of_findings(diagnosis: Diagnosis) -> Chart | None:
                            marker={"color": colours.get(finding.node, INK), "size": 4, "opacity": 0.6},
                            hovertemplate="%{x:.4g}: %{y:.4g} W<extra></extra>", row=row, col=1)  # fmt: skip
         figure.update_xaxes(title=label, row=row, col=1)
-        titles.append(f"<b>Against the signal that it follows most</b>, W ({name(finding.mechanism)})")
+        whose = f" ({name(finding.mechanism)})" if len(drivers) > 1 else ""
+        titles.append(f"<b>Against the signal it follows most</b>, W{whose}")
     figure.update_yaxes(rangemode="tozero")
     height = 80 + rows * (HEAT_PX + 40) + LEGEND_PX * len(warm)
     dressed(figure, height, annotations=row_titles(titles), hovermode="closest",

@@ -132,6 +132,8 @@ def assemble(
     ])  # fmt: skip
     told = {name for finding in findings for name in (finding.mechanism, *finding.tie_set)}
     told |= {rival.mechanism for finding in findings for rival in finding.confusable_with}
+    if posterior.detected:  # nobody is silent about a name that looks like what is there
+        told |= {one.effects[0].name for one in posterior.judged if one.log_bayes > posterior.threshold}
     unseen = tuple(one for one in _unseen(posterior, catalogue) if one.mechanism not in told)
     train_fits = _fits(setup, predicted.train, counting)
     spoiled = spoiled_in(train_fits, holdout, baselines=[r.name for r in healthy],
@@ -417,7 +419,8 @@ def _calibrated(
 
 
 def _ranking(posterior: Posterior) -> tuple[Ranked, ...]:
-    """Everything that was judged, most probable first; of a pair both names."""
+    """Everything that was judged, most probable first, then by evidence; of a pair both names."""
+    ranked = sorted(posterior.ranked, key=lambda one: (-round(one[1], 4), -one[0].log_bayes))
     return tuple(
         Ranked(
             mechanism=" + ".join(effect.name for effect in one.effects),
@@ -426,5 +429,5 @@ def _ranking(posterior: Posterior) -> tuple[Ranked, ...]:
             probability=probability,
             laws=tuple(law_of(effect.mechanism, effect.place) for effect in one.effects),
         )
-        for one, probability in posterior.ranked[:MOST_RANKED]
+        for one, probability in ranked[:MOST_RANKED]
     )  # fmt: skip

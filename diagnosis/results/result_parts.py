@@ -223,7 +223,7 @@ class Location:
     Attributes
     ----------
     nodes : tuple of str
-        That share the heat; the first stands for them
+        That share the heat; of one place the first is the one that scorers read
     probability : float
     heat_mean_W, heat_max_W : float
         Of all of them together
@@ -242,7 +242,7 @@ class Location:
 
     @property
     def node(self) -> str:
-        """The node that stands for the place."""
+        """The first node, which is that of :attr:`nodes` in single places."""
         return self.nodes[0]
 
 

@@ -63,9 +63,10 @@ def _term(
     label = f"{SHAPE}{factor}_{variable.replace(' ', '_')}"
     if variable == "rise":
         label += f"_{targets[0].name.split('-')[0]}"
+    how, of = "bend" if " " in variable else "tilt", " and ".join(dict.fromkeys(variable.split()))
     parameter = Parameter(
         name=label, start=0.0, sd=sd, lower=-1.0, upper=1.0, log=False,
-        description=f"tilt of '{factor}' with {variable}, per e-fold",
+        description=f"{how} of '{factor}' with {of}, per e-fold",
     )  # fmt: skip
     tilt = symbol(label) * sp.Mul(*(sp.log(_ratio(v, targets, network, scale)) for v in variable.split()))
     return Term(

@@ -127,7 +127,7 @@ def unexplained() -> Diagnosis:
         equation="", probability=0.83, log_bayes=22.0, parameters=(), heat_mean_W=14.0, heat_max_W=48.0,
         heat={"train_2": (np.linspace(0.0, 7200.0, 200), 30.0 * (np.linspace(0.0, 20.0, 200) % 4.0 < 1.0))},
     )  # fmt: skip
-    place = replace(base.location[0], node="housing_lower", probability=0.83, regime="no regime of speed or torque")
+    place = replace(base.location[0], nodes=("housing_lower",), probability=0.83, regime="no regime of speed or torque")
     return replace(
         base, verdict="unexplained", findings=(heat,), location=(place,),
         train=_fits(4.1, 3.0, 1.9), holdout=_fits(5.2, 3.6, 3.1), misfit=2.7, remaining_p_value=0.001,

@@ -45,7 +45,7 @@ def test_what_has_no_place_is_told() -> None:
 
 def test_of_an_instrument_and_a_place_with_heat_the_heat_is_told() -> None:
     place = missing_physics().location[0]
-    torque = replace(place, node="torque", probability=0.99, heat_mean_W=0.0, heat_max_W=0.0)
+    torque = replace(place, nodes=("torque",), probability=0.99, heat_mean_W=0.0, heat_max_W=0.0)
     assert told(replace(missing_physics(), location=(torque,)), "Where?").endswith("no heat")
     where = told(replace(missing_physics(), location=(torque, replace(place, probability=0.98))), "Where?")
     assert where.startswith(f"torque (0.99), {place.node} (0.98); in {place.node} ") and " W added on average" in where
@@ -168,7 +168,7 @@ def test_every_likely_place_is_told_with_what_the_first_one_does() -> None:
     base = missing_physics()
     first, other = base.location
     both = replace(
-        base, location=(first, replace(other, node="air", probability=0.52), replace(other, probability=0.48))
+        base, location=(first, replace(other, nodes=("air",), probability=0.52), replace(other, probability=0.48))
     )
     expected = "oil (0.96), air (0.52); 21.0 W added on average, 66.0 W at most; speed above 2900 1/min"
     assert told(both, "Where?") == expected
@@ -232,3 +232,9 @@ def test_without_a_claim_the_verdict_is_only_probable() -> None:
     (finding,) = missing_physics().findings
     likely = replace(missing_physics(), findings=(replace(finding, grade="likely"),))
     assert "probably" in likely.verdict_text and "probably" not in missing_physics().verdict_text
+
+
+def test_a_place_of_several_nodes_has_all_of_them() -> None:
+    base = missing_physics()
+    place = replace(base.location[0], nodes=("housing_lower", "housing_upper"))
+    assert told(replace(base, location=(place,)), "Where?").startswith("housing_lower and housing_upper (0.96); 21")
