@@ -31,8 +31,8 @@ WORDS: Mapping[str, str] = {
     "loss counts too.",
     "free-running": "Simulated from the start temperatures on with the recorded inputs alone, never corrected by a "
     "measurement on the way.",
-    "RMSE": "Root mean square of simulated less measured: the typical size of the error. Readings are means over 20 s "
-    "or longer where rows lie closer; what a recording begins with, to find its start temperatures, does not count.",
+    "RMSE": "Root mean square of simulated less measured: the typical size of the error. Readings are means over 20 to "
+    "100 s where rows lie closer; what a recording begins with, to find its start temperatures, does not count.",
     "probability": "Share of the belief among all explanations that were compared, weighed before by how usual each "
     "is; not the chance that a thing of this name is in the gearbox if the true cause is not among them.",
     "evidence": "Natural logarithm of how many times better the data are predicted with the effect than without it, "
