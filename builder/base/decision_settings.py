@@ -8,6 +8,7 @@ from typing import Any
 
 import click
 
+from builder.base.finite_range import FiniteRange
 from diagnosis.decision.settings import LIMITS, Settings
 
 DEFAULT = Settings()
@@ -31,7 +32,7 @@ def settings_options(command: Callable[..., Any]) -> Callable[..., Any]:
     for name, (option, metavar, text) in reversed(OPTIONS.items()):
         low, high = LIMITS[name]
         with_settings = click.option(
-            option, name, type=click.FloatRange(low, high), metavar=metavar, default=getattr(DEFAULT, name),
+            option, name, type=FiniteRange(low, high), metavar=metavar, default=getattr(DEFAULT, name),
             show_default=True, help=text,
         )(with_settings)  # fmt: skip
     return with_settings

@@ -10,6 +10,7 @@ import click
 
 from builder.base import console
 from builder.base.example import example
+from builder.base.finite_range import FiniteRange
 from builder.base.progress import LOADING, progress
 from models.assembly.gearbox import load_gearbox
 from models.base.errors import InputError
@@ -39,13 +40,13 @@ def _list_effects(context: click.Context, _: click.Parameter, asked: bool) -> No
 
 @click.command("conceal", epilog=example("conceal --effect windage --seed 1 --output out/concealed"))
 @click.option("--plant", type=click.Choice(["own", "zoo"]), default="own", show_default=True, is_eager=True,
-              help="own: finer, with other formulas, of any gearbox; zoo: of random structure.")  # fmt: skip
+              help="own: finer, other formulas, of any gearbox with geometry; zoo: of random structure.")  # fmt: skip
 @click.option("--effect", default=None, metavar="NAME", help="Effect to conceal; --list shows the names.")
 @click.option(
     "--list", is_flag=True, is_eager=True, expose_value=False, callback=_list_effects, help="Show the effects."
 )
 @click.option("--random", "random", is_flag=True, help="Draw the effects to conceal; there may be none.")
-@click.option("--strength", type=click.FloatRange(min=0.01, max=10.0), default=None, metavar="X",
+@click.option("--strength", type=FiniteRange(min=0.01, max=10.0), default=None, metavar="X",
               help="Strength relative to the usual one.  [default: drawn from 0.25 to 2]")  # fmt: skip
 @click.option("--seed", type=click.IntRange(min=0, max=2**32 - 1), required=True, metavar="N",
               help="The same seed gives the same bytes.")  # fmt: skip
@@ -54,8 +55,8 @@ def _list_effects(context: click.Context, _: click.Parameter, asked: bool) -> No
 @click.option("--truth", type=click.Path(path_type=Path, file_okay=False), default=None, metavar="DIR",
               help="Folder for the truth.  [default: 'truth' in --output]")  # fmt: skip
 @click.option("--cases", type=click.IntRange(min=1, max=10_000), default=None, metavar="N", help="How many cases.")
-@click.option("--gearbox", default="fzg", show_default=True, metavar="NAME|FILE",
-              help="Name or definition file (TOML), of the own plant.")  # fmt: skip
+@click.option("--gearbox", default=None, metavar="NAME|FILE",
+              help="Name or definition file (TOML), of the own plant and of --into.  [default: fzg]")  # fmt: skip
 @click.option("--machine", default=None, metavar="NAME|FILE",
               help="Zoo: name or definition file (TOML).  [default: drawn]")  # fmt: skip
 @click.option(
@@ -65,7 +66,7 @@ def _list_effects(context: click.Context, _: click.Parameter, asked: bool) -> No
               help="Zoo: control, single, date, sensor, pair, outside or messy.  [default: drawn]")  # fmt: skip
 @click.option("--baselines", type=click.IntRange(min=0, max=20), default=0, show_default=True, metavar="N",
               help="Zoo: healthy recordings of the same plant as well.")  # fmt: skip
-@click.option("--session-deviation", type=click.FloatRange(min=0.0, max=0.2), default=None, metavar="X",
+@click.option("--session-deviation", type=FiniteRange(min=0.0, max=0.2), default=None, metavar="X",
               help="Zoo: relative deviation of the plant's parameters between sessions.  [default: 0, 0.01 or 0.03]"
               )  # fmt: skip
 @click.option("--into", default=None, metavar="FILE[@FROM..TO]", help="Recording of a real machine to inject into.")
@@ -81,7 +82,7 @@ def conceal(
     output: Path,
     truth: Path | None,
     cases: int | None,
-    gearbox: str,
+    gearbox: str | None,
     machine: str | None,
     families: str | None,
     group: str | None,
@@ -104,11 +105,12 @@ def conceal(
     of_injection = {"--into": into, "--place": place, "--date": date, "--control": control or None}
     recordings, truth, number = output / "recordings", truth or output / "truth", cases or 1
     if plant == "zoo":
-        own = {"--effect": effect, "--random": random or None, "--strength": strength}
-        _refuse({**own, **of_injection}, "do not go with --plant zoo, where effects are drawn; see --group")
+        own = {"--effect": effect, "--random": random or None, "--strength": strength, "--gearbox": gearbox}
+        _refuse({**own, **of_injection}, "do not go with --plant zoo: see --group, --machine")
         what, make = "concealing", _in_zoo(seed, number, machine=machine, families=families, group=group)
         make = partial(make, baselines=baselines, session_deviation=session_deviation)
     else:
+        gearbox = gearbox or "fzg"
         _refuse(of_zoo, "go with --plant zoo only; the own plant takes --gearbox and records no baselines")
         if into is not None:
             if random or strength is not None:

@@ -14,6 +14,7 @@ from builder.base import console
 from builder.base.example import example
 from builder.base.progress import LOADING, progress
 from builder.base.workers import jobs_option
+from models.assembly.gearbox import load_gearbox
 from models.base.errors import InputError
 
 if TYPE_CHECKING:
@@ -51,7 +52,7 @@ NOT_REAL = (*ONLY_NEW, "recordings", "truth", "answers", "continued")
 @click.option("--answers", type=click.Path(path_type=Path, dir_okay=False), default=None, metavar="FILE",
               help="File that gets a line per case.  [default: <seed>.jsonl in --output]")  # fmt: skip
 @click.option("--continue", "continued", type=click.Path(path_type=Path, dir_okay=False, exists=True), default=None,
-              metavar="FILE", help="Continue the proof of this file of answers, with its options.")  # fmt: skip
+              metavar="FILE", help="Continue the proof of this file of answers: its options, its folder.")  # fmt: skip
 @jobs_option()
 @click.option("--output", type=click.Path(path_type=Path, file_okay=False), default=Path("out/proof"),
               show_default=True, metavar="DIR", help="Folder for recordings, truth and scores.")  # fmt: skip
@@ -84,10 +85,13 @@ def prove(
         if wrong:
             raise InputError(f"--{_dashed(wrong[0])} does not go with --continue: {continued} has its options")
         file = continued
+        if context.get_parameter_source("output") != ParameterSource.COMMANDLINE:
+            output = file.parent
     elif recordings is not None:
         wrong = [name for name in typed if name in MADE]
         if wrong:
             raise InputError(f"--{_dashed(wrong[0])} is for cases that are made; --recordings names cases that exist")
+        load_gearbox(gearbox or "fzg")
         file = answers or output / "given.jsonl"
         begin_lines(file, Settings(plant="given", gearbox=gearbox or "fzg", cells_every=cells_every,
                                    baselines=baselines))  # fmt: skip
@@ -120,7 +124,6 @@ def score(results: Path, truth: Path, gearbox: str, output: Path) -> None:
     from diagnosis.proof.scoring.lines import Task
     from diagnosis.proof.scoring.outcome import outcome
     from diagnosis.proof.scoring.truth import read_truths
-    from models.assembly.gearbox import load_gearbox
 
     truths, machine = read_truths(truth), load_gearbox(gearbox)
     if not any((results / case / "diagnosis.json").exists() for case in truths):

@@ -82,11 +82,16 @@ def prove(
     alone = make_cases(settings, recordings, truth, jobs, progress)
     cases = sorted(path.name for path in recordings.iterdir() if path.is_dir())
     tasks = lines.tasks_of(settings, cases, alone)
+    if not tasks:
+        raise InputError(f"{recordings}: holds no folder per case; conceal --cases N writes such folders")
     for task, record in records.items():
         if task not in tasks or record["recordings"] != hash_of(
-            lines.files_of(recordings, task, settings.baselines)[0]
+            with_definition(lines.files_of(recordings, task, settings.baselines)[0], settings.gearbox)
         ):
-            raise InputError(f"{file}: {task.case} was answered from other recordings than those in {recordings}")
+            raise InputError(
+                f"{file}: {task.case} was answered from other recordings than those in {recordings}, or with another "
+                "definition"
+            )
     missing = [task for task in tasks if task not in records]
     work = ((task, *lines.files_of(recordings, task, settings.baselines), settings.gearbox) for task in missing)
     progress("diagnosing", len(records), len(tasks))
@@ -121,12 +126,10 @@ def diagnose(
     Task
     dict
         ``status`` (``answered``, ``refused``, ``failed``), ``seconds``, ``processor_s``, ``sha256`` of
-        ``diagnosis.json``, ``recordings`` (SHA-256 of the files), ``answer`` (see
+        ``diagnosis.json``, ``recordings`` (SHA-256 of the files, a definition file among them), ``answer`` (see
         :func:`diagnosis.proof.scoring.lines.compact`, or None), ``message``
     """
-    content = dict(files)
-    if DEFINITION not in content and names_a_file(gearbox):
-        content[DEFINITION] = Path(gearbox).read_bytes()
+    content = with_definition(files, gearbox)
     definition = DEFINITION if DEFINITION in content else gearbox
     command = [sys.executable, "-c", BLIND, "diagnose", *arguments, "--gearbox", definition, "--jobs", "1",
                "--output", "out"]  # fmt: skip
@@ -150,10 +153,16 @@ def diagnose(
         "seconds": round(time.perf_counter() - begin, 1),
         "processor_s": round(sum(os.times()[2:4]) - sum(used[2:4]), 1),
         "sha256": hashlib.sha256(written).hexdigest() if status == 0 else "",
-        "recordings": hash_of(files),
+        "recordings": hash_of(content),
         "answer": lines.compact(json.loads(written)) if status == 0 else None,
         "message": "" if status == 0 else message[-MESSAGE_LENGTH:],
     }
+
+
+def with_definition(files: Mapping[str, bytes], gearbox: str) -> dict[str, bytes]:
+    """The files of a task, and the definition if it is a file of the user."""
+    given = {DEFINITION: Path(gearbox).read_bytes()} if names_a_file(gearbox) else {}
+    return given | dict(files)
 
 
 def hash_of(files: Mapping[str, bytes]) -> str:

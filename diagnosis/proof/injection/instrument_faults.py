@@ -15,6 +15,7 @@ from diagnosis.proof.injection.machine_changes import input_shift
 from diagnosis.proof.injection.real_recording import RealRecording
 from diagnosis.proof.injection.trial import SIZES, SMALLEST, Course, Trial, ladder
 from models.assembly.gearbox import Gearbox
+from models.base.errors import InputError
 from models.base.types import Array
 from models.network.laws import symbol
 from models.quantities.quantities import node_of_channel
@@ -68,7 +69,9 @@ def stuck(real: RealRecording, channel: str, course: Course, _: np.random.Genera
     """The reading stays as it was."""
     values, acts = real.channels[channel], course(real.time)
     before = np.flatnonzero(np.isfinite(values) & (real.time < course.from_s))
-    held = float(values[before[-1]]) if len(before) else float("nan")
+    if not len(before):
+        raise InputError(f"{channel} has no reading before {course.from_s:.0f} s that it could be stuck at")
+    held = float(values[before[-1]])
     return _sensor(real, "stuck", channel, course, np.ones(1), "1", ((held - values) * acts)[None])
 
 
@@ -76,7 +79,9 @@ def swapped(real: RealRecording, channel: str, course: Course, rng: np.random.Ge
     """Two sensors in each other's columns."""
     others = [name for name in real.channels if name != channel]
     other = others[int(rng.integers(len(others)))]
-    difference = (real.channels[other] - real.channels[channel]) * course(real.time)
+    acts = course(real.time)
+    # Nothing changes outside its dates, also where one of the two is missing.
+    difference = np.where(acts > 0.0, (real.channels[other] - real.channels[channel]) * acts, 0.0)
     trial = _sensor(real, "swapped", channel, course, np.ones(1), "1", difference[None])
     shifts = {channel: difference[None], other: -difference[None]}
     return replace(

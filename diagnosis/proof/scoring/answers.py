@@ -6,9 +6,10 @@ import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, get_args
 
 from diagnosis.proof.zoo.setting import What
+from diagnosis.results.result import Verdict
 from models.assembly.gearbox import Gearbox
 from models.mechanisms import CATALOGUE, OPEN_FORM
 
@@ -101,10 +102,12 @@ def read_answer(result: Mapping[str, Any] | None, gearbox: Gearbox, *, otherwise
     errors = result.get("fit", {}).get("holdout") or {}
     after = [errors.get(f"rmse_{stage}_K") for stage in ("calibrated", "after")]
     location = max(result.get("location") or [{}], key=lambda place: place.get("probability") or 0.0)
+    if result["verdict"] not in (*get_args(Verdict), "failed", "refused"):
+        raise ValueError(f"there is no verdict {result['verdict']!r}")
     return Answer(
         verdict=result["verdict"],
         claims=tuple(_claim(finding, gearbox) for finding in result.get("findings") or []),
-        node=location.get("node", ""),
+        node=str(location.get("node") or ""),
         holdout_K=(_number(after[0]), _number(after[1])),
     )
 

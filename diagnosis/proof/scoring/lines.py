@@ -210,9 +210,12 @@ def begin_lines(file: Path, settings: Settings) -> None:
     """
     if file.exists() and read_lines(file)[2]:
         raise InputError(f"{file}: holds answers already; continue it with --continue, or name another file")
-    file.parent.mkdir(parents=True, exist_ok=True)
     first = {"proof": SCHEMA, "settings": asdict(settings), "code": code_hash(), "version": project_version()}
-    file.write_text(json.dumps(first) + "\n", encoding="utf-8")
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(json.dumps(first) + "\n", encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"{file}: cannot be written ({error.strerror})") from error
 
 
 def read_lines(file: Path) -> tuple[Settings, str, dict[Task, dict[str, Any]]]:
@@ -228,11 +231,11 @@ def read_lines(file: Path) -> tuple[Settings, str, dict[Task, dict[str, Any]]]:
         whole = content[: content.rfind("\n") + 1]
         first, *lines = map(json.loads, whole.splitlines())
         settings = Settings(**first["settings"])
-        records = {Task(**line.pop("task")): line for line in lines}
+        records = {Task(**line.pop("task")): {**line, "recordings": str(line["recordings"])} for line in lines}
         code = str(first["code"])
     except OSError as error:
         raise InputError(f"{file}: cannot be read ({error.strerror})") from error
-    except (ValueError, KeyError, TypeError) as error:
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise InputError(f"{file}: is not a file of answers that prove wrote ({error})") from error
     if whole != content:
         file.write_text(whole, encoding="utf-8")

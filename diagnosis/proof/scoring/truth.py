@@ -179,6 +179,8 @@ def _verdicts(effects: Sequence[TrueEffect], far: str) -> tuple[str, ...]:
 
 
 def _effect(raw: Mapping[str, Any], case: Mapping[str, Any], oracle: Mapping[str, Any]) -> TrueEffect:
+    if len(case["effects"]) == 1 and "changed" in case:  # of an injection
+        raw = {"changed": case["changed"], **raw}
     changed = changed_of(raw)
     nats = raw.get("oracle") or (case.get("oracle") if len(case["effects"]) == 1 else None) or {}
     given = oracle.get(raw["name"], {}).get("nats", {})

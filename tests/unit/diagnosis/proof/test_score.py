@@ -24,6 +24,9 @@ BY_NAME = {rule.name: rule for rule in RULES}
 RIGHT, WRONG, NOT_COUNTED = True, False, None
 
 
+SOME = "unexplained"  # verdict of an answer that is judged by something else
+
+
 def effect(name: str, what: str, nodes: list[str], sign: int = 1, nats: float = 100.0, **more: Any) -> dict[str, Any]:
     changed = [{"what": what, "of": "-".join(nodes), "nodes": nodes, "sign": sign, "course": "always"}]
     return {"name": name, "catalogue": name, "family": "x", "kind": "source", "nodes": nodes, "parameters": {"a": 1.0},
@@ -63,8 +66,8 @@ TIED = says("missing_physics", finding("churning_swirl", windage=0.3))
 FOURTH = says("missing_physics", finding("churning_swirl", pump_heat=0.3, pocketing=0.2, windage=0.1))
 COOLED = finding("air_cooling_change", "link_factor", "housing_upper", -0.2, place="housing_upper-air")
 OPEN = finding("open_speed_loss", node="bearing_1", family="open form")
-MIST = says("x", finding("oil_mist", "link_factor", "oil", 1.0, place="oil_housing_upper"))
-LOWER_MIST = says("x", finding("oil_mist", "link_factor", "oil", 1.0, place="oil_housing_lower"))
+MIST = says(SOME, finding("oil_mist", "link_factor", "oil", 1.0, place="oil_housing_upper"))
+LOWER_MIST = says(SOME, finding("oil_mist", "link_factor", "oil", 1.0, place="oil_housing_lower"))
 PARAMETER = finding("parameter", "parameter", "mesh", place="mesh")
 
 
@@ -89,44 +92,44 @@ PARAMETER = finding("parameter", "parameter", "mesh", place="mesh")
         ("named", ONE, says("missing_physics", finding("windage") | {"acts_like": True}), False),
         ("named or tied", ONE, TIED, True), ("named or tied", ONE, OTHER, False), ("named or tied", ONE, FOURTH, False),
         ("named or tied", ONE, says("missing_physics", finding("churning_swirl", windage=0.04)), False),
-        ("acts like", ONE, OTHER, True), ("acts like", ONE, says("x", finding("pump_heat", value=-1.0)), False),
-        ("acts like", ONE, says("x", finding("pump_heat") | {"parameters": []}), False),
-        ("acts like", ONE, says("x", finding("oil_tank")), False), ("acts like", ONE, FAILED, False),
-        ("acts like", ONE, says("x", finding("windage", node="wheel", place="gears")), True),
-        ("acts like", ONE, says("x", finding("churning_swirl", node="wheel")), False),
-        ("acts like", LINK, says("x", COOLED | {"mechanism": "radiation_error"}), True),
-        ("acts like", LINK, says("x", finding("radiation_error", "link_factor", "housing_upper", 0.2)), False),
-        ("acts like", LINK, says("x", finding("aeration", "link_factor", "oil", -0.2)), False),
+        ("acts like", ONE, OTHER, True), ("acts like", ONE, says(SOME, finding("pump_heat", value=-1.0)), False),
+        ("acts like", ONE, says(SOME, finding("pump_heat") | {"parameters": []}), False),
+        ("acts like", ONE, says(SOME, finding("oil_tank")), False), ("acts like", ONE, FAILED, False),
+        ("acts like", ONE, says(SOME, finding("windage", node="wheel", place="gears")), True),
+        ("acts like", ONE, says(SOME, finding("churning_swirl", node="wheel")), False),
+        ("acts like", LINK, says(SOME, COOLED | {"mechanism": "radiation_error"}), True),
+        ("acts like", LINK, says(SOME, finding("radiation_error", "link_factor", "housing_upper", 0.2)), False),
+        ("acts like", LINK, says(SOME, finding("aeration", "link_factor", "oil", -0.2)), False),
         ("acts like", INSIDE, MIST, True),
         ("acts like", INSIDE, LOWER_MIST, False),
-        ("acts like", BIAS, says("x", finding("sensor_drift", "sensor", "pinion")), True),
-        ("acts like", BIAS, says("x", finding("sensor_drift", "sensor", "oil")), False),
-        ("acts like", TORQUE, says("x", finding("torque_offset", "sensor", "torque", -1.0)), True),
-        ("acts like", TORQUE, says("x", finding("torque_offset", "sensor", "torque", 1.0)), False),
-        ("acts like", WORN, says("x", PARAMETER | {"parameters": [{"value": 1.3}]}), True),
-        ("acts like", WORN, says("x", PARAMETER | {"parameters": [{"value": 0.7}]}), False),
-        ("acts like", LINK, says("x", finding("parameter", "parameter", "frame", 0.7, place="h_air")), True),
-        ("acts like", LINK, says("x", finding("parameter", "parameter", "frame", 0.7, place="seal")), False),
-        ("acts like", ALIEN, says("x", OPEN), True), ("acts like", CLEAN, SILENT, None),
+        ("acts like", BIAS, says(SOME, finding("sensor_drift", "sensor", "pinion")), True),
+        ("acts like", BIAS, says(SOME, finding("sensor_drift", "sensor", "oil")), False),
+        ("acts like", TORQUE, says(SOME, finding("torque_offset", "sensor", "torque", -1.0)), True),
+        ("acts like", TORQUE, says(SOME, finding("torque_offset", "sensor", "torque", 1.0)), False),
+        ("acts like", WORN, says(SOME, PARAMETER | {"parameters": [{"value": 1.3}]}), True),
+        ("acts like", WORN, says(SOME, PARAMETER | {"parameters": [{"value": 0.7}]}), False),
+        ("acts like", LINK, says(SOME, finding("parameter", "parameter", "frame", 0.7, place="h_air")), True),
+        ("acts like", LINK, says(SOME, finding("parameter", "parameter", "frame", 0.7, place="seal")), False),
+        ("acts like", ALIEN, says(SOME, OPEN), True), ("acts like", CLEAN, SILENT, None),
         ("place right", ONE, says("unexplained", node="housing_lower"), True),
         ("place right", ONE, says("unexplained", node="bearing_1"), True),
         ("place right", ONE, says("unexplained", node="frame"), False), ("place right", TORQUE, SILENT, None),
         ("named or tied, visible", ONE, TIED, True), ("named or tied, visible", FAINT, TIED, None),
         ("named or tied, visible", ONE, SILENT, False),
-        ("acts like, visible", ALIEN, says("x", OPEN), True), ("acts like, visible", ALIEN, SILENT, False),
+        ("acts like, visible", ALIEN, says(SOME, OPEN), True), ("acts like, visible", ALIEN, SILENT, False),
         ("acts like, visible", FAINT, SILENT, None),
         ("silent where nothing can be seen", FAINT, SILENT, True),
         ("silent where nothing can be seen", ONE, SILENT, None),
         ("silent where nothing can be seen", FAINT, NAMED, False),
         ("silent where nothing can be seen", FAINT, FAILED, False),
-        ("outside: no wrong name", ALIEN, says("unexplained", OPEN), True),
+        ("outside: no wrong name", ALIEN, says(SOME, OPEN), True),
         ("outside: no wrong name", ALIEN, NAMED, False), ("outside: no wrong name", ALIEN, SILENT, False),
-        ("outside: no wrong name", ALIEN, says("unexplained", finding("windage", probability=0.8)), True),
-        ("heat within 20 %", ONE, says("x", finding("windage", heat=59.0)), True),
-        ("heat within 20 %", ONE, says("x", finding("windage", heat=61.0)), False),
+        ("outside: no wrong name", ALIEN, says(SOME, finding("windage", probability=0.8)), True),
+        ("heat within 20 %", ONE, says(SOME, finding("windage", heat=59.0)), True),
+        ("heat within 20 %", ONE, says(SOME, finding("windage", heat=61.0)), False),
         ("heat within 20 %", ONE, OTHER, None),
         ("held-out error improves", ONE, NAMED, True), ("held-out error improves", ONE, SILENT, None),
-        ("held-out error improves", ONE, says("x", finding("windage"), after=1.1), False),
+        ("held-out error improves", ONE, says(SOME, finding("windage"), after=1.1), False),
     ],
 )  # fmt: skip
 def test_rule(
@@ -237,8 +240,19 @@ def test_verb_scores_a_folder(tmp_path: Path) -> None:
     (tmp_path / "results" / "b" / "diagnosis.json").write_text('{"verdict": "missing_physics", "findings": [{}]}')
     done = CliRunner().invoke(commands, ["score", *arguments], catch_exceptions=False)
     assert done.exit_code == 0 and "1 diagnoses ended without an answer" in done.output
+    for verdict in ("null", '"banana"', "5"):
+        (tmp_path / "results" / "b" / "diagnosis.json").write_text('{"verdict": ' + verdict + "}")
+        done = CliRunner().invoke(commands, ["score", *arguments], catch_exceptions=False)
+        assert done.exit_code == 0 and "1 diagnoses ended without an answer" in done.output
     truths.write_text('{"a": 1}')
     assert "is no truth of a set of cases" in str(CliRunner().invoke(verb, arguments).exception)
+
+
+def test_what_an_injection_changed_is_that_of_its_effect() -> None:
+    changed = {"what": "heat", "of": "oil", "nodes": ["oil"], "sign": 1, "course": "step"}
+    effect = {"name": "heat", "nodes": ["oil"], "size": 5.0, "heat_W": {"oil": {"mean": 3.0}}}
+    (found,) = truth_of({"group": "injection", "changed": [changed], "effects": [effect]}, {}).effects
+    assert [(one.what, one.of, one.sign) for one in found.changed] == [("heat", "oil", 1)]
 
 
 @pytest.mark.parametrize("cases", [6, 7, 60, WHOLE])

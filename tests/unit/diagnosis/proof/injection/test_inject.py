@@ -15,6 +15,7 @@ from click.testing import CliRunner
 from builder.commands.conceal import conceal
 from diagnosis.proof.injection.control import Control, find_control
 from diagnosis.proof.injection.inject import KINDS, Injector, Wish, inject_set
+from diagnosis.proof.injection.instrument_faults import stuck, swapped
 from diagnosis.proof.injection.machine_changes import MACHINE_CHANGES, heat
 from diagnosis.proof.injection.real_recording import read_real_recording
 from diagnosis.proof.injection.trial import Course, choose_size
@@ -86,6 +87,20 @@ def test_a_stuck_sensor_shows_its_last_reading(rod: Injector, tmp_path: Path) ->
     after = pd.read_csv(file)["NTC1_degC"]
     assert set(after[300:end]) == {after[299]}
     assert after[end] != after[299]
+
+
+def test_gaps_before_a_fault_are_not_its_own(rod: Injector) -> None:
+    """A sensor that starts late: what is swapped later changes nothing before, and nothing can be stuck before."""
+    late = np.where(rod.real.time < 3000.0, np.nan, rod.real.channels["cell_1"])
+    two = tuple(one for one in rod.real.recording.channels if one.name in ("cell_1", "cell_2"))
+    found = replace(rod.real.found, values={**rod.real.found.values, "T_cell_1": late})
+    real = replace(rod.real, recording=replace(rod.real.recording, channels=two), found=found)
+    trial = swapped(real, "cell_1", Course(form="step", from_s=12000.0, to_s=30000.0), np.random.default_rng(0))
+    for shift in trial.columns.values():
+        assert (shift[0][real.time < 12000.0] == 0.0).all()
+        assert np.abs(shift[0][real.time > 13000.0]).max() > 0.0
+    with pytest.raises(InputError, match="cell_1 has no reading before 1000 s that it could be stuck at"):
+        stuck(real, "cell_1", Course(form="step", from_s=1000.0, to_s=30000.0), np.random.default_rng(0))
 
 
 def test_a_changed_link_is_the_difference_of_two_simulations(rod: Injector, tmp_path: Path) -> None:
