@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -22,7 +23,7 @@ from diagnosis.forward.whitening import RandomHeat
 from diagnosis.recordings.recording import Recording
 from diagnosis.results.advice import next_test, without_sensor
 from diagnosis.results.baseline_notes import baseline_notes
-from diagnosis.results.findings import estimates_of, finding_of, joint_estimate_of
+from diagnosis.results.findings import estimates_of, finding_of, joint_estimate_of, switch_errors
 from diagnosis.results.instruments import sensors_and_inputs_of
 from diagnosis.results.locations import locations_of
 from diagnosis.results.predictions import Predicted, Predictions, predict_recordings, temperatures
@@ -248,12 +249,13 @@ def _terms(best: Judged | None, final: Fit) -> tuple[Term, ...]:
     if best is None or best.fit is None:
         return ()
     found = estimates_of(final)
+    terms = [effect.term for effect in best.effects if effect.term is not None]
+    more = {name: error for term in terms for name, error in switch_errors(final, term).items()}
 
     def as_found(p: Parameter) -> Parameter:
         value, error = found.get(p.name, (p.start, 0.0))
-        return replace(p, start=value, sd=error)
+        return replace(p, start=value, sd=math.hypot(error, more.get(p.name, 0.0)))
 
-    terms = [effect.term for effect in best.effects if effect.term is not None]
     return tuple(replace(term, parameters=tuple(map(as_found, term.parameters))) for term in terms)
 
 

@@ -208,7 +208,7 @@ def values_of(fit: Fit, effect: Hypothesis) -> Values:
     if effect.term is None:
         return found
     name = effect.term.strength.name
-    for parameter, error in _switch_errors(fit, effect.term).items():
+    for parameter, error in switch_errors(fit, effect.term).items():
         found[parameter] = (found[parameter][0], math.hypot(found[parameter][1], error))
     if not effect.term.of_measurement:
         value, error = found[name]
@@ -216,8 +216,8 @@ def values_of(fit: Fit, effect: Hypothesis) -> Values:
     return {**found, name: _whole_bias(fit, effect.term)} if _is_bias(effect.term) else found
 
 
-def _switch_errors(fit: Fit, term: Term) -> dict[str, float]:
-    """Errors of set-point and band of a two-point control that a straight line does not have, [K].
+def switch_errors(fit: Fit, term: Term) -> dict[str, float]:
+    """Return the errors of set-point and band of a two-point control that a straight line does not have, [K].
 
     Readings say between which two grid points it switched, so a switching temperature is known to about half of what
     the temperature changes from one to the next.

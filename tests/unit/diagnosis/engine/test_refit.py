@@ -9,6 +9,7 @@ from diagnosis.candidates.hypotheses import hypothesis_of
 from diagnosis.engine.fit import Experiment, Fit, calibrate
 from diagnosis.engine.refit import refit
 from diagnosis.engine.scan import SHAPES_TRIED, Scan, scan
+from diagnosis.results.findings import switch_errors
 from models.assembly.gearbox import Gearbox
 from models.mechanisms import CATALOGUE, Placed, Scale
 from tests.unit.diagnosis.inference_example import CHANNELS, acting, with_measured
@@ -90,6 +91,15 @@ def test_a_set_point_is_found(experiment: Experiment, scale: Scale) -> None:
     edge = value_of(found, f"{placed.label}_set_point") + 0.5 * value_of(found, f"{placed.label}_band")
     assert edge == pytest.approx(true + 1.0, abs=1.5)
     assert found.log_evidence > base.log_evidence + 20.0
+    # It switches between two grid points: it is known to half of what the housing changes from one to the next.
+    (trajectory,) = found.trajectories
+    halves = [found.experiment.machine.model.parts.index(f"housing_{half}") for half in ("lower", "upper")]
+    switched = np.flatnonzero(np.diff(trajectory.memory[:, -1]))
+    change = np.sqrt(np.mean(np.diff(trajectory.seen[:, halves].mean(axis=1))[switched] ** 2))
+    assert 0.1 < change < 1.0
+    errors = switch_errors(found, placed)
+    assert errors[f"{placed.label}_set_point"] == pytest.approx(0.5 * change / np.sqrt(2.0))
+    assert errors[f"{placed.label}_band"] == pytest.approx(0.5 * change * np.sqrt(2.0))
 
 
 def test_what_may_have_several_optima_is_fitted_from_several_starts(experiment: Experiment, scale: Scale) -> None:
