@@ -44,6 +44,7 @@ LARGEST_ERROR = "full"  # class of model error
 FAR_SD, MOST_FAR = 3.0, 3  # standard deviations of a prior, beyond which the summary tells of a parameter; how many
 MOST_UNSEEN = 6  # effects that the summary names of those that cannot be seen
 OF_DATE = ("since", "lasting")  # parameters that the date contains
+BADLY = 2.0  # times the size that matters, which a calibrated model may be off without a word
 OF_SWITCH = ("set_point", "band")  # parameters that the switching temperatures contain
 LONG_S = 7200.0  # times beyond are told in hours
 LITTLE_SPREAD = 0.05  # deviation between sessions that is not worth a word, in prior standard deviations
@@ -103,7 +104,13 @@ def _missing(d: Diagnosis) -> str:
             "wrong columns, other units, and a wrong definition."
         )
     where = " in what was learnt from" if d.missed else ""
-    return f"Nothing that these data show{where}: {reached}."
+    off = max((one.calibrated, what) for one, what in ((d.train, "learnt from"), (d.holdout, "held out"))
+              if not math.isnan(one.calibrated))  # fmt: skip
+    doubt = (
+        f" But calibrated, the model is {off[0]:.2f} K off what was {off[1]}: it fits this machine badly, and an "
+        "effect may hide in that."
+    ) if off[0] > BADLY * d.settings.matters_K + d.noise_K else ""  # fmt: skip
+    return f"Nothing that these data show{where}: {reached}.{doubt}"
 
 
 def _cannot_be_fitted(d: Diagnosis) -> bool:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from diagnosis.decision.posterior import Placebo
+from diagnosis.decision.settings import Settings
 from diagnosis.report import finding_charts, page
 from diagnosis.results.first_screen import EITHER, VERDICT_TEXT
 from diagnosis.results.result import Diagnosis
@@ -238,3 +239,12 @@ def test_a_place_of_several_nodes_has_all_of_them() -> None:
     base = missing_physics()
     place = replace(base.location[0], nodes=("housing_lower", "housing_upper"))
     assert told(replace(base, location=(place,)), "Where?").startswith("housing_lower and housing_upper (0.96); 21")
+
+
+def test_silence_about_a_machine_that_the_model_fits_badly_is_no_health() -> None:
+    base = consistent()
+    assert "But" not in told(base, "Is something missing?")
+    far = replace(base, holdout=replace(base.holdout, calibrated=4.61))
+    doubt = "But calibrated, the model is 4.61 K off what was held out: it fits this machine badly"
+    assert doubt in told(far, "Is something missing?")
+    assert "But" not in told(replace(far, settings=Settings(matters_K=3.0)), "Is something missing?")
