@@ -114,7 +114,7 @@ class Piece:
         )  # fmt: skip
 
     def finer(self) -> tuple[Piece, NDArray[np.intp]]:
-        """The piece in intervals of about :data:`FREE_S`; for slow rows, of the sampling interval of the inputs.
+        """The piece in intervals of about :data:`FREE_S`; for slow rows, of half the sampling interval of the inputs.
 
         Returns
         -------
@@ -124,7 +124,7 @@ class Piece:
             Where the grid points are in it
         """
         most = self.samples.shape[1]
-        parts = np.full(len(self.steps), most)
+        parts = np.full(len(self.steps), 2 * most)
         if not self.slow:
             parts = np.maximum(np.rint(self.steps / FREE_S), 1).astype(int)
         at = np.concatenate([[0], np.cumsum(parts)])

@@ -144,8 +144,8 @@ def test_finer_has_the_same_inputs() -> None:
         assert fine.inputs[at[k] : at[k + 1], 0].mean() == pytest.approx(piece.inputs[k, 0])
     slow = piece_of(np.arange(0.0, 60001.0, 600.0))
     fine, at = slow.finer()
-    assert set(np.diff(at)) == {SAMPLES}
-    np.testing.assert_allclose(fine.steps, 600.0 / SAMPLES)
+    assert set(np.diff(at)) == {2 * SAMPLES}
+    np.testing.assert_allclose(fine.steps, 300.0 / SAMPLES)
 
 
 def test_switches_run_free_as_on_an_even_grid(fzg: Gearbox) -> None:
