@@ -151,8 +151,6 @@ class Mechanism:
             found.setdefault(replace(one, name=""), one)  # a group of one node is that node
         common, traced = _aliases(network, scale), cache(partial(trace, stand_in=self.name))
         placed = [self._at(network, scale, placement, common, traced) for placement in found.values()]
-        if any(symbol(p.strength.name) not in p.expression.free_symbols for p in placed):
-            raise InputError(f"mechanism {self.name!r}: its law must contain {STRENGTH!r}, the size of the effect")
         return tuple(
             p for p in placed if p.target and not any(ABSENT in law.free_symbols for law in p.written.values())
         )

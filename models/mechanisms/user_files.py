@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
+import sympy as sp
 from pydantic import Field, model_validator
 
 from models.assembly.gearbox import Gearbox
@@ -14,10 +15,10 @@ from models.definition.messages import validate_section
 from models.definition.sections import Name, OneOrMore, Section, Text
 from models.files.toml_file import parse_schema_1, read_text
 from models.mechanisms.forms import LARGEST, strength
-from models.mechanisms.mechanism import STRENGTH, Mechanism, Memory
+from models.mechanisms.mechanism import STRENGTH, Mechanism, Memory, Placed
 from models.mechanisms.scale import Scale
 from models.network.expressions import Law
-from models.network.laws import Parameter
+from models.network.laws import Parameter, symbol
 from models.terms.law_file import LawParameter, LawTable
 
 Positive = Annotated[float, Field(gt=0.0)]
@@ -177,6 +178,8 @@ def check_placeable(mechanisms: Iterable[Mechanism], gearbox: Gearbox, file: str
         try:
             placed = mechanism.placed(network, scale)
             sentences = [place.says for place in placed]
+            for place in placed:
+                _check_strength(place)
         except InputError as error:
             raise InputError(f"{file}: {error}") from error
         except Exception as error:  # a user's own code runs here
@@ -189,6 +192,18 @@ def check_placeable(mechanisms: Iterable[Mechanism], gearbox: Gearbox, file: str
                 f"{file}: mechanism {mechanism.name!r} has no place in this gearbox; its places are {places}, the "
                 f"parts are {', '.join(part.name for part in network.parts)}"
             )
+
+
+def _check_strength(placed: Placed) -> None:
+    size = symbol(placed.strength.name)
+    absent = placed.written["law"].xreplace({size: sp.Integer(0)})
+    slope = placed.written["law"].diff(size).xreplace({size: sp.Integer(0)})
+    if absent != 0 or slope == 0 or slope.has(sp.zoo, sp.oo, sp.nan):
+        raise InputError(
+            f"mechanism {placed.mechanism.name!r}: its law must contain {STRENGTH!r}, the size of the effect: 0 "
+            f"without the effect, and at first in proportion to it. With {STRENGTH} = 0 it gives {absent}, and its "
+            f"slope is {slope}"
+        )
 
 
 def _from_toml(path: Path) -> tuple[Mechanism, ...]:
@@ -205,6 +220,6 @@ def _from_python(path: Path) -> tuple[Mechanism, ...]:
     except (Exception, SystemExit) as error:
         raise InputError(f"{path}: fails with {type(error).__name__}: {error}") from error
     found = content.get("MECHANISMS")
-    if not isinstance(found, (list, tuple)) or not all(isinstance(entry, Mechanism) for entry in found):
-        raise InputError(f"{path}: needs a list MECHANISMS of models.mechanisms.Mechanism")
+    if not found or not isinstance(found, (list, tuple)) or not all(isinstance(entry, Mechanism) for entry in found):
+        raise InputError(f"{path}: needs a list MECHANISMS of models.mechanisms.Mechanism, at least one")
     return tuple(found)

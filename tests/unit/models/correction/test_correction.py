@@ -410,6 +410,9 @@ def test_a_mechanism_from_python(tmp_path: Path) -> None:
         ("exp(-worn)", "exp(-worn", "mechanism 'belt_guard'.law: .* is not an expression"),
         ("schema = 1", f"schema = 1\n{AGAIN}", "'belt_guard' is there 2 times"),
         ("strength * n**exponent", "20 * n**exponent", "its law must contain 'strength'"),
+        ("strength * n**exponent", "(strength + 5) * n", r"With strength = 0 it gives 5\*n"),
+        ("strength * n**exponent", "n / strength", "With strength = 0 it gives zoo"),
+        ("strength * n**exponent", "strength**2 * n", "and its slope is 0"),
         ('places = ["oil", "each bearings"]', 'places = ["oill"]', "no place in this gearbox.*'oill'.*oil"),
         ("({place})", "({ort})", "'belt_guard' fails with KeyError: 'ort'"),
         ("n**exponent", "sped**exponent", "'belt_guard' uses 'sped'.*did you mean 'speed'"),
@@ -431,6 +434,7 @@ def test_faults_of_a_file_of_mechanisms(tmp_path: Path, fzg: Gearbox, old: str, 
         ("1/0", "fails with ZeroDivisionError"),
         ("x = 1", "needs a list MECHANISMS"),
         ("MECHANISMS = [1]", "needs a list"),
+        ("MECHANISMS = []", "needs a list MECHANISMS .*at least one"),
         (
             "from dataclasses import replace\nfrom models.mechanisms import CATALOGUE\n"
             "MECHANISMS = [replace(CATALOGUE['windage'], name='mine', parameters=lambda scale: 1 / 0)]\n",
