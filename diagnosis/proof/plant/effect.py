@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from typing import Literal
 
 import numpy as np
@@ -14,16 +14,16 @@ from models.base.types import Array
 
 Kind = Literal["source", "link", "loss_factor", "link_factor", "signal", "sensor", "parameter"]
 Hook = Callable[["Grip"], None]
+Places = Callable[[Plant, np.random.Generator], tuple[str, ...]]
+Draw = Callable[[Plant, np.random.Generator, float], Mapping[str, float]]
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Effect:
     """Physics that the plant can hide.
 
     Attributes
     ----------
-    catalogue : bool
-        Whether the diagnosis has a mechanism of this name
     places : callable
         Of the plant and a random generator: places of one specimen, the main one first
     draw : callable
@@ -32,17 +32,20 @@ class Effect:
         The law in words and symbols, for the truth
     before, after : callable or None
         Act on the inputs before, and on heat and conductances after the losses are known
+    catalogue : bool
+        Whether the diagnosis has a mechanism of this name
     """
 
     name: str
-    catalogue: bool
-    family: str
     kind: Kind
-    places: Callable[[Plant, np.random.Generator], tuple[str, ...]]
-    draw: Callable[[Plant, np.random.Generator, float], Mapping[str, float]]
+    places: Places
+    draw: Draw
     law: str
+    _: KW_ONLY
+    family: str
     before: Hook | None = None
     after: Hook | None = None
+    catalogue: bool = True
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,6 +74,8 @@ class Grip:
         One per member, all of the same effect and places
     positions : sequence of int
         Which of its run's effects each specimen is
+    rows : int
+        Of these runs
 
     Attributes
     ----------
@@ -81,24 +86,16 @@ class Grip:
     """
 
     def __init__(
-        self, plant: Plant, members: Sequence[int], specimens: Sequence[Concealed], positions: Sequence[int]
+        self, plant: Plant, members: Sequence[int], specimens: Sequence[Concealed], positions: Sequence[int], rows: int
     ) -> None:
         self.plant, self.members, self.positions = plant, np.asarray(members), tuple(positions)
         self.places = specimens[0].places
         names = specimens[0].parameters
         self.p = {name: np.array([specimen.parameters[name] for specimen in specimens]) for name in names}
         self.moment: Moment
+        self.row, self.rows = 0, rows
         self.made: dict[str, Array] = {}
         self.memory: dict[str, Array] = {}
-        self.row, self.rows = 0, 0
-
-    def prepare(self, rows: int) -> None:
-        """Make room for the rows to come."""
-        self.row, self.rows = 0, rows
-
-    def next_row(self) -> None:
-        """Go on to the next row."""
-        self.row += 1
 
     # ------------------------------------------------------------------ reading
 

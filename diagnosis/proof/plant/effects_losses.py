@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 
 import numpy as np
 
 from diagnosis.proof.plant.anatomy import MESH, OIL, T_SERVICE
-from diagnosis.proof.plant.effect import Effect, Grip, Hook, Kind
+from diagnosis.proof.plant.effect import Draw, Effect, Grip, Places
 from diagnosis.proof.plant.plant import REFERENCE_SPEED, Plant
 from models.losses.bearing import BearingLaw
 from models.losses.loss_term import RPM
-
-Draw = Callable[[Plant, np.random.Generator, float], Mapping[str, float]]
-Places = Callable[[Plant, np.random.Generator], tuple[str, ...]]
 
 TEMPERATURES, DIFFERENCES = {"T", "T_on", "T_off", "T_melt"}, {"band", "dT"}
 SLIDING, ROLLING, CHURNING = "mesh_sliding", "mesh_rolling", "churning"
@@ -69,11 +66,6 @@ def bearings_of_input(plant: Plant, _: np.random.Generator) -> tuple[str, ...]:
 def output_shaft(plant: Plant, _: np.random.Generator) -> tuple[str, ...]:
     """The output shaft."""
     return (plant.gearbox.stage[0].driven,)
-
-
-def seals(grip: Grip) -> tuple[str, ...]:
-    """Components of the seals."""
-    return tuple(seal.name for seal in grip.plant.gearbox.seal)
 
 
 # ---------------------------------------------------------------------- no-load losses
@@ -155,8 +147,8 @@ def run_in_seals(g: Grip) -> None:
     """Lips bed in while the shafts turn."""
     run = g.remembered("run", 0.0)
     g.memory["run"] = run + (g.hours > 0.0) * (g.x > 0.0) * 10.0 / 3600.0
-    for seal in seals(g):
-        g.factor(seal, g.p["a"] * np.exp(-((g.memory["run"] / g.p["life"]) ** 0.85)))
+    for seal in g.plant.gearbox.seal:
+        g.factor(seal.name, g.p["a"] * np.exp(-((g.memory["run"] / g.p["life"]) ** 0.85)))
 
 
 def oil_ageing(g: Grip) -> None:
@@ -221,54 +213,42 @@ def brake_drag(g: Grip) -> None:
     g.heat(g.places[0], g.p["a"] * g.x**0.85, lost=True)
 
 
-def _oil_jet(plant: Plant, rng: np.random.Generator, strength: float) -> Mapping[str, float]:
-    return {"a": 0.18 * plant.loss_ref * strength, **drawn(plant, rng, {"T": (40.0, 55.0)})}
-
-
-def effect(
-    name: str, kind: Kind, places: Places, draw: Draw, law: str, *, family: str, before: Hook | None = None,
-    after: Hook | None = None, catalogue: bool = True,
-) -> Effect:  # fmt: skip
-    """An effect; arguments as the attributes of :class:`~diagnosis.proof.plant.effect.Effect`."""
-    return Effect(name=name, catalogue=catalogue, family=family, kind=kind, places=places, draw=draw, law=law,
-                  before=before, after=after)  # fmt: skip
-
-
 LOSS_EFFECTS = (
-    effect("windage", "source", at(OIL), share_of_loss(0.025, exponent=(2.5, 2.75)),
+    Effect("windage", "source", at(OIL), share_of_loss(0.025, exponent=(2.5, 2.75)),
            "a x^2.6 W, x = speed / top speed; 80 % oil, 10 % each gear", family="no-load loss", after=windage),
-    effect("pocketing", "source", at(MESH, OIL), share_of_loss(0.05), "a x^3.2 W; 60 % mesh, 40 % oil",
+    Effect("pocketing", "source", at(MESH, OIL), share_of_loss(0.05), "a x^3.2 W; 60 % mesh, 40 % oil",
            family="no-load loss", after=pocketing),
-    effect("churning_swirl", "source", at(OIL), share_of_loss(0.40, Re=(6500.0, 8500.0)),
+    Effect("churning_swirl", "source", at(OIL), share_of_loss(0.40, Re=(6500.0, 8500.0)),
            "a (0.15 + 0.85 s(Re)) x^1.9 W, s: step at Re = v b / nu(T_oil)", family="no-load loss",
            after=churning_swirl),
-    effect("churning_load", "source", at(OIL), share_of_loss(0.05), "a y^0.85 (x / 0.415)^1.4 W",
+    Effect("churning_load", "source", at(OIL), share_of_loss(0.05), "a y^0.85 (x / 0.415)^1.4 W",
            family="load-dependent loss", after=churning_load),
-    effect("oil_level_thermal", "loss_factor", at(OIL), relative(0.30), "churning (1 + a (T_oil - 40) / 60)",
+    Effect("oil_level_thermal", "loss_factor", at(OIL), relative(0.30), "churning (1 + a (T_oil - 40) / 60)",
            family="no-load loss", after=oil_level_thermal),
-    effect("oil_loss", "loss_factor", at(OIL), relative(0.04), "level falls by a per hour: churning, drag, capacity",
+    Effect("oil_loss", "loss_factor", at(OIL), relative(0.04), "level falls by a per hour: churning, drag, capacity",
            family="ageing", after=oil_loss),
-    effect("splash_starvation", "loss_factor", at(MESH), relative(0.30),
+    Effect("splash_starvation", "loss_factor", at(MESH), relative(0.30),
            "mesh sliding (1 + a ((x - 0.25)+ / 0.75)^1.2)", family="lubrication", after=splash_starvation),
-    effect("oil_jet", "source", at(OIL), _oil_jet, "0.3 a x^1.9 W, and a / 30 W/K to oil of temperature T",
+    Effect("oil_jet", "source", at(OIL), share_of_loss(0.18, T=(40.0, 55.0)),
+           "0.3 a x^1.9 W, and a / 30 W/K to oil of temperature T",
            family="oil circuit", after=oil_jet),
-    effect("pump_heat", "source", at(OIL), share_of_loss(0.045), "a x^1.15 W", family="oil circuit", after=pump_heat),
-    effect("run_in_flanks", "loss_factor", at(MESH), relative(0.35, life=(0.6, 1.2)),
+    Effect("pump_heat", "source", at(OIL), share_of_loss(0.045), "a x^1.15 W", family="oil circuit", after=pump_heat),
+    Effect("run_in_flanks", "loss_factor", at(MESH), relative(0.35, life=(0.6, 1.2)),
            "mesh sliding (1 + a m(x nu) exp(-w / life)), dw = x y^0.5 dt", family="ageing", after=run_in_flanks),
-    effect("run_in_seals", "loss_factor", at(OIL), relative(0.5, life=(1.5, 3.0)),
+    Effect("run_in_seals", "loss_factor", at(OIL), relative(0.5, life=(1.5, 3.0)),
            "seals (1 + a exp(-(t_run / life)^0.85))", family="ageing", after=run_in_seals),
-    effect("oil_ageing", "loss_factor", all_bearings, relative(0.03), "viscosity (1 + a t^0.9), t in hours",
+    Effect("oil_ageing", "loss_factor", all_bearings, relative(0.03), "viscosity (1 + a t^0.9), t in hours",
            family="ageing", before=oil_ageing),
-    effect("gear_wear", "loss_factor", at(MESH), relative(0.012), "mesh sliding (1 + a w^1.3), dw = y^1.2 dt (hours)",
+    Effect("gear_wear", "loss_factor", at(MESH), relative(0.012), "mesh sliding (1 + a w^1.3), dw = y^1.2 dt (hours)",
            family="ageing", after=gear_wear),
-    effect("bearing_damage", "source", bearing, share_of_loss(0.10, onset_h=(0.5, 1.2)),
+    Effect("bearing_damage", "source", bearing, share_of_loss(0.10, onset_h=(0.5, 1.2)),
            "a s(t) (0.2 + 0.8 x) (0.6 + 0.4 y) W from t = onset", family="damage", after=bearing_damage),
-    effect("bearing_preload", "loss_factor", bearings_of_input, relative(0.12, dT=(4.0, 7.0)),
+    Effect("bearing_preload", "loss_factor", bearings_of_input, relative(0.12, dT=(4.0, 7.0)),
            "loss (1 + a ((T_shaft - T_housing) - dT)+^1.15)", family="load-dependent loss", after=bearing_preload),
-    effect("bearing_additive", "loss_factor", all_bearings, relative(0.55, 0.95),
+    Effect("bearing_additive", "loss_factor", all_bearings, relative(0.55, 0.95),
            "sliding moment of the bearings (1 - a)", family="lubrication", after=bearing_additive),
-    effect("misalignment", "loss_factor", at(MESH), relative(0.05),
+    Effect("misalignment", "loss_factor", at(MESH), relative(0.05),
            "mesh sliding (1 + a min(0.7 + 0.3 y, 1.5)); bearing loads +-40 % a / 0.05", family="load-dependent loss",
            before=misaligned_load, after=misaligned_mesh),
-    effect("brake_drag", "source", output_shaft, share_of_loss(0.08), "a x^0.85 W", family="damage", after=brake_drag),
+    Effect("brake_drag", "source", output_shaft, share_of_loss(0.08), "a x^0.85 W", family="damage", after=brake_drag),
 )  # fmt: skip

@@ -8,18 +8,15 @@ import numpy as np
 
 from diagnosis.proof.plant.anatomy import MESH, OIL
 from diagnosis.proof.plant.cycles import ROW_S, STAIRS
-from diagnosis.proof.plant.effect import Effect, Grip, Hook, Kind
+from diagnosis.proof.plant.effect import Draw, Effect, Grip, Hook, Kind, Places
 from diagnosis.proof.plant.effects_heat import highest_part, input_shaft, lowest_part, share_of_shed
 from diagnosis.proof.plant.effects_losses import (
     ROLLING,
     SLIDING,
-    Draw,
-    Places,
     at,
     bearing,
     bearings_of_input,
     drawn,
-    effect,
     output_shaft,
     relative,
     share_of_loss,
@@ -148,7 +145,7 @@ def _wax(plant: Plant, rng: np.random.Generator, strength: float) -> Mapping[str
 
 
 def _outside(name: str, kind: Kind, places: Places, draw: Draw, law: str, after: Hook) -> Effect:
-    return effect(name, kind, places, draw, law, family="outside the catalogue", after=after, catalogue=False)
+    return Effect(name, kind, places, draw, law, family="outside the catalogue", after=after, catalogue=False)
 
 
 OUTSIDE_EFFECTS = (

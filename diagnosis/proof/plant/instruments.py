@@ -9,8 +9,8 @@ import numpy as np
 from scipy.signal import lfilter, lfiltic
 
 from diagnosis.proof.plant.cycles import ROW_S, reference_torque
-from diagnosis.proof.plant.effect import Concealed, Effect, Kind
-from diagnosis.proof.plant.effects_losses import Draw, Places, at
+from diagnosis.proof.plant.effect import Concealed, Draw, Effect, Kind, Places
+from diagnosis.proof.plant.effects_losses import at
 from diagnosis.proof.plant.plant import Plant
 from diagnosis.proof.plant.plant_run import Outcome, Run
 from models.base.types import Array
@@ -218,7 +218,7 @@ def _stuck(_: Plant, rng: np.random.Generator, strength: float) -> Mapping[str, 
 
 
 def _fault(name: str, places: Places, draw: Draw, law: str, kind: Kind = "sensor") -> Effect:
-    return Effect(name=name, catalogue=True, family="measurement", kind=kind, places=places, draw=draw, law=law)
+    return Effect(name, kind, places, draw, law, family="measurement")
 
 
 SENSOR_EFFECTS = (

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from diagnosis.proof.plant.cycles import ROW_S, Programme
-from diagnosis.proof.plant.effect import Concealed, Grip, Hook
+from diagnosis.proof.plant.effect import Concealed, Effect, Grip
 from diagnosis.proof.plant.integrator import sdirk_step
 from diagnosis.proof.plant.laws import Laws
 from diagnosis.proof.plant.plant import Moment, Plant
@@ -107,15 +107,6 @@ class Outcome:
     shed: float
 
 
-@dataclass(kw_only=True)
-class _Tally:
-    """Heat balance while stepping, shape (B,) each, [J]."""
-
-    stored: Array
-    given: Array
-    shed: Array
-
-
 def run_plant(plant: Plant, runs: Sequence[Run], progress: Callable[[int], None] | None = None) -> list[Outcome]:
     """Integrate runs; those of equal length go through one loop.
 
@@ -166,7 +157,7 @@ class _Batch:
                     heat[:, member, self.plant.anatomy.index[node]] += weight * watts
         return heat
 
-    def _grips(self) -> list[tuple[Concealed, Grip]]:
+    def _grips(self) -> list[tuple[Effect, Grip]]:
         """Effects of the same kind act in one go on the runs that have them."""
         together: dict[str, list[tuple[int, Concealed, int]]] = {}
         for member, run in enumerate(self.runs):
@@ -175,7 +166,7 @@ class _Batch:
         grips = []
         for group in together.values():
             members, specimens, positions = zip(*group, strict=True)
-            grips.append((specimens[0], Grip(self.plant, members, specimens, positions)))
+            grips.append((specimens[0].effect, Grip(self.plant, members, specimens, positions, len(self.runs[0]))))
         return grips
 
     # ------------------------------------------------------------------ time
@@ -195,26 +186,24 @@ class _Batch:
         kept = np.empty((rows, B, len(anatomy.coarse)))
         felt = {name: np.empty((rows, B)) for name in ("air", "torque", "lost")}
         losses = {place: np.zeros((rows, B)) for place in map(self.plant.place_of, self.plant.components)}
-        tally = _Tally(stored=np.zeros(B), given=np.zeros(B), shed=np.zeros(B))
-        for _, grip in self.grips:
-            grip.prepare(rows)
+        balance = np.zeros((3, B))
         for row in range(rows):
             kept[row] = T @ anatomy.reading.T
             after = min(row + 1, rows - 1)
             middle = {name: 0.5 * (values[row] + values[after]) for name, values in inputs.items()}
             hours = np.maximum(row + 0.5 - skipped, 0.0) * ROW_S / 3600.0
-            moment = self._moment(hours, middle, T + 0.5 * (T - before), self.random_heat[row])
+            moment = self._moment(row, hours, middle, T + 0.5 * (T - before))
             for name, values in (("air", moment.air), ("torque", moment.torque), ("lost", moment.lost)):
                 felt[name][row] = values
             for k, component in enumerate(self.plant.components):
                 losses[self.plant.place_of(component)][row] += moment.loss[:, k]
-            before, T = T, self._step(T, moment, tally)
+            before, T = T, self._step(T, moment, balance)
             if progress is not None and row % 20 == 19:
                 progress(20 * B)
-        return [self._outcome(i, kept, felt, losses, tally) for i in range(B)]
+        return [self._outcome(i, kept, felt, losses, balance[:, i]) for i in range(B)]
 
     def _outcome(
-        self, i: int, kept: Array, felt: Mapping[str, Array], losses: Mapping[str, Array], tally: _Tally
+        self, i: int, kept: Array, felt: Mapping[str, Array], losses: Mapping[str, Array], balance: Array
     ) -> Outcome:
         first = self.runs[i].programme.unrecorded
         heat: list[Mapping[str, Array]] = [{} for _ in self.runs[i].effects]
@@ -228,12 +217,13 @@ class _Batch:
             torque=felt["torque"][first:, i],
             losses={place: values[first:, i] for place, values in losses.items()},
             heat=tuple(heat),
-            stored=float(tally.stored[i]),
-            given=float(tally.given[i]),
-            shed=float(tally.shed[i]),
+            stored=float(balance[0]),
+            given=float(balance[1]),
+            shed=float(balance[2]),
         )
 
-    def _step(self, T: Array, moment: Moment, tally: _Tally) -> Array:
+    def _step(self, T: Array, moment: Moment, balance: Array) -> Array:
+        """Temperatures after a step; adds what is stored, given and shed in it to `balance`, shape (3, B), [J]."""
         plant, B, n = self.plant, len(T), self.n
         K = np.zeros((B, n, n))
         K[:, plant.a, plant.b] = K[:, plant.b, plant.a] = -moment.G
@@ -244,42 +234,34 @@ class _Batch:
         heat = moment.heat + moment.ground_heat
         new, mean = sdirk_step(T=T, capacity=moment.capacity, K=K, heat=heat, dt=ROW_S)
         own = np.setdiff1d(np.arange(n), boundary)
-        tally.stored += (moment.capacity * (new - T))[:, own].sum(axis=1)
-        tally.given += ROW_S * moment.heat.sum(axis=1)
+        balance[0] += (moment.capacity * (new - T))[:, own].sum(axis=1)
+        balance[1] += ROW_S * moment.heat.sum(axis=1)
         for path in np.flatnonzero(np.isin(plant.b, boundary)):
-            tally.shed += ROW_S * moment.G[:, path] * (mean[:, plant.a[path]] - mean[:, plant.b[path]])
-        tally.shed += ROW_S * (moment.ground * mean - moment.ground_heat).sum(axis=1)
+            balance[2] += ROW_S * moment.G[:, path] * (mean[:, plant.a[path]] - mean[:, plant.b[path]])
+        balance[2] += ROW_S * (moment.ground * mean - moment.ground_heat).sum(axis=1)
         return np.asarray(new)
 
-    def _moment(self, hours: Array, inputs: Mapping[str, Array], T: Array, random_heat: Array) -> Moment:
+    def _moment(self, row: int, hours: Array, inputs: Mapping[str, Array], T: Array) -> Moment:
         B, anatomy = len(self.runs), self.plant.anatomy
         bearings = len(anatomy.bearings)
         moment = Moment(
             hours=hours, speed=inputs["speed"].copy(), torque=inputs["torque"].copy(), air=inputs["air"].copy(),
             air_speed=inputs["air_speed"].copy(), T=T, thinning=np.zeros(B), bearing_load=np.ones((B, bearings)),
-            loss=np.zeros((B, len(self.plant.components))), lost=np.zeros(B), heat=random_heat.copy(),
+            loss=np.zeros((B, len(self.plant.components))), lost=np.zeros(B), heat=self.random_heat[row].copy(),
             G=np.empty(0), ground=np.zeros((B, self.n)), ground_heat=np.zeros((B, self.n)),
             capacity=self.laws.capacity.copy(),
         )  # fmt: skip
-        self._act("before", moment)
+        for effect, grip in self.grips:
+            grip.moment, grip.row = moment, row
+            if effect.before is not None:
+                effect.before(grip)
         moment.loss = self.laws.losses(moment)
         moment.G = self.laws.conductances(moment)
-        self._act("after", moment)
-        self._place_losses(moment)
-        return moment
-
-    def _act(self, when: str, moment: Moment) -> None:
         for effect, grip in self.grips:
-            hook: Hook | None = getattr(effect.effect, when)
-            grip.moment = moment
-            if hook is not None:
-                hook(grip)
-            if when == "after":
-                grip.next_row()
-
-    def _place_losses(self, moment: Moment) -> None:
-        """Losses into the nodes."""
+            if effect.after is not None:
+                effect.after(grip)
         moment.lost += moment.loss.sum(axis=1)
         for k, component in enumerate(self.plant.components):
             for node, weight in self.plant.spread_of(component).items():
-                moment.heat[:, self.plant.anatomy.index[node]] += weight * moment.loss[:, k]
+                moment.heat[:, anatomy.index[node]] += weight * moment.loss[:, k]
+        return moment
