@@ -21,42 +21,11 @@ OF_AIR = ("T_ambient", "T_outdoor")  # temperatures that are inputs
 DECIMALS = {"time_s": 0, "speed_rpm": 1, "torque_Nm": 2}
 
 
-def keep_apart(recordings: Path, truth: Path) -> None:
-    """Refuse to put the truth where the recordings are.
-
-    Raises
-    ------
-    InputError
-        If it would lie there.
-    """
-    if recordings.resolve() in (truth.resolve(), *truth.resolve().parents):
-        raise InputError(f"{truth}: the truth must not lie among the recordings in {recordings}; name another folder")
-
-
-def keep_other_cases(made: Path, output: Path) -> None:
-    """Refuse to replace files of another case; the same case may be made again.
-
-    Parameters
-    ----------
-    made : Path
-        Folder with new files
-    output : Path
-        Folder that they will be moved to
-
-    Raises
-    ------
-    InputError
-        If a file there has other content.
-    """
-    for file in sorted(path for path in made.rglob("*") if path.is_file()):
-        there = output / file.relative_to(made)
-        if there.is_file() and there.read_bytes() != file.read_bytes():
-            raise InputError(f"{there}: is of another case, which would be lost; choose another output")
-
-
 @contextmanager
 def staged_folders(recordings: Path, truth: Path) -> Iterator[tuple[Path, Path]]:
     """Folders to write cases into; both replace those named when all is done, or nothing changes.
+
+    A case may be made again: files that are there may be replaced by the same content.
 
     Yields
     ------
@@ -68,11 +37,15 @@ def staged_folders(recordings: Path, truth: Path) -> Iterator[tuple[Path, Path]]
     InputError
         If the truth is to lie among the recordings, or files of another case would be lost.
     """
-    keep_apart(recordings, truth)
+    if recordings.resolve() in (truth.resolve(), *truth.resolve().parents):
+        raise InputError(f"{truth}: the truth must not lie among the recordings in {recordings}; name another folder")
     with atomic_folder(recordings) as stage, atomic_folder(truth) as truth_stage:
         yield stage, truth_stage
-        keep_other_cases(stage, recordings)
-        keep_other_cases(truth_stage, truth)
+        for made, output in ((stage, recordings), (truth_stage, truth)):
+            for file in sorted(path for path in made.rglob("*") if path.is_file()):
+                there = output / file.relative_to(made)
+                if there.is_file() and there.read_bytes() != file.read_bytes():
+                    raise InputError(f"{there}: is of another case, which would be lost; choose another output")
 
 
 def write_case(
@@ -89,7 +62,7 @@ def write_case(
     folder : Path
         Gets ``<recording>.csv.gz`` and, if anything is stated of the sensors, ``mapping.toml``
     truth_file : Path or None
-        Outside `folder`; see :func:`keep_apart`. None: the truth is not written
+        Outside `folder`; see :func:`staged_folders`. None: the truth is not written
     recordings : mapping of name to columns
     stated : mapping of key to float, or None
         Data sheet of every temperature sensor, by the keys of a mapping file; it may be wrong

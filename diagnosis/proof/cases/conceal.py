@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -23,10 +22,9 @@ from diagnosis.proof.plant.effects_losses import LOSS_EFFECTS
 from diagnosis.proof.plant.effects_outside import OUTSIDE_EFFECTS
 from diagnosis.proof.plant.instruments import SENSOR_EFFECTS, Instruments, default_channels, record
 from diagnosis.proof.plant.plant import READINGS, Plant
-from diagnosis.proof.plant.plant_run import EXPONENTS, ORDINARY_SPREAD, Individual, Outcome, Run, factor_sd, run_plant
+from diagnosis.proof.plant.plant_run import EXPONENTS, ORDINARY_SPREAD, Individual, Run, factor_sd, run_plant
 from models.assembly.gearbox import Gearbox, load_gearbox
 from models.base.errors import InputError, did_you_mean
-from models.base.types import Array
 
 EFFECTS: Mapping[str, Effect] = {e.name: e for e in (*LOSS_EFFECTS, *HEAT_EFFECTS, *SENSOR_EFFECTS, *OUTSIDE_EFFECTS)}
 PHYSICS = tuple(e.name for e in (*LOSS_EFFECTS, *HEAT_EFFECTS))
@@ -201,50 +199,28 @@ def conceal_set(
     digits = max(3, len(str(len(plans))))
     cases = [draw_case(plant, plan, seed=(seed, i), name=f"case_{i + 1:0{digits}d}") for i, plan in enumerate(plans)]
     for first in range(0, len(cases), TOGETHER):
+        batch = cases[first : first + TOGETHER]
+        runs = [replace(run, effects=kept) for case in batch for kept in twins(case) for run in case.runs]
+        total, done = sum(map(len, runs)), 0
 
-        def report(done: int, of: int, first: int = first, cases: int = min(TOGETHER, len(cases) - first)) -> None:
+        def report(rows: int, first: int = first, count: int = len(batch), total: int = total) -> None:
+            nonlocal done
+            done += rows
             if progress is not None:
-                progress(round(100 * (first + cases * done / of)), 100 * len(plans))
+                progress(round(100 * (first + count * min(done, total) / total)), 100 * len(plans))
 
-        for case, columns, facts in simulate_cases(plant, cases[first : first + TOGETHER], report):
-            folder = recordings if flat else recordings / case.name
+        outcomes = iter(run_plant(plant, runs, report))
+        for case in batch:
+            by_twin = [[next(outcomes) for _ in case.runs] for _ in twins(case)]
+            columns = {
+                run.programme.name: record(
+                    plant, run, outcome, case.instruments, case.faults, np.random.default_rng([*case.seed, 7, k])
+                )
+                for k, (run, outcome) in enumerate(zip(case.runs, by_twin[0], strict=True))
+            }
+            folder, facts = recordings if flat else recordings / case.name, truth_of(plant, case, by_twin)
             write_case(folder, truth / f"{case.name}.json", columns, facts, case.instruments.stated)
     return [case.name for case in cases]
-
-
-def simulate_cases(
-    plant: Plant, cases: Sequence[ConcealedCase], progress: Callable[[int, int], None] | None = None
-) -> list[tuple[ConcealedCase, Mapping[str, Mapping[str, Array]], Mapping[str, Any]]]:
-    """Simulate cases together; recordings and truth of each.
-
-    Returns
-    -------
-    list of (ConcealedCase, columns by recording, truth)
-    """
-    runs: list[Run] = []
-    for case in cases:
-        for kept in twins(case):
-            runs += [replace(run, effects=kept) for run in case.runs]
-    total, done = sum(len(run) for run in runs), 0
-
-    def report(rows: int) -> None:
-        nonlocal done
-        done += rows
-        if progress is not None:
-            progress(min(done, total), total)
-
-    outcomes = iter(run_plant(plant, runs, report))
-    results: list[tuple[ConcealedCase, Mapping[str, Mapping[str, Array]], Mapping[str, Any]]] = []
-    for case in cases:
-        by_twin: list[list[Outcome]] = [[next(outcomes) for _ in case.runs] for _ in twins(case)]
-        columns = {
-            run.programme.name: record(
-                plant, run, outcome, case.instruments, case.faults, np.random.default_rng([*case.seed, 7, k])
-            )
-            for k, (run, outcome) in enumerate(zip(case.runs, by_twin[0], strict=True))
-        }
-        results.append((case, columns, truth_of(plant, case, by_twin)))
-    return results
 
 
 def twins(case: ConcealedCase) -> list[tuple[Concealed, ...]]:
@@ -288,9 +264,8 @@ def _specimen(plant: Plant, plan: Plan, k: int, rng: np.random.Generator) -> Con
     elif k == 0 and plan.strength is not None:
         strength = plan.strength
     else:
-        strongest = STRENGTH[1]
         weakest = LEAST_STRENGTH.get(plan.group, STRENGTH[0])
-        strength = float(np.exp(rng.uniform(np.log(weakest), np.log(strongest))))
+        strength = float(np.exp(rng.uniform(np.log(weakest), np.log(STRENGTH[1]))))
     return Concealed(
         effect=effect, places=effect.places(plant, rng), parameters=effect.draw(plant, rng, strength), strength=strength
     )

@@ -18,6 +18,7 @@ from diagnosis.proof.plant.plant_run import Outcome, factor_sd
 from models.base.types import Array
 
 SCHEMA = 1
+SETS = ("train", "hold")
 PRACTICAL_K = 0.3
 FAR_CONTROL = "parameter_far"
 # Errors of a recorded input that no gearbox's owner would care for, by column.
@@ -41,14 +42,17 @@ def truth_of(plant: Plant, case: ConcealedCase, by_twin: Sequence[Sequence[Outco
     """
     everything, without_any = by_twin[0], by_twin[min(1, len(by_twin) - 1)]
     physics = case.physics
+    names = [run.programme.name for run in case.runs]
+    rows = {name: len(outcome.T) for name, outcome in zip(names, everything, strict=True)}
     facts = []
     for effect in case.effects:
         if effect in physics:
             k = physics.index(effect)
             twin = without_any if len(physics) == 1 else by_twin[2 + k] if 2 + k < len(by_twin) else None
             K = None if twin is None else _kelvin(plant, case, everything, twin)
-            heat = [_heat_of(effect, k, *pair) for pair in zip(everything, twin or without_any, strict=True)]
-            facts.append(_effect(effect, case) | {"K": K} | _heat(case, heat) | _felt(everything, without_any, effect))
+            triples = zip(names, everything, twin or without_any, strict=True)
+            heat = facts_of_heat({name: _heat_of(effect, k, a, b) for name, a, b in triples}, rows, ROW_S)
+            facts.append(_effect(effect, case) | {"K": K} | heat | _felt(everything, without_any, effect))
         else:
             facts.append(_effect(effect, case) | _measured(plant, case, everything, effect))
     instruments = case.instruments
@@ -100,13 +104,13 @@ def _farthest(plant: Plant, case: ConcealedCase) -> str:
 
 def practical_of(facts: Sequence[Mapping[str, Any]]) -> list[bool | None]:
     """True per effect if it moves a measured temperature by more than is of practical interest; None: not known."""
-    largest = [None if f["K"] is None else max(size["rms"] for size in f["K"]["train"].values()) for f in facts]
-    inputs = [any(c in COLUMN_SIZE and s["rms"] > COLUMN_SIZE[c] for c, s in _columns(f).items()) for f in facts]
-    return [None if K is None else K > PRACTICAL_K or moved for K, moved in zip(largest, inputs, strict=True)]
-
-
-def _columns(fact: Mapping[str, Any]) -> Mapping[str, Mapping[str, float]]:
-    return dict(fact.get("column_shift", {}).get("train", {}))
+    found: list[bool | None] = []
+    for fact in facts:
+        shifts = fact.get("column_shift", {}).get("train", {})
+        moved = any(shifts[c]["rms"] > size for c, size in COLUMN_SIZE.items() if c in shifts)
+        K = fact["K"]
+        found.append(None if K is None else moved or max(s["rms"] for s in K["train"].values()) > PRACTICAL_K)
+    return found
 
 
 def _effect(effect: Concealed, case: ConcealedCase) -> dict[str, Any]:
@@ -130,14 +134,14 @@ def _at(plant: Plant, outcome: Outcome, place: str) -> Array:
 
 def _sets(case: ConcealedCase) -> dict[str, list[int]]:
     names = [run.programme.name for run in case.runs]
-    return {kind: [i for i, name in enumerate(names) if name.startswith(kind)] for kind in ("train", "hold")}
+    return {kind: [i for i, name in enumerate(names) if name.startswith(kind)] for kind in SETS}
 
 
 def size_of(values: Array) -> dict[str, float]:
-    """Root mean square and greatest magnitude, rounded for the truth."""
+    """Root mean square and greatest magnitude of what is not missing, rounded for the truth."""
     return {
-        "rms": round(float(np.sqrt(np.mean(values**2))), 3),
-        "max": round(float(np.abs(values).max(initial=0.0)), 3),
+        "rms": round(float(np.sqrt(np.nanmean(values**2))), 3),
+        "max": round(float(np.nanmax(np.abs(values), initial=0.0)), 3),
     }
 
 
@@ -173,25 +177,30 @@ def _heat_of(effect: Concealed, k: int, with_it: Outcome, without: Outcome) -> M
     return {place: with_it.losses[place] - without.losses[place] for place in with_it.losses}
 
 
-def _heat(case: ConcealedCase, heat: Sequence[Mapping[str, Array]]) -> dict[str, Any]:
-    """Mean and greatest heat by place, its mean magnitude over all places, and when it acted."""
-    places = list(heat[0])
-    found: dict[str, Any] = {}
-    for kind, members in _sets(case).items():
-        found[kind] = {}
-        for place in places:
-            found[kind][place] = size_of_heat(np.concatenate([heat[i][place] for i in members]))
-    total = [np.sum([np.abs(part[place]) for place in places], axis=0, initial=0.0) for part in heat]
-    top = max((float(values.max(initial=0.0)) for values in total), default=0.0)
-    acting = {
-        run.programme.name: spans_of(values > ACTIVE_SHARE * top, ROW_S)
-        for run, values in zip(case.runs, total, strict=True)
+def facts_of_heat(heat: Mapping[str, Mapping[str, Array]], rows: Mapping[str, int], row_s: float) -> dict[str, Any]:
+    """Mean and greatest heat by place, its mean magnitude over all places, and when it acted.
+
+    Parameters
+    ----------
+    heat : mapping of recording to mapping of place to Array, shape (rows,)
+        [W]
+    rows : mapping of recording to int
+    """
+    places = dict.fromkeys(place for made in heat.values() for place in made)
+    total = {name: sum(map(np.abs, made.values()), np.zeros(rows[name])) for name, made in heat.items()}
+    top = max(float(values.max(initial=0.0)) for values in total.values())
+    sets = {kind: [name for name in heat if name.startswith(kind)] for kind in SETS}
+    return {
+        "heat_W": {
+            kind: {p: size_of_heat(np.concatenate([heat[n].get(p, 0.0 * total[n]) for n in names])) for p in places}
+            for kind, names in sets.items()
+        },
+        "heat_magnitude_W": {
+            kind: round(float(np.concatenate([total[name] for name in names]).mean()), 3)
+            for kind, names in sets.items()
+        },
+        "acting_s": {name: spans_of(values > ACTIVE_SHARE * top, row_s) for name, values in total.items()},
     }
-    magnitude = {
-        kind: round(float(np.concatenate([total[i] for i in members]).mean()), 3)
-        for kind, members in _sets(case).items()
-    }
-    return {"heat_W": found, "heat_magnitude_W": magnitude, "acting_s": acting}
 
 
 def spans_of(active: NDArray[np.bool_], row_s: float) -> list[list[float]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from diagnosis.proof.cases.case_files import write_files
-from diagnosis.proof.cases.truth import size_of_heat
+from diagnosis.proof.cases.truth import size_of, size_of_heat
 from diagnosis.proof.injection.calibrated_model import CalibratedModel, calibrate
 from diagnosis.proof.injection.instrument_faults import (
     INPUT_FAULTS,
@@ -25,6 +25,7 @@ from diagnosis.proof.injection.trial import FORMS, Form, Trial, choose_size, dra
 from diagnosis.recordings.time_axis import moment_text
 from models.assembly.gearbox import Gearbox
 from models.base.errors import InputError, did_you_mean
+from models.base.types import Array
 
 SCHEMA = 1
 # Largest change of a measured temperature, [K]: of fast recordings, and of those whose rows are means over minutes.
@@ -300,11 +301,5 @@ def _effect(injector: Injector, trial: Trial, chosen: int) -> dict[str, Any]:
     }
 
 
-def _sizes(K: Any, chosen: int) -> dict[str, dict[str, float]]:
-    return {
-        name: {
-            "rms": round(float(np.sqrt(np.nanmean(values[chosen] ** 2))), 3),
-            "max": round(float(np.nanmax(np.abs(values[chosen]))), 3),
-        }
-        for name, values in K.items()
-    }
+def _sizes(K: Mapping[str, Array], chosen: int) -> dict[str, dict[str, float]]:
+    return {name: size_of(values[chosen]) for name, values in K.items()}

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-
-import numpy as np
+from dataclasses import dataclass, field
 
 from diagnosis.proof.zoo.effects import ZooEffect
-from diagnosis.proof.zoo.faults import Fault, Measured, hold_reading, spoiled
+from diagnosis.proof.zoo.faults import Fault, spoiled
 from diagnosis.proof.zoo.oracle import LOSS, OracleNats
 from diagnosis.proof.zoo.recorder import ZooInstruments, measure
 from diagnosis.proof.zoo.simulate import simulate
@@ -21,6 +19,30 @@ TRAIN, HOLD, BASELINE = "train", "hold", "baseline"
 SEEN_NATS = 3.0
 
 NatsOf = Callable[[Sequence[Mapping[str, Array]]], OracleNats]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class CaseRuns:
+    """Runs of a case.
+
+    Attributes
+    ----------
+    sets : tuple of tuples of int
+        Which effects act in each run of a batch: all, none, and every one alone
+    outcomes : mapping of str to Outcome
+        By recording; a baseline has one run
+    as_recorded : mapping of str to Outcome
+        Of the training recordings, with errors of recorded inputs turned into errors of the true ones
+    """
+
+    sets: tuple[tuple[int, ...], ...]
+    outcomes: Mapping[str, Outcome]
+    as_recorded: Mapping[str, Outcome]
+
+    @property
+    def none(self) -> int:
+        """The run without any effect."""
+        return self.sets.index(())
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -45,7 +67,7 @@ class ZooCase:
         From the nominal model, after calibration
     rejected : int
         Plants that were drawn before it and were too near to or too far from the nominal model
-    runs : CaseRuns or None
+    runs : CaseRuns
         What its recordings gave
     nats : OracleNats or None
         Evidence for all effects together; None of a control
@@ -67,14 +89,9 @@ class ZooCase:
     sessions: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     distance_K: float
     rejected: int = 0
-    runs: CaseRuns | None = None
+    runs: CaseRuns = CaseRuns(sets=((),), outcomes={}, as_recorded={})
     nats: OracleNats | None = None
     nats_of_effects: tuple[OracleNats, ...] = ()
-
-    @property
-    def has_loss(self) -> bool:
-        """True if the total loss is measured."""
-        return self.instruments.loss_noise is not None
 
     @property
     def visible(self) -> bool | None:
@@ -84,25 +101,6 @@ class ZooCase:
     def recordings(self, *kinds: str) -> list[Programme]:
         """Programmes whose names begin with one of some words."""
         return [p for p in self.programmes if p.name.startswith(kinds)]
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class CaseRuns:
-    """Runs of a case.
-
-    Attributes
-    ----------
-    sets : tuple of tuples of int
-        Which effects act in each run of a batch: all, none, and every one alone
-    outcomes : mapping of str to Outcome
-        By recording; a baseline has one run
-    as_recorded : mapping of str to Outcome
-        Of the training recordings, with errors of recorded inputs turned into errors of the true ones
-    """
-
-    sets: tuple[tuple[int, ...], ...]
-    outcomes: Mapping[str, Outcome]
-    as_recorded: Mapping[str, Outcome]
 
 
 def run_case(case: ZooCase, *kinds: str) -> CaseRuns:
@@ -116,18 +114,16 @@ def run_case(case: ZooCase, *kinds: str) -> CaseRuns:
     number = len(case.effects)
     alone = tuple((k,) for k in range(number)) if number > 1 else ()
     sets = (tuple(range(number)), (), *alone) if number else ((),)
-    plain = {p.name: simulate(case.plant, p, [_variant(case, s) for s in sets]) for p in case.recordings(TRAIN, HOLD)
-             if p.name.startswith(kinds)}  # fmt: skip
-    felt = {}
-    if any(effect.fault is not None and effect.fault.what == "input" for effect in case.effects):
-        variants = [_variant(case, s, felt=True) for s in sets]
-        felt = {p.name: simulate(case.plant, p, variants) for p in case.recordings(TRAIN)}
-    healthy = {
-        p.name: simulate(case.plant, p, [Variant(parameters=case.sessions[p.name])])
-        for p in case.recordings(BASELINE)
-        if p.name.startswith(kinds)
-    }
-    return CaseRuns(sets=sets, outcomes={**plain, **healthy}, as_recorded=felt)
+    plain, as_felt = [_variant(case, s) for s in sets], [_variant(case, s, felt=True) for s in sets]
+    faulty_inputs = any(effect.fault is not None and effect.fault.what == "input" for effect in case.effects)
+    outcomes, as_recorded = {}, {}
+    for p in case.recordings(*kinds):
+        healthy = p.name.startswith(BASELINE)
+        variants = [Variant(parameters=case.sessions[p.name])] if healthy else plain
+        outcomes[p.name] = simulate(case.plant, p, variants)
+        if faulty_inputs and p.name.startswith(TRAIN):
+            as_recorded[p.name] = simulate(case.plant, p, as_felt)
+    return CaseRuns(sets=sets, outcomes=outcomes, as_recorded=as_recorded)
 
 
 def nats_of_case(case: ZooCase, runs: CaseRuns, nats_of: NatsOf) -> tuple[OracleNats, tuple[OracleNats, ...]]:
@@ -147,31 +143,19 @@ def differences(case: ZooCase, runs: CaseRuns, run: int) -> list[dict[str, Array
     list of dict of channel to Array, shape (rows,)
         [K], and [W] of :data:`~diagnosis.proof.zoo.oracle.LOSS`
     """
-    none = runs.sets.index(())
     faults = [fault for fault in (case.effects[k].fault for k in runs.sets[run]) if fault is not None]
     found = []
     for programme in case.recordings(TRAIN):
-        sound = measure(case.plant, programme, runs.outcomes[programme.name], none, has_loss=case.has_loss)
+        sound = measure(case.plant, programme, runs.outcomes[programme.name], runs.none)
         outcome = runs.as_recorded.get(programme.name, runs.outcomes[programme.name])
-        measured = measure(case.plant, programme, outcome, run, has_loss=case.has_loss)
-        measured = with_reading_faults(measured, faults)
+        measured = measure(case.plant, programme, outcome, run)
+        for fault in faults:
+            measured = spoiled(measured, fault)
         x = {name: measured.readings[name] - sound.readings[name] for name in case.instruments.channels}
-        if measured.P_loss is not None and sound.P_loss is not None:
+        if case.instruments.loss_noise is not None:
             x[LOSS] = measured.P_loss - sound.P_loss
         found.append(x)
     return found
-
-
-def with_reading_faults(measured: Measured, faults: Sequence[Fault]) -> Measured:
-    """Noise-free readings with faults of sensors and the clock."""
-    for fault in faults:
-        if fault.kind == "stuck":
-            (name,) = fault.channels
-            held = hold_reading(measured.readings[name], measured, fault)
-            measured = replace(measured, readings={**measured.readings, name: held})
-        elif fault.what != "input":
-            measured = spoiled(measured, fault)
-    return measured
 
 
 def _variant(case: ZooCase, acting: Sequence[int], *, felt: bool = False) -> Variant:
@@ -203,10 +187,3 @@ def _as_felt(fault: Fault, plant: ZooPlant) -> Change:
             return a * course.share(m.hours) * (near - m.inputs[name])
 
     return Change(kind="input", target=name, law=law)
-
-
-def deviating(
-    parameters: Mapping[str, float], names: Sequence[str], sd: float, rng: np.random.Generator
-) -> dict[str, float]:
-    """Parameters of another session: every positive one is off by a lognormal factor."""
-    return {name: parameters[name] * float(np.exp(sd * rng.standard_normal())) for name in names}

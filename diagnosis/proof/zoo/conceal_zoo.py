@@ -167,12 +167,11 @@ def write_zoo_case(case: ZooCase, folder: Path, truth_file: Path | None) -> None
 
 def record_case(case: ZooCase, columns: Mapping[str, str]) -> dict[str, dict[str, Array]]:
     """Columns by recording, with noise and faults; faults do not reach back to baselines."""
-    assert case.runs is not None  # noqa: S101
     faults = [effect.fault for effect in case.effects if effect.fault is not None]
     made = {}
     for k, programme in enumerate(case.programmes):
         rng = np.random.default_rng([case.seed, 8, k])
-        measured = measure(case.plant, programme, case.runs.outcomes[programme.name], 0, has_loss=case.has_loss)
+        measured = measure(case.plant, programme, case.runs.outcomes[programme.name], 0)
         acting = [] if programme.name.startswith(BASELINE) else faults
         made[programme.name] = record(measured, case.instruments, acting, columns, rng)
     return made

@@ -32,15 +32,15 @@ class Measured:
         By their names in the nominal network
     readings : mapping of str to Array, shape (rows,)
         By channel, [degC]
-    P_loss : Array, shape (rows,), or None
-        Measured total loss [W], where it is measured
+    P_loss : Array, shape (rows,)
+        Total loss [W], measured or not
     """
 
     hours: Array
     row_s: float
     inputs: Mapping[str, Array]
     readings: Mapping[str, Array]
-    P_loss: Array | None
+    P_loss: Array
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -154,12 +154,10 @@ def input_of(name: str) -> str:
 
 
 def spoiled(measured: Measured, fault: Fault) -> Measured:
-    """The recording with a fault; all but ``stuck``, which :func:`hold_reading` does to the noisy reading."""
+    """The recording with a fault; of noisy readings :func:`hold_reading` does what ``stuck`` does."""
     if fault.what == "input":
         (name,) = fault.channels
         return replace(measured, inputs={**measured.inputs, name: _spoiled_input(measured, fault)})
-    if fault.kind == "stuck":
-        return measured
     share, a = fault.course.share(measured.hours), fault.sign * fault.strength
     readings = dict(measured.readings)
     if fault.kind == "swapped":
@@ -169,7 +167,10 @@ def spoiled(measured: Measured, fault: Fault) -> Measured:
         readings[other] = np.where(there, measured.readings[one], measured.readings[other])
         return replace(measured, readings=readings)
     for name in readings if fault.kind == "clock" else fault.channels:
-        readings[name] = _SPOIL[fault.kind](readings[name], a, share, measured, fault.course)
+        if fault.kind == "stuck":
+            readings[name] = hold_reading(readings[name], measured, fault)
+        else:
+            readings[name] = _SPOIL[fault.kind](readings[name], a, share, measured, fault.course)
     return replace(measured, readings=readings)
 
 
@@ -177,12 +178,6 @@ def hold_reading(values: Array, measured: Measured, fault: Fault) -> Array:
     """A stuck sensor repeats its last reading, noise and all, from the start of its course for so many hours."""
     held = (measured.hours >= fault.course.from_h) & (measured.hours < fault.course.from_h + fault.strength)
     return np.where(held, values[int(np.argmax(held))], values)
-
-
-def recorded_minus_true(measured: Measured, fault: Fault) -> Array:
-    """Error of a recorded input, shape (rows,)."""
-    (name,) = fault.channels
-    return np.asarray(_spoiled_input(measured, fault) - measured.inputs[name])
 
 
 def _spoiled_input(measured: Measured, fault: Fault) -> Array:

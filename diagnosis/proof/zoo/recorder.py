@@ -85,7 +85,7 @@ def with_slow_sensors(plant: ZooPlant, rng: np.random.Generator) -> ZooPlant:
     return replace(plant, probes=probes)
 
 
-def measure(plant: ZooPlant, programme: Programme, outcome: Outcome, run: int, *, has_loss: bool) -> Measured:
+def measure(plant: ZooPlant, programme: Programme, outcome: Outcome, run: int) -> Measured:
     """Recording of one run of a batch by perfect instruments."""
     first = programme.unrecorded
     rows = outcome.P_loss.shape[1]
@@ -94,7 +94,7 @@ def measure(plant: ZooPlant, programme: Programme, outcome: Outcome, run: int, *
         row_s=plant.row_s,
         inputs={name: programme.inputs[name][first:] for name in plant.inputs},
         readings={name: values[run] for name, values in outcome.readings.items()},
-        P_loss=outcome.P_loss[run] if has_loss else None,
+        P_loss=outcome.P_loss[run],
     )
 
 
@@ -120,7 +120,8 @@ def record(
     """
     sound = _with_errors(measured, instruments)
     for fault in faults:
-        sound = spoiled(sound, fault)
+        if fault.kind != "stuck":
+            sound = spoiled(sound, fault)
     rows = len(measured.hours)
     inputs = {}
     for name, values in sound.inputs.items():
@@ -139,7 +140,7 @@ def record(
     drop_readings(readings, instruments.dropouts, rng)
     made = {"time_s": np.asarray(np.arange(rows) * measured.row_s), **inputs}
     made |= {f"T_{name}_degC": values for name, values in readings.items()}
-    if sound.P_loss is not None and instruments.loss_noise is not None:
+    if instruments.loss_noise is not None:
         relative, absolute = instruments.loss_noise
         noise = np.hypot(relative * sound.P_loss, absolute) * rng.standard_normal(rows)
         made["P_loss_W"] = np.round(sound.P_loss + noise, 1)
@@ -155,6 +156,5 @@ def _with_errors(measured: Measured, instruments: ZooInstruments) -> Measured:
     time = measured.hours * 3600.0
     readings = {n: np.interp(time - instruments.clock_s, time, values) for n, values in measured.readings.items()}
     loss = measured.P_loss
-    if loss is not None:
-        loss = loss * (1.0 + instruments.loss_gain) + instruments.loss_offset_W * (loss > 0.0)
+    loss = loss * (1.0 + instruments.loss_gain) + instruments.loss_offset_W * (loss > 0.0)
     return replace(measured, inputs=inputs, readings=readings, P_loss=loss)

@@ -7,25 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from diagnosis.proof.cases.truth import (
-    ACTIVE_SHARE,
-    SCHEMA,
-    facts_of_fault,
-    practical_of,
-    size_of,
-    size_of_heat,
-    spans_of,
-)
-from diagnosis.proof.zoo.case import HOLD, TRAIN, ZooCase, with_reading_faults
+from diagnosis.proof.cases.truth import SCHEMA, SETS, facts_of_fault, facts_of_heat, practical_of, size_of
+from diagnosis.proof.zoo.case import ZooCase
 from diagnosis.proof.zoo.effects import ZooEffect
-from diagnosis.proof.zoo.faults import recorded_minus_true
+from diagnosis.proof.zoo.faults import Fault, spoiled
 from diagnosis.proof.zoo.oracle import OracleNats
 from diagnosis.proof.zoo.recorder import measure
 from diagnosis.proof.zoo.setting import Changed
-from diagnosis.proof.zoo.structure import Change, Outcome, Programme, ZooPlant
+from diagnosis.proof.zoo.structure import Change, Outcome, ZooPlant
 from models.base.types import Array
-
-SETS = (TRAIN, HOLD)
 
 
 def truth_of(case: ZooCase, gearbox_hash: str, columns: Mapping[str, str]) -> dict[str, Any]:
@@ -97,15 +87,12 @@ def truth_of(case: ZooCase, gearbox_hash: str, columns: Mapping[str, str]) -> di
         },
         "begins_h": {p.name: round(p.begins_h, 3) for p in case.programmes},
         "start_degC": {
-            p.name: {name: round(float(values[0, 0]), 1) for name, values in _runs(case, p).readings.items()}
+            p.name: {
+                name: round(float(values[0, 0]), 1) for name, values in case.runs.outcomes[p.name].readings.items()
+            }
             for p in case.programmes
         },
     }
-
-
-def _runs(case: ZooCase, programme: Programme) -> Outcome:
-    assert case.runs is not None  # noqa: S101
-    return case.runs.outcomes[programme.name]
 
 
 def _nats(nats: OracleNats | None) -> dict[str, float | None]:
@@ -133,16 +120,19 @@ def _effect(case: ZooCase, k: int, columns: Mapping[str, str]) -> dict[str, Any]
         "changed": [_changed(case, effect, one) for one in effect.changed],
     }
     if effect.fault is not None:
-        sign = effect.fault.sign
-        facts["parameters"]["a"] = round(sign * effect.strength, 6)
-        return facts | _measured(case, effect, columns)
+        facts["parameters"]["a"] = round(effect.fault.sign * effect.strength, 6)
+        return facts | _measured(case, effect.fault, columns)
     run = 0 if len(case.effects) == 1 else 2 + k
-    return facts | {"K": _kelvin(case, run)} | _heat(case, run)
+    changes = [change for k in case.runs.sets[run] for change in case.effects[k].changes]
+    outcomes = {p.name: case.runs.outcomes[p.name] for p in case.recordings(*SETS)}
+    heat = {name: _heat_of(case.plant, outcome, run, case.runs.none, changes) for name, outcome in outcomes.items()}
+    rows = {name: outcome.P_loss.shape[1] for name, outcome in outcomes.items()}
+    return facts | {"K": _kelvin(case, run)} | facts_of_heat(heat, rows, case.plant.row_s)
 
 
 def _changed(case: ZooCase, effect: ZooEffect, changed: Changed) -> dict[str, Any]:
     """One thing that was changed, with its course in seconds of the recording in which it begins."""
-    course = effect.course if effect.fault is None else effect.fault.course
+    course = effect.course
     facts: dict[str, Any] = {
         "what": changed.what,
         "of": changed.of,
@@ -156,10 +146,10 @@ def _changed(case: ZooCase, effect: ZooEffect, changed: Changed) -> dict[str, An
     }
     to_h = course.to_h
     if effect.fault is not None and effect.fault.kind == "stuck":
-        facts["course"], to_h = "from_to", course.from_h + effect.fault.strength
+        facts["course"], to_h = "from_to", course.from_h + effect.strength
     if course.kind == "always":
         return facts
-    began = [p for p in case.recordings(TRAIN, HOLD) if p.begins_h <= course.from_h]
+    began = [p for p in case.recordings(*SETS) if p.begins_h <= course.from_h]
     recording = max(began, key=lambda p: p.begins_h)
     facts |= {"recording": recording.name, "from_s": round(3600.0 * (course.from_h - recording.begins_h), 1)}
     if np.isfinite(to_h):
@@ -171,48 +161,12 @@ def _kelvin(case: ZooCase, run: int) -> dict[str, Any]:
     """Difference of the readings, without faults of measurement, of a run and that without effects."""
     found: dict[str, Any] = {}
     for kind in SETS:
-        outcomes = [_runs(case, p) for p in case.recordings(kind)]
-        none = _none(case)
+        outcomes, none = [case.runs.outcomes[p.name] for p in case.recordings(kind)], case.runs.none
         found[kind] = {
             name: size_of(np.concatenate([o.readings[name][run] - o.readings[name][none] for o in outcomes]))
             for name in case.instruments.channels
         }
     return found
-
-
-def _none(case: ZooCase) -> int:
-    assert case.runs is not None  # noqa: S101
-    return case.runs.sets.index(())
-
-
-def _heat(case: ZooCase, run: int) -> dict[str, Any]:
-    """Heat that an effect made by nominal node, its mean magnitude, and when it acted."""
-    plant, none = case.plant, _none(case)
-    by_recording = {
-        p.name: _heat_of(plant, _runs(case, p), run, none, _acting(case, run)) for p in case.recordings(*SETS)
-    }
-    nodes = sorted({node for heat in by_recording.values() for node in heat})
-    found: dict[str, Any] = {}
-    total: dict[str, Array] = {}
-    for name, heat in by_recording.items():
-        rows = _runs(case, next(p for p in case.programmes if p.name == name)).P_loss.shape[1]
-        total[name] = np.sum([np.abs(heat[node]) for node in heat], axis=0) if heat else np.zeros(rows)
-    for kind in SETS:
-        names = [p.name for p in case.recordings(kind)]
-        found[kind] = {
-            n: size_of_heat(np.concatenate([by_recording[r].get(n, 0.0 * total[r]) for r in names])) for n in nodes
-        }
-    top = max(float(values.max(initial=0.0)) for values in total.values())
-    magnitude = {
-        kind: round(float(np.concatenate([total[p.name] for p in case.recordings(kind)]).mean()), 3) for kind in SETS
-    }
-    acting = {name: spans_of(values > ACTIVE_SHARE * top, plant.row_s) for name, values in total.items()}
-    return {"heat_W": found, "heat_magnitude_W": magnitude, "acting_s": acting}
-
-
-def _acting(case: ZooCase, run: int) -> list[Change]:
-    assert case.runs is not None  # noqa: S101
-    return [change for k in case.runs.sets[run] for change in case.effects[k].changes]
 
 
 def _heat_of(plant: ZooPlant, outcome: Outcome, run: int, none: int, changes: Sequence[Change]) -> dict[str, Array]:
@@ -239,22 +193,18 @@ def _heat_of(plant: ZooPlant, outcome: Outcome, run: int, none: int, changes: Se
     return found
 
 
-def _measured(case: ZooCase, effect: ZooEffect, columns: Mapping[str, str]) -> dict[str, Any]:
+def _measured(case: ZooCase, fault: Fault, columns: Mapping[str, str]) -> dict[str, Any]:
     """Changes of the columns by a fault of measurement, without noise."""
-    fault = effect.fault
-    assert fault is not None  # noqa: S101
     shifts: dict[str, dict[str, Any]] = {kind: {} for kind in SETS}
     for kind in SETS:
         changes: dict[str, list[Array]] = {}
         for p in case.recordings(kind):
-            sound = measure(case.plant, p, _runs(case, p), _none(case), has_loss=case.has_loss)
-            if fault.what == "input":
-                changes.setdefault(columns[fault.channels[0]], []).append(recorded_minus_true(sound, fault))
-                continue
-            faulty = with_reading_faults(sound, [fault])
+            sound = measure(case.plant, p, case.runs.outcomes[p.name], case.runs.none)
+            faulty = spoiled(sound, fault)
+            for name in sound.inputs:
+                changes.setdefault(columns[name], []).append(faulty.inputs[name] - sound.inputs[name])
             for name in case.instruments.channels:
-                column = f"T_{name}_degC"
-                changes.setdefault(column, []).append(faulty.readings[name] - sound.readings[name])
+                changes.setdefault(f"T_{name}_degC", []).append(faulty.readings[name] - sound.readings[name])
         for column, parts in changes.items():
             values = np.concatenate(parts)
             if np.any(values != 0.0):
