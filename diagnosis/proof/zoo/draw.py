@@ -18,7 +18,7 @@ from diagnosis.proof.zoo.families import find_family
 from diagnosis.proof.zoo.faults import AMBIENT, INPUT_FAULTS, SENSOR_FAULTS, Fault, FaultMaker, input_of
 from diagnosis.proof.zoo.oracle_columns import design_of
 from diagnosis.proof.zoo.recorder import draw_instruments, with_slow_sensors
-from diagnosis.proof.zoo.setting import Setting, UnfitError, either
+from diagnosis.proof.zoo.setting import Setting, UnfitError, either, pick
 from diagnosis.proof.zoo.simulate import simulate
 from diagnosis.proof.zoo.structure import Variant
 from diagnosis.proof.zoo.time_course import ALWAYS, Course
@@ -204,12 +204,12 @@ def draw_fault(name: str, setting: Setting, rng: np.random.Generator, course: Co
     maker, plant = FAULT_MAKERS[name], setting.plant
     channels = [probe.channel for probe in plant.probes]
     cap, near, scale = maker.cap, "", 1.0
-    chosen: tuple[str, ...] = (channels[int(rng.integers(len(channels)))],)
+    chosen: tuple[str, ...] = (pick(channels, rng),)
     if name in INPUT_FAULTS:
         chosen = (input_of(name),)
         if chosen[0] not in plant.inputs:
             raise UnfitError(name)
-        near = channels[int(rng.integers(len(channels)))]
+        near = pick(channels, rng)
         scale = setting.reference["torque"] if name == "torque_offset" else 1.0
     elif maker.fault == "swapped":
         if len(channels) < 2:

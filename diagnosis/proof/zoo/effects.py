@@ -141,7 +141,6 @@ def made(
         If the plant lacks what it needs.
     """
     draft = maker.draw(setting, rng)
-
     return ZooEffect(name=name, catalogue=catalogue, family=maker.family, kind=maker.kind, law=draft.law,
                      unit=draft.unit, cap=draft.cap, act=draft.act, parameters=draft.parameters,
                      course=course)  # fmt: skip

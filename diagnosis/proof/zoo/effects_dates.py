@@ -8,7 +8,7 @@ import numpy as np
 
 from diagnosis.proof.zoo import effects
 from diagnosis.proof.zoo.effects import Draft, Maker
-from diagnosis.proof.zoo.setting import Setting, UnfitError, either
+from diagnosis.proof.zoo.setting import Setting, UnfitError, either, pick
 from diagnosis.proof.zoo.structure import constant
 from diagnosis.proof.zoo.time_course import Course
 
@@ -49,14 +49,14 @@ def capacity_changes(s: Setting, rng: np.random.Generator) -> Draft:
 @makes("source")
 def heat_appears(s: Setting, rng: np.random.Generator) -> Draft:
     """A constant heat into one node."""
-    node = s.nodes[int(rng.integers(len(s.nodes)))]
+    node = pick(s.nodes, rng)
     return Draft(act=s.heat(node, constant(1.0)), law=f"a into {node}", unit="W", cap=0.3 * s.loss)
 
 
 @makes("link")
 def link_appears(s: Setting, rng: np.random.Generator) -> Draft:
     """A further way from one node to the air."""
-    node = s.nodes[int(rng.integers(len(s.nodes)))]
+    node = pick(s.nodes, rng)
     act = s.bridge(node, s.air(), constant(1.0), called="air")
     return Draft(act=act, law=f"a between {node} and air", unit="W/K", cap=0.4 * s.shed)
 
@@ -67,13 +67,13 @@ def set_point_changes(s: Setting, rng: np.random.Generator) -> Draft:
     names = [name for name in ("torque", "speed", "heater_power") if name in s.plant.inputs]
     if not names:
         raise UnfitError("inputs")
-    name, sign = names[int(rng.integers(len(names)))], either(rng)
+    name, sign = pick(names, rng), either(rng)
     act = s.input_shift(name, lambda m: sign * m.inputs[name], sign=sign)
     return Draft(act=act, law=f"true {name} = recorded (1 {_plus(sign)} a)", unit="1", cap=0.2)
 
 
 def _relative(s: Setting, rng: np.random.Generator, what: str, names: tuple[str, ...]) -> Draft:
-    name, sign = names[int(rng.integers(len(names)))], either(rng)
+    name, sign = pick(names, rng), either(rng)
     law = constant(float(sign))
     if what == "link":
         act = s.link_factor((name,), law, sign=sign)

@@ -8,7 +8,7 @@ import numpy as np
 
 from diagnosis.proof.zoo import effects
 from diagnosis.proof.zoo.effects import Draft, Maker
-from diagnosis.proof.zoo.setting import Act, Setting, soft
+from diagnosis.proof.zoo.setting import Act, Setting, pick, soft
 from diagnosis.proof.zoo.structure import Law, Moment, constant
 from models.base.types import Array
 from models.formulas.heat_transfer import KELVIN
@@ -49,8 +49,7 @@ def oil_mist(s: Setting, _: np.random.Generator) -> Draft:
 @makes("link_factor", INSIDE)
 def bearing_seat_contact(s: Setting, rng: np.random.Generator) -> Draft:
     """A loose seat, tighter while the bearing is warmer than the wall."""
-    bearings = s.group("bearings")
-    bearing = bearings[int(rng.integers(len(bearings)))]
+    bearing = pick(s.group("bearings"), rng)
     T, wall = s.temperature(bearing), s.temperature(s.group("housing")[0])
     names = s.link_between((bearing,), s.group("housing"))
     act = s.link_factor(names, lambda m: -np.exp(-np.maximum(T(m) - wall(m), 0.0) / 20.0), sign=-1)
@@ -69,8 +68,7 @@ def radiation_error(s: Setting, _: np.random.Generator) -> Draft:
 @makes("link_factor", OUT)
 def air_cooling_change(s: Setting, rng: np.random.Generator) -> Draft:
     """A fan cools one wall less than it did."""
-    walls = s.group("housing")
-    wall = walls[int(rng.integers(len(walls)))]
+    wall = pick(s.group("housing"), rng)
     names = s.link_between((wall,), (AIR,))
     act = s.link_factor(names, constant(-1.0), sign=-1)
     return Draft(act=act, law="conductance of one wall to air (1 - a)", unit="1", cap=0.8)
@@ -79,8 +77,7 @@ def air_cooling_change(s: Setting, rng: np.random.Generator) -> Draft:
 @makes("link_factor", AROUND)
 def fan_thermostat(s: Setting, rng: np.random.Generator) -> Draft:
     """A fan cools one wall, faster the warmer its feeler is."""
-    walls = s.group("housing")
-    wall = walls[int(rng.integers(len(walls)))]
+    wall = pick(s.group("housing"), rng)
     T_on, tau = s.quantile(wall, float(rng.uniform(0.4, 0.8))), s.lag(rng, 300.0)
     act = s.link_factor(s.link_between((wall,), (AIR,)), lambda m: soft((m.T["fan feeler"] - T_on) / 1.0))
     act = act + Act(parts=s.follower("fan feeler", wall, tau))
@@ -296,9 +293,4 @@ def _below_air(s: Setting, rng: np.random.Generator) -> float:
 
 
 def _capacity(s: Setting, node: str) -> float:
-    sizes = s.bodies(node)
-    return sum(float(b.capacity(s.typical)[0]) for b in s.plant.bodies if b.name in sizes)
-
-
-def _maker(family: str, kind: str, draw: object) -> Maker:
-    return Maker(family=family, kind=kind, draw=draw)  # type: ignore[arg-type]
+    return sum(s.capacities(node).values())

@@ -8,7 +8,7 @@ import numpy as np
 
 from diagnosis.proof.zoo import effects
 from diagnosis.proof.zoo.effects import Draft, Maker
-from diagnosis.proof.zoo.setting import Setting, UnfitError, soft
+from diagnosis.proof.zoo.setting import Setting, UnfitError, pick, soft
 from diagnosis.proof.zoo.structure import Law, constant
 
 LOSS_MAKERS: dict[str, Maker] = {}
@@ -82,7 +82,7 @@ def misalignment(s: Setting, _: np.random.Generator) -> Draft:
 @makes("loss_factor", LOAD)
 def bearing_preload(s: Setting, rng: np.random.Generator) -> Draft:
     """A bearing warmer than its housing closes its clearance softly."""
-    bearing = _bearing(s, rng)
+    bearing = pick(s.group("bearings"), rng)
     T, wall = s.temperature(bearing), s.temperature(s.group("housing")[0])
     dT = float(rng.uniform(1.0, 4.0))
     act = s.loss_factor(s.losses(bearing), lambda m: 0.2 * np.logaddexp(0.0, (T(m) - wall(m) - dT) / 0.8))
@@ -162,7 +162,7 @@ def gear_wear(s: Setting, _: np.random.Generator) -> Draft:
 @makes("source", AGEING)
 def bearing_damage(s: Setting, rng: np.random.Generator) -> Draft:
     """One bearing grinds from a moment on, in proportion to speed."""
-    bearing, x = _bearing(s, rng), s.speed()
+    bearing, x = pick(s.group("bearings"), rng), s.speed()
     at_h = s.date(rng, 0.05, 0.7)
     act = s.heat(bearing, lambda m: x(m) * soft((m.hours - at_h) / 0.05), is_loss=True)
     return Draft(act=act, law="a x s((t - at) / 0.05 h) into the bearing", unit="W", cap=0.4 * s.loss,
@@ -175,8 +175,3 @@ def torque_decay(s: Setting, _: np.random.Generator) -> Draft:
     s.load()
     act = s.input_shift("torque", lambda m: -m.inputs["torque"] * np.sqrt(m.hours / s.span), sign=-1)
     return Draft(act=act, law="true torque = recorded (1 - a (t / span)^0.5)", unit="1", cap=0.3)
-
-
-def _bearing(s: Setting, rng: np.random.Generator) -> str:
-    names = s.group("bearings")
-    return names[int(rng.integers(len(names)))]

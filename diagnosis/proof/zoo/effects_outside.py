@@ -8,7 +8,7 @@ import numpy as np
 
 from diagnosis.proof.zoo import effects
 from diagnosis.proof.zoo.effects import Draft, Maker
-from diagnosis.proof.zoo.setting import Setting, soft
+from diagnosis.proof.zoo.setting import Setting, pick, soft
 from diagnosis.proof.zoo.structure import Law, Moment, constant
 from models.base.types import Array
 
@@ -19,7 +19,7 @@ makes = partial(effects.makes, family="outside the catalogue", table=OUTSIDE_MAK
 @makes("source")
 def bearing_torque_square(s: Setting, rng: np.random.Generator) -> Draft:
     """A bearing that bends loses power with the square of torque."""
-    x, y, node = s.speed(), s.load(), _any(s.group("bearings"), rng)
+    x, y, node = s.speed(), s.load(), pick(s.group("bearings"), rng)
     act = s.heat(node, lambda m: y(m) ** 2 * x(m), is_loss=True)
     return Draft(act=act, law="a y^2 x into the bearing", unit="W", cap=0.4 * s.loss)
 
@@ -27,7 +27,7 @@ def bearing_torque_square(s: Setting, rng: np.random.Generator) -> Draft:
 @makes("source")
 def resonance(s: Setting, rng: np.random.Generator) -> Draft:
     """A narrow band of speed shakes one node."""
-    x, x0, node = s.speed(), float(rng.uniform(0.2, 0.8)), _any(s.group("bearings"), rng)
+    x, x0, node = s.speed(), float(rng.uniform(0.2, 0.8)), pick(s.group("bearings"), rng)
     act = s.heat(node, lambda m: 1.0 / (1.0 + ((x(m) - x0) / (0.06 * x0)) ** 2), is_loss=True)
     return Draft(act=act, law="a / (1 + ((x - x0) / (0.06 x0))^2)", unit="W", cap=0.5 * s.loss, parameters={"x0": x0})
 
@@ -35,7 +35,7 @@ def resonance(s: Setting, rng: np.random.Generator) -> Draft:
 @makes("source")
 def stick_slip(s: Setting, rng: np.random.Generator) -> Draft:
     """A support creaks below a speed and slides above it."""
-    x, x0, node = s.speed(), float(rng.uniform(0.1, 0.3)), _any(s.group("bearings"), rng)
+    x, x0, node = s.speed(), float(rng.uniform(0.1, 0.3)), pick(s.group("bearings"), rng)
     act = s.heat(node, lambda m: soft((x0 - x(m)) / 0.01) * np.tanh(x(m) / 0.01), is_loss=True)
     return Draft(act=act, law="a while 0 < x < x0", unit="W", cap=0.5 * s.loss, parameters={"x0": x0})
 
@@ -52,7 +52,7 @@ def eddy_brake(s: Setting, rng: np.random.Generator) -> Draft:
 @makes("source")
 def stiff_grease(s: Setting, rng: np.random.Generator) -> Draft:
     """Grease that stiffens at rest is sheared soft in every recording."""
-    x, tau, node = s.speed(), float(rng.uniform(0.4, 2.0)), _any(s.group("bearings"), rng)
+    x, tau, node = s.speed(), float(rng.uniform(0.4, 2.0)), pick(s.group("bearings"), rng)
     act = s.heat(node, lambda m: np.sqrt(x(m)) * np.exp(-m.since_start / tau), is_loss=True)
     return Draft(act=act, law="a x^0.5 exp(-t / tau), t since the recording began", unit="W", cap=0.6 * s.loss,
                  parameters={"tau_h": tau})  # fmt: skip
@@ -88,7 +88,7 @@ def growing_insulation(s: Setting, rng: np.random.Generator) -> Draft:
 def opening_gap(s: Setting, rng: np.random.Generator) -> Draft:
     """A gap opens in one link inside as it warms."""
     inside = [n for n in s.links if all(node in s.nodes for node in n.split("-"))]
-    name = _any(inside, rng)
+    name = pick(inside, rng)
     node = name.split("-")[0]
     T, T0 = s.temperature(node), s.quantile(node, float(rng.uniform(0.3, 0.7)))
     act = s.link_factor((name,), lambda m: -soft((T(m) - T0) / 2.0), sign=-1)
@@ -176,14 +176,10 @@ def _timer(rng: np.random.Generator) -> _Timer:
     return _Timer(float(rng.uniform(0.7, 3.0)), float(rng.uniform(0.0, 1.0)))
 
 
-def _any(names: tuple[str, ...] | list[str], rng: np.random.Generator) -> str:
-    return names[int(rng.integers(len(names)))]
-
-
 def _outer(s: Setting, rng: np.random.Generator) -> str:
     """A node that touches the air, a housing part if there is one."""
-    return _any(s.group("housing"), rng) if s.groups.get("housing") else _any(s.nodes, rng)
+    return pick(s.group("housing"), rng) if s.groups.get("housing") else pick(s.nodes, rng)
 
 
 def _way_to_air(s: Setting, rng: np.random.Generator) -> tuple[str, ...]:
-    return (_any(s.link_between(s.nodes, ("air",)), rng),)
+    return (pick(s.link_between(s.nodes, ("air",)), rng),)

@@ -7,7 +7,7 @@ that laws of parameters alone are evaluated once and a derivative evaluates only
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import cast
 
 import numpy as np
@@ -110,7 +110,7 @@ class Laws:
     def note_reads(self, moment: Moment) -> None:
         """Find out what every law reads, at any moment."""
         boundaries = {name: law(moment) for name, law in zip(self.boundaries, self.laws, strict=False)}
-        whole = _with(moment, T={**moment.T, **boundaries})
+        whole = replace(moment, T={**moment.T, **boundaries})
         self.reads: list[set[Key]] = []
         for law in self.laws:
             noted = _Noted(whole)
@@ -148,7 +148,7 @@ class Laws:
         for k in chosen:
             if k < count:
                 values[k] = self.laws[k](moment)
-        whole = _with(moment, T=self.temperatures(moment, values))
+        whole = replace(moment, T=self.temperatures(moment, values))
         for k in chosen:
             if k >= count:
                 values[k] = self.laws[k](whole)
@@ -163,7 +163,7 @@ class Laws:
         _, G, P, C = np.split(values, self.cut)
         B = values.shape[1]
         T = self.temperatures(moment, values)
-        whole = _with(moment, T=T)
+        whole = replace(moment, T=T)
         bridges = np.zeros((len(self.ends) - len(G), B))
         G, P, C = np.concatenate([G, bridges]), P.copy(), C.copy()
         extra, extra_loss, made = np.zeros((len(self.bodies), B)), np.zeros(B), []
@@ -213,11 +213,7 @@ def feel(moment: Moment, acting: Acting) -> Moment:
             amount = np.zeros(len(moment.hours))
             amount[members] = np.broadcast_to(change.law(moment), amount.shape)[members]
             inputs[change.target] = inputs[change.target] + amount
-    return Moment(hours=moment.hours, since_start=moment.since_start, inputs=inputs, T=moment.T, p=moment.p)
-
-
-def _with(moment: Moment, *, T: Mapping[str, Array]) -> Moment:
-    return Moment(hours=moment.hours, since_start=moment.since_start, inputs=moment.inputs, T=T, p=moment.p)
+    return replace(moment, inputs=inputs)
 
 
 class _Noted:

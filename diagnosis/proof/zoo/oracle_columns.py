@@ -214,10 +214,11 @@ def _errors_of_laws(plant: ZooPlant, smooth: _Smooth) -> Iterator[Change]:
 
 def _errors_of_splits(plant: ZooPlant) -> Iterator[Change]:
     """Heat of a source that goes to another of its bodies, or to a neighbour of the main one, instead."""
+    bodies = {body.name for body in plant.bodies}
     for source in plant.sources:
         main = max(source.spread, key=lambda name: source.spread[name])
-        for target in dict.fromkeys([*source.spread, *_bodies_next_to(plant, main)]):
-            if target != main:
+        for target in dict.fromkeys([*source.spread, *_next_to(plant, main)]):
+            if target != main and target in bodies:
                 yield Change(kind="heat", target=target, other=main, law=times(LUMPED_SD, source.power))
 
 
@@ -245,8 +246,3 @@ def _next_to(plant: ZooPlant, name: str) -> list[str]:
     """Bodies and boundaries that a path joins to another."""
     pairs = [path.ends for path in plant.paths if name in path.ends]
     return list(dict.fromkeys(b if a == name else a for a, b in pairs))
-
-
-def _bodies_next_to(plant: ZooPlant, name: str) -> list[str]:
-    bodies = {body.name for body in plant.bodies}
-    return [other for other in _next_to(plant, name) if other in bodies]

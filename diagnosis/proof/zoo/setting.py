@@ -161,8 +161,8 @@ class Setting:
 
     # ------------------------------------------------------------------ what there is
 
-    def bodies(self, node: str) -> dict[str, float]:
-        """Bodies of a nominal node and the share of each in its heat capacity.
+    def capacities(self, node: str) -> dict[str, float]:
+        """Bodies of a nominal node and the heat capacity of each, [J/K].
 
         Raises
         ------
@@ -172,6 +172,11 @@ class Setting:
         sizes = {b.name: float(b.capacity(self.typical)[0]) for b in self.plant.bodies if is_part(b.part_of, node)}
         if not sizes:
             raise UnfitError(node)
+        return sizes
+
+    def bodies(self, node: str) -> dict[str, float]:
+        """Bodies of a nominal node and the share of each in its heat capacity."""
+        sizes = self.capacities(node)
         return {name: size / sum(sizes.values()) for name, size in sizes.items()}
 
     def group(self, name: str) -> tuple[str, ...]:
@@ -355,8 +360,7 @@ class Setting:
 
     def follower(self, name: str, node: str, tau_s: float) -> Parts:
         """A small body that follows a node with a time constant: the feeler of a valve or thermostat."""
-        body = max(self.bodies(node).items(), key=lambda item: item[1])[0]
-        size = next(float(b.capacity(self.typical)[0]) for b in self.plant.bodies if b.name == body)
+        body, size = max(self.capacities(node).items(), key=lambda item: item[1])
         small = 1e-4 * size
         return Parts(
             bodies=(Body(name=name, capacity=constant(small), part_of=""),),
@@ -381,3 +385,8 @@ class Setting:
 def either(rng: np.random.Generator) -> int:
     """1 or -1."""
     return 1 if rng.random() < 0.5 else -1
+
+
+def pick(names: Sequence[str], rng: np.random.Generator) -> str:
+    """One of some names."""
+    return names[int(rng.integers(len(names)))]

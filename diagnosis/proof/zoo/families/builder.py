@@ -6,6 +6,7 @@ from collections.abc import Collection, Mapping
 
 import numpy as np
 
+from diagnosis.proof.plant.cycles import ROW_S, ornstein_uhlenbeck
 from diagnosis.proof.zoo.structure import Body, Boundary, Law, Moment, Path, Probe, Source, ZooPlant
 from models.base.types import Array
 
@@ -84,18 +85,9 @@ class Builder:
         name = name or f"{a}-{b}"
         parameter = self.draw(f"G {name}", 1.0, spread)
 
-        if callable(conductance):
-            shape = conductance
-
-            def law(m: Moment) -> Array:
-                value = m.p[parameter] * shape(m)
-                return value * m.p[common] if common else value
-        else:
-            constant = float(conductance)
-
-            def law(m: Moment) -> Array:
-                value = m.p[parameter] * constant
-                return value * m.p[common] if common else value
+        def law(m: Moment) -> Array:
+            value = m.p[parameter] * (conductance(m) if callable(conductance) else conductance)
+            return value * m.p[common] if common else value
 
         self.paths.append(
             Path(name=name, ends=(a, b), conductance=law, part_of=self._link(a, b) if part_of is None else part_of)
@@ -176,13 +168,7 @@ def wander(rng: np.random.Generator, *, sd: float, tau_h: float, span_h: float) 
     """
     step = tau_h / 8.0
     count = int(np.ceil(span_h / step)) + 1
-    keep = np.exp(-step / tau_h)
-    kicks = rng.standard_normal(count) * np.sqrt(1.0 - keep**2)
-    process = np.empty(count)
-    process[0] = rng.standard_normal()
-    for k in range(1, count):
-        process[k] = keep * process[k - 1] + kicks[k]
-    factor = np.exp(sd * process)
+    factor = np.exp(sd * ornstein_uhlenbeck(count, rng, sd=1.0, tau_s=8.0 * ROW_S))
     times = np.arange(count) * step
 
     def law(m: Moment) -> Array:

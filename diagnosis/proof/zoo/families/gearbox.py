@@ -49,7 +49,10 @@ class _Gearbox:
         self._gears_and_shafts()
         self._bearings()
         self._mesh()
-        self._other_losses()
+        self._churning()
+        self._bearing_losses()
+        for seal in self.gearbox.seal:
+            self._seal_loss(seal.name, seal.shaft, seal.diameter_mm)
         self._probes()
         return self.b.plant(loss_W=self._reference_loss(), row_s=10.0)
 
@@ -371,11 +374,6 @@ class _Gearbox:
 
         b.path(rims[0], rims[1], contact, 0.15, name="mesh", part_of="+".join(f"mesh-{gear}" for gear in sizes.gears))
 
-    def _other_losses(self) -> None:
-        self._churning()
-        self._bearing_losses()
-        self._seal_losses()
-
     def _churning(self) -> None:
         b, sizes, pair, oil, design = self.b, self.sizes, self.sizes.pair, self.oil, self.design
         sump, rho = self.at["oil"]["sump"], float(oil.density(T_SERVICE))
@@ -420,10 +418,6 @@ class _Gearbox:
 
         into = {inner: 1.0} if inner == outer else {inner: 0.5, outer: 0.5}
         self.b.source(name, name, power, into, 0.12)
-
-    def _seal_losses(self) -> None:
-        for seal in self.gearbox.seal:
-            self._seal_loss(seal.name, seal.shaft, seal.diameter_mm)
 
     def _seal_loss(self, name: str, shaft: str, d_mm: float) -> None:
         design, sump, nu_40 = self.design, self.at["oil"]["sump"], self.oil.nu_40

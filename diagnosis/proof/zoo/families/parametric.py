@@ -337,15 +337,13 @@ class _Machine:
         """A law that a definition gives as text, of inputs, parameters at their start and temperatures of parts."""
         if text is None:
             return constant(1.0)
-        expression = parse_expression(text)
-        values = {sp.Symbol(p.name, real=True): p.start for p in self.definition.parameter}
-        known = {str(symbol): value for symbol, value in values.items()}
+        expression, start = parse_expression(text), {p.name: p.start for p in self.definition.parameter}
         expression = expression.xreplace(
-            {s: sp.Float(known[str(s)]) for s in expression.free_symbols if str(s) in known}
+            {s: sp.Float(start[str(s)]) for s in expression.free_symbols if str(s) in start}
         )
-        names = sorted(str(s) for s in expression.free_symbols)
-        by_name = {str(s): s for s in expression.free_symbols}
-        function: Callable[..., Array] = sp.lambdify([by_name[name] for name in names], expression, "numpy")
+        symbols = sorted(expression.free_symbols, key=str)
+        names = [str(s) for s in symbols]
+        function: Callable[..., Array] = sp.lambdify(symbols, expression, "numpy")
         nodes = {f"T_{name}": body for name, body in self.core.items()} | {f"T_{name}": name for name in self.input_of}
 
         def law(m: Moment) -> Array:

@@ -13,7 +13,7 @@ from diagnosis.proof.zoo.families.losses import RPM, Dip, Roller
 from models.assembly.gearbox import Gearbox
 from models.base.errors import InputError
 from models.base.types import Array
-from models.definition.sections import Shaft
+from models.definition.sections import Bearing, Shaft
 from models.formulas.ehl import reduced_modulus
 from models.formulas.geometry import GearPair
 
@@ -93,6 +93,10 @@ class Sizes:
         """Section of a shaft."""
         return next(shaft for shaft in self.gearbox.shaft if shaft.name == name)
 
+    def bearing(self, name: str) -> Bearing:
+        """Section of a bearing."""
+        return next(bearing for bearing in self.gearbox.bearing if bearing.name == name)
+
     def bearings(self, shaft: str) -> list[str]:
         """Bearings of a shaft."""
         return [bearing.name for bearing in self.gearbox.bearing if bearing.shaft == shaft]
@@ -125,8 +129,7 @@ class Sizes:
 
     def C_bearing(self, name: str) -> float:
         """Heat capacity of a bearing."""
-        bearing = next(b for b in self.gearbox.bearing if b.name == name)
-        return float(bearing.mass_kg * self.gearbox.stage[0].material.specific_heat_J_kgK)
+        return float(self.bearing(name).mass_kg * self.gearbox.stage[0].material.specific_heat_J_kgK)
 
     # ------------------------------------------------------------------ resistances, [K/W]
 
@@ -149,7 +152,7 @@ class Sizes:
 
     def R_bearing(self, name: str) -> float:
         """Resistance of a bearing, a solid ring."""
-        bearing = next(b for b in self.gearbox.bearing if b.name == name)
+        bearing = self.bearing(name)
         ratio = bearing.outside_diameter_mm / bearing.bore_mm
         return float(np.log(ratio) / (2.0 * np.pi * self.k_steel * bearing.width_mm * 1e-3))
 
@@ -177,7 +180,7 @@ class Sizes:
 
     def roller(self, name: str) -> Roller:
         """A bearing."""
-        b = next(b for b in self.gearbox.bearing if b.name == name)
+        b = self.bearing(name)
         return Roller(
             d_m=0.5 * (b.bore_mm + b.outside_diameter_mm),
             bore=b.bore_mm,
@@ -185,17 +188,13 @@ class Sizes:
             width=b.width_mm,
         )
 
-    def load_share(self, name: str) -> float:
-        """Share of a bearing in the normal force of the mesh."""
-        return next(b.load_share for b in self.gearbox.bearing if b.name == name)
-
     def ratio(self, shaft: str) -> float:
         """Speed of a shaft over that of the input."""
         return self.gearbox.speed_ratio[shaft]
 
     def through_flow(self, name: str) -> float:
         """Most heat that oil takes through a bearing, ``27 D B / 12500``, [W/K] (ISO/TR 14179-2, read in the paper)."""
-        b = next(b for b in self.gearbox.bearing if b.name == name)
+        b = self.bearing(name)
         return 27.0 * b.outside_diameter_mm * b.width_mm / 12500.0
 
     def nominal_links(self) -> Iterator[str]:
