@@ -17,6 +17,7 @@ from diagnosis.forward.recurrence import lagged
 from diagnosis.forward.whitening import RandomHeat
 from diagnosis.proof.injection.control import Control, find_control
 from diagnosis.proof.injection.real_recording import RealRecording
+from diagnosis.proof.injection.trial import Course
 from diagnosis.setup.inference_setup import InferenceSetup
 from diagnosis.setup.shaft import shafts
 from models.assembly.gearbox import Gearbox
@@ -30,6 +31,7 @@ from models.simulation.simulate import simulate
 from models.simulation.thermal_network import Losses, ThermalNetwork
 
 AMPLITUDE, COURSE, SEEN = "injected_size", "injected_course", "injected_seen"
+SIZE_AND_COURSE: sp.Expr = symbol(AMPLITUDE) * symbol(COURSE)  # the factor that every change has
 HOLD, HELD = "injected_hold", "injected_held"
 HOLD_K = 1.0  # change of a held temperature at which its control removes as much heat as all sources make
 BLOCK_S = 30.0  # the model runs on means over so long, of recordings with faster rows
@@ -126,22 +128,16 @@ class CalibratedModel:
             self.control.node, f"{HELD}_temperature", symbol(HOLD), name=HOLD, temperature=symbol(HELD)
         )
 
-    @property
-    def size_and_course(self) -> sp.Expr:
-        """Size times course, the factor that every change has."""
-        return symbol(AMPLITUDE) * symbol(COURSE)
-
     def seen(self, node: str) -> Array:
         """Measured minus simulated temperature of a node in blocks, shape (blocks,), [K]; 0 if it is not measured."""
-        for channel, values in self.real.channels.items():
+        for channel in self.real.channels:
             if node_of_channel(channel, [node]) == node:
-                good = np.isfinite(values)
-                measured = np.interp(self.cycle.time, self.real.time[good], values[good])
+                measured = self.real.reading_at(channel, self.cycle.time)
                 return np.asarray(measured - self.base.temperatures[node])
         return np.zeros(len(self.cycle.time))
 
     def differences(
-        self, changed: ThermalNetwork, sizes: Array, course: Array, extra: Mapping[str, Array] | None = None
+        self, changed: ThermalNetwork, sizes: Array, course: Course, extra: Mapping[str, Array] | None = None
     ) -> Differences:
         """Run the model with a change of several sizes and without.
 
@@ -150,12 +146,13 @@ class CalibratedModel:
         changed : ThermalNetwork
             Made from :meth:`prepared`; without effect at size 0 and at course 0
         sizes : Array, shape (B,)
-        course : Array, shape (blocks,)
+        course : Course
         extra : mapping of input to Array, shape (blocks,), or None
             Further inputs
         """
-        first = max(int(np.argmax(course != 0.0)) - 1, 0)
-        inputs = {**self.cycle.inputs, COURSE: course, **(extra or {})}
+        acts = course(self.cycle.time)
+        first = max(int(np.argmax(acts != 0.0)) - 1, 0)
+        inputs = {**self.cycle.inputs, COURSE: acts, **(extra or {})}
         if self.control is not None:
             active = np.interp(self.cycle.time, self.real.time, self.control.active)
             inputs |= {HOLD: active * self.heat_W / HOLD_K, HELD: self.base.temperatures[self.control.node]}

@@ -57,10 +57,7 @@ def find_control(real: RealRecording) -> Control | None:
 
     Of several sensors that do, it is the one whose turns meet their levels most often.
     """
-    whole = {
-        name: np.interp(real.time, real.time[np.isfinite(values)], values[np.isfinite(values)])
-        for name, values in real.channels.items()
-    }
+    whole = {name: real.reading_at(name, real.time) for name in real.channels}
     best: tuple[float, Control] | None = None
     for channel, T in whole.items():
         spread = float(np.percentile(T, 90.0) - np.percentile(T, 10.0))
@@ -72,7 +69,8 @@ def find_control(real: RealRecording) -> Control | None:
         high, low = float(np.median(T[peaks])), float(np.median(T[valleys]))
         near = LEVEL_SHARE * (high - low)
         hits = [np.abs(T[peaks] - high) <= near, np.abs(T[valleys] - low) <= near]
-        if min(float(hit.mean()) for hit in hits) < AT_LEVEL:
+        met = min(float(hit.mean()) for hit in hits)
+        if met < AT_LEVEL:
             continue
         turns = np.sort(np.concatenate([peaks[hits[0]], valleys[hits[1]]]))
         usual = float(np.median(np.diff(real.time[turns])))
@@ -87,7 +85,6 @@ def find_control(real: RealRecording) -> Control | None:
         if others and falls[others[0]] < SHARED * (high - low):  # noise or a broken sensor, which no other one follows
             continue
         node, acts_at = (node_of_channel(name, real.nodes) for name in (channel, cooled))
-        met = min(float(hit.mean()) for hit in hits)
         if best is None or met > best[0]:
             best = met, Control(channel=channel, node=node, acts_at=acts_at, low=low, high=high, active=active)
     return None if best is None else best[1]

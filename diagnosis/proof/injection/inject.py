@@ -246,20 +246,25 @@ def inject_set(
 def truth_of(injector: Injector, found: tuple[Trial, int] | None) -> dict[str, Any]:
     """Return the truth of a case, ready for JSON; without an injection that of a control."""
     real = injector.real
-    return {
+    facts = {
         "schema": SCHEMA,
         "gearbox": injector.gearbox.hash,
-        "group": "control" if found is None else "injection",
-        "control": "real" if found is None else None,
         "source": {"file": real.path.name, "part": real.part, "sha256": real.recording.sha256},
         "bounds_K": list(injector.bounds_K),
-        "changed": [] if found is None else [_changed(real, found[0], float(found[0].sizes[found[1]]))],
-        "effects": [] if found is None else [_effect(injector, *found)],
-        "K_all": {name: {"rms": 0.0, "max": 0.0} for name in real.channels}
-        if found is None or found[0].what == "input"
-        else _sizes(found[0].K, found[1]),
-        "approximate": bool(found and found[0].approximate),
-        "approximate_because": found[0].approximate if found else "",
+        "K_all": {name: {"rms": 0.0, "max": 0.0} for name in real.channels},
+    }
+    if found is None:
+        of_control = {"changed": [], "effects": [], "approximate": False, "approximate_because": ""}
+        return facts | {"group": "control", "control": "real"} | of_control
+    trial, chosen = found
+    return facts | {
+        "group": "injection",
+        "control": None,
+        "changed": [_changed(real, trial, float(trial.sizes[chosen]))],
+        "effects": [_effect(injector, trial, chosen)],
+        "approximate": bool(trial.approximate),
+        "approximate_because": trial.approximate,
+        **({} if trial.what == "input" else {"K_all": _sizes(trial.K, chosen)}),
     }
 
 

@@ -57,12 +57,11 @@ def lag(real: RealRecording, channel: str, course: Course, _: np.random.Generato
     sizes = sizes[sizes >= 0.1 * real.step_s]
     values, acts = real.channels[channel], course(real.time)
     first = int(np.argmax(acts > 0.0))
-    known = np.isfinite(values)
-    whole = np.interp(real.time, real.time[known], values[known])
+    whole = real.reading_at(channel, real.time)
     slow = np.stack([lagged(whole[first:], np.diff(real.time[first:]), float(size)) for size in sizes])
     shift = np.zeros((len(sizes), len(values)))
     shift[:, first:] = (slow - whole[first:]) * acts[first:]
-    return _sensor(real, "lag", channel, course, sizes, "s", np.where(known, shift, np.nan))
+    return _sensor(real, "lag", channel, course, sizes, "s", np.where(np.isfinite(values), shift, np.nan))
 
 
 def stuck(real: RealRecording, channel: str, course: Course, _: np.random.Generator) -> Trial:
@@ -101,9 +100,7 @@ def clock(real: RealRecording, _: str, course: Course, __: np.random.Generator) 
     acts = course(real.time) > 0.0
     columns, K = {}, {}
     for name, values in real.channels.items():
-        smooth = median_filter(
-            np.interp(real.time, real.time[np.isfinite(values)], values[np.isfinite(values)]), SMOOTH
-        )
+        smooth = median_filter(real.reading_at(name, real.time), SMOOTH)
         shifts, moved = np.zeros((len(rows), len(values))), np.zeros((len(rows), len(values)))
         for k, late in enumerate(rows):
             at = np.searchsorted(real.time, real.time - late * step - 0.5 * step)

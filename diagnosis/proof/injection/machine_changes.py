@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import sympy as sp
 
-from diagnosis.proof.injection.calibrated_model import AMPLITUDE, SEEN, CalibratedModel, Differences
+from diagnosis.proof.injection.calibrated_model import AMPLITUDE, SEEN, SIZE_AND_COURSE, CalibratedModel, Differences
 from diagnosis.proof.injection.trial import Course, Trial, ladder
 from models.base.types import Array
 from models.formulas.extremes import Max, Min
@@ -41,9 +41,10 @@ Maker = Callable[[CalibratedModel, str, Course, np.random.Generator], Trial]
 def loss_factor(model: CalibratedModel, name: str, course: Course, rng: np.random.Generator) -> Trial:
     """Loss or heat source times ``1 + size``."""
     source = next(s for s in model.nominal.sources if s.name == name)
-    changed = model.prepared().with_loss_factor(name, model.size_and_course)
-    d = _run(model, changed, ladder(*FACTOR, rng), course)
-    heat = _source(d, name) * _share(model, d, course)
+    changed = model.prepared().with_loss_factor(name, SIZE_AND_COURSE)
+    d = model.differences(changed, ladder(*FACTOR, rng), course)
+    made = d.result.losses[name] if name in d.result.losses else d.result.extra_heat[name]
+    heat = made[1:] * _share(model, d, course)
     return _trial(
         model, d, course, kind="loss_factor", what="loss" if source.is_loss else "heat", of=name,
         nodes=(source.node,), unit="1", heat={source.node: heat},
@@ -53,8 +54,8 @@ def loss_factor(model: CalibratedModel, name: str, course: Course, rng: np.rando
 def link_factor(model: CalibratedModel, name: str, course: Course, rng: np.random.Generator) -> Trial:
     """Conductance times ``1 + size``."""
     link = next(k for k in model.nominal.links if k.name == name)
-    changed = model.prepared().with_link_factor(name, model.size_and_course)
-    d = _run(model, changed, ladder(*FACTOR, rng), course)
+    changed = model.prepared().with_link_factor(name, SIZE_AND_COURSE)
+    d = model.differences(changed, ladder(*FACTOR, rng), course)
     return _trial(
         model, d, course, kind="link_factor", what="link", of=name, nodes=link.nodes, unit="1",
         heat=_flow(model, d, name, _share(model, d, course)),
@@ -64,10 +65,10 @@ def link_factor(model: CalibratedModel, name: str, course: Course, rng: np.rando
 def new_link(model: CalibratedModel, name: str, course: Course, rng: np.random.Generator) -> Trial:
     """A further path of `size` [W/K] between two nodes."""
     a, b = name.split("-")
-    changed = model.prepared().with_link(a, b, model.size_and_course, name="injected")
+    changed = model.prepared().with_link(a, b, SIZE_AND_COURSE, name="injected")
     difference = np.mean(model.base.temperatures[a] - model.base.temperatures[b])
     cap = PATH_SHARE * model.heat_W / max(abs(float(difference)), LEAST_DIFFERENCE_K)
-    d = _run(model, changed, ladder(0.0, cap, rng), course)
+    d = model.differences(changed, ladder(0.0, cap, rng), course)
     return _trial(
         model, d, course, kind="new_link", what="link", of=name, nodes=(a, b), unit="W/K",
         heat=_flow(model, d, "injected", 1.0),
@@ -84,10 +85,10 @@ def thermostat(model: CalibratedModel, name: str, course: Course, rng: np.random
     opens = float(np.quantile(T + seen, rng.uniform(*VALVE_QUANTILES))) - rng.uniform() * VALVE_OPENS_K
     network = model.prepared().with_input(SEEN, 0.0)
     opening = Min(Max((symbol(f"T_{node}") + symbol(SEEN) - opens) / VALVE_OPENS_K, 0.0), 1.0)
-    changed = network.with_link(node, boundary, model.size_and_course * opening, name="injected")
+    changed = network.with_link(node, boundary, SIZE_AND_COURSE * opening, name="injected")
     difference = abs(float(np.mean(T - model.base.temperatures[boundary])))
     cap = 2.0 * PATH_SHARE * model.heat_W / max(difference, LEAST_DIFFERENCE_K)
-    d = _run(model, changed, ladder(0.0, cap, rng), course, {SEEN: seen})
+    d = model.differences(changed, ladder(0.0, cap, rng), course, {SEEN: seen})
     return _trial(
         model, d, course, kind="thermostat", what="link", of=name, nodes=(node, boundary), unit="W/K",
         heat=_flow(model, d, "injected", 1.0), further_reason=BY_VALVE,
@@ -100,10 +101,10 @@ def heat(model: CalibratedModel, name: str, course: Course, rng: np.random.Gener
     speed = model.cycle.inputs["speed"]
     full = float(np.percentile(np.abs(speed), RUNNING_QUANTILE))
     with_speed = bool(rng.integers(2)) and full > 0.0
-    law = model.size_and_course * (sp.Abs(symbol("speed")) / full if with_speed else 1.0)
+    law = SIZE_AND_COURSE * (sp.Abs(symbol("speed")) / full if with_speed else 1.0)
     changed = model.prepared().with_source(name, law, name="injected")
     sizes = ladder(HEAT_SHARE[0] * model.heat_W, HEAT_SHARE[1] * model.heat_W, rng)
-    d = _run(model, changed, sizes, course)
+    d = model.differences(changed, sizes, course)
     return _trial(
         model, d, course, kind="heat", what="heat", of=name, nodes=(name,), unit="W",
         heat={name: d.result.extra_heat["injected"][1:]},
@@ -119,7 +120,7 @@ def capacity(model: CalibratedModel, name: str, course: Course, rng: np.random.G
         replace(n, capacity=n.capacity * factor) if n.name == name and n.capacity is not None else n
         for n in network.nodes
     )
-    d = _run(model, replace(network, nodes=nodes), ladder(*CAPACITY, rng), course)
+    d = model.differences(replace(network, nodes=nodes), ladder(*CAPACITY, rng), course)
     return _trial(model, d, course, kind="capacity", what="capacity", of=name, nodes=(name,), unit="1", heat={})
 
 
@@ -127,8 +128,8 @@ def input_shift(
     model: CalibratedModel, name: str, law: sp.Expr, sizes: Array, course: Course
 ) -> Mapping[str, Array]:  # fmt: skip
     """Return the change of the model's temperatures if an input were `law` times size more, (B, rows), [K]."""
-    changed = model.prepared().with_signal_shift(name, model.size_and_course * law)
-    return _temperatures(_run(model, changed, sizes, course))
+    changed = model.prepared().with_signal_shift(name, SIZE_AND_COURSE * law)
+    return _temperatures(model.differences(changed, sizes, course))
 
 
 MACHINE_CHANGES: Mapping[str, Maker] = {
@@ -156,13 +157,6 @@ def places(kind: str, network: ThermalNetwork) -> list[str]:
 
 
 # ---------------------------------------------------------------------- runs
-
-
-def _run(
-    model: CalibratedModel, changed: ThermalNetwork, sizes: Array, course: Course,
-    extra: Mapping[str, Array] | None = None,
-) -> Differences:  # fmt: skip
-    return model.differences(changed, sizes, course(model.cycle.time), extra)
 
 
 def _temperatures(d: Differences) -> dict[str, Array]:
@@ -200,11 +194,6 @@ def _share(model: CalibratedModel, d: Differences, course: Course) -> Array:
     """Share of a changed value that the change is, shape (B, blocks)."""
     change = d.sizes[1:, None] * course(model.cycle.time)[d.first :]
     return np.asarray(change / (1.0 + change))
-
-
-def _source(d: Differences, name: str) -> Array:
-    found = d.result.losses[name] if name in d.result.losses else d.result.extra_heat[name]
-    return np.asarray(found[1:])
 
 
 def _flow(model: CalibratedModel, d: Differences, name: str, share: Array | float) -> dict[str, Array]:

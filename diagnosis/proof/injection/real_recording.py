@@ -86,6 +86,12 @@ class RealRecording:
         names = [c.name for c in self.recording.channels if not is_total_loss(c.name)]
         return {name: self.found.values[f"T_{name}"] for name in names}
 
+    def reading_at(self, channel: str, time: Array) -> Array:
+        """Reading of a sensor at times since the first row, straight across what is missing, [degC]."""
+        values = self.channels[channel]
+        known = np.isfinite(values)
+        return np.interp(time, self.time[known], values[known])
+
     @cached_property
     def inputs(self) -> dict[str, Array]:
         """Inputs that have a column, shape (rows,); NaN where missing."""
