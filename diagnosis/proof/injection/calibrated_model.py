@@ -15,9 +15,9 @@ from diagnosis.engine.prepare import prepare_experiment
 from diagnosis.engine.unknown import InputGain, InputOffset, NetworkParameter
 from diagnosis.forward.recurrence import lagged
 from diagnosis.forward.whitening import RandomHeat
+from diagnosis.proof.cases.time_course import Course
 from diagnosis.proof.injection.control import Control, find_control
 from diagnosis.proof.injection.real_recording import RealRecording
-from diagnosis.proof.injection.trial import Course
 from diagnosis.setup.inference_setup import InferenceSetup
 from diagnosis.setup.shaft import shafts
 from models.assembly.gearbox import Gearbox
@@ -150,7 +150,7 @@ class CalibratedModel:
         extra : mapping of input to Array, shape (blocks,), or None
             Further inputs
         """
-        acts = course(self.cycle.time)
+        acts = course.share(self.cycle.time)
         first = max(int(np.argmax(acts != 0.0)) - 1, 0)
         inputs = {**self.cycle.inputs, COURSE: acts, **(extra or {})}
         if self.control is not None:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from diagnosis.proof.cases.case_files import write_files
+from diagnosis.proof.cases.time_course import FORMS, Form
 from diagnosis.proof.cases.truth import size_of, size_of_heat
 from diagnosis.proof.injection.calibrated_model import CalibratedModel, calibrate
 from diagnosis.proof.injection.instrument_faults import (
@@ -21,7 +22,7 @@ from diagnosis.proof.injection.instrument_faults import (
 )
 from diagnosis.proof.injection.machine_changes import MACHINE_CHANGES, places
 from diagnosis.proof.injection.real_recording import RealRecording, read_real_recording
-from diagnosis.proof.injection.trial import FORMS, Form, Trial, choose_size, draw_course
+from diagnosis.proof.injection.trial import Trial, choose_size, draw_course
 from diagnosis.recordings.time_axis import moment_text
 from models.assembly.gearbox import Gearbox
 from models.base.errors import InputError, did_you_mean
@@ -276,11 +277,11 @@ def _changed(real: RealRecording, trial: Trial, size: float) -> dict[str, Any]:
         "of": trial.of,
         "nodes": list(trial.nodes),
         "sign": 0 if unsigned else int(np.sign(size)),
-        "course": course.form,
-        "from_s": round(course.from_s, 1),
-        "to_s": round(course.to_s, 1),
-        "from": moment_text(first + course.from_s, clock),
-        "to": moment_text(first + course.to_s, clock),
+        "course": course.kind,
+        "from_s": round(course.begins, 1),
+        "to_s": round(course.ends, 1),
+        "from": moment_text(first + course.begins, clock),
+        "to": moment_text(first + course.ends, clock),
         "recording": real.stem,
     }
 

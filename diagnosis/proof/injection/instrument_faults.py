@@ -10,10 +10,11 @@ import sympy as sp
 from scipy.ndimage import median_filter
 
 from diagnosis.forward.recurrence import lagged
+from diagnosis.proof.cases.time_course import Course
 from diagnosis.proof.injection.calibrated_model import CalibratedModel
 from diagnosis.proof.injection.machine_changes import input_shift
 from diagnosis.proof.injection.real_recording import RealRecording
-from diagnosis.proof.injection.trial import SIZES, SMALLEST, Course, Trial, ladder
+from diagnosis.proof.injection.trial import SIZES, SMALLEST, Trial, ladder
 from models.assembly.gearbox import Gearbox
 from models.base.errors import InputError
 from models.base.types import Array
@@ -34,7 +35,7 @@ Maker = Callable[[RealRecording, str, Course, np.random.Generator], Trial]
 def bias(real: RealRecording, channel: str, course: Course, rng: np.random.Generator) -> Trial:
     """Reading plus `size` [K]."""
     sizes = ladder(-BIAS_K, BIAS_K, rng)
-    shift = sizes[:, None] * np.where(np.isnan(real.channels[channel]), np.nan, course(real.time))
+    shift = sizes[:, None] * np.where(np.isnan(real.channels[channel]), np.nan, course.share(real.time))
     return _sensor(real, "bias", channel, course, sizes, "K", shift)
 
 
@@ -47,7 +48,7 @@ def gain(real: RealRecording, channel: str, course: Course, rng: np.random.Gener
     """Reading in degC times ``1 + size``."""
     sizes = ladder(-GAIN, GAIN, rng)
     return _sensor(
-        real, "gain", channel, course, sizes, "1", sizes[:, None] * real.channels[channel] * course(real.time)
+        real, "gain", channel, course, sizes, "1", sizes[:, None] * real.channels[channel] * course.share(real.time)
     )
 
 
@@ -55,7 +56,7 @@ def lag(real: RealRecording, channel: str, course: Course, _: np.random.Generato
     """A slower sensor: the reading follows the old one with a time constant of `size` [s]."""
     sizes = max(LONGEST_LAG_S, LONGEST_LAG_ROWS * real.step_s) * np.geomspace(SMALLEST, 1.0, SIZES)
     sizes = sizes[sizes >= 0.1 * real.step_s]
-    values, acts = real.channels[channel], course(real.time)
+    values, acts = real.channels[channel], course.share(real.time)
     first = int(np.argmax(acts > 0.0))
     whole = real.reading_at(channel, real.time)
     slow = np.stack([lagged(whole[first:], np.diff(real.time[first:]), float(size)) for size in sizes])
@@ -66,10 +67,10 @@ def lag(real: RealRecording, channel: str, course: Course, _: np.random.Generato
 
 def stuck(real: RealRecording, channel: str, course: Course, _: np.random.Generator) -> Trial:
     """The reading stays as it was."""
-    values, acts = real.channels[channel], course(real.time)
-    before = np.flatnonzero(np.isfinite(values) & (real.time < course.from_s))
+    values, acts = real.channels[channel], course.share(real.time)
+    before = np.flatnonzero(np.isfinite(values) & (real.time < course.begins))
     if not len(before):
-        raise InputError(f"{channel} has no reading before {course.from_s:.0f} s that it could be stuck at")
+        raise InputError(f"{channel} has no reading before {course.begins:.0f} s that it could be stuck at")
     held = float(values[before[-1]])
     return _sensor(real, "stuck", channel, course, np.ones(1), "1", ((held - values) * acts)[None])
 
@@ -78,7 +79,7 @@ def swapped(real: RealRecording, channel: str, course: Course, rng: np.random.Ge
     """Two sensors in each other's columns."""
     others = [name for name in real.channels if name != channel]
     other = others[int(rng.integers(len(others)))]
-    acts = course(real.time)
+    acts = course.share(real.time)
     # Nothing changes outside its dates, also where one of the two is missing.
     difference = np.where(acts > 0.0, (real.channels[other] - real.channels[channel]) * acts, 0.0)
     trial = _sensor(real, "swapped", channel, course, np.ones(1), "1", difference[None])
@@ -95,9 +96,9 @@ def clock(real: RealRecording, _: str, course: Course, __: np.random.Generator) 
     It is chosen by the rms change of the median sensor: noise and spikes move as well, and would look like an effect.
     """
     step = real.step_s
-    most = int(min(max(LONGEST_CLOCK_S, LONGEST_CLOCK_ROWS * step), course.from_s) / step)
+    most = int(min(max(LONGEST_CLOCK_S, LONGEST_CLOCK_ROWS * step), course.begins) / step)
     rows = np.unique(np.round(np.geomspace(1, max(most, 1), SIZES)).astype(int))
-    acts = course(real.time) > 0.0
+    acts = course.share(real.time) > 0.0
     columns, K = {}, {}
     for name, values in real.channels.items():
         smooth = median_filter(real.reading_at(name, real.time), SMOOTH)
@@ -126,14 +127,14 @@ def input_offset(model: CalibratedModel, name: str, course: Course, rng: np.rand
     is_temperature = name in network.inputs and network.inputs[name].quantity.is_temperature
     cap = INPUT_OFFSET_K if is_temperature else INPUT_OFFSET * _usual(real.inputs[name])
     sizes = ladder(-cap, cap, rng)
-    shift = sizes[:, None] * np.where(np.isnan(real.inputs[name]), np.nan, course(real.time))
+    shift = sizes[:, None] * np.where(np.isnan(real.inputs[name]), np.nan, course.share(real.time))
     return _input(model, "input_offset", name, sp.Integer(1), course, sizes, shift)
 
 
 def input_gain(model: CalibratedModel, name: str, course: Course, rng: np.random.Generator) -> Trial:
     """Recorded input times ``1 + size``."""
     sizes = ladder(-INPUT_GAIN, INPUT_GAIN, rng)
-    shift = sizes[:, None] * model.real.inputs[name] * course(model.real.time)
+    shift = sizes[:, None] * model.real.inputs[name] * course.share(model.real.time)
     return _input(model, "input_gain", name, symbol(name), course, sizes, shift)
 
 

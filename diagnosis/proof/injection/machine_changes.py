@@ -8,8 +8,9 @@ from dataclasses import replace
 import numpy as np
 import sympy as sp
 
+from diagnosis.proof.cases.time_course import Course
 from diagnosis.proof.injection.calibrated_model import AMPLITUDE, SEEN, SIZE_AND_COURSE, CalibratedModel, Differences
-from diagnosis.proof.injection.trial import Course, Trial, ladder
+from diagnosis.proof.injection.trial import Trial, ladder
 from models.base.types import Array
 from models.formulas.extremes import Max, Min
 from models.network.laws import symbol
@@ -192,7 +193,7 @@ def _trial(
 
 def _share(model: CalibratedModel, d: Differences, course: Course) -> Array:
     """Share of a changed value that the change is, shape (B, blocks)."""
-    change = d.sizes[1:, None] * course(model.cycle.time)[d.first :]
+    change = d.sizes[1:, None] * course.share(model.cycle.time)[d.first :]
     return np.asarray(change / (1.0 + change))
 
 

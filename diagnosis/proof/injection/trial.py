@@ -4,47 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
+from diagnosis.proof.cases.time_course import FORMS, Course, Form
 from models.base.types import Array
 
-Form = Literal["step", "ramp", "from_to"]
-FORMS: tuple[Form, ...] = ("step", "ramp", "from_to")
 EARLIEST, LATEST, SHORTEST = 0.25, 0.7, 0.1  # of the recording's length: when a change begins, how long it takes
 SIZES = 24  # that are tried
 SMALLEST = 1.0 / 300.0  # of the largest size
-
-
-@dataclass(frozen=True, kw_only=True)
-class Course:
-    """How large a change is over time, from 0 to 1.
-
-    Attributes
-    ----------
-    form : str
-        ``step``: 1 from `from_s` on; ``ramp``: rises from `from_s` to `to_s` and stays; ``from_to``: 1 between them
-    from_s, to_s : float
-        Since the first row, [s]
-    """
-
-    form: Form
-    from_s: float
-    to_s: float
-
-    def __call__(self, time: Array) -> Array:
-        """Return the course at times [s]."""
-        if self.form == "ramp":
-            return np.asarray(np.clip((time - self.from_s) / (self.to_s - self.from_s), 0.0, 1.0))
-        return ((time >= self.from_s) & ((time < self.to_s) | (self.form == "step"))).astype(float)
 
 
 def draw_course(
     duration_s: float, rng: np.random.Generator, *, forms: Sequence[Form] = FORMS, date_s: float | None = None,
     longest_s: float = np.inf,
 ) -> Course:  # fmt: skip
-    """Draw a course.
+    """Draw a course over the seconds of a recording.
 
     Parameters
     ----------
@@ -63,7 +39,7 @@ def draw_course(
     room = duration_s - begin
     shortest = min(SHORTEST * duration_s, 0.5 * room, 0.5 * longest_s)
     end = begin + shortest + length * (min(0.9 * room, longest_s) - shortest)
-    return Course(form=form, from_s=begin, to_s=duration_s if form == "step" else end)
+    return Course(kind=form, begins=begin, ends=duration_s if form == "step" else end)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from diagnosis.proof.cases.time_course import ALWAYS, Course
 from diagnosis.proof.zoo.case import BASELINE, CONTROLS, GROUPS, HOLD, TRAIN, NatsOf, ZooCase, nats_of_case, run_case
 from diagnosis.proof.zoo.distance import Drawn, draw_plant
 from diagnosis.proof.zoo.effects import Maker, ZooEffect, made, made_fault
@@ -21,7 +22,6 @@ from diagnosis.proof.zoo.recorder import draw_instruments, with_slow_sensors
 from diagnosis.proof.zoo.setting import Setting, UnfitError, either, pick
 from diagnosis.proof.zoo.simulate import simulate
 from diagnosis.proof.zoo.structure import Variant
-from diagnosis.proof.zoo.time_course import ALWAYS, Course
 from models.assembly.gearbox import Gearbox, load_gearbox
 from models.base.errors import InputError, did_you_mean
 
@@ -222,7 +222,7 @@ def draw_fault(name: str, setting: Setting, rng: np.random.Generator, course: Co
     if maker.fault == "lag":
         cap = max(cap, 3.0 * plant.row_s)
     if maker.fault == "stuck":
-        course = Course(kind="step", from_h=setting.date(rng, 0.1, 0.7))
+        course = Course(kind="step", begins=setting.date(rng, 0.1, 0.7))
     sign = either(rng) if maker.signed else 1
     nodes = tuple(channel for channel in chosen if channel in setting.nodes)
     fault = Fault(

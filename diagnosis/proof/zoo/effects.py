@@ -11,10 +11,10 @@ from functools import cached_property
 
 import numpy as np
 
+from diagnosis.proof.cases.time_course import ALWAYS, Course
 from diagnosis.proof.zoo.faults import Fault, FaultMaker
 from diagnosis.proof.zoo.setting import Act, Changed, Setting
 from diagnosis.proof.zoo.structure import Change, Law
-from diagnosis.proof.zoo.time_course import ALWAYS, Course
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -6,11 +6,11 @@ from functools import partial
 
 import numpy as np
 
+from diagnosis.proof.cases.time_course import FORMS, Course
 from diagnosis.proof.zoo import effects
 from diagnosis.proof.zoo.effects import Draft, Maker
 from diagnosis.proof.zoo.setting import Setting, UnfitError, either, pick
 from diagnosis.proof.zoo.structure import constant
-from diagnosis.proof.zoo.time_course import Course
 
 DATED_MAKERS: dict[str, Maker] = {}
 makes = partial(effects.makes, family="change at a date", table=DATED_MAKERS)
@@ -91,8 +91,8 @@ def _plus(sign: int) -> str:
 def draw_course(s: Setting, rng: np.random.Generator) -> Course:
     """A step, ramp or passing change that begins in the training recordings and lasts through later ones."""
     from_h = s.date(rng, 0.1, 0.75)
-    kind = ("step", "ramp", "from_to")[int(rng.choice(3, p=(0.5, 0.3, 0.2)))]
+    kind = FORMS[int(rng.choice(3, p=(0.5, 0.3, 0.2)))]
     if kind == "step":
-        return Course(kind="step", from_h=from_h)
+        return Course(kind="step", begins=from_h)
     lasts = float(rng.uniform(0.1, 0.6)) * s.hours
-    return Course(kind="ramp" if kind == "ramp" else "from_to", from_h=from_h, to_h=from_h + lasts)
+    return Course(kind=kind, begins=from_h, ends=from_h + lasts)

@@ -8,8 +8,8 @@ from typing import Literal
 
 import numpy as np
 
+from diagnosis.proof.cases.time_course import ALWAYS, Course
 from diagnosis.proof.plant.instruments import lagged
-from diagnosis.proof.zoo.time_course import ALWAYS, Course
 from models.base.types import Array
 
 FaultKind = Literal["bias", "gain", "drift", "lag", "stuck", "swapped", "clock", "offset", "input_gain", "heated"]
@@ -176,7 +176,7 @@ def spoiled(measured: Measured, fault: Fault) -> Measured:
 
 def hold_reading(values: Array, measured: Measured, fault: Fault) -> Array:
     """A stuck sensor repeats its last reading, noise and all, from the start of its course for so many hours."""
-    held = (measured.hours >= fault.course.from_h) & (measured.hours < fault.course.from_h + fault.strength)
+    held = (measured.hours >= fault.course.begins) & (measured.hours < fault.course.begins + fault.strength)
     return np.where(held, values[int(np.argmax(held))], values)
 
 
@@ -194,8 +194,8 @@ _Spoil = Callable[[Array, float, Array, Measured, Course], Array]
 
 
 def _drifted(values: Array, a: float, share: Array, m: Measured, course: Course) -> Array:
-    start = max(course.from_h, 0.0)
-    return np.asarray(values + a * np.clip(np.minimum(m.hours, course.to_h) - start, 0.0, None) * (share > 0.0))
+    start = max(course.begins, 0.0)
+    return np.asarray(values + a * np.clip(np.minimum(m.hours, course.ends) - start, 0.0, None) * (share > 0.0))
 
 
 def _slowed(values: Array, a: float, share: Array, m: Measured, _: Course) -> Array:

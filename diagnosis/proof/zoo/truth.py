@@ -144,14 +144,14 @@ def _changed(case: ZooCase, effect: ZooEffect, changed: Changed) -> dict[str, An
         "to_s": None,
         "recording": None,
     }
-    to_h = course.to_h
+    to_h = course.ends
     if effect.fault is not None and effect.fault.kind == "stuck":
-        facts["course"], to_h = "from_to", course.from_h + effect.strength
+        facts["course"], to_h = "from_to", course.begins + effect.strength
     if course.kind == "always":
         return facts
-    began = [p for p in case.recordings(*SETS) if p.begins_h <= course.from_h]
+    began = [p for p in case.recordings(*SETS) if p.begins_h <= course.begins]
     recording = max(began, key=lambda p: p.begins_h)
-    facts |= {"recording": recording.name, "from_s": round(3600.0 * (course.from_h - recording.begins_h), 1)}
+    facts |= {"recording": recording.name, "from_s": round(3600.0 * (course.begins - recording.begins_h), 1)}
     if np.isfinite(to_h):
         facts["to_s"] = round(3600.0 * (to_h - recording.begins_h), 1)
     return facts

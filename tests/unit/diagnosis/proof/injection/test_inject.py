@@ -13,12 +13,13 @@ import pytest
 from click.testing import CliRunner
 
 from builder.commands.conceal import conceal
+from diagnosis.proof.cases.time_course import Course
 from diagnosis.proof.injection.control import Control, find_control
 from diagnosis.proof.injection.inject import KINDS, Injector, Wish, inject_set
 from diagnosis.proof.injection.instrument_faults import stuck, swapped
 from diagnosis.proof.injection.machine_changes import MACHINE_CHANGES, heat
 from diagnosis.proof.injection.real_recording import read_real_recording
-from diagnosis.proof.injection.trial import Course, choose_size
+from diagnosis.proof.injection.trial import choose_size
 from diagnosis.recordings.read import read_recording
 from models.assembly.gearbox import load_gearbox
 from models.base.errors import InputError
@@ -95,23 +96,23 @@ def test_gaps_before_a_fault_are_not_its_own(rod: Injector) -> None:
     two = tuple(one for one in rod.real.recording.channels if one.name in ("cell_1", "cell_2"))
     found = replace(rod.real.found, values={**rod.real.found.values, "T_cell_1": late})
     real = replace(rod.real, recording=replace(rod.real.recording, channels=two), found=found)
-    trial = swapped(real, "cell_1", Course(form="step", from_s=12000.0, to_s=30000.0), np.random.default_rng(0))
+    trial = swapped(real, "cell_1", Course(kind="step", begins=12000.0, ends=30000.0), np.random.default_rng(0))
     for shift in trial.columns.values():
         assert (shift[0][real.time < 12000.0] == 0.0).all()
         assert np.abs(shift[0][real.time > 13000.0]).max() > 0.0
     with pytest.raises(InputError, match="cell_1 has no reading before 1000 s that it could be stuck at"):
-        stuck(real, "cell_1", Course(form="step", from_s=1000.0, to_s=30000.0), np.random.default_rng(0))
+        stuck(real, "cell_1", Course(kind="step", begins=1000.0, ends=30000.0), np.random.default_rng(0))
 
 
 def test_a_changed_link_is_the_difference_of_two_simulations(rod: Injector, tmp_path: Path) -> None:
     truth, file = inject(rod, tmp_path, kind="link_factor", place="cell_5-cell_6", date="24000", seed=3)
     (changed,), (effect,) = truth["changed"], truth["effects"]
-    model, course = rod.model, Course(form=changed["course"], from_s=changed["from_s"], to_s=changed["to_s"])
+    model, course = rod.model, Course(kind=changed["course"], begins=changed["from_s"], ends=changed["to_s"])
     # An independent way: the parameter of the link, held from block to block.
     base = model.base.temperatures
     rows = [{name: T[k] for name, T in base.items()} for k in range(len(model.cycle.time))]
-    first = int(np.argmax(model.cycle.time > course.from_s))
-    T, size = rows[first], 1.0 + effect["size"] * course(model.cycle.time)
+    first = int(np.argmax(model.cycle.time > course.begins))
+    T, size = rows[first], 1.0 + effect["size"] * course.share(model.cycle.time)
     for k in range(first, len(rows) - 1):
         conductance = model.parameters["G_cell_5_cell_6"] * 0.5 * (size[k] + size[k + 1])
         step = Cycle(model.cycle.time[k : k + 2], {n: v[k : k + 2] for n, v in model.cycle.inputs.items()})
@@ -187,7 +188,7 @@ def test_the_control_of_a_turbine_is_found() -> None:
 def test_a_control_holds_its_temperature_where_it_is_at_work(rod: Injector) -> None:
     late = rod.real.time > 20000.0
     control = Control(channel="cell_1", node="cell_1", acts_at="cell_2", low=0.0, high=9.0, active=late.astype(float))
-    course = Course(form="step", from_s=10000.0, to_s=1e9)
+    course = Course(kind="step", begins=10000.0, ends=1e9)
     held, free = (
         np.abs(heat(replace(rod.model, control=found), "cell_1", course, np.random.default_rng(1)).K["cell_1"][-1])
         for found in (control, None)

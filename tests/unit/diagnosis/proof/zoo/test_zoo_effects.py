@@ -13,6 +13,7 @@ import pytest
 from click.testing import CliRunner
 
 from builder.commands.conceal import conceal
+from diagnosis.proof.cases.time_course import ALWAYS, Course
 from diagnosis.proof.plant import cycles
 from diagnosis.proof.zoo import draw
 from diagnosis.proof.zoo.case import ZooCase, run_case
@@ -26,7 +27,6 @@ from diagnosis.proof.zoo.programmes import programmes
 from diagnosis.proof.zoo.setting import Setting, UnfitError
 from diagnosis.proof.zoo.simulate import simulate
 from diagnosis.proof.zoo.structure import Outcome, Variant, ZooPlant
-from diagnosis.proof.zoo.time_course import ALWAYS, Course
 from diagnosis.proof.zoo.truth import truth_of
 from models.assembly.gearbox import Gearbox
 from models.base.types import Array
@@ -137,7 +137,7 @@ def test_a_date_counts_from_the_first_row_and_lasts(setting: Setting, drawn: Dra
     at_h = 0.5 * setting.programmes[0].begins_h + 0.25  # in train_1
     last = drawn.programmes[4]
     to_h = {"step": np.inf, "ramp": at_h + 0.1, "from_to": last.begins_h - 0.5}[kind]
-    course = Course(kind=kind, from_h=at_h, to_h=to_h)  # type: ignore[arg-type]
+    course = Course(kind=kind, begins=at_h, ends=to_h)  # type: ignore[arg-type]
     effect = made("windage", ALL["windage"], setting, np.random.default_rng(1), catalogue="windage", course=course)
     case = case_of(drawn, fzg, "date", effect.with_strength(0.2 * effect.cap))
     shift = {p.name: case.runs.outcomes[p.name].readings["oil"] for p in case.recordings("train", "hold")}
@@ -156,7 +156,7 @@ def test_faults_spoil_what_they_name_from_their_date_on(setting: Setting) -> Non
     wave = {name: 40.0 + k + 10.0 * np.sin(hours * 6.0) for k, name in enumerate(channels)}
     inputs = {name: np.full(400, 20.0) for name in setting.plant.inputs}
     m = Measured(hours=hours, row_s=10.0, inputs=inputs, readings=wave, P_loss=np.zeros(400))
-    course = Course(kind="step", from_h=0.5)
+    course = Course(kind="step", begins=0.5)
     before = hours < 0.5
     for name in draw.FAULT_MAKERS:
         if name == "heater_power_gain":
@@ -171,7 +171,7 @@ def test_faults_spoil_what_they_name_from_their_date_on(setting: Setting) -> Non
         if fault.kind == "stuck":
             (one,) = fault.channels
             held = spoiled(m, fault).readings[one]
-            rows = (hours >= fault.course.from_h) & (hours < fault.course.from_h + fault.strength)
+            rows = (hours >= fault.course.begins) & (hours < fault.course.begins + fault.strength)
             assert np.ptp(held[rows]) == 0.0 and np.all(held[~rows] == wave[one][~rows])
             continue
         found = spoiled(m, fault).readings
