@@ -23,6 +23,7 @@ import pandas as pd
 import psutil
 
 from diagnosis import diagnose
+from diagnosis.proof.cases.case_files import DECIMALS
 from diagnosis.proof.cases.conceal import draw_case
 from diagnosis.proof.cases.concealed_case import Plan
 from diagnosis.proof.plant.cycles import Programme, ambient, programmes
@@ -37,7 +38,6 @@ from models.mechanisms import CATALOGUE
 EFFECT, SEED = "cooler_thermostat", 1
 ROW_S = 10.0  # of the plant
 NOISE_K, STEP_K, LOSS_NOISE = 0.2, 0.1, 0.02
-DIGITS = {"time_s": 0, "speed_rpm": 1, "torque_Nm": 2}
 # (name, hours, seconds between rows)
 SIZES = (("6 h at 10 s", 6.0, 10.0), ("26 h at 10 s", 26.0, 10.0), ("3 days at 10 s", 72.0, 10.0),
          ("a week at 10 s", 168.0, 10.0), ("a week at 1 s", 168.0, 1.0))  # fmt: skip
@@ -90,7 +90,7 @@ def make_recordings(folder: Path, lengths_h: Sequence[float], step_s: float, eff
                 table[name] *= 1.0 + LOSS_NOISE * rng.standard_normal(len(at))
             elif name.startswith("T_") and name != "T_ambient_degC":
                 table[name] = STEP_K * np.round((table[name] + NOISE_K * rng.standard_normal(len(at))) / STEP_K)
-            table[name] = table[name].round(DIGITS.get(name, 1))
+            table[name] = table[name].round(DECIMALS.get(name, 1))
         paths.append(folder / f"{run.programme.name}.csv")
         table.to_csv(paths[-1], index=False)
     return paths

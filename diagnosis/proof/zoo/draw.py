@@ -10,7 +10,7 @@ import numpy as np
 from diagnosis.proof.cases.time_course import ALWAYS, Course
 from diagnosis.proof.zoo.case import BASELINE, CONTROLS, GROUPS, HOLD, TRAIN, NatsOf, ZooCase, nats_of_case, run_case
 from diagnosis.proof.zoo.distance import Drawn, draw_plant
-from diagnosis.proof.zoo.effects import Maker, ZooEffect, made, made_fault
+from diagnosis.proof.zoo.effects import Maker, ZooEffect, made
 from diagnosis.proof.zoo.effects_dates import DATED_MAKERS, draw_course
 from diagnosis.proof.zoo.effects_heat import HEAT_MAKERS
 from diagnosis.proof.zoo.effects_losses import LOSS_MAKERS
@@ -228,7 +228,11 @@ def draw_fault(name: str, setting: Setting, rng: np.random.Generator, course: Co
     fault = Fault(
         kind=maker.fault, channels=chosen, nodes=nodes, near=near, strength=scale * cap, sign=sign, course=course
     )
-    return made_fault(name, maker, fault, least=scale * maker.least, cap=fault.strength, course=course)
+    return ZooEffect(
+        name=name, catalogue=name if maker.in_catalogue else None, family="measurement",
+        kind="signal" if name in INPUT_FAULTS else "sensor", law=maker.law, unit=maker.unit, least=scale * maker.least,
+        cap=fault.strength, fault=fault, strength=fault.strength, course=course,
+    )  # fmt: skip
 
 
 def list_effects() -> list[list[str]]:
@@ -237,7 +241,7 @@ def list_effects() -> list[list[str]]:
         [name, "yes" if name in CATALOGUE_MAKERS else "no", str(maker.draw.__doc__)]
         for name, maker in {**CATALOGUE_MAKERS, **OUTSIDE_MAKERS, **DATED_MAKERS}.items()
     ]
-    faults = [[name, "yes" if maker.catalogue else "no", maker.law] for name, maker in FAULT_MAKERS.items()]
+    faults = [[name, "yes" if maker.in_catalogue else "no", maker.law] for name, maker in FAULT_MAKERS.items()]
     return sorted(rows + faults)
 
 

@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 
 from diagnosis.proof.cases.time_course import ALWAYS, Course
-from diagnosis.proof.zoo.faults import Fault, FaultMaker
+from diagnosis.proof.zoo.faults import Fault
 from diagnosis.proof.zoo.setting import Act, Changed, Setting
 from diagnosis.proof.zoo.structure import Change, Law
 
@@ -143,13 +143,6 @@ def made(
     draft = maker.draw(setting, rng)
     return ZooEffect(name=name, catalogue=catalogue, family=maker.family, kind=maker.kind, law=draft.law,
                      unit=draft.unit, cap=draft.cap, act=draft.act, parameters=draft.parameters,
-                     course=course)  # fmt: skip
-
-
-def made_fault(name: str, maker: FaultMaker, fault: Fault, *, least: float, cap: float, course: Course) -> ZooEffect:
-    """A fault of measurement as an effect; its strength is still that of the fault."""
-    return ZooEffect(name=name, catalogue=maker.catalogue, family="measurement", kind=maker.kind, law=maker.law,
-                     unit=maker.unit, least=least, cap=cap, fault=fault, strength=fault.strength,
                      course=course)  # fmt: skip
 
 

@@ -88,63 +88,54 @@ class Fault:
 
 @dataclass(frozen=True, kw_only=True)
 class FaultMaker:
-    """Kind of fault: its name in the catalogue, unit and greatest strength.
+    """Kind of fault: unit and greatest strength.
 
     Attributes
     ----------
-    kind : str
-        ``sensor`` or ``signal``, as in the catalogue
     fault : str
         Kind of the :class:`Fault`
-    catalogue : str or None
-        Mechanism of the catalogue
     cap, least : float
         Greatest strength that happens, and the least that stands out of ordinary errors of instruments; of a torque's
         offset in units of the highest torque
     signed : bool
         True if it may go either way
+    in_catalogue : bool
+        True if the catalogue has a mechanism of its name
     """
 
-    kind: str
     fault: FaultKind
-    catalogue: str | None
     unit: str
     cap: float
     law: str
     signed: bool = True
     least: float = 0.0
+    in_catalogue: bool = True
 
 
 SENSOR_FAULTS: Mapping[str, FaultMaker] = {
-    "sensor_bias": FaultMaker(kind="sensor", fault="bias", catalogue="sensor_bias", unit="K", cap=8.0, least=0.3,
-                              law="reading + a"),
-    "sensor_gain": FaultMaker(kind="sensor", fault="gain", catalogue="sensor_gain", unit="1", cap=0.15,
-                              law="reading + a (reading - 20 degC)"),
-    "sensor_drift": FaultMaker(kind="sensor", fault="drift", catalogue="sensor_drift", unit="K/h", cap=0.5,
-                               law="reading + a t, t in hours over all recordings"),
-    "sensor_lag": FaultMaker(kind="sensor", fault="lag", catalogue="sensor_lag", unit="s", cap=900.0,
-                             law="a first-order lag of a seconds more", signed=False),
-    "sensor_stuck": FaultMaker(kind="sensor", fault="stuck", catalogue="sensor_stuck", unit="h", cap=12.0,
-                               law="the reading stands still for a hours", signed=False),
-    "swapped_channels": FaultMaker(kind="sensor", fault="swapped", catalogue="swapped_channels", unit="1", cap=1.0,
-                                   law="two channels exchanged", signed=False),
-    "clock_offset": FaultMaker(kind="sensor", fault="clock", catalogue="clock_offset", unit="s", cap=600.0, least=6.0,
+    "sensor_bias": FaultMaker(fault="bias", unit="K", cap=8.0, least=0.3, law="reading + a"),
+    "sensor_gain": FaultMaker(fault="gain", unit="1", cap=0.15, law="reading + a (reading - 20 degC)"),
+    "sensor_drift": FaultMaker(fault="drift", unit="K/h", cap=0.5, law="reading + a t, t in hours over all recordings"),
+    "sensor_lag": FaultMaker(fault="lag", unit="s", cap=900.0, signed=False,
+                             law="a first-order lag of a seconds more"),
+    "sensor_stuck": FaultMaker(fault="stuck", unit="h", cap=12.0, signed=False,
+                               law="the reading stands still for a hours"),
+    "swapped_channels": FaultMaker(fault="swapped", unit="1", cap=1.0, signed=False, law="two channels exchanged"),
+    "clock_offset": FaultMaker(fault="clock", unit="s", cap=600.0, least=6.0,
                                law="temperatures are stamped a seconds late"),
 }  # fmt: skip
 INPUT_FAULTS: Mapping[str, FaultMaker] = {
-    "torque_offset": FaultMaker(kind="signal", fault="offset", catalogue="torque_offset", unit="N m", cap=0.15,
-                                least=0.01, law="recorded torque = true + a"),
-    "torque_gain": FaultMaker(kind="signal", fault="input_gain", catalogue="torque_gain", unit="1", cap=0.2, least=0.02,
+    "torque_offset": FaultMaker(fault="offset", unit="N m", cap=0.15, least=0.01, law="recorded torque = true + a"),
+    "torque_gain": FaultMaker(fault="input_gain", unit="1", cap=0.2, least=0.02,
                               law="recorded torque = true (1 + a)"),
-    "speed_gain": FaultMaker(kind="signal", fault="input_gain", catalogue="speed_gain", unit="1", cap=0.15, least=0.004,
+    "speed_gain": FaultMaker(fault="input_gain", unit="1", cap=0.15, least=0.004,
                              law="recorded speed = true (1 + a)"),
-    "heater_power_gain": FaultMaker(kind="signal", fault="input_gain", catalogue=None, unit="1", cap=0.2, least=0.02,
-                                    law="recorded power = true (1 + a)"),
-    "ambient_probe_offset": FaultMaker(kind="signal", fault="offset", catalogue="ambient_probe_offset", unit="K",
-                                       cap=8.0, least=0.5, law="recorded ambient = true + a"),
-    "ambient_probe_heated": FaultMaker(kind="signal", fault="heated", catalogue="ambient_probe_heated", unit="1",
-                                       cap=0.3, law="recorded ambient = true + a (neighbour - true), 300 s late",
-                                       signed=False),
+    "heater_power_gain": FaultMaker(fault="input_gain", unit="1", cap=0.2, least=0.02,
+                                    law="recorded power = true (1 + a)", in_catalogue=False),
+    "ambient_probe_offset": FaultMaker(fault="offset", unit="K", cap=8.0, least=0.5,
+                                       law="recorded ambient = true + a"),
+    "ambient_probe_heated": FaultMaker(fault="heated", unit="1", cap=0.3, signed=False,
+                                       law="recorded ambient = true + a (neighbour - true), 300 s late"),
 }  # fmt: skip
 
 

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from diagnosis.proof.plant.integrator import GAMMA
-from diagnosis.proof.zoo.laws import Acting, Balance, feel
+from diagnosis.proof.zoo.laws import Balance, feel
 from diagnosis.proof.zoo.run import integrate, read_probes, rows_of_run
 from diagnosis.proof.zoo.structure import Change, Moment, Outcome, Programme, Variant, ZooPlant
 from models.base.types import Array
@@ -70,7 +70,8 @@ def simulate(plant: ZooPlant, programme: Programme, variants: Sequence[Variant])
     for b, variant in enumerate(variants):
         moment, values = rows_of_run(laws, clock, variant, run.T[:, :, b])
         inputs.append(moment.inputs)
-        P_loss.append(laws.balance(moment, values, _of_all(variant)).loss[first:])
+        acting = [(change, slice(None)) for change in variant.changes]
+        P_loss.append(laws.balance(moment, values, acting).loss[first:])
         boundary.append(values[: len(laws.boundaries)])
     whole = {name: run.T[:, k].T for k, name in enumerate(laws.bodies)}
     whole |= {name: np.stack([own[k] for own in boundary]) for k, name in enumerate(laws.boundaries)}
@@ -85,11 +86,6 @@ def simulate(plant: ZooPlant, programme: Programme, variants: Sequence[Variant])
         inputs={name: np.stack([own[name][first:] for own in inputs]) for name in inputs[0]},
         heat=heat,
     )
-
-
-def _of_all(variant: Variant) -> Acting:
-    """Changes of one run, acting on every column of a moment."""
-    return [(change, slice(None)) for change in variant.changes]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -10,16 +10,16 @@ from itertools import pairwise
 
 import numpy as np
 
+from diagnosis.proof.plant.anatomy import AIR, FRAME, T_SERVICE
 from diagnosis.proof.zoo.families import films, losses
 from diagnosis.proof.zoo.families.builder import Builder, wander
 from diagnosis.proof.zoo.families.design import Design
 from diagnosis.proof.zoo.families.losses import RPM
-from diagnosis.proof.zoo.families.sizes import T_SERVICE, Sizes
+from diagnosis.proof.zoo.families.sizes import Sizes
 from diagnosis.proof.zoo.structure import Law, Moment, ZooPlant, constant
 from models.assembly.gearbox import Gearbox
 from models.base.types import Array
 
-AIR, FRAME = "air", "frame"
 OIL_TO_WALL = 0.4  # share of the oil's heat transfer that is left at rest
 SPAN_H = 80.0  # of a wandering draught before it repeats
 

@@ -9,6 +9,9 @@ from itertools import pairwise
 
 import numpy as np
 
+from diagnosis.proof.plant.anatomy import T_SERVICE
+from diagnosis.proof.plant.cycles import reference_torque, top_speed
+from diagnosis.proof.plant.plant import REFERENCE_SPEED
 from diagnosis.proof.zoo.families.losses import RPM, Dip, Roller
 from models.assembly.gearbox import Gearbox
 from models.base.errors import InputError
@@ -16,9 +19,6 @@ from models.base.types import Array
 from models.definition.sections import Bearing, Shaft
 from models.formulas.ehl import reduced_modulus
 from models.formulas.geometry import GearPair
-
-T_SERVICE = 60.0
-TOP_SPEED, REFERENCE_TORQUE = 0.8021, 94.0 / 350.0  # of the training range, as the programmes
 
 
 def refuse_unsplit(gearbox: Gearbox) -> None:
@@ -80,14 +80,9 @@ class Sizes:
         return self.gearbox.stage[0].driver, self.gearbox.stage[0].driven
 
     @cached_property
-    def top_speed(self) -> float:
-        """Highest speed of the programmes, [1/min]."""
-        return TOP_SPEED * self.gearbox.training.speed_rpm[1]
-
-    @cached_property
     def reference(self) -> tuple[float, float]:
-        """Speed [1/min] and torque [N m] where a machine is compared with the next: 0.415 of the top."""
-        return 0.415 * self.top_speed, REFERENCE_TORQUE * self.gearbox.training.torque_Nm[1]
+        """Speed [1/min] and torque [N m] of the programmes where a machine is compared with the next."""
+        return REFERENCE_SPEED * top_speed(self.gearbox), reference_torque(self.gearbox)
 
     def shaft(self, name: str) -> Shaft:
         """Section of a shaft."""
