@@ -7,7 +7,7 @@ import gzip
 import io
 import zlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -41,9 +41,7 @@ class CsvText:
 
     def with_rows(self, rows: NDArray[np.int64]) -> CsvText:
         """Return the text of some rows, counted from 1."""
-        return CsvText(
-            head=self.head, names=self.names, lines=tuple(self.lines[row - 1] for row in rows), form=self.form
-        )
+        return replace(self, lines=tuple(self.lines[row - 1] for row in rows))
 
     def with_shifts(self, shifts: Mapping[str, Array]) -> CsvText:
         """Return the text with numbers added to cells; the other cells keep their characters.
@@ -53,6 +51,8 @@ class CsvText:
         shifts : mapping of column to Array, shape (rows,)
             In the unit of the file; NaN empties a cell. Empty cells stay empty. Sums get the decimals of their column
         """
+        if not shifts:
+            return self
         rows = [_cells(line, self.form.separator) for line in self.lines]
         for name, shift in shifts.items():
             at = self.names.index(name)
@@ -62,10 +62,10 @@ class CsvText:
                 if texts[k]:
                     rows[k][at] = _sum(texts[k], float(shift[k]), least, most, self.form.decimal)
         changed = [
-            line if not shifts else _line(cells, self.form.separator) + line[len(line.rstrip("\r\n")) :]
+            _line(cells, self.form.separator) + line[len(line.rstrip("\r\n")) :]
             for line, cells in zip(self.lines, rows, strict=True)
         ]
-        return CsvText(head=self.head, names=self.names, lines=tuple(changed), form=self.form)
+        return replace(self, lines=tuple(changed))
 
     def decimals(self, name: str) -> int:
         """Return the most decimals in a column."""

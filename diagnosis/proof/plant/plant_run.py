@@ -133,7 +133,7 @@ class _Batch:
 
     def __init__(self, plant: Plant, runs: Sequence[Run]) -> None:
         self.plant, self.runs = plant, runs
-        anatomy, B = plant.anatomy, len(runs)
+        anatomy = plant.anatomy
         self.n = len(anatomy.nodes)
         who = [run.individual for run in runs]
         names = sorted({name for individual in who for name in individual.factors})
@@ -141,21 +141,15 @@ class _Batch:
             plant,
             {name: np.array([individual.factors.get(name, 1.0) for individual in who]) for name in names},
             reading=np.array([individual.reading for individual in who]),
-            forced_exponent=np.array([individual.forced_exponent for individual in who]),
-            oil_exponent=np.array([individual.oil_exponent for individual in who]),
-            exchange_exponent=np.array([individual.exchange_exponent for individual in who]),
+            **{name: np.array([getattr(individual, name) for individual in who]) for name in EXPONENTS},
         )
-        self.random_heat = self._random_heat(B)
-        self.grips = self._grips()
-
-    def _random_heat(self, B: int) -> Array:
-        """Heat of the unknown by row, run and node, shape (rows, B, nodes), [W]."""
-        heat = np.zeros((len(self.runs[0]), B, self.n))
-        for member, run in enumerate(self.runs):
+        # Heat of the unknown by row, run and node, [W].
+        self.random_heat = np.zeros((len(runs[0]), len(runs), self.n))
+        for member, run in enumerate(runs):
             for place, watts in run.random_heat.items():
-                for node, weight in self.plant.anatomy.members(place).items():
-                    heat[:, member, self.plant.anatomy.index[node]] += weight * watts
-        return heat
+                for node, weight in anatomy.members(place).items():
+                    self.random_heat[:, member, anatomy.index[node]] += weight * watts
+        self.grips = self._grips()
 
     def _grips(self) -> list[tuple[Effect, Grip]]:
         """Effects of the same kind act in one go on the runs that have them."""
