@@ -54,6 +54,7 @@ def write_case(
     recordings: Mapping[str, Mapping[str, Array]],
     truth: Mapping[str, Any],
     stated: Mapping[str, float] | None = None,
+    definition: str | None = None,
 ) -> None:
     """Write the recordings into a folder and the truth into a file outside it.
 
@@ -66,6 +67,8 @@ def write_case(
     recordings : mapping of name to columns
     stated : mapping of key to float, or None
         Data sheet of every temperature sensor, by the keys of a mapping file; it may be wrong
+    definition : str or None
+        Text of ``gearbox.toml``, if the folder gets one
 
     Raises
     ------
@@ -78,6 +81,8 @@ def write_case(
     }
     if stated is not None:
         files[MAPPING] = _mapping(recordings, stated).encode()
+    if definition is not None:
+        files[DEFINITION] = definition.encode()
     write_files(folder, files, truth_file, truth)
 
 

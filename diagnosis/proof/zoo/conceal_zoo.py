@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from diagnosis.proof.cases.case_files import DEFINITION, write_case
+from diagnosis.proof.cases.case_files import write_case
 from diagnosis.proof.zoo.case import BASELINE, CONTROLS, GROUPS, ZooCase
 from diagnosis.proof.zoo.draw import draw_case
 from diagnosis.proof.zoo.families import FAMILIES, find_family
@@ -158,11 +158,9 @@ def write_zoo_case(case: ZooCase, folder: Path, truth_file: Path | None) -> None
     """
     gearbox = load_gearbox(case.machine)
     source = Path(case.machine) if names_a_file(case.machine) else packaged(FOLDER, case.machine)
-    folder.mkdir(parents=True, exist_ok=True)
-    (folder / DEFINITION).write_text(read_text(source), encoding="utf-8", newline="\n")
     columns = {name: one.quantity.column for name, one in gearbox.network().inputs.items()}
     truth = {} if truth_file is None else truth_of(case, gearbox.hash, columns)
-    write_case(folder, truth_file, record_case(case, columns), truth, case.instruments.stated)
+    write_case(folder, truth_file, record_case(case, columns), truth, case.instruments.stated, read_text(source))
 
 
 def record_case(case: ZooCase, columns: Mapping[str, str]) -> dict[str, dict[str, Array]]:

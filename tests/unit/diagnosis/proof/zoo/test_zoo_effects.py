@@ -17,7 +17,7 @@ from diagnosis.proof.cases.time_course import ALWAYS, Course
 from diagnosis.proof.plant import cycles
 from diagnosis.proof.zoo import draw
 from diagnosis.proof.zoo.case import ZooCase, run_case
-from diagnosis.proof.zoo.conceal_zoo import conceal_zoo, record_case, zoo_plans
+from diagnosis.proof.zoo.conceal_zoo import conceal_zoo, record_case, write_zoo_case, zoo_plans
 from diagnosis.proof.zoo.distance import Drawn
 from diagnosis.proof.zoo.effects import ZooEffect, made
 from diagnosis.proof.zoo.families import FAMILIES
@@ -29,6 +29,7 @@ from diagnosis.proof.zoo.simulate import simulate
 from diagnosis.proof.zoo.structure import Outcome, Variant, ZooPlant
 from diagnosis.proof.zoo.truth import truth_of
 from models.assembly.gearbox import Gearbox
+from models.base.errors import InputError
 from models.base.types import Array
 
 ALL = {**draw.CATALOGUE_MAKERS, **draw.OUTSIDE_MAKERS, **draw.DATED_MAKERS}
@@ -217,6 +218,12 @@ def test_baselines_share_the_plant_up_to_the_deviation(drawn: Drawn, fzg: Gearbo
     healthy = simulate(drawn.plant, baseline, [Variant(parameters=case.sessions["baseline_1"])])
     recorded = record_case(case, COLUMNS)["baseline_1"]["T_oil_degC"]
     assert np.nanstd(recorded - healthy.readings["oil"][0]) < 0.25  # noise of 0.2 K
+
+
+def test_a_folder_that_cannot_be_written_is_named(drawn: Drawn, fzg: Gearbox, tmp_path: Path) -> None:
+    (tmp_path / "case").write_text("a file, no folder")
+    with pytest.raises(InputError, match="case: cannot be written"):
+        write_zoo_case(case_of(drawn, fzg, "control"), tmp_path / "case", None)
 
 
 @pytest.mark.parametrize(
