@@ -132,9 +132,17 @@ def _at(plant: Plant, outcome: Outcome, place: str) -> Array:
     return outcome.T[:, plant.anatomy.coarse.index(place)]
 
 
-def _sets(case: ConcealedCase) -> dict[str, list[int]]:
-    names = [run.programme.name for run in case.runs]
-    return {kind: [i for i, name in enumerate(names) if name.startswith(kind)] for kind in SETS}
+def joined(parts: Mapping[str, Mapping[str, Array]], kind: str) -> dict[str, Array]:
+    """Values by name, those of all recordings of a set one after the other.
+
+    Parameters
+    ----------
+    parts : mapping of recording to mapping of str to Array, shape (rows,)
+    kind : str
+        One of :data:`SETS`
+    """
+    members = [values for recording, values in parts.items() if recording.startswith(kind)]
+    return {name: np.concatenate([values[name] for values in members]) for name in members[0]}
 
 
 def size_of(values: Array) -> dict[str, float]:
@@ -159,15 +167,11 @@ def size_of_heat(watts: Array) -> dict[str, float]:
 def _kelvin(
     plant: Plant, case: ConcealedCase, with_it: Sequence[Outcome], without: Sequence[Outcome]
 ) -> dict[str, Any]:
-    return {
-        kind: {
-            place: size_of(
-                np.concatenate([_at(plant, with_it[i], place) - _at(plant, without[i], place) for i in members])
-            )
-            for place in case.instruments.channels
-        }
-        for kind, members in _sets(case).items()
+    changes = {
+        run.programme.name: {p: _at(plant, a, p) - _at(plant, b, p) for p in case.instruments.channels}
+        for run, a, b in zip(case.runs, with_it, without, strict=True)
     }
+    return {kind: {p: size_of(values) for p, values in joined(changes, kind).items()} for kind in SETS}
 
 
 def _heat_of(effect: Concealed, k: int, with_it: Outcome, without: Outcome) -> Mapping[str, Array]:
@@ -220,21 +224,22 @@ def _felt(with_it: Sequence[Outcome], without: Sequence[Outcome], effect: Concea
     return {"input_shift": {name: size_of(values) for name, values in shift.items() if np.any(values != 0.0)}}
 
 
-def facts_of_fault(shifts: Mapping[str, Mapping[str, Any]], channels: Sequence[str]) -> dict[str, Any]:
-    """Facts of a fault of measurement, from the sizes of its changes by column, of each set of recordings."""
+def facts_of_fault(changes: Mapping[str, Mapping[str, Array]], channels: Sequence[str]) -> dict[str, Any]:
+    """Facts of a fault of measurement, from its changes of the columns, without noise.
+
+    Parameters
+    ----------
+    changes : mapping of recording to mapping of column to Array, shape (rows,)
+    """
+    shifts = {kind: {c: size_of(v) for c, v in joined(changes, kind).items() if np.any(v != 0.0)} for kind in SETS}
     nothing = {"rms": 0.0, "max": 0.0}
     K = {kind: {place: found.get(f"T_{place}_degC", nothing) for place in channels} for kind, found in shifts.items()}
     return {"K": K, "column_shift": shifts, "heat_W": {}, "acting_s": {}}
 
 
 def _measured(plant: Plant, case: ConcealedCase, outcomes: Sequence[Outcome], effect: Concealed) -> dict[str, Any]:
-    """Changes of the columns by a fault of measurement, without noise."""
-    shifts: dict[str, dict[str, Any]] = {"train": {}, "hold": {}}
-    for kind, members in _sets(case).items():
-        faulty = [record(plant, case.runs[i], outcomes[i], case.instruments, (effect,), None) for i in members]
-        sound = [record(plant, case.runs[i], outcomes[i], case.instruments, (), None) for i in members]
-        for column in faulty[0]:
-            change = np.concatenate([f[column] - s[column] for f, s in zip(faulty, sound, strict=True)])
-            if np.any(change != 0.0):
-                shifts[kind][column] = size_of(change)
-    return facts_of_fault(shifts, case.instruments.channels)
+    changes = {}
+    for run, outcome in zip(case.runs, outcomes, strict=True):
+        faulty, sound = (record(plant, run, outcome, case.instruments, faults, None) for faults in ((effect,), ()))
+        changes[run.programme.name] = {column: faulty[column] - sound[column] for column in faulty}
+    return facts_of_fault(changes, case.instruments.channels)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from diagnosis.proof.cases.truth import SCHEMA, SETS, facts_of_fault, facts_of_heat, practical_of, size_of
+from diagnosis.proof.cases.truth import SCHEMA, SETS, facts_of_fault, facts_of_heat, joined, practical_of, size_of
 from diagnosis.proof.zoo.case import ZooCase
 from diagnosis.proof.zoo.effects import ZooEffect
 from diagnosis.proof.zoo.faults import Fault, spoiled
@@ -159,14 +159,11 @@ def _changed(case: ZooCase, effect: ZooEffect, changed: Changed) -> dict[str, An
 
 def _kelvin(case: ZooCase, run: int) -> dict[str, Any]:
     """Difference of the readings, without faults of measurement, of a run and that without effects."""
-    found: dict[str, Any] = {}
-    for kind in SETS:
-        outcomes, none = [case.runs.outcomes[p.name] for p in case.recordings(kind)], case.runs.none
-        found[kind] = {
-            name: size_of(np.concatenate([o.readings[name][run] - o.readings[name][none] for o in outcomes]))
-            for name in case.instruments.channels
-        }
-    return found
+    changes: dict[str, dict[str, Array]] = {}
+    for p in case.recordings(*SETS):
+        readings = case.runs.outcomes[p.name].readings
+        changes[p.name] = {n: readings[n][run] - readings[n][case.runs.none] for n in case.instruments.channels}
+    return {kind: {n: size_of(values) for n, values in joined(changes, kind).items()} for kind in SETS}
 
 
 def _heat_of(plant: ZooPlant, outcome: Outcome, run: int, none: int, changes: Sequence[Change]) -> dict[str, Array]:
@@ -194,19 +191,12 @@ def _heat_of(plant: ZooPlant, outcome: Outcome, run: int, none: int, changes: Se
 
 
 def _measured(case: ZooCase, fault: Fault, columns: Mapping[str, str]) -> dict[str, Any]:
-    """Changes of the columns by a fault of measurement, without noise."""
-    shifts: dict[str, dict[str, Any]] = {kind: {} for kind in SETS}
-    for kind in SETS:
-        changes: dict[str, list[Array]] = {}
-        for p in case.recordings(kind):
-            sound = measure(case.plant, p, case.runs.outcomes[p.name], case.runs.none)
-            faulty = spoiled(sound, fault)
-            for name in sound.inputs:
-                changes.setdefault(columns[name], []).append(faulty.inputs[name] - sound.inputs[name])
-            for name in case.instruments.channels:
-                changes.setdefault(f"T_{name}_degC", []).append(faulty.readings[name] - sound.readings[name])
-        for column, parts in changes.items():
-            values = np.concatenate(parts)
-            if np.any(values != 0.0):
-                shifts[kind][column] = size_of(values)
-    return facts_of_fault(shifts, case.instruments.channels)
+    changes: dict[str, dict[str, Array]] = {}
+    for p in case.recordings(*SETS):
+        sound = measure(case.plant, p, case.runs.outcomes[p.name], case.runs.none)
+        faulty = spoiled(sound, fault)
+        changes[p.name] = {
+            **{columns[name]: faulty.inputs[name] - sound.inputs[name] for name in sound.inputs},
+            **{f"T_{name}_degC": faulty.readings[name] - sound.readings[name] for name in case.instruments.channels},
+        }
+    return facts_of_fault(changes, case.instruments.channels)
