@@ -299,26 +299,6 @@ class GearPair:
         return half_tooth_angle(z=self.z[gear], x=self.x[gear], alpha_n=self.alpha_n, r_b=r_b, r=r_b)
 
 
-def _basic_faults(
-    *, z: tuple[int, int], m_n: float, alpha_n: float, b: float, a: float, x: tuple[float, float]
-) -> list[str]:
-    """Faults of single values, each with the limit that it breaks."""
-    faults = []
-    for name, value in (("module m_n", m_n), ("face width b", b), ("centre distance a", a)):
-        if not (math.isfinite(value) and value > 0.0):
-            faults.append(f"{name} = {value:g} m must be above 0")
-    if not math.radians(10.0) <= alpha_n <= math.radians(35.0):
-        faults.append(
-            f"pressure angle {math.degrees(alpha_n):g} degrees must lie between 10 and 35; is it given in rad?"
-        )
-    for gear, teeth in enumerate(z, start=1):
-        if teeth != int(teeth) or teeth < 5:
-            faults.append(f"gear {gear}: number of teeth {teeth} must be a whole number of at least 5")
-    if not all(math.isfinite(shift) for shift in x):
-        faults.append(f"profile shifts {x[0]:g}, {x[1]:g} must be finite")
-    return faults
-
-
 def _shape_faults(pair: GearPair) -> list[str]:
     """Faults of the tooth shapes and of their contact."""
     faults = []
@@ -364,11 +344,6 @@ def _shape_faults(pair: GearPair) -> list[str]:
             "diameters or the numbers of teeth, or lower the profile shifts or the centre distance"
         )
     return faults
-
-
-def _refuse(faults: list[str]) -> None:
-    if faults:
-        raise InputError("gear pair: " + "; ".join(faults))
 
 
 def _asked_centre_distance(z: tuple[int, int], m_n: float, alpha_n: float, x_sum: float) -> str:
@@ -421,8 +396,8 @@ def gear_pair(
     Raises
     ------
     InputError
-        Naming every fault: values out of their range, a centre distance that no mesh can have or that contradicts
-        the profile shifts, undercut, pointed teeth, interference, contact ratio below 1.
+        Naming every fault: a centre distance that no mesh can have or that contradicts the profile shifts, undercut,
+        pointed teeth, interference, contact ratio below 1.
 
     Examples
     --------
@@ -432,8 +407,6 @@ def gear_pair(
     >>> round(pair.epsilon_alpha, 5), round(2e3 * pair.r_a[0], 3), round(2e3 * pair.r_a[1], 3)
     (1.43716, 82.452, 118.362)
     """
-    _refuse(_basic_faults(z=z, m_n=m_n, alpha_n=alpha_n, b=b, a=a, x=x))
-
     r = (0.5 * m_n * z[0], 0.5 * m_n * z[1])
     r_b = (r[0] * math.cos(alpha_n), r[1] * math.cos(alpha_n))
     if a <= sum(r_b):
@@ -464,7 +437,7 @@ def gear_pair(
     T1A = T1T2 - math.sqrt(max(0.0, r_a[1] ** 2 - r_b[1] ** 2))
     epsilon_1, epsilon_2 = (T1E - T1C) / p_b, (T1C - T1A) / p_b
     pair = GearPair(
-        z=(int(z[0]), int(z[1])),
+        z=z,
         m_n=m_n,
         b=b,
         a=a,
@@ -491,5 +464,6 @@ def gear_pair(
         rho_red_C=T1C * (T1T2 - T1C) / T1T2,
         H_V=gear_loss_factor_ohlendorf(z_1=z[0], u=u, epsilon_1=epsilon_1, epsilon_2=epsilon_2),
     )
-    _refuse(_shape_faults(pair))
+    if faults := _shape_faults(pair):
+        raise InputError("gear pair: " + "; ".join(faults))
     return pair

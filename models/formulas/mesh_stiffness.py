@@ -17,7 +17,6 @@ import math
 
 import numpy as np
 
-from models.base.errors import InputError
 from models.base.types import Array, Numeric
 from models.formulas.geometry import GearPair
 
@@ -248,11 +247,6 @@ def tooth_pair_stiffness(
     Array, shape (...)
         Normal force per displacement along the line of action, [N/m], over the whole face width
 
-    Raises
-    ------
-    InputError
-        If a bore radius is not between 0 and the root radius.
-
     Examples
     --------
     >>> from models.formulas.geometry import gear_pair
@@ -262,15 +256,6 @@ def tooth_pair_stiffness(
     array([ 7.84, 11.39,  7.65])
     """
     bores = r_bore or default_bore(pair)
-    faults = [
-        f"gear {i + 1}: bore radius {1e3 * bores[i]:g} mm must be above 0 and below the root radius "
-        f"{1e3 * pair.r_f[i]:.3f} mm"
-        for i in (0, 1)
-        if not 0.0 < bores[i] < pair.r_f[i]
-    ]
-    if faults:
-        raise InputError("gear pair: " + "; ".join(faults))
-
     rho_1, rho_2, _ = pair.curvature_radii(t)
     compliance = np.full(rho_1.shape, hertz_compliance(b=pair.b, E=E, nu=nu))
     for i, rho in enumerate((rho_1, rho_2)):

@@ -13,7 +13,6 @@ from typing import Any, Literal
 
 import numpy as np
 
-from models.base.errors import InputError
 from models.base.types import Array, Numeric
 
 KELVIN = 273.15
@@ -44,11 +43,6 @@ def d341_constants(T_1: float, nu_1: float, T_2: float, nu_2: float) -> tuple[fl
     (m, n) : tuple of float
         Intercept and slope, [-]
 
-    Raises
-    ------
-    InputError
-        If the temperatures are equal, a viscosity is not above 0.3 mm^2/s, or the hotter point is not the thinner one.
-
     References
     ----------
     .. [1] ASTM D341, "Standard practice for viscosity-temperature equations and charts for liquid petroleum products".
@@ -59,11 +53,6 @@ def d341_constants(T_1: float, nu_1: float, T_2: float, nu_2: float) -> tuple[fl
     >>> round(m, 4), round(n, 4)
     (9.5468, 3.752)
     """
-    points = f"({T_1:g} degC, {nu_1:g} mm2/s) and ({T_2:g} degC, {nu_2:g} mm2/s)"
-    if min(nu_1, nu_2) <= 0.3:
-        raise InputError(f"viscosity points {points}: both viscosities must be above 0.3 mm2/s for ASTM D341")
-    if T_1 == T_2 or (nu_1 - nu_2) * (T_1 - T_2) >= 0.0:
-        raise InputError(f"viscosity points {points}: the hotter point must be the thinner one; swap or correct them")
     y_1, y_2 = (float(np.log10(np.log10(nu + D341_CONSTANT))) for nu in (nu_1, nu_2))
     x_1, x_2 = (float(np.log10(T + KELVIN)) for T in (T_1, T_2))
     n = (y_1 - y_2) / (x_2 - x_1)

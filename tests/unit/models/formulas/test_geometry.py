@@ -112,22 +112,12 @@ def test_fzg_type_a_with_its_slight_undercut_is_accepted() -> None:
         ({"r_a": (41.226e-3, 62.0e-3)}, ["before T1", "gear 2", "into the root of gear 1"]),
         ({"z": (24, 16), "x": (0.172, 0.182), "r_a": (62.0e-3, 41.226e-3)}, ["beyond T2", "into the root of gear 2"]),
         ({"r_a": (33.0e-3, 59.181e-3)}, ["gear 1", "tip diameter 66.000 mm", "base diameter"]),
-        ({"alpha_n": 20.0}, ["pressure angle", "rad"]),
-        ({"z": (16.5, 24)}, ["gear 1", "16.5", "whole number"]),
-        ({"x": (math.nan, 0.1)}, ["profile shifts", "finite"]),
     ],
 )
 def test_impossible_pairs_are_refused_with_the_limit(change: dict[str, Any], words: list[str]) -> None:
     with pytest.raises(InputError) as refusal:
         gear_pair(**{**TYPE_C, **change})
     for word in words:
-        assert word in str(refusal.value)
-
-
-def test_all_faults_are_named_at_once() -> None:
-    with pytest.raises(InputError) as refusal:
-        gear_pair(**{**TYPE_C, "m_n": -1.0, "b": 0.0, "z": (16, 0)})
-    for word in ("module", "face width", "gear 2"):
         assert word in str(refusal.value)
 
 

@@ -111,17 +111,6 @@ def test_sanchez_pedrero_refuses_high_contact_ratio(high: GearPair) -> None:
         load_share(high, high.T1C, model="sanchez_pedrero")
 
 
-def test_unknown_model_is_named_with_the_nearest(pair: GearPair) -> None:
-    wrong: Any = "potential"
-    with pytest.raises(InputError, match="did you mean 'potential_energy'"):
-        load_share(pair, pair.T1C, model=wrong)
-
-
-def test_points_need_at_least_one_per_segment(pair: GearPair) -> None:
-    with pytest.raises(InputError, match="at least 1"):
-        contact_points(pair, 0)
-
-
 def test_coinciding_breakpoints_are_one(high: GearPair) -> None:
     """The tip of gear 1 placed so that the contact ends one base pitch after the pitch point: B is C up to rounding."""
     tip = math.hypot(high.r_b[0], high.T1C + high.p_b)

@@ -10,7 +10,6 @@ import pytest
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
-from models.base.errors import InputError
 from models.formulas.geometry import GearPair, gear_pair, half_tooth_angle
 from models.formulas.mesh_stiffness import (
     foundation_compliance,
@@ -158,6 +157,3 @@ def test_default_bore_is_a_third_of_the_root_radius(pair: GearPair) -> None:
     assert tooth_pair_stiffness(pair, pair.T1C) == tooth_pair_stiffness(pair, pair.T1C, r_bore=thirds)
 
 
-def test_impossible_bores_are_refused_together(pair: GearPair) -> None:
-    with pytest.raises(InputError, match=r"gear 1: bore radius 40 mm.*31\.194 mm; gear 2: bore radius 0 mm"):
-        tooth_pair_stiffness(pair, pair.T1C, r_bore=(40e-3, 0.0))

@@ -9,7 +9,6 @@ import pytest
 from scipy.integrate import quad
 
 from models.assembly.gearbox import load_gearbox
-from models.base.errors import InputError
 from models.formulas.oil import (
     T_HIGHEST,
     T_LOWEST,
@@ -38,19 +37,6 @@ def test_d341_against_din_51563() -> None:
     for T, limit in ((60.0, 0.0045), (80.0, 0.0045), (20.0, 0.0125), (0.0, 0.0325)):
         din = 10.0**10.0 ** (y[0] - slope * (np.log10(T + 273.15) - x[0])) - 0.8
         assert OIL.kinematic_viscosity(T) == pytest.approx(din, rel=limit)
-
-
-@pytest.mark.parametrize(
-    ("points", "says"),
-    [
-        ((40.0, 5.0, 100.0, 32.0), "the hotter point must be the thinner one"),
-        ((40.0, 32.0, 40.0, 5.0), "the hotter point must be the thinner one"),
-        ((40.0, 32.0, 100.0, 0.2), "above 0.3 mm2/s"),
-    ],
-)
-def test_impossible_viscosity_points(points: tuple[float, float, float, float], says: str) -> None:
-    with pytest.raises(InputError, match=says):
-        d341_constants(*points)
 
 
 @pytest.mark.parametrize("T", [-20.0, 20.0, 60.0, 150.0])
