@@ -25,7 +25,7 @@ from models.definition.sections import Training
 from models.files.cycle import Cycle
 from models.files.output_files import refuse_to_replace, write_table
 from models.files.paths import kind_of
-from models.quantities.quantities import MEMORY, Input
+from models.quantities.quantities import MEMORY, Input, node_columns
 from models.simulation.start_temperatures import start_temperatures
 
 if TYPE_CHECKING:
@@ -279,8 +279,7 @@ def _check_outputs(output: Path, plot: Path | None, inputs: list[Path]) -> None:
 
 def _show(columns: Mapping[str, Array], inputs: Mapping[str, Input]) -> None:
     given = [known.column for known in inputs.values()]
-    shown = [n for n in columns if n.startswith("T_") and n.endswith("_degC") and n not in given]
-    temperatures = {n[2:-5]: columns[n] for n in shown}
+    temperatures = {node: columns[name] for node, name in node_columns(columns).items() if name not in given}
     rows = [[n, f"{v[0]:.1f}", f"{v.max():.1f}", f"{v[-1]:.1f}"] for n, v in temperatures.items()]
     console.table("Temperatures in degC", ["node", "first", "highest", "last"], rows)
     losses = {n: v for n, v in columns.items() if n.startswith("P_loss")}

@@ -33,6 +33,7 @@ from builder.drive.machine_of_fmu import (
     fmu_machine,
     memory_variables,
     start_variables,
+    temperature_variables,
     to_column,
     to_column_factors,
 )
@@ -43,7 +44,6 @@ from models.base.types import Array
 from models.columns.columns import Columns
 from models.files.cycle import Cycle
 from models.quantities.quantities import column_of_input
-from models.quantities.units import UNITS
 from models.simulation.start_temperatures import start_memories, start_temperatures
 
 logger = logging.getLogger(__name__)
@@ -192,8 +192,8 @@ class LoadedFmu:
 
     def set_initial(self, initial: float | Mapping[str, float]) -> None:
         """Set start values: one temperature for all nodes, or all parts by name, and memories; [degC]."""
-        starts = start_variables(self.variables)
-        nodes = [v.name.removesuffix(".T").strip("'") for v in self._outputs if v.name.endswith(".T")]
+        variables = self.description.modelVariables
+        starts, nodes = start_variables(variables), temperature_variables(variables)
         temperatures = start_temperatures(initial, list(starts), known=nodes, source=str(self.path))
         self.slave.setBoolean([self.variables["initial.uniform"].valueReference], [not isinstance(initial, Mapping)])
         if not isinstance(initial, Mapping):
@@ -201,20 +201,20 @@ class LoadedFmu:
             return
         for name, variable in starts.items():
             self._set_real(variable, temperatures[name])
-        memories = memory_variables(self.variables.values())
+        memories = memory_variables(variables)
         values = start_memories(initial, {name: float(v.start) for name, v in memories.items()})
         self.slave.setReal([memories[name].valueReference for name in values], list(values.values()))
 
     def surroundings(self) -> float:
         """Return the ambient temperature, else that of the first boundary, at the inputs that are set, [degC]."""
-        starts = start_variables(self.variables)
-        temperatures = [v for v in self._outputs if v.name.endswith(".T")]
-        boundaries = (v for v in temperatures if v.name.removesuffix(".T").strip("'") not in starts)
+        variables = self.description.modelVariables
+        starts = start_variables(variables)
+        boundaries = (v for node, v in temperature_variables(variables).items() if node not in starts)
         variable = self.variables.get("T_ambient") or next(boundaries)
         return float(to_column(variable, self.slave.getReal([variable.valueReference])[0]))
 
     def _set_real(self, variable: Any, value: float) -> None:
-        scale, offset = UNITS[variable.unit].column[1:]
+        scale, offset = to_column_factors(variable)
         self.slave.setReal([variable.valueReference], [(float(value) - offset) / scale])
 
     def log(self, _environment: int | None, status: int, _category: bytes, message: bytes) -> None:

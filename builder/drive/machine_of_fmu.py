@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -36,7 +36,7 @@ def fmu_machine(path: Path) -> DescribedMachine:
     inputs = [_input(v, recorded.required) for v in variables if v.causality == "input"]
     return DescribedMachine(
         inputs={given.name: given for given in inputs},
-        parts=tuple(Part(name) for name in start_variables({v.name: v for v in variables})),
+        parts=tuple(Part(name) for name in start_variables(variables)),
         recording=recorded.mapping,
     )
 
@@ -49,8 +49,7 @@ def fmu_nodes(path: Path) -> tuple[str, ...]:
     InputError
         If the file is not an FMU of this project.
     """
-    names = (v.name for v in description_of(path).modelVariables if v.causality != "parameter")
-    return tuple(name.removesuffix(".T").strip("'") for name in names if name.endswith(".T"))
+    return tuple(temperature_variables(description_of(path).modelVariables))
 
 
 def fmu_memories(path: Path) -> dict[str, float]:
@@ -107,9 +106,15 @@ def _input(variable: Any, required: Sequence[str]) -> Input:
     )  # fmt: skip
 
 
-def start_variables(variables: Mapping[str, Any]) -> dict[str, Any]:
+def temperature_variables(variables: Iterable[Any]) -> dict[str, Any]:
+    """Variables of the temperatures of nodes, by node; boundaries are among them."""
+    found = (v for v in variables if v.name.endswith(".T") and v.causality != "parameter")
+    return {v.name.removesuffix(".T").strip("'"): v for v in found}
+
+
+def start_variables(variables: Iterable[Any]) -> dict[str, Any]:
     """Variables of start temperatures by node."""
-    return {n.removesuffix(".T_start").strip("'"): v for n, v in variables.items() if n.endswith(".T_start")}
+    return {v.name.removesuffix(".T_start").strip("'"): v for v in variables if v.name.endswith(".T_start")}
 
 
 def description_of(path: Path) -> Any:
@@ -165,5 +170,5 @@ def to_column_factors(variable: Any) -> tuple[float, float]:
         return 1.0, 0.0
     unit = UNITS[variable.unit]
     if variable.causality != "input" or variable.name in GEARBOX_INPUTS:
-        return unit.column[1:]
+        return unit.to_column
     return conversion(unit, find_unit(variable.displayUnit or variable.unit, unit.dimension))

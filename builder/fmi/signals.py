@@ -21,7 +21,7 @@ from models.base.errors import InputError, did_you_mean
 from models.network.laws import symbol
 from models.portable.surrogate import KELVIN, SurrogateLosses
 from models.quantities.quantities import GEARBOX_INPUTS, MEMORY, TYPES, quantity_of_signal
-from models.quantities.units import UNITS, Unit, conversion, find_unit, fmi_symbol
+from models.quantities.units import INSIDE, UNITS, conversion, convert, find_unit, fmi_symbol
 from models.simulation.thermal_network import ThermalNetwork
 
 START_DEGC = 20.0  # of a network without an ambient temperature
@@ -118,7 +118,7 @@ class Signal:
         if unit is None or self.role == "factor":
             return 1.0, 0.0
         if self.inner_unit is None:
-            return unit.column[1:]
+            return unit.to_column
         return conversion(unit, find_unit(self.inner_unit, unit.dimension))
 
 
@@ -266,12 +266,6 @@ def start_temperature(network: ThermalNetwork) -> float:
     return START_DEGC if ambient is None else ambient.default
 
 
-def _convert(unit: Unit, to: Unit, value: float) -> float:
-    """Convert a value to another unit, to 12 digits."""
-    factor, offset = conversion(to, unit)
-    return float(f"{(value - offset) / factor:.12g}")
-
-
 class _Table:
     """The network at hand while its signals are listed."""
 
@@ -280,7 +274,7 @@ class _Table:
         self.losses = losses
         self.inputs = tuple(network.inputs)
         self.parameters = {parameter.name: self._parameter_name(parameter.name) for parameter in network.parameters}
-        self.boundaries = {node.name: node.temperature for node in network.nodes if node.temperature is not None}
+        self.boundaries = network.boundaries
         self.loss_heats = [source.heat for source in network.sources if source.is_loss]
 
     def signals(self) -> Iterator[Signal]:
@@ -312,7 +306,8 @@ class _Table:
             return None
         kind, (low, high) = bounds[name]
         unit = UNITS[TYPES[kind].unit]
-        return unit.from_column(low), unit.from_column(high)
+        inside = find_unit(INSIDE[unit.dimension], unit.dimension)
+        return convert(low, inside, unit), convert(high, inside, unit)
 
     def _inputs(self) -> Iterator[Signal]:
         texts = {
@@ -325,7 +320,7 @@ class _Table:
             quantity = given.quantity
             kind = TYPES[quantity.type or "Ratio"]
             unit, own = find_unit(kind.unit, quantity.dimension), find_unit(quantity.unit, quantity.dimension)
-            at_fmi = partial(_convert, own, unit)
+            at_fmi = partial(convert, unit=own, to=unit)
             display = None if name in GEARBOX_INPUTS else quantity.unit * (quantity.unit != kind.unit)
             yield Signal(
                 name=quantity.fmi, role="input", of=name,

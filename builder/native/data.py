@@ -149,13 +149,16 @@ def _wrap(texts: Sequence[str]) -> str:
 
 def _network_data(data: _Data, network: ThermalNetwork) -> Structure:
     parts = [part.name for part in network.parts]
-    boundaries = [node.name for node in network.nodes if node.temperature is not None]
-    number_of = {name: index for index, name in enumerate([*parts, *boundaries])}
-    fixed, varying = _links(network)
+    number_of = {name: index for index, name in enumerate([*parts, *network.boundaries])}
+    # In the order of the law functions.
+    fixed, varying = (
+        [link.nodes for link, varies in zip(network.links, network.varying, strict=True) if varies is which]
+        for which in (False, True)
+    )
     sizes = {
         "N_INPUTS": len(network.inputs),
         "N_PARTS": len(parts),
-        "N_BOUNDARIES": len(boundaries),
+        "N_BOUNDARIES": len(network.boundaries),
         "N_PARAMETERS": len(network.parameters),
         "N_MEMORY": len(network.states),
         "N_COMPONENTS": len(network.components),
@@ -170,24 +173,13 @@ def _network_data(data: _Data, network: ThermalNetwork) -> Structure:
         data.define(name, size)
     structure = Structure(
         n_parts=len(parts),
-        n_boundaries=len(boundaries),
+        n_boundaries=len(network.boundaries),
         links=tuple((number_of[a], number_of[b]) for a, b in (*fixed, *varying)),
         sources=tuple(number_of[source.node] for source in network.sources),
     )
     data.define("N_FACTORS", structure.n_factors)
     data.array("char", "SOURCE_IS_LOSS", (int(source.is_loss) for source in network.sources))
     return structure
-
-
-def _links(network: ThermalNetwork) -> tuple[list[tuple[str, str]], list[tuple[str, str]]]:
-    """Ends of the links of constant and of varying conductance, in the order of the law functions."""
-    parameters = {parameter.name for parameter in network.parameters}
-    fixed: list[tuple[str, str]] = []
-    varying: list[tuple[str, str]] = []
-    for link in network.links:
-        varies = {s.name for s in link.conductance.free_symbols} - parameters
-        (varying if varies else fixed).append(link.nodes)
-    return fixed, varying
 
 
 def _laws_header() -> str:
@@ -229,10 +221,9 @@ def _place_data(data: _Data, table: SignalTable, network: ThermalNetwork) -> Non
     places("FACTOR", "factor", (parameter.name for parameter in network.parameters))
     places("START", "start_temperature", parts)
     places("PART_TEMPERATURE", "temperature", parts)
-    boundaries = [node.name for node in network.nodes if node.temperature is not None]
-    places("BOUNDARY_TEMPERATURE", "temperature", boundaries)
-    places("BOUNDARY_FLOW", "heat_flow", boundaries)
-    places("BOUNDARY_HEAT", "heat_to_boundary", boundaries)
+    places("BOUNDARY_TEMPERATURE", "temperature", network.boundaries)
+    places("BOUNDARY_FLOW", "heat_flow", network.boundaries)
+    places("BOUNDARY_HEAT", "heat_to_boundary", network.boundaries)
     places("MEMORY_START", "start_state", (state.name for state in network.states))
     places("MEMORY_OUTPUT", "state", (state.name for state in network.states))
     heats = (by_role["loss" if source.is_loss else "heat", source.name] for source in network.sources)

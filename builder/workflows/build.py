@@ -31,6 +31,7 @@ from models.base.types import Array
 from models.base.version import project_version
 from models.correction.correction import Correction, corrected_network
 from models.files.output_files import write_table
+from models.quantities.quantities import node_columns
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -342,10 +343,8 @@ def _left_from_before(folder: Path, files: Sequence[Path]) -> list[str]:
 
 def cycle_errors(driven: Mapping[str, Array], reference: Mapping[str, Array]) -> CycleErrors:
     """Compare two results over the same rows, in the columns of the file contract."""
-    nodes = [
-        name for name in reference if name.startswith("T_") and name.endswith("_degC") and name != "T_ambient_degC"
-    ]
-    temperatures = {name[2:-5]: float(np.max(np.abs(driven[name] - reference[name]))) for name in nodes}
+    nodes = node_columns(reference)
+    temperatures = {node: float(np.max(np.abs(driven[name] - reference[name]))) for node, name in nodes.items()}
     loss = reference.get("P_loss_W", np.zeros(1))
     lost = loss > 0.0
     if not lost.any():

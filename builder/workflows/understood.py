@@ -79,7 +79,7 @@ def _signals(gearbox: Gearbox, network: ThermalNetwork, share: float) -> dict[st
 def _value(law: sp.Expr, network: ThermalNetwork, values: Mapping[str, float]) -> float:
     """A law at known signals; temperatures of boundaries follow from their own laws."""
     laws = {symbol(name): derived for name, derived in network.derived.items()}
-    laws |= {symbol(f"T_{n.name}"): n.temperature for n in network.nodes if n.temperature is not None}
+    laws |= {symbol(f"T_{name}"): temperature for name, temperature in network.boundaries.items()}
     numbers = {symbol(name): sp.Float(value) for name, value in values.items()}
     value = complex(law.xreplace(laws).xreplace(laws).xreplace(numbers))
     return value.real if value.imag == 0.0 else math.nan

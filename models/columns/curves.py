@@ -12,7 +12,7 @@ import numpy as np
 from models.base.errors import InputError, did_you_mean
 from models.base.types import Array
 from models.quantities.part_colours import AMBIENT, OTHER_HUES, part_colours
-from models.quantities.quantities import GEARBOX_INPUTS, node_of_channel, quantity_of_column
+from models.quantities.quantities import GEARBOX_INPUTS, node_columns, node_of_channel, quantity_of_column
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -97,9 +97,10 @@ def draw_ambient(ax: Axes, x: Array, columns: Mapping[str, Array]) -> None:
 
 def members(columns: Mapping[str, Array], what: str) -> list[str]:
     """Return all nodes that have a temperature, or all losses, without the total."""
-    before, after = ("T_", "_degC") if what == "temperatures" else ("P_loss_", "_W")
-    names = [n for n in columns if n.startswith(before) and n.endswith(after)]
-    return [n[len(before) : -len(after)] for n in names if n not in (GEARBOX_INPUTS["T_ambient"].column, "P_loss_W")]
+    if what == "temperatures":
+        return list(node_columns(columns))
+    names = [n for n in columns if n.startswith("P_loss_") and n.endswith("_W") and n != "P_loss_W"]
+    return [n.removeprefix("P_loss_").removesuffix("_W") for n in names]
 
 
 def temperature_curves(columns: Mapping[str, Array], only: Sequence[str] = ()) -> Curves:
@@ -110,7 +111,7 @@ def temperature_curves(columns: Mapping[str, Array], only: Sequence[str] = ()) -
     InputError
         If there are none, or a named one is missing.
     """
-    curves: Curves = {n: (columns[f"T_{n}_degC"], (f"T_{n}_degC",)) for n in members(columns, "temperatures")}
+    curves: Curves = {node: (columns[name], (name,)) for node, name in node_columns(columns).items()}
     return _chosen(curves, only, "temperature")
 
 

@@ -16,7 +16,7 @@ from models.base.types import Array
 from models.files.cycle import Cycle
 from models.files.paths import KINDS
 from models.files.table_file import read_table
-from models.quantities.quantities import GEARBOX_INPUTS, MEMORY, NODE_TEMPERATURE, Input
+from models.quantities.quantities import GEARBOX_INPUTS, MEMORY, NODE_TEMPERATURE, Input, node_columns
 
 
 @dataclass(frozen=True)
@@ -103,10 +103,11 @@ def read_cycle_and_start(path: Path, inputs: Mapping[str, Input] = GEARBOX_INPUT
     """
     table = read_table(path)
     cycle = Cycle.from_columns({str(c): table[c].to_numpy() for c in table.columns}, name=str(path), inputs=inputs)
+    given = {one.column for one in inputs.values()}
     measured = (
-        (name[2:-5], name, _temperatures(table[name]))
-        for name in _temperature_columns(table)
-        if name not in {given.column for given in inputs.values()}
+        (node, name, _temperatures(table[name]))
+        for node, name in node_columns(map(str, table.columns)).items()
+        if name not in given
     )
     return cycle, RecordedStart.first_of(path, measured, np.asarray(table.index) + 1)
 
@@ -141,18 +142,14 @@ def read_initial(value: str) -> float | dict[str, float]:
                 f"{value}: is no start; a temperature in degC, 'recorded', or a table ({', '.join(KINDS)}) is"
             ) from None
         table = read_table(Path(value))
-    memories = [str(name) for name in table.columns if str(name).startswith(MEMORY)]
-    last = {column: table[column].iloc[-1] for column in _temperature_columns(table) + memories if len(table)}
-    if not last.keys() - set(memories):
+    names = list(map(str, table.columns))
+    nodes = node_columns(names)
+    if not nodes or not len(table):
         raise InputError(f"{value}: has no T_<node>_degC columns with values to start from")
+    columns = nodes | {name: name for name in names if name.startswith(MEMORY)}
+    last = {name: table[column].iloc[-1] for name, column in columns.items()}
     try:
-        return {name if name in memories else name[2:-5]: float(x) for name, x in last.items() if pd.notna(x)}
+        return {name: float(x) for name, x in last.items() if pd.notna(x)}
     except ValueError as error:
-        texts = [f"{column} is {T!r}" for column, T in last.items() if isinstance(T, str)]
+        texts = [f"{columns[name]} is {T!r}" for name, T in last.items() if isinstance(T, str)]
         raise InputError(f"{value}: {', '.join(texts)} in the last row; numbers are needed to start from") from error
-
-
-def _temperature_columns(table: pd.DataFrame) -> list[str]:
-    """Return the columns of nodes; that of the surroundings is an input."""
-    names = [str(c) for c in table.columns if str(c).startswith("T_") and str(c).endswith("_degC")]
-    return [name for name in names if name != "T_ambient_degC"]

@@ -118,13 +118,12 @@ class Scale:
         ambient = gearbox.ambient_degC if ambient is None else ambient
         network, losses, (oil_m, oil_n) = gearbox.network(), gearbox.loss_laws(), gearbox.viscosity_constants
         start = {symbol(p.name): p.start for p in network.parameters}
-        boundaries = {node.name for node in network.nodes if node.temperature is not None}
-        here = {symbol(f"T_{name}"): ambient for name in boundaries}
+        here = {symbol(f"T_{name}"): ambient for name in network.boundaries}
         here |= {symbol(f"T_{part.name}"): ambient + TYPICAL_RISE for part in network.parts}
         here |= {symbol(name): given.default for name, given in network.inputs.items()}
         here |= {symbol(name): value for name, value in (inputs or {}).items()}
         here |= {symbol("speed"): speed, symbol("torque"): torque, symbol("time"): 0.0}
-        outward = [link.conductance for link in network.links if boundaries & set(link.nodes)]
+        outward = [link.conductance for link in network.links if network.boundaries.keys() & set(link.nodes)]
         conductance = float(sum(law.xreplace(start | here).evalf() for law in outward))
         at = [[ambient + TYPICAL_RISE] * len(losses.temperature_nodes)]
         loss = float(losses.power([speed], [torque], at).sum())

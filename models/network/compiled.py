@@ -36,14 +36,14 @@ def laws_of(network: Network, functions: Mapping[str, Callable[..., tuple[Any, .
     return Laws(
         **functions,
         parts=tuple(part.name for part in network.parts),
-        boundaries=tuple(node.name for node in network.nodes if node.temperature is not None),
+        boundaries=tuple(network.boundaries),
         components=network.components,
         sources=tuple(source.name for source in network.sources),
         losses_of_sources=tuple(source.is_loss for source in network.sources),
         inputs=tuple(network.inputs),
         parameters=tuple(parameter.name for parameter in network.parameters),
         states=tuple(state.name for state in network.states),
-        varying=tuple(index for index, varies in enumerate(_varying(network)) if varies),
+        varying=tuple(index for index, varies in enumerate(network.varying) if varies),
         laplacian=laplacian,
         to_boundary=to_boundary,
         injection=injection,
@@ -103,18 +103,13 @@ def law_expressions(network: Network) -> dict[str, tuple[list[str], list[sp.Expr
         If a heat capacity is missing or depends on more than parameters.
     """
     derived = {symbol(name): law for name, law in network.derived.items()}
-    boundary = {
-        symbol(f"T_{node.name}"): node.temperature.xreplace(derived)
-        for node in network.nodes
-        if node.temperature is not None
-    }
+    boundary = {symbol(f"T_{name}"): law.xreplace(derived) for name, law in network.boundaries.items()}
     known = derived | boundary
     parameters = [parameter.name for parameter in network.parameters]
     parts = [f"T_{part.name}" for part in network.parts]
     common = [*BASE_SIGNALS, *network.inputs, *parts, *parameters, *(state.name for state in network.states)]
     with_numeric = [*common, *network.numeric_laws]
     losses = [f"P_{name}" for name in network.components]
-    varies = _varying(network)
     conductances = [link.conductance.xreplace(known) for link in network.links]
     capacities = []
     for part in network.parts:
@@ -124,8 +119,8 @@ def law_expressions(network: Network) -> dict[str, tuple[list[str], list[sp.Expr
     memory = [state.rate for state in network.states]
     memory += [symbol(state.name) if state.update is None else state.update for state in network.states]
     heats = [expression.xreplace(known) for expression in [*(source.heat for source in network.sources), *memory]]
-    moving = [c for c, varying in zip(conductances, varies, strict=True) if varying]
-    constant = [c for c, varying in zip(conductances, varies, strict=True) if not varying]
+    moving = [c for c, varying in zip(conductances, network.varying, strict=True) if varying]
+    constant = [c for c, varying in zip(conductances, network.varying, strict=True) if not varying]
     functions = {
         "boundary": (common, list(boundary.values())),
         "exchange": (with_numeric, moving),
@@ -143,7 +138,7 @@ def structure(network: Network) -> tuple[Array, Array, Array]:
     `injection`.
     """
     part = {node.name: index for index, node in enumerate(network.parts)}
-    boundaries = [node.name for node in network.nodes if node.temperature is not None]
+    boundaries = list(network.boundaries)
     laplacian = np.zeros((len(network.links), len(part), len(part)))
     to_boundary = np.zeros((len(network.links), len(part), len(boundaries)))
     for index, link in enumerate(network.links):
@@ -158,11 +153,6 @@ def structure(network: Network) -> tuple[Array, Array, Array]:
     for index, source in enumerate(network.sources):
         injection[index, part[source.node]] = 1.0
     return laplacian, to_boundary, injection
-
-
-def _varying(network: Network) -> list[bool]:
-    parameters = {parameter.name for parameter in network.parameters}
-    return [bool({s.name for s in link.conductance.free_symbols} - parameters) for link in network.links]
 
 
 def _on_signals(law: NumericLaw) -> Callable[[Mapping[str, Any]], Any]:

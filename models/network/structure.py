@@ -153,6 +153,17 @@ class Network:
         return tuple(node for node in self.nodes if node.temperature is None)
 
     @cached_property
+    def boundaries(self) -> dict[str, sp.Expr]:
+        """Nodes of given temperature, with its law, [degC]."""
+        return {node.name: node.temperature for node in self.nodes if node.temperature is not None}
+
+    @cached_property
+    def varying(self) -> tuple[bool, ...]:
+        """True for every link whose conductance depends on more than parameters."""
+        parameters = {parameter.name for parameter in self.parameters}
+        return tuple(bool({s.name for s in link.conductance.free_symbols} - parameters) for link in self.links)
+
+    @cached_property
     def signals(self) -> tuple[str, ...]:
         """Every name that a law may use."""
         return (

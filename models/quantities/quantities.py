@@ -6,7 +6,7 @@ written in them. A family (``T_{}``) has one quantity per node or component.
 
 from __future__ import annotations
 
-from collections.abc import Container, Mapping
+from collections.abc import Container, Iterable, Mapping
 from dataclasses import dataclass, replace
 from math import inf
 from typing import Literal
@@ -277,6 +277,22 @@ def column_of(name: str) -> str:
     """Return the column of a quantity; an input of a user has its own name."""
     quantity = quantity_of(name)
     return name if quantity is None else quantity.column
+
+
+def node_columns(columns: Iterable[str]) -> dict[str, str]:
+    """Return the columns of the temperatures of nodes, by node; that of the surroundings is an input.
+
+    Examples
+    --------
+    >>> node_columns(["time_s", "T_ambient_degC", "T_oil_degC"])
+    {'oil': 'T_oil_degC'}
+    """
+    before, after = NODE_TEMPERATURE.column.split("{}")
+    return {
+        column[len(before) : -len(after)]: column
+        for column in columns
+        if column.startswith(before) and column.endswith(after) and column != GEARBOX_INPUTS["T_ambient"].column
+    }
 
 
 MEMORY = "state_"  # before the name of a memory of the laws, in results and start values

@@ -49,25 +49,11 @@ class Unit:
     display: tuple[str, float, float] | None = None
 
     @cached_property
-    def column(self) -> tuple[str, float, float]:
-        """Unit inside, which file columns have too, and factor and offset to it."""
+    def to_column(self) -> tuple[float, float]:
+        """Factor and offset to the unit inside, which file columns have too."""
         if not self.dimension:
-            return "", 1.0, 0.0
-        inside = INSIDE[self.dimension]
-        if inside == self.symbol or inside in self.aliases:
-            return inside, 1.0, 0.0
-        to = next(unit for unit in TABLE if unit.dimension == self.dimension and inside in (unit.symbol, *unit.aliases))
-        return inside, *conversion(self, to)
-
-    def from_column(self, value: float) -> float:
-        """Convert a value of a file column to this unit, to 12 digits.
-
-        Examples
-        --------
-        >>> UNITS["K"].from_column(-90.0)
-        183.15
-        """
-        return float(f"{(value - self.column[2]) / self.column[1]:.12g}")
+            return 1.0, 0.0
+        return conversion(self, find_unit(INSIDE[self.dimension], self.dimension))
 
 
 _POWER = {"kg": 1, "m": 2, "s": -3}
@@ -185,6 +171,18 @@ def conversion(unit: Unit, to: Unit) -> tuple[float, float]:
     if unit is to:
         return 1.0, 0.0
     return unit.factor / to.factor, (unit.offset - to.offset) / to.factor
+
+
+def convert(value: float, unit: Unit, to: Unit) -> float:
+    """Convert a value from one unit to another of the same dimension, to 12 digits.
+
+    Examples
+    --------
+    >>> convert(-90.0, UNITS["degC"], UNITS["K"])
+    183.15
+    """
+    factor, offset = conversion(to, unit)
+    return float(f"{(value - offset) / factor:.12g}")
 
 
 def units_in_files(dimension: str | None, unit: str) -> dict[str, tuple[float, float]]:

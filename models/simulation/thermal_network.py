@@ -88,11 +88,11 @@ class ThermalNetwork(Network):
         >>> network.inputs["frame_T_in"].default, [n.temperature for n in network.nodes if n.name == "frame"]
         (27.0, [frame_T_in])
         """
-        laws = {node.name: node.temperature for node in self.nodes if node.temperature is not None}
+        laws = self.boundaries
         if name not in laws:
             raise InputError(f"{name!r} is not a boundary of this network{did_you_mean(name, laws)}")
         elsewhere = (
-            *(node.temperature for node in self.nodes if node.temperature is not None and node.name != name),
+            *(law for boundary, law in laws.items() if boundary != name),
             *(link.conductance for link in self.links), *(source.heat for source in self.sources),
             *self.derived.values(),
         )  # fmt: skip
@@ -359,7 +359,7 @@ class ThermalNetwork(Network):
             raise InputError(f"the input {name!r} can be shifted only where all laws are expressions, without branches")
         self._refuse_losses(shift, f"the shift of {name!r}")
         # A boundary's temperature may itself follow this input: the shift means it as it was.
-        boundary = {symbol(f"T_{node.name}"): node.temperature for node in self.nodes if node.temperature is not None}
+        boundary = {symbol(f"T_{node}"): law for node, law in self.boundaries.items()}
         seen = {symbol(name): symbol(name) + shift.xreplace(boundary)}
         operating = {key: law.xreplace(seen) for key, law in self.operating.items()}
         if name in self.derived:

@@ -155,5 +155,3 @@ def test_foundation_against_a_value_worked_by_hand() -> None:
 def test_default_bore_is_a_third_of_the_root_radius(pair: GearPair) -> None:
     thirds = (pair.r_f[0] / 3.0, pair.r_f[1] / 3.0)
     assert tooth_pair_stiffness(pair, pair.T1C) == tooth_pair_stiffness(pair, pair.T1C, r_bore=thirds)
-
-
