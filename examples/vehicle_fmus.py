@@ -16,7 +16,7 @@ from builder.fmi.model_description import Identity
 from builder.fmi.package import AUTHOR, model_identifier, write_archive
 from builder.fmi.signals import Signal, SignalTable
 from builder.native.data import number
-from builder.native.native_fmu import NativeBuild, build_native_archive
+from builder.native.native_fmu import build_native_archive
 from models.base.atomic_write import atomic_file
 from models.base.errors import InputError
 from models.base.version import license_text, project_version
@@ -79,7 +79,7 @@ def cycle_table() -> SignalTable:
     return SignalTable([_output("speed", "m/s", "Speed of the drive cycle at this moment", kind="VehicleSpeed")])
 
 
-def build_vehicle_fmu(output: Path, *, platforms: str = "host") -> NativeBuild:
+def build_vehicle_fmu(output: Path, *, platforms: str = "host") -> Path:
     """A light vehicle as a native FMU.
 
     Parameters
@@ -91,7 +91,8 @@ def build_vehicle_fmu(output: Path, *, platforms: str = "host") -> NativeBuild:
 
     Returns
     -------
-    NativeBuild
+    Path
+        `output`
 
     Raises
     ------
@@ -106,7 +107,7 @@ def build_vehicle_fmu(output: Path, *, platforms: str = "host") -> NativeBuild:
     return _build(output, table, "Light vehicle", text, sources, platforms)
 
 
-def build_cycle_fmu(output: Path, time: ArrayLike, speed: ArrayLike, *, platforms: str = "host") -> NativeBuild:
+def build_cycle_fmu(output: Path, time: ArrayLike, speed: ArrayLike, *, platforms: str = "host") -> Path:
     """A drive cycle as a native FMU with one output, straight between its rows.
 
     Parameters
@@ -120,7 +121,8 @@ def build_cycle_fmu(output: Path, time: ArrayLike, speed: ArrayLike, *, platform
 
     Returns
     -------
-    NativeBuild
+    Path
+        `output`
 
     Raises
     ------
@@ -190,9 +192,7 @@ def _source(name: str) -> str:
     return (Path(__file__).parent / "vehicle" / name).read_text(encoding="utf-8")
 
 
-def _build(
-    output: Path, table: SignalTable, name: str, text: str, sources: Mapping[str, str], platforms: str
-) -> NativeBuild:
+def _build(output: Path, table: SignalTable, name: str, text: str, sources: Mapping[str, str], platforms: str) -> Path:
     version = project_version()
     identity = Identity(
         model_name=name,

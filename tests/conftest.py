@@ -96,11 +96,11 @@ def build_fmu(fzg: Gearbox, fzg_training: TrainingResult, fzg_networks: tuple[Pa
 
 
 @pytest.fixture(scope="session")
-def build_native(fzg: Gearbox, fzg_training: TrainingResult, fzg_networks: tuple[Path, ...]) -> FmuBuilder:
+def build_native(fzg: Gearbox, fzg_training: TrainingResult) -> FmuBuilder:
     """Builds a native FMU at a path for this machine, of the default network or of another one."""
 
     def build(path: Path, network: ThermalNetwork | None = None, *, fmi: int = 2) -> Path:
-        return build_native_fmu(fzg, fzg_training, fzg_networks, path, network=network, platforms="host", fmi=fmi).path
+        return build_native_fmu(fzg, fzg_training, path, network=network, platforms="host", fmi=fmi)
 
     return build
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import zipfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -52,7 +52,6 @@ class CommonParts:
 def common_parts(
     gearbox: Gearbox,
     training: TrainingResult | None,
-    networks: Sequence[Path],
     output: Path,
     *,
     network: ThermalNetwork | None,
@@ -67,8 +66,6 @@ def common_parts(
     gearbox : Gearbox
     training : TrainingResult or None
         The trained surrogate; None for a network without loss components
-    networks : sequence of Path
-        Its ONNX files
     output : Path
         The FMU; its stem becomes the model identifier
     network : ThermalNetwork or None
@@ -87,7 +84,11 @@ def common_parts(
     """
     network = corrected_network(gearbox, correction) if network is None else network
     losses = None if training is None else training.losses
-    refuse_mismatch(network, losses, networks)
+    if network.numeric_laws:
+        raise InputError(
+            f"{', '.join(network.numeric_laws)}: this law branches on values or calls numpy, so it simulates but "
+            "cannot go into an FMU; write it with arithmetic, sympy functions and sympy.Piecewise"
+        )
     table = signal_table(network, losses)
     identity = gearbox_identity(gearbox, output, flags, correction)
     reference = reference_run(gearbox, network, table, losses)
@@ -128,26 +129,6 @@ def model_identifier(name: str) -> str:
     """
     plain = re.sub(r"[^A-Za-z0-9_]", "_", name)
     return plain if re.match(r"[A-Za-z]", plain) else f"gearbox_{plain}"
-
-
-def refuse_mismatch(network: ThermalNetwork, losses: SurrogateLosses | None, networks: Sequence[Path]) -> None:
-    """Refuse laws that are no expressions, and networks of another gearbox.
-
-    Raises
-    ------
-    InputError
-    """
-    if network.numeric_laws:
-        raise InputError(
-            f"{', '.join(network.numeric_laws)}: this law branches on values or calls numpy, so it simulates but "
-            "cannot go into an FMU; write it with arithmetic, sympy functions and sympy.Piecewise"
-        )
-    if (() if losses is None else tuple(losses.components)) != tuple(network.components):
-        raise InputError("the networks were trained for another gearbox; train them for this one")
-    trained = () if losses is None else losses.networks
-    missing = {f"{one.name}.onnx" for one in trained} - {path.name for path in networks}
-    if missing:
-        raise InputError(f"the ONNX files {', '.join(sorted(missing))} are missing; export the networks again")
 
 
 def package_fmu(output: Path, description: bytes, *parts: Mapping[str, bytes]) -> None:

@@ -131,14 +131,6 @@ class Compiler:
     is_zig: bool
 
 
-@dataclass(frozen=True)
-class Binaries:
-    """Shared libraries by their path below ``binaries/``, and a line on platforms that are missing, or ``""``."""
-
-    libraries: Mapping[str, bytes]
-    note: str
-
-
 def _host_processor() -> str:
     """Folder of this machine in FMI 3.0."""
     machine = {"amd64": "x86_64", "arm64": "aarch64"}.get(platform.machine().lower(), platform.machine().lower())
@@ -219,7 +211,7 @@ def plan_for(platforms: str) -> Plan:
 def compile_libraries(
     sources: Mapping[str, bytes], platforms: str = "host", *, name: str = "library", fmi: int = 2,
     progress: Progress = silent,
-) -> Binaries:  # fmt: skip
+) -> dict[str, bytes]:  # fmt: skip
     """Compile C sources to shared libraries.
 
     Parameters
@@ -237,7 +229,8 @@ def compile_libraries(
 
     Returns
     -------
-    Binaries
+    dict of str to bytes
+        Shared libraries by their path below ``binaries/``
 
     Raises
     ------
@@ -263,8 +256,7 @@ def compile_libraries(
     for library, content in zip(wanted, compiled, strict=True):
         folder = library.folder if fmi == 2 else library.processor
         found.setdefault(f"{folder}/{library.file}", []).append(content)
-    joined = {path: parts[0] if len(parts) == 1 else universal_binary(parts) for path, parts in found.items()}
-    return Binaries(joined, plan.note)
+    return {path: parts[0] if len(parts) == 1 else universal_binary(parts) for path, parts in found.items()}
 
 
 def universal_binary(libraries: Sequence[bytes]) -> bytes:

@@ -9,8 +9,8 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 from sys import float_info
@@ -96,15 +96,6 @@ LINKER_NAMES = """\
 """
 
 
-@dataclass(frozen=True)
-class NativeBuild:
-    """A native FMU, its binaries by their path below ``binaries/``, and a line on platforms left out, or ``""``."""
-
-    path: Path
-    binaries: tuple[str, ...]
-    note: str
-
-
 def native_source(name: str) -> str:
     """A hand-written C file or header."""
     return (files("fmu_src") / "native" / name).read_text(encoding="utf-8")
@@ -113,7 +104,6 @@ def native_source(name: str) -> str:
 def build_native_fmu(
     gearbox: Gearbox,
     training: TrainingResult | None,
-    networks: Sequence[Path],
     output: Path,
     *,
     network: ThermalNetwork | None = None,
@@ -121,12 +111,12 @@ def build_native_fmu(
     platforms: str = "host",
     fmi: int = 2,
     progress: Progress = silent,
-) -> NativeBuild:
+) -> Path:
     """Package the thermal network of a gearbox as a native FMU.
 
     Parameters
     ----------
-    gearbox, training, networks, output, network, correction
+    gearbox, training, output, network, correction
         See :func:`builder.fmi.package.common_parts`
     platforms : str
         See :func:`builder.native.compile.compile_libraries`
@@ -135,6 +125,11 @@ def build_native_fmu(
     progress : callable
         Told what is being done
 
+    Returns
+    -------
+    Path
+        `output`
+
     Raises
     ------
     InputError
@@ -142,7 +137,7 @@ def build_native_fmu(
         gearbox's, or there is no compiler.
     """
     parts = common_parts(
-        gearbox, training, networks, output, network=network, correction=correction, flags=FLAGS[fmi], kind="native"
+        gearbox, training, output, network=network, correction=correction, flags=FLAGS[fmi], kind="native"
     )
     written = THERMAL_MODEL if parts.losses is None else THERMAL_MODEL + LOSS_NETWORKS
     return build_native_archive(
@@ -171,7 +166,7 @@ def build_native_archive(
     platforms: str = "host",
     fmi: int = 2,
     progress: Progress = silent,
-) -> NativeBuild:
+) -> Path:
     """Compile a model with the FMI layer and package it.
 
     Parameters
@@ -194,7 +189,8 @@ def build_native_archive(
 
     Returns
     -------
-    NativeBuild
+    Path
+        `output`
 
     Raises
     ------
@@ -210,15 +206,15 @@ def build_native_archive(
     xml = describe(table, identity, content=digest)
     sources["model_variables.c"] = variables_source(table, guid_of(xml))
     encoded = {name: text.encode() for name, text in sources.items()}
-    binaries = compile_libraries(encoded, platforms, name=identity.model_identifier, fmi=fmi, progress=progress)
+    libraries = compile_libraries(encoded, platforms, name=identity.model_identifier, fmi=fmi, progress=progress)
     inside = {f"sources/{name}": text for name, text in encoded.items()}
     if fmi == 3:
         inside["sources/buildDescription.xml"] = build_description(identity)
-    inside |= {f"binaries/{path}": library for path, library in binaries.libraries.items()}
+    inside |= {f"binaries/{path}": library for path, library in libraries.items()}
     pages = {ICON[fmi] if path == ICON[2] else path: page for path, page in pages.items()}
     licence = native_source(f"fmi{fmi}_headers_license.txt").encode()
     package_fmu(output, xml, pages, {f"documentation/licenses/fmi{fmi}_headers.txt": licence}, inside)
-    return NativeBuild(output, tuple(binaries.libraries), binaries.note)
+    return output
 
 
 def linker_names(sources: Mapping[str, str], identifier: str) -> str:

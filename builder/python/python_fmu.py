@@ -91,8 +91,10 @@ def build_python_fmu(
 
     Parameters
     ----------
-    gearbox, training, networks, output, network, correction
+    gearbox, training, output, network, correction
         See :func:`builder.fmi.package.common_parts`
+    networks : sequence of Path
+        The ONNX files of `training`
 
     Returns
     -------
@@ -105,9 +107,7 @@ def build_python_fmu(
         If the folder cannot be written to, the network has laws that are no expressions, or the networks are another
         gearbox's.
     """
-    parts = common_parts(
-        gearbox, training, networks, output, network=network, correction=correction, flags=FLAGS, kind="python"
-    )
+    parts = common_parts(gearbox, training, output, network=network, correction=correction, flags=FLAGS, kind="python")
     onnx = {path.name: path.read_bytes() for path in networks}
     code = python_code(parts.table, parts.network, parts.losses, onnx)
     digest = hashlib.sha256(json.dumps(code, sort_keys=True).encode()).hexdigest()

@@ -261,7 +261,7 @@ def build(
                     build_python_fmu(gearbox, training, networks, path, network=inside, correction=correction)
                 else:
                     build_native_fmu(
-                        gearbox, training, networks, path, network=inside, platforms=platforms,
+                        gearbox, training, path, network=inside, platforms=platforms,
                         fmi=3 if kind == "native_fmi3" else 2, correction=correction, progress=progress,
                     )  # fmt: skip
         cycle, losses = reference_cycle(gearbox), gearbox.loss_laws()

@@ -103,7 +103,7 @@ def prove_real(plant: RealPlant, output: Path, *, jobs: int = 1, progress: Progr
         progress("building the FMU")
         fmu = stage / f"{plant.definition}_native.fmu"
         build_native_fmu(
-            gearbox, None, (), fmu, network=gearbox.network_of_laws(correction.network(gearbox)),
+            gearbox, None, fmu, network=gearbox.network_of_laws(correction.network(gearbox)),
             correction=correction, progress=progress,
         )  # fmt: skip
         progress("driving the FMU")

@@ -365,7 +365,7 @@ def test_the_cache_follows_the_sources_and_can_be_done_without(tmp_path: Path, m
     first = compile_libraries(SOURCE, "host")
     (kept,) = (tmp_path / "cache").iterdir()
     kept.write_bytes(b"from the cache")
-    assert list(compile_libraries(SOURCE, "host").libraries.values()) == [b"from the cache"]
+    assert list(compile_libraries(SOURCE, "host").values()) == [b"from the cache"]
     compile_libraries({"one.c": SOURCE["one.c"].replace(b"return 1", b"return 2")}, "host")
     assert len(list((tmp_path / "cache").iterdir())) == 2
     (tmp_path / "file").write_text("")
@@ -392,7 +392,7 @@ def test_compiler_of_the_environment_is_taken_or_refused(monkeypatch: pytest.Mon
 def test_without_ziglang_the_machines_own_compiler_is_taken(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(native_compile, "_zig", lambda: None)
     assert not plan_for("host").compiler.is_zig
-    assert compile_libraries(SOURCE, "host").libraries
+    assert compile_libraries(SOURCE, "host")
     with pytest.raises(InputError, match="own compiler cannot build for win32"):
         plan_for("win32")
 
@@ -404,28 +404,31 @@ def test_restrict_is_written_as_microsofts_compiler_knows_it(fzg_native: Path) -
     assert users == {"sources/linker_names.h"}  # which defines RESTRICT
 
 
+def binaries_in(fmu: Path) -> set[str]:
+    with zipfile.ZipFile(fmu) as archive:
+        return {name.removeprefix("binaries/") for name in archive.namelist() if name.startswith("binaries/")}
+
+
 @pytest.mark.slow
 @pytest.mark.skipif(not HAS_ZIG, reason="no ziglang")
 def test_all_platforms_are_built_and_the_bytes_are_reproducible(
-    fzg: Gearbox, fzg_training: TrainingResult, fzg_networks: tuple[Path, ...], tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:  # fmt: skip
+    fzg: Gearbox, fzg_training: TrainingResult, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv(CACHE_VARIABLE, "off")
     builds = [
-        build_native_fmu(fzg, fzg_training, fzg_networks, tmp_path / folder / "fzg.fmu", platforms="all")
-        for folder in ("a", "b")
+        build_native_fmu(fzg, fzg_training, tmp_path / folder / "fzg.fmu", platforms="all") for folder in ("a", "b")
     ]
-    assert builds[0].binaries == tuple(f"{name}/fzg{platform.suffix}" for name, platform in PLATFORMS.items())
-    assert builds[0].path.read_bytes() == builds[1].path.read_bytes()
+    assert binaries_in(builds[0]) == {f"{name}/fzg{platform.suffix}" for name, platform in PLATFORMS.items()}
+    assert builds[0].read_bytes() == builds[1].read_bytes()
     starts = {".so": b"\x7fELF", ".dll": b"MZ", ".dylib": b"\xca\xfe\xba\xbe"}  # the last is a universal binary
-    with zipfile.ZipFile(builds[0].path) as archive:
+    with zipfile.ZipFile(builds[0]) as archive:
         for name, platform in PLATFORMS.items():
             assert archive.read(f"binaries/{name}/fzg{platform.suffix}").startswith(starts[platform.suffix])
         universal = archive.read("binaries/darwin64/fzg.dylib")
-    with hosted(builds[0].path) as host:
+    with hosted(builds[0]) as host:
         host.step(1.0)
-    third = build_native_fmu(fzg, fzg_training, fzg_networks, tmp_path / "fzg.fmu", platforms="darwin64", fmi=3)
-    assert third.binaries == ("x86_64-darwin/fzg.dylib", "aarch64-darwin/fzg.dylib")
+    third = build_native_fmu(fzg, fzg_training, tmp_path / "fzg.fmu", platforms="darwin64", fmi=3)
+    assert binaries_in(third) == {"x86_64-darwin/fzg.dylib", "aarch64-darwin/fzg.dylib"}
     processors, names, oldest = zip(*map(mac_library, slices(universal)), strict=True)
     assert processors == (0x01000007, 0x0100000C)  # x86_64 and arm64
     assert names == ("@rpath/fzg.dylib",) * 2 and oldest == (11 << 16,) * 2

@@ -101,7 +101,7 @@ def network(request: pytest.FixtureRequest) -> ThermalNetwork:
 @pytest.fixture(scope="module")
 def path(network: ThermalNetwork, tmp_path_factory: pytest.TempPathFactory) -> Path:
     target = tmp_path_factory.mktemp("networks") / "thermal.fmu"
-    return build_native_fmu(ANY, None, (), target, network=network, platforms="host").path
+    return build_native_fmu(ANY, None, target, network=network, platforms="host")
 
 
 def test_the_fmu_is_the_network(path: Path, network: ThermalNetwork) -> None:
@@ -168,7 +168,7 @@ def test_a_run_is_continued_with_its_memories(tmp_path: Path) -> None:
     cycle = Cycle(np.linspace(0.0, 900.0, 91), {"T_ambient": np.full(91, 20.0)})
     later = Cycle(cycle.time[45:], {"T_ambient": np.full(46, 20.0)})
     targets = [tmp_path / "native.fmu", tmp_path / "python.fmu"]
-    build_native_fmu(ANY, None, (), targets[0], network=network, platforms="host")
+    build_native_fmu(ANY, None, targets[0], network=network, platforms="host")
     build_python_fmu(ANY, None, (), targets[1], network=network)
 
     def full(cycle: Cycle, initial: float | dict[str, float]) -> dict[str, np.ndarray]:

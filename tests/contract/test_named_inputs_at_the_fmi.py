@@ -23,7 +23,7 @@ def test_they_keep_their_unit_on_both_sides(kind: str, tmp_path: Path) -> None:
     network = machine.network()
     path = tmp_path / "rig.fmu"
     if kind == "native":
-        build_native_fmu(machine, None, (), path, network=network)
+        build_native_fmu(machine, None, path, network=network)
     else:
         build_python_fmu(machine, None, (), path, network=network)
     assert validate_fmu(str(path)) == []

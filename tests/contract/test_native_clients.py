@@ -249,7 +249,7 @@ def test_the_windows_library_gives_the_same_under_wine(
     fmu = fmu if fmi == 2 else unpacked(fzg_native3, tmp_path / "fmi3")
     sources = {path.name: path.read_bytes() for path in (fmu.folder / "sources").iterdir()}
     library, host = tmp_path / "fzg.dll", tmp_path / "play.exe"
-    library.write_bytes(compile_libraries(sources, "win64").libraries["win64/library.dll"])
+    library.write_bytes(compile_libraries(sources, "win64")["win64/library.dll"])
     zig = [sys.executable, "-m", "ziglang", "cc", "-target", "x86_64-windows-gnu", "-O1", "-w"]
     run([*zig, f"-I{fmu.folder / 'sources'}", "-o", host, SOURCES / ("play.c" if fmi == 2 else "play3.c")])
     environment = os.environ | {"WINEPREFIX": str(tmp_path / "prefix"), "WINEDEBUG": "-all"}

@@ -102,7 +102,7 @@ def test_corrected_model_and_rebuilt_fmus_follow_the_held_out_recording(
     cycle = read_cycle(folder / "hold.csv")
     python, native = tmp_path / "corrected.fmu", tmp_path / "native.fmu"
     build_python_fmu(fzg, fzg_training, fzg_networks, python, correction=correction)
-    build_native_fmu(fzg, fzg_training, fzg_networks, native, platforms="host", correction=correction)
+    build_native_fmu(fzg, fzg_training, native, platforms="host", correction=correction)
     for fmu in (python, native):  # it says what it is
         said = read_model_description(fmu).description
         assert correction.findings[0].mechanism in said and correction.summary()["sha256"][:12] in said
