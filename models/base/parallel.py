@@ -47,23 +47,16 @@ def run_parallel(
     [8, 9]
     """
     items = list(items)
-    jobs = _processes(jobs)
-    if dask is None and (jobs < 2 or len(items) < 2):
-        return _collected((_numbered(function, *numbered) for numbered in enumerate(items)), len(items), progress)
     calls = (delayed(_numbered)(function, *numbered) for numbered in enumerate(items))
+    found: dict[int, R] = {}
     with _backend(dask), warnings.catch_warnings():
         # joblib replaces a worker whose memory has grown between two calls; no result is lost.
         warnings.filterwarnings("ignore", "A worker stopped while some jobs were given to the executor")
-        return _collected(_pool(jobs, dask)(calls), len(items), progress)
-
-
-def _collected(results: Iterable[tuple[int, R]], number: int, progress: Callable[[int, int], None] | None) -> list[R]:
-    found: dict[int, R] = {}
-    for index, result in results:
-        found[index] = result
-        if progress is not None:
-            progress(len(found), number)
-    return [found[index] for index in range(number)]
+        for index, result in _pool(jobs if len(items) > 1 else 1, dask)(calls):
+            found[index] = result
+            if progress is not None:
+                progress(len(found), len(items))
+    return [found[index] for index in range(len(items))]
 
 
 def _numbered(function: Callable[..., R], index: int, item: Sequence[Any]) -> tuple[int, R]:
@@ -83,7 +76,7 @@ def iterate_parallel(
     [8, 9]
     """
     with _backend(dask):
-        yield from _pool(_processes(jobs), dask)(delayed(_call)(function, item) for item in items)
+        yield from _pool(jobs, dask)(delayed(_call)(function, item) for item in items)
 
 
 @contextmanager
@@ -93,18 +86,15 @@ def one_thread() -> Iterator[None]:
         yield
 
 
-def _processes(jobs: int | None) -> int:
-    return int(cpu_count()) if jobs is None else jobs
-
-
 def _call(function: Callable[..., R], item: Sequence[Any]) -> R:
     with one_thread():
         return function(*item)
 
 
-def _pool(jobs: int, dask: str | None) -> Parallel:
-    """Every item is sent alone, which suits few large ones of unequal size."""
-    return Parallel(n_jobs=jobs if dask is None else None, batch_size=1, return_as="generator_unordered")
+def _pool(jobs: int | None, dask: str | None) -> Parallel:
+    """Every item is sent alone, which suits few large ones of unequal size. One job is done in this process."""
+    processes = None if dask is not None else cpu_count() if jobs is None else jobs
+    return Parallel(n_jobs=processes, batch_size=1, return_as="generator_unordered")
 
 
 def _backend(dask: str | None) -> AbstractContextManager[None]:
