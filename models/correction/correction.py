@@ -7,6 +7,7 @@ same when the catalogue changes.
 from __future__ import annotations
 
 import hashlib
+from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -18,7 +19,7 @@ from pydantic import Field, StringConstraints, model_validator
 from models.assembly.gearbox import Gearbox
 from models.base.atomic_write import atomic_file
 from models.base.errors import InputError, did_you_mean
-from models.correction.instruments import InputCorrection, SensorCorrection, named_twice, unknown_to_machine
+from models.correction.instruments import InputCorrection, SensorCorrection
 from models.definition.messages import validate_section
 from models.definition.sections import Name, OneOrMore, Section, Text
 from models.files.toml_file import parse_schema_1, read_text
@@ -203,7 +204,8 @@ class Correction(Section):
 
     @model_validator(mode="after")
     def _instruments_are_named_once(self) -> Self:
-        faults = list(named_twice(self.sensors, self.inputs))
+        tables = Counter([("sensor", s.channel) for s in self.sensors] + [("input", i.name) for i in self.inputs])
+        faults = [f"{n} tables [[{kind}]] are about {name!r}; keep one" for (kind, name), n in tables.items() if n > 1]
         if faults:
             raise ValueError("; ".join(faults))
         return self
@@ -272,7 +274,7 @@ class Correction(Section):
                 raise InputError(f"finding '{finding.label}': {error}") from error
         return network
 
-    def network(self, gearbox: Gearbox, *, as_recorded: bool = False) -> ThermalNetwork:
+    def network(self, gearbox: Gearbox) -> ThermalNetwork:
         """Return the corrected network of the gearbox that the correction was made for.
 
         Raises
@@ -281,7 +283,7 @@ class Correction(Section):
             If it was made for another definition, or :meth:`apply` refuses.
         """
         self.check_made_for(gearbox)
-        return self.apply(gearbox.network(), as_recorded=as_recorded)
+        return self.apply(gearbox.network())
 
     def check_instruments(self, nodes: Collection[str], inputs: Collection[str]) -> None:
         """Refuse sensors at nodes and inputs that a machine lacks.
@@ -291,7 +293,12 @@ class Correction(Section):
         InputError
             With all of them.
         """
-        faults = list(unknown_to_machine(self.sensors, self.inputs, nodes=nodes, known_inputs=inputs))
+        faults = [fault for sensor in self.sensors for fault in sensor.faults(nodes)]
+        faults += [
+            f"[[input]] {given.name!r} is no input{did_you_mean(given.name, inputs)}"
+            for given in self.inputs
+            if given.name not in inputs
+        ]
         if faults:
             raise InputError("\n".join(faults))
 

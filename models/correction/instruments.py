@@ -18,7 +18,7 @@ They are for recordings; a network or an FMU holds nothing of them.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterator
 from typing import Annotated, Self
 
 from pydantic import Field, model_validator
@@ -70,6 +70,15 @@ class SensorCorrection(Section):
             raise ValueError("a node is mixed in twice with the same lag; keep one")
         return self
 
+    def faults(self, nodes: Collection[str]) -> Iterator[str]:
+        """Yield a fault for the channel and every mixed node if a machine with these nodes lacks it."""
+        node = node_of_channel(self.channel, nodes)
+        if not is_total_loss(self.channel) and node not in nodes:
+            yield f"[[sensor]] {self.channel!r} is at no node{did_you_mean(node, nodes)}"
+        for one in self.mix:
+            if one.node not in (*nodes, AIR):
+                yield f"[[sensor]] {self.channel!r} mixes in {one.node!r}, no node{did_you_mean(one.node, nodes)}"
+
 
 class InputCorrection(Section):
     """``[[input]]``: truth = gain * recorded + offset, of the moment `clock` seconds before."""
@@ -81,39 +90,3 @@ class InputCorrection(Section):
     offset_stderr: NotNegative = 0.0
     clock: Number = 0.0
     clock_stderr: NotNegative = 0.0
-
-
-def named_twice(sensors: Iterable[SensorCorrection], inputs: Iterable[InputCorrection]) -> Iterator[str]:
-    """Yield a fault for every channel or input with two tables."""
-    for kind, names in (("sensor", [s.channel for s in sensors]), ("input", [i.name for i in inputs])):
-        for name in dict.fromkeys(names):
-            if names.count(name) > 1:
-                yield f"{names.count(name)} tables [[{kind}]] are about {name!r}; keep one"
-
-
-def unknown_to_machine(
-    sensors: Iterable[SensorCorrection],
-    inputs: Iterable[InputCorrection],
-    *,
-    nodes: Collection[str],
-    known_inputs: Collection[str],
-) -> Iterator[str]:
-    """Yield a fault for every channel, mixed node or input that a machine lacks.
-
-    Parameters
-    ----------
-    sensors, inputs
-    nodes : collection of str
-        With a temperature
-    known_inputs : collection of str
-    """
-    for sensor in sensors:
-        node = node_of_channel(sensor.channel, nodes)
-        if not is_total_loss(sensor.channel) and node not in nodes:
-            yield f"[[sensor]] {sensor.channel!r} is at no node{did_you_mean(node, nodes)}"
-        for one in sensor.mix:
-            if one.node not in (*nodes, AIR):
-                yield f"[[sensor]] {sensor.channel!r} mixes in {one.node!r}, no node{did_you_mean(one.node, nodes)}"
-    for given in inputs:
-        if given.name not in known_inputs:
-            yield f"[[input]] {given.name!r} is no input{did_you_mean(given.name, known_inputs)}"

@@ -158,7 +158,7 @@ def test_corrected_network(file: Path) -> None:
 def test_a_twin_gets_true_torque_and_a_recording_the_recorded_one(file: Path) -> None:
     read = read_correction(file, RIG)
     assert read.network(RIG).operating == {}
-    seen = read.network(RIG, as_recorded=True).operating["torque"]
+    seen = read.apply(RIG.network(), as_recorded=True).operating["torque"]
     assert seen.subs({symbol("torque"): 100.0, symbol("torque_gain_torque_strength"): 0.02}) == pytest.approx(102.0)
 
 
