@@ -7,7 +7,7 @@ between tables are left to the program.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from models.assembly.gearbox_definition import FACTORS, Definition
@@ -97,16 +97,19 @@ def table_classes(root: type[Definition] | type[ParametricDefinition]) -> dict[s
     while pending:
         path, table = pending.pop()
         for key, item in table["properties"].items():
-            if name := _class_of(item):
+            if name := next((inner["$ref"] for inner in _tables_in(item) if "$ref" in inner), None):
                 classes[join(path, key)] = name
                 pending.append((join(path, key), schema["$defs"][name]))
     return classes
 
 
-def _class_of(schema: Any) -> str | None:
+def _tables_in(schema: Any) -> Iterator[Mapping[str, Any]]:
+    """Yield a schema and all that are nested in it."""
     if isinstance(schema, Mapping):
-        return schema.get("$ref") or next(filter(None, map(_class_of, schema.values())), None)
-    return next(filter(None, map(_class_of, schema)), None) if isinstance(schema, list) else None
+        yield schema
+    inside = schema.values() if isinstance(schema, Mapping) else schema if isinstance(schema, list) else ()
+    for item in inside:
+        yield from _tables_in(item)
 
 
 def key_line(table: str, key: str, limits: tuple[float, float] | None) -> str:
@@ -129,15 +132,8 @@ def key_line(table: str, key: str, limits: tuple[float, float] | None) -> str:
 
 def limits_of(schema: Any) -> tuple[float, float] | None:
     """Return the limits of the numbers in the schema of a key, if all have the same."""
-    found = set(_limits(schema))
+    found = {(one["minimum"], one["maximum"]) for one in _tables_in(schema) if {"minimum", "maximum"} <= one.keys()}
     return found.pop() if len(found) == 1 else None
-
-
-def _limits(schema: Any) -> list[tuple[float, float]]:
-    if isinstance(schema, Mapping):
-        own = [(schema["minimum"], schema["maximum"])] if {"minimum", "maximum"} <= set(schema) else []
-        return own + [limits for value in schema.values() for limits in _limits(value)]
-    return [limits for value in schema for limits in _limits(value)] if isinstance(schema, list) else []
 
 
 def _table(name: str, table: Schema) -> Schema:
@@ -177,7 +173,8 @@ def _key(table: str, key: str, schema: Schema) -> Schema:
         plain = {"enum": list(known_oils())}
     if table == Bearing.__name__ and key == "designation":
         told["examples"] = list(known_bearings())
-    if key != "factors" and (_is_table(schema) or key in ("schema", "recording")):
+    is_table = any("$ref" in one or one.get("type") == "object" for one in _tables_in(schema))
+    if key != "factors" and (is_table or key in ("schema", "recording")):
         return told | plain
     if key == "factors":
         factor = _annotated(plain["additionalProperties"])
@@ -196,12 +193,6 @@ def _annotated(plain: Schema) -> Schema:
 
 def _ref(name: str) -> Schema:
     return {"$ref": f"#/definitions/{name}"}
-
-
-def _is_table(schema: Any) -> bool:
-    if isinstance(schema, Mapping):
-        return "$ref" in schema or schema.get("type") == "object" or any(_is_table(item) for item in schema.values())
-    return isinstance(schema, list) and any(_is_table(item) for item in schema)
 
 
 def _draft_7(schema: Any) -> Any:

@@ -99,6 +99,15 @@ def _parts_of(loss: Loss, n: Any, m: Any, nu: Any) -> tuple[Any, Any]:
     return no_load, loss.load_W * n * m**loss.torque_exponent
 
 
+def _ratios(definition: ParametricDefinition, loss: Loss) -> tuple[sp.Expr, sp.Expr, sp.Expr]:
+    """Speed, torque and viscosity in the part that a loss warms, over those of the reference, as symbols."""
+    at, constants = definition.operation, definition.viscosity_constants
+    T = Min(Max(symbol(f"T_{loss.part}"), T_LOWEST), T_HIGHEST)
+    nu_ref = kinematic_viscosity_d341(at.temperature_degC, *constants)
+    nu = kinematic_viscosity_d341(T, *constants, xp=sp) / nu_ref
+    return sp.Abs(symbol("speed")) / at.speed_rpm, sp.Abs(symbol("torque")) / at.torque_Nm, nu
+
+
 def build_parametric_network(definition: ParametricDefinition, priors: Mapping[str, float]) -> ThermalNetwork:
     """Return the network that the tables of a definition without geometry describe.
 
@@ -168,13 +177,9 @@ def with_losses_as_laws(network: ThermalNetwork, definition: ParametricDefinitio
     network : ThermalNetwork
         With the signals ``P_<loss>`` of :class:`ParametricLosses`
     """
-    operation, constants = definition.operation, definition.viscosity_constants
-    n, m = sp.Abs(symbol("speed")) / operation.speed_rpm, sp.Abs(symbol("torque")) / operation.torque_Nm
-    nu_ref = kinematic_viscosity_d341(operation.temperature_degC, *constants)
     laws: dict[sp.Symbol, sp.Expr] = {}
     for loss in definition.loss:
-        T = Min(Max(symbol(f"T_{loss.part}"), T_LOWEST), T_HIGHEST)
-        nu = kinematic_viscosity_d341(T, *constants, xp=sp) / nu_ref
+        n, m, nu = _ratios(definition, loss)
         no_load, load = _parts_of(loss, n, m, nu)
         either = {"no_load": sp.Piecewise((no_load, n > 0), (sp.Float(0.0), True)), "load": load}
         laws |= {symbol(f"P_{loss.name}_{kind}"): either[kind] for kind in kinds_of(loss)}
@@ -196,8 +201,6 @@ class _Builder:
     def __init__(self, definition: ParametricDefinition, priors: Mapping[str, float]) -> None:
         self.definition, self.priors = definition, priors
         self.parameters: list[Parameter] = []
-        self.n = sp.Abs(symbol("speed")) / definition.operation.speed_rpm
-        self.m = sp.Abs(symbol("torque")) / definition.operation.torque_Nm
 
     def network(self) -> ThermalNetwork:
         definition = self.definition
@@ -271,11 +274,8 @@ class _Builder:
 
     def _sources(self, index: int, loss: Loss) -> Iterator[Source]:
         path = f"loss.{index}"
-        constants = self.definition.viscosity_constants
-        T = Min(Max(symbol(f"T_{loss.part}"), T_LOWEST), T_HIGHEST)
-        nu_ref = kinematic_viscosity_d341(self.definition.operation.temperature_degC, *constants)
-        nu = kinematic_viscosity_d341(T, *constants, xp=sp) / nu_ref
-        tilts = {"no_load": (("speed", self.n), ("viscosity", nu)), "load": (("torque", self.m),)}
+        n, m, nu = _ratios(self.definition, loss)
+        tilts = {"no_load": (("speed", n), ("viscosity", nu)), "load": (("torque", m),)}
         sizes = {"no_load": (loss.no_load_W, "no-load"), "load": (loss.load_W, "load-dependent")}
         for kind in kinds_of(loss):
             name, (size, text) = f"{loss.name}_{kind}", sizes[kind]

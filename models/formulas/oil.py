@@ -378,10 +378,8 @@ class Oil:
     def _roelands(self, T: Numeric) -> tuple[Array, Array]:
         """Exponent Z and ``ln eta_0 + 9.67``, such that the mean coefficient up to 0.2 GPa is Gold's."""
         slope = np.log(self.dynamic_viscosity(T)) + 9.67
-        return np.log1p(self._gold(T) * P_GOLD / slope) / np.log1p(P_GOLD / P_ROELANDS), slope
-
-    def _gold(self, T: Numeric) -> Array:
-        return np.asarray(pressure_viscosity_gold(self.kinematic_viscosity(T), self.gold_s, self.gold_t))
+        gold = np.asarray(pressure_viscosity_gold(self.kinematic_viscosity(T), self.gold_s, self.gold_t))
+        return np.log1p(gold * P_GOLD / slope) / np.log1p(P_GOLD / P_ROELANDS), slope
 
 
 def modulus_scale(nu_40_measured: float, nu_40: float) -> float:

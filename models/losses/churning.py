@@ -185,9 +185,7 @@ class ChurningLaw:
 
     def power(self, x: Array) -> Array:
         """Churning loss [W], shape (N, 1), at speed [1/min] and oil temperature [degC], shape (N, 2)."""
-        return self._loss(x[:, 0] * RPM, x[:, 1])[:, None]
-
-    def _loss(self, omega_1: Array, T_oil: Array) -> Array:
+        omega_1, T_oil = x[:, 0] * RPM, x[:, 1]
         pair, v_t = self.pair, omega_1 * self.pair.r_w[0]
         omega = (omega_1, omega_1 / pair.u)
         if self.model == "niemann":
@@ -218,7 +216,7 @@ class ChurningLaw:
                 )
                 for i in (0, 1)
             ]
-        return np.asarray(sum(per_gear))
+        return np.asarray(sum(per_gear))[:, None]
 
 
 def churning_terms(gearbox: GearboxData) -> Iterator[LossTerm]:

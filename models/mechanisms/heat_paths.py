@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from models.formulas.heat_transfer import KELVIN
-from models.mechanisms.forms import plain, positive, rises, strength, temperature
+from models.mechanisms.forms import plain, positive, rises, share_between, strength, temperature
 from models.mechanisms.mechanism import Mechanism, Memory
 
 FAMILY_OUT = "heat to the surroundings"
@@ -44,7 +44,7 @@ hot_neighbour = Mechanism(
             0.5 * (scale.ambient + scale.temperature),
             sd=20.0,
             lower=scale.ambient,
-            grid=[scale.ambient + r * (scale.temperature - scale.ambient) for r in (0.3, 0.6, 1.0)],
+            grid=[share_between(scale, share) for share in (0.3, 0.6, 1.0)],
         ),
     ),
     law=lambda s: s.strength,

@@ -10,13 +10,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, reduce
 from typing import Any, TypeAlias
 
 import numpy as np
 import sympy as sp
 from sympy.printing.c import C99CodePrinter
-from sympy.printing.codeprinter import PrintMethodNotImplementedError
+from sympy.printing.codeprinter import CodePrinter, PrintMethodNotImplementedError
 from sympy.printing.numpy import NumPyPrinter
 from sympy.printing.pycode import PythonCodePrinter
 
@@ -185,26 +185,26 @@ def _check_expression(expression: sp.Expr, known: Mapping[str, sp.Symbol], name:
     return expression
 
 
+def _nested(printer: CodePrinter, function: str, args: Sequence[sp.Expr]) -> str:
+    """Code of a function of many arguments as calls of one of two."""
+    code: str = reduce(lambda code, arg: f"{function}({code}, {arg})", map(printer._print, args))
+    return code
+
+
 class _VectorPrinter(NumPyPrinter):  # type: ignore[misc]
     """numpy code whose Max, Min, And, Or and Piecewise broadcast (sympy's own need arguments of one shape)."""
 
-    def _nested(self, function: str, args: Sequence[sp.Expr]) -> str:
-        code: str = self._print(args[0])
-        for arg in args[1:]:
-            code = f"{self._module_format(function)}({code}, {self._print(arg)})"
-        return code
-
     def _print_Max(self, expr: sp.Max) -> str:
-        return self._nested("numpy.maximum", expr.args)
+        return _nested(self, self._module_format("numpy.maximum"), expr.args)
 
     def _print_Min(self, expr: sp.Min) -> str:
-        return self._nested("numpy.minimum", expr.args)
+        return _nested(self, self._module_format("numpy.minimum"), expr.args)
 
     def _print_And(self, expr: sp.And) -> str:
-        return self._nested("numpy.logical_and", expr.args)
+        return _nested(self, self._module_format("numpy.logical_and"), expr.args)
 
     def _print_Or(self, expr: sp.Or) -> str:
-        return self._nested("numpy.logical_or", expr.args)
+        return _nested(self, self._module_format("numpy.logical_or"), expr.args)
 
     def _print_Piecewise(self, expr: sp.Piecewise) -> str:
         code: str = self._print(expr.args[-1].expr)
@@ -325,17 +325,11 @@ class _CPrinter(C99CodePrinter):  # type: ignore[misc]
             return f"pow({base}, {self._print(expr.exp)})"
         return power if exponent > 0.0 else f"(1.0/{power})"
 
-    def _chosen(self, relation: str, args: Sequence[sp.Expr]) -> str:
-        code: str = self._print(args[0])
-        for arg in args[1:]:
-            code = f"{relation}({code}, {self._print(arg)})"
-        return code
-
     def _print_Max(self, expr: sp.Max) -> str:
-        return self._chosen("larger", expr.args)
+        return _nested(self, "larger", expr.args)
 
     def _print_Min(self, expr: sp.Min) -> str:
-        return self._chosen("smaller", expr.args)
+        return _nested(self, "smaller", expr.args)
 
     def _print_sign(self, expr: sp.Expr) -> str:
         return f"sign({self._print(expr.args[0])})"
