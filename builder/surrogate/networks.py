@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from models.base.errors import InputError, did_you_mean
+from models.base.errors import InputError
 from models.base.types import Array
 from models.losses.loss_model import LossModel
 from models.losses.loss_term import SPEED, SPEED_FLOOR_RPM, TORQUE, TORQUE_FLOOR_NM, LossTerm
@@ -122,19 +122,6 @@ PRESETS: Mapping[str, Preset] = {
         domain=Domain(speed_rpm=(50.0, 6500.0), torque_Nm=(1.0, 350.0), temperature_degC=(20.0, 120.0)),
     ),
 }
-
-
-def preset_named(name: str) -> Preset:
-    """Return a preset.
-
-    Raises
-    ------
-    InputError
-        If no preset has that name.
-    """
-    if name not in PRESETS:
-        raise InputError(f"there is no training preset {name!r}{did_you_mean(name, PRESETS)}")
-    return PRESETS[name]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -13,8 +13,8 @@ from sklearn.model_selection import train_test_split
 from builder.surrogate.doe import latin_hypercube, mixed_hypercube, random_points, sample_losses
 from builder.surrogate.fit import fit_network, joined_network
 from builder.surrogate.levenberg_marquardt import LevenbergMarquardtRegressor
-from builder.surrogate.networks import OTHER_HIDDEN, Domain, NetworkSpec, Preset, network_specs, preset_named
-from models.base.errors import InputError
+from builder.surrogate.networks import OTHER_HIDDEN, PRESETS, Domain, NetworkSpec, Preset, network_specs
+from models.base.errors import InputError, did_you_mean
 from models.base.parallel import run_parallel
 from models.base.progress import Progress, silent
 from models.base.types import Array
@@ -200,8 +200,11 @@ def chosen_preset(preset: str | Preset, samples: int | None = None) -> Preset:
     InputError
         If the preset is not known or there are too few samples.
     """
-    chosen = preset_named(preset) if isinstance(preset, str) else preset
-    chosen = chosen if samples is None else replace(chosen, samples=samples)
+    if isinstance(preset, str):
+        if preset not in PRESETS:
+            raise InputError(f"there is no training preset {preset!r}{did_you_mean(preset, PRESETS)}")
+        preset = PRESETS[preset]
+    chosen = preset if samples is None else replace(preset, samples=samples)
     if chosen.samples < LEAST_SAMPLES:
         raise InputError(f"{chosen.samples} samples per network are too few; give at least {LEAST_SAMPLES}")
     return chosen

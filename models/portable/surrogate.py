@@ -12,7 +12,7 @@ Numpy only: this file also runs where neither scikit-learn nor onnxruntime is in
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any, Literal, Self
 
@@ -158,19 +158,7 @@ class Network:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the network as plain lists, numbers and strings (JSON)."""
-        return {
-            "name": self.name,
-            "inputs": list(self.inputs),
-            "outputs": list(self.outputs),
-            "lower": list(self.lower),
-            "upper": list(self.upper),
-            "features": [list(feature) for feature in self.features],
-            "viscosity": list(self.viscosity),
-            "weights": [w.tolist() for w in self.weights],
-            "biases": [b.tolist() for b in self.biases],
-            "passed": self.passed.tolist(),
-            "log_output": self.log_output,
-        }
+        return {f.name: _plain(getattr(self, f.name)) for f in fields(self)}
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Self:
@@ -426,15 +414,7 @@ class SurrogateLosses:
             "torque_Nm": list(self.torque_bounds),
             "temperature_degC": list(self.temperature_bounds),
             "torque_driven": list(self.torque_driven),
-            "uses": [
-                {
-                    "network": use.network,
-                    "sources": list(use.sources),
-                    "factors": list(use.factors),
-                    "components": list(use.components),
-                }
-                for use in self.uses
-            ],
+            "uses": [{f.name: _plain(getattr(use, f.name)) for f in fields(use)} for use in self.uses],
             "networks": [network.to_dict() for network in self.networks],
         }
 
@@ -462,6 +442,13 @@ class SurrogateLosses:
             temperature_bounds=_pair(data["temperature_degC"]),
             torque_driven=tuple(data["torque_driven"]),
         )
+
+
+def _plain(value: Any) -> Any:
+    """A field of a network or its use as lists, numbers and strings."""
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    return [_plain(item) for item in value] if isinstance(value, tuple) else value
 
 
 def _pair(values: Iterable[float]) -> tuple[float, float]:
