@@ -29,6 +29,7 @@ from models.quantities.quantities import MEMORY, Input, node_columns
 from models.simulation.start_temperatures import start_temperatures
 
 if TYPE_CHECKING:
+    from diagnosis.recordings.machine import RecordedMachine
     from models.files.cycle_file import RecordedStart
 
 RECORDED = "recorded"  # --initial: as the cycle's own file says
@@ -48,11 +49,8 @@ class Model:
     ----------
     title : str
         Its name, for a plot
-    read : callable
-        From the file of a cycle, as named, to the cycle, its recorded start, and notes of what was read how
-    inputs : mapping of str to Input
-    nodes : tuple of str
-        Nodes that have a start temperature
+    machine : RecordedMachine
+        Its inputs, and its parts, which have a start temperature
     domain : str
         What ``in_domain`` is about, for a warning
     run : callable
@@ -66,9 +64,7 @@ class Model:
     """
 
     title: str
-    read: Callable[[Path], tuple[Cycle, RecordedStart, tuple[str, ...]]]
-    inputs: Mapping[str, Input]
-    nodes: tuple[str, ...]
+    machine: RecordedMachine
     domain: str
     run: Callable[[Cycle, Initial, Count], dict[str, Array]]
     groups: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
@@ -76,9 +72,7 @@ class Model:
     memories: Mapping[str, float] = field(default_factory=dict)
 
 
-def _full_model(name_or_file: str, correction: Path | None, mapping: Path | None, *, claims_only: bool) -> Model:
-    from diagnosis.recordings.as_cycle import read_cycle_or_recording
-
+def _full_model(name_or_file: str, correction: Path | None, *, claims_only: bool) -> Model:
     gearbox = load_gearbox(name_or_file)
     network, found = gearbox.network(), None
     if correction is not None:
@@ -93,9 +87,7 @@ def _full_model(name_or_file: str, correction: Path | None, mapping: Path | None
 
     return Model(
         title=f"{gearbox.name}, full model",
-        read=lambda file: read_cycle_or_recording(file, network, mapping=mapping),
-        inputs=network.inputs,
-        nodes=tuple(part.name for part in network.parts),
+        machine=network,
         domain="the domain of the losses" if trained is None else _range_of(trained),
         run=run,
         groups=network.groups,
@@ -112,10 +104,9 @@ def _range_of(trained: Training) -> str:
     )
 
 
-def _fmu(path: Path, correction: Path | None, mapping: Path | None, *, claims_only: bool) -> Model:
+def _fmu(path: Path, correction: Path | None, *, claims_only: bool) -> Model:
     from builder.drive.driver import drive_fmu  # imports fmpy; the full model need not wait for it
     from builder.drive.machine_of_fmu import fmu_machine, fmu_memories, fmu_nodes, refuse_other_correction
-    from diagnosis.recordings.as_cycle import read_cycle_or_recording
 
     machine, found = fmu_machine(path), None
     if correction is not None:
@@ -132,9 +123,7 @@ def _fmu(path: Path, correction: Path | None, mapping: Path | None, *, claims_on
 
     return Model(
         title=path.name,
-        read=lambda file: read_cycle_or_recording(file, machine, mapping=mapping),
-        inputs=machine.inputs,
-        nodes=tuple(part.name for part in machine.parts),
+        machine=machine,
         domain="the surrogate's training domain",
         run=run,
         correction=found,
@@ -212,25 +201,27 @@ def simulate(
     _check_usage(files, gearbox, correction, claims_only=claims_only)
     named = [Path(name) for name in (gearbox, initial, mapping, correction) if name is not None]
     _check_outputs(output, plot, inputs=[*_read_as_files(files, gearbox), *named])
+    from diagnosis.recordings.as_cycle import read_cycle_or_recording
     from models.files.cycle_file import read_initial
 
     given = None if initial in (None, RECORDED) else read_initial(str(initial))
     model_of = partial(_fmu, files[0]) if gearbox is None else partial(_full_model, gearbox)
-    model = model_of(correction, mapping, claims_only=claims_only)
-    cycle, recorded, notes = model.read(files[-1])
+    model = model_of(correction, claims_only=claims_only)
+    inputs, nodes = model.machine.inputs, tuple(part.name for part in model.machine.parts)
+    cycle, recorded, notes = read_cycle_or_recording(files[-1], model.machine, mapping=mapping)
     for note in notes:
         console.err.print(f"note: {files[-1]}: {note}")
     recorded = _without_biases(recorded, model.correction)
-    start = recorded.of(model.nodes) if initial == RECORDED else given
+    start = recorded.of(nodes) if initial == RECORDED else given
     if start is not None:
         memories = {}
         if isinstance(start, Mapping):  # a result also has temperatures of boundaries
             memories = {MEMORY + name: start.get(MEMORY + name, value) for name, value in model.memories.items()}
             if initial != RECORDED and (fresh := [name for name in memories if name not in start]):
                 console.err.print(f"note: {initial}: has no {', '.join(fresh)}; they start from their beginning")
-            start = {name: T for name, T in start.items() if name in model.nodes}
+            start = {name: T for name, T in start.items() if name in nodes}
         source = str(recorded.path) if initial == RECORDED else f"--initial {initial}"
-        start = start_temperatures(start, model.nodes, source=source) | memories
+        start = start_temperatures(start, nodes, source=source) | memories
     if output_interval is not None:
         cycle = cycle.refined(output_interval)
     columns = _simulated(model, cycle, start, is_recording=bool(recorded.temperatures))
@@ -238,16 +229,15 @@ def simulate(
         if picture is not None:
             from builder.drive.plots import plot_cycle
 
-            plot_cycle(
-                picture, columns, title=f"{model.title}: {files[-1].name}", groups=model.groups, inputs=model.inputs
-            )
+            title = f"{model.title}: {files[-1].name}"
+            plot_cycle(picture, columns, title=title, groups=model.groups, inputs=inputs)
         write_table(output, columns)
-    _show(columns, model.inputs)
-    _print_assumed_inputs(columns, cycle, model.inputs)
+    _show(columns, inputs)
+    _print_assumed_inputs(columns, cycle, inputs)
     _warn_of_domain(columns, model.domain)
     _warn_of_heat(columns)
     if initial is None:
-        _warn_of_start(columns, recorded, model.nodes)
+        _warn_of_start(columns, recorded, nodes)
     for file in (output, plot):
         if file is not None:
             console.out.print(f"wrote {file}")

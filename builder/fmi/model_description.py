@@ -7,7 +7,7 @@ same arguments give the same bytes. FMI 3.0: :mod:`builder.fmi.model_description
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import isfinite
 from xml.etree.ElementTree import Element, SubElement, fromstring, indent, tostring
@@ -101,7 +101,11 @@ def _xml(table: SignalTable, identity: Identity, *, guid: str) -> bytes:
         copyright=identity.copyright, license=identity.license, generationTool=identity.generation_tool,
         variableNamingConvention="structured", numberOfEventIndicators="0",
     )  # fmt: skip
-    _co_simulation(root, identity)
+    element = add_co_simulation(root, identity)
+    if identity.source_files:
+        files = SubElement(element, "SourceFiles")
+        for name in identity.source_files:
+            SubElement(files, "File", name=name)
     add_units(root, table)
     _types(root, table)
     add_log_categories(root)
@@ -140,14 +144,6 @@ def add_co_simulation(root: Element, identity: Identity) -> Element:
     for name, value in identity.flags.items():
         element.set(name, boolean(value) if isinstance(value, bool) else str(value))
     return element
-
-
-def _co_simulation(root: Element, identity: Identity) -> None:
-    element = add_co_simulation(root, identity)
-    if identity.source_files:
-        files = SubElement(element, "SourceFiles")
-        for name in identity.source_files:
-            SubElement(files, "File", name=name)
 
 
 def add_units(root: Element, table: SignalTable) -> None:
@@ -215,18 +211,13 @@ def value_attributes(signal: Signal) -> dict[str, str]:
 
 def _structure(root: Element, table: SignalTable) -> None:
     structure = SubElement(root, "ModelStructure")
-    outputs = [signal for signal in table if signal.causality == "output"]
-    _unknowns(SubElement(structure, "Outputs"), table, ((s, s.depends, DEPENDENCY_KINDS) for s in outputs))
-    unknowns = SubElement(structure, "InitialUnknowns")
-    _unknowns(unknowns, table, ((s, s.depends_initially, INITIAL_DEPENDENCY_KINDS) for s in outputs))
-
-
-def _unknowns(
-    parent: Element, table: SignalTable, unknowns: Iterable[tuple[Signal, Sequence[str], Sequence[str]]]
-) -> None:
-    for signal, names, kinds in unknowns:
-        attributes = {"index": str(signal.reference + 1)}
-        SubElement(parent, "Unknown", attributes | dependencies(table, signal, names, kinds, first=1))
+    outputs, unknowns = SubElement(structure, "Outputs"), SubElement(structure, "InitialUnknowns")
+    for signal in (signal for signal in table if signal.causality == "output"):
+        index = {"index": str(signal.reference + 1)}
+        known = dependencies(table, signal, signal.depends, DEPENDENCY_KINDS, first=1)
+        SubElement(outputs, "Unknown", index | known)
+        known = dependencies(table, signal, signal.depends_initially, INITIAL_DEPENDENCY_KINDS, first=1)
+        SubElement(unknowns, "Unknown", index | known)
 
 
 def dependencies(

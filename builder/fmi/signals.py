@@ -273,7 +273,7 @@ class _Table:
         self.network = network
         self.losses = losses
         self.inputs = tuple(network.inputs)
-        self.parameters = {parameter.name: self._parameter_name(parameter.name) for parameter in network.parameters}
+        self.parameters = {parameter.name: f"factor.{fmi_name(parameter.name)}" for parameter in network.parameters}
         self.boundaries = network.boundaries
         self.loss_heats = [source.heat for source in network.sources if source.is_loss]
 
@@ -463,9 +463,6 @@ class _Table:
         for part in self.network.parts:
             text = f"Temperature of {part.name.replace('_', ' ')} at the start, unless initial.uniform"
             yield fixed(f"{fmi_name(part.name)}.T_start", "start_temperature", text, part.name)
-
-    def _parameter_name(self, name: str) -> str:
-        return f"factor.{fmi_name(name)}"
 
     def _factors(self) -> Iterator[Signal]:
         for parameter in self.network.parameters:
