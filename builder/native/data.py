@@ -261,7 +261,7 @@ def _loss_data(data: _Data, network: ThermalNetwork, losses: SurrogateLosses) ->
     for use in losses.uses:
         blocks.add(by_name[use.network], use)
     features.write(data)
-    blocks.write(data, network.components, losses)
+    blocks.write(network.components, losses)
 
 
 class _Pool:
@@ -374,7 +374,8 @@ class _Blocks:
                 )
         return w_1.shape[1], w_2.shape[1]
 
-    def write(self, data: _Data, components: Sequence[str], losses: SurrogateLosses) -> None:
+    def write(self, components: Sequence[str], losses: SurrogateLosses) -> None:
+        data = self.data
         data.define("SUMS_ARE_LARGE", int(self.largest_sum > LARGEST_EXPONENT))
         for name, size in (("N_BLOCKS", len(self.rows)), ("N_FIRST", self.n_first), ("N_SECOND", self.n_second),
                            ("N_NETS", self.n_nets + -self.n_nets % LANES),

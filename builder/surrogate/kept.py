@@ -21,6 +21,7 @@ from builder.base.cache import cached_path, keep, recall
 from builder.surrogate.networks import Preset
 from builder.surrogate.train import ErrorReport, TrainingResult, chosen_preset, train_surrogate
 from models.base.progress import Progress, silent
+from models.definition.sections import Training
 from models.portable.surrogate import SurrogateLosses
 
 if TYPE_CHECKING:
@@ -104,7 +105,7 @@ def _key(gearbox: Gearbox, preset: Preset, seed: int) -> str:
             if one["user_api"] == "blas"
         ),
     }
-    return hashlib.sha256(json.dumps(made_of, sort_keys=True).encode()).hexdigest()[:32]
+    return hashlib.sha256(json.dumps(made_of, sort_keys=True, default=Training.model_dump).encode()).hexdigest()[:32]
 
 
 @cache

@@ -13,47 +13,26 @@ import numpy as np
 
 from models.base.errors import InputError
 from models.base.types import Array
+from models.definition.sections import Training
 from models.losses.loss_model import LossModel
 from models.losses.loss_term import SPEED, SPEED_FLOOR_RPM, TORQUE, TORQUE_FLOOR_NM, LossTerm
 from models.portable.surrogate import Feature, Use
 
-Bounds = tuple[float, float]
 
+def above_floors(trained: Training) -> Training:
+    """Return the range of training above the full model's lowest speed and torque: below, losses are linear.
 
-@dataclass(frozen=True, kw_only=True)
-class Domain:
-    """Range of training.
-
-    Attributes
-    ----------
-    speed_rpm, torque_Nm : (float, float)
-        Bounds of the input shaft's speed [1/min] and torque [N m]
-    temperature_degC : (float, float)
-        Bounds of all temperatures, [degC]
+    Raises
+    ------
+    InputError
+        If nothing is left.
     """
-
-    speed_rpm: Bounds
-    torque_Nm: Bounds
-    temperature_degC: Bounds
-
-    def of(self, source: str) -> Bounds:
-        """Return the bounds of speed, torque, or the temperature of a node."""
-        return {SPEED: self.speed_rpm, TORQUE: self.torque_Nm}.get(source, self.temperature_degC)
-
-    def above_floors(self) -> Domain:
-        """Return the range above the full model's lowest speed and torque: below, losses are linear.
-
-        Raises
-        ------
-        InputError
-            If nothing is left.
-        """
-        speed = (max(self.speed_rpm[0], SPEED_FLOOR_RPM), self.speed_rpm[1])
-        torque = (max(self.torque_Nm[0], TORQUE_FLOOR_NM), self.torque_Nm[1])
-        for name, (low, high) in {"speed_rpm": speed, "torque_Nm": torque}.items():
-            if not low < high:
-                raise InputError(f"training.{name}: the upper bound {high:g} must be above {low:g}; widen it")
-        return Domain(speed_rpm=speed, torque_Nm=torque, temperature_degC=self.temperature_degC)
+    speed = (max(trained.speed_rpm[0], SPEED_FLOOR_RPM), trained.speed_rpm[1])
+    torque = (max(trained.torque_Nm[0], TORQUE_FLOOR_NM), trained.torque_Nm[1])
+    for name, (low, high) in {"speed_rpm": speed, "torque_Nm": torque}.items():
+        if not low < high:
+            raise InputError(f"training.{name}: the upper bound {high:g} must be above {low:g}; widen it")
+    return trained.model_copy(update={"speed_rpm": speed, "torque_Nm": torque})
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,7 +55,7 @@ class Preset:
         work
     max_iter, starts, start_iterations, patience, tolerance
         See :class:`builder.surrogate.levenberg_marquardt.LevenbergMarquardtRegressor`
-    domain : Domain, optional
+    domain : Training, optional
         Range of training; that of the gearbox's ``[training]`` where absent
     """
 
@@ -90,7 +69,7 @@ class Preset:
     start_iterations: int
     patience: int
     tolerance: float
-    domain: Domain | None = None
+    domain: Training | None = None
 
 
 OTHER_HIDDEN = (10, 10)  # of a network that a preset does not name
@@ -119,7 +98,7 @@ PRESETS: Mapping[str, Preset] = {
         start_iterations=100,
         patience=1000,
         tolerance=0.0,
-        domain=Domain(speed_rpm=(50.0, 6500.0), torque_Nm=(1.0, 350.0), temperature_degC=(20.0, 120.0)),
+        domain=Training(speed_rpm=(50.0, 6500.0), torque_Nm=(1.0, 350.0), temperature_degC=(20.0, 120.0)),
     ),
 }
 
@@ -205,7 +184,7 @@ class NetworkSpec:
         return np.concatenate(found, axis=1)
 
 
-def network_specs(model: LossModel, domain: Domain) -> tuple[NetworkSpec, ...]:
+def network_specs(model: LossModel, domain: Training) -> tuple[NetworkSpec, ...]:
     """Return the networks of a gearbox, those of the most inputs (the most laborious) first."""
     learnt: dict[str, list[LossTerm]] = {}
     for terms in model.groups:
@@ -217,11 +196,12 @@ def network_specs(model: LossModel, domain: Domain) -> tuple[NetworkSpec, ...]:
     return tuple(sorted(specs, key=lambda spec: -len(spec.inputs)))
 
 
-def _spec(name: str, terms: tuple[LossTerm, ...], domain: Domain) -> NetworkSpec:
+def _spec(name: str, terms: tuple[LossTerm, ...], domain: Training) -> NetworkSpec:
     kind, bounds = terms[0].kind, []
+    ranges = {SPEED: domain.speed_rpm, TORQUE: domain.torque_Nm}
     for column, first in enumerate(terms[0].inputs):
         factors = [term.inputs[column].factor for term in terms]
-        low, high = domain.of(first.source)
+        low, high = ranges.get(first.source, domain.temperature_degC)
         if first.lowest is None:
             bounds.append((min(factors) * low, max(factors) * high))
         else:

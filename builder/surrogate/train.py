@@ -13,7 +13,7 @@ from sklearn.model_selection import train_test_split
 from builder.surrogate.doe import latin_hypercube, mixed_hypercube, random_points, sample_losses
 from builder.surrogate.fit import fit_network, joined_network
 from builder.surrogate.levenberg_marquardt import LevenbergMarquardtRegressor
-from builder.surrogate.networks import OTHER_HIDDEN, PRESETS, Domain, NetworkSpec, Preset, network_specs
+from builder.surrogate.networks import OTHER_HIDDEN, PRESETS, NetworkSpec, Preset, above_floors, network_specs
 from models.base.errors import InputError, did_you_mean
 from models.base.parallel import run_parallel
 from models.base.progress import Progress, silent
@@ -148,13 +148,7 @@ def train_surrogate(
     """
     begin = time.perf_counter()
     chosen = chosen_preset(preset, samples)
-    bounds = gearbox.training
-    domain = (
-        chosen.domain
-        or Domain(
-            speed_rpm=bounds.speed_rpm, torque_Nm=bounds.torque_Nm, temperature_degC=bounds.temperature_degC
-        ).above_floors()
-    )
+    domain = chosen.domain or above_floors(gearbox.training)
     model = gearbox.losses()
     viscosity = gearbox.viscosity_constants
     specs = network_specs(model, domain)

@@ -15,6 +15,7 @@ from models.base.types import Array
 from models.definition.parametric_sections import Heat, Loss, ParametricDefinition, Path, TorqueFromPower
 from models.formulas.extremes import Max, Min
 from models.formulas.oil import T_HIGHEST, T_LOWEST, kinematic_viscosity_d341
+from models.losses.loss_term import RPM
 from models.network.expressions import parse_expression
 from models.network.laws import Parameter, compile_each, symbol
 from models.quantities.units import find_unit
@@ -24,7 +25,6 @@ GROUPS = ("housing", "bearings", "returns")
 RUN_POWER = 8  # sharpness of the step of a conductance from standstill to running, over speed
 RATIOS = (0.02, 50.0)  # of speed, torque or viscosity, beyond which an exponent's deviation has no further effect
 SLOWEST_RPM = 1.0  # below it a torque from a power is that at it
-RPM = np.pi / 30.0
 FARTHEST = 1000.0  # limits of a factor; its prior keeps it much nearer to 1
 COLD_DEGC = 20.0  # from which to the stated temperature factors on conductances are tried
 

@@ -7,10 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from builder.surrogate.networks import PRESETS, Domain, network_specs
+from builder.surrogate.networks import PRESETS, above_floors, network_specs
 from builder.surrogate.train import judge, train_surrogate
 from models.assembly.gearbox import load_gearbox
 from models.base.errors import InputError
+from models.definition.sections import Training
 
 FZG = load_gearbox("fzg")
 TINY = {"max_iter": 3, "starts": 1, "judged": 20, "hidden": dict.fromkeys(("mesh", "no_load", "bearing"), (2, 2))}
@@ -66,7 +67,7 @@ def test_bounds_come_from_the_definition_above_the_full_models_floors():
     losses = train_surrogate(changed, preset=replace(PRESETS["default"], **TINY), samples=60).losses
     assert (losses.speed_bounds, losses.torque_bounds) == ((1.0, 3000.0), (2.0, 80.0))
     with pytest.raises(InputError, match=r"training\.torque_Nm: the upper bound 0\.5 must be above 1"):
-        Domain(speed_rpm=(1.0, 2.0), torque_Nm=(0.1, 0.5), temperature_degC=(0.0, 1.0)).above_floors()
+        above_floors(Training(speed_rpm=(1.0, 2.0), torque_Nm=(0.1, 0.5), temperature_degC=(0.0, 1.0)))
 
 
 def test_bearings_of_two_kinds_get_a_network_each():
