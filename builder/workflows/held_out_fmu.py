@@ -13,8 +13,9 @@ from diagnosis.forward.grid import stands_for
 from diagnosis.forward.recorder import simulated_as_recorded
 from diagnosis.forward.sensor_fault import AS_RECORDED, channel_column
 from diagnosis.recordings.recording import Recording
+from diagnosis.results.predicted_run import PredictedRun
 from diagnosis.results.result import Diagnosis
-from diagnosis.results.result_parts import PredictedRun
+from diagnosis.results.result_parts import MODELS
 from models.base.types import Array
 from models.correction.correction import Correction
 from models.files.cycle import Cycle
@@ -55,7 +56,7 @@ def fmu_errors(
 
 def errors_of(diagnosis: Diagnosis, state: str) -> dict[str, float]:
     """Root mean square over the held-out recordings of ``before``, ``calibrated`` or ``after``, by channel."""
-    which = ("before", "calibrated", "after").index(state)
+    which = tuple(MODELS).index(state)
     return {name: errors[which] for name, errors in diagnosis.holdout.sensors.items()}
 
 

@@ -23,6 +23,7 @@ from diagnosis.recordings.read import read_by_role
 from diagnosis.recordings.recording import Recording
 from diagnosis.report.write import CORRECTION, write_files
 from diagnosis.results.result import Diagnosis
+from diagnosis.results.result_parts import MODELS
 from models.assembly.gearbox import Gearbox, load_gearbox
 from models.base.atomic_write import atomic_folder
 from models.base.errors import InputError
@@ -33,7 +34,6 @@ from models.correction.correction import read_correction
 RESULT = "real.json"
 SCHEMA = 1
 DATA = Path("examples") / "data"
-STATES = ("before", "calibrated", "after")
 BY_SOUND = "calibrated by the sound channels"
 MOST_RATIO, MOST_FMU_K, MOST_S = 0.9, 0.02, 180.0  # after to calibrated by the sound channels; FMU less report; time
 
@@ -107,7 +107,7 @@ def prove_real(plant: RealPlant, output: Path, *, jobs: int = 1, progress: Progr
             correction=correction, progress=progress,
         )  # fmt: skip
         progress("driving the FMU")
-        errors = {state: errors_of(found, state) for state in STATES} | {
+        errors = {state: errors_of(found, state) for state in MODELS} | {
             "fmu": fmu_errors(fmu, correction, found, held)
         }
         progress("calibrating by the sound channels")

@@ -26,13 +26,14 @@ from diagnosis.report.chart import (
 )
 from diagnosis.report.wording import LOSS, name, time_scale
 from diagnosis.results.number_format import fixed
+from diagnosis.results.predicted_run import PredictedRun
 from diagnosis.results.result import Diagnosis
-from diagnosis.results.result_parts import PredictedRun
+from diagnosis.results.result_parts import MODELS
 from models.base.types import Array
 from models.quantities.part_colours import AMBIENT, CALIBRATED, DELIVERED, MEASURED, part_colours
 from models.quantities.quantities import Input, node_of_channel
 
-STAGES = (("as delivered", "before"), ("calibrated", "calibrated"), ("corrected", "after"))
+STAGES = tuple((label, model) for model, label in MODELS.items())
 LINES: Mapping[str, dict[str, Any]] = {
     "before": {"dash": "dot", "width": 1.6, "color": DELIVERED},
     "calibrated": {"dash": "dash", "width": 1.6, "color": CALIBRATED},

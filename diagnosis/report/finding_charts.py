@@ -11,8 +11,9 @@ from diagnosis.report.chart import INK, MOST_POINTS, Chart, curve_points, dresse
 from diagnosis.report.wording import clause, name, short_title, time_scale
 from diagnosis.results.first_screen import date_told
 from diagnosis.results.number_format import share
+from diagnosis.results.predicted_run import PredictedRun
 from diagnosis.results.result import Diagnosis
-from diagnosis.results.result_parts import LEAST_RIVAL, Finding, PredictedRun
+from diagnosis.results.result_parts import LEAST_RIVAL, Finding
 from models.base.types import Array
 from models.quantities.part_colours import AMBIENT, part_colours
 

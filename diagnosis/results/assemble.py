@@ -26,6 +26,7 @@ from diagnosis.results.baseline_notes import baseline_notes
 from diagnosis.results.findings import estimates_of, finding_of, joint_estimate_of, switch_errors
 from diagnosis.results.instruments import sensors_and_inputs_of
 from diagnosis.results.locations import locations_of
+from diagnosis.results.predicted_run import PredictedRun
 from diagnosis.results.predictions import Predicted, Predictions, predict_recordings, temperatures
 from diagnosis.results.ratios_only import ratio_notes
 from diagnosis.results.result import Diagnosis, Verdict
@@ -35,7 +36,6 @@ from diagnosis.results.result_parts import (
     Finding,
     Fits,
     NotDetectable,
-    PredictedRun,
     Ranked,
     law_of,
     spoiled_in,

@@ -5,14 +5,16 @@ from __future__ import annotations
 import html
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, replace
-from typing import TYPE_CHECKING, Any, Literal
+from dataclasses import asdict, dataclass, field, fields, replace
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from diagnosis.decision.posterior import Placebo, Repeating, ScaledError
 from diagnosis.decision.settings import Settings
 from diagnosis.results.first_screen import first_screen_of, verdict_text_of
 from diagnosis.results.joint_estimate import JointEstimate
+from diagnosis.results.predicted_run import PredictedRun
 from diagnosis.results.result_parts import (
+    MODELS,
     MOST_NEAREST,
     NEAREST,
     NO_CLAIM,
@@ -22,12 +24,13 @@ from diagnosis.results.result_parts import (
     Fits,
     Location,
     NotDetectable,
-    PredictedRun,
     Ranked,
+    named,
     or_none,
 )
-from diagnosis.results.tables import Table, draw_explanations, table_of
+from models.base.errors import InputError, did_you_mean
 from models.correction.instruments import InputCorrection, SensorCorrection
+from models.quantities.quantities import is_total_loss
 from models.simulation.thermal_network import ThermalNetwork
 from models.terms.term import Term
 
@@ -37,6 +40,8 @@ if TYPE_CHECKING:
 
 SCHEMA = 1
 LIKELY = 0.5  # probability from which a further place is told
+MOST_BARS, LEAST_DRAWN = 10, 0.005
+Table = Literal["findings", "explanations", "calibration", "errors"]
 Verdict = Literal[
     "consistent", "parameter_error", "missing_physics", "sensor_fault", "unexplained", "insufficient_data"
 ]
@@ -320,7 +325,25 @@ class Diagnosis:
         InputError
             If there is no such table.
         """
-        return table_of(self, what)
+        import pandas as pd
+
+        if what not in get_args(Table):
+            raise InputError(f"{what!r} is not a table of a diagnosis{did_you_mean(what, get_args(Table))}")
+        if what == "findings":
+            rows = [(f.mechanism, f.place, f.grade, f.sureness, f.heat_mean_W, p.name, p.value, p.stderr, p.unit)
+                    for f in self.findings for p in f.parameters]  # fmt: skip
+            return pd.DataFrame(rows, columns=["mechanism", "place", "grade", "probability", "heat_mean_W",
+                                               "parameter", "value", "stderr", "unit"])  # fmt: skip
+        if what == "explanations":
+            ranks = [(r.mechanism, r.place, r.family, r.log_bayes, r.probability) for r in self.ranking]
+            return pd.DataFrame(ranks, columns=["mechanism", "place", "family", "log_bayes_nat", "probability"])
+        if what == "calibration":
+            calibrated = [asdict(one) for one in self.calibration]
+            return pd.DataFrame(calibrated, columns=[one.name for one in fields(Calibrated)])
+        errors = [(recordings, channel, "W" if is_total_loss(channel) else "K", *of)
+                  for recordings, fits in (("train", self.train), ("holdout", self.holdout))
+                  for channel, of in fits.sensors.items()]  # fmt: skip
+        return pd.DataFrame(errors, columns=["recordings", "channel", "unit", *(f"rmse_{model}" for model in MODELS)])
 
     def plot(self, *, ax: Axes | None = None) -> Axes:
         """Draw the most probable explanations; predictions over time are drawn by :meth:`PredictedRun.plot`.
@@ -334,7 +357,15 @@ class Diagnosis:
         -------
         Axes
         """
-        return draw_explanations(self, ax)
+        from models.columns.curves import PALETTE, axes_or_new  # imports matplotlib
+
+        likely = [r for r in self.ranking if r.probability >= LEAST_DRAWN]
+        shown = likely[:MOST_BARS][::-1]
+        with axes_or_new(ax) as axes:
+            names = [named(r.mechanism, r.place).replace("__", " ").replace("_", " ") for r in shown]
+            axes.barh(names, [r.probability for r in shown], color=PALETTE[0])
+            axes.set(xlabel="Probability", xlim=(0.0, 1.0))
+        return axes
 
     def _repr_html_(self) -> str:
         head, *rest = self.summary()

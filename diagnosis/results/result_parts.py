@@ -5,22 +5,20 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from diagnosis.decision.answer import Grade
 from models.base.types import Array
 from models.correction.instruments import InputCorrection, SensorCorrection
 from models.terms.term import Term
 
-if TYPE_CHECKING:
-    import pandas as pd
-    from matplotlib.axes import Axes
-
 PARAMETER = "parameter"
 NO_CLAIM = ("consistent", "insufficient_data")  # verdicts
 LEAST_RIVAL = 0.01  # probability of what is told as a rival
 MOST_NEAREST = 3  # names that are told of those that were not reported
 NEAREST = 0.1  # their probability at least
+# Models that are compared by their predictions, as people call them.
+MODELS: Mapping[str, str] = {"before": "as delivered", "calibrated": "calibrated", "after": "corrected"}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -246,71 +244,6 @@ class Location:
         return self.nodes[0]
 
 
-@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class PredictedRun:
-    """One recording as measured and as simulated, free-running.
-
-    Attributes
-    ----------
-    recording : str
-    held_out : bool
-    time : Array, shape (rows,)
-        [s]
-    inputs : mapping of str to Array, shape (rows,)
-        By name in the network: speed [1/min], torque [N m], temperatures of the surroundings [degC] and others
-    measured, before, calibrated, after : mapping of channel to Array, shape (rows,)
-        [degC], or [W] for ``P_loss``; before: the model as delivered; calibrated: its parameters tuned inside their
-        priors; after: corrected, with findings and what was learnt of model error
-    counts_from_s : float
-        Rows before it served to find the start temperatures and do not count
-    start : mapping of node to float
-        Temperatures of all nodes at the first row, corrected, [degC]
-    """
-
-    recording: str
-    held_out: bool
-    time: Array
-    inputs: Mapping[str, Array]
-    measured: Mapping[str, Array]
-    before: Mapping[str, Array]
-    calibrated: Mapping[str, Array]
-    after: Mapping[str, Array]
-    counts_from_s: float
-    start: Mapping[str, float] = field(default_factory=dict)
-
-    def __repr__(self) -> str:
-        role = "held out" if self.held_out else "learnt from"
-        return f"<PredictedRun {self.recording!r}, {role}: {len(self.time)} rows; {', '.join(self.measured)}>"
-
-    def to_dataframe(self) -> pd.DataFrame:
-        """Return time, inputs, and of every channel the measured and the predicted values.
-
-        Columns are ``T_oil_degC`` for what was measured, ``T_oil_degC_before``, ``_calibrated`` and ``_after``.
-        """
-        from diagnosis.results.tables import run_columns
-
-        return run_columns(self).to_dataframe()
-
-    def plot(self, channel: str | None = None, *, ax: Axes | None = None) -> Axes:
-        """Draw one channel as measured and as predicted.
-
-        Parameters
-        ----------
-        channel : str or None
-            By default the temperature that the model as delivered predicts worst
-        ax : Axes or None
-            By default new ones
-
-        Raises
-        ------
-        InputError
-            If it was not measured.
-        """
-        from diagnosis.results.tables import draw_channel
-
-        return draw_channel(self, channel, ax)
-
-
 MISSED = 3.0  # times the error of the recordings learnt from, beyond which a held-out one is missed
 
 
@@ -360,10 +293,7 @@ class Fits:
             "rmse_findings_K": or_none(self.found),
             "rmse_after_K": or_none(self.after),
             **{
-                what: {
-                    name: dict(zip(("before", "calibrated", "after"), map(or_none, errors), strict=True))
-                    for name, errors in of.items()
-                }
+                what: {name: dict(zip(MODELS, map(or_none, errors), strict=True)) for name, errors in of.items()}
                 for what, of in (("sensors", self.sensors), ("recordings", self.recordings))
             },
         }

@@ -15,9 +15,9 @@ from diagnosis.engine.prepare import prepare_experiment
 from diagnosis.engine.scale import scale_direction
 from diagnosis.recordings.read import read_recordings
 from diagnosis.recordings.recording import Recording
+from diagnosis.results.predicted_run import PredictedRun
 from diagnosis.results.ratios_only import ratio_notes
 from diagnosis.results.result import Diagnosis
-from diagnosis.results.result_parts import PredictedRun
 from models.assembly.gearbox import load_gearbox
 
 

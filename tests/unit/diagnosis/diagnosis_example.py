@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from diagnosis.decision.settings import Settings
+from diagnosis.results.predicted_run import PredictedRun
 from diagnosis.results.result import Diagnosis
 from diagnosis.results.result_parts import (
     Calibrated,
@@ -15,7 +16,6 @@ from diagnosis.results.result_parts import (
     Location,
     NotDetectable,
     ParameterValue,
-    PredictedRun,
     Ranked,
     Rival,
 )
