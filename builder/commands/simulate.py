@@ -246,9 +246,9 @@ def simulate(
 
 def _read_as_files(files: tuple[Path, ...], gearbox: str | None) -> tuple[Path, ...]:
     """Return the files that are read; a part of a recording counts as its file."""
-    from diagnosis.recordings.as_cycle import files_of
+    from diagnosis.recordings.time_axis import split_path
 
-    return (*(files[:-1] if gearbox is None else ()), *files_of(files[-1]))
+    return (*(files[:-1] if gearbox is None else ()), *split_path(files[-1])[0])
 
 
 def _check_usage(files: tuple[Path, ...], gearbox: str | None, correction: Path | None, *, claims_only: bool) -> None:

@@ -21,17 +21,6 @@ from models.quantities.quantities import is_total_loss, node_of_channel
 MOST_SHOWN = 3  # pieces of a recording with gaps
 
 
-def files_of(text: Path) -> tuple[Path, ...]:
-    """Return the files of ``FILE+FILE@start..end``.
-
-    Raises
-    ------
-    InputError
-        If the text after the ``@`` is not a part.
-    """
-    return split_path(text)[0]
-
-
 def read_cycle_or_recording(
     text: Path, network: RecordedMachine, *, mapping: Path | None = None
 ) -> tuple[Cycle, RecordedStart, tuple[str, ...]]:
@@ -83,7 +72,7 @@ def _is_recording(text: Path, needed: Set[str], usual: RecordingMapping) -> bool
     So are parts, joined files and formats other than tables; files with a column that a mapping names; and files that
     lack columns of a plain cycle, but have a mapping next to them or dates.
     """
-    if not text.name.lower().endswith(KINDS) or len(files_of(text)) > 1:
+    if not text.name.lower().endswith(KINDS) or len(split_path(text)[0]) > 1:
         return True
     names, own = set(column_names(text)), mapping_beside(text, name_parts(text)[1])
     if own is not None:

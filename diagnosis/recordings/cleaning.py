@@ -138,9 +138,8 @@ def steady_rows(inputs: Mapping[str, Array]) -> Mask:
     """Return True for rows with unchanged inputs around them, shape (rows,)."""
     moves = np.zeros(len(next(iter(inputs.values()))), dtype=bool)
     for values in inputs.values():
-        known = values[np.isfinite(values)]
-        span = float(np.ptp(known)) if len(known) else 0.0
-        step = ~(np.abs(np.diff(values, prepend=values[:1])) <= STEADY_INPUT * span)  # what is not known may move
+        most = STEADY_INPUT * _span(values)
+        step = ~(np.abs(np.diff(values, prepend=values[:1])) <= most)  # what is not known may move
         for shift in range(-LONGEST_OUTLIER, LONGEST_OUTLIER + 2):
             moves |= np.roll(step, shift)
     return ~moves

@@ -118,8 +118,8 @@ def open_recording(path: Path, mapping: Path | None, usual: RecordingMapping) ->
     units: Mapping[str, str] = {}
     if kind in (".mf4", ".mdf"):
         base = next((name for name, column in found.columns.items() if column.quantity == "speed"), "speed_rpm")
-        mdf = read_mdf(path, base=base)
-        chunks, start, units = iter([without(found.missing, mdf.table)]), mdf.start, mdf.units
+        table, units, start = read_mdf(path, base=base)
+        chunks = iter([without(found.missing, table)])
     else:
         chunks = read_chunks(path, found.text_form)
     head = next(chunks)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -16,32 +14,22 @@ from models.base.errors import InputError
 FARTHEST_STEPS = 1.5  # of the usual time between rows, that a sample may be from its row
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class MdfTable:
-    """Numeric channels of an MDF file as one table.
-
-    Attributes
-    ----------
-    table : DataFrame
-        ``time_s`` since the start of the measurement, and the channels; NaN where a slower channel has no sample
-    units : mapping of channel to str
-        As the file names them
-    start : float
-        Start of the measurement since 1970, [s]
-    """
-
-    table: pd.DataFrame
-    units: Mapping[str, str]
-    start: float
-
-
-def read_mdf(path: Path, *, base: str) -> MdfTable:
-    """Read an MDF file.
+def read_mdf(path: Path, *, base: str) -> tuple[pd.DataFrame, dict[str, str], float]:
+    """Read the numeric channels of an MDF file as one table.
 
     Parameters
     ----------
     base : str
         Channel whose times become the rows; a sample of another channel goes to the nearest row, several to their mean
+
+    Returns
+    -------
+    table : DataFrame
+        ``time_s`` since the start of the measurement, and the channels; NaN where a slower channel has no sample
+    units : dict of channel to str
+        As the file names them
+    start : float
+        Start of the measurement since 1970, [s]
 
     Raises
     ------
@@ -70,7 +58,7 @@ def read_mdf(path: Path, *, base: str) -> MdfTable:
     except Exception as error:
         text = str(error).strip().splitlines()
         raise InputError(f"{path}: cannot be read as mf4: {text[0] if text else type(error).__name__}") from error
-    return MdfTable(table=_on_rows_of(base, groups, path), units={n: u for n, u in units.items() if u}, start=start)
+    return _on_rows_of(base, groups, path), {name: unit for name, unit in units.items() if unit}, start
 
 
 def _on_rows_of(base: str, groups: list[pd.DataFrame], path: Path) -> pd.DataFrame:

@@ -15,7 +15,7 @@ from diagnosis.recordings.time_axis import Clock
 from models.base.types import Array
 from models.columns.columns import Columns, What
 from models.files.cycle import Cycle
-from models.quantities.quantities import TOTAL_LOSS, column_of, is_total_loss
+from models.quantities.quantities import column_of, is_total_loss
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -125,8 +125,9 @@ class Recording:
 
     def columns(self) -> Columns:
         """Return inputs and measurements by the names of columns in files; NaN where missing."""
-        names = {c.name: TOTAL_LOSS if is_total_loss(c.name) else f"T_{c.name}" for c in self.channels}
-        return self.cycle.columns() | {column_of(names[c.name]): c.values for c in self.channels}
+        return self.cycle.columns() | {
+            column_of(c.name if is_total_loss(c.name) else f"T_{c.name}"): c.values for c in self.channels
+        }
 
     def to_dataframe(self) -> pd.DataFrame:
         """Return :meth:`columns` as a data frame; its index is the time (UTC) if the file has dates."""
