@@ -282,15 +282,13 @@ def mapping_file(recording: Path, stem: str) -> Path | None:
 
 
 def mapping_of_definition(values: Mapping[str, Any]) -> RecordingMapping:
-    """Return the mapping in the table ``[recording]`` of a gearbox definition; an empty one if there is none.
+    """Return the mapping in the table ``[recording]`` of a gearbox definition; an empty one if that is empty.
 
     Raises
     ------
     InputError
         With all its faults.
     """
-    if not values:
-        return RecordingMapping()
     table = toml_file.with_tuples(dict(values))
     return validate_section(RecordingMapping, table, file="[recording] of the gearbox definition")
 

@@ -92,8 +92,7 @@ def curve_points(x: Array, y: Array, most: int = MOST_POINTS) -> tuple[Array, Ar
     thin = [thinned(x[s], y[s], max(2, int(share * (s.stop - s.start)))) for s in parts]
     xs = [piece for one, _ in thin for piece in (one, one[-1:])]
     ys = [piece for _, one in thin for piece in (one, np.full(min(len(one), 1), np.nan))]
-    joined = np.concatenate(xs[:-1] or [x]), np.concatenate(ys[:-1] or [y])
-    return joined[0].astype(np.float32), single(joined[1])
+    return np.concatenate(xs[:-1]).astype(np.float32), single(np.concatenate(ys[:-1]))
 
 
 def single(values: Array) -> Array:
@@ -145,7 +144,7 @@ def stretches(x: Array) -> list[slice]:
 
 def limits(curves: Sequence[Array]) -> list[float] | None:
     """A range around curves; None if they have no values."""
-    values = np.concatenate([c[np.isfinite(c)] for c in curves] or [np.zeros(0)])
+    values = np.concatenate([c[np.isfinite(c)] for c in curves])
     if not len(values):
         return None
     low, high = float(values.min()), float(values.max())

@@ -68,7 +68,7 @@ class Shown:
     @property
     def scale(self) -> tuple[float, str]:
         """Seconds of the unit of its time axis, and that unit."""
-        return time_scale(float(self.run.time[-1]) if len(self.run.time) else 0.0)
+        return time_scale(float(self.run.time[-1]))
 
     def counted(self) -> Array:
         """True for rows that count."""
@@ -92,11 +92,9 @@ def recordings_of(diagnosis: Diagnosis) -> list[Shown]:
     ]  # fmt: skip
 
 
-def measured_and_simulated(diagnosis: Diagnosis) -> Chart | None:
+def measured_and_simulated(diagnosis: Diagnosis) -> Chart:
     """Inputs, surroundings, and per sensor what was measured and simulated, of one recording at a time."""
     shown = recordings_of(diagnosis)
-    if not shown:
-        return None
     channels = list(shown[0].run.measured)
     driven = _inputs(diagnosis, shown)
     inputs = [key for key, given in driven.items() if not given.quantity.is_temperature][:MOST_INPUTS]
@@ -135,11 +133,9 @@ def measured_and_simulated(diagnosis: Diagnosis) -> Chart | None:
     )  # fmt: skip
 
 
-def errors_over_time(diagnosis: Diagnosis) -> Chart | None:
+def errors_over_time(diagnosis: Diagnosis) -> Chart:
     """Errors of all sensors on one scale: calibrated, and corrected."""
     shown = recordings_of(diagnosis)
-    if not shown:
-        return None
     channels = [channel for channel in shown[0].run.measured if channel != LOSS]
     stages = stages_of(diagnosis)[-2:]
     has_loss = LOSS in shown[0].run.measured
@@ -197,7 +193,7 @@ def _joined(title: str, pieces: Sequence[PredictedRun]) -> Shown:
         inputs=joined("inputs"), measured=joined("measured"), before=joined("before"),
         calibrated=joined("calibrated"), after=joined("after"), counts_from_s=first.counts_from_s, start=first.start,
     )  # fmt: skip
-    starts = [(float(piece.time[0]), piece.counts_from_s) for piece in pieces if len(piece.time)]
+    starts = [(float(piece.time[0]), piece.counts_from_s) for piece in pieces]
     weights = np.concatenate([stands_for(piece.time) for piece in pieces])
     return Shown(title=title, run=run, unscored=[(a, b) for a, b in starts if b > a], weights=weights)
 
@@ -320,9 +316,8 @@ def _look(
 
 def _x_axis(one: Shown, rows: int) -> dict[str, Any]:
     scale, symbol = one.scale
-    time = one.run.time[[0, -1]] / scale if len(one.run.time) else np.array([0.0, 1.0])
     lowest = axis("xaxis", rows)
-    return {f"{lowest}.title.text": f"Time in {symbol}", f"{lowest}.range": time.tolist()}
+    return {f"{lowest}.title.text": f"Time in {symbol}", f"{lowest}.range": (one.run.time[[0, -1]] / scale).tolist()}
 
 
 def _unscored(one: Shown, rows: int) -> list[dict[str, Any]]:

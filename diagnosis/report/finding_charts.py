@@ -145,7 +145,7 @@ def _spans(diagnosis: Diagnosis) -> dict[str, tuple[float, float, bool]]:
     """Begin and end of every recording but baselines, [s] on their clock, and True if it is held out as a whole."""
     spans: dict[str, tuple[float, float, bool]] = {}
     for course in diagnosis.courses:
-        if len(course.time) and course.recording in diagnosis.starts_at:
+        if course.recording in diagnosis.starts_at:
             start = diagnosis.starts_at[course.recording]
             a, b, held = spans.get(course.recording, (np.inf, -np.inf, True))
             spans[course.recording] = (
@@ -213,7 +213,7 @@ def driver_of(diagnosis: Diagnosis, finding: Finding) -> tuple[str, Array, Array
         return None  # time decides
     heats, signals = [], []
     for recording, (time, heat) in finding.heat.items():
-        runs = [c for c in diagnosis.courses if c.recording == recording and not c.held_out and len(c.time)]
+        runs = [c for c in diagnosis.courses if c.recording == recording and not c.held_out]
         if runs:
             heats.append(heat)
             signals.append(_signals_at(diagnosis, finding, runs, time))
@@ -269,7 +269,7 @@ def _one_after_another(findings: Sequence[Finding]) -> tuple[dict[str, float], f
     ends: dict[str, float] = {}
     for finding in findings:
         for recording, (time, _) in finding.heat.items():
-            ends[recording] = max(ends.get(recording, 0.0), float(time[-1]) if len(time) else 0.0)
+            ends[recording] = max(ends.get(recording, 0.0), float(time[-1]))
     offsets, total = {}, 0.0
     for recording, end in ends.items():
         offsets[recording] = total

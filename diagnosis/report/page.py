@@ -15,7 +15,7 @@ from diagnosis.report.chart import Chart
 from diagnosis.results import number_format as numbers
 from diagnosis.results.first_screen import date_told, values_told
 from diagnosis.results.result import Diagnosis
-from diagnosis.results.result_parts import LEAST_RIVAL, NO_CLAIM, Calibrated, Finding, Fits, title_of
+from diagnosis.results.result_parts import NO_CLAIM, Calibrated, Finding, Fits, title_of
 from diagnosis.results.robustness import ahead_in, size_of
 
 PACKAGE = "diagnosis.report"
@@ -113,8 +113,8 @@ def _finding(finding: Finding) -> dict[str, Any]:
             (wording.name(p.name), numbers.with_error(p.value, p.stderr), wording.unit(p.unit))
             for p in finding.parameters
         ],
-        "rivals": [one for one in finding.confusable_with if one.instead and one.probability >= LEAST_RIVAL],
-        "companions": [one for one in finding.confusable_with if not one.instead and one.probability >= LEAST_RIVAL],
+        "rivals": [one for one in finding.confusable_with if one.instead],
+        "companions": [one for one in finding.confusable_with if not one.instead],
     }
 
 

@@ -195,9 +195,8 @@ def provenance(inputs: Mapping[str, Any]) -> list[tuple[str, str]]:
         label = str(key).replace("_", " ")
         if isinstance(value, Mapping):
             rows += [(f"{label}: {inner}", str(one)) for inner, one in value.items()]
-        elif isinstance(value, list | tuple):
-            told = [", ".join(map(str, one.values())) if isinstance(one, Mapping) else str(one) for one in value]
-            rows += [(label, one) for one in told]
+        elif isinstance(value, list):
+            rows += [(label, str(one)) for one in value]
         else:
             rows.append((label, str(value)))
     return rows

@@ -10,11 +10,11 @@ import numpy as np
 import pandas as pd
 
 from diagnosis.candidates.factors import SHAPE
+from diagnosis.forward.sensor_fault import channel_column
 from diagnosis.recordings.recording import Recording
 from diagnosis.results.result import Diagnosis
 from models.assembly.gearbox import Gearbox
 from models.correction.correction import MODEL_ERROR, Correction, Estimate, Finding, write_correction
-from models.quantities.quantities import is_total_loss
 from models.terms.term import Term
 
 UNNAMED, IMPROVES = "without a name", "It improves the prediction; what it is, the data do not say."
@@ -93,7 +93,7 @@ def prediction_table(diagnosis: Diagnosis, recording: Recording) -> pd.DataFrame
         for course in courses:
             inside = (recording.time >= course.time[0]) & (recording.time <= course.time[-1] + 1e-6)
             values[inside] = np.interp(recording.time[inside], course.time, course.after[name])
-        columns["P_loss_W" if is_total_loss(name) else f"T_{name}_degC"] = values
+        columns[channel_column(name)] = values
     return pd.DataFrame(columns)
 
 

@@ -222,13 +222,12 @@ def switch_errors(fit: Fit, term: Term) -> dict[str, float]:
     Readings say between which two grid points it switched, so a switching temperature is known to about half of what
     the temperature changes from one to the next.
     """
-    state = next((s for s in term.states if s.update is not None), None)
-    set_point, band = f"{term.label}_set_point", f"{term.label}_band"
-    if state is None or state.update is None or not {set_point, band} <= {p.name for p in term.parameters}:
+    if (control := _two_point(term)) is None:
         return {}
+    state, switch, set_point, band = control
     network = fit.parts[0].point.machine.model.network
-    index = [one.name for one in network.states].index(state.name)
-    read = {s.name for s in state.update.free_symbols}
+    index = [one.name for one in network.states].index(state)
+    read = {s.name for s in switch.free_symbols}
     nodes = [i for i, part in enumerate(network.parts) if f"T_{part.name}" in read]
     changes: list[float] = []
     for trajectory in fit.trajectories if nodes else ():
@@ -241,8 +240,13 @@ def switch_errors(fit: Fit, term: Term) -> dict[str, float]:
     return {set_point: half / math.sqrt(2.0), band: half * math.sqrt(2.0)}
 
 
-def _places_of(fit: Fit, names: Sequence[str]) -> list[int]:
-    return [i for i, unknown in enumerate(fit.experiment.unknowns) if unknown.parameter.name in names]
+def _two_point(term: Term) -> tuple[str, sp.Expr, str, str] | None:
+    """The state of a two-point control, its law, and the names of set-point and band; None if a term has none."""
+    set_point, band = f"{term.label}_set_point", f"{term.label}_band"
+    switches = [(state.name, state.update) for state in term.states if state.update is not None]
+    if not switches or not {set_point, band} <= {p.name for p in term.parameters}:
+        return None
+    return *switches[0], set_point, band
 
 
 def _is_bias(term: Term) -> bool:
@@ -279,7 +283,8 @@ def mean_heat_of(fit: Fit, effect: Hypothesis) -> tuple[float, float]:
     """
     if not effect.in_network:
         return 0.0, 0.0
-    own = _places_of(fit, names_of(effect))
+    names = names_of(effect)
+    own = [i for i, unknown in enumerate(fit.experiment.unknowns) if unknown.parameter.name in names]
     unknowns, covariance = [fit.experiment.unknowns[i] for i in own], fit.covariance[np.ix_(own, own)]
     sd = np.sqrt(np.diag(covariance))
     moved = fit.z[own] + np.concatenate([np.zeros((1, len(own))), np.diag(sd), -np.diag(sd)])
@@ -287,7 +292,7 @@ def mean_heat_of(fit: Fit, effect: Hypothesis) -> tuple[float, float]:
     rows = [{name: value for name, (value, _) in start.items()}
             | {u.parameter.name: u.value(z) for u, z in zip(unknowns, row, strict=True)}
             for row in moved.tolist()]  # fmt: skip
-    values = np.array([[row[name] for name in names_of(effect)] for row in rows])
+    values = np.array([[row[name] for name in names] for row in rows])
     acting = [part.point.trajectory.piece.recording not in fit.experiment.healthy for part in fit.parts]
     steps = np.concatenate([
         part.point.trajectory.piece.steps * acts for part, acts in zip(fit.parts, acting, strict=True)
@@ -340,13 +345,9 @@ def change_of(
 
 def switching_of(values: Values, effect: Hypothesis) -> Switching | None:
     """Temperatures at which the two-point control of an effect switches on and off; None if it has none."""
-    term = effect.term
-    if term is None:
+    if effect.term is None or (control := _two_point(effect.term)) is None:
         return None
-    set_point, band = f"{term.label}_set_point", f"{term.label}_band"
-    switch = next((s.update for s in term.states if s.update is not None), None)
-    if switch is None or set_point not in values or band not in values:
-        return None
+    _, switch, set_point, band = control
     upper, lower = (values[set_point][0] + way * 0.5 * values[band][0] for way in (1.0, -1.0))
     known = {symbol(name): sp.Float(value) for name, (value, _) in values.items()}
     hot = {s: sp.Float(HOT_DEGC) for s in switch.free_symbols if s.name.startswith("T_")}

@@ -175,8 +175,7 @@ def _how_sure(d: Diagnosis) -> tuple[str, ...]:
             of = f"of this name {share(finding.probability)}, of all that act alike"
         title = f"{title_of(item)}: " if len(d.items) > 1 else ""
         line = " ".join(filter(None, (f"{title}{finding.grade}, probability", of, share(finding.sureness))))
-        others = [r for r in finding.confusable_with
-                  if r.probability >= LEAST_RIVAL and r.law not in finding.tie_set]  # fmt: skip
+        others = [rival for rival in finding.confusable_with if rival.law not in finding.tie_set]
         roles = (("not ruled out instead", True), ("may act as well", False))
         for words, instead in roles[: 1 + d.further_helps]:
             told = [f"{named(r.mechanism, r.place)} ({r.probability:.2f})" for r in others if r.instead is instead]
