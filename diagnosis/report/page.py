@@ -30,7 +30,6 @@ def page(diagnosis: Diagnosis) -> str:
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     environment.filters.update(
         name=wording.name,
-        unit=wording.unit,
         number=numbers.number,
         fixed=numbers.fixed,
         share=numbers.share,
@@ -46,7 +45,6 @@ def page(diagnosis: Diagnosis) -> str:
         plotly=Markup(_text(PLOTLY)),  # noqa: S704 - a library
         charts={chart.name: chart for chart in charts_of(diagnosis)},
         words=wording.WORDS,
-        verdict_text=diagnosis.verdict_text,
         claims=diagnosis.verdict not in NO_CLAIM,
         evidence=_evidence(diagnosis),
         items=[(wording.plain(title_of(item)), [_finding(finding) for finding in item]) for item in diagnosis.items],
@@ -54,7 +52,6 @@ def page(diagnosis: Diagnosis) -> str:
         told=network_chart.marks(diagnosis).told(network_chart.corrected(diagnosis)),
         fits=[(title, _rows(fits, diagnosis.faulty), _each(fits))
               for title, fits in (("Held out", diagnosis.holdout), ("Learned from", diagnosis.train))],
-        has_noise=diagnosis.noise_K > 0.0,
         learnt=[
             {"description": size.description, "size": numbers.with_error(size.start, size.sd)}
             for size in sorted((term.strength for term in diagnosis.learnt), key=lambda size: -size.start)[:MOST_LEARNT]
@@ -67,7 +64,6 @@ def page(diagnosis: Diagnosis) -> str:
         size_of=size_of,
         ahead_in=ahead_in,
         recordings=len({course.recording for course in diagnosis.courses}),
-        loss=wording.LOSS,
         provenance=wording.provenance(diagnosis.inputs),
     )  # fmt: skip
 

@@ -12,7 +12,7 @@ from models.quantities.quantities import TOTAL_LOSS
 
 DAY, HOUR, MINUTE = 86_400.0, 3600.0, 60.0
 WEEKS_S, LONG_S, SHORT_S = 14.0 * DAY, 2.0 * HOUR, 5.0 * MINUTE  # above: in days, in hours; below: in seconds
-UNITS = {"1": "", "degC": "°C", "W/degC": "W/K", "N m": "N m", "N.m": "N m", "rpm": "1/min"}
+UNITS = {"1": "", "degC": "°C", "W/degC": "W/K", "N.m": "N m", "rpm": "1/min"}
 LOSS = TOTAL_LOSS
 
 COURSES = {"step": "from a date on", "for_a_while": "for a while", "over_hours": "over the hours"}

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Collection, Mapping
 from typing import Any
 
 import numpy as np
@@ -28,32 +27,8 @@ from models.quantities.quantities import TOTAL_LOSS
 from models.terms.term import Term
 
 Estimate = tuple[float, float]  # value and standard error
-
-
-@dataclass(kw_only=True)
-class _Collected:
-    """Numbers by channel or input, and by key of its table."""
-
-    sensors: dict[str, dict[str, Estimate]] = field(default_factory=dict)
-    inputs: dict[str, dict[str, Estimate]] = field(default_factory=dict)
-    late: Estimate = (0.0, 0.0)
-
-    def delay(self, given: Estimate) -> None:
-        """Add to the time by which temperatures come after the inputs."""
-        self.late = (self.late[0] + given[0], float(np.hypot(self.late[1], given[1])))
-
-    def add(self, table: dict[str, dict[str, Estimate]], name: str, key: str, given: Estimate) -> None:
-        """Put a number in; a second one of a key is added, standard errors as of independent numbers."""
-        before = table.setdefault(name, {}).get(key, (0.0, 0.0))
-        table[name][key] = (before[0] + given[0], float(np.hypot(before[1], given[1])))
-
-    def scale(self, name: str, factor: Estimate) -> None:
-        """Multiply all that was known of an input."""
-        own = self.inputs.setdefault(name, {})
-        gain = own.get("gain", (1.0, 0.0))
-        own["gain"] = (gain[0] * factor[0], float(np.hypot(gain[1] * factor[0], gain[0] * factor[1])))
-        if "offset" in own:
-            own["offset"] = (own["offset"][0] * factor[0], own["offset"][1] * factor[0])
+Entry = tuple[str, str, str]  # table, channel or input, and key
+LATE: Entry = ("clock", "", "late")  # the time by which temperatures come after the inputs
 
 
 def sensors_and_inputs_of(
@@ -80,84 +55,90 @@ def sensors_and_inputs_of(
     experiment = fit.experiment
     names = [piece.recording for piece in experiment.pieces]
     recording = next((name for name in names if name not in experiment.healthy), names[0])
-    collected, terms = _Collected(), {term.label: term for term in experiment.machine.terms}
+    terms = {term.label: term for term in experiment.machine.terms}
     errors = np.sqrt(np.diag(fit.covariance)).tolist()
-    after: list[tuple[Term, Estimate]] = []
+    numbers, after = list[tuple[Entry, Estimate]](), list[tuple[Entry, Estimate]]()
     for unknown, z, error in zip(experiment.unknowns, fit.z.tolist(), errors, strict=True):
         if not in_scope(unknown, recording):
             continue
         estimate = unknown.value(z), error * unknown.per_z(z)
         if not isinstance(unknown, TermParameter):
-            _collect(collected, unknown, estimate)
+            numbers += [(entry, estimate) for entry in _entries_of(unknown)]
         elif unknown.label not in findings and unknown.parameter.name == terms[unknown.label].strength.name:
-            after.append((terms[unknown.label], estimate))
-    for term, estimate in after:  # the engine shifts inputs after gains and offsets
-        _collect_term(collected, term, estimate)
-    mixes = experiment.machine.mixes
-    _collect_clock(collected, experiment.machine.inputs, has_loss=TOTAL_LOSS in experiment.pieces[0].channels)
+            after += _numbers_of(terms[unknown.label], estimate)
+    found: dict[Entry, Estimate] = {}
+    for entry, estimate in (*numbers, *after):  # the engine shifts inputs after gains and offsets
+        _put(found, entry, estimate)
+    channels, driven, mixes = experiment.pieces[0].channels, experiment.machine.inputs, experiment.machine.mixes
+    late, error = found.get(LATE, (0.0, 0.0))
+    if late:  # late temperatures are early inputs; the measured loss has the clock of the inputs
+        for name in driven:
+            _put(found, ("input", name, "clock"), (late, error))
+        if TOTAL_LOSS in channels:
+            _put(found, ("sensor", TOTAL_LOSS, "delay"), (-late, error))
+    sensors = {channel: _table(found, "sensor", channel) for channel in channels}
+    true_inputs = {name: _table(found, "input", name) for name in driven if inputs is None or name in inputs}
     return (
         tuple(
-            SensorCorrection(
-                channel=channel, mix=tuple(mixes.get(channel, ())), **_table(collected.sensors.get(channel, {}))
-            )
-            for channel in experiment.pieces[0].channels
-            if channel in collected.sensors or channel in mixes
+            SensorCorrection(channel=channel, mix=tuple(mixes.get(channel, ())), **keys)
+            for channel, keys in sensors.items() if keys or channel in mixes
         ),
-        tuple(
-            InputCorrection(name=name, **_table(collected.inputs[name]))
-            for name in experiment.machine.inputs
-            if name in collected.inputs and (inputs is None or name in inputs)
-        ),
+        tuple(InputCorrection(name=name, **keys) for name, keys in true_inputs.items() if keys),
     )  # fmt: skip
 
 
-def _collect(collected: _Collected, unknown: Unknown, estimate: Estimate) -> None:
-    """Put an unknown of a sensor or an input in; others are physics."""
-    if isinstance(unknown, ClockOffset):
-        collected.delay(estimate)
-    elif isinstance(unknown, SensorBias):
-        collected.add(collected.sensors, unknown.channel, "bias", estimate)
-    elif isinstance(unknown, SensorLag):
-        collected.add(collected.sensors, unknown.channel, "lag", estimate)
-    elif isinstance(unknown, LossGain):
-        collected.add(collected.sensors, TOTAL_LOSS, "gain", estimate)
-    elif isinstance(unknown, LossDelay):
-        collected.add(collected.sensors, TOTAL_LOSS, "delay", estimate)
-    elif isinstance(unknown, InputOffset):
-        collected.add(collected.inputs, unknown.input, "offset", estimate)
-    elif isinstance(unknown, InputGain) and unknown.parameter.name != EFFICIENCY:  # that one is of the definition
-        collected.scale(unknown.input, estimate)
+def _entries_of(unknown: Unknown) -> list[Entry]:
+    """The entry of an unknown of a sensor or an input; none of physics."""
+    match unknown:
+        case ClockOffset():
+            return [LATE]
+        case SensorBias():
+            return [("sensor", unknown.channel, "bias")]
+        case SensorLag():
+            return [("sensor", unknown.channel, "lag")]
+        case LossGain():
+            return [("sensor", TOTAL_LOSS, "gain")]
+        case LossDelay():
+            return [("sensor", TOTAL_LOSS, "delay")]
+        case InputOffset():
+            return [("input", unknown.input, "offset")]
+        case InputGain() if unknown.parameter.name != EFFICIENCY:  # that one is of the definition
+            return [("input", unknown.input, "gain")]
+    return []
 
 
-def _collect_term(collected: _Collected, term: Term, estimate: Estimate) -> None:
-    """Put a term in that is a constant shift or delay, or a gain."""
-    if term.kind == "sensor" and term.form == "clock" and _is_constant(term):
-        collected.delay(estimate)
-    elif term.kind == "sensor" and term.form == "shift" and _is_constant(term):
-        for channel in term.target:
-            collected.add(collected.sensors, channel, "bias", estimate)
-    elif term.kind == "signal" and _is_constant(term):
-        collected.add(collected.inputs, term.target[0], "offset", estimate)
-    elif term.kind == "signal" and term.expression == symbol(term.strength.name) * symbol(term.target[0]):
-        collected.scale(term.target[0], (1.0 + estimate[0], estimate[1]))
+def _numbers_of(term: Term, estimate: Estimate) -> list[tuple[Entry, Estimate]]:
+    """The entries of a term that is a constant shift or delay, or a gain, with its strength."""
+    strength = symbol(term.strength.name)
+    is_constant = term.expression == strength
+    if term.kind == "sensor" and term.form == "clock" and is_constant:
+        return [(LATE, estimate)]
+    if term.kind == "sensor" and term.form == "shift" and is_constant:
+        return [(("sensor", channel, "bias"), estimate) for channel in term.target]
+    if term.kind == "signal" and is_constant:
+        return [(("input", term.target[0], "offset"), estimate)]
+    if term.kind == "signal" and term.expression == strength * symbol(term.target[0]):
+        return [(("input", term.target[0], "gain"), (1.0 + estimate[0], estimate[1]))]
+    return []
 
 
-def _collect_clock(collected: _Collected, inputs: Sequence[str], *, has_loss: bool) -> None:
-    """Turn late temperatures into early inputs; the measured loss has the clock of the inputs."""
-    value, error = collected.late
-    if not value:
+def _put(found: dict[Entry, Estimate], entry: Entry, given: Estimate) -> None:
+    """Add a number to that of an entry; a gain of an input multiplies all that was known of it. Errors: independent."""
+    table, name, key = entry
+    value, error = given
+    if (table, key) != ("input", "gain"):
+        before = found.get(entry, (0.0, 0.0))
+        found[entry] = before[0] + value, float(np.hypot(before[1], error))
         return
-    for name in inputs:
-        collected.add(collected.inputs, name, "clock", (value, error))
-    if has_loss:
-        collected.add(collected.sensors, TOTAL_LOSS, "delay", (-value, error))
+    gain, gain_error = found.get(entry, (1.0, 0.0))
+    found[entry] = gain * value, float(np.hypot(gain_error * value, gain * error))
+    offset = (table, name, "offset")
+    if offset in found:
+        found[offset] = found[offset][0] * value, found[offset][1] * value
 
 
-def _is_constant(term: Term) -> bool:
-    return bool(term.expression == symbol(term.strength.name))
-
-
-def _table(estimates: Mapping[str, Estimate]) -> dict[str, Any]:
-    """Keys of a table: numbers, and their standard errors."""
-    values = {key: value for key, (value, _) in estimates.items()}
-    return values | {f"{key}_stderr": stderr for key, (_, stderr) in estimates.items()}
+def _table(found: Mapping[Entry, Estimate], table: str, name: str) -> dict[str, Any]:
+    """Keys of a channel or an input: numbers, and their standard errors."""
+    own = {key: estimate for (where, of, key), estimate in found.items() if (where, of) == (table, name)}
+    values = {key: value for key, (value, _) in own.items()}
+    return values | {f"{key}_stderr": stderr for key, (_, stderr) in own.items()}
