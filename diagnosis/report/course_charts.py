@@ -28,7 +28,7 @@ from diagnosis.report.wording import LOSS, name, time_scale
 from diagnosis.results.number_format import fixed
 from diagnosis.results.predicted_run import PredictedRun
 from diagnosis.results.result import Diagnosis
-from diagnosis.results.result_parts import MODELS
+from diagnosis.results.result_parts import MODELS, error_unit
 from models.base.types import Array
 from models.quantities.part_colours import AMBIENT, CALIBRATED, DELIVERED, MEASURED, part_colours
 from models.quantities.quantities import Input, node_of_channel
@@ -303,10 +303,9 @@ def _look(
             look[f"{axis('yaxis', row)}.autorange"] = True
             continue
         sizes = _errors(one, key, stages)
-        symbol = "W" if key == LOSS else "K"
         faulty = ", its sensor is at fault" if key in diagnosis.faulty else ""
         titles.append(f"<b>{name(key).capitalize()}</b>, {'W' if key == LOSS else '°C'}: RMSE "
-                      f"{' → '.join(fixed(size) for size in sizes)} {symbol}{faulty}")  # fmt: skip
+                      f"{' → '.join(fixed(size) for size in sizes)} {error_unit(key)}{faulty}")  # fmt: skip
         far = len(sizes) > 1 and sizes[0] > FAR * sizes[1]
         near = [getattr(one.run, state)[key] for _, state in stages[int(far) :]]
         look[f"{axis('yaxis', row)}.range"] = limits([one.run.measured[key], *near])
@@ -342,8 +341,7 @@ def _sizes_told(one: Shown, stages: Sequence[tuple[str, str]]) -> str:
     """Errors of the channels in words."""
     order = ", ".join(stage for stage, _ in stages)
     told = "; ".join(
-        f"{name(channel)} {', '.join(fixed(size) for size in _errors(one, channel, stages))}"
-        f" {'W' if channel == LOSS else 'K'}"
+        f"{name(channel)} {', '.join(fixed(size) for size in _errors(one, channel, stages))} {error_unit(channel)}"
         for channel in one.run.measured
     )
     return f"RMSE {order}: {told}."

@@ -76,18 +76,15 @@ def _names(diagnosis: Diagnosis) -> list[tuple[str, str, float]]:
             sums[law] = sums.get(law, 0.0) + one.probability
     for law, finding in reported.items():
         sums[law] = max(sums.get(law, 0.0), finding.probability)
-    idle = set() if diagnosis.further_helps else _companions(diagnosis)
+    # Names that explain the data only together with a finding.
+    companions = {rival.law for one in diagnosis.findings for rival in one.confusable_with if not rival.instead}
+    idle = set() if diagnosis.further_helps else companions
     rows = [(_label(law), grades.get(law, "not reported"), p) for law, p in sums.items()
             if p >= LEAST_RIVAL and law not in idle]  # fmt: skip
     nothing = diagnosis.kinds.get("nothing", 0.0)
     if nothing >= LEAST_RIVAL:
         rows.append(("nothing", "nothing is missing", nothing))
     return sorted(rows, key=lambda row: -row[2])[:MOST_NAMES]
-
-
-def _companions(diagnosis: Diagnosis) -> set[str]:
-    """Names that explain the data only together with a finding."""
-    return {rival.law for finding in diagnosis.findings for rival in finding.confusable_with if not rival.instead}
 
 
 def _label(mechanism: str) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from importlib import resources
 from typing import Any
 
@@ -15,7 +15,7 @@ from diagnosis.report.chart import Chart
 from diagnosis.results import number_format as numbers
 from diagnosis.results.first_screen import date_told, values_told
 from diagnosis.results.result import Diagnosis
-from diagnosis.results.result_parts import NO_CLAIM, Calibrated, Finding, Fits, title_of
+from diagnosis.results.result_parts import NO_CLAIM, Calibrated, Finding, Fits, error_unit, title_of
 from diagnosis.results.robustness import ahead_in, size_of
 
 PACKAGE = "diagnosis.report"
@@ -50,7 +50,7 @@ def page(diagnosis: Diagnosis) -> str:
         items=[(wording.plain(title_of(item)), [_finding(finding) for finding in item]) for item in diagnosis.items],
         stages=course_charts.stages_of(diagnosis),
         told=network_chart.marks(diagnosis).told(network_chart.corrected(diagnosis)),
-        fits=[(title, _rows(fits, diagnosis.faulty), _each(fits))
+        fits=[(title, _rows(fits, diagnosis.faulty), fits.recordings if len(fits.recordings) > 1 else {})
               for title, fits in (("Held out", diagnosis.holdout), ("Learned from", diagnosis.train))],
         learnt=[
             {"description": size.description, "size": numbers.with_error(size.start, size.sd)}
@@ -123,12 +123,7 @@ def _rows(fits: Fits, faulty: Sequence[str]) -> list[tuple[str, str, tuple[float
         "K",
         (fits.before, fits.calibrated, fits.after),
     )
-    return [total, *((c, "W" if c == wording.LOSS else "K", errors) for c, errors in fits.sensors.items())]
-
-
-def _each(fits: Fits) -> Mapping[str, tuple[float, float, float]]:
-    """Errors of every recording over all temperatures; nothing where one recording is all."""
-    return fits.recordings if len(fits.recordings) > 1 else {}
+    return [total, *((c, error_unit(c), errors) for c, errors in fits.sensors.items())]
 
 
 def _calibrated(diagnosis: Diagnosis, one: Calibrated) -> dict[str, Any]:

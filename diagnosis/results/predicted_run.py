@@ -12,9 +12,9 @@ from diagnosis.forward.sensor_fault import channel_column
 from diagnosis.results.result_parts import MODELS
 from models.base.errors import InputError, did_you_mean
 from models.base.types import Array
-from models.columns.columns import Columns
+from models.files.cycle import Cycle
 from models.quantities.part_colours import CALIBRATED, DELIVERED, MEASURED, part_colours
-from models.quantities.quantities import column_of_input, is_total_loss
+from models.quantities.quantities import is_total_loss
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -62,13 +62,11 @@ class PredictedRun:
 
         Columns are ``T_oil_degC`` for what was measured, ``T_oil_degC_before``, ``_calibrated`` and ``_after``.
         """
-        columns: dict[str, Array] = {"time_s": self.time}
-        columns |= {column_of_input(name): values for name, values in self.inputs.items()}
-        for channel in self.measured:
+        columns = Cycle(self.time, self.inputs).columns()
+        for channel, measured in self.measured.items():
             column = channel_column(channel)
-            columns[column] = self.measured[channel]
-            columns |= {f"{column}_{model}": getattr(self, model)[channel] for model in MODELS}
-        return Columns(columns).to_dataframe()
+            columns |= {column: measured, **{f"{column}_{model}": getattr(self, model)[channel] for model in MODELS}}
+        return columns.to_dataframe()
 
     def plot(self, channel: str | None = None, *, ax: Axes | None = None) -> Axes:
         """Draw one channel as measured and as predicted.

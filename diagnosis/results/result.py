@@ -25,12 +25,12 @@ from diagnosis.results.result_parts import (
     Location,
     NotDetectable,
     Ranked,
+    error_unit,
     named,
     or_none,
 )
 from models.base.errors import InputError, did_you_mean
 from models.correction.instruments import InputCorrection, SensorCorrection
-from models.quantities.quantities import is_total_loss
 from models.simulation.thermal_network import ThermalNetwork
 from models.terms.term import Term
 
@@ -340,7 +340,7 @@ class Diagnosis:
         if what == "calibration":
             calibrated = [asdict(one) for one in self.calibration]
             return pd.DataFrame(calibrated, columns=[one.name for one in fields(Calibrated)])
-        errors = [(recordings, channel, "W" if is_total_loss(channel) else "K", *of)
+        errors = [(recordings, channel, error_unit(channel), *of)
                   for recordings, fits in (("train", self.train), ("holdout", self.holdout))
                   for channel, of in fits.sensors.items()]  # fmt: skip
         return pd.DataFrame(errors, columns=["recordings", "channel", "unit", *(f"rmse_{model}" for model in MODELS)])

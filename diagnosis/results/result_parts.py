@@ -10,6 +10,7 @@ from typing import Any
 from diagnosis.decision.answer import Grade
 from models.base.types import Array
 from models.correction.instruments import InputCorrection, SensorCorrection
+from models.quantities.quantities import is_total_loss
 from models.terms.term import Term
 
 PARAMETER = "parameter"
@@ -421,6 +422,11 @@ def law_of(mechanism: str, place: str) -> str:
     ('windage', 'parameter h_air')
     """
     return named(mechanism, place) if mechanism == PARAMETER else mechanism
+
+
+def error_unit(channel: str) -> str:
+    """Unit of the error of a channel."""
+    return "W" if is_total_loss(channel) else "K"
 
 
 def or_none(value: float) -> float | None:
