@@ -75,8 +75,8 @@ def infer(
         progress("judging the baselines as if they were tested")
     placebo, candidates = judge_baselines(calibration, candidates, candidates_in)
     progress(f"scanning {len(candidates)} candidates")
-    found = scan(base, [one for one in candidates if one.term is not None], calibration.near.columns)
-    first = scan_in_classes(calibration, found, candidates, log_prior)
+    found = scan(base, candidates, calibration.near.columns)
+    first = scan_in_classes(calibration, found, log_prior)
     judged = _raced(calibration, first, progress)
     alone = {one.label: float(value) for one, value in zip(first.candidates, first.log_bayes, strict=True)}
     gained, pairs, elsewhere = 0.0, list[Judged](), None
@@ -120,10 +120,7 @@ def infer(
         error_evidence=dict(calibration.evidence),
         session_s=chosen.session_s,
         scaled=tuple(
-            with_scaled_error(
-                calibration, found, candidates, log_prior, factor, first, settings.false_alarm_rate, least
-            )
-            for factor in SCALED
+            with_scaled_error(calibration, found, factor, first, settings.false_alarm_rate, least) for factor in SCALED
         ),
         repeating=repeating_of(first, error_class),
         expected=expected_of(first, chosen.error_class, settings),
@@ -194,7 +191,7 @@ def _with_wider_prior(fit: Fit, index: int, iterations: int) -> Fit:
 def _by_scan(found: Scanned, index: int, log_bayes: float) -> Judged:
     """A candidate in its best shape, without a fit."""
     candidate = found.candidates[index]
-    variant = found.best[index].scan.best[index] if candidate.term is not None else 0
+    variant = found.best[index].scan.best[index]
     return Judged(
         effects=(replace(candidate, variants=candidate.variants[[variant]]),), log_prior=float(found.log_prior[index]),
         log_bayes=log_bayes, error_class=found.best[index].error_class,

@@ -62,11 +62,10 @@ def judge_baselines(
             now = starts.setdefault(piece.recording, now) + float(piece.time[-1])
         swapped = replace(experiment, healthy=whole.healthy - starts.keys(), starts_at=starts)
         tried = [one for one in candidates_in(swapped) if one.term is None or whole.scope_of(one.name) is not None]
-        terms = [one for one in tried if one.term is not None]
-        if not any(one.how == "always" for one in terms):  # what is switched off has no place in this machine
+        if not any(one.how == "always" for one in tried):  # what is switched off has no place in this machine
             continue
-        there = scan(replace(fit, experiment=swapped), terms, columns)
-        judged = scan_in_classes(calibration, there, tried, log_prior(tried))
+        there = scan(replace(fit, experiment=swapped), tried, columns)
+        judged = scan_in_classes(calibration, there, log_prior(tried))
         longer = max(tested / sum(hours[name] for name in starts), 1.0)
         always = _part(judged, [i for i, one in enumerate(judged.candidates) if one.how not in OVER_TIME])
         best = next(one for one in map(always.candidates.__getitem__, always.order) if one.term is not None)

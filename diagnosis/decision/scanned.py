@@ -12,7 +12,7 @@ from diagnosis.candidates.hypotheses import Hypothesis
 from diagnosis.decision.posterior import Expected, Judged, Likeness, Repeating, ScaledError
 from diagnosis.decision.settings import Settings
 from diagnosis.engine.calibration import Calibration
-from diagnosis.engine.gram import Given, Strengths
+from diagnosis.engine.gram import Strengths
 from diagnosis.engine.learnt import ErrorClass, rule
 from diagnosis.engine.scan import Scan, scan
 from diagnosis.engine.sessions import OverSessions, over_sessions
@@ -26,7 +26,7 @@ WORSE, LEAST_DEVIATION = 2.0, 0.05  # times the deviation between sessions; prio
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ScanInClass:
-    """Everything judged by straight lines with model error of one class: terms in the order of the scan, parameters."""
+    """Everything judged by straight lines with model error of one class."""
 
     error_class: ErrorClass
     scan: Scan
@@ -68,21 +68,17 @@ class Scanned:
         return next(one for one in self.classes if one.error_class == error_class)
 
 
-def scan_in_classes(
-    calibration: Calibration, found: Scan, candidates: Sequence[Hypothesis], log_prior: Array, factor: float = 1.0
-) -> Scanned:
+def scan_in_classes(calibration: Calibration, found: Scan, log_prior: Array, factor: float = 1.0) -> Scanned:
     """The scan at the calibrated point with model error of all classes, their amplitudes scaled."""
-    fit, parameters, judged = calibration.fit, _parameters(candidates), []
+    chosen, judged = calibration.chosen.error_class, []
     for one in calibration.classes:
         scaled = one.scaled(factor)
         here = found.in_directions(calibration.near.directions(scaled))
-        over = over_sessions(here.gram, fit.experiment, range(here.further.stop))
+        over = over_sessions(here.gram, calibration.fit.experiment, range(here.further.stop))
         judged.append((scaled, here, over, float(np.log(one.prior)) + over.log_evidence))
-    nothing = next(evidence for one, _, _, evidence in judged if one.name == calibration.chosen.error_class.name)
-    return in_best_classes([
-        _in_class(one, here, parameters, over, evidence - nothing, calibration.chosen.error_class)
-        for one, here, over, evidence in judged
-    ], candidates, log_prior, parameters)  # fmt: skip
+    nothing = next(evidence for one, _, _, evidence in judged if one.name == chosen.name)
+    classes = [_in_class(one, here, over, evidence - nothing, chosen) for one, here, over, evidence in judged]
+    return in_best_classes(classes, log_prior)
 
 
 def scan_given(calibration: Calibration, given: Judged, candidates: Sequence[Hypothesis], log_prior: Array) -> Scanned:
@@ -90,12 +86,9 @@ def scan_given(calibration: Calibration, given: Judged, candidates: Sequence[Hyp
     fit, mine = given.fit, {effect.label for effect in given.effects}
     assert fit is not None  # noqa: S101
     left = [index for index, one in enumerate(candidates) if one.label not in mine]
-    others = [candidates[index] for index in left]
-    found, parameters = scan(fit, [one for one in others if one.term is not None]), _parameters(others)
-    base = len(calibration.fit.z)
+    found, base = scan(fit, [candidates[index] for index in left]), len(calibration.fit.z)
     over = over_sessions(found.gram, fit.experiment, [*range(base), *found.further], range(base, len(fit.z)))
-    here = _in_class(given.error_class, found, parameters, over, 0.0, given.error_class)
-    return in_best_classes([here], others, log_prior[left], parameters)
+    return in_best_classes([_in_class(given.error_class, found, over, 0.0, given.error_class)], log_prior[left])
 
 
 def judge_alone(calibration: Calibration, best: Judged, second: Scanned, ahead: float) -> dict[str, float]:
@@ -103,42 +96,41 @@ def judge_alone(calibration: Calibration, best: Judged, second: Scanned, ahead: 
     fit, found = best.fit, second.classes[0].scan
     assert fit is not None  # noqa: S101
     without = over_sessions(found.gram, fit.experiment, [*range(len(calibration.fit.z)), *found.further])
-    log_bayes = _weighed(found, _parameters(second.candidates), without) + ahead
+    log_bayes = _weighed(found, without) + ahead
     log_bayes -= counts_less(second.candidates, calibration.chosen.error_class, best.error_class)
     return dict(zip((one.label for one in second.candidates), log_bayes.tolist(), strict=True))
 
 
 def _in_class(
-    error_class: ErrorClass, found: Scan, parameters: Sequence[Hypothesis], over: OverSessions, ahead: float,
-    nothing: ErrorClass,
-) -> ScanInClass:  # fmt: skip
+    error_class: ErrorClass, found: Scan, over: OverSessions, ahead: float, nothing: ErrorClass
+) -> ScanInClass:
     """Candidates in one class; `nothing`: that without any effect."""
-    strengths = _strengths(found, parameters, over.given[over.most_probable])
-    less = counts_less((*found.candidates, *parameters), nothing, error_class)
-    log_bayes = _weighed(found, parameters, over) - less
+    strengths = found.singles(over.given[over.most_probable])
+    log_bayes = _weighed(found, over) - counts_less(found.candidates, nothing, error_class)
     hardly = hardly_there(found.candidates, strengths.value)
     log_bayes[hardly] = np.minimum(log_bayes[hardly], 0.0)
     return ScanInClass(error_class=error_class, ahead=ahead, scan=found, over=over, log_bayes=log_bayes + ahead,
                        strengths=strengths)  # fmt: skip
 
 
+def _weighed(found: Scan, over: OverSessions) -> Array:
+    """Log Bayes factors of all candidates, over variants and deviations between sessions."""
+    return over.weighed([found.means(given) for given in over.given])
+
+
 def hardly_there(candidates: Sequence[Hypothesis], strengths: Array) -> NDArray[np.intp]:
-    """Places of faults of which an instrument would have a small share only; a strength per candidate, or more."""
+    """Places of faults of which an instrument would have a small share only; a strength per candidate."""
     return np.array([
-        index for index, (one, value) in enumerate(zip(candidates, strengths.tolist(), strict=False))
+        index for index, (one, value) in enumerate(zip(candidates, strengths.tolist(), strict=True))
         if one.term is not None and one.term.form in WHOLE and abs(value) < LEAST_SHARE
     ], dtype=np.intp)  # fmt: skip
 
 
-def in_best_classes(
-    classes: Sequence[ScanInClass], candidates: Sequence[Hypothesis], log_prior: Array, parameters: Sequence[Hypothesis]
-) -> Scanned:
+def in_best_classes(classes: Sequence[ScanInClass], log_prior: Array) -> Scanned:
     """Every candidate in the class that suits it best."""
-    known = {one.label: value for one, value in zip(candidates, log_prior.tolist(), strict=True)}
-    every = (*classes[0].scan.candidates, *parameters)
     table = np.stack([one.log_bayes for one in classes])
     return Scanned(
-        candidates=every, log_prior=np.array([known[one.label] for one in every]), log_bayes=table.max(axis=0),
+        candidates=classes[0].scan.candidates, log_prior=log_prior, log_bayes=table.max(axis=0),
         classes=tuple(classes), best=tuple(classes[at] for at in table.argmax(axis=0).tolist()),
     )  # fmt: skip
 
@@ -155,32 +147,6 @@ def counts_less(candidates: Sequence[Hypothesis], nothing: ErrorClass, here: Err
     ])  # fmt: skip
 
 
-def _parameters(candidates: Sequence[Hypothesis]) -> list[Hypothesis]:
-    """Parameters outside their priors."""
-    return [one for one in candidates if one.unknown is not None]
-
-
-def _strengths(found: Scan, parameters: Sequence[Hypothesis], given: Given) -> Strengths:
-    """Of every term in its best shape, then of every parameter outside its prior, in prior standard deviations."""
-    terms = found.singles(given)
-    wider = np.sqrt(rule().wider ** 2 - 1.0)
-    further = given.singles([one.unknown for one in parameters if one.unknown is not None], wider)
-    return Strengths(**{name: np.concatenate([getattr(terms, name), getattr(further, name)])
-                        for name in ("log_bayes", "value", "sd")})  # fmt: skip
-
-
-def _weighed(found: Scan, parameters: Sequence[Hypothesis], over: OverSessions) -> Array:
-    """Log Bayes factors of all candidates, over variants and deviations between sessions."""
-    return over.weighed([_log_bayes(found, parameters, given) for given in over.given])
-
-
-def _log_bayes(found: Scan, parameters: Sequence[Hypothesis], given: Given) -> Array:
-    """Log Bayes factors of all candidates, over variants."""
-    best = np.array(_strengths(found, parameters, given).log_bayes)
-    best[: len(found.candidates)] -= found.spread
-    return best
-
-
 def log_sum(log: Sequence[float] | Array) -> float:
     """Logarithm of a sum, of nothing too."""
     return float(np.logaddexp.reduce(np.asarray(log, dtype=float)))
@@ -195,10 +161,8 @@ def repeating_of(found: Scanned, error_class: ErrorClass) -> tuple[Repeating, ..
         return ()
     every = []
     for at in (supported, worse):
-        parameters = found.candidates[len(here.scan.candidates) :]
-        log_bayes = _log_bayes(here.scan, parameters, here.over.given[at])
-        log_bayes -= counts_less(found.candidates, error_class, error_class)
-        judged = replace(found, log_bayes=log_bayes)
+        log_bayes = here.scan.means(here.over.given[at])
+        judged = replace(found, log_bayes=log_bayes - counts_less(found.candidates, error_class, error_class))
         best = judged.candidates[judged.order[0]]
         every.append(Repeating(deviation_in_sd=float(deviations[at]), log_e_value=judged.log_e,
                                mechanism=best.mechanism, place=best.place))  # fmt: skip
@@ -206,17 +170,10 @@ def repeating_of(found: Scanned, error_class: ErrorClass) -> tuple[Repeating, ..
 
 
 def with_scaled_error(
-    calibration: Calibration,
-    found: Scan,
-    candidates: Sequence[Hypothesis],
-    log_prior: Array,
-    factor: float,
-    first: Scanned,
-    rate: float,
-    least: float,
+    calibration: Calibration, found: Scan, factor: float, first: Scanned, rate: float, least: float
 ) -> ScaledError:
     """Evidence of the scan if all model error were larger or smaller than assumed."""
-    there = first if factor == 1.0 else scan_in_classes(calibration, found, candidates, log_prior, factor)
+    there = first if factor == 1.0 else scan_in_classes(calibration, found, first.log_prior, factor)
     nothing = max(there.classes, key=lambda one: one.ahead)
     there = replace(there, log_bayes=there.log_bayes - nothing.ahead)
     index = there.order[0]
@@ -230,25 +187,25 @@ def likeness_of(found: Scanned, error_class: ErrorClass) -> Likeness:
     """How much alike candidates look in these readings, each in its best shape, with model error of one class."""
     here = found.in_class(error_class)
     given = here.over.given[here.over.most_probable]
-    unknown = [one.unknown for one in found.candidates if one.unknown is not None]
-    at = np.array([*here.scan.of_candidates, *unknown], dtype=int) + 1
+    at = here.scan.of_candidates + 1
     inner = given.matrix[np.ix_(at, at)]
     norm = np.sqrt(np.maximum(np.diag(inner), 1e-12))
     return Likeness(labels=tuple(one.label for one in found.candidates), cosines=np.abs(inner / norm / norm[:, None]))
 
 
 def expected_of(scanned: Scanned, error_class: ErrorClass, settings: Settings) -> tuple[Expected, ...]:
-    """Expected evidence of every candidate at the size that matters: of a temperature or a heat, whichever is less."""
-    found = scanned.in_class(error_class)
-    given, terms = found.over.given[found.over.most_probable], found.scan
-    at = np.array(terms.of_candidates) + 1
+    """Expected evidence of every term at the size that matters: of a temperature or a heat, whichever is less."""
+    here = scanned.in_class(error_class)
+    given, found = here.over.given[here.over.most_probable], here.scan
+    at = found.of_candidates + 1
     b = np.maximum(given.matrix[at, at], 0.0)
-    sd, size = terms.sd, np.full(len(b), np.inf)
-    for matters, peak in ((settings.matters_K, terms.peak_K), (settings.matters_W, terms.peak_W)):
+    sd, size = found.sd, np.full(len(b), np.inf)
+    for matters, peak in ((settings.matters_K, found.peak_K), (settings.matters_W, found.peak_W)):
         reached = (peak > 0.0) & (matters > 0.0)
         size[reached] = np.minimum(size[reached], matters / peak[reached])
     size = np.where(np.isfinite(size), size, sd)
     log_bayes = 0.5 * np.square(b * size) / (b + 1.0 / np.square(sd)) - 0.5 * np.log1p(b * np.square(sd))
-    log_bayes -= counts_less(terms.candidates, error_class, error_class)
-    each = zip(terms.candidates, log_bayes.tolist(), scanned.log_prior.tolist(), strict=False)  # terms come first
-    return tuple(Expected(effect=one, log_bayes=value, log_prior=prior) for one, value, prior in each)
+    log_bayes -= counts_less(found.candidates, error_class, error_class)
+    each = zip(found.candidates, log_bayes.tolist(), scanned.log_prior.tolist(), strict=True)
+    return tuple(Expected(effect=one, log_bayes=value, log_prior=prior) for one, value, prior in each
+                 if one.term is not None)  # fmt: skip

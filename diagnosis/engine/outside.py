@@ -46,15 +46,15 @@ def judge_outside(fit: Fit, hypotheses: Sequence[Hypothesis]) -> list[tuple[Hypo
     functions = [replace(one, variants=row[None, :]) for one in hypotheses for row in one.variants]
     found = scan(fit, functions)
     over = over_sessions(found.gram, fit.experiment, [*found.unknowns, *found.further])
-    judged, first = [], found.of_candidates.start
+    judged, first = [], 0
     for one in hypotheses:
         assert one.term is not None  # noqa: S101 - it is a heat
-        columns = range(first, first + len(one.variants))
+        columns = found.of_candidates[first : first + len(one.variants)]
         each = [judged_together(given, columns, one.term.strength.sd) for given in over.given]
         log_bayes = over.weighed([np.array([value]) for value, _ in each])
         weights = each[over.most_probable][1]
         judged.append((shaped(one, weights), float(log_bayes[0])))
-        first = columns.stop
+        first += len(columns)
     return judged
 
 

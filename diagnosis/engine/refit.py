@@ -10,7 +10,7 @@ import numpy as np
 from diagnosis.candidates.hypotheses import Hypothesis
 from diagnosis.engine.fit import Experiment, Fit, Linearised
 from diagnosis.engine.point import Machine
-from diagnosis.engine.scan import Starts, columns_of, scope_of, term_on_grid
+from diagnosis.engine.scan import Starts, columns_of, scope_of
 from diagnosis.engine.unknown import TERM_STEP, Held, NetworkParameter, TermParameter, Unknown
 from diagnosis.forward.network_on_grid import NetworkOnGrid
 from models.base.types import Array
@@ -62,9 +62,7 @@ def refit(
 def _straight_line(fit: Fit, candidate: Hypothesis, variant: int) -> tuple[Array, Experiment, Array]:
     """Change of the other unknowns per unit of strength, and the experiment with one variant and its ``z``."""
     one = replace(candidate, variants=candidate.variants[[variant]])
-    assert candidate.term is not None  # noqa: S101 - parameters out of their priors have no term
-    on_grid = term_on_grid(fit.experiment.machine.model, candidate.term)
-    column = [part.filter(columns_of(fit.experiment, part, [(one, on_grid)])[0]) for part in fit.parts]
+    column = [part.filter(columns_of(fit.experiment, part, [one])[0]) for part in fit.parts]
     both = Linearised.of([replace(part, residual=x[:, 0]) for part, x in zip(fit.parts, column, strict=True)],
                          fit.experiment.metric)  # fmt: skip
     return (-fit.covariance @ both.products[1:, 0], *with_candidate(fit, candidate, variant))

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from diagnosis.candidates.hypotheses import Hypothesis, chunks
 from diagnosis.engine.fit import Experiment, Fit, Linear
 from diagnosis.engine.gram import Given, Gram, Strengths, strengths
+from diagnosis.engine.learnt import rule
 from diagnosis.engine.metric import Metric
 from diagnosis.engine.point import Point, columns_at_once
 from diagnosis.engine.products import base_of, gram_of, whitened_base
@@ -42,11 +43,13 @@ class Scan:
     spread : Array, shape (candidates,)
         Of the best variant, less that mean; at least 0
     gram : Gram
-        Of residual, unknowns, further columns, candidates: in this order
-    unknowns, further, of_candidates : range
-        Their places among the labels of the Gram matrix
+        Of residual, unknowns, further columns, terms: in this order
+    unknowns, further : range
+        Their places among the columns of the Gram matrix
+    of_candidates : Array of int, shape (candidates,)
+        Places of the candidates; of a parameter outside its prior that of the unknown
     sd, sign : Array, shape (candidates,)
-        Prior of the strengths
+        Prior of the strengths; of a parameter what a wider prior adds to its own
     peak_K, peak_W : Array, shape (candidates,)
         Largest change of a temperature [K], and heat into or out of a part [W], per unit of strength
     starts : tuple of tuple of (int, float)
@@ -60,7 +63,7 @@ class Scan:
     gram: Gram
     unknowns: range
     further: range
-    of_candidates: range
+    of_candidates: NDArray[np.intp]
     sd: Array
     sign: NDArray[np.int_]
     peak_K: Array
@@ -69,14 +72,18 @@ class Scan:
 
     def in_directions(self, directions: Array) -> Scan:
         """The scan with combinations, shape (further, n), in place of the further columns."""
-        first, count = self.further.start, directions.shape[1]
-        last = first + count
+        first, last = self.further.start, self.further.start + directions.shape[1]
+        moved = np.where(self.of_candidates < first, 0, last - self.further.stop)  # parameters stay where they are
         return replace(self, gram=self.gram.combined(self.further, directions), further=range(first, last),
-                       of_candidates=range(last, last + len(self.of_candidates)))  # fmt: skip
+                       of_candidates=self.of_candidates + moved)  # fmt: skip
 
     def singles(self, given: Given) -> Strengths:
         """Every candidate alone, in its best shape; the sign of a clock fault is that of its variant."""
         return given.singles(self.of_candidates, self.sd, self.sign)
+
+    def means(self, given: Given) -> Array:
+        """Log Bayes factor of every candidate, mean over its variants, shape (candidates,)."""
+        return self.singles(given).log_bayes - self.spread
 
 
 def scan(fit: Fit, candidates: Sequence[Hypothesis], error: Sequence[Array] = ()) -> Scan:
@@ -87,82 +94,85 @@ def scan(fit: Fit, candidates: Sequence[Hypothesis], error: Sequence[Array] = ()
     fit : Fit
         Model error in its metric becomes columns of the Gram matrix
     candidates : sequence of Hypothesis
-        Terms; parameters out of their priors follow from the unknowns themselves
+        A parameter outside its prior needs no column but that of its unknown
     error : sequence of Array, shape (M, n) each
         Whitened columns of model error per unit, for the Gram matrix; by default those of the metric
     """
-    count, model = len(fit.z), fit.experiment.machine.model
-    placed = [(c, term_on_grid(model, c.term)) for c in candidates if c.term is not None]
     base = whitened_base(fit.parts, fit.z, error) if error else base_of(fit)
-    chosen = [np.empty((len(W), len(placed)), order="F") for W in base]
-    shapes: list[_Shape] = []
-    peaks: list[tuple[float, float]] = []
+    terms = [one for one in candidates if one.term is not None]
+    first_term, chosen = base[0].shape[1] - 1, [np.empty((len(W), len(terms)), order="F") for W in base]
+    shapes = {one: _outside(one.unknown) for one in candidates if one.unknown is not None}
     warm = [not is_total_loss(name) for name in fit.parts[0].point.sensors.channels]
-    everything, residuals = _with_unknowns(fit), [W[:, 0] for W in base]
+    everything, residuals, column = _with_unknowns(fit), [W[:, 0] for W in base], 0
     intervals = max(len(part.point.trajectory.T) for part in fit.parts)
-    for chunk in chunks([c for c, _ in placed], columns_at_once(intervals)):
-        some = placed[len(shapes) : len(shapes) + len(chunk)]
+    for some in chunks(terms, columns_at_once(intervals)):
         raw, heats = zip(*(columns_of(fit.experiment, part, some) for part in fit.parts), strict=True)
         peaks_K, peaks_W = np.max([np.abs(X[:, warm]).max(axis=(0, 1)) for X in raw], axis=0), np.max(heats, axis=0)
         blocks = [part.filter(X) for part, X in zip(fit.parts, raw, strict=True)]
         (a, b), first = everything.against(residuals, blocks), 0
-        for candidate, on_grid in some:
-            mine = slice(first, first + len(candidate.variants))
-            shape = _best_shape(candidate, on_grid.term.strength.sd, a[mine], b[mine])
-            at, first = first + shape.variant, mine.stop
+        for one in some:
+            mine = slice(first, first + len(one.variants))
+            first = mine.stop
+            shape = _best_shape(one, first_term + column, a[mine], b[mine], peaks_K[mine], peaks_W[mine])
             for kept, block in zip(chosen, blocks, strict=True):
-                kept[:, len(shapes)] = block[:, at]
-            shapes.append(shape)
-            peaks.append((float(peaks_K[at]), float(peaks_W[at])))
-    extra = base[0].shape[1] - 1 - count
-    peak_K, peak_W = np.array(peaks).reshape(-1, 2).T
+                kept[:, column] = block[:, mine.start + shape.variant]
+            shapes[one], column = shape, column + 1
+    every = [shapes[one] for one in candidates]
     return Scan(
-        candidates=tuple(c for c, _ in placed),
-        best=tuple(shape.variant for shape in shapes),
-        log_bayes=np.array([shape.log_bayes for shape in shapes]),
-        spread=np.array([shape.spread for shape in shapes]),
+        candidates=tuple(candidates),
+        best=tuple(shape.variant for shape in every),
+        log_bayes=np.array([shape.log_bayes for shape in every]),
+        spread=np.array([shape.spread for shape in every]),
         gram=gram_of(fit.parts, base, chosen),
-        unknowns=range(count),
-        further=range(count, count + extra),
-        of_candidates=range(count + extra, count + extra + len(placed)),
-        sd=np.array([on_grid.term.strength.sd for _, on_grid in placed]),
-        sign=np.array([shape.sign for shape in shapes], dtype=int),
-        peak_K=peak_K,
-        peak_W=peak_W,
-        starts=tuple(shape.starts for shape in shapes),
+        unknowns=range(len(fit.z)),
+        further=range(len(fit.z), first_term),
+        of_candidates=np.array([shape.at for shape in every], dtype=int),
+        sd=np.array([shape.sd for shape in every]),
+        sign=np.array([shape.sign for shape in every], dtype=int),
+        peak_K=np.array([shape.peak_K for shape in every]),
+        peak_W=np.array([shape.peak_W for shape in every]),
+        starts=tuple(shape.starts for shape in every),
     )
 
 
 @dataclass(frozen=True, kw_only=True)
 class _Shape:
-    """The best shape of a candidate; see :class:`Scan` for the numbers."""
+    """The best shape of a candidate, and its place in the Gram matrix; see :class:`Scan` for the numbers."""
 
-    variant: int
-    log_bayes: float
-    spread: float
-    sign: int
-    starts: Starts
+    at: int
+    sd: float
+    variant: int = 0
+    log_bayes: float = 0.0
+    spread: float = 0.0
+    sign: int = 0
+    peak_K: float = 0.0
+    peak_W: float = 0.0
+    starts: Starts = ()
 
 
-def _best_shape(candidate: Hypothesis, sd: float, a: Array, b: Array) -> _Shape:
+def _outside(unknown: int) -> _Shape:
+    """A parameter outside its prior: what a wider prior adds to its own."""
+    return _Shape(at=unknown, sd=float(np.sqrt(rule().wider ** 2 - 1.0)))
+
+
+def _best_shape(candidate: Hypothesis, at: int, a: Array, b: Array, peaks_K: Array, peaks_W: Array) -> _Shape:
     """Compare all shapes of a candidate, by their inner products with the residual and with themselves."""
-    way = np.sign(candidate.variants[:, 0]).astype(int)
+    assert candidate.term is not None  # noqa: S101 - parameters outside their priors have one shape
+    sd, way = candidate.term.strength.sd, np.sign(candidate.variants[:, 0]).astype(int)
     sign = way if len(set(way.tolist())) > 1 else np.full(len(way), candidate.sign)
     found = strengths(a, b, sd, sign)
     best = int(np.argmax(found.log_bayes))
     mean = float(np.logaddexp.reduce(found.log_bayes) - np.log(len(way)))
-    return _Shape(variant=best, log_bayes=mean, spread=float(found.log_bayes[best]) - mean, sign=int(sign[best]),
-                  starts=_further_starts(candidate, found, best))  # fmt: skip
+    return _Shape(at=at, sd=sd, variant=best, log_bayes=mean, spread=float(found.log_bayes[best]) - mean,
+                  sign=int(sign[best]), peak_K=float(peaks_K[best]), peak_W=float(peaks_W[best]),
+                  starts=_further_starts(candidate.term, candidate.variants[:, 0], found, best))  # fmt: skip
 
 
-def _further_starts(candidate: Hypothesis, found: Strengths, best: int) -> Starts:
+def _further_starts(term: Term, sizes: Array, found: Strengths, best: int) -> Starts:
     """Every size with the promised sign of a clock's fault; the next best shapes of what has a memory."""
-    assert candidate.term is not None  # noqa: S101 - parameters out of their priors have no term
-    sizes = candidate.variants[:, 0]
     if len(np.unique(np.abs(sizes))) > 1:  # none looks like another one, scaled
-        sd = candidate.term.strength.sd
-        return tuple((best, float(size * sd)) for size in sizes[sizes * found.value[best] > 0.0])
-    if not candidate.term.states:
+        return tuple((best, float(size * term.strength.sd)) for size in sizes[sizes * found.value[best] > 0.0])
+    if not term.states:
         return ()
     next_best = np.argsort(-found.log_bayes)[:SHAPES_TRIED]
     return tuple((int(i), float(found.value[i])) for i in next_best if i != best)
@@ -177,10 +187,8 @@ def _with_unknowns(fit: Fit) -> Metric:
     return replace(metric, columns=both, shared=count + metric.shared, own=count + metric.own)
 
 
-def columns_of(
-    experiment: Experiment, part: Linear, some: Sequence[tuple[Hypothesis, TermOnGrid]]
-) -> tuple[Array, Array]:
-    """Effect per unit of strength of all variants of some candidates; zero where a candidate cannot act.
+def columns_of(experiment: Experiment, part: Linear, some: Sequence[Hypothesis]) -> tuple[Array, Array]:
+    """Effect per unit of strength of all variants of some terms; zero where a candidate cannot act.
 
     Returns
     -------
@@ -190,18 +198,19 @@ def columns_of(
         Largest heat into or out of a part, [W]
     """
     point, trajectory = part.point, part.point.trajectory
-    count, recording = sum(len(candidate.variants) for candidate, _ in some), trajectory.piece.recording
-    scopes = [scope_of(experiment, candidate) for candidate, _ in some]
+    count, recording = sum(len(candidate.variants) for candidate in some), trajectory.piece.recording
+    scopes = [scope_of(experiment, candidate) for candidate in some]
     acting = [scope is None or recording in scope for scope in scopes]
     if not any(acting):
         return np.zeros((*point.read.shape, count)), np.zeros(count)
     into = np.zeros((len(trajectory.piece.steps), trajectory.decay.shape[-1], count))
     loss, shown, first = np.zeros((len(into), count)), {}, 0
-    for (candidate, on_grid), acts in zip(some, acting, strict=True):
+    for candidate, acts in zip(some, acting, strict=True):
         mine = slice(first, first + len(candidate.variants))
         first = mine.stop
-        if not acts:
+        if candidate.term is None or not acts:
             continue
+        on_grid = term_on_grid(experiment.machine.model, candidate.term)
         values = _by_clock(candidate, experiment.starts_at.get(recording))
         if on_grid.term.kind == "sensor":
             shown[mine.start] = _faults(point, values, on_grid)

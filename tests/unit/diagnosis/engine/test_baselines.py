@@ -67,7 +67,7 @@ def test_an_effect_is_scanned_and_fitted_where_it_may_act(prepared: tuple[Infere
     placed = CATALOGUE["windage"].placed(experiment.machine.model.network, setup.scale, setup.channels)
     windage = next(hypothesis_of(p) for p in placed if p.place == "oil")
     found = scan(fit, [windage])
-    at = found.of_candidates.start + 1
+    at = found.of_candidates[0] + 1
     assert not found.gram.of_recording["april"][:, at].any() and found.gram.of_recording["train"][at, at] > 0.0
     reached = refit(fit, windage, found.best[0], float(found.singles(found.gram.given(found.unknowns)).value[0]))
     unknown, z = reached.experiment.unknowns[len(fit.z)], float(reached.z[len(fit.z)])

@@ -16,7 +16,7 @@ from diagnosis.engine.fit import Experiment, Fit, calibrate
 from diagnosis.engine.outside import judge_outside, outside_of
 from diagnosis.engine.prepare import prepare_experiment
 from diagnosis.engine.refit import refit, with_candidate
-from diagnosis.engine.scan import Scan, columns_of, scan, term_on_grid
+from diagnosis.engine.scan import Scan, columns_of, scan
 from diagnosis.recordings.recording import Recording
 from diagnosis.setup.inference_setup import InferenceSetup
 from models.assembly.gearbox import Gearbox
@@ -137,9 +137,7 @@ def test_columns_are_those_of_repeated_simulation(fit: Fit, air: Hypothesis) -> 
     size = 0.01
     for index, part in enumerate(fit.parts):
         one = replace(air, variants=air.variants[[variant]])
-        assert one.term is not None
-        on_grid = term_on_grid(fit.experiment.machine.model, one.term)
-        column = columns_of(fit.experiment, part, [(one, on_grid)])[0][:, :, 0]
+        column = columns_of(fit.experiment, part, [one])[0][:, :, 0]
         own[0] = experiment.unknowns[len(fit.z)].z_of(size)
         there = experiment.point(index, np.concatenate([fit.z, own]), part.point.trajectory, rounds=12).read
         own[0] = experiment.unknowns[len(fit.z)].z_of(-size)
