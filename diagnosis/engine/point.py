@@ -210,7 +210,7 @@ class Point:
         index = self.machine.parameter_index[name]
         p, value = model.network.parameters[index], float(self.trajectory.values[index])
         step = MEMORY_STEP * p.sd * (value if p.log else 1.0)
-        into, loss = parameter_heat(model, self.trajectory, self.balance, index, step)
+        into, loss = parameter_heat(model, self.trajectory, index, step)
         return Heat(into=into, loss=loss)
 
     def heat_per_relative(self, name: str) -> Heat:

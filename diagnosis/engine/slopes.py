@@ -14,7 +14,7 @@ import numpy as np
 import sympy as sp
 
 from diagnosis.forward.network_on_grid import Balance, NetworkOnGrid
-from diagnosis.forward.trajectory import Trajectory
+from diagnosis.forward.trajectory import Trajectory, losses_along
 from models.base.types import Array
 from models.formulas.extremes import Max, Min
 from models.network.laws import compile_function, function_source, symbol
@@ -82,7 +82,7 @@ class LawSlopes:
             Its heat balance, see :func:`diagnosis.forward.trajectory.settled_balance`
         """
         model, T = self.model, trajectory.middle
-        power = trajectory.tangent.at(T[:, model.loss_nodes])
+        power = losses_along(model, trajectory)
         signals = model.signals(trajectory.piece, T, trajectory.values, trajectory.memory)
         signals, stored = [*signals, *power.T], np.diff(trajectory.T, axis=0) / trajectory.piece.steps[:, None]
         n, nodes = model.n, [model.parts.index(source.node) for source in model.network.sources]

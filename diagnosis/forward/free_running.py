@@ -52,12 +52,10 @@ def free_running(
     now, held = complete_start(model, start), None
     for first in range(0, count, length):
         last = min(first + length, count)
-        window = replace(fine, time=fine.time[first : last + 1], samples=fine.samples[first:last],
-                         measured=fine.measured[first : last + 1], counts=fine.counts[first : last + 1])  # fmt: skip
         near = None
         if guess is not None and length == count:
             near = np.stack([np.interp(fine.time, piece.time, course) for course in guess.T], axis=-1)
-        found = _settled_window(model, window, values, now, near, held)
+        found = _settled_window(model, fine.part(first, last), values, now, near, held)
         T[first : last + 1], states[first:last], now, held = found.T, found.memory, found.end, found.held
     # What rows minutes apart show are means, over as much around every grid point; at the ends over what there is.
     half = piece.samples.shape[1] // 2 if piece.slow else 0

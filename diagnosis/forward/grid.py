@@ -107,11 +107,12 @@ class Piece:
 
     def until(self, time: float) -> Piece:
         """The piece up to a time [s], with at least one interval."""
-        count = max(int(np.searchsorted(self.time, time, side="right")), 2)
-        return replace(
-            self, time=self.time[:count], samples=self.samples[: count - 1], measured=self.measured[:count],
-            counts=self.counts[:count],
-        )  # fmt: skip
+        return self.part(0, max(int(np.searchsorted(self.time, time, side="right")), 2) - 1)
+
+    def part(self, first: int, last: int) -> Piece:
+        """The piece from one interval up to another one (excluded)."""
+        return replace(self, time=self.time[first : last + 1], samples=self.samples[first:last],
+                       measured=self.measured[first : last + 1], counts=self.counts[first : last + 1])  # fmt: skip
 
     def finer(self) -> tuple[Piece, NDArray[np.intp]]:
         """The piece in intervals of about :data:`FREE_S`; for slow rows, of half the sampling interval of the inputs.

@@ -3,27 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, TypeVar
+from functools import wraps
+from typing import Any, ParamSpec, TypeVar
 from weakref import WeakKeyDictionary
 
 Kept = TypeVar("Kept")
-_known: WeakKeyDictionary[Any, dict[tuple[Any, str], Any]] = WeakKeyDictionary()
+Arguments = ParamSpec("Arguments")
+_known: WeakKeyDictionary[Any, dict[tuple[Any, ...], Any]] = WeakKeyDictionary()
 
 
-def kept(model: object, trajectory: object, name: str, found: Callable[[], Kept]) -> Kept:
-    """The result of `found`, computed at the first call with this trajectory of a model.
+def kept(function: Callable[Arguments, Kept]) -> Callable[Arguments, Kept]:
+    """A function of a model, a trajectory and further values that is computed once for each of them.
 
-    Parameters
-    ----------
-    model, trajectory : object
-        Compared by identity
-    name : str
-        Of the result
-    found : callable
-        Computes the result, which must not hold the trajectory
+    Models and trajectories are compared by identity. The result must not hold the trajectory.
     """
-    known = _known.setdefault(trajectory, {})
-    if (model, name) not in known:
-        known[model, name] = found()
-    result: Kept = known[model, name]
-    return result
+
+    @wraps(function)
+    def found(*args: Arguments.args, **more: Arguments.kwargs) -> Kept:
+        model, trajectory, *others = args
+        known, key = _known.setdefault(trajectory, {}), (function, model, *others)
+        if key not in known:
+            known[key] = function(*args, **more)
+        result: Kept = known[key]
+        return result
+
+    return found

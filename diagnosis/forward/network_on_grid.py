@@ -139,21 +139,6 @@ class NetworkOnGrid:
             result[..., index] = value
         return result
 
-    def differences(self, signals: Sequence[Array | float], T: Array, shape: tuple[int, ...]) -> Array:
-        """Temperature differences over the links [K], shape (K, links) or (V, K, links)."""
-        everywhere = np.empty((*shape, self.incidence.shape[1]))
-        everywhere[..., : self.n] = T
-        for index, value in enumerate(self.laws.boundary(*signals), start=self.n):
-            everywhere[..., index] = value
-        return np.asarray(everywhere @ self.incidence.T)
-
-    def source_heats(self, signals: Sequence[Array | float], power: Array, shape: tuple[int, ...]) -> Array:
-        """Heats of all sources [W], shape (K, sources) or (V, K, sources)."""
-        result = np.empty((*shape, len(self.laws.sources)))
-        for index, value in enumerate(self.laws.heat(*signals, *np.moveaxis(power, -1, 0))[: result.shape[-1]]):
-            result[..., index] = value
-        return result
-
     def balance(self, piece: Piece, T: Array, values: Array, power: Array, memory: Array) -> Balance:
         """Heat balance at the middles of the intervals.
 
@@ -170,8 +155,13 @@ class NetworkOnGrid:
         shape = np.broadcast_shapes(T.shape[:-1], power.shape[:-1])
         signals = self.signals(piece, T, values, memory)
         conductances = self.conductances(signals, values, shape)
-        differences = self.differences(signals, T, shape)
-        sources = self.source_heats(signals, power, shape)
+        everywhere, sources = np.empty((*shape, self.incidence.shape[1])), np.empty((*shape, len(self.laws.sources)))
+        everywhere[..., : self.n] = T
+        for index, value in enumerate(self.laws.boundary(*signals), start=self.n):
+            everywhere[..., index] = value
+        differences = everywhere @ self.incidence.T
+        for index, value in enumerate(self.laws.heat(*signals, *np.moveaxis(power, -1, 0))[: sources.shape[-1]]):
+            sources[..., index] = value
         heat = sources @ self.injection + (conductances * differences) @ self.to_parts
         if piece.error is not None:
             heat = heat + piece.error.heat

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from itertools import compress
 from typing import Any
 
 import numpy as np
@@ -17,10 +18,9 @@ from diagnosis.forward.kept import kept
 from diagnosis.forward.network_on_grid import NetworkOnGrid
 from diagnosis.forward.observation import Sensors, boundary_temperatures
 from diagnosis.forward.sensor_fault import passed_on
-from diagnosis.forward.trajectory import Trajectory, settled_balance
+from diagnosis.forward.trajectory import Trajectory, heat_change, losses_along
 from models.base.types import Array
 from models.network.laws import compile_each, symbol
-from models.simulation.thermal_network import BASE_SIGNALS
 from models.terms.term import FACTORS, Term
 
 INPUT_STEP: Mapping[str, float] = {"speed": 5.0, "torque": 1.0}
@@ -39,19 +39,12 @@ class TermOnGrid:
     def __init__(self, model: NetworkOnGrid, term: Term) -> None:
         self.model, self.term = model, term
         network = model.network
-        own = [p.name for p in term.parameters]
-        given = [
-            *BASE_SIGNALS, *network.inputs, *(f"T_{part.name}" for part in network.parts),
-            *(p.name for p in network.parameters if p.name not in own),
-            *(s.name for s in network.states if s.name not in {own.name for own in term.states}),
-            *(f"P_{c}" for c in network.components),
-        ]  # fmt: skip
+        own, states = [p.name for p in term.parameters], [s.name for s in term.states]
         # The term may be in the network already: its own parameters and states are then given apart.
-        self._kept = np.array([p.name not in own for p in network.parameters], dtype=bool)
-        self._inside = not self._kept.all()
-        memories = {s.name for s in term.states}
-        self._remembered = np.array([s.name not in memories for s in network.states], dtype=bool)
-        arguments = [*given, *own, *(s.name for s in term.states)]
+        self._inside = not set(own).isdisjoint(p.name for p in network.parameters)
+        self._given = [name not in own and name not in states for name in model.arguments]
+        given = [*compress(model.arguments, self._given)]
+        arguments = [*given, *own, *states]
         other = sp.Integer(0) if term.boundary_temperature is None else term.boundary_temperature
         laws = [law.xreplace(model.boundary) for law in (term.expression, other)]
         names = {name: f"own_{i}" for i, name in enumerate(own)}
@@ -87,7 +80,7 @@ class TermOnGrid:
             power = np.zeros((len(T), len(model.laws.components)))
         else:
             inputs, T, time, memory = piece.inputs, trajectory.middle, piece.middle, trajectory.memory
-            power = trajectory.tangent.at(T[:, model.loss_nodes])
+            power = losses_along(model, trajectory)
         rows = self._rows(time, inputs, T, trajectory.values, memory, power)
         own = [values[:, index, None] for index in range(values.shape[1])]
         states = self._memories.follow(piece, [*rows, *own], trajectory.seen)
@@ -97,8 +90,8 @@ class TermOnGrid:
 
     def _rows(self, time: Array, inputs: Array, T: Array, values: Array, memory: Array, power: Array) -> list[Array]:
         """Arguments of the law from the network, without those of the term itself: shape (K,) each."""
-        numbers = (np.full(len(T), value) for value in values[self._kept])
-        return [time, *inputs.T, *T.T, *numbers, *memory[:, self._remembered].T, *power.T]
+        numbers = (np.full(len(T), value) for value in values)
+        return [*compress([time, *inputs.T, *T.T, *numbers, *memory.T, *power.T], self._given)]
 
     def constant(self, values: Array) -> float:
         """The law where it has nothing but the term's own parameters, of shape (parameters,); else nothing."""
@@ -199,7 +192,7 @@ class TermOnGrid:
             T, memory = trajectory.middle, np.zeros((len(trajectory.piece.steps), len(model.network.states)))
             memory[:, : trajectory.memory.shape[1]] = trajectory.memory
             numbers = np.concatenate([trajectory.values, model.start[len(trajectory.values) :]])
-            power = trajectory.tangent.at(T[:, model.loss_nodes])
+            power = losses_along(model, trajectory)
         rows = self._rows(piece.middle, piece.inputs, T, numbers, memory, power)
         shift = np.broadcast_to(self._law(*rows, *values.tolist())[0], (len(T),))
         samples = np.array(piece.samples)
@@ -235,12 +228,9 @@ def _compiled(
     return compile_each([names.get(name, name) for name in arguments], [law.xreplace(given) for law in laws])
 
 
+@kept
 def input_slope(model: NetworkOnGrid, trajectory: Trajectory, name: str) -> tuple[Array, Array]:
     """Net heat, shape (K, parts + coupled), and loss, (K,), per unit of an input."""
-    return kept(model, trajectory, f"slope {name}", lambda: _input_slope(model, trajectory, name))
-
-
-def _input_slope(model: NetworkOnGrid, trajectory: Trajectory, name: str) -> tuple[Array, Array]:
     step = INPUT_STEP.get(name, OTHER_INPUT_STEP)
     samples = np.array(trajectory.piece.samples)
     samples[..., model.laws.inputs.index(name)] += step
@@ -250,17 +240,13 @@ def _input_slope(model: NetworkOnGrid, trajectory: Trajectory, name: str) -> tup
 
 def moved_heat(model: NetworkOnGrid, trajectory: Trajectory, moved: Piece) -> tuple[Array, Array]:
     """Change of the net heat, (K, parts + coupled), and of the loss, (K,), when the inputs of a piece are others."""
-    piece, T = trajectory.piece, trajectory.middle
-    power = trajectory.tangent.at(T[:, model.loss_nodes])
-    changed = power
-    if not np.array_equal(moved.samples[..., :2], piece.samples[..., :2]):
-        before = kept(model, trajectory, "losses", lambda: model.loss_at(piece.samples, T))
-        changed = power + model.loss_at(moved.samples, T) - before
-    here = settled_balance(model, trajectory)
-    values, memory = trajectory.values, trajectory.memory
-    there = model.balance(moved, T, values, changed, memory)
-    into = there.heat - here.heat
-    if model.coupled:
-        driven = model.rates(moved, T, values, changed, memory) - model.rates(piece, T, values, power, memory)
-        into = np.concatenate([into, driven], axis=1)
-    return into, (there.sources - here.sources)[:, model.is_loss].sum(axis=-1)
+    power = losses_along(model, trajectory)
+    if not np.array_equal(moved.samples[..., :2], trajectory.piece.samples[..., :2]):
+        power = power + model.loss_at(moved.samples, trajectory.middle) - _losses(model, trajectory)
+    return heat_change(model, trajectory, moved, trajectory.values, power, trajectory.memory)
+
+
+@kept
+def _losses(model: NetworkOnGrid, trajectory: Trajectory) -> Array:
+    """Nominal losses as computed, not by the tangent."""
+    return model.loss_at(trajectory.piece.samples, trajectory.middle)

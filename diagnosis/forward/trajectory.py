@@ -262,55 +262,33 @@ class _Solved:
 def _linearised(
     model: NetworkOnGrid, piece: Piece, values: Array, T: Array, tangent: LossTangent, memory: Array
 ) -> _Solved:
-    power = tangent.at(T[:, model.loss_nodes])
-    balance = model.balance(piece, T, values, power, memory)
+    n, power = model.n, tangent.at(T[:, model.loss_nodes])
+    balance, capacities = model.balance(piece, T, values, power, memory), model.capacities(values)
     total = balance.sources[:, model.is_loss].sum(axis=-1)
-    moved, changed = _moved(model, T, tangent)
+    # One part's temperature is a little higher, for every part: (parts, K, ...).
+    moved, changed = T + TEMPERATURE_STEP_K * np.eye(n)[:, None, :], np.tile(power, (n, 1, 1))
+    changed[model.loss_nodes] += TEMPERATURE_STEP_K * np.moveaxis(tangent.slope, -1, 0)
     there = model.balance(piece, moved, values, changed, memory)
-    jacobian = np.ascontiguousarray(np.moveaxis((there.heat - balance.heat) / TEMPERATURE_STEP_K, 0, -1))
     loss_slope = ((there.sources[..., model.is_loss].sum(axis=-1) - total) / TEMPERATURE_STEP_K).T
-    capacities = model.capacities(values)
-    matrix = jacobian / capacities[:, None]
-    constant = balance.heat / capacities - np.einsum("kij,kj->ki", matrix, T)
+    size, here, slope = n + len(model.coupled), T, balance.heat / capacities
+    matrix = np.empty((len(T), size, size))
+    matrix[:, :n, :n] = np.moveaxis((there.heat - balance.heat) / TEMPERATURE_STEP_K, 0, -1) / capacities[:, None]
     if model.coupled:
-        matrix, constant = _with_states(model, piece, values, T, tangent, memory, balance, matrix, capacities)
+        rates = model.rates(piece, T, values, power, memory)
+        higher = model.rates(piece, moved, values, changed, memory)
+        matrix[:, n:, :n] = np.moveaxis((higher - rates) / TEMPERATURE_STEP_K, 0, -1)
+        here, slope = np.concatenate([T, memory[:, model.coupled]], axis=1), np.concatenate([slope, rates], axis=1)
+        for index, state in enumerate(model.coupled):
+            other = memory.copy()
+            other[:, state] += STATE_STEP
+            heat = model.balance(piece, T, values, power, other).heat
+            matrix[:, :n, n + index] = (heat - balance.heat) / capacities / STATE_STEP
+            matrix[:, n:, n + index] = (model.rates(piece, T, values, power, other) - rates) / STATE_STEP
     decay, gain = exponential(matrix, piece.steps)
     return _Solved(
         balance=balance, loss_slope=loss_slope, total=total, capacities=capacities, decay=decay, gain=gain,
-        driven=np.einsum("kij,kj->ki", gain, constant),
+        driven=np.einsum("kij,kj->ki", gain, slope - np.einsum("kij,kj->ki", matrix, here)),
     )  # fmt: skip
-
-
-def _moved(model: NetworkOnGrid, T: Array, tangent: LossTangent) -> tuple[Array, Array]:
-    """Temperatures of which one part's is a little higher, and the losses there, for every part: (parts, K, ...)."""
-    moved = T + TEMPERATURE_STEP_K * np.eye(model.n)[:, None, :]
-    power = np.tile(tangent.at(T[:, model.loss_nodes]), (model.n, 1, 1))
-    power[model.loss_nodes] += TEMPERATURE_STEP_K * np.moveaxis(tangent.slope, -1, 0)
-    return moved, power
-
-
-def _with_states(
-    model: NetworkOnGrid, piece: Piece, values: Array, T: Array, tangent: LossTangent, memory: Array, balance: Balance,
-    matrix: Array, capacities: Array,
-) -> tuple[Array, Array]:  # fmt: skip
-    """Matrix and constant of temperatures and the states that are solved with them."""
-    n, power = model.n, tangent.at(T[:, model.loss_nodes])
-    rates = model.rates(piece, T, values, power, memory)
-    size = n + len(model.coupled)
-    whole = np.zeros((len(T), size, size))
-    whole[:, :n, :n] = matrix
-    moved, changed = _moved(model, T, tangent)
-    there = model.rates(piece, moved, values, changed, memory)
-    whole[:, n:, :n] = np.moveaxis((there - rates) / TEMPERATURE_STEP_K, 0, -1)
-    for index, state in enumerate(model.coupled):
-        changed = memory.copy()
-        changed[:, state] += STATE_STEP
-        heat = model.balance(piece, T, values, power, changed).heat
-        whole[:, :n, n + index] = (heat - balance.heat) / capacities / STATE_STEP
-        whole[:, n:, n + index] = (model.rates(piece, T, values, power, changed) - rates) / STATE_STEP
-    here = np.concatenate([T, memory[:, model.coupled]], axis=1)
-    slope = np.concatenate([balance.heat / capacities, rates], axis=1)
-    return whole, slope - np.einsum("kij,kj->ki", whole, here)
 
 
 def linear_round(
@@ -355,26 +333,23 @@ def _walked(
     return solved, result
 
 
+@kept
 def settled_balance(model: NetworkOnGrid, trajectory: Trajectory) -> Balance:
     """The heat balance along a settled trajectory; its own is that of the one before, about which it was solved."""
-    return kept(model, trajectory, "balance", lambda: _settled_balance(model, trajectory))
+    return model.balance(trajectory.piece, trajectory.middle, trajectory.values, losses_along(model, trajectory),
+                         trajectory.memory)  # fmt: skip
 
 
-def _settled_balance(model: NetworkOnGrid, trajectory: Trajectory) -> Balance:
-    T = trajectory.middle
-    power = trajectory.tangent.at(T[:, model.loss_nodes])
-    return model.balance(trajectory.piece, T, trajectory.values, power, trajectory.memory)
+def losses_along(model: NetworkOnGrid, trajectory: Trajectory) -> Array:
+    """Nominal losses along a trajectory, by its tangent, shape (K, components), [W]."""
+    return trajectory.tangent.at(trajectory.middle[:, model.loss_nodes])
 
 
-def parameter_heat(
-    model: NetworkOnGrid, trajectory: Trajectory, here: Balance, index: int, step: float
-) -> tuple[Array, Array]:
+def parameter_heat(model: NetworkOnGrid, trajectory: Trajectory, index: int, step: float) -> tuple[Array, Array]:
     """Net heat and total loss per unit of a parameter, along a trajectory, by a difference.
 
     Parameters
     ----------
-    here : Balance
-        Its :func:`settled_balance`
     index : int
         Which parameter
     step : float
@@ -382,19 +357,34 @@ def parameter_heat(
 
     Returns
     -------
-    heat : Array, shape (K, parts + coupled)
-        Including the change of stored heat that another capacity makes, per unit of the parameter, [W/unit]; then the
-        rates of the states that are solved with the temperatures
-    loss : Array, shape (K,)
+    heat, loss : Array
+        See :func:`heat_change`, per unit of the parameter
     """
-    T, piece, memory = trajectory.middle, trajectory.piece, trajectory.memory
     values = trajectory.values.copy()
     values[index] += step
-    power = trajectory.tangent.at(T[:, model.loss_nodes])
-    moved = model.memory(piece, trajectory.T, trajectory.seen, values, power, memory)
-    there = model.balance(piece, T, values, power, moved)
-    heat = (there.heat * (trajectory.capacities / model.capacities(values)) - here.heat) / step
+    power = losses_along(model, trajectory)
+    memory = model.memory(trajectory.piece, trajectory.T, trajectory.seen, values, power, trajectory.memory)
+    heat, loss = heat_change(model, trajectory, trajectory.piece, values, power, memory)
+    return heat / step, loss / step
+
+
+def heat_change(
+    model: NetworkOnGrid, trajectory: Trajectory, piece: Piece, values: Array, power: Array, memory: Array
+) -> tuple[Array, Array]:
+    """Change of heat and loss along a trajectory when inputs, parameters, nominal losses or memories are others.
+
+    Returns
+    -------
+    heat : Array, shape (K, parts + coupled)
+        Net heat [W], including the change of stored heat that another capacity makes; then the rates of the states that
+        are solved with the temperatures
+    loss : Array, shape (K,)
+        Total mechanical loss, [W]
+    """
+    T, here = trajectory.middle, settled_balance(model, trajectory)
+    there = model.balance(piece, T, values, power, memory)
+    heat = there.heat * (trajectory.capacities / model.capacities(values)) - here.heat
     if model.coupled:
-        driven = model.rates(piece, T, values, power, moved) - model.rates(piece, T, trajectory.values, power, memory)
-        heat = np.concatenate([heat, driven / step], axis=-1)
-    return heat, (there.sources - here.sources)[:, model.is_loss].sum(axis=-1) / step
+        before = model.rates(trajectory.piece, T, trajectory.values, losses_along(model, trajectory), trajectory.memory)
+        heat = np.concatenate([heat, model.rates(piece, T, values, power, memory) - before], axis=-1)
+    return heat, (there.sources - here.sources)[:, model.is_loss].sum(axis=-1)

@@ -15,7 +15,7 @@ from diagnosis.forward.free_running import free_running
 from diagnosis.forward.grid import Piece, pieces
 from diagnosis.forward.network_on_grid import NetworkOnGrid
 from diagnosis.forward.recurrence import lagged, recurrence
-from diagnosis.forward.trajectory import parameter_heat, settled_balance, simulate
+from diagnosis.forward.trajectory import parameter_heat, simulate
 from diagnosis.recordings.recording import Recording
 from models.assembly.gearbox import Gearbox, load_gearbox
 from models.base.types import Array
@@ -165,10 +165,10 @@ def test_derivatives_of_a_slow_valve(fzg: Gearbox) -> None:
     )
     start = np.full(model.n, 45.0)
     found = simulate(model, piece, named_values(model.network, given), start, rounds=20, settled_K=1e-7)
-    names, here = [p.name for p in model.network.parameters], settled_balance(model, found)
+    names = [p.name for p in model.network.parameters]
     for parameter, least in zip((placed.parameters[0], placed.parameters[4]), (1.0, 0.01), strict=True):
         step = 0.02 * given[parameter.name]
-        heat, _ = parameter_heat(model, found, here, names.index(parameter.name), step)
+        heat, _ = parameter_heat(model, found, names.index(parameter.name), step)
         column = found.response(heat[:, :, None])[..., 0]
         sides = []
         for moved in (given[parameter.name] + step, given[parameter.name] - step):

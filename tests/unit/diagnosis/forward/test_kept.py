@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gc
-from collections.abc import Callable
 
 from diagnosis.forward import kept as module
 from diagnosis.forward.kept import kept
@@ -13,30 +12,31 @@ class Thing:
     """Compared by identity."""
 
 
-def found(calls: list[int]) -> Callable[[], int]:
-    """Counts its calls, and gives their number."""
+def test_is_computed_once_for_each_model_trajectory_and_value() -> None:
+    calls: list[str] = []
 
-    def count() -> int:
-        calls.append(1)
+    @kept
+    def count(_: Thing, __: Thing, name: str) -> int:
+        calls.append(name)
         return len(calls)
 
-    return count
+    @kept
+    def another(_: Thing, __: Thing, name: str) -> str:
+        return name
 
-
-def test_is_computed_once_for_each_model_trajectory_and_name() -> None:
-    calls: list[int] = []
     model, trajectory, other = Thing(), Thing(), Thing()
-    assert [kept(model, trajectory, "a", found(calls)) for _ in range(3)] == [1, 1, 1]
-    assert kept(model, trajectory, "b", found(calls)) == 2
-    assert kept(other, trajectory, "a", found(calls)) == 3
-    assert kept(model, other, "a", found(calls)) == 4
+    assert [count(model, trajectory, "a") for _ in range(3)] == [1, 1, 1]
+    assert count(model, trajectory, "b") == 2
+    assert count(other, trajectory, "a") == 3
+    assert count(model, other, "a") == 4
+    assert another(model, trajectory, "a") == "a"
 
 
 def test_goes_with_its_trajectory() -> None:
     trajectory = Thing()
     gc.collect()
     before = len(module._known)
-    kept(Thing(), trajectory, "a", lambda: 1)
+    kept(lambda _, __: 1)(Thing(), trajectory)
     assert len(module._known) == before + 1
     del trajectory
     gc.collect()

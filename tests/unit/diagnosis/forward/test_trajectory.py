@@ -121,10 +121,10 @@ def test_a_tank_is_solved_with_the_temperatures(fzg: Gearbox, piece: Piece, ride
     np.testing.assert_allclose(found.T[:, nodes], T, atol=0.05)
     without = simulate(model, piece, named_values(model.network, given | {placed.strength.name: 0.0}), found.T[0])
     assert np.abs(without.T - found.T)[:, nodes].max() > 2.0
-    names, here = [p.name for p in model.network.parameters], settled_balance(model, found)
+    names = [p.name for p in model.network.parameters]
     for name in (placed.parameters[1].name, placed.parameters[2].name):
         step = 0.02 * given[name]
-        heat, _ = parameter_heat(model, found, here, names.index(name), step)
+        heat, _ = parameter_heat(model, found, names.index(name), step)
         column = found.response(heat[:, :, None])[:, nodes, 0]
         sides = [simulate(model, piece, named_values(model.network, given | {name: given[name] + sign * step}),
                           found.T[0], settled_K=1e-6, rounds=20).T[:, nodes] for sign in (1, -1)]  # fmt: skip
