@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import sympy as sp
 
@@ -121,8 +122,7 @@ def _placed(
         experiment="repeat the operation before and after",
         of_measurement=family == MEASUREMENT,
     )  # fmt: skip
-    strength = Parameter(name=f"{label}_strength", unit=size.unit, start=0.0, sd=size.sd, lower=size.lower,
-                         upper=size.upper, log=False)  # fmt: skip
+    strength = replace(size, name=f"{label}_strength")
     return Placed(
         mechanism=mechanism, place=place, written={"law": symbol("strength") * law}, scale=scale, label=label,
         kind=kind, target=target, expression=symbol(strength.name) * law, parameters=(strength,), is_loss=is_loss,

@@ -18,7 +18,7 @@ from models.assembly.gearbox import Gearbox
 from models.base.types import Array
 from models.mechanisms import Scale
 from models.quantities.quantities import GEARBOX_INPUTS, TOTAL_LOSS, is_total_loss
-from models.simulation.thermal_network import Losses, ThermalNetwork
+from models.simulation.thermal_network import ThermalNetwork
 from models.terms.term import Term
 
 STANDSTILL_RPM = 10.0
@@ -54,7 +54,6 @@ class InferenceSetup:
 
     gearbox: Gearbox
     nominal: ThermalNetwork
-    losses: Losses
     model: NetworkOnGrid
     shapes: tuple[Term, ...]
     scale: Scale
@@ -102,7 +101,7 @@ def prepare(
     even : bool
         True for intervals of one length, see :func:`diagnosis.forward.grid.pieces`
     """
-    as_defined, losses = gearbox.network(), gearbox.loss_laws()
+    as_defined = gearbox.network()
     nominal = with_shaft(as_defined)
     recordings, holdout, baseline = (shafts(given, as_defined) for given in (recordings, holdout, baseline))
     everything = (*recordings, *baseline)
@@ -111,7 +110,7 @@ def prepare(
     network = nominal
     for term in shapes:
         network = term.apply(network)
-    model = NetworkOnGrid(network, losses)
+    model = NetworkOnGrid(network, gearbox.loss_laws())
     measured = {c.name for r in everything for c in r.channels}
     temperatures = sorted((c for c in measured if not is_total_loss(c)), key=lambda c: (model.part_index(c), c))
     channels = (*temperatures, *([TOTAL_LOSS] if TOTAL_LOSS in measured else []))
@@ -121,7 +120,7 @@ def prepare(
     if not holdout:
         learnt, held_out = tuple(map(first_part, learnt)), tuple(map(last_part, learnt))
     return InferenceSetup(
-        gearbox=gearbox, nominal=nominal, losses=losses, model=model, shapes=shapes, scale=scale, channels=channels,
+        gearbox=gearbox, nominal=nominal, model=model, shapes=shapes, scale=scale, channels=channels,
         learnt=(*learnt, *healthy), held_out=held_out, loss_W=typical_loss(model, recordings),
         white_K=channel_noise(everything, channels),
         white_loss=loss_noise(everything) if TOTAL_LOSS in channels else (0.0, 0.0),

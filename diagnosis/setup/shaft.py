@@ -31,8 +31,12 @@ def with_shaft(network: ThermalNetwork) -> ThermalNetwork:
     return replace(network, inputs=first | dict(network.inputs), derived={}, parameters=kept)
 
 
-def recording_with_shaft(recording: Recording, network: ThermalNetwork) -> Recording:
-    """Return a recording with speed [1/min] and torque [N m] of every row: as recorded, derived, or 0."""
+def shafts(recordings: Sequence[Recording], network: ThermalNetwork) -> tuple[Recording, ...]:
+    """Return recordings with speed [1/min] and torque [N m] of every row: as recorded, derived, or 0."""
+    return tuple(_with_shaft(recording, network) for recording in recordings)
+
+
+def _with_shaft(recording: Recording, network: ThermalNetwork) -> Recording:
     given = dict(recording.inputs)
     zero = np.zeros(len(recording.time))
     speed = given.pop("speed", zero)
@@ -50,8 +54,3 @@ def torque_gain(network: ThermalNetwork) -> Parameter | None:
     """Return the factor on the efficiency, which a recording calibrates as the gain of the torque; None without one."""
     found = [p for p in network.parameters if network.derived and p.name == EFFICIENCY]
     return found[0] if found else None
-
-
-def shafts(recordings: Sequence[Recording], network: ThermalNetwork) -> tuple[Recording, ...]:
-    """Return :func:`recording_with_shaft` of all recordings."""
-    return tuple(recording_with_shaft(recording, network) for recording in recordings)

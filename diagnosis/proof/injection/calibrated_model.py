@@ -208,7 +208,7 @@ def calibrate(gearbox: Gearbox, real: RealRecording) -> CalibratedModel:
     first = found.parts[0].point
     network = first.machine.model.network
     return CalibratedModel(
-        real=real, nominal=setup.nominal, network=network, losses=setup.losses,
+        real=real, nominal=setup.nominal, network=network, losses=setup.model.losses,
         parameters={p.name: float(value) for p, value in zip(network.parameters, first.setting.values, strict=True)},
         start={part.name: float(T) for part, T in zip(network.parts, first.trajectory.T[0], strict=True)},
         cycle=_cycle(setup, found, real),

@@ -9,7 +9,7 @@ import pytest
 
 from diagnosis.engine.prepare import prepare_experiment
 from diagnosis.recordings.read import read_recording
-from diagnosis.setup.shaft import recording_with_shaft, torque_gain, with_shaft
+from diagnosis.setup.shaft import shafts, torque_gain, with_shaft
 from models.assembly.gearbox import load_gearbox, read_gearbox
 from models.mechanisms import CATALOGUE
 
@@ -42,7 +42,7 @@ def test_a_torque_from_a_power_is_an_input_whose_gain_is_the_efficiency() -> Non
     machine = read_gearbox(text, file="power.toml")
     network = machine.network()
     file = ROOT / "examples" / "data" / "la_haute_borne_R80736.csv.gz@2017-10-02..2017-10-03"
-    recording = recording_with_shaft(read_recording(file, network), network)
+    (recording,) = shafts([read_recording(file, network)], network)
     omega = np.maximum(np.abs(recording.inputs["speed"]), 1.0) * np.pi / 30.0
     np.testing.assert_allclose(recording.inputs["torque"], 0.9e3 * recording.inputs["P"] / omega)
     gain = torque_gain(network)
