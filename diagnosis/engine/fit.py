@@ -24,7 +24,6 @@ LEAST_GAIN = 0.02  # of the objective
 NEAR = 0.5  # of a prior sd: every other time, after so short a step, the columns are kept
 FARTHEST_STEP = 3.0  # of the z in one iteration
 SLOW_PATIENCE = 3  # times as many iterations where switches follow slow measurements: steps are small there
-PASSES = 3  # simulations of a piece whose inputs follow its own temperatures, before there is a trajectory
 Guess = Trajectory | Array | None
 
 
@@ -125,8 +124,7 @@ class Experiment:
         """
         setting, model = self.setting(index, z), self.machine.model
         known = guess if isinstance(guess, Trajectory) else None
-        follows = any(shift.follows for shift in self.machine.shifts)
-        for _ in range(PASSES if follows and known is None else 1):
+        for _ in range(self.machine.passes if known is None else 1):
             piece = replace(setting.piece(self.pieces[index], known), error=error)
             known = simulate(model, piece, setting.values, self.starts[index], guess=guess, rounds=rounds,
                              settled_K=0.01)  # fmt: skip

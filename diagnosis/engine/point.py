@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -22,6 +22,7 @@ from models.terms.term import Term
 
 FEWEST_AT_ONCE, AT_ONCE = 16, 256  # columns that go through the network and the filter together
 VALUES_AT_ONCE = 800_000  # of heats that are held together, per part: bounds the memory of long recordings
+PASSES = 3  # simulations of a piece whose inputs follow its own temperatures, before there is a trajectory
 MEMORY_STEP = 0.02  # of a prior sd, for parameters that decide on switches and memories
 
 
@@ -62,6 +63,11 @@ class Machine:
         return [on_grid for on_grid in self.on_grid.values() if on_grid.term.kind == "signal"]
 
     @property
+    def passes(self) -> int:
+        """Simulations of a piece before its inputs have followed its own temperatures."""
+        return PASSES if any(shift.follows for shift in self.shifts) else 1
+
+    @property
     def distortions(self) -> list[TermOnGrid]:
         """Terms that distort a reading."""
         return [on_grid for on_grid in self.on_grid.values() if on_grid.term.kind == "sensor"]
@@ -73,38 +79,33 @@ class Setting:
 
     machine: Machine
     recording: str
-    channels: tuple[str, ...]
+    sensors: Sensors
     values: Array
     samples: Array
-    lag: Array
-    bias: Array
-    loss_gain: float = 1.0
-    loss_delay: float = 0.0
+    of_terms: dict[str, float]
     clock: float = 0.0
-    of_terms: Mapping[str, Array] = field(default_factory=dict)
 
     @classmethod
     def of(cls, machine: Machine, piece: Piece) -> Setting:
         """As delivered: parameters at their start, ideal sensors, inputs as recorded."""
-        nothing = np.zeros(len(piece.channels))
+        count = len(piece.channels)
         return cls(
-            machine=machine, recording=piece.recording, channels=piece.channels,
-            values=machine.model.start.copy(), samples=np.array(piece.samples), lag=nothing.copy(), bias=nothing.copy(),
-            of_terms={term.label: np.array([p.start for p in term.parameters]) for term in machine.terms},
+            machine=machine, recording=piece.recording,
+            sensors=Sensors(channels=piece.channels, lag=np.zeros(count), bias=np.zeros(count), mixes=machine.mixes),
+            values=machine.model.start.copy(), samples=np.array(piece.samples),
+            of_terms={p.name: p.start for term in machine.terms for p in term.parameters},
         )  # fmt: skip
 
-    @property
-    def sensors(self) -> Sensors:
-        """The sensors."""
-        return Sensors(channels=self.channels, lag=self.lag, bias=self.bias, loss_gain=self.loss_gain,
-                       loss_delay=self.loss_delay, mixes=self.machine.mixes)  # fmt: skip
+    def values_of(self, on_grid: TermOnGrid) -> Array:
+        """Values of the parameters of a term outside the network."""
+        return np.array([self.of_terms[p.name] for p in on_grid.term.parameters])
 
     def piece(self, piece: Piece, known: Trajectory | None) -> Piece:
         """The piece with its inputs as they probably were."""
-        piece = replace(piece, samples=self.samples, lags=self.lag)
+        piece = replace(piece, samples=self.samples, lags=self.sensors.lag)
         for shift in self.machine.shifts:
-            piece = shift.adjusted(piece, self.of_terms[shift.term.label], known)
-        clocks = [d.constant(self.of_terms[d.term.label]) for d in self.machine.distortions if d.term.form == "clock"]
+            piece = shift.adjusted(piece, self.values_of(shift), known)
+        clocks = [d.constant(self.values_of(d)) for d in self.machine.distortions if d.term.form == "clock"]
         late = self.clock + sum(clocks)
         return replace(piece, late_s=late) if late else piece
 
@@ -112,20 +113,20 @@ class Setting:
         """Readings of the sensors, faults included, shape (K + 1, channels)."""
         read = readings(self.machine.model, trajectory, self.sensors)
         for fault in self.machine.distortions:
-            read = fault.distorted(trajectory, self.sensors, read, self.of_terms[fault.term.label])
+            read = fault.distorted(trajectory, self.sensors, read, self.values_of(fault))
         return self._by_clock(trajectory, read)
 
     def passed_on(self, trajectory: Trajectory, changes: Array) -> Array:
         """Changes of readings as faulty sensors and clock show them, shape (K + 1, channels, ...)."""
         for fault in self.machine.distortions:
-            changes = fault.passed_on(trajectory, self.sensors, changes, self.of_terms[fault.term.label])
+            changes = fault.passed_on(trajectory, self.sensors, changes, self.values_of(fault))
         return self._by_clock(trajectory, changes)
 
     def _by_clock(self, trajectory: Trajectory, read: Array) -> Array:
         if not self.clock:
             return read
         late = delayed(read, trajectory.piece.time, self.clock)
-        losses = [is_total_loss(name) for name in self.channels]
+        losses = [is_total_loss(name) for name in self.sensors.channels]
         late[:, losses] = read[:, losses]
         return late
 
@@ -145,13 +146,6 @@ class Column:
     heat: Heat | None = None
     reading: Array | None = None
     shown: Array | None = None
-
-    def __mul__(self, factor: float) -> Column:
-        return Column(
-            heat=None if self.heat is None else self.heat * factor,
-            reading=None if self.reading is None else self.reading * factor,
-            shown=None if self.shown is None else self.shown * factor,
-        )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -173,7 +167,7 @@ class Point:
         """The network."""
         return self.setting.machine
 
-    @cached_property
+    @property
     def sensors(self) -> Sensors:
         """The sensors."""
         return self.setting.sensors
@@ -232,21 +226,20 @@ class Point:
         into, loss = moved_heat(self.machine.model, self.trajectory, piece)
         return Heat(into=into / step, loss=loss / step)
 
-    def term_column(self, label: str, index: int, step: float) -> Column:
-        """Column per unit of a parameter of a term outside the network."""
-        term, trajectory = self.machine.on_grid[label], self.trajectory
-        values = self.setting.of_terms[label]
-        moved = np.array(values)
-        moved[index] += step
+    def term_column(self, label: str, name: str, per_z: float, step_z: float) -> Column:
+        """Column of a parameter of a term outside the network, by a difference."""
+        term, trajectory, step = self.machine.on_grid[label], self.trajectory, step_z * per_z
+        values = self.setting.values_of(term)
+        moved = values + step * np.array([p.name == name for p in term.term.parameters])
         if term.term.kind == "sensor":
             read = readings(self.machine.model, trajectory, self.sensors)
             there = term.distorted(trajectory, self.sensors, read, moved)
             here = term.distorted(trajectory, self.sensors, read, values)
-            return Column(shown=(there - here) / step)
+            return Column(shown=(there - here) / step * per_z)
         # The trajectory's piece is shifted already: only the difference is added.
         there = term.adjusted(trajectory.piece, moved, trajectory).samples
         here = term.adjusted(trajectory.piece, values, trajectory).samples
-        return Column(heat=self.moved_heat(trajectory.piece.samples + there - here, step))
+        return Column(heat=self.moved_heat(trajectory.piece.samples + there - here, step) * per_z)
 
     def clock_column(self) -> Array:
         """Change of the readings per second of delay, shape (K + 1, channels)."""

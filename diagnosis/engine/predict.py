@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from diagnosis.engine.fit import PASSES, Experiment, Fit, Linear
+from diagnosis.engine.fit import Experiment, Fit, Linear
 from diagnosis.engine.point import Setting
 from diagnosis.forward.free_running import free_running
 from diagnosis.forward.grid import Piece, stands_for
@@ -87,18 +87,14 @@ def _setting(experiment: Experiment, index: int, z: Array | None) -> Setting:
     if z is not None:
         return experiment.setting(index, z)
     setting = experiment.setting(index, np.zeros(len(experiment.unknowns)))
-    nothing = np.zeros(len(setting.channels))
-    return replace(setting, lag=nothing, bias=nothing, loss_gain=1.0, loss_delay=0.0)
-
-
-def _passes(setting: Setting) -> int:
-    return PASSES if any(shift.follows for shift in setting.machine.shifts) else 1
+    nothing = np.zeros(len(setting.sensors.channels))
+    return replace(setting, sensors=replace(setting.sensors, lag=nothing, bias=nothing, loss_gain=1.0, loss_delay=0.0))
 
 
 def _free_run(setting: Setting, piece: Piece, start: Array, guess: Array | None) -> Trajectory:
     """The trajectory of a whole piece that nothing measured guides."""
     model, trajectory = setting.machine.model, None
-    for _ in range(_passes(setting)):
+    for _ in range(setting.machine.passes):
         adjusted = replace(setting.piece(piece, trajectory), guided=False)
         if any(state.update is not None for state in model.network.states):
             trajectory = free_running(model, adjusted, setting.values, start, guess=guess)

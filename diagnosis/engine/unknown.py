@@ -97,7 +97,7 @@ class SensorBias(Unknown):
 
     def act(self, setting: Setting, z: float) -> None:
         """Shift the readings."""
-        setting.bias[setting.channels.index(self.channel)] += self.value(z)
+        setting.sensors.bias[setting.sensors.channels.index(self.channel)] += self.value(z)
 
     def column(self, point: Point, z: float) -> Column:
         """A constant."""
@@ -112,7 +112,7 @@ class SensorLag(Unknown):
 
     def act(self, setting: Setting, z: float) -> None:
         """Slow the sensor."""
-        setting.lag[setting.channels.index(self.channel)] = self.value(z)
+        setting.sensors.lag[setting.sensors.channels.index(self.channel)] = self.value(z)
 
     def column(self, point: Point, z: float) -> Column:
         """Difference of the lagged course with the lag."""
@@ -130,7 +130,7 @@ class LossGain(Unknown):
 
     def act(self, setting: Setting, z: float) -> None:
         """Scale the reading of the loss."""
-        setting.loss_gain *= self.value(z)
+        setting.sensors.loss_gain *= self.value(z)
 
     def column(self, point: Point, z: float) -> Column:
         """The loss itself."""
@@ -144,7 +144,7 @@ class LossDelay(Unknown):
 
     def act(self, setting: Setting, z: float) -> None:
         """Delay the reading of the loss."""
-        setting.loss_delay += self.value(z)
+        setting.sensors.loss_delay += self.value(z)
 
     def column(self, point: Point, z: float) -> Column:
         """Minus the rate of the loss."""
@@ -200,17 +200,15 @@ class TermParameter(Unknown):
     """A parameter of a term outside the network: an input shifted, or a reading distorted."""
 
     label: str
-    names: tuple[str, ...]
     step: float = TERM_STEP
 
     def act(self, setting: Setting, z: float) -> None:
         """Set the term's parameter."""
-        setting.of_terms[self.label][self.names.index(self.parameter.name)] = self.value(z)
+        setting.of_terms[self.parameter.name] = self.value(z)
 
     def column(self, point: Point, z: float) -> Column:
         """Difference of the shifted heat or of the distorted reading."""
-        per_z, index = self.per_z(z), self.names.index(self.parameter.name)
-        return point.term_column(self.label, index, self.step * per_z) * per_z
+        return point.term_column(self.label, self.parameter.name, self.per_z(z), self.step)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -219,16 +217,10 @@ class Held(Unknown):
 
     Attributes
     ----------
-    label : str
-        Of the term
-    names : tuple of str
-        Parameters of the term
     of_recording : mapping of str to float
         Value in every recording; elsewhere the start of the parameter
     """
 
-    label: str
-    names: tuple[str, ...]
     of_recording: Mapping[str, float] = field(default_factory=dict)
 
     def value(self, z: float) -> float:  # noqa: ARG002 - of the protocol
@@ -250,7 +242,7 @@ class Held(Unknown):
         if index is not None:
             setting.values[index] = value
         else:
-            setting.of_terms[self.label][self.names.index(self.parameter.name)] = value
+            setting.of_terms[self.parameter.name] = value
 
     def column(self, point: Point, z: float) -> Column:  # noqa: ARG002 - of the protocol
         """Nothing."""

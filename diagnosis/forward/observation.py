@@ -15,9 +15,9 @@ from models.correction.instruments import Mix
 from models.quantities.quantities import is_total_loss
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(kw_only=True, eq=False)
 class Sensors:
-    """Properties of every channel.
+    """Properties of every channel; unknowns write into them.
 
     Attributes
     ----------

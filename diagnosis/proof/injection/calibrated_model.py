@@ -212,7 +212,7 @@ def calibrate(gearbox: Gearbox, real: RealRecording) -> CalibratedModel:
         parameters={p.name: float(value) for p, value in zip(network.parameters, first.setting.values, strict=True)},
         start={part.name: float(T) for part, T in zip(network.parts, first.trajectory.T[0], strict=True)},
         cycle=_cycle(setup, found, real),
-        lags=dict(zip(first.setting.channels, map(float, first.setting.lag), strict=True)), misfit_K=misfit,
+        lags=dict(zip(first.sensors.channels, map(float, first.sensors.lag), strict=True)), misfit_K=misfit,
         left_out=left_out, control=find_control(real),
     )  # fmt: skip
 

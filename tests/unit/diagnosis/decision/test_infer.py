@@ -320,7 +320,7 @@ def test_a_share_of_a_swap_or_of_a_held_reading_is_refused_with_a_number(
                 parameters=(strength,))  # fmt: skip
     swap = Hypothesis(name="swapped_channels", place="oil_pinion", family="measurement", term=term, law="swap",
                       variants=np.ones((1, 1)))  # fmt: skip
-    unknown = TermParameter(parameter=strength, label="swap", names=("swap",))
+    unknown = TermParameter(parameter=strength, label="swap")
     experiment = SimpleNamespace(unknowns=[unknown])
     fit = SimpleNamespace(z=np.array([share]), covariance=np.eye(1), experiment=experiment)
     monkeypatch.setattr(infer_module, "fit_over_sessions", lambda *_: SimpleNamespace(log_evidence=50.0))

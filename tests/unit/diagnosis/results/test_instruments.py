@@ -91,9 +91,7 @@ def test_terms_are_folded_in_unless_they_are_findings(fzg: Gearbox, experiment: 
     network = experiment.machine.model.network
     wanted = {"sensor_bias": ("oil",), "torque_gain": ("torque",), "ambient_probe_offset": ("T_ambient",)}
     terms = [next(t for t in CATALOGUE[n].placed(network, scale) if t.target == target) for n, target in wanted.items()]
-    added = [
-        TermParameter(parameter=t.strength, label=t.label, names=tuple(p.name for p in t.parameters)) for t in terms
-    ]
+    added = [TermParameter(parameter=t.strength, label=t.label) for t in terms]
     experiment = replace(experiment, machine=Machine(experiment.machine.model, terms),
                          unknowns=(*experiment.unknowns, *added))  # fmt: skip
     values = VALUES | {t.strength.name: v for t, v in zip(terms, (2.0, 0.1, 0.5), strict=True)}
