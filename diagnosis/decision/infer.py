@@ -181,8 +181,8 @@ def _refitted(fit: Fit, found: Scanned, index: int, iterations: int) -> Judged:
 def _with_wider_prior(fit: Fit, index: int, iterations: int) -> Fit:
     """Everything fitted with one parameter outside its prior."""
     experiment, z = fit.experiment, fit.z.copy()
-    unknowns = list(experiment.unknowns)
-    unknowns[index] = replace(unknowns[index], amplitude=rule().wider)
+    unknowns, prior = list(experiment.unknowns), experiment.unknowns[index].parameter
+    unknowns[index] = replace(unknowns[index], parameter=replace(prior, sd=rule().wider * prior.sd))
     z[index] /= rule().wider
     wider = replace(experiment, unknowns=tuple(unknowns))
     return wider.fit(z, fit.trajectories, iterations=iterations)

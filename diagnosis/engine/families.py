@@ -90,7 +90,7 @@ def changes(
 def _sensor_sd(experiment: Experiment) -> dict[str, float]:
     """Prior of a step of every thermometer: some times its tolerance, [K]."""
     return {
-        unknown.channel: max(SENSOR_SD_K, TOLERANCES * unknown.sd)
+        unknown.channel: max(SENSOR_SD_K, TOLERANCES * unknown.parameter.sd)
         for unknown in experiment.unknowns
         if isinstance(unknown, SensorBias) and not is_total_loss(unknown.channel)
     }

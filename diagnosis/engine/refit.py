@@ -86,11 +86,10 @@ def with_candidate(fit: Fit, candidate: Hypothesis, variant: int) -> tuple[Exper
     experiment, term = fit.experiment, candidate.term
     assert term is not None  # noqa: S101 - parameters out of their priors have no term
     machine = experiment.machine
-    outside = term.kind in ("sensor", "signal")
-    if outside:
-        machine = Machine(machine.model, (*machine.terms, term))
-    else:
+    if candidate.in_network:
         machine = Machine(NetworkOnGrid(term.apply(machine.model.network), machine.model.losses), machine.terms)
+    else:
+        machine = Machine(machine.model, (*machine.terms, term))
     values = candidate.variants[variant].tolist()
     scopes = [scope_of(experiment, candidate), *(None for _ in term.parameters[1:])]
     added: list[Unknown] = []
@@ -99,11 +98,11 @@ def with_candidate(fit: Fit, candidate: Hypothesis, variant: int) -> tuple[Exper
             added.append(Held(parameter=p, of_recording=experiment.starts_at))
         elif p.sd == 0.0:
             added.append(Held(parameter=replace(p, start=value)))
-        elif outside:
+        elif candidate.in_network:
+            added.append(NetworkParameter(parameter=p, scope=scope))
+        else:
             # Differences by a date must be small next to the time that a step takes.
             step = DATE_STEP_S / p.sd if candidate.clock and p.unit == "s" and not p.log else TERM_STEP
             added.append(TermParameter(parameter=p, scope=scope, label=term.label, step=min(step, TERM_STEP)))
-        else:
-            added.append(NetworkParameter(parameter=p, scope=scope))
     z = [unknown.z_of(value) for unknown, value in zip(added, values, strict=True)]
     return replace(experiment, machine=machine, unknowns=(*experiment.unknowns, *added)), np.array(z)

@@ -39,7 +39,7 @@ class Scan:
     best : tuple of int
         Best variant of each
     log_bayes : Array, shape (candidates,)
-        Mean over the variants, against nothing
+        Mean over the variants, against nothing; 0 of a parameter outside its prior
     spread : Array, shape (candidates,)
         Of the best variant, less that mean; at least 0
     gram : Gram

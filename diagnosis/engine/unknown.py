@@ -31,36 +31,28 @@ class Unknown(ABC):
     ----------
     parameter : Parameter
         Start, prior and bounds
-    amplitude : float
-        Factor on the prior standard deviation, above 0
     scope : frozenset of str, or None
         Recordings in which it is there; None for all
     """
 
     parameter: Parameter
-    amplitude: float = 1.0
     scope: Scope = None
-
-    @property
-    def sd(self) -> float:
-        """Prior standard deviation: of the logarithm of a log-normal number, else in its unit."""
-        return self.parameter.sd * self.amplitude
 
     def value(self, z: float) -> float:
         """Value at `z`, held at the bounds."""
         p = self.parameter
-        value = p.start * np.exp(self.sd * z) if p.log else p.start + self.sd * z
+        value = p.start * np.exp(p.sd * z) if p.log else p.start + p.sd * z
         return float(min(max(value, p.lower), p.upper))
 
     def z_of(self, value: float) -> float:
         """The ``z`` of the nearest possible value."""
         p = self.parameter
         value = min(max(value, p.lower), p.upper)
-        return float(np.log(value / p.start) / self.sd if p.log else (value - p.start) / self.sd)
+        return float(np.log(value / p.start) / p.sd if p.log else (value - p.start) / p.sd)
 
     def per_z(self, z: float) -> float:
         """Change of the value with `z`, at a bound that to the inside."""
-        return self.value(z) * self.sd if self.parameter.log else self.sd
+        return self.value(z) * self.parameter.sd if self.parameter.log else self.parameter.sd
 
     def bounds(self) -> tuple[float, float]:
         """Lowest and highest ``z``."""

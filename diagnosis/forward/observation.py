@@ -121,6 +121,5 @@ def delayed_loss(trajectory: Trajectory, delay: float) -> Array:
 
 def delay_column(trajectory: Trajectory, delay: float) -> Array:
     """Change of the total loss per second of delay, shape (K + 1,), [W/s]."""
-    step = 1.0
-    later, earlier = (delayed_loss(trajectory, delay + way * step) for way in (1.0, -1.0))
-    return np.asarray((later - earlier) / (2.0 * step))
+    later, earlier = (delayed_loss(trajectory, delay + way) for way in (1.0, -1.0))
+    return np.asarray(0.5 * (later - earlier))

@@ -17,12 +17,12 @@ AS_RECORDED = "_as_recorded"  # ending of columns of readings
 
 
 def passed_on(term: Term, law: Array, time: Array, changes: Array, channels: Sequence[int]) -> Array:
-    """Return changes of the readings as a faulty sensor shows them; a shift leaves them as they are.
+    """Return changes of the readings as a faulty sensor shows them.
 
     Parameters
     ----------
     term : Term
-        Of kind ``sensor``
+        Of kind ``sensor``, no shift: that one leaves changes as they are
     law : Array, shape (K + 1,)
         Its law at the points of time
     time : Array, shape (K + 1,)
@@ -31,8 +31,6 @@ def passed_on(term: Term, law: Array, time: Array, changes: Array, channels: Seq
     channels : sequence of int
         Places of the term's channels
     """
-    if term.form == "shift":
-        return changes
     along = law.reshape(-1, *[1] * (changes.ndim - 2))
     changes = np.array(changes)
     for index in channels:
@@ -96,7 +94,8 @@ def columns_as_recorded(
         readings = np.stack([read.get(name, columns[true[name]]) for name in channels], axis=-1)
         if term.form == "shift":
             readings = readings + law[:, None]
-        readings = passed_on(term, law, time, readings, range(len(channels)))
+        else:
+            readings = passed_on(term, law, time, readings, range(len(channels)))
         read |= dict(zip(channels, readings.T, strict=True))
     return {f"{channel_column(channel)}{AS_RECORDED}": values for channel, values in read.items()}
 

@@ -138,7 +138,7 @@ def link_laws(machine: Anatomy) -> Iterator[Change]:
         yield from (_of_links(name, (name,)) for name in family.members)
 
 
-def heat_splits(machine: Anatomy, course: Course | None = None) -> Iterator[Change]:
+def heat_splits(machine: Anatomy, course: Course = CONSTANT) -> Iterator[Change]:
     """A share of the heat of a source goes to another part; sources of a family in one part go together."""
     for family in machine.source_families:
         nodes = {source.name: source.node for source in machine.network.sources}
@@ -146,7 +146,7 @@ def heat_splits(machine: Anatomy, course: Course | None = None) -> Iterator[Chan
             names = tuple(name for name in family.members if nodes[name] == node)
             for target in machine.split_targets(node):
                 heat = heats.SplitHeat(names=names, target=target)
-                yield HeatChange(place=f"{' '.join(names)} to {target}", heat=heat, course=course or CONSTANT)
+                yield HeatChange(place=f"{' '.join(names)} to {target}", heat=heat, course=course)
 
 
 def sensor_places(machine: Anatomy) -> Iterator[Change]:
@@ -269,12 +269,12 @@ GROUPS: Mapping[str, Callable[[Anatomy], Iterator[Change]]] = {
 # ---------------------------------------------------------------------- pieces of the declarations
 
 
-def _of_sources(place: str, names: tuple[str, ...], course: Course | None = None) -> HeatChange:
-    return HeatChange(place=f"heat of {place}", heat=heats.SourceHeat(names=names), course=course or CONSTANT)
+def _of_sources(place: str, names: tuple[str, ...], course: Course = CONSTANT) -> HeatChange:
+    return HeatChange(place=f"heat of {place}", heat=heats.SourceHeat(names=names), course=course)
 
 
-def _of_links(place: str, names: tuple[str, ...], course: Course | None = None) -> HeatChange:
-    return HeatChange(place=f"path {place}", heat=heats.LinkHeat(names=names), course=course or CONSTANT)
+def _of_links(place: str, names: tuple[str, ...], course: Course = CONSTANT) -> HeatChange:
+    return HeatChange(place=f"path {place}", heat=heats.LinkHeat(names=names), course=course)
 
 
 def _everything(machine: Anatomy, course: Course) -> Iterator[Change]:
@@ -282,20 +282,19 @@ def _everything(machine: Anatomy, course: Course) -> Iterator[Change]:
     yield from (_of_links(link.name, (link.name,), course) for link in machine.conducting)
 
 
-def _smooth(coordinates: tuple[str, ...], degree: int) -> Smooth | None:
-    return Smooth(coordinates=coordinates, highest=degree) if coordinates else None
-
-
 def _link_course(machine: Anatomy, family: Family) -> Smooth | None:
     """Free convection outside, flow inside; a few others by their own laws, many together by operation."""
-    few = len(family.members) <= FEW
+    by = tuple(name for name in (SPEED, TEMPERATURE) if name in machine.coordinates)
     if machine.to_boundary(family):
         more = [name for name in family.coordinates if name not in (SPEED, TORQUE, TEMPERATURE)]
-        return _smooth((TEMPERATURE, *more), DEGREE)
-    by = tuple(name for name in (SPEED, TEMPERATURE) if name in machine.coordinates)
-    if not few:
-        return _smooth(by, JOINT_DEGREE)
-    return _smooth(by, DEGREE) if machine.of_oil(family) else _smooth(family.coordinates, JOINT_DEGREE)
+        by, degree = (TEMPERATURE, *more), DEGREE
+    elif len(family.members) > FEW:
+        degree = JOINT_DEGREE
+    elif machine.of_oil(family):
+        degree = DEGREE
+    else:
+        by, degree = family.coordinates, JOINT_DEGREE
+    return Smooth(coordinates=by, highest=degree) if by else None
 
 
 def _zero(view: View) -> Array:

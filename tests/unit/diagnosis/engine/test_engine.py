@@ -142,10 +142,10 @@ def test_what_is_there_is_found_and_fitted(fit: Fit, hypotheses: list[Hypothesis
     assert again.log_evidence - fit.log_evidence > 5.0
 
 
-def test_an_amplitude_scales_the_prior(prepared: tuple[InferenceSetup, Experiment]) -> None:
+def test_a_prior_scales_the_column(prepared: tuple[InferenceSetup, Experiment]) -> None:
     _, experiment = prepared
     bias = Parameter(name="bias_here", unit="K", start=0.0, sd=1.0, lower=-10.0, upper=10.0, log=False)
-    wide, narrow = (SensorBias(parameter=bias, channel="oil", amplitude=a) for a in (1.0, 0.1))
+    wide, narrow = (SensorBias(parameter=replace(bias, sd=sd), channel="oil") for sd in (1.0, 0.1))
     assert (wide.value(2.0), narrow.value(2.0)) == pytest.approx((2.0, 0.2))
     assert narrow.z_of(narrow.value(1.5)) == pytest.approx(1.5)
     point = experiment.point(0, np.zeros(len(experiment.unknowns)))
