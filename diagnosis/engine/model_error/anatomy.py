@@ -197,15 +197,14 @@ class Anatomy:
             expression = law.heat if isinstance(law, Source) else law.conductance
             named = tuple(sorted(varying & {s.name for s in expression.free_symbols}))
             found.setdefault(named or (law.name,), []).append(law)
-        return [
-            Family(name=members[0].name if len(members) == 1 else " ".join(key), members=tuple(m.name for m in members),
-                   coordinates=self._in_order(set().union(*(self._felt(m) for m in members))),
-                   calibrated=set(key) <= varying)
-            for key, members in found.items()
-        ]  # fmt: skip
-
-    def _in_order(self, names: set[str]) -> tuple[str, ...]:
-        return tuple(name for name in self.coordinates if name in names)
+        families = []
+        for key, members in found.items():
+            felt = set[str]().union(*(self._felt(member) for member in members))
+            families.append(Family(
+                name=members[0].name if len(members) == 1 else " ".join(key), members=tuple(m.name for m in members),
+                coordinates=tuple(name for name in self.coordinates if name in felt), calibrated=set(key) <= varying,
+            ))  # fmt: skip
+        return families
 
     @cached_property
     def source_families(self) -> list[Family]:
@@ -217,23 +216,6 @@ class Anatomy:
     def link_families(self) -> list[Family]:
         """Links that conduct, by the parameters that scale them."""
         return self._families(self.conducting)
-
-    def link(self, name: str) -> Link:
-        """A link by its name."""
-        return next(link for link in self.network.links if link.name == name)
-
-    def to_boundary(self, family: Family) -> bool:
-        """True if all links of a family end at boundaries."""
-        return all(set(self.link(name).nodes) - set(self.parts) for name in family.members)
-
-    def of_oil(self, family: Family) -> bool:
-        """True if all links of a family are between the oil and other parts."""
-        return all(self.oil in self.link(name).nodes for name in family.members)
-
-    @cached_property
-    def between_parts(self) -> list[str]:
-        """Links between parts that conduct."""
-        return [link.name for link in self.conducting if set(link.nodes) <= set(self.parts)]
 
     def own_nodes(self, source: Source) -> tuple[str, ...]:
         """Parts whose temperature a loss may follow other than the oil's; of oil losses the best-linked part."""

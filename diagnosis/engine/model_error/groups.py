@@ -233,7 +233,8 @@ def losses_by_own_temperature(machine: Anatomy) -> Iterator[Change]:
 def links_by_operation(machine: Anatomy) -> Iterator[Change]:
     """Every heat path between parts by speed and temperature."""
     by = tuple(name for name in (SPEED, TEMPERATURE) if name in machine.coordinates)
-    return (_of_links(name, (name,), SpeedAndTemperature(coordinates=by)) for name in machine.between_parts)
+    return (_of_links(link.name, (link.name,), SpeedAndTemperature(coordinates=by)) for link in machine.conducting
+            if set(link.nodes) <= set(machine.parts))  # fmt: skip
 
 
 def links_by_difference(machine: Anatomy) -> Iterator[Change]:
@@ -285,12 +286,13 @@ def _everything(machine: Anatomy, course: Course) -> Iterator[Change]:
 def _link_course(machine: Anatomy, family: Family) -> Smooth | None:
     """Free convection outside, flow inside; a few others by their own laws, many together by operation."""
     by = tuple(name for name in (SPEED, TEMPERATURE) if name in machine.coordinates)
-    if machine.to_boundary(family):
+    ends = [set(link.nodes) for link in machine.conducting if link.name in family.members]
+    if not any(nodes <= set(machine.parts) for nodes in ends):
         more = [name for name in family.coordinates if name not in (SPEED, TORQUE, TEMPERATURE)]
         by, degree = (TEMPERATURE, *more), DEGREE
     elif len(family.members) > FEW:
         degree = JOINT_DEGREE
-    elif machine.of_oil(family):
+    elif all(machine.oil in nodes for nodes in ends):
         degree = DEGREE
     else:
         by, degree = family.coordinates, JOINT_DEGREE
