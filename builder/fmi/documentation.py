@@ -11,7 +11,7 @@ from typing import Literal
 
 from PIL import Image, ImageDraw
 
-from builder.fmi.model_description import Identity
+from builder.fmi.model_description import FmuIdentity
 from builder.fmi.reference import STEP_S, ReferenceRun, csv
 from builder.fmi.signals import SignalTable, nomenclature
 from builder.surrogate.train import TrainingResult
@@ -27,7 +27,7 @@ Kind = Literal["python", "native"]
 def documentation(
     gearbox: Gearbox,
     table: SignalTable,
-    identity: Identity,
+    identity: FmuIdentity,
     training: TrainingResult | None,
     reference: ReferenceRun,
     *,
@@ -48,7 +48,7 @@ def documentation(
 
 
 def _index(
-    gearbox: Gearbox, table: SignalTable, identity: Identity, training: TrainingResult | None, kind: Kind
+    gearbox: Gearbox, table: SignalTable, identity: FmuIdentity, training: TrainingResult | None, kind: Kind
 ) -> str:
     networks = "" if training is None else (
         f", networks: preset {training.preset.name}, {training.preset.samples} samples each, seed {training.seed}"

@@ -28,7 +28,7 @@ LOG_CATEGORIES: Mapping[str, str] = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class Identity:
+class FmuIdentity:
     """Content of a model description other than its signals.
 
     Attributes
@@ -63,13 +63,13 @@ class Identity:
     tolerance: float = 1e-4
 
 
-def model_description(table: SignalTable, identity: Identity, *, content: bytes = b"") -> bytes:
+def model_description(table: SignalTable, identity: FmuIdentity, *, content: bytes = b"") -> bytes:
     """The XML of an FMU.
 
     Parameters
     ----------
     table : SignalTable
-    identity : Identity
+    identity : FmuIdentity
     content : bytes
         What else makes up the FMU (or a hash of it): the GUID is a hash of this and of the XML
 
@@ -94,7 +94,7 @@ def guid_of(xml: bytes) -> str:
     return attributes.get("guid") or attributes["instantiationToken"]
 
 
-def _xml(table: SignalTable, identity: Identity, *, guid: str) -> bytes:
+def _xml(table: SignalTable, identity: FmuIdentity, *, guid: str) -> bytes:
     root = Element(
         "fmiModelDescription", fmiVersion="2.0", modelName=identity.model_name, guid=guid,
         description=identity.description, author=identity.author, version=identity.version,
@@ -131,14 +131,14 @@ def add_log_categories(root: Element) -> None:
         SubElement(categories, "Category", name=name, description=meaning)
 
 
-def add_experiment(root: Element, identity: Identity) -> None:
+def add_experiment(root: Element, identity: FmuIdentity) -> None:
     """The default experiment."""
     experiment = {"stopTime": identity.stop_time, "tolerance": identity.tolerance, "stepSize": identity.step_size}
     attributes = {name: number(value) for name, value in experiment.items()}
     SubElement(root, "DefaultExperiment", {"startTime": "0"} | attributes)
 
 
-def add_co_simulation(root: Element, identity: Identity) -> Element:
+def add_co_simulation(root: Element, identity: FmuIdentity) -> Element:
     """Capabilities of the FMU."""
     element = SubElement(root, "CoSimulation", modelIdentifier=identity.model_identifier)
     for name, value in identity.flags.items():

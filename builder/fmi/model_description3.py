@@ -11,7 +11,7 @@ from xml.etree.ElementTree import Element, SubElement
 from builder.fmi.model_description import (
     DEPENDENCY_KINDS,
     INITIAL_DEPENDENCY_KINDS,
-    Identity,
+    FmuIdentity,
     add_co_simulation,
     add_experiment,
     add_log_categories,
@@ -26,12 +26,12 @@ from builder.fmi.signals import SignalTable
 from models.quantities.quantities import TYPES
 
 
-def model_description3(table: SignalTable, identity: Identity, *, content: bytes = b"") -> bytes:
+def model_description3(table: SignalTable, identity: FmuIdentity, *, content: bytes = b"") -> bytes:
     """The XML of an FMU of FMI 3.0; arguments as of :func:`builder.fmi.model_description.model_description`."""
     return with_guid(lambda token: _xml(table, identity, token), content)
 
 
-def build_description(identity: Identity) -> bytes:
+def build_description(identity: FmuIdentity) -> bytes:
     """``sources/buildDescription.xml``: the files that a compiler takes."""
     root = Element("fmiBuildDescription", fmiVersion="3.0")
     configuration = SubElement(root, "BuildConfiguration", modelIdentifier=identity.model_identifier)
@@ -41,7 +41,7 @@ def build_description(identity: Identity) -> bytes:
     return document(root)
 
 
-def _xml(table: SignalTable, identity: Identity, token: str) -> bytes:
+def _xml(table: SignalTable, identity: FmuIdentity, token: str) -> bytes:
     root = Element(
         "fmiModelDescription", fmiVersion="3.0", modelName=identity.model_name, instantiationToken=token,
         description=identity.description, author=identity.author, version=identity.version,

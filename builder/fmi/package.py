@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from builder.fmi.documentation import Kind, documentation
-from builder.fmi.model_description import Identity
+from builder.fmi.model_description import FmuIdentity
 from builder.fmi.recorded import recorded_file
 from builder.fmi.reference import reference_run
 from builder.fmi.signals import SignalTable, signal_table
@@ -37,7 +37,7 @@ class CommonParts:
     losses : SurrogateLosses or None
         None for a network without loss components
     table : SignalTable
-    identity : Identity
+    identity : FmuIdentity
     pages : mapping of path to bytes
         Documentation, and what the FMU knows of recordings, by path in the archive
     """
@@ -45,7 +45,7 @@ class CommonParts:
     network: ThermalNetwork
     losses: SurrogateLosses | None
     table: SignalTable
-    identity: Identity
+    identity: FmuIdentity
     pages: Mapping[str, bytes]
 
 
@@ -100,13 +100,13 @@ def common_parts(
 
 def gearbox_identity(
     gearbox: Gearbox, output: Path, flags: Mapping[str, bool | int], correction: Correction | None
-) -> Identity:
+) -> FmuIdentity:
     """Description of an FMU of a gearbox."""
     version = project_version()
     model = "thermal network" if gearbox.is_parametric else "reduced-order twin of a detailed loss model"
     subject = "Temperatures" if isinstance(gearbox.loss_laws(), NoLosses) else "Power loss and temperatures"
     model += f", {correction.words}" if correction is not None and correction.has_physics else ""
-    return Identity(
+    return FmuIdentity(
         model_name=gearbox.name,
         model_identifier=model_identifier(output.stem),
         description=f"{subject} of {gearbox.name}: {model}",

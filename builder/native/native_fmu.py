@@ -15,7 +15,7 @@ from importlib.resources import files
 from pathlib import Path
 from sys import float_info
 
-from builder.fmi.model_description import Identity, guid_of, model_description
+from builder.fmi.model_description import FmuIdentity, guid_of, model_description
 from builder.fmi.model_description3 import build_description, model_description3
 from builder.fmi.package import common_parts, package_fmu
 from builder.fmi.signals import Signal, SignalTable
@@ -160,7 +160,7 @@ def build_native_archive(
     output: Path,
     *,
     table: SignalTable,
-    identity: Identity,
+    identity: FmuIdentity,
     sources: Mapping[str, str],
     pages: Mapping[str, bytes],
     platforms: str = "host",
@@ -174,7 +174,7 @@ def build_native_archive(
     output : Path
     table : SignalTable
         Variables; their places are the value references that the model uses
-    identity : Identity
+    identity : FmuIdentity
         Of the model description; flags and source files are added
     sources : mapping of file name to str
         The model: C files and headers that implement ``model.h``

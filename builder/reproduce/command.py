@@ -39,11 +39,11 @@ def reproduce(output: Path, seed: int, jobs: int) -> None:
     with progress(LOADING):
         from builder.reproduce.report import FIGURES, NUMBERS, PAGE, SUMMARY  # imports matplotlib, scikit-learn, onnx
         from builder.reproduce.reproduce import reproduce as run
-        from builder.reproduce.study import Settings
+        from builder.reproduce.study import StudySettings
 
     begin = time.perf_counter()
     with progress("starting") as told:
-        report = run(output, settings=Settings(seed=seed, jobs=jobs), progress=told)
+        report = run(output, settings=StudySettings(seed=seed, jobs=jobs), progress=told)
     rows = [(item.key, item.title, item.verdict.value) for item in report.items]
     console.table("The paper, reproduced", ["item", "what", "verdict"], rows, text_columns=3)
     counted = ", ".join(f"{number} {verdict.value}" for verdict, number in report.count.items())

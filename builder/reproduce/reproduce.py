@@ -13,7 +13,7 @@ import numpy as np
 from builder.python.python_fmu import build_python_fmu
 from builder.reproduce import drive, losses, networks, others, rig, speed, stages
 from builder.reproduce.report import Item, Report
-from builder.reproduce.study import Settings, Study
+from builder.reproduce.study import Study, StudySettings
 from builder.surrogate.onnx_export import export_onnx
 from builder.surrogate.train import train_surrogate
 from models.assembly.gearbox import load_gearbox
@@ -52,7 +52,7 @@ ITEMS = (
 )
 
 
-def reproduce(folder: Path, *, settings: Settings | None = None, progress: Progress = silent) -> Report:
+def reproduce(folder: Path, *, settings: StudySettings | None = None, progress: Progress = silent) -> Report:
     """Recompute the paper and write the report.
 
     Parameters
@@ -60,7 +60,7 @@ def reproduce(folder: Path, *, settings: Settings | None = None, progress: Progr
     folder : Path
         Where ``report.html``, ``report.json``, ``figures/``, the FMU and its networks go; they appear together when all
         is done, files of an earlier report are replaced, others left alone
-    settings : Settings or None
+    settings : StudySettings or None
     progress : callable
         Told what is being done
 
@@ -74,7 +74,7 @@ def reproduce(folder: Path, *, settings: Settings | None = None, progress: Progr
         If the folder cannot be written to.
     """
     begin = time.perf_counter()
-    settings = settings or Settings()
+    settings = settings or StudySettings()
     gearbox = load_gearbox(GEARBOX)
     with atomic_folder(folder) as stage:
         printed = train_surrogate(

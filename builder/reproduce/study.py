@@ -38,7 +38,7 @@ FACTORS = np.geomspace(1.0, 40.0, 41)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Settings:
+class StudySettings:
     """How much is computed.
 
     Attributes
@@ -82,7 +82,7 @@ class Study:
         Networks of the default preset, and as the paper prints them
     fmu : Path
         Of our networks
-    settings : Settings
+    settings : StudySettings
     progress : callable
         Told what is being done
     """
@@ -91,7 +91,7 @@ class Study:
     ours: TrainingResult
     printed: TrainingResult
     fmu: Path
-    settings: Settings
+    settings: StudySettings
     progress: Progress
 
     @cached_property

@@ -67,7 +67,7 @@ NO_DIAGNOSIS: Mapping[str, Any] = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class Outcome:
+class MemberOutcome:
     """Result of one gearbox.
 
     Attributes
@@ -151,7 +151,7 @@ def diagnose_fleet(
     settings: Settings,
     jobs: int = 1,
     dask: str | None = None,
-) -> list[Outcome]:
+) -> list[MemberOutcome]:
     """Diagnose every gearbox of a fleet; an error with one is its row in the summary, and the others go on.
 
     Parameters
@@ -172,7 +172,7 @@ def diagnose_fleet(
 
     Returns
     -------
-    list of Outcome
+    list of MemberOutcome
         In the order of `members`
 
     Raises
@@ -180,7 +180,7 @@ def diagnose_fleet(
     InputError
         If the output cannot be written to, or no scheduler answers.
     """
-    outcomes: dict[str, Outcome] = {}
+    outcomes: dict[str, MemberOutcome] = {}
     inside = jobs if len(members) == 1 and dask is None else 1
 
     def readable() -> Iterator[tuple[object, ...]]:
@@ -221,25 +221,25 @@ def diagnose_fleet(
 def _diagnose(
     name: str, recordings: ByRole, gearbox: Gearbox, catalogue: Mapping[str, Mechanism], switched_off: Sequence[str],
     settings: Settings, jobs: int,
-) -> Outcome:  # fmt: skip
+) -> MemberOutcome:  # fmt: skip
     train, holdout, baseline = recordings
     try:
         with tempfile.TemporaryDirectory() as folder:
             found = diagnose(train, gearbox, holdout=holdout, baseline=baseline, switched_off=switched_off,
                              catalogue=catalogue, settings=settings, jobs=jobs)  # fmt: skip
             written = write_files(found, gearbox, [*train, *holdout], Path(folder))
-            return Outcome(row=_row(name, found), files={path.name: path.read_bytes() for path in written})
+            return MemberOutcome(row=_row(name, found), files={path.name: path.read_bytes() for path in written})
     except Exception as error:  # noqa: BLE001 - shown with its traceback at the end, when the others are done
         return _without_diagnosis(name, error)
 
 
-def _without_diagnosis(name: str, error: Exception) -> Outcome:
+def _without_diagnosis(name: str, error: Exception) -> MemberOutcome:
     fault = "" if isinstance(error, InputError) else "".join(traceback.format_exception(error))
     text = f"a fault of this program: {fault.splitlines()[-1]}" if fault else str(error)
-    return Outcome(row={**NO_DIAGNOSIS, "gearbox": name, "error": text}, fault=fault)
+    return MemberOutcome(row={**NO_DIAGNOSIS, "gearbox": name, "error": text}, fault=fault)
 
 
-def _write(outcome: Outcome, output: Path) -> Outcome:
+def _write(outcome: MemberOutcome, output: Path) -> MemberOutcome:
     if not outcome.files:
         return outcome
     try:

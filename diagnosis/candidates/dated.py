@@ -60,7 +60,7 @@ class Axis:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Course:
+class DatedCourse:
     """A course in time that a law is multiplied by.
 
     Attributes
@@ -94,12 +94,12 @@ class Course:
 NOW, START = symbol("now"), "start"
 
 
-def step(axis: Axis, *, slow: bool = True) -> Course:
+def step(axis: Axis, *, slow: bool = True) -> DatedCourse:
     """From a date on, at once or (if `slow` ones are tried) in some hours, and then constant."""
     since, rise = symbol("since"), symbol("within")
     rises = axis.distance * np.array(RISES)
     at_once, slowly = _products(axis.dates, [axis.edge_s]), _products([0.0, *axis.dates[::2]], rises)
-    return Course(
+    return DatedCourse(
         ending=STEP, how="from_date", sentence="From a date on",
         parameters=(axis.moment("since"), _span("within", axis.edge_s, rises[-1])),
         variants=np.concatenate([at_once, slowly]) if slow else at_once,
@@ -107,18 +107,18 @@ def step(axis: Axis, *, slow: bool = True) -> Course:
     )  # fmt: skip
 
 
-def for_a_while(axis: Axis) -> Course:
+def for_a_while(axis: Axis) -> DatedCourse:
     """From one date to another."""
     since, length = symbol("since"), symbol("lasting")
     lengths = axis.distance * np.array(LENGTHS)
-    return Course(
+    return DatedCourse(
         ending=WHILE, how="from_date", sentence="From one date to another",
         parameters=(axis.moment("since"), _span("lasting", *lengths)), variants=_products(axis.dates[::2], lengths),
         law=steps(NOW, at=since, width=0.5 * axis.edge_s) - steps(NOW, at=since + length, width=0.5 * axis.edge_s),
     )  # fmt: skip
 
 
-def over_hours(axis: Axis) -> Course:
+def over_hours(axis: Axis) -> DatedCourse:
     """Slowly over the hours since the first row of the first recording: on and on, or until it has settled."""
     names = ("linear", "settling", "fading")
     linear, settling, fading = (symbol(name) for name in names)
@@ -126,7 +126,7 @@ def over_hours(axis: Axis) -> Course:
         Parameter(name=name, start=0.0, sd=0.0, lower=0.0, upper=1.0, log=False) for name in names
     )  # fmt: skip
     decay = sp.exp(-NOW / SETTLING_S)
-    return Course(
+    return DatedCourse(
         ending=HOURS, how="over_hours", sentence="Slowly over the hours", parameters=parameters, variants=np.eye(3),
         law=linear * NOW / max(LINEAR_S, axis.end) + settling * (1 - decay) + fading * decay,
     )  # fmt: skip
@@ -142,7 +142,7 @@ def _products(first: Iterable[float], second: Iterable[float]) -> Array:
     return np.array([(a, b) for a in first for b in second]).reshape(-1, 2)
 
 
-def changing(placed: Placed, course: Course, axis: Axis, *, sd: float | None = None) -> Hypothesis:
+def changing(placed: Placed, course: DatedCourse, axis: Axis, *, sd: float | None = None) -> Hypothesis:
     """A law times a course in time.
 
     Parameters

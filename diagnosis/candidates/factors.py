@@ -79,8 +79,7 @@ def _links(network: ThermalNetwork, scale: Scale) -> Iterator[Placed]:
 
 def _link(network: ThermalNetwork, scale: Scale, links: Sequence[Link], place: str) -> Placed:
     a, b = (_group(network, node).removesuffix("s") for node in links[0].nodes)
-    boundaries = {node.name for node in network.nodes if node.temperature is not None}
-    outward = bool(boundaries & set(links[0].nodes))
+    outward = bool(network.boundaries.keys() & set(links[0].nodes))
     name = "air_cooling" if AIR in links[0].nodes else f"{a}_{b}_conductance"
     what = "cooling by air" if AIR in links[0].nodes else f"the conductance between {a} and {b}".replace("_", " ")
     return _factor(scale, "link_factor", name, place, tuple(link.name for link in links),

@@ -47,7 +47,7 @@ class InClass:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Near:
+class NearReadings:
     """All pieces linearised near the readings, and what model error does there.
 
     Attributes
@@ -64,7 +64,7 @@ class Near:
     columns: tuple[Array, ...]
 
     @classmethod
-    def of(cls, experiment: Experiment, error: ModelError, fit: Fit) -> Near:
+    def of(cls, experiment: Experiment, error: ModelError, fit: Fit) -> NearReadings:
         """Linearise about the courses of a fit, with the model error assumed there and new noise filters."""
         free = replace(experiment, filters=None)
         parts = tuple(free.linearise_piece(i, fit.z, trajectory, error=trajectory.piece.error)
@@ -173,7 +173,7 @@ class Calibration:
         The most probable class
     evidence : mapping of str to float
         Log evidence of every class, prior included, less that of the best
-    near : Near
+    near : NearReadings
         Where it is linearised
     of_others : Calibration or None
         By the readings without the channels set apart alone, if there are any
@@ -181,7 +181,7 @@ class Calibration:
 
     chosen: InClass
     evidence: Mapping[str, float]
-    near: Near
+    near: NearReadings
     of_others: Calibration | None = None
     _known: dict[str, InClass] = field(default_factory=dict, init=False)
 
@@ -229,7 +229,7 @@ def calibrate_with_error(experiment: Experiment, start: Fit, apart: Collection[s
         return found
     sound, others = found.near.experiment, found.chosen
     whole = replace(experiment.with_random_heat(sound.random_heat), most_deviation=sound.most_deviation)
-    near = Near.of(whole, error, found.fit)
+    near = NearReadings.of(whole, error, found.fit)
     chosen = near.fitted(others.error_class, found.fit, others.deviation, iterations=0)
     return replace(found, chosen=chosen, near=near, of_others=found)
 
@@ -239,13 +239,14 @@ def _calibrated(experiment: Experiment, error: ModelError, start: Fit) -> Calibr
     (widest,) = (one for one in classes if one.name == WIDEST_CLASS)
     # There may be several basins: without model error, parameters may have gone far to stand in for it.
     middles = experiment.fit(np.zeros(len(experiment.unknowns)), iterations=0)
-    first = [Near.of(experiment, error, one).fitted(widest, one) for one in (start, middles)]
+    first = [NearReadings.of(experiment, error, one).fitted(widest, one) for one in (start, middles)]
     fit = max(first, key=lambda one: one.log_evidence).fit
-    near = Near.of(experiment, error, fit)
+    near = NearReadings.of(experiment, error, fit)
     experiment = experiment.with_random_heat(near.likely_random_heat(widest, fit.z))
-    fit = Near.of(experiment, error, fit).fitted(widest, fit, iterations=ITERATIONS).fit
+    fit = NearReadings.of(experiment, error, fit).fitted(widest, fit, iterations=ITERATIONS).fit
     experiment = replace(
-        experiment, most_deviation=most_deviation(Near.of(experiment, error, fit).gram(widest, fit.z), experiment)
+        experiment,
+        most_deviation=most_deviation(NearReadings.of(experiment, error, fit).gram(widest, fit.z), experiment),
     )
     return _settled(experiment, error, fit)
 
@@ -259,12 +260,12 @@ def recalibrate(calibration: Calibration, fit: Fit) -> Calibration:
 def _settled(experiment: Experiment, error: ModelError, fit: Fit) -> Calibration:
     """The class of model error by the evidence about a fit, and the machine with it."""
     classes = error_classes()
-    near = Near.of(experiment, error, fit)
+    near = NearReadings.of(experiment, error, fit)
     evidence = {one.name: near.log_evidence(one, fit.z) for one in classes}
     best = max(classes, key=lambda one: evidence[one.name])
     chosen = near.fitted(best, fit)
     for _ in range(TURNS - 1):
-        near = Near.of(experiment, error, chosen.fit)
+        near = NearReadings.of(experiment, error, chosen.fit)
         chosen = near.fitted(best, chosen.fit, chosen.deviation)
     largest = max(evidence.values())
     return Calibration(chosen=chosen, evidence={name: value - largest for name, value in evidence.items()}, near=near)

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import sympy as sp
 
-from diagnosis.engine.calibration import WIDEST_CLASS, Calibration, Near
+from diagnosis.engine.calibration import WIDEST_CLASS, Calibration, NearReadings
 from diagnosis.engine.fit import Fit
 from diagnosis.engine.learnt import ErrorClass, error_classes
 from diagnosis.engine.model_error import ModelError, groups, heats
@@ -84,7 +84,7 @@ def in_writable_class(fit: Fit, error_class: ErrorClass, calibration: Calibratio
     return there.fit(fit.z, fit.trajectories), best
 
 
-def with_learnt_error(fit: Fit, near: Near, error_class: ErrorClass) -> tuple[Fit, tuple[Term, ...]]:
+def with_learnt_error(fit: Fit, near: NearReadings, error_class: ErrorClass) -> tuple[Fit, tuple[Term, ...]]:
     """The machine of a fit with the model error of its class written into it.
 
     The values of the unknowns are those that were fitted with the straight lines of the same model error, deviations of
@@ -95,7 +95,7 @@ def with_learnt_error(fit: Fit, near: Near, error_class: ErrorClass) -> tuple[Fi
     ----------
     fit : Fit
         With model error of the class in its metric
-    near : Near
+    near : NearReadings
         Where model error was linearised
 
     Returns

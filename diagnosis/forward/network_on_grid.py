@@ -289,7 +289,7 @@ class NetworkOnGrid:
     @cached_property
     def boundary(self) -> Mapping[sp.Symbol, sp.Expr]:
         """Expressions of all boundary temperatures, [degC], by their signal."""
-        return {symbol(f"T_{n.name}"): n.temperature for n in self.network.nodes if n.temperature is not None}
+        return {symbol(f"T_{node}"): law for node, law in self.network.boundaries.items()}
 
     @cached_property
     def _signal_names(self) -> list[str]:

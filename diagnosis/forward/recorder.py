@@ -16,7 +16,7 @@ from models.correction.correction import Correction
 from models.correction.instruments import SensorCorrection
 from models.files.cycle import Cycle
 from models.files.cycle_file import RecordedStart
-from models.quantities.quantities import TOTAL_LOSS, column_of_input, is_total_loss, node_of_channel
+from models.quantities.quantities import TOTAL_LOSS, column_of_input, is_total_loss, node_columns, node_of_channel
 
 PASSES = 3  # simulations where a shift of an input follows the machine's temperatures
 Columns = Mapping[str, Array]
@@ -109,7 +109,7 @@ def read_as_recorded(columns: Columns, correction: Correction, *, late: float = 
     dict of column name to Array, shape (N,)
         ``T_oil_degC_as_recorded`` of every channel of the correction; of all nodes if readings are late
     """
-    nodes = {name[2:-5] for name in columns if name.startswith("T_") and name.endswith("_degC")} - {"ambient"}
+    nodes = node_columns(columns)
     everything = [*sorted(nodes), TOTAL_LOSS] if late else []
     read = {c: np.asarray(columns[channel_column(c)]) for c in everything if channel_column(c) in columns}
     read |= {

@@ -10,7 +10,7 @@ from diagnosis.forward.recurrence import lagged
 from models.base.errors import InputError
 from models.base.types import Array
 from models.network.laws import compile_function, function_source
-from models.quantities.quantities import column_of, is_total_loss, node_of_channel, quantity_of_column
+from models.quantities.quantities import column_of, is_total_loss, node_columns, node_of_channel, quantity_of_column
 from models.terms.term import Term
 
 AS_RECORDED = "_as_recorded"  # ending of columns of readings
@@ -83,7 +83,7 @@ def columns_as_recorded(
         ``T_oil_degC_as_recorded`` for every channel that is in `read` or that a term distorts
     """
     time = columns["time_s"]
-    nodes = {name[2:-5] for name in columns if name.startswith("T_") and name.endswith("_degC")}
+    nodes = node_columns(columns)
     read = dict(read or {})
     for term in terms:
         true = {channel: channel_column(node_of_channel(channel, nodes)) for channel in term.target}

@@ -47,7 +47,7 @@ def _rows_of(network: ThermalNetwork, nominal: ThermalNetwork) -> list[list[str]
 def _layers(network: ThermalNetwork, nominal: ThermalNetwork) -> dict[str, int]:
     """Steps from every node to the surroundings, along the links of the model as delivered."""
     joined = [link.nodes for link in nominal.links]
-    layer = {node.name: 0 for node in nominal.nodes if node.temperature is not None}
+    layer = dict.fromkeys(nominal.boundaries, 0)
     reached = list(layer)
     for near in reached:
         for pair in joined:

@@ -14,13 +14,13 @@ from builder.reproduce.report import FIGURES, NUMBERS, PAGE, SUMMARY, Check, Ite
 from builder.reproduce.reproduce import reproduce
 from builder.reproduce.rig import characteristics
 from builder.reproduce.speed import measure
-from builder.reproduce.study import Settings, Study
+from builder.reproduce.study import Study, StudySettings
 from models.assembly.gearbox import load_gearbox
 from models.base.errors import InputError
 from models.base.progress import silent
 
 SLOW = pytest.mark.slow  # the report takes a minute
-QUICK = Settings(
+QUICK = StudySettings(
     jobs=1, samples=400, test_points=100, runs=1, longest_s=1.0, step_s=600.0, fine_step_s=300.0, trajectories=2
 )
 # Times of this machine at this moment decide them; they do not decide the verdict of an item.

@@ -147,9 +147,8 @@ def places(kind: str, network: ThermalNetwork) -> list[str]:
     if kind == "link_factor":
         return [link.name for link in network.links]
     if kind in ("new_link", "thermostat"):
-        boundaries = [node.name for node in network.nodes if node.temperature is not None]
         known = {frozenset(link.nodes) for link in network.links}
-        pairs = [(a, b) for a in parts for b in boundaries]
+        pairs = [(a, b) for a in parts for b in network.boundaries]
         if kind == "new_link":
             pairs += [(a, b) for i, a in enumerate(parts) for b in parts[i + 1 :]]
             pairs = [pair for pair in pairs if frozenset(pair) not in known]
@@ -209,6 +208,5 @@ def _flow(model: CalibratedModel, d: Differences, name: str, share: Array | floa
     conductance = sp.lambdify(names, law, "numpy")(*(known[key] for key in names))
     a, b = (d.result.temperatures[node][1:] for node in link.nodes)
     flow = conductance * (a - b) * share
-    boundaries = {node.name for node in d.network.nodes if node.temperature is not None}
     ends = zip(link.nodes, (-flow, flow), strict=True)
-    return {node: heat for node, heat in ends if node not in boundaries}
+    return {node: heat for node, heat in ends if node not in d.network.boundaries}

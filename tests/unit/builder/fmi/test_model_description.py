@@ -7,13 +7,13 @@ from xml.etree import ElementTree as ET
 import pytest
 from fmpy.validation import validate_fmu
 
-from builder.fmi.model_description import Identity, model_description
+from builder.fmi.model_description import FmuIdentity, model_description
 from builder.fmi.model_description3 import model_description3
 from builder.fmi.signals import SignalTable, signal_table
 from builder.surrogate.train import TrainingResult
 from models.assembly.gearbox import Gearbox, load_gearbox
 
-IDENTITY = Identity(
+IDENTITY = FmuIdentity(
     model_name="a < b & c",
     model_identifier="box",
     description="Überlast",

@@ -14,7 +14,7 @@ from builder.workflows.held_out_fmu import overall
 from builder.workflows.prove_real import BY_SOUND, PLANTS, data_file, prove_real, rows_of
 from diagnosis.decision.posterior import Judged, Posterior
 from diagnosis.decision.settings import Settings
-from diagnosis.engine.calibration import Calibration, Near
+from diagnosis.engine.calibration import Calibration, NearReadings
 from diagnosis.engine.fit import calibrate
 from diagnosis.engine.learnt import error_classes, rule
 from diagnosis.engine.model_error import ModelError
@@ -35,7 +35,7 @@ def calibrated(train: Any, gearbox: Any, *, holdout: Any, **_: object) -> Diagno
     fit, apart = calibrate_apart(experiment, plain)
     nothing = Judged(effects=(), log_prior=0.0, log_bayes=0.0, fit=fit, error_class=error_classes()[0])
     posterior = Posterior(nothing=nothing, judged=(), log_e=-1.0, threshold=5.0, class_threshold=5.0, rule=rule())
-    near = Near.of(experiment, ModelError.of(experiment), plain)
+    near = NearReadings.of(experiment, ModelError.of(experiment), plain)
     calibration = Calibration(chosen=near.fitted(nothing.error_class, plain, iterations=0), evidence={}, near=near)
     return assemble(
         setup, experiment, posterior, (), plain=plain, calibration=calibration,

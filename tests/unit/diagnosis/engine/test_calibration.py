@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from diagnosis.engine.calibration import WIDEST_CLASS, Calibration, Near, calibrate_with_error, recalibrate
+from diagnosis.engine.calibration import WIDEST_CLASS, Calibration, NearReadings, calibrate_with_error, recalibrate
 from diagnosis.engine.fit import Experiment, calibrate
 from diagnosis.engine.learnt import error_classes
 from diagnosis.engine.model_error import ModelError
@@ -46,7 +46,7 @@ def test_it_is_judged_by_the_random_heat_that_its_readings_show(found: Calibrati
 
 def test_it_has_settled(found: Calibration) -> None:
     chosen = found.chosen
-    near = Near.of(chosen.fit.experiment, found.near.error, chosen.fit)
+    near = NearReadings.of(chosen.fit.experiment, found.near.error, chosen.fit)
     again = near.fitted(chosen.error_class, chosen.fit, chosen.deviation)
     assert np.abs(again.fit.z - chosen.fit.z).max() < 0.1
     assert again.log_evidence == pytest.approx(chosen.log_evidence, abs=0.5)
@@ -88,7 +88,7 @@ def shaken(fzg: Gearbox, *, times: float, lasting: float = 1.0) -> Experiment:
 
 def likely(experiment: Experiment) -> RandomHeat:
     fit = calibrate(experiment)
-    return Near.of(experiment, ModelError.of(experiment), fit).likely_random_heat(WIDEST, fit.z)
+    return NearReadings.of(experiment, ModelError.of(experiment), fit).likely_random_heat(WIDEST, fit.z)
 
 
 def test_random_heats_are_as_much_as_the_readings_show(fzg: Gearbox) -> None:

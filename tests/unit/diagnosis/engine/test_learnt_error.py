@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from diagnosis.engine import learnt_error as module
-from diagnosis.engine.calibration import Calibration, Near
+from diagnosis.engine.calibration import Calibration, NearReadings
 from diagnosis.engine.fit import Experiment
 from diagnosis.engine.learnt import error_classes
 from diagnosis.engine.learnt_error import (
@@ -127,7 +127,7 @@ def test_a_correction_holds_it() -> None:
 def test_the_session_that_is_predicted_deviates_from_what_all_share() -> None:
     experiment = experiment_of("fzg")
     plain = experiment.with_filters(experiment.fit(iterations=0).parts).fit(iterations=0)
-    near = Near.of(experiment, ModelError.of(experiment), plain)
+    near = NearReadings.of(experiment, ModelError.of(experiment), plain)
     splits = next(one for one in error_classes() if one.name == "splits")
     fit = near.fitted(splits, plain, 0.4, iterations=0).fit
     metric = fit.experiment.metric
@@ -149,7 +149,7 @@ def test_classes_that_a_model_can_hold() -> None:
 def test_a_class_that_no_model_holds_is_replaced_by_the_best_that_one_holds() -> None:
     experiment = experiment_of("fzg")
     plain = experiment.with_filters(experiment.fit(iterations=0).parts).fit(iterations=0)
-    near = Near.of(experiment, ModelError.of(experiment), plain)
+    near = NearReadings.of(experiment, ModelError.of(experiment), plain)
     classes = {one.name: one for one in error_classes()}
     links, small = classes["splits, cores and links"], classes["splits and small law errors"]
     chosen = near.fitted(links, plain, iterations=0)

@@ -15,7 +15,7 @@ from diagnosis.candidates.hypotheses import Hypothesis, hypothesis_of
 from diagnosis.decision.answer import Answer
 from diagnosis.decision.posterior import Expected, Judged, Placebo, Posterior
 from diagnosis.decision.settings import Settings
-from diagnosis.engine.calibration import Calibration, Near
+from diagnosis.engine.calibration import Calibration, NearReadings
 from diagnosis.engine.families import candidates_of
 from diagnosis.engine.fit import Experiment, Fit, calibrate
 from diagnosis.engine.learnt import error_classes, rule
@@ -118,7 +118,7 @@ Assemble = Callable[..., Diagnosis]
 @pytest.fixture(scope="module")
 def calibration(prepared: Prepared) -> Calibration:
     _, experiment, plain = prepared
-    near = Near.of(experiment, ModelError.of(experiment), plain)
+    near = NearReadings.of(experiment, ModelError.of(experiment), plain)
     evidence = {one.name: near.log_evidence(one, plain.z) for one in error_classes()}
     return Calibration(chosen=near.fitted(error_classes()[0], plain, iterations=0), evidence=evidence, near=near)
 
