@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from builder.fmi.model_description import Identity
+from builder.fmi.model_description import FmuIdentity
 from builder.fmi.package import AUTHOR, model_identifier, write_archive
 from builder.fmi.signals import Signal, SignalTable
 from builder.native.data import number
@@ -194,7 +194,7 @@ def _source(name: str) -> str:
 
 def _build(output: Path, table: SignalTable, name: str, text: str, sources: Mapping[str, str], platforms: str) -> Path:
     version = project_version()
-    identity = Identity(
+    identity = FmuIdentity(
         model_name=name,
         model_identifier=model_identifier(output.stem),
         description=text,
