@@ -10,10 +10,11 @@ from pathlib import Path
 from typing import Any
 
 from diagnosis.proof.zoo.setting import Changed, What
-from models.base.errors import InputError
+from models.base.errors import InputError, did_you_mean
 from models.mechanisms import CATALOGUE
 
 CONTROL, MESSY, OUTSIDE = "control", "messy", "outside"
+NONE = "none"  # of the catalogue
 MEASUREMENT = ("sensor", "input", "clock")
 # Names that others gave to mechanisms of the catalogue.
 ALIASES = {
@@ -132,8 +133,10 @@ def read_truths(path: Path) -> dict[str, Truth]:
             evidence = path.with_name("oracle.json")
             oracle = json.loads(evidence.read_text(encoding="utf-8")) if evidence.exists() else {}
         if not raw:
-            raise InputError(f"{path}: holds no truth (<case>.json)")
+            raise InputError("holds no truth (<case>.json)")
         return {case: truth_of(one, oracle.get(case, {})) for case, one in raw.items()}
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror})") from error
     except (ValueError, KeyError, TypeError, AttributeError) as error:
@@ -184,11 +187,9 @@ def _effect(raw: Mapping[str, Any], case: Mapping[str, Any], oracle: Mapping[str
     changed = changed_of(raw)
     nats = raw.get("oracle") or (case.get("oracle") if len(case["effects"]) == 1 else None) or {}
     given = oracle.get(raw["name"], {}).get("nats", {})
-    catalogue = raw.get("catalogue") or ""
-    name = ALIASES.get(catalogue, catalogue)
     return TrueEffect(
         label=raw["name"],
-        name=name if name in CATALOGUE else "",
+        name=_mechanism(raw),
         changed=changed,
         heat_W=_heat(raw),
         course=next((one.get("course", "") for one in raw.get("changed", [])), ""),
@@ -197,6 +198,16 @@ def _effect(raw: Mapping[str, Any], case: Mapping[str, Any], oracle: Mapping[str
             float(nats.get("D_tool_nats", given.get("lumped|0.1|T", math.nan))),
         ),
     )
+
+
+def _mechanism(effect: Mapping[str, Any]) -> str:
+    """Mechanism of the catalogue that an effect is, or empty."""
+    given = effect.get("catalogue") or NONE
+    name = ALIASES.get(given, given)
+    if name != NONE and name not in CATALOGUE:
+        hint = did_you_mean(name, [*CATALOGUE, NONE])
+        raise InputError(f"effect {effect['name']!r}: its catalogue is {given!r}, which is no mechanism{hint}")
+    return "" if name == NONE else name
 
 
 def changed_of(effect: Mapping[str, Any]) -> tuple[Changed, ...]:
@@ -210,10 +221,7 @@ def changed_of(effect: Mapping[str, Any]) -> tuple[Changed, ...]:
                     sign=one["sign"] * (flip if one["what"] == "input" else 1))
             for one in effect["changed"]
         )  # fmt: skip
-    catalogue = effect.get("catalogue") or ""
-    name = ALIASES.get(catalogue, catalogue) or effect["name"]
-    if name == "none":
-        name = effect["name"]
+    name = _mechanism(effect) or effect["name"]
     kind = effect["kind"]
     what: What
     if kind == "sensor":

@@ -59,7 +59,7 @@ INSIDE = truth("single", effect("oil_housing_speed", "link", ["oil", "housing_up
 TORQUE = truth("sensor", effect("torque_gain", "input", ["torque"]) | {"family": "measurement"})
 BIAS = truth("sensor", effect("sensor_bias", "sensor", ["pinion"]))
 ALIEN = truth("outside", effect("hum", "loss", ["bearing_1"]) | {"catalogue": "none"})
-WORN = truth("date", effect("loss_changes", "loss", ["mesh"]))
+WORN = truth("date", effect("loss_changes", "loss", ["mesh"]) | {"catalogue": None})
 SILENT, FAILED = says("consistent"), None
 NAMED, OTHER = says("missing_physics", finding("windage")), says("missing_physics", finding("pump_heat", node="oil"))
 TIED = says("missing_physics", finding("churning_swirl", windage=0.3))
@@ -161,11 +161,19 @@ def test_rule(
 def test_what_was_changed_by_truths_that_do_not_name_it(
     name: str, kind: str, nodes: list[str], what: str, sign: int
 ) -> None:
-    raw = {"name": name, "catalogue": name, "kind": kind, "nodes": nodes}
+    catalogue = None if name in ("phase_change", "stick_slip") else name
+    raw = {"name": name, "catalogue": catalogue, "kind": kind, "nodes": nodes}
     changed = changed_of(raw | {"parameters": {"a": 0.5}})
     assert ({c.what for c in changed}, {c.sign for c in changed}) == ({what}, {sign})
     assert [node for c in changed for node in c.nodes] == nodes
     assert {c.sign for c in changed_of(raw | {"parameters": {"a": -0.5}})} == {-sign}
+
+
+def test_a_mechanism_that_does_not_exist_is_refused(tmp_path: Path) -> None:
+    effect = ONE["effects"][0] | {"catalogue": "windag"}
+    (tmp_path / "a.json").write_text(json.dumps(ONE | {"effects": [effect]}))
+    with pytest.raises(InputError, match="'windag', which is no mechanism.*did you mean 'windage'"):
+        read_truths(tmp_path)
 
 
 def test_what_was_changed_by_truths_of_the_zoo() -> None:
