@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 
 import numpy as np
@@ -21,6 +22,8 @@ NEAR = 0.85  # likeness of names that makes one a slip of the other
 SWAPPED = str.maketrans(",.", ".,")
 MOST_NAMED = 12  # unused columns in a note
 FEW = 0.01  # share of rows that may be impossible
+# Both signs, or groups of three digits with gaps between them: 1,500.0  1.500,0  1'500  1 500
+THOUSANDS = re.compile(r"[+-]?\d{1,3}((,\d{3})+\.\d+|(\.\d{3})+,\d+|(['’\s]\d{3})+([.,]\d+)?)")
 CODES, CODED = 3, 0.5  # so many different impossible values, in up to this share of rows, are codes of a logger
 
 
@@ -140,7 +143,12 @@ def _numbers(cells: pd.Series, name: str, decimal: str, problems: Problems) -> A
     advice = "if it means a missing value, name it under 'missing' in a mapping file"
     whole, comma, rest = cell.strip().partition(",")
     if decimal == "." and comma and whole.lstrip("+-").isdigit() and rest.isdigit():
-        advice = 'with decimal commas, give csv = { separator = ";", decimal = "," } in a mapping file'
+        advice = (
+            'with decimal commas, columns are separated by semicolons: csv = { separator = ";", decimal = "," } in a '
+            "mapping file"
+        )
+    if THOUSANDS.fullmatch(cell.strip()):
+        advice = "write numbers without thousands separators"
     problems.add(
         f"{name} holds {cell!r} at row {rows[wrong[0]]}, which is no number ({len(wrong)} such cells, "
         f"{rows_text(rows[wrong])}); {advice}"

@@ -74,6 +74,8 @@ FILES: list[tuple[str | bytes, tuple[str, ...]]] = [
     # cells
     (cell(3, "T_oil_degC", "#REF!"), ("T_oil_degC holds '#REF!' at row 4, which is no number", "'missing'")),
     (cell(4, "torque_Nm", "12,5"), ("torque_Nm", "row 5", "decimal commas")),
+    (cell(4, "speed_rpm", "1,500.0"), ("'1,500.0' at row 5", "without thousands separators")),
+    (cell(4, "speed_rpm", "1'500"), ("1'500", "without thousands separators")),
     (cell(9, "speed_rpm", "inf"), ("speed_rpm is inf in row 10",)),
     (with_column("T_oil_degC", np.nan), ("T_oil_degC has no value in any of its 60",)),
     (with_column("T_oil_degC", "on"), ("T_oil_degC", "60 such cells, rows 1-60")),
