@@ -23,7 +23,7 @@ SWAPPED = str.maketrans(",.", ".,")
 MOST_NAMED = 12  # unused columns in a note
 FEW = 0.01  # share of rows that may be impossible
 # Both signs, or groups of three digits with gaps between them: 1,500.0  1.500,0  1'500  1 500
-THOUSANDS = re.compile(r"[+-]?\d{1,3}((,\d{3})+\.\d+|(\.\d{3})+,\d+|(['’\s]\d{3})+([.,]\d+)?)")
+THOUSANDS = re.compile(r"[+-]?\d{1,3}((,\d{3})+\.\d+|(\.\d{3})+,\d+|(['\u2019\s]\d{3})+([.,]\d+)?)")
 CODES, CODED = 3, 0.5  # so many different impossible values, in up to this share of rows, are codes of a logger
 
 
