@@ -186,11 +186,13 @@ def stepped(
     Stepped
         With the temperatures that the switches followed; memories as given, except for the values computed here
     """
-    switches, actuated, acting, kept = model.switches, model.actuated, model.acting, memory.copy()
-    corners = list(product((0.0, 1.0), repeat=len(acting)))
+    switches, actuated, kept = model.switches, model.actuated, memory.copy()
+    moving = [*switches, *actuated]
+    felt, followed = [moving.index(index) for index in model.acting], model.followed
+    corners = list(product((0.0, 1.0), repeat=len(felt)))
     solutions = []
     for corner in corners:
-        kept[:, acting] = corner
+        kept[:, model.acting] = corner
         solved = _linearised(model, piece, values, middle, tangent, kept)
         solutions.append((solved.decay, solved.driven))
     switching, actuation = model.switching(averaged=piece.guided and piece.slow), model.actuation
@@ -199,30 +201,33 @@ def stepped(
     table = np.concatenate([piece.middle[:, None], piece.inputs, middle, given, kept, power], axis=1).tolist()
     first = 1 + piece.inputs.shape[1]
     states = first + model.n + len(values)
-    n, now = model.n, complete_start(model, start)
-    result, seen = np.empty((len(kept) + 1, len(now))), np.empty((len(kept) + 1, n))
+    n, now, guide = model.n, complete_start(model, start), guide[: len(kept)]
+    result, openings = np.empty((len(kept) + 1, len(now))), []
     result[0] = now
-    state = {index: model.network.states[index].start for index in (*switches, *actuated)} | (held or {})
-    for k, (signals, h) in enumerate(zip(table, piece.steps.tolist(), strict=True)):
-        near = np.abs(now[:n] - guide[k]) < ASTRAY_K  # not where nothing was measured
-        seen[k] = np.where(near, guide[k], now[:n])
-        signals[first : first + n] = seen[k].tolist()
+    state = {index: model.network.states[index].start for index in moving} | (held or {})
+    rows = zip(table, guide[:, followed].tolist(), piece.steps.tolist(), strict=True)
+    for k, (signals, shown, h) in enumerate(rows):
+        for index, T, guided in zip(followed, now[followed].tolist(), shown, strict=True):
+            signals[first + index] = guided if abs(T - guided) < ASTRAY_K else T  # T where nothing was measured
         for index, value in state.items():
             signals[states + index] = value
         for index, value in zip(switches, switching(signals), strict=True):
             state[index] = signals[states + index] = value
         # Seen in means over minutes a switch may be half way; it is where it is more likely to be.
-        opening = state | {index: float(state[index] > 0.5) for index in switches}
+        opening = [float(state[index] > 0.5) for index in switches]
         if actuated:
             found = actuation(signals)
             for index, rate, slope in zip(actuated, found, found[len(actuated) :], strict=False):
-                opening[index] += rate * 0.5 * h * float(exprel(0.5 * h * slope))
+                opening.append(state[index] + rate * 0.5 * h * float(exprel(0.5 * h * slope)))
                 state[index] += rate * h * float(exprel(h * slope))
-        kept[k, list(opening)] = list(opening.values())
-        now = _between(solutions, corners, [opening[index] for index in acting], k, now)
+        openings.append(opening)
+        now = _between(solutions, corners, [opening[place] for place in felt], k, now)
         result[k + 1] = now
-    seen[-1] = now[:n]
+    kept[:, moving] = openings
     kept[:, model.coupled] = 0.5 * (result[1:, n:] + result[:-1, n:])
+    seen = result[:, :n].copy()
+    near = np.abs(seen[:-1] - guide) < ASTRAY_K
+    seen[:-1][near] = guide[near]
     return Stepped(T=result[:, :n], seen=seen, memory=kept, end=now, held=state)
 
 
@@ -231,12 +236,12 @@ def _between(
     now: Array,
 ) -> Array:  # fmt: skip
     """One step between the solutions at the ends of what acts."""
-    result = np.zeros_like(now)
+    result: Array | float = 0.0
     for corner, (decay, driven) in zip(corners, solutions, strict=True):
-        weight = math.prod(z if end else 1.0 - z for z, end in zip(positions, corner, strict=True))
+        weight = math.prod([z if end else 1.0 - z for z, end in zip(positions, corner, strict=True)])
         if weight:
-            result += weight * (decay[k] @ now + driven[k])
-    return result
+            result = result + weight * (decay[k].dot(now) + driven[k])
+    return np.asarray(result)
 
 
 def complete_start(model: NetworkOnGrid, start: Array) -> Array:
