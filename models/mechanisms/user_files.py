@@ -195,14 +195,14 @@ def check_placeable(mechanisms: Iterable[Mechanism], gearbox: Gearbox, file: str
 
 
 def _check_strength(placed: Placed) -> None:
-    size = symbol(placed.strength.name)
-    absent = placed.written["law"].xreplace({size: sp.Integer(0)})
-    slope = placed.written["law"].diff(size).xreplace({size: sp.Integer(0)})
-    if absent != 0 or slope == 0 or slope.has(sp.zoo, sp.oo, sp.nan):
+    size, law = symbol(placed.strength.name), placed.written["law"]
+    absent, slope = (one.xreplace({size: sp.Integer(0)}) for one in (law, law.diff(size)))
+    endless = slope.has(sp.zoo, sp.oo, sp.nan)
+    if absent != 0 or slope == 0 or endless:
+        found = "it has no finite slope" if endless else f"it gives {absent}, and its slope is {slope}"
         raise InputError(
             f"mechanism {placed.mechanism.name!r}: its law must contain {STRENGTH!r}, the size of the effect: 0 "
-            f"without the effect, and at first in proportion to it. With {STRENGTH} = 0 it gives {absent}, and its "
-            f"slope is {slope}"
+            f"without the effect, and at first in proportion to it. With {STRENGTH} = 0 {found}"
         )
 
 

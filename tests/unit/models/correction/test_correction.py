@@ -411,7 +411,7 @@ def test_a_mechanism_from_python(tmp_path: Path) -> None:
         ("schema = 1", f"schema = 1\n{AGAIN}", "'belt_guard' is there 2 times"),
         ("strength * n**exponent", "20 * n**exponent", "its law must contain 'strength'"),
         ("strength * n**exponent", "(strength + 5) * n", r"With strength = 0 it gives 5\*n"),
-        ("strength * n**exponent", "n / strength", "With strength = 0 it gives zoo"),
+        ("strength * n**exponent", "n / strength", "With strength = 0 it has no finite slope"),
         ("strength * n**exponent", "strength**2 * n", "and its slope is 0"),
         ('places = ["oil", "each bearings"]', 'places = ["oill"]', "no place in this gearbox.*'oill'.*oil"),
         ("({place})", "({ort})", "'belt_guard' fails with KeyError: 'ort'"),
