@@ -287,13 +287,6 @@ class NetworkOnGrid:
         return [index for index, part in enumerate(self.parts) if f"T_{part}" in read]
 
     @cached_property
-    def followed(self) -> list[int]:
-        """Which parts' temperatures decide on switches and on what follows them."""
-        rates = [self.network.states[index].rate.xreplace(self.boundary) for index in self.actuated]
-        read = {s.name for law in rates for s in law.free_symbols}
-        return [index for index, part in enumerate(self.parts) if index in self.switched_by or f"T_{part}" in read]
-
-    @cached_property
     def boundary(self) -> Mapping[sp.Symbol, sp.Expr]:
         """Expressions of all boundary temperatures, [degC], by their signal."""
         return {symbol(f"T_{node}"): law for node, law in self.network.boundaries.items()}

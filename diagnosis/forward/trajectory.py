@@ -186,29 +186,31 @@ def stepped(
     Stepped
         With the temperatures that the switches followed; memories as given, except for the values computed here
     """
-    switches, actuated, kept = model.switches, model.actuated, memory.copy()
+    switches, actuated, memories = model.switches, model.actuated, memory.copy()
     moving = [*switches, *actuated]
-    felt, followed = [moving.index(index) for index in model.acting], model.followed
+    felt = [moving.index(index) for index in model.acting]
     corners = list(product((0.0, 1.0), repeat=len(felt)))
     solutions = []
     for corner in corners:
-        kept[:, model.acting] = corner
-        solved = _linearised(model, piece, values, middle, tangent, kept)
+        memories[:, model.acting] = corner
+        solved = _linearised(model, piece, values, middle, tangent, memories)
         solutions.append((solved.decay, solved.driven))
     switching, actuation = model.switching(averaged=piece.guided and piece.slow), model.actuation
     power = tangent.at(middle[:, model.loss_nodes])
-    given = np.broadcast_to(values, (len(kept), len(values)))
-    table = np.concatenate([piece.middle[:, None], piece.inputs, middle, given, kept, power], axis=1).tolist()
+    given = np.broadcast_to(values, (len(memories), len(values)))
+    table = np.concatenate([piece.middle[:, None], piece.inputs, middle, given, memories, power], axis=1).tolist()
     first = 1 + piece.inputs.shape[1]
     states = first + model.n + len(values)
-    n, now, guide = model.n, complete_start(model, start), guide[: len(kept)]
-    result, openings = np.empty((len(kept) + 1, len(now))), []
+    n, now, seen, openings = model.n, complete_start(model, start), [], []
+    result = np.empty((len(memories) + 1, len(now)))
     result[0] = now
     state = {index: model.network.states[index].start for index in moving} | (held or {})
-    rows = zip(table, guide[:, followed].tolist(), piece.steps.tolist(), strict=True)
-    for k, (signals, shown, h) in enumerate(rows):
-        for index, T, guided in zip(followed, now[followed].tolist(), shown, strict=True):
-            signals[first + index] = guided if abs(T - guided) < ASTRAY_K else T  # T where nothing was measured
+    rows = zip(table, guide[:-1].tolist(), piece.steps.tolist(), strict=True)
+    for k, (signals, guides, h) in enumerate(rows):
+        # A guide is NaN where nothing was measured.
+        T = [there if abs(own - there) < ASTRAY_K else own for own, there in zip(now.tolist(), guides, strict=False)]
+        seen.append(T)
+        signals[first : first + n] = T
         for index, value in state.items():
             signals[states + index] = value
         for index, value in zip(switches, switching(signals), strict=True):
@@ -223,12 +225,9 @@ def stepped(
         openings.append(opening)
         now = _between(solutions, corners, [opening[place] for place in felt], k, now)
         result[k + 1] = now
-    kept[:, moving] = openings
-    kept[:, model.coupled] = 0.5 * (result[1:, n:] + result[:-1, n:])
-    seen = result[:, :n].copy()
-    near = np.abs(seen[:-1] - guide) < ASTRAY_K
-    seen[:-1][near] = guide[near]
-    return Stepped(T=result[:, :n], seen=seen, memory=kept, end=now, held=state)
+    memories[:, moving] = openings
+    memories[:, model.coupled] = 0.5 * (result[1:, n:] + result[:-1, n:])
+    return Stepped(T=result[:, :n], seen=np.array([*seen, now[:n]]), memory=memories, end=now, held=state)
 
 
 def _between(

@@ -14,7 +14,7 @@ from models.base.errors import InputError, did_you_mean
 from models.mechanisms import CATALOGUE
 
 CONTROL, MESSY, OUTSIDE = "control", "messy", "outside"
-NONE = "none"  # of the catalogue
+NONE = "none"  # catalogue of an effect that is in none
 MEASUREMENT = ("sensor", "input", "clock")
 # Names that others gave to mechanisms of the catalogue.
 ALIASES = {
