@@ -63,22 +63,36 @@ class Scanned:
         parameter = np.array([one.how == "parameter" for one in self.candidates], dtype=bool)
         return log_sum(log[~parameter]) - log_sum([0.0, *log[parameter]])
 
+    def to_its_best(self, rate: float) -> tuple[Scanned, float]:
+        """All against nothing in the class that suits nothing best; evidence from which something is missing, [nat].
+
+        Parameters
+        ----------
+        rate : float
+            False-alarm rate that a user asks for
+        """
+        nothing = max(self.classes, key=lambda one: one.ahead)
+        detection, _ = rule().thresholds(nothing.error_class, self.best[self.order[0]].error_class, rate)
+        return replace(self, log_bayes=self.log_bayes - nothing.ahead), detection
+
     def in_class(self, error_class: ErrorClass) -> ScanInClass:
         """Everything with model error of one class."""
         return next(one for one in self.classes if one.error_class == error_class)
 
 
-def scan_in_classes(calibration: Calibration, found: Scan, log_prior: Array, factor: float = 1.0) -> Scanned:
-    """The scan at the calibrated point with model error of all classes, their amplitudes scaled."""
-    chosen, judged = calibration.chosen.error_class, []
-    for one in calibration.classes:
-        scaled = one.scaled(factor)
-        here = found.in_directions(calibration.near.directions(scaled))
+def scan_in_classes(
+    calibration: Calibration, found: Scan, log_prior: Array, classes: Sequence[ErrorClass] = ()
+) -> Scanned:
+    """The scan at the calibrated point with model error of all classes, or of others in their place."""
+    judged = []
+    for one in classes or calibration.classes:
+        here = found.in_directions(calibration.near.directions(one))
         over = over_sessions(here.gram, calibration.fit.experiment, range(here.further.stop))
-        judged.append((scaled, here, over, float(np.log(one.prior)) + over.log_evidence))
-    nothing = next(evidence for one, _, _, evidence in judged if one.name == chosen.name)
-    classes = [_in_class(one, here, over, evidence - nothing, chosen) for one, here, over, evidence in judged]
-    return in_best_classes(classes, log_prior)
+        judged.append((one, here, over, float(np.log(one.prior)) + over.log_evidence))
+    chosen = [one for one in judged if one[0].name == calibration.chosen.error_class.name] or judged
+    nothing, *_, reached = max(chosen, key=lambda one: one[-1])
+    each = [_in_class(one, here, over, evidence - reached, nothing) for one, here, over, evidence in judged]
+    return in_best_classes(each, log_prior)
 
 
 def scan_given(calibration: Calibration, given: Judged, candidates: Sequence[Hypothesis], log_prior: Array) -> Scanned:
@@ -173,12 +187,10 @@ def with_scaled_error(
     calibration: Calibration, found: Scan, factor: float, first: Scanned, rate: float, least: float
 ) -> ScaledError:
     """Evidence of the scan if all model error were larger or smaller than assumed."""
-    there = first if factor == 1.0 else scan_in_classes(calibration, found, first.log_prior, factor)
-    nothing = max(there.classes, key=lambda one: one.ahead)
-    there = replace(there, log_bayes=there.log_bayes - nothing.ahead)
-    index = there.order[0]
-    best = there.candidates[index]
-    detection, _ = rule().thresholds(nothing.error_class, there.best[index].error_class, rate)
+    scaled = [one.scaled(factor) for one in calibration.classes]
+    there = first if factor == 1.0 else scan_in_classes(calibration, found, first.log_prior, scaled)
+    there, detection = there.to_its_best(rate)
+    best = there.candidates[there.order[0]]
     return ScaledError(factor=factor, log_e_value=there.log_e, threshold=max(detection, least),
                        mechanism=best.mechanism, place=best.place)  # fmt: skip
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from diagnosis.engine.fit import Experiment, Linear
 from diagnosis.engine.learnt import ErrorClass
@@ -67,8 +68,10 @@ class ModelError:
         """Amplitude of every unknown in a class, 0 of those that are absent, shape (unknowns,)."""
         return np.array([one.amplitudes.get(group, 0.0) for group in self.groups])
 
-    def columns(self, point: Point, first: int, last: int) -> ErrorCourses:
+    def columns(self, point: Point, first: int, last: int, wanted: NDArray[np.bool_] | None = None) -> ErrorCourses:
         """Change per unit of the unknowns from `first` up to `last` (excluded), heat with rates of coupled states.
+
+        Of those that are not `wanted`, shape (unknowns,), it may be left out.
 
         The point may be that of an extended machine: everything is found by its name.
         """
@@ -78,6 +81,8 @@ class ModelError:
         for change, begin, end in self.between(first, last):
             low, high = max(begin, first), min(end, last)
             mine = slice(low - first, high - first)
+            if wanted is not None and not wanted[begin:end].any():
+                continue
             if isinstance(change, HeatChange):
                 heat, course = change.heat(view), change.course.along(view)[:, low - begin : high - begin]
                 for part in np.flatnonzero(heat.into.any(axis=0)):  # few
@@ -92,9 +97,7 @@ class ModelError:
         last = len(self.groups) if last is None else last
         result = np.empty((*point.read.shape, last - first))
         for begin, end in self._chunks(point, first, last):
-            found = self.columns(point, begin, end)
-            shown = point.setting.passed_on(point.trajectory, found.reading)
-            result[:, :, begin - first : end - first] = point.heated(found.heat, found.loss) + shown
+            result[:, :, begin - first : end - first] = _recorded(point, self.columns(point, begin, end))
         return result
 
     def whitened(self, part: Linear) -> Array:
@@ -106,22 +109,30 @@ class ModelError:
 
     def combined_responses(self, point: Point, combinations: Array) -> Array:
         """Change of what is recorded per unit of combinations of the unknowns, shape (K + 1, channels, n)."""
-        result = np.zeros((*point.read.shape, combinations.shape[1]))
-        for begin, end in self._chunks(point, 0, len(self.groups)):
-            result += self.responses(point, begin, end) @ combinations[begin:end]
-        return result
+        return _recorded(point, self._combined(point, combinations))
 
     def courses(self, point: Point, combinations: Array) -> ErrorCourses:
-        """Courses of combinations of the unknowns, shape (unknowns, n), along a piece."""
-        points, channels = point.read.shape
-        n, count = point.machine.model.n, combinations.shape[1]
-        heat, loss = np.zeros((points - 1, n, count)), np.zeros((points - 1, count))
-        reading = np.zeros((points, channels, count))
+        """Courses of combinations of the unknowns, shape (unknowns, n), along a piece, to simulate with."""
+        found = self._combined(point, combinations)
+        return replace(found, heat=np.ascontiguousarray(found.heat[:, : point.machine.model.n]))
+
+    def _combined(self, point: Point, combinations: Array) -> ErrorCourses:
+        """Change per unit of combinations; see :meth:`columns`."""
+        (points, channels), count, wanted = (
+            point.read.shape,
+            combinations.shape[1],
+            np.asarray(combinations.any(axis=1)),
+        )
+        heat = np.zeros((points - 1, point.trajectory.decay.shape[-1], count))
+        loss, reading = np.zeros((points - 1, count)), np.zeros((points, channels, count))
         for begin, end in self._chunks(point, 0, len(self.groups)):
-            found, some = self.columns(point, begin, end), combinations[begin:end]
-            heat += found.heat[:, :n] @ some
+            found, some = self.columns(point, begin, end, wanted), combinations[begin:end]
+            for part in range(heat.shape[1]):
+                acting = np.flatnonzero(found.heat[:, part].any(axis=0))  # most heat few parts
+                heat[:, part] += found.heat[:, part, acting] @ some[acting]
             loss += found.loss @ some
-            reading += found.reading @ some
+            acting = np.flatnonzero(found.reading.any(axis=(0, 1)))
+            reading += found.reading[:, :, acting] @ some[acting]
         return ErrorCourses(heat=heat, loss=loss, reading=reading)
 
     def _chunks(self, point: Point, first: int, last: int) -> Iterator[tuple[int, int]]:
@@ -137,3 +148,8 @@ class ModelError:
             if end > first and begin < last:
                 yield change, begin, end
             begin = end
+
+
+def _recorded(point: Point, found: ErrorCourses) -> Array:
+    """Change of what is recorded by heats and readings, shape (K + 1, channels, n)."""
+    return point.heated(found.heat, found.loss) + point.setting.passed_on(point.trajectory, found.reading)

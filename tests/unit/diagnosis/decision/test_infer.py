@@ -210,7 +210,8 @@ def test_scaled_model_error_is_that_of_a_class_with_such_amplitudes(fzg: Gearbox
     found = scan(calibration.fit, candidates, calibration.near.columns)
 
     def scanned(name: str, factor: float) -> tuple[float, float]:
-        every = scan_in_classes(calibration, found, np.zeros(len(candidates)), factor).classes
+        classes = [each.scaled(factor) for each in error_classes()]
+        every = scan_in_classes(calibration, found, np.zeros(len(candidates)), classes).classes
         none, one = (next(each for each in every if each.error_class.name == which) for which in ("none", name))
         return one.ahead - none.ahead - float(np.log(one.error_class.prior)), float(one.log_bayes[0] - one.ahead)
 
