@@ -128,7 +128,7 @@ def report(pairs: Sequence[tuple[Path, Path]]) -> None:
         table.add_row(variant, str(int((excess > 0.0).sum())), f"{excess.max(initial=-np.inf):.0f}", str(sum(found)),
                       str(int((ahead > 0.0).sum())), f"{own.mean():.0f}", f"{ahead.mean():.1f}",
                       f"{np.mean(change):.1f}")  # fmt: skip
-    Console(width=160).print(table)
+    Console(width=240).print(table)
 
 
 def _weights(names: Mapping[str, float], right: set[str]) -> tuple[float, float]:

@@ -13,9 +13,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 import sympy as sp
 
-from diagnosis.engine.calibration import WIDEST_CLASS, Calibration, NearReadings
+from diagnosis.engine.calibration import NearReadings
 from diagnosis.engine.fit import Fit
-from diagnosis.engine.learnt import ErrorClass, error_classes
+from diagnosis.engine.learnt import ErrorClass
 from diagnosis.engine.model_error import ModelError, groups, heats
 from diagnosis.engine.model_error.courses import Constant, Smooth, Standard
 from diagnosis.engine.point import Machine
@@ -60,28 +60,12 @@ class LearntError:
 
 
 def is_writable(one: ErrorClass) -> bool:
-    """True if a model can hold all model error of a class, and there is any."""
-    return bool(one.amplitudes) and set(one.amplitudes) <= WRITABLE
+    """True if a model can hold all model error of a class, and there is any.
 
-
-def in_writable_class(fit: Fit, error_class: ErrorClass, calibration: Calibration) -> tuple[Fit, ErrorClass] | None:
-    """A fit with model error that a model can hold: of its class, or of the best class that one can hold.
-
-    None without model error, and with the widest class: the machine has another structure than the model there, and
-    what can be held would stand in for the rest.
-
-    Raises
-    ------
-    ArithmeticError
-        If the fit in the other class has no solution.
+    Not that of the widest class: the machine has another structure than the model there, and what can be held would
+    stand in for the rest.
     """
-    if is_writable(error_class):
-        return fit, error_class
-    if error_class.name == WIDEST_CLASS or not error_class.amplitudes:
-        return None
-    best = max(filter(is_writable, error_classes()), key=lambda one: calibration.evidence[one.name])
-    there = replace(fit.experiment, metric=calibration.in_class(best).fit.experiment.metric)
-    return there.fit(fit.z, fit.trajectories), best
+    return bool(one.amplitudes) and set(one.amplitudes) <= WRITABLE
 
 
 def with_learnt_error(fit: Fit, near: NearReadings, error_class: ErrorClass) -> tuple[Fit, tuple[Term, ...]]:

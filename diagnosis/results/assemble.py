@@ -116,7 +116,7 @@ def assemble(
     predicted = predict_recordings(
         experiment, held_out_experiment(setup, experiment), plain=plain,
         found=_final(best, plain if others is None else others.fit, faulty),
-        explanation=None if faulty else best or posterior.nothing, calibration=calibration, counting=counting,
+        explanation=None if faulty else best or posterior.nothing, near=calibration.near, counting=counting,
         jobs=jobs,
     )  # fmt: skip
     final, holdout = predicted.final, _fits(setup, predicted.holdout, counting)

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from diagnosis.decision.posterior import Judged
-from diagnosis.engine.calibration import Calibration
+from diagnosis.engine.calibration import NearReadings
 from diagnosis.engine.fit import Experiment, Fit
-from diagnosis.engine.learnt_error import in_writable_class, with_learnt_error
+from diagnosis.engine.learnt_error import is_writable, with_learnt_error
 from diagnosis.engine.predict import Prediction, log_score_gain, overall_rmse, predict, with_pieces_of
 from diagnosis.engine.set_apart import without_channels
 from models.base.parallel import run_parallel
@@ -47,7 +47,7 @@ class Predicted:
 
 def predict_recordings(
     experiment: Experiment, judged: Experiment, *, plain: Fit, found: Fit, explanation: Judged | None,
-    calibration: Calibration, counting: Collection[str], jobs: int,
+    near: NearReadings, counting: Collection[str], jobs: int,
 ) -> Predicted:  # fmt: skip
     """Predict all recordings, with model error written into the best explanation if that helps.
 
@@ -59,8 +59,8 @@ def predict_recordings(
         The nominal machine, and that with the findings, both calibrated without model error
     explanation : Judged or None
         What model error may be written into; None: nothing, since it would stand in for a broken sensor
-    calibration : Calibration
-        Where model error was linearised, and its classes
+    near : NearReadings
+        Where model error was linearised
     counting : collection of str
         Channels that count
 
@@ -74,8 +74,8 @@ def predict_recordings(
     final, learnt, after = found, tuple[Term, ...](), [train["found"], holdout["found"]]
     if explanation is not None and explanation.fit is not None:
         try:
-            if held := in_writable_class(explanation.fit, explanation.error_class, calibration):
-                written, terms = with_learnt_error(held[0], calibration.near, held[1])
+            if is_writable(explanation.error_class):
+                written, terms = with_learnt_error(explanation.fit, near, explanation.error_class)
                 if there := _closer(written, (experiment, judged), after, counting, jobs):
                     final, learnt, after = written, terms, there
         except ArithmeticError:

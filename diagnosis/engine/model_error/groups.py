@@ -22,11 +22,7 @@ from diagnosis.engine.model_error.courses import (
     Constant,
     Course,
     Hours,
-    LaggedDrive,
-    OwnDifference,
-    OwnTemperature,
     Smooth,
-    SpeedAndTemperature,
     View,
 )
 from diagnosis.engine.slopes import Heat
@@ -138,7 +134,7 @@ def link_laws(machine: Anatomy) -> Iterator[Change]:
         yield from (_of_links(name, (name,)) for name in family.members)
 
 
-def heat_splits(machine: Anatomy, course: Course = CONSTANT) -> Iterator[Change]:
+def heat_splits(machine: Anatomy) -> Iterator[Change]:
     """A share of the heat of a source goes to another part; sources of a family in one part go together."""
     for family in machine.source_families:
         nodes = {source.name: source.node for source in machine.network.sources}
@@ -146,7 +142,7 @@ def heat_splits(machine: Anatomy, course: Course = CONSTANT) -> Iterator[Change]
             names = tuple(name for name in family.members if nodes[name] == node)
             for target in machine.split_targets(node):
                 heat = heats.SplitHeat(names=names, target=target)
-                yield HeatChange(place=f"{' '.join(names)} to {target}", heat=heat, course=course)
+                yield HeatChange(place=f"{' '.join(names)} to {target}", heat=heat)
 
 
 def sensor_places(machine: Anatomy) -> Iterator[Change]:
@@ -222,48 +218,18 @@ def fine_loss_laws(machine: Anatomy) -> Iterator[Change]:
         yield _of_sources(family.name, family.members, course)
 
 
-def losses_by_own_temperature(machine: Anatomy) -> Iterator[Change]:
-    """Heat of sources by how much warmer than the oil their own parts are."""
-    by = tuple(name for name in (SPEED,) if name in machine.coordinates)
-    for source in machine.network.sources:
-        if own := machine.own_nodes(source):
-            yield _of_sources(source.name, (source.name,), OwnTemperature(nodes=own, coordinates=by))
-
-
-def links_by_operation(machine: Anatomy) -> Iterator[Change]:
-    """Every heat path between parts by speed and temperature."""
-    by = tuple(name for name in (SPEED, TEMPERATURE) if name in machine.coordinates)
-    return (_of_links(link.name, (link.name,), SpeedAndTemperature(coordinates=by)) for link in machine.conducting
-            if set(link.nodes) <= set(machine.parts))  # fmt: skip
-
-
-def links_by_difference(machine: Anatomy) -> Iterator[Change]:
-    """Every heat path by its own temperature difference."""
-    return (_of_links(link.name, (link.name,), OwnDifference(link=link.name)) for link in machine.conducting)
-
-
-def memories(machine: Anatomy) -> Iterator[Change]:
-    """Losses and links by the operation before."""
-    return _everything(machine, LaggedDrive())
-
-
 def ageing(machine: Anatomy) -> Iterator[Change]:
     """Losses and links by the hours, losses by the time after the start."""
-    yield from _everything(machine, Hours())
+    yield from (_of_sources(source.name, (source.name,), Hours()) for source in machine.network.sources)
+    yield from (_of_links(link.name, (link.name,), Hours()) for link in machine.conducting)
     yield from (_of_sources(source.name, (source.name,), AfterStart()) for source in machine.network.sources)
-
-
-def splits_by_temperature(machine: Anatomy) -> Iterator[Change]:
-    """Heat splits by temperature."""
-    return heat_splits(machine, Smooth(coordinates=(TEMPERATURE,), highest=1))
 
 
 GROUPS: Mapping[str, Callable[[Anatomy], Iterator[Change]]] = {
     "a_loss": loss_laws, "a_link": link_laws, "b_split": heat_splits, "c_sensor": sensor_places,
     "c_lag": slow_sensors, "d_sub": slow_cores, "mass": slow_masses, "e_link": missing_links, "f_input": input_errors,
     "g_cap": capacities, "p_zero": loss_zero,
-    "law_deg5": fine_loss_laws, "loss_own": losses_by_own_temperature, "link_nT": links_by_operation,
-    "link_dT": links_by_difference, "lag": memories, "hours": ageing, "split_T": splits_by_temperature,
+    "law_deg5": fine_loss_laws, "hours": ageing,
 }  # fmt: skip
 
 
@@ -276,11 +242,6 @@ def _of_sources(place: str, names: tuple[str, ...], course: Course = CONSTANT) -
 
 def _of_links(place: str, names: tuple[str, ...], course: Course = CONSTANT) -> HeatChange:
     return HeatChange(place=f"path {place}", heat=heats.LinkHeat(names=names), course=course)
-
-
-def _everything(machine: Anatomy, course: Course) -> Iterator[Change]:
-    yield from (_of_sources(source.name, (source.name,), course) for source in machine.network.sources)
-    yield from (_of_links(link.name, (link.name,), course) for link in machine.conducting)
 
 
 def _link_course(machine: Anatomy, family: Family) -> Smooth | None:
