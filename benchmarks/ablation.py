@@ -38,7 +38,7 @@ from models.base.parallel import iterate_parallel
 from models.mechanisms import CATALOGUE
 
 AS_IT_IS = "as it is"
-FINE = {"law_deg5", "loss_own", "link_nT", "link_dT", "lag", "hours", "split_T"}
+FINE = {"law_deg5", "hours"}
 RATE = Settings().false_alarm_rate
 
 
@@ -112,13 +112,13 @@ def report(pairs: Sequence[tuple[Path, Path]]) -> None:
         truths = read_truths(path)
         cases += [(case, truths[case["case"]]) for case in read(file)]
     healthy = [case for case, truth in cases if truth.group == CONTROL]
-    named = [(case, {effect.name for effect in truth.effects if effect.name}) for case, truth in cases]
+    named = [(case, {effect.name for effect in truth.effects} & set(case[AS_IT_IS]["names"])) for case, truth in cases]
     named = [(case, names) for case, names in named if names]
     others = [case for case, truth in cases if truth.group != CONTROL]
     table = Table(
         "model error", "healthy machines above the threshold", "largest excess", "effects above it",
         "true name first", "nat of it, mean", "ahead of the best wrong one, mean", "nat of nothing, mean change",
-        title=f"{len(healthy)} healthy machines, {len(others)} with effects, {len(named)} of them in the catalogue",
+        title=f"{len(healthy)} healthy machines, {len(others)} with effects, {len(named)} of them with a candidate",
     )  # fmt: skip
     for variant in variants():
         excess = np.array([case[variant]["log_e"] - case[variant]["threshold"] for case in healthy])
@@ -133,7 +133,7 @@ def report(pairs: Sequence[tuple[Path, Path]]) -> None:
 
 def _weights(names: Mapping[str, float], right: set[str]) -> tuple[float, float]:
     """Evidence and prior of the best right name; the same less that of the best wrong one, parameters left out."""
-    own = max(names.get(name, -1e3) for name in right)
+    own = max(names[name] for name in right)
     return own, own - max(value for name, value in names.items() if name not in (*right, "parameter"))
 
 

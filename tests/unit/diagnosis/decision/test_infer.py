@@ -200,24 +200,25 @@ def test_the_scan_is_told_for_less_and_more_model_error(concealed: Posterior, he
     assert all(one.log_e_value < one.threshold for one in healthy.scaled)
 
 
-def test_scaled_model_error_is_that_of_a_class_with_such_amplitudes(fzg: Gearbox) -> None:
-    """Half of "splits" is "half splits", but for the priors of the two classes."""
+def test_candidates_are_judged_with_the_classes_that_are_given(fzg: Gearbox) -> None:
     train = recorded(fzg, "train", windage_W=WINDAGE_W, hours=HOURS)
     setup, experiment = prepare_experiment(fzg, [train], [train])
     calibration = calibrate_with_error(experiment, calibrate(experiment))
     placed = CATALOGUE["windage"].placed(experiment.machine.model.network, setup.scale, setup.channels)
     candidates = [hypothesis_of(one) for one in placed]
     found = scan(calibration.fit, candidates, calibration.near.columns)
+    none, splits = error_classes()[:2]
 
-    def scanned(name: str, factor: float) -> tuple[float, float]:
-        classes = [each.scaled(factor) for each in error_classes()]
-        every = scan_in_classes(calibration, found, np.zeros(len(candidates)), classes).classes
-        none, one = (next(each for each in every if each.error_class.name == which) for which in ("none", name))
-        return one.ahead - none.ahead - float(np.log(one.error_class.prior)), float(one.log_bayes[0] - one.ahead)
+    def scanned(one: ErrorClass) -> tuple[float, float]:
+        without, there = scan_in_classes(calibration, found, np.zeros(len(candidates)), [none, one]).classes
+        return there.ahead - without.ahead, float(there.log_bayes[0] - there.ahead)
 
-    assert scanned("splits", 0.5) == pytest.approx(scanned("half splits", 1.0), abs=1e-6)
-    assert scanned("half splits", 2.0) == pytest.approx(scanned("splits", 1.0), abs=1e-6)
-    assert abs(scanned("splits", 0.5)[0] - scanned("splits", 1.0)[0]) > 0.5
+    half = replace(splits, amplitudes={"b_split": 0.05, "c_sensor": 0.005, "c_lag": 0.025})
+    assert scanned(splits.scaled(0.5)) == pytest.approx(scanned(half), abs=1e-6)
+    assert abs(scanned(half)[0] - scanned(splits)[0]) > 0.5
+    assert scanned(replace(splits, amplitudes={})) == pytest.approx(
+        (np.log(splits.prior / none.prior), scanned(none)[1]), abs=1e-6
+    )
 
 
 def test_its_size_is_found(concealed: Posterior) -> None:

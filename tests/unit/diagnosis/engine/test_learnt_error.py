@@ -10,13 +10,12 @@ import numpy as np
 import pytest
 
 from diagnosis.engine import learnt_error as module
-from diagnosis.engine.calibration import Calibration, NearReadings
+from diagnosis.engine.calibration import NearReadings
 from diagnosis.engine.fit import Experiment
 from diagnosis.engine.learnt import error_classes
 from diagnosis.engine.learnt_error import (
     WRITABLE,
     LearntError,
-    in_writable_class,
     is_writable,
     learnt_error,
     with_learnt_error,
@@ -143,23 +142,4 @@ def test_the_session_that_is_predicted_deviates_from_what_all_share() -> None:
 def test_classes_that_a_model_can_hold() -> None:
     held = {one.name for one in error_classes() if is_writable(one)}
     assert "splits and small law errors" in held
-    assert held.isdisjoint({"none", "full", "splits, cores and links"})
-
-
-def test_a_class_that_no_model_holds_is_replaced_by_the_best_that_one_holds() -> None:
-    experiment = experiment_of("fzg")
-    plain = experiment.with_filters(experiment.fit(iterations=0).parts).fit(iterations=0)
-    near = NearReadings.of(experiment, ModelError.of(experiment), plain)
-    classes = {one.name: one for one in error_classes()}
-    links, small = classes["splits, cores and links"], classes["splits and small law errors"]
-    chosen = near.fitted(links, plain, iterations=0)
-    evidence = {name: -10.0 * (name != small.name) for name in classes} | {links.name: 5.0}
-    calibration = Calibration(chosen=chosen, evidence=evidence, near=near)
-    found = in_writable_class(chosen.fit, links, calibration)
-    assert found is not None
-    fit, error_class = found
-    assert error_class == small and fit.experiment.metric is calibration.in_class(small).fit.experiment.metric
-    assert fit.objective <= calibration.in_class(small).fit.objective
-    assert in_writable_class(chosen.fit, small, calibration) == (chosen.fit, small)
-    for name in ("full", "none"):
-        assert in_writable_class(chosen.fit, classes[name], calibration) is None
+    assert held.isdisjoint({"none", "full"})
