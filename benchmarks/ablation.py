@@ -5,7 +5,7 @@ Run:  python -m benchmarks.ablation scan RECORDINGS [--gearbox NAME] [--jobs 2] 
 
 ``scan`` calibrates every case of a folder (a folder each; baselines are not read) and judges all candidates from one
 Gram matrix with model error as it is, and with parts of it left out; a line of JSON per case, and an interrupted run
-continues. ``report`` compares with the truths. Nothing is calibrated anew or fitted, and no channel is set apart.
+continues. ``report`` compares with the truths. Nothing is calibrated again or fitted, and no channel is set apart.
 """
 
 from __future__ import annotations
