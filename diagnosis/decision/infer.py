@@ -145,7 +145,31 @@ def _raced(calibration: Calibration, found: Scanned, progress: Progress) -> dict
         progress(f"fitting {one.label} to the end", step, len(ahead))
         if one.fit is not None:
             judged[one.label] = _fitted_on(calibration, one)
+    best = max((judged[one.label] for one in ahead), key=_weight, default=None)
+    if best is not None and best.fit is not None and best.effects[0].how == "from_date":
+        progress(f"fitting what may have begun instead of {best.label}")
+        for one in (judged[one.label] for one in ahead):
+            if one.fit is not None and one is not best and one.effects[0].ending == best.effects[0].ending:
+                judged[one.label] = max(one, _with_course_of(best, calibration, one), key=_weight)
     return judged
+
+
+def _with_course_of(best: Judged, calibration: Calibration, one: Judged) -> Judged:
+    """A change that is fitted once more from the course of the best one: dates and durations have several optima."""
+    assert best.fit is not None  # noqa: S101
+    assert one.fit is not None  # noqa: S101
+    first = len(calibration.fit.z)
+    of_best, own = (
+        [unknown.value(z) for unknown, z in zip(fit.experiment.unknowns[first:], fit.z[first:].tolist(), strict=True)]
+        for fit in (best.fit, one.fit)
+    )
+    shape = np.array([[1.0, *own[1:-3], *of_best[-3:-1], own[-1]]])  # last are date, duration and clock
+    start = calibration.in_class(one.error_class).fit
+    try:
+        reached = refit(start, replace(one.effects[0], variants=shape), 0, own[0], iterations=RACE_STEPS)
+    except (InputError, ArithmeticError, np.linalg.LinAlgError):
+        return one
+    return _fitted_on(calibration, _judged(calibration, replace(one, fit=reached), spread=0.0))
 
 
 def _worth_a_fit(found: Scanned) -> list[int]:
