@@ -38,7 +38,7 @@ from models.base.parallel import iterate_parallel
 from models.mechanisms import CATALOGUE
 
 AS_IT_IS = "as it is"
-FINE = {"law_deg5", "hours"}
+FINE = {"law_deg5", "loss_own", "lag", "hours"}
 RATE = Settings().false_alarm_rate
 
 

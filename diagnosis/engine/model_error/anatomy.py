@@ -21,7 +21,7 @@ from models.simulation.thermal_network import Link, Source, ThermalNetwork
 OIL, AMBIENT = "oil", "T_ambient"
 FLOOR_SHARE = 0.01  # of the largest speed or torque: less is standstill
 LEAST_LOG_SD, LEAST_K, LEAST_SHARE = 0.3, 5.0, 0.01  # of coordinates: of logarithms, temperatures, other inputs
-DAY_PART, LEAST_HOURS_S = 0.3, 36_000.0
+DRIVE_SHARE, DAY_PART, LEAST_HOURS_S = 0.6, 0.3, 36_000.0
 LEAST_RISE_K = 5.0
 PROBES, PROBE_SHARE, PROBE_K, FELT = 40, 1.2, 10.0, 1e-4
 NEIGHBOURS, MOST_PAIRS = 4, 120
@@ -116,14 +116,16 @@ class Anatomy:
     def standard(self) -> Standard:
         """Sizes over all pieces."""
         largest = {name: float(np.abs(column).max()) for name, column in zip(self.names, self.inputs.T, strict=True)}
+        drive = np.abs(self.sources_W.sum(axis=1)).max()
         T = np.stack([self.temperatures[part] for part in self.parts], axis=1)
         outside = self.temperatures[self.ambient] if self.ambient else T.min()
         rise = float(np.sqrt(self.mean(np.square(T - np.reshape(outside, (-1, 1))).mean(axis=1))))
         heat = float(self.mean(np.abs(self.sources_W).sum(axis=1)))
         last = max(float(point.trajectory.piece.time[-1]) for point in self.points)
         return Standard(
-            coordinates=self.coordinates, warm=self.warm, largest=largest, hours_s=max(LEAST_HOURS_S, DAY_PART * last),
-            heat=heat, conductance=heat / max(rise, LEAST_RISE_K),
+            coordinates=self.coordinates, warm=self.warm, largest=largest,
+            drive=DRIVE_SHARE * max(largest[SPEED] if SPEED in self.coordinates else float(drive), 1e-6),
+            hours_s=max(LEAST_HOURS_S, DAY_PART * last), heat=heat, conductance=heat / max(rise, LEAST_RISE_K),
         )  # fmt: skip
 
     @cached_property
@@ -211,6 +213,17 @@ class Anatomy:
     def link_families(self) -> list[Family]:
         """Links that conduct, by the parameters that scale them."""
         return self._families(self.conducting)
+
+    def own_nodes(self, source: Source) -> tuple[str, ...]:
+        """Parts whose temperature a loss may follow other than the oil's; of oil losses the best-linked part."""
+        names = {s.name for s in source.heat.free_symbols}
+        read = {node for node in self.parts if f"T_{node}" in names}
+        for component, nodes in zip(self.network.components, self.model.losses.reads, strict=False):
+            read |= set(nodes) if f"P_{component}" in names else set()
+        own = tuple(part for part in self.parts if part in read - {self.oil}) or (source.node,)
+        if own != self.warm:
+            return own
+        return tuple(node for node in self.neighbours(source.node) if node in self.parts)[:1]
 
     # ------------------------------------------------------------------ places
 

@@ -1,4 +1,4 @@
-r"""Courses over time with which a model error may act: smooth functions of operation and temperature, hours.
+r"""Courses over time with which a model error may act: smooth functions of operation and temperature, lags, hours.
 
 The smooth ones are the truncated expansion of a squared-exponential kernel of length 1 in standardised coordinates c,
 
@@ -25,12 +25,15 @@ import sympy as sp
 
 from diagnosis.engine.point import Point
 from diagnosis.forward.observation import boundary_temperatures, total_at_points
+from diagnosis.forward.recurrence import lagged
 from models.base.types import Array
 from models.formulas.extremes import Max, Min
 from models.network.laws import symbol
 
 SPEED, TORQUE, TEMPERATURE = "speed", "torque", "temperature"
 FARTHEST, WIDTH = 3.0, 1.5  # in standard deviations: where a coordinate is held, and the length of the kernel
+LAG_S, LAG_REACH = 900.0, 2.0
+OWN_SPAN_K, OWN_REACH = 10.0, 3.0
 START_S = 3600.0
 
 
@@ -73,6 +76,8 @@ class Standard:
         Parts whose mean is the temperature that laws depend on: the oil, or the parts that sources heat
     largest : mapping of str to float
         Largest size of every input, in its unit
+    drive : float
+        Change of speed [1/min], or of the heat [W] without speed, that counts as one
     hours_s : float
         Time that counts as one, [s]
     heat : float
@@ -84,6 +89,7 @@ class Standard:
     coordinates: Mapping[str, Coordinate]
     warm: tuple[str, ...]
     largest: Mapping[str, float]
+    drive: float
     hours_s: float
     heat: float
     conductance: float
@@ -136,6 +142,11 @@ class View:
             name: one.standardised(self.temperature(*self.standard.warm) if name == TEMPERATURE else self.input(name))
             for name, one in self.standard.coordinates.items()
         }
+
+    @cached_property
+    def drive(self) -> Array:
+        """The quantity that sets the machine's load: its speed, or the heat of all sources; shape (K,)."""
+        return self.input(SPEED) if SPEED in self.standard.coordinates else self.point.balance.sources.sum(axis=1)
 
     def feature(self, names: tuple[str, ...], powers: tuple[int, ...]) -> Array:
         """One smooth function of some coordinates, shape (K,); kept, since many laws use it."""
@@ -207,6 +218,38 @@ class Smooth:
             for value, powers in zip(values.tolist(), self.powers, strict=True)
         )
         return sp.exp(-sp.Add(*(x**2 for x in c)) / 2) * sp.Add(*terms)
+
+
+@dataclass(frozen=True, kw_only=True)
+class OwnTemperature:
+    """By how much warmer than the oil a loss's own parts are: x, x^2/2, and x with the speed."""
+
+    nodes: tuple[str, ...]
+    coordinates: tuple[str, ...]
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Powers of the difference."""
+        return ("own^1", "own^2", *(f"own^1 {name}^1" for name in self.coordinates))
+
+    def along(self, view: View) -> Array:
+        """The functions, per :data:`OWN_SPAN_K`."""
+        x = (view.temperature(*self.nodes) - view.temperature(*view.standard.warm)) / OWN_SPAN_K
+        x = np.clip(x, -OWN_REACH, OWN_REACH)
+        return np.stack([x, 0.5 * x * x, *(x * view.coordinates[name] for name in self.coordinates)], axis=1)
+
+
+@dataclass(frozen=True, kw_only=True)
+class LaggedDrive:
+    """By how much faster, or hotter, the machine ran before."""
+
+    labels: tuple[str, ...] = ("before",)
+
+    def along(self, view: View) -> Array:
+        """The function."""
+        middle = view.trajectory.piece.middle
+        change = (lagged(view.drive, np.diff(middle), LAG_S) - view.drive) / view.standard.drive
+        return np.asarray(np.clip(change, -LAG_REACH, LAG_REACH))[:, None]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -22,6 +22,8 @@ from diagnosis.engine.model_error.courses import (
     Constant,
     Course,
     Hours,
+    LaggedDrive,
+    OwnTemperature,
     Smooth,
     View,
 )
@@ -218,10 +220,22 @@ def fine_loss_laws(machine: Anatomy) -> Iterator[Change]:
         yield _of_sources(family.name, family.members, course)
 
 
+def losses_by_own_temperature(machine: Anatomy) -> Iterator[Change]:
+    """Heat of sources by how much warmer than the oil their own parts are."""
+    by = tuple(name for name in (SPEED,) if name in machine.coordinates)
+    for source in machine.network.sources:
+        if own := machine.own_nodes(source):
+            yield _of_sources(source.name, (source.name,), OwnTemperature(nodes=own, coordinates=by))
+
+
+def memories(machine: Anatomy) -> Iterator[Change]:
+    """Losses and links by the operation before."""
+    return _everything(machine, LaggedDrive())
+
+
 def ageing(machine: Anatomy) -> Iterator[Change]:
     """Losses and links by the hours, losses by the time after the start."""
-    yield from (_of_sources(source.name, (source.name,), Hours()) for source in machine.network.sources)
-    yield from (_of_links(link.name, (link.name,), Hours()) for link in machine.conducting)
+    yield from _everything(machine, Hours())
     yield from (_of_sources(source.name, (source.name,), AfterStart()) for source in machine.network.sources)
 
 
@@ -229,7 +243,7 @@ GROUPS: Mapping[str, Callable[[Anatomy], Iterator[Change]]] = {
     "a_loss": loss_laws, "a_link": link_laws, "b_split": heat_splits, "c_sensor": sensor_places,
     "c_lag": slow_sensors, "d_sub": slow_cores, "mass": slow_masses, "e_link": missing_links, "f_input": input_errors,
     "g_cap": capacities, "p_zero": loss_zero,
-    "law_deg5": fine_loss_laws, "hours": ageing,
+    "law_deg5": fine_loss_laws, "loss_own": losses_by_own_temperature, "lag": memories, "hours": ageing,
 }  # fmt: skip
 
 
@@ -242,6 +256,11 @@ def _of_sources(place: str, names: tuple[str, ...], course: Course = CONSTANT) -
 
 def _of_links(place: str, names: tuple[str, ...], course: Course = CONSTANT) -> HeatChange:
     return HeatChange(place=f"path {place}", heat=heats.LinkHeat(names=names), course=course)
+
+
+def _everything(machine: Anatomy, course: Course) -> Iterator[Change]:
+    yield from (_of_sources(source.name, (source.name,), course) for source in machine.network.sources)
+    yield from (_of_links(link.name, (link.name,), course) for link in machine.conducting)
 
 
 def _link_course(machine: Anatomy, family: Family) -> Smooth | None:

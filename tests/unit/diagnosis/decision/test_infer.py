@@ -30,6 +30,7 @@ from diagnosis.engine.families import axis_of, changes, log_prior, parameters_ou
 from diagnosis.engine.fit import Experiment, Fit, calibrate
 from diagnosis.engine.learnt import ErrorClass, error_classes, rule
 from diagnosis.engine.prepare import prepare_experiment
+from diagnosis.engine.refit import with_candidate
 from diagnosis.engine.scan import scan
 from diagnosis.engine.unknown import TermParameter
 from diagnosis.results.findings import values_of
@@ -38,7 +39,7 @@ from models.base.types import Array
 from models.mechanisms import CATALOGUE, Placed
 from models.network.laws import Parameter, symbol
 from models.terms.term import Form, Term
-from tests.unit.diagnosis.inference_example import recorded
+from tests.unit.diagnosis.inference_example import acting, recorded
 
 LOOKED_FOR = ("windage", "air_cooling_change", "sensor_bias", "hot_neighbour")
 WINDAGE_W, AT_RPM, HOURS = 150.0, 3300.0, 1.5
@@ -239,6 +240,36 @@ def test_a_change_at_a_date_competes_under_the_name_of_its_law(concealed: Poster
     assert dated.effects[0].how == "from_date" and dated.names == ("windage",)
     # It was there from the first row on: a date brings nothing.
     assert dated.log_bayes < members["windage@oil"].log_bayes + 1.0
+
+
+def test_a_change_is_fitted_from_the_date_of_the_best_one(fzg: Gearbox) -> None:
+    """It has settled on another date, as fits of dates may."""
+    date, heat_W = 2400.0, 600.0
+    train = recorded(fzg, "train", hours=HOURS)
+    setup, healthy = prepare_experiment(fzg, [train], [train])
+    placed = CATALOGUE["pump_heat"].placed(healthy.machine.model.network, setup.scale, setup.channels)
+    (dated,) = changes([], [one for one in placed if one.place == "oil"], axis_of(healthy), {})
+    assert dated.term is not None
+    names = [p.name for p in dated.term.parameters]  # strength, date, duration, clock
+    acts = acting(healthy, dated.term, dict(zip(names, (heat_W, date, 120.0, 0.0), strict=True)))
+    calibration = calibrate_with_error(acts, calibrate(acts))
+
+    def fitted(name: str, since: float, iterations: int) -> Judged:
+        effect = replace(dated, name=name, variants=np.array([[1.0, since, 120.0, 0.0]]))
+        experiment, z = with_candidate(calibration.fit, effect, 0)
+        z[0] = experiment.unknowns[-4].z_of(heat_W)
+        fit = experiment.fit(np.concatenate([calibration.fit.z, z]), iterations=iterations)
+        error_class = calibration.chosen.error_class
+        one = Judged(effects=(effect,), log_prior=0.0, log_bayes=0.0, error_class=error_class, fit=fit)
+        return infer_module._judged(calibration, one, spread=0.0)
+
+    best, other = fitted("right", date, 10), fitted("wrong", 4500.0, 0)
+    assert best.log_bayes > other.log_bayes + 10.0
+    found = infer_module._with_course_of(best, calibration, other)
+    assert best.fit is not None and found.fit is not None
+    right, since = (fit.experiment.unknowns[-3].value(float(fit.z[-3])) for fit in (best.fit, found.fit))
+    assert found.effects[0].name == "wrong" and abs(since - right) < 60.0 < abs(right - 4500.0)
+    assert found.log_bayes == pytest.approx(best.log_bayes, abs=1.0)
 
 
 def test_every_candidate_is_judged_and_the_best_are_fitted(healthy: Posterior, concealed: Posterior) -> None:

@@ -20,7 +20,7 @@ from tests.unit.diagnosis.inference_example import recording_of
 
 DATA = Path(__file__).parents[5] / "examples" / "data"
 BASE = ("a_loss", "a_link", "b_split", "c_sensor", "c_lag", "d_sub", "mass", "e_link", "f_input", "g_cap", "p_zero")
-FINER = ("law_deg5", "hours")
+FINER = ("law_deg5", "loss_own", "lag", "hours")
 
 
 def real(name: str, recording: str) -> Experiment:
@@ -48,7 +48,7 @@ def test_groups_of_machines_with_geometry() -> None:
     assert fzg["law_deg5"] == 3 * 36 + 2 * 11
     assert (fzg["g_cap"], fzg["d_sub"], fzg["c_sensor"], fzg["c_lag"]) == (12, 36, 5, 2)
     assert fzg["e_link"] == 12 * 11 // 2 - 25 + 12 - 2 + 1
-    assert fzg["hours"] == 27 + 9 + 9
+    assert (fzg["lag"], fzg["hours"]) == (27 + 9, 27 + 9 + 9)
     assert tuple(conveyor) == tuple(fzg) and conveyor["g_cap"] == 13
 
 
@@ -58,7 +58,7 @@ def test_groups_of_a_machine_without_speed_torque_oil_and_losses() -> None:
     assert set(GROUPS) - set(count) == {"p_zero", "mass"}  # random heat may last for hours
     # 23 links, 12 of them to air; 5 sources in 1 family; 13 thermometers at 12 parts.
     assert (count["a_loss"], count["e_link"], count["g_cap"]) == (3 + 5, 12 * 11 // 2 - 11, 12)
-    assert (count["b_split"], count["c_lag"], count["hours"]) == (9, 26, 23 + 5 + 5)
+    assert (count["b_split"], count["c_lag"], count["lag"]) == (9, 26, 23 + 5)
     assert not any("speed" in label or "torque" in label for label in error.labels)
 
 

@@ -134,6 +134,9 @@ def test_finer_laws(case: Case) -> None:
         "law_deg5: heat of churning, speed^3 temperature^1": lambda network, step: network.with_loss_factor(
             "churning", lambda _: step * sp.exp(-(n**2 + T**2) / 2) * n**3 * T / np.sqrt(6.0)
         ),
+        "loss_own: heat of bearing_1, own^1 speed^1": lambda network, step: network.with_loss_factor(
+            "bearing_1", lambda s: step * n * sp.Max(-3, sp.Min(3, (s.T_bearing_1 - s.T_oil) / 10.0))
+        ),
         "hours: path pinion-shaft_1, hours": lambda network, step: network.with_link_factor(
             "pinion-shaft_1", lambda s: step * s.time / 36_000.0
         ),
