@@ -71,9 +71,12 @@ class ModelError:
     def columns(self, point: Point, first: int, last: int, wanted: NDArray[np.bool_] | None = None) -> ErrorCourses:
         """Change per unit of the unknowns from `first` up to `last` (excluded), heat with rates of coupled states.
 
-        Of those that are not `wanted`, shape (unknowns,), it may be left out.
-
         The point may be that of an extended machine: everything is found by its name.
+
+        Parameters
+        ----------
+        wanted : Array of bool, shape (unknowns,), optional
+            Changes of which no unknown is wanted are left zero
         """
         view, (points, channels) = View(point, self.standard), point.read.shape
         into = np.zeros((points - 1, point.trajectory.decay.shape[-1], last - first))
@@ -118,11 +121,8 @@ class ModelError:
 
     def _combined(self, point: Point, combinations: Array) -> ErrorCourses:
         """Change per unit of combinations; see :meth:`columns`."""
-        (points, channels), count, wanted = (
-            point.read.shape,
-            combinations.shape[1],
-            np.asarray(combinations.any(axis=1)),
-        )
+        (points, channels), count = point.read.shape, combinations.shape[1]
+        wanted = np.asarray(combinations.any(axis=1))
         heat = np.zeros((points - 1, point.trajectory.decay.shape[-1], count))
         loss, reading = np.zeros((points - 1, count)), np.zeros((points, channels, count))
         for begin, end in self._chunks(point, 0, len(self.groups)):
