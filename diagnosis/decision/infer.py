@@ -150,11 +150,11 @@ def _raced(calibration: Calibration, found: Scanned, progress: Progress) -> dict
         progress(f"fitting what may have begun instead of {best.label}")
         for one in (judged[one.label] for one in ahead):
             if one.fit is not None and one is not best and one.effects[0].ending == best.effects[0].ending:
-                judged[one.label] = max(one, _with_course_of(best, calibration, one), key=_weight)
+                judged[one.label] = max(one, _with_course_of(calibration, best, one), key=_weight)
     return judged
 
 
-def _with_course_of(best: Judged, calibration: Calibration, one: Judged) -> Judged:
+def _with_course_of(calibration: Calibration, best: Judged, one: Judged) -> Judged:
     """A change that is fitted once more from the course of the best one: dates and durations have several optima."""
     assert best.fit is not None  # noqa: S101
     assert one.fit is not None  # noqa: S101

@@ -35,6 +35,7 @@ from diagnosis.engine.scan import scan
 from diagnosis.engine.unknown import TermParameter
 from diagnosis.results.findings import values_of
 from models.assembly.gearbox import Gearbox
+from models.base.progress import silent
 from models.base.types import Array
 from models.mechanisms import CATALOGUE, Placed
 from models.network.laws import Parameter, symbol
@@ -242,34 +243,38 @@ def test_a_change_at_a_date_competes_under_the_name_of_its_law(concealed: Poster
     assert dated.log_bayes < members["windage@oil"].log_bayes + 1.0
 
 
-def test_a_change_is_fitted_from_the_date_of_the_best_one(fzg: Gearbox) -> None:
-    """It has settled on another date, as fits of dates may."""
+def test_a_change_is_fitted_from_the_date_of_the_best_one(fzg: Gearbox, monkeypatch: pytest.MonkeyPatch) -> None:
+    """One that has settled on another date, as fits of dates may."""
     date, heat_W = 2400.0, 600.0
     train = recorded(fzg, "train", hours=HOURS)
     setup, healthy = prepare_experiment(fzg, [train], [train])
     placed = CATALOGUE["pump_heat"].placed(healthy.machine.model.network, setup.scale, setup.channels)
     (dated,) = changes([], [one for one in placed if one.place == "oil"], axis_of(healthy), {})
     assert dated.term is not None
-    names = [p.name for p in dated.term.parameters]  # strength, date, duration, clock
-    acts = acting(healthy, dated.term, dict(zip(names, (heat_W, date, 120.0, 0.0), strict=True)))
+    acts = acting(healthy, dated.term, {"strength": heat_W, "since": date, "within": 120.0, "start": 0.0})
     calibration = calibrate_with_error(acts, calibrate(acts))
+    effects = [replace(dated, name=name, law=name, variants=np.array([[1.0, since, 120.0, 0.0]]))
+               for name, since in (("right", date), ("wrong", 4500.0))]  # fmt: skip
 
-    def fitted(name: str, since: float, iterations: int) -> Judged:
-        effect = replace(dated, name=name, variants=np.array([[1.0, since, 120.0, 0.0]]))
-        experiment, z = with_candidate(calibration.fit, effect, 0)
-        z[0] = experiment.unknowns[-4].z_of(heat_W)
-        fit = experiment.fit(np.concatenate([calibration.fit.z, z]), iterations=iterations)
-        error_class = calibration.chosen.error_class
-        one = Judged(effects=(effect,), log_prior=0.0, log_bayes=0.0, error_class=error_class, fit=fit)
-        return infer_module._judged(calibration, one, spread=0.0)
+    def settled(_fit: Fit, found: Scanned, index: int, _steps: int) -> Judged:
+        experiment, z = with_candidate(calibration.fit, found.candidates[index], 0)
+        z[0] = experiment.unknowns[-len(z)].z_of(heat_W)
+        fit = experiment.fit(np.concatenate([calibration.fit.z, z]), iterations=0)
+        error_class = found.best[index].error_class
+        return Judged(
+            effects=(found.candidates[index],), log_prior=0.0, log_bayes=0.0, error_class=error_class, fit=fit
+        )
 
-    best, other = fitted("right", date, 10), fitted("wrong", 4500.0, 0)
-    assert best.log_bayes > other.log_bayes + 10.0
-    found = infer_module._with_course_of(best, calibration, other)
-    assert best.fit is not None and found.fit is not None
-    right, since = (fit.experiment.unknowns[-3].value(float(fit.z[-3])) for fit in (best.fit, found.fit))
-    assert found.effects[0].name == "wrong" and abs(since - right) < 60.0 < abs(right - 4500.0)
-    assert found.log_bayes == pytest.approx(best.log_bayes, abs=1.0)
+    monkeypatch.setattr(infer_module, "_refitted", settled)
+    monkeypatch.setattr(infer_module, "MOST_TURNS", 0)
+    found = scan_in_classes(calibration, scan(calibration.fit, effects, calibration.near.columns), np.zeros(2))
+    raced = infer_module._raced(calibration, replace(found, log_bayes=np.array([50.0, 40.0])), silent)
+    right, wrong = (raced[one.label] for one in effects)
+    assert right.fit is not None and wrong.fit is not None and right.log_bayes > 50.0
+    dates = [fit.experiment.unknowns[-3].value(float(fit.z[-3])) for fit in (right.fit, wrong.fit)]
+    assert dates == pytest.approx([date, date], abs=20.0)
+    before = infer_module._judged(calibration, settled(calibration.fit, found, 1, 0), spread=0.0)
+    assert wrong.log_bayes > before.log_bayes + 50.0
 
 
 def test_every_candidate_is_judged_and_the_best_are_fitted(healthy: Posterior, concealed: Posterior) -> None:
