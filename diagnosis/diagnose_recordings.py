@@ -14,6 +14,7 @@ from diagnosis.decision.settings import Settings
 from diagnosis.engine.calibration import calibrate_with_error, recalibrate
 from diagnosis.engine.families import candidates_of, log_prior
 from diagnosis.engine.fit import calibrate
+from diagnosis.engine.known_switches import start_with_switches
 from diagnosis.engine.outside import outside_of
 from diagnosis.engine.prepare import prepare_experiment
 from diagnosis.engine.set_apart import calibrate_apart
@@ -30,6 +31,8 @@ from models.assembly.gearbox import Gearbox, load_gearbox
 from models.base.errors import InputError
 from models.base.parallel import one_thread
 from models.base.progress import Progress, silent
+from models.correction.corrected_gearbox import corrected_gearbox
+from models.correction.correction import Correction
 from models.mechanisms import CATALOGUE, Mechanism
 from models.quantities.quantities import is_total_loss
 
@@ -45,6 +48,7 @@ def diagnose(
     holdout: Source | Sequence[Source] = (),
     baseline: Source | Sequence[Source] = (),
     switched_off: str | Sequence[str] = (),
+    correction: Correction | None = None,
     settings: Settings = SETTINGS,
     catalogue: Mapping[str, Mechanism] | None = None,
     jobs: int = 1,
@@ -63,6 +67,9 @@ def diagnose(
         The same machine in other sessions, without the effect that is looked for
     switched_off : str, or several
         Mechanisms that are known to be off in the baselines; by default all are
+    correction : Correction, optional
+        What is known of the machine and its definition lacks: a cooler, or what an earlier diagnosis found. Standard
+        errors are the priors of its numbers; calibrated values are where those of the definition begin
     settings : Settings
         Numbers of the decision
     catalogue : mapping of str to Mechanism, optional
@@ -80,10 +87,12 @@ def diagnose(
     Raises
     ------
     InputError
-        If a recording cannot be used, with file, column and rows.
+        If a recording cannot be used, with file, column and rows, or the correction was made for another gearbox.
     """
     catalogue = CATALOGUE if catalogue is None else catalogue
     gearbox = gearbox if isinstance(gearbox, Gearbox) else load_gearbox(gearbox)
+    known = Correction() if correction is None else correction.of_machine()
+    gearbox = corrected_gearbox(gearbox, known)
     train, held, healthy = named_apart(*(_read(given, gearbox) for given in (recordings, holdout, baseline)))
     off = (switched_off,) if isinstance(switched_off, str) else tuple(switched_off)
     if not train:
@@ -102,8 +111,9 @@ def diagnose(
     _refuse_too_short(train, experiment.pieces)
     try:
         progress("calibrating the model")
-        plain = calibrate(experiment)
-        others, apart = calibrate_apart(experiment, plain)
+        start = start_with_switches(gearbox, experiment, train, held, healthy)
+        plain = calibrate(experiment, start)
+        others, apart = calibrate_apart(experiment, plain, start)
         progress("calibrating with model error")
         calibration = calibrate_with_error(experiment, others, apart)
         candidates = candidates_of(setup, experiment, catalogue)
@@ -128,7 +138,7 @@ def diagnose(
             setup, experiment, posterior, decide(posterior, settings), plain=plain, calibration=calibration,
             settings=settings,
             others=None if rest is None else Others(fit=others, posterior=rest, channels=faulty, apart=tuple(apart)),
-            catalogue=catalogue, train=train, held_out=held, healthy=healthy, switched_off=off, jobs=jobs,
+            catalogue=catalogue, known=known, train=train, held_out=held, healthy=healthy, switched_off=off, jobs=jobs,
         )  # fmt: skip
     except ArithmeticError as error:
         if type(error) is not ArithmeticError:

@@ -11,6 +11,7 @@ import click
 from builder.base.example import example
 from builder.base.progress import LOADING, progress
 from builder.base.workers import worker_options
+from builder.commands.add import add
 from builder.commands.check import check
 from builder.commands.conceal import conceal
 from builder.commands.definition_files import new, schema
@@ -26,8 +27,7 @@ GEARBOX_HELP = f"Name ({', '.join(known_gearboxes())}) or definition file (TOML)
 
 LONGEST = 80  # characters of a first sentence, which the help of all verbs has in full
 GROUPS = {
-    "Your machine": ("new", "check", "schema", "build-fmu", "simulate"),
-    "Recordings of it": ("diagnose",),
+    "Your machine, and recordings of it": ("new", "check", "add", "schema", "build-fmu", "simulate", "diagnose"),
     "Trust": ("conceal", "prove", "score", "reproduce"),
 }
 
@@ -119,5 +119,5 @@ def build_fmu(
     report.show()
 
 
-for verb in (new, check, schema, build_fmu, simulate, diagnose, conceal, prove, score, reproduce):
+for verb in (new, check, add, schema, build_fmu, simulate, diagnose, conceal, prove, score, reproduce):
     commands.add_command(verb)

@@ -16,6 +16,7 @@ from builder.base.progress import LOADING, progress
 from builder.base.workers import worker_options
 from models.assembly.gearbox import known_gearboxes, load_gearbox
 from models.base.errors import InputError, did_you_mean
+from models.correction.correction import Correction, read_correction
 from models.files.output_files import refuse_to_replace
 
 if TYPE_CHECKING:
@@ -69,6 +70,8 @@ class _OptionsOfMany(click.Command):
                    "every effect is]")  # fmt: skip
 @click.option("--mapping", type=click.Path(path_type=Path, dir_okay=False), default=None, metavar="FILE",
               help="What the columns mean.  [default: <stem>.toml or mapping.toml next to each]")  # fmt: skip
+@click.option("--correction", type=click.Path(path_type=Path, dir_okay=False), default=None, metavar="FILE",
+              help="What is known of the machine already: physics of an earlier correction, or of 'add'.")  # fmt: skip
 @click.option("--mechanisms", type=click.Path(path_type=Path, dir_okay=False), multiple=True,
               metavar="FILE", help="Your own mechanisms (.toml or .py), added to the catalogue's.")  # fmt: skip
 @click.option("--without-mechanism", "without", multiple=True, metavar="NAME",
@@ -87,6 +90,7 @@ def diagnose(
     baseline: tuple[str, ...],
     switched_off: tuple[str, ...],
     mapping: Path | None,
+    correction: Path | None,
     mechanisms: tuple[Path, ...],
     without: tuple[str, ...],
     output: Path,
@@ -116,6 +120,7 @@ def diagnose(
     if click.get_current_context().get_parameter_source("gearbox") is ParameterSource.DEFAULT:
         console.err.print(f"note: the machine is taken to be {gearbox!r}, the FZG rig; --gearbox names another one")
     definition = load_gearbox(gearbox)
+    known = None if correction is None else read_correction(correction, definition)
     catalogue = dict(CATALOGUE)
     for file in mechanisms:
         own = load_mechanisms(file)
@@ -128,8 +133,10 @@ def diagnose(
         if catalogue.pop(name, None) is None:
             raise InputError(f"--without-mechanism {name}: is not in the catalogue{did_you_mean(name, CATALOGUE)}")
     if fleet:
-        _diagnose_fleet(Path(recordings[0]), definition, output, mapping=mapping, catalogue=catalogue,
-                        switched_off=switched_off, settings=settings, jobs=jobs, dask=dask)  # fmt: skip
+        _diagnose_fleet(
+            Path(recordings[0]), definition, output, mapping=mapping, catalogue=catalogue, correction=known,
+            switched_off=switched_off, settings=settings, jobs=jobs, dask=dask,
+        )  # fmt: skip
         return
     with progress("reading the recordings"):
         train, held, healthy = read_by_role(recordings, holdout, baseline, definition.network(), mapping=mapping)
@@ -137,13 +144,13 @@ def diagnose(
         *(p for r in (*train, *held, *healthy) for p in r.files),
         *mechanisms,
         Path(gearbox),
-        *([mapping] if mapping else []),
+        *(file for file in (mapping, correction) if file),
     ]
     refuse_to_replace(given, [output / name for name in names_of_files((*train, *held))])
     _print_notes((*train, *held, *healthy))
     old = [path for path in left_from_earlier(output, (*train, *held)) if path not in given]
     with atomic_folder(output) as stage, progress("starting") as tell:
-        found = run(train, definition, holdout=held, baseline=healthy, switched_off=switched_off,
+        found = run(train, definition, holdout=held, baseline=healthy, switched_off=switched_off, correction=known,
                     settings=settings, catalogue=catalogue, jobs=jobs, progress=tell)  # fmt: skip
         tell("writing the report")
         names = [path.name for path in write_files(found, definition, [*train, *held], stage)]
@@ -177,13 +184,13 @@ def _check_options(recordings: tuple[str, ...], others: tuple[str, ...], dask: s
 
 def _diagnose_fleet(
     folder: Path, gearbox: Gearbox, output: Path, *, mapping: Path | None, catalogue: Mapping[str, Mechanism],
-    switched_off: tuple[str, ...], settings: Settings, jobs: int, dask: str | None,
+    correction: Correction | None, switched_off: tuple[str, ...], settings: Settings, jobs: int, dask: str | None,
 ) -> None:  # fmt: skip
     from builder.workflows.fleet import SUMMARY, diagnose_fleet, members_of, show_summary
 
     outcomes = diagnose_fleet(
         members_of(folder, without=output), gearbox, output, mapping=mapping, catalogue=catalogue,
-        switched_off=switched_off, settings=settings, jobs=jobs, dask=dask,
+        correction=correction, switched_off=switched_off, settings=settings, jobs=jobs, dask=dask,
     )  # fmt: skip
     rows = [outcome.row for outcome in outcomes]
     show_summary(rows)

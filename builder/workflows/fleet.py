@@ -26,6 +26,7 @@ from models.assembly.gearbox import Gearbox
 from models.base.atomic_write import atomic_folder
 from models.base.errors import InputError
 from models.base.parallel import iterate_parallel
+from models.correction.correction import Correction
 from models.files.output_files import refuse_to_replace, write_table
 from models.mechanisms import Mechanism
 
@@ -147,6 +148,7 @@ def diagnose_fleet(
     *,
     mapping: Path | None,
     catalogue: Mapping[str, Mechanism],
+    correction: Correction | None = None,
     switched_off: Sequence[str] = (),
     settings: Settings,
     jobs: int = 1,
@@ -163,7 +165,7 @@ def diagnose_fleet(
         Gets a folder per gearbox as soon as it is done, and at the end ``summary.csv``
     mapping : Path or None
         See :func:`diagnosis.recordings.read.read_recordings`
-    catalogue, switched_off, settings
+    catalogue, correction, switched_off, settings
         See :func:`diagnosis.diagnose`
     jobs : int
         Gearboxes at the same time on this machine; a single gearbox gets all processes
@@ -198,7 +200,7 @@ def diagnose_fleet(
                     [output / member.name / name for name in files],
                 )
                 recordings = (train, held, healthy)
-                yield member.name, recordings, gearbox, catalogue, switched_off, settings, inside
+                yield member.name, recordings, gearbox, catalogue, correction, switched_off, settings, inside
             except InputError as error:
                 outcomes[member.name] = _without_diagnosis(member.name, error)
 
@@ -219,14 +221,15 @@ def diagnose_fleet(
 
 
 def _diagnose(
-    name: str, recordings: ByRole, gearbox: Gearbox, catalogue: Mapping[str, Mechanism], switched_off: Sequence[str],
-    settings: Settings, jobs: int,
+    name: str, recordings: ByRole, gearbox: Gearbox, catalogue: Mapping[str, Mechanism], correction: Correction | None,
+    switched_off: Sequence[str], settings: Settings, jobs: int,
 ) -> MemberOutcome:  # fmt: skip
     train, holdout, baseline = recordings
     try:
         with tempfile.TemporaryDirectory() as folder:
             found = diagnose(train, gearbox, holdout=holdout, baseline=baseline, switched_off=switched_off,
-                             catalogue=catalogue, settings=settings, jobs=jobs)  # fmt: skip
+                             catalogue=catalogue, correction=correction, settings=settings,
+                             jobs=jobs)  # fmt: skip
             written = write_files(found, gearbox, [*train, *holdout], Path(folder))
             return MemberOutcome(row=_row(name, found), files={path.name: path.read_bytes() for path in written})
     except Exception as error:  # noqa: BLE001 - shown with its traceback at the end, when the others are done

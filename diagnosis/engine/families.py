@@ -50,13 +50,15 @@ def candidates_of(
         parameters outside their priors
     """
     network = experiment.machine.model.network
-    placed = [one for m in catalogue.values() for one in m.placed(network, setup.scale, setup.channels)]
+    known = {p.name for p in network.parameters}  # what the machine is known to have is there once
+    placed = [one for m in catalogue.values() for one in m.placed(network, setup.scale, setup.channels)
+              if one.strength.name not in known]  # fmt: skip
     factors = factors_of(network, setup.scale, setup.channels)
     axis = axis_of(experiment)
     several = len({piece.recording for piece in experiment.pieces} - experiment.healthy) > 1
-    known = {law_of(name): name for name in catalogue} | {name: name for name in catalogue}
+    names = {law_of(name): name for name in catalogue} | {name: name for name in catalogue}
     return tuple(
-        replace(one, known_as=known.get(one.name, known.get(one.law)))
+        replace(one, known_as=names.get(one.name, names.get(one.law)))
         for one in (
             *(hypothesis_of(one) for one in placed),
             *changes(factors, placed, axis, _sensor_sd(experiment)),

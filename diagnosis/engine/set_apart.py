@@ -11,6 +11,7 @@ import numpy as np
 from diagnosis.engine.fit import Experiment, Fit, calibrate
 from diagnosis.engine.unknown import SensorBias, SensorLag, TermParameter, Unknown
 from diagnosis.forward.whitening import AS_ASSUMED
+from models.base.types import Array
 from models.quantities.quantities import is_total_loss
 from models.terms.term import Term
 
@@ -19,7 +20,7 @@ MOST_SHARE = 0.25  # of the temperatures: more that are off are no fault of a se
 FEWEST = 4  # temperatures, for a median that means something
 
 
-def calibrate_apart(experiment: Experiment, plain: Fit) -> tuple[Fit, tuple[str, ...]]:
+def calibrate_apart(experiment: Experiment, plain: Fit, start: Array | None = None) -> tuple[Fit, tuple[str, ...]]:
     """Calibrate the nominal machine without the channels that are at odds with all others.
 
     A channel is set apart if the machine, calibrated by the other ones, misses it by :data:`MANY` times what it misses
@@ -29,6 +30,8 @@ def calibrate_apart(experiment: Experiment, plain: Fit) -> tuple[Fit, tuple[str,
     ----------
     plain : Fit
         Of all channels
+    start : Array, shape (unknowns,), or None
+        Where calibrations begin; by default at the middles of the priors
 
     Returns
     -------
@@ -47,7 +50,7 @@ def calibrate_apart(experiment: Experiment, plain: Fit) -> tuple[Fit, tuple[str,
         if off[worst] < SUSPECT:
             break
         try:
-            tried = calibrate(without_channels(experiment, (*apart, worst)))
+            tried = calibrate(without_channels(experiment, (*apart, worst)), start)
             if _missed_by(experiment, tried, apart)[worst] < MANY:
                 break
         except ArithmeticError:  # no solution without it

@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from diagnosis.candidates.factors import SHAPE
+from diagnosis.candidates.factors import SHAPE as SHAPE_OF
 from diagnosis.forward.sensor_fault import channel_column
 from diagnosis.recordings.recording import Recording
 from diagnosis.results.result import Diagnosis
 from models.assembly.gearbox import Gearbox
-from models.correction.correction import MODEL_ERROR, Correction, Estimate, Finding, write_correction
+from models.correction.correction import MODEL_ERROR, SHAPE, Correction, Estimate, Finding, write_correction
 from models.terms.term import Term
 
 UNNAMED, IMPROVES = "without a name", "It improves the prediction; what it is, the data do not say."
@@ -40,16 +40,24 @@ def left_from_earlier(folder: Path, recordings: Sequence[Recording]) -> list[Pat
 
 
 def correction_of(diagnosis: Diagnosis, gearbox: Gearbox) -> Correction:
-    """A diagnosis as a correction of the definition: the model that predicts, and how it was recorded."""
+    """A diagnosis as a correction of the definition: the model that predicts, and how it was recorded.
+
+    Parameters
+    ----------
+    gearbox : Gearbox
+        As its definition has it
+    """
     nominal = {p.name: p for p in gearbox.network().parameters}
     calibrated = {c.parameter: c for c in diagnosis.calibration}
-    findings = [_finding_of(term, diagnosis) for term in diagnosis.terms]
+    estimates = {name: (c.value, c.stderr) for name, c in calibrated.items()}
+    findings = [finding.with_estimates(estimates) for finding in diagnosis.known.findings]
+    findings += [_finding_of(term, diagnosis) for term in diagnosis.terms]
     for term in diagnosis.shapes:
         name = term.strength.name
         if name in calibrated:
             findings.append(Finding.of(
-                term, {name: (calibrated[name].value, calibrated[name].stderr)}, mechanism="shape",
-                family="calibration", place=name.removeprefix(SHAPE), says=term.strength.description, grade="learnt",
+                term, {name: estimates[name]}, mechanism=SHAPE, family="calibration",
+                place=name.removeprefix(SHAPE_OF), says=term.strength.description, grade="learnt",
             ))  # fmt: skip
     findings += [
         Finding.of(term, {term.strength.name: (term.strength.start, term.strength.sd)}, mechanism=MODEL_ERROR,

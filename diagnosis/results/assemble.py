@@ -44,6 +44,7 @@ from diagnosis.setup.inference_setup import InferenceSetup
 from diagnosis.setup.noise import HEAT_FRACTION, HEAT_TIME_S, PARAMETRIC_FRACTION, PARAMETRIC_K, WANDER
 from models.base.types import Array
 from models.base.version import project_version
+from models.correction.correction import Correction
 from models.mechanisms import Mechanism
 from models.network.laws import Parameter
 from models.terms.term import Term
@@ -84,6 +85,7 @@ def assemble(
     others: Others | None = None,
     settings: Settings,
     catalogue: Mapping[str, Mechanism],
+    known: Correction,
     train: Sequence[Recording],
     held_out: Sequence[Recording],
     healthy: Sequence[Recording] = (),
@@ -104,6 +106,8 @@ def assemble(
         With model error
     others : Others or None
         What all but faulty channels say, if there are any
+    known : Correction
+        What was known of the machine before
     train, held_out, healthy : sequence of Recording
     switched_off : sequence of str
         Mechanisms that are off in `healthy`; all if empty
@@ -161,6 +165,7 @@ def assemble(
         holdout=holdout,
         faulty=faulty,
         terms=_terms(best, final),
+        known=known,
         sensors=model.sensors,
         true_inputs=model.true_inputs,
         alone=_calibrated(plain, calibration.fit, plain, inputs),
@@ -189,6 +194,7 @@ def assemble(
             "baselines": {r.name: r.sha256 for r in healthy},
             "switched_off": list(switched_off),
             "gearbox": setup.gearbox.hash,
+            "correction": known.summary()["sha256"] if known.has_physics else None,
             "version": project_version(),
         },
         notes=(

@@ -185,6 +185,9 @@ def _how_sure(d: Diagnosis) -> tuple[str, ...]:
         kinds = sorted(d.kinds.items(), key=lambda kind: -kind[1])
         told = [f"{kind} {share(p)}" for kind, p in kinds if p >= LEAST_RIVAL]
         lines.append(f"Probabilities: {', '.join(told)}.")
+    if d.known.has_physics:
+        known = ", ".join(d.known.summary()["findings"]) or "calibrated values"
+        lines.append(f"Known before, and part of the model as delivered: {known}.")
     if d.error_class:
         hides = ", the largest, because the model fits badly: a real effect can hide in it"
         lines.append(f"Model error assumed: class {d.error_class}{hides if d.error_class == LARGEST_ERROR else ''}.")
@@ -196,7 +199,7 @@ def _how_sure(d: Diagnosis) -> tuple[str, ...]:
         deviations = {p.name for p in d.network.parameters if p.start == 0.0}  # from what the definition assumes
         told = [f"{c.parameter} {'off by' if c.parameter in deviations else '='} {c.estimate:.3g}{_unit(c.unit)} "
                 f"({abs(c.shift_in_sd):.1f} sd)" for c in far[:MOST_FAR]]  # fmt: skip
-        lines.append(f"Far from what the definition expects: {', '.join(told)}.")
+        lines.append(f"Far from what was expected: {', '.join(told)}.")
     if d.remaining_note:
         lines.append(f"Remaining: {d.remaining_note}")
     return tuple(lines)

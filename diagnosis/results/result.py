@@ -30,6 +30,7 @@ from diagnosis.results.result_parts import (
     or_none,
 )
 from models.base.errors import InputError, did_you_mean
+from models.correction.correction import Correction
 from models.correction.instruments import InputCorrection, SensorCorrection
 from models.simulation.thermal_network import ThermalNetwork
 from models.terms.term import Term
@@ -120,6 +121,8 @@ class Diagnosis:
     terms : tuple of Term
         What the model that predicts has more than the nominal one, with its values as the parameters' start and their
         standard errors as `sd`; of an effect without a name that is certain enough too
+    known : Correction
+        What was known of the machine before, and is in the nominal network
     sensors : tuple of SensorCorrection
         How its sensors differ from the machine, without what is in `terms`
     true_inputs : tuple of InputCorrection
@@ -171,6 +174,7 @@ class Diagnosis:
     spoiled: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     faulty: tuple[str, ...] = ()
     terms: tuple[Term, ...] = ()
+    known: Correction = field(default_factory=Correction)
     sensors: tuple[SensorCorrection, ...] = ()
     true_inputs: tuple[InputCorrection, ...] = ()
     alone: CalibratedModel = field(default_factory=CalibratedModel)

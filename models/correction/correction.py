@@ -32,10 +32,10 @@ from models.terms.term import FACTORS, Term
 if TYPE_CHECKING:
     import pandas as pd
 
-HEADER = "# Found by a diagnosis: the same gearbox definition plus this file is the corrected model.\n"
+HEADER = "# A correction: the same gearbox definition plus this file is the corrected model.\n"
 BOUND_TOLERANCE = 1e-9  # a fit that ends at a bound may exceed it by rounding
 Grade = Literal["claim", "likely", "learnt"]
-MODEL_ERROR = "model error"  # mechanism of a finding that was learnt of it
+SHAPE, MODEL_ERROR = "shape", "model error"  # mechanisms of findings that were learnt of them
 Sha256 = Annotated[str, StringConstraints(pattern=r"^[0-9a-f]{64}$")]
 NotNegative = Annotated[float, Field(ge=0.0)]
 
@@ -158,8 +158,16 @@ class Finding(LawTable):
                 )
                 for p in valued.parameters
             ),
-            state=tuple(LawState(name=s.name, start=s.start, rate=s.rate, update=s.update) for s in term.states),
+            state=tuple(LawState(**vars(s)) for s in term.states),
         )  # fmt: skip
+
+    def with_estimates(self, estimates: Mapping[str, tuple[float, float]]) -> Finding:
+        """Return the finding with other values and standard errors of some of its parameters."""
+        parameters = tuple(
+            p.model_copy(update=dict(zip(("value", "stderr"), estimates.get(p.name, (p.value, p.stderr)), strict=True)))
+            for p in self.parameter
+        )
+        return self.model_copy(update={"parameter": parameters})
 
     @property
     def term(self) -> Term:
@@ -177,7 +185,7 @@ class Finding(LawTable):
                 )
                 for p in self.parameter
             ),
-            states=tuple(ExtraState(name=s.name, start=s.start, rate=s.rate, update=s.update) for s in self.state),
+            states=tuple(ExtraState(**dict(s)) for s in self.state),
             is_loss=self.is_loss,
             boundary_temperature=self.boundary_temperature,
             form=self.form,
@@ -320,6 +328,15 @@ class Correction(Section):
         """Return the correction without what is only likely; calibrated values and shapes of laws name nothing."""
         return self.model_copy(update={"findings": tuple(f for f in self.findings if f.grade != "likely")})
 
+    def of_machine(self) -> Correction:
+        """Return what the correction says of the machine alone.
+
+        Instruments are of a recorder. Shapes of laws and model error are what some recordings left open, and every
+        diagnosis asks its own for them.
+        """
+        kept = (f for f in self.findings if not f.of_measurement and f.mechanism not in (SHAPE, MODEL_ERROR))
+        return self.model_copy(update={"findings": tuple(kept), "sensors": (), "inputs": ()})
+
     def summary(self) -> dict[str, Any]:
         """Return the names of the findings that change the machine, and a hash of the whole, for a report."""
         return {
@@ -327,7 +344,7 @@ class Correction(Section):
             "findings": [
                 f"{'likely ' if f.grade == 'likely' else ''}{f.mechanism} at {f.place}"
                 for f in self.findings
-                if not f.of_measurement and f.grade != "learnt" and f.mechanism not in ("shape", MODEL_ERROR)
+                if not f.of_measurement and f.grade != "learnt" and f.mechanism not in (SHAPE, MODEL_ERROR)
             ],
         }
 

@@ -123,6 +123,7 @@ class Scale:
         here |= {symbol(name): given.default for name, given in network.inputs.items()}
         here |= {symbol(name): value for name, value in (inputs or {}).items()}
         here |= {symbol("speed"): speed, symbol("torque"): torque, symbol("time"): 0.0}
+        here |= {symbol(state.name): state.start for state in network.states}
         outward = [link.conductance for link in network.links if network.boundaries.keys() & set(link.nodes)]
         conductance = float(sum(law.xreplace(start | here).evalf() for law in outward))
         at = [[ambient + TYPICAL_RISE] * len(losses.temperature_nodes)]

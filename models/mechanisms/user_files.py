@@ -125,6 +125,7 @@ class MechanismTable(LawTable):
                     start=lambda _, start=state.start: start,  # type: ignore[misc]
                     rate=state.rate,
                     update=state.update,
+                    averaged_update=state.averaged_update,
                 )
                 for state in self.state
             ),

@@ -22,12 +22,16 @@ class LawParameter(Section):
 
 
 class LawState(Section):
-    """A state with the time derivative `rate` [1/s], set to `update` after each step."""
+    """A state with the time derivative `rate` [1/s], set to `update` after each step.
+
+    `averaged_update` takes the place of `update` where temperatures are means over minutes.
+    """
 
     name: Name
     start: float = 0.0
     rate: Law = sp.S.Zero
     update: Law | None = None
+    averaged_update: Law | None = None
 
 
 class LawTable(Section):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -17,6 +18,7 @@ from diagnosis.forward.trajectory import simulate
 from diagnosis.recordings.recording import Channel, Recording
 from models.assembly.gearbox import Gearbox
 from models.base.types import Array
+from models.correction.correction import Correction, corrected_network
 from models.mechanisms import CATALOGUE, Scale
 from models.simulation.thermal_network import ThermalNetwork
 from models.terms.term import Term
@@ -38,7 +40,7 @@ def recording_of(columns: dict[str, Array], channels: dict[str, Array]) -> Recor
 def recorded(
     fzg: Gearbox, name: str, *, windage_W: float = 0.0, drift_K: float = 0.0, factors: dict[str, float] | None = None,
     hours: float = 1.5,
-    seed: int = 0, nodes: tuple[str, ...] = NODES,
+    seed: int = 0, nodes: tuple[str, ...] = NODES, correction: Correction | None = None,
 ) -> Recording:  # fmt: skip
     """The model itself, with noise; windage in the oil, and a drift of its thermometer over the whole recording."""
     rng = np.random.default_rng(seed)
@@ -50,7 +52,7 @@ def recorded(
         "torque_Nm": rng.uniform(40.0, 160.0, step.max() + 1)[step],
         "T_ambient_degC": np.full(len(time), 22.0),
     }
-    network = fzg.network()
+    network = corrected_network(fzg, correction)
     term = next(
         p for p in CATALOGUE["windage"].placed(network, Scale.of(fzg, speed=3300.0, torque=150.0)) if p.place == "oil"
     )
@@ -63,7 +65,7 @@ def recorded(
     made = network.simulate(driven, losses=fzg.losses(), initial=22.0).columns()
     read = {n: made[f"T_{n}_degC"] + 0.1 * rng.standard_normal(len(time)) for n in nodes}
     read["oil"] = read["oil"] + drift_K * time / time[-1]
-    return replace(recording_of(columns, read), name=name, sha256=name)
+    return replace(recording_of(columns, read), name=name, sha256=hashlib.sha256(name.encode()).hexdigest())
 
 
 def with_measured(experiment: Experiment, measured: Array) -> Experiment:

@@ -36,7 +36,7 @@ from diagnosis.results.findings import estimates_of
 from diagnosis.results.result import Diagnosis
 from diagnosis.setup.inference_setup import InferenceSetup
 from models.assembly.gearbox import Gearbox
-from models.correction.correction import MODEL_ERROR, correction_text, read_correction, write_correction
+from models.correction.correction import MODEL_ERROR, Correction, correction_text, read_correction, write_correction
 from models.files.cycle import Cycle
 from models.mechanisms import CATALOGUE, Scale
 from tests.unit.diagnosis.inference_example import recording_of
@@ -131,7 +131,7 @@ def assembled(prepared: Prepared, calibration: Calibration, recordings: tuple[Re
         return assemble(
             setup, given.pop("experiment", experiment), posterior, answers, plain=plain,
             calibration=calibration, settings=Settings(),
-            catalogue=CATALOGUE, train=recordings[:1], held_out=recordings[1:], **given,
+            catalogue=CATALOGUE, known=Correction(), train=recordings[:1], held_out=recordings[1:], **given,
         )  # fmt: skip
 
     return result

@@ -161,7 +161,7 @@ def test_parameters_far_from_their_priors_are_told_the_farthest_first() -> None:
     far = (replace(bearing, parameter="bearing", estimate=1.9, shift_in_sd=3.2),
            replace(seal, parameter="seal", estimate=0.319, shift_in_sd=-4.57))  # fmt: skip
     sure = told(replace(usual, calibration=(*far, *rest)), "How sure?")
-    assert "Far from what the definition expects: seal = 0.319 (4.6 sd), bearing = 1.9 (3.2 sd)" in sure
+    assert "Far from what was expected: seal = 0.319 (4.6 sd), bearing = 1.9 (3.2 sd)" in sure
 
 
 def test_every_likely_place_is_told_with_what_the_first_one_does() -> None:

@@ -1,0 +1,87 @@
+"""Where a calibration begins if the machine is known to have a switch or a memory with numbers that are known roughly.
+
+The objective has many minima along a set-point: a control that hardly misses a peak never switches. So the numbers are
+found as those of a mechanism that nobody knew of: scans of finer and finer grids, with switches that follow the
+readings, and a fit from the best place in them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+
+from diagnosis.candidates.hypotheses import Hypothesis
+from diagnosis.engine.fit import Experiment, calibrate
+from diagnosis.engine.prepare import prepare_experiment
+from diagnosis.engine.refit import refit
+from diagnosis.engine.scan import scan
+from diagnosis.recordings.recording import Recording
+from models.base.types import Array
+from models.correction.corrected_gearbox import CorrectedGearbox, corrected_gearbox
+from models.terms.term import Term
+
+WIDTH, VARIANTS, POINTS = 2.0, 700, 61  # prior sd to either side; how many places a grid has, and in one direction
+LEAST_SHARE = 0.1  # of a strength that is known exactly, by which it may differ while the rest is looked for
+
+
+def start_with_switches(
+    gearbox: CorrectedGearbox, experiment: Experiment, recordings: Sequence[Recording], holdout: Sequence[Recording],
+    baseline: Sequence[Recording],
+) -> Array | None:  # fmt: skip
+    """Unknowns to start from, shape (unknowns,); None if no switch has uncertain numbers: the middles of the priors.
+
+    Parameters
+    ----------
+    gearbox : CorrectedGearbox
+        With what is known
+    experiment : Experiment
+        Of this machine and these recordings
+    """
+    values: dict[str, float] = {}
+    for known in gearbox.correction.findings:
+        term = _uncertain(known.term)
+        rough = _roughly_known(term)
+        if not rough:
+            continue
+        others = tuple(finding for finding in gearbox.correction.findings if finding is not known)
+        without = corrected_gearbox(gearbox, gearbox.correction.model_copy(update={"findings": others}))
+        with suppress(ArithmeticError):
+            fit = calibrate(prepare_experiment(without, recordings, holdout, baseline)[1])
+            best = np.array([1.0, *(p.start for p in term.parameters[1:])])
+            points = min(int(VARIANTS ** (1.0 / len(rough))), POINTS)
+            for width in (WIDTH, 2.0 * WIDTH / points):  # of the second grid: about two steps of the first
+                tried = _about(term, best, rough, np.linspace(-width, width, points))
+                best = tried.variants[scan(fit, [tried]).best[0]]
+            reached = refit(fit, replace(tried, variants=best[None, :]), 0, term.strength.start)
+            both = zip(reached.experiment.unknowns, reached.z.tolist(), strict=True)
+            values |= {unknown.parameter.name: unknown.value(z) for unknown, z in both}
+    if not values:
+        return None
+    return np.array([u.z_of(values.get(u.parameter.name, u.value(0.0))) for u in experiment.unknowns])
+
+
+def _uncertain(term: Term) -> Term:
+    """A term with a strength that may differ from its value."""
+    strength, *shapes = term.parameters
+    sd = strength.sd or LEAST_SHARE * abs(strength.start)
+    return replace(term, parameters=(replace(strength, sd=sd), *shapes))
+
+
+def _roughly_known(term: Term) -> list[int]:
+    """Places of the uncertain parameters that decide on a memory of a term."""
+    laws = [law for state in term.states for law in (state.rate, state.update) if law is not None]
+    remembered = {symbol.name for law in laws for symbol in law.free_symbols}
+    return [i for i, p in enumerate(term.parameters[1:], start=1) if p.name in remembered and p.sd > 0.0]
+
+
+def _about(term: Term, best: Array, rough: Sequence[int], grid: Array) -> Hypothesis:
+    """A term with values around the best ones so far, in prior standard deviations."""
+    parameters = [term.parameters[i] for i in rough]
+    values = [np.clip(best[i] + p.sd * grid, p.lower, p.upper) for i, p in zip(rough, parameters, strict=True)]
+    variants = np.tile(best, (len(grid) ** len(rough), 1))
+    variants[:, rough] = list(product(*values))
+    return Hypothesis(name=term.label, place=term.label, family="known", law=term.label, term=term, variants=variants)
