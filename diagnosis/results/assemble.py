@@ -178,7 +178,9 @@ def assemble(
         remaining_note=_remaining(posterior, others, best),
         ranking=_ranking(posterior),
         unseen=unseen,
-        not_tried=tuple(sorted(catalogue.keys() - {one.effect.name for one in posterior.expected})),
+        not_tried=tuple(sorted(
+            catalogue.keys() - {one.effect.name for one in posterior.expected} - {f.mechanism for f in known.findings}
+        )),
         next_test=next_test(
             verdict, findings, location, unseen, catalogue, assumed=assumed,
             free=without_sensor(setup.nominal, setup.channels),

@@ -76,6 +76,7 @@ def known_before(fzg: Gearbox, rides: list[Recording]) -> Diagnosis:
 def test_what_is_known_is_not_missing(known_before: Diagnosis) -> None:
     assert known_before.verdict == "consistent"
     assert known_before.holdout.calibrated < 0.15
+    assert "fan_thermostat" not in known_before.not_tried
     assert "Known before, and part of the model as delivered: fan_thermostat at housing." in str(known_before)
 
 
