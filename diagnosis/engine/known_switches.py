@@ -21,7 +21,7 @@ from diagnosis.engine.refit import refit
 from diagnosis.engine.scan import scan
 from diagnosis.recordings.recording import Recording
 from models.base.types import Array
-from models.correction.corrected_gearbox import CorrectedGearbox, corrected_gearbox
+from models.correction.corrected_gearbox import CorrectedGearbox
 from models.terms.term import Term
 
 WIDTH, VARIANTS, POINTS = 2.0, 700, 61  # prior sd to either side; how many places a grid has, and in one direction
@@ -48,7 +48,7 @@ def start_with_switches(
         if not rough:
             continue
         others = tuple(finding for finding in gearbox.correction.findings if finding is not known)
-        without = corrected_gearbox(gearbox, gearbox.correction.model_copy(update={"findings": others}))
+        without = replace(gearbox, correction=gearbox.correction.model_copy(update={"findings": others}))
         with suppress(ArithmeticError):
             fit = calibrate(prepare_experiment(without, recordings, holdout, baseline)[1])
             best = np.array([1.0, *(p.start for p in term.parameters[1:])])

@@ -43,5 +43,7 @@ def corrected_gearbox(gearbox: Gearbox, correction: Correction) -> CorrectedGear
     >>> [round(one.temperatures["oil"], 1) for one in steady]
     [63.6, 47.4]
     """
-    correction.network(gearbox)
-    return CorrectedGearbox(gearbox.definition, gearbox.notes, gearbox.given, gearbox.file, correction)
+    correction.check_made_for(gearbox)
+    found = CorrectedGearbox(gearbox.definition, gearbox.notes, gearbox.given, gearbox.file, correction)
+    found.network()
+    return found

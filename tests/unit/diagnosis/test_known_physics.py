@@ -47,7 +47,9 @@ def values_of(fit: Fit) -> dict[str, float]:
 def test_numbers_known_roughly_are_calibrated_and_exact_ones_stay(fzg: Gearbox) -> None:
     nodes = (*NODES, "housing_upper")  # all that the switch feels
     ride = recorded(fzg, "often", hours=4.0, seed=1, nodes=nodes, correction=fan(fzg, {"strength": 15.0}))
-    rough = corrected_gearbox(fzg, fan(fzg, {"strength": 15.0}, strength=-3.0, set_point=2.7))
+    known = fan(fzg, {"strength": 15.0}, strength=-3.0, set_point=2.7)
+    pump = known_finding(fzg, fzg.network(), "pump_heat", {"strength": (0.1, 0.0)})
+    rough = corrected_gearbox(fzg, known.model_copy(update={"findings": (*known.findings, pump)}))
     _, experiment = prepare_experiment(rough, [ride], [ride])
     start = start_with_switches(rough, experiment, [ride], [ride], [])
     found, from_middles = values_of(calibrate(experiment, start)), values_of(calibrate(experiment))
