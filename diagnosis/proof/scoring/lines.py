@@ -273,7 +273,7 @@ def hash_list(records: Mapping[Task, Mapping[str, Any]]) -> str:
 
 
 def compact(answer: Mapping[str, Any]) -> dict[str, Any]:
-    """The part of ``diagnosis.json`` that scoring reads, with :data:`DIGITS` digits."""
+    """The part of ``diagnosis.json`` that scoring reads, and what tells why: :data:`DIGITS` digits of each number."""
     findings = [
         {
             **{key: one.get(key) for key in (*FINDING, "heat_W")},
@@ -293,6 +293,8 @@ def compact(answer: Mapping[str, Any]) -> dict[str, Any]:
         "location": location,
         "fit": {"holdout": answer.get("fit", {}).get("holdout", {})},
         "not_visible": unseen,
+        "error_class": answer.get("model_error", {}).get("class", ""),
+        "placebo": (answer.get("sessions", {}).get("placebo") or {}).get("log_e_value"),
     }
     return dict(json.loads(json.dumps(kept), parse_float=lambda text: float(f"{float(text):.{DIGITS}g}")))
 
