@@ -1,8 +1,8 @@
 """Where a calibration begins if the machine is known to have a switch or a memory with numbers that are known roughly.
 
 The objective has many minima along a set-point: a control that hardly misses a peak never switches. So the numbers are
-found as those of a mechanism that nobody knew of: scans of finer and finer grids, with switches that follow the
-readings, and a fit from the best place in them.
+looked for as those of a mechanism that nobody knew of, by two scans of a grid with switches that follow the readings,
+and the calibration begins at the best place.
 """
 
 from __future__ import annotations
@@ -17,7 +17,6 @@ import numpy as np
 from diagnosis.candidates.hypotheses import Hypothesis
 from diagnosis.engine.fit import Experiment, calibrate
 from diagnosis.engine.prepare import prepare_experiment
-from diagnosis.engine.refit import refit
 from diagnosis.engine.scan import scan
 from diagnosis.recordings.recording import Recording
 from models.base.types import Array
@@ -25,7 +24,6 @@ from models.correction.corrected_gearbox import CorrectedGearbox
 from models.terms.term import Term
 
 WIDTH, VARIANTS, POINTS = 2.0, 700, 61  # prior sd to either side; how many places a grid has, and in one direction
-LEAST_SHARE = 0.1  # of a strength that is known exactly, by which it may differ while the rest is looked for
 
 
 def start_with_switches(
@@ -43,7 +41,7 @@ def start_with_switches(
     """
     values: dict[str, float] = {}
     for known in gearbox.correction.findings:
-        term = _uncertain(known.term)
+        term = _may_be_absent(known.term)
         rough = _roughly_known(term)
         if not rough:
             continue
@@ -56,24 +54,22 @@ def start_with_switches(
             for width in (WIDTH, 2.0 * WIDTH / points):  # of the second grid: about two steps of the first
                 tried = _about(term, best, rough, np.linspace(-width, width, points))
                 best = tried.variants[scan(fit, [tried]).best[0]]
-            reached = refit(fit, replace(tried, variants=best[None, :]), 0, term.strength.start)
-            both = zip(reached.experiment.unknowns, reached.z.tolist(), strict=True)
-            values |= {unknown.parameter.name: unknown.value(z) for unknown, z in both}
+            values |= {term.parameters[i].name: float(best[i]) for i in rough}
     if not values:
         return None
     return np.array([u.z_of(values.get(u.parameter.name, u.value(0.0))) for u in experiment.unknowns])
 
 
-def _uncertain(term: Term) -> Term:
-    """A term with a strength that may differ from its value."""
+def _may_be_absent(term: Term) -> Term:
+    """A term that may be absent, as in a scan."""
     strength, *shapes = term.parameters
-    sd = strength.sd or LEAST_SHARE * abs(strength.start)
-    return replace(term, parameters=(replace(strength, sd=sd), *shapes))
+    return replace(term, parameters=(replace(strength, sd=abs(strength.start) + strength.sd), *shapes))
 
 
 def _roughly_known(term: Term) -> list[int]:
-    """Places of the uncertain parameters that decide on a memory of a term."""
-    laws = [law for state in term.states for law in (state.rate, state.update) if law is not None]
+    """Places of the uncertain parameters that decide when a term switches, or else of those of its memories."""
+    switches = [state.update for state in term.states if state.update is not None]
+    laws = switches or [state.rate for state in term.states]
     remembered = {symbol.name for law in laws for symbol in law.free_symbols}
     return [i for i, p in enumerate(term.parameters[1:], start=1) if p.name in remembered and p.sd > 0.0]
 
