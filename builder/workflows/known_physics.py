@@ -1,4 +1,4 @@
-"""Physics of the catalogue that a machine is known to have, with numbers of its own."""
+"""Physics of the catalogue that a machine is known to have, with the numbers that are known."""
 
 from __future__ import annotations
 

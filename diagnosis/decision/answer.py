@@ -5,10 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Literal
 
+import numpy as np
+
 from diagnosis.candidates.hypotheses import Hypothesis
 from diagnosis.decision.posterior import Judged, Posterior
 from diagnosis.decision.settings import Settings
+from diagnosis.engine.scan import heat_over_time
 from diagnosis.engine.learnt import Rule
+from models.network.laws import symbol
 from models.terms.term import Term
 
 Grade = Literal["claim", "likely"]
@@ -38,7 +42,8 @@ class Answer:
         the kind of the effect (a course over the hours, a parameter where model error is large), because it begins
         together with another one, or because held-out recordings contradict it
     one_event : bool
-        True if another effect begins at the same time: one cause is more probable than two
+        True if another effect begins at the same time, or acts on the same thing at the same times: one cause is more
+        probable than two
     """
 
     best: Judged
@@ -60,8 +65,8 @@ def decide(posterior: Posterior, settings: Settings) -> tuple[Answer, ...]:
     over the hours: the nearest name is found, not the cause. Where much is left, what is stated of it is only the
     share :attr:`Rule.nearest` of its probability, because most names that were nearest turned out wrong. The same holds
     if model error is large, of a parameter outside its prior, which stands in for another structure of the machine, and
-    of every name with less evidence than :attr:`Rule.named_if_large`; and of two that begin at the same time, because
-    they are probably one cause that has another name.
+    of every name with less evidence than :attr:`Rule.named_if_large`; and of two that begin at the same time, or act on
+    one thing at the same times, because they are probably one cause that has another name.
     """
     if not posterior.detected and not posterior.parameter_outside:
         return ()
@@ -100,7 +105,8 @@ def _answer(posterior: Posterior, best: Judged, effect: Hypothesis, enough: floa
     """The narrowest set of names that holds enough probability."""
     name = effect.law
     doubtful = effect.term is None or posterior.log_e < posterior.rule.named_if_large
-    together = _begin_together(best, posterior.rule.one_event)
+    chance, overlap = posterior.rule.one_event
+    together = _begin_together(best, chance) or _act_together(best, overlap)
     much = posterior.leaves_much(best) or (doubtful and best.error_class.is_large) or together
     vague = effect.how == "over_hours" or effect.is_open or much
     sure = posterior.rule.nearest if much else 1.0
@@ -136,6 +142,16 @@ def _begin_together(best: Judged, chance: float) -> bool:
     )  # fmt: skip
     tested = sum(float(piece.steps.sum()) for piece in experiment.pieces if piece.recording not in experiment.healthy)
     return abs(first - second) < 0.5 * chance * tested
+
+
+def _act_together(best: Judged, overlap: float) -> bool:
+    """True if a pair are laws of the time whose heats into one thing come and go together, with any signs."""
+    terms = [effect.term for effect in best.effects if effect.term is not None and effect.in_network]
+    of_time = [term for term in terms if symbol("time") in term.expression.free_symbols]
+    if best.fit is None or len(of_time) < 2 or _changed(of_time[0]).isdisjoint(_changed(of_time[1])):
+        return False
+    first, second = (heat_over_time(best.fit, term) for term in of_time)
+    return abs(float(first @ second)) > overlap * float(np.linalg.norm(first) * np.linalg.norm(second))
 
 
 def _comes_along(posterior: Posterior, name: str, other: str) -> bool:

@@ -71,8 +71,9 @@ class Rule:
         Evidence from which a name counts where model error is large, [nat]
     repeats : float
         Deviation between sessions that every machine is granted, in prior standard deviations
-    one_event : float
-        Chance that two dates fall as close together, below which two effects are one event, [-]
+    one_event : (float, float)
+        Chance that two dates fall as close together, below which two effects are one event; cosine between two heats
+        over the time, above which they are, [-]
     trusted : (int, float)
         Baselines, and their time to that of the tested recordings, that show what a wrong model makes of a change, [-]
     wider : float
@@ -90,7 +91,7 @@ class Rule:
     nearest: float
     named_if_large: float
     repeats: float
-    one_event: float
+    one_event: tuple[float, float]
     trusted: tuple[int, float]
     wider: float
 
@@ -129,7 +130,7 @@ def error_classes() -> tuple[ErrorClass, ...]:
 def rule() -> Rule:
     """Numbers of the rule of decision."""
     found = dict(_document()["decision"])
-    return Rule(**found | {name: tuple(found[name]) for name in ("temper", "much_left", "trusted")})
+    return Rule(**found | {name: tuple(found[name]) for name in ("temper", "much_left", "one_event", "trusted")})
 
 
 @cache

@@ -251,6 +251,16 @@ def _finite(heat: Array) -> Array:
     return heat if np.isfinite(heat.sum()) else np.nan_to_num(heat, nan=0.0, posinf=0.0, neginf=0.0)
 
 
+def heat_over_time(fit: Fit, term: Term) -> Array:
+    """Net heat of a term of the network in all pieces of a fit, times the root of the time it lasts, [W s^0.5]."""
+    index, on_grid = fit.experiment.machine.parameter_index, term_on_grid(fit.experiment.machine.model, term)
+    at, courses = [index[p.name] for p in term.parameters], list[Array]()
+    for point in (part.point for part in fit.parts):
+        heat, _ = on_grid.heat(point.trajectory, point.setting.values[None, at])
+        courses.append(heat[:, :, 0].sum(axis=1) * np.sqrt(point.trajectory.piece.steps))
+    return np.concatenate(courses)
+
+
 @lru_cache(maxsize=2048)
 def term_on_grid(model: NetworkOnGrid, term: Term) -> TermOnGrid:
     """A term at its place in a network; kept, since its laws take long to compile."""

@@ -26,7 +26,7 @@ class CorrectedGearbox(Gearbox):
 
 
 def corrected_gearbox(gearbox: Gearbox, correction: Correction) -> CorrectedGearbox:
-    """Return a gearbox whose network holds what a correction says of the machine, not what it says of a recorder.
+    """Return a gearbox whose network holds the physics and calibrated values of a correction, nothing of a recorder.
 
     Raises
     ------

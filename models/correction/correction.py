@@ -329,7 +329,7 @@ class Correction(Section):
         return self.model_copy(update={"findings": tuple(f for f in self.findings if f.grade != "likely")})
 
     def of_machine(self) -> Correction:
-        """Return what the correction says of the machine alone.
+        """Return the part of the correction that is about the machine alone.
 
         Instruments are of a recorder. Shapes of laws and model error are what some recordings left open, and every
         diagnosis asks its own for them.

@@ -273,7 +273,7 @@ def hash_list(records: Mapping[Task, Mapping[str, Any]]) -> str:
 
 
 def compact(answer: Mapping[str, Any]) -> dict[str, Any]:
-    """The part of ``diagnosis.json`` that scoring reads, and what tells why: :data:`DIGITS` digits of each number."""
+    """The part of ``diagnosis.json`` that scoring reads, and the reasons: :data:`DIGITS` digits of each number."""
     findings = [
         {
             **{key: one.get(key) for key in (*FINDING, "heat_W")},

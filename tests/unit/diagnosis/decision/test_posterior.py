@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from diagnosis.candidates.hypotheses import Hypothesis
+from diagnosis.decision import answer as answer_module
 from diagnosis.decision.answer import Answer, decide, withdraw_claim
 from diagnosis.decision.posterior import KINDS, Judged, Likeness, Posterior
 from diagnosis.decision.settings import Settings
@@ -272,6 +273,29 @@ def test_two_that_begin_at_the_same_time_are_no_claims(apart_s: float, grade: st
         (grade, grade == "likely", grade == "likely")
     ] * 2
     assert (answers[0].probability < 0.5) == (grade == "likely")
+
+
+@pytest.mark.parametrize(("second", "of_time", "cosine", "grade"), [
+    ("oil", True, -0.6, "likely"),  # sun and rain at once
+    ("oil", True, -0.4, "claim"),
+    ("mesh", True, -0.6, "claim"),
+    ("oil", False, -0.6, "claim"),  # a loss and a cooler: whatever both follow
+])  # fmt: skip
+def test_two_that_come_and_go_together_are_no_claims(
+    monkeypatch: pytest.MonkeyPatch, second: str, of_time: bool, cosine: float, grade: str
+) -> None:
+    def law(name: str, place: str) -> Hypothesis:
+        one = effect(name, place)
+        assert one.term is not None
+        return replace(one, term=replace(one.term, expression=one.term.expression * symbol("time"))) if of_time else one
+
+    pair = law("first", "oil"), law("second", second)
+    heats = {"first_oil": np.array([2.0, 0.0]), f"second_{second}": np.array([cosine, np.sqrt(1.0 - cosine**2)])}
+    monkeypatch.setattr(answer_module, "heat_over_time", lambda _, term: heats[term.label])
+    fit = cast(Fit, SimpleNamespace(experiment=SimpleNamespace(unknowns=[], pieces=[], healthy=set()), z=np.zeros(0)))
+    both = replace(judged(2.0 * STRONG, *pair), fit=fit, left=0.0)
+    answers = decide(posterior(*(judged(STRONG, one) for one in pair), both, remainder=10.0), Settings())
+    assert [(one.grade, one.one_event) for one in answers] == [(grade, grade == "likely")] * 2
 
 
 @pytest.mark.parametrize(("left", "grade"), [(None, "likely"), (1.0, "claim"), (STRONG, "likely")])

@@ -8,11 +8,11 @@ import pytest
 from diagnosis.candidates.hypotheses import hypothesis_of
 from diagnosis.engine.fit import Experiment, Fit, calibrate
 from diagnosis.engine.refit import refit
-from diagnosis.engine.scan import SHAPES_TRIED, Scan, scan
+from diagnosis.engine.scan import SHAPES_TRIED, Scan, heat_over_time, scan
 from diagnosis.results.findings import switch_errors
 from models.assembly.gearbox import Gearbox
 from models.mechanisms import CATALOGUE, Placed, Scale
-from tests.unit.diagnosis.inference_example import CHANNELS, acting, with_measured
+from tests.unit.diagnosis.inference_example import CHANNELS, acting, at, with_measured, with_term
 
 
 @pytest.fixture(scope="module")
@@ -128,3 +128,15 @@ def test_the_best_start_goes_on(experiment: Experiment, scale: Scale) -> None:
     assert value_of(alone, placed.strength.name) < 0.25 * late_s
     assert value_of(several, placed.strength.name) == pytest.approx(late_s, abs=10.0)
     assert several.objective < 0.25 * alone.objective
+
+
+def test_the_heat_of_a_term_over_the_time(experiment: Experiment, scale: Scale) -> None:
+    placed = next(p for p in CATALOGUE["solar_soak"].placed(experiment.machine.model.network, scale)
+                  if p.place == "housing")  # fmt: skip
+    piece = experiment.pieces[0]
+    noon, length = 0.4 * piece.time[-1], 0.2 * piece.time[-1]
+    given = dict(zip((p.name for p in placed.parameters), (80.0, noon, length), strict=True))
+    sunny = with_term(experiment, placed)
+    heat = heat_over_time(sunny.fit(at(sunny, given), iterations=0), placed)
+    bell = 80.0 * np.exp(-(((piece.middle - noon) / length) ** 2))
+    assert heat == pytest.approx(bell * np.sqrt(piece.steps), rel=1e-6, abs=1e-6)
