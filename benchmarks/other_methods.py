@@ -198,8 +198,9 @@ def _table(predictions: Sequence[Prediction]) -> tuple[Array, Array]:
 
 
 def answers_to_files(folder: Path, gearbox: str) -> dict[str, Any]:
-    """Answers of the methods to the recordings ``train*`` and ``hold*`` of a folder."""
-    definition = load_gearbox(gearbox)
+    """Answers of the methods to the recordings ``train*`` and ``hold*`` of a folder, which may have a definition."""
+    own = folder / "gearbox.toml"
+    definition = load_gearbox(own if own.is_file() else gearbox)
     train, held = (
         read_recordings(sorted(folder.glob(f"{kind}*.csv*")), definition.network()) for kind in ("train", "hold")
     )

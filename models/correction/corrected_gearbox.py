@@ -41,7 +41,7 @@ def corrected_gearbox(gearbox: Gearbox, correction: Correction) -> CorrectedGear
     >>> known = Correction.of(fzg, calibration=[Estimate(name="h_air", value=2.0, stderr=0.1)])
     >>> steady = [one.steady_state(speed=1500.0, torque=94.0) for one in (fzg, corrected_gearbox(fzg, known))]
     >>> [round(one.temperatures["oil"], 1) for one in steady]
-    [63.6, 47.4]
+    [63.6, 48.6]
     """
     correction.check_made_for(gearbox)
     found = CorrectedGearbox(gearbox.definition, gearbox.notes, gearbox.given, gearbox.file, correction)

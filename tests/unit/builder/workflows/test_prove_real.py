@@ -23,6 +23,7 @@ from diagnosis.engine.set_apart import calibrate_apart
 from diagnosis.results.assemble import Others, assemble
 from diagnosis.results.result import Diagnosis
 from models.base.errors import InputError
+from models.correction.correction import Correction
 from models.mechanisms import CATALOGUE
 
 SHORT = replace(PLANTS["rod"], train="0..10800", hold="10800..14400")
@@ -40,7 +41,7 @@ def calibrated(train: Any, gearbox: Any, *, holdout: Any, **_: object) -> Diagno
     return assemble(
         setup, experiment, posterior, (), plain=plain, calibration=calibration,
         others=Others(fit=fit, posterior=posterior, channels=apart, apart=apart),
-        settings=Settings(), catalogue=CATALOGUE, train=train, held_out=holdout,
+        settings=Settings(), catalogue=CATALOGUE, known=Correction(), train=train, held_out=holdout,
     )  # fmt: skip
 
 
