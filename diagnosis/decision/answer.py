@@ -10,8 +10,8 @@ import numpy as np
 from diagnosis.candidates.hypotheses import Hypothesis
 from diagnosis.decision.posterior import Judged, Posterior
 from diagnosis.decision.settings import Settings
-from diagnosis.engine.scan import heat_over_time
 from diagnosis.engine.learnt import Rule
+from diagnosis.engine.scan import heat_over_time
 from models.network.laws import symbol
 from models.terms.term import Term
 

@@ -108,7 +108,7 @@ def _says(answer: Answer, found: Mapping[str, float], stated: Mapping[str, float
     says = " ".join(says.split())
     inside = f"{says[:1].lower()}{says[1:]}"
     if answer.one_event:
-        return f"One of two effects that begin or act together, so probably of one cause; this one acts like this: {inside}"
+        return f"One of two effects that begin or act together, so of one cause probably; this one acts like: {inside}"
     if answer.acts_like:
         return f"Something acts like this, its cause was not found: {inside}"
     if len(answer.tied) > 1:
