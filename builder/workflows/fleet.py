@@ -228,8 +228,7 @@ def _diagnose(
     try:
         with tempfile.TemporaryDirectory() as folder:
             found = diagnose(train, gearbox, holdout=holdout, baseline=baseline, switched_off=switched_off,
-                             catalogue=catalogue, correction=correction, settings=settings,
-                             jobs=jobs)  # fmt: skip
+                             catalogue=catalogue, correction=correction, settings=settings, jobs=jobs)  # fmt: skip
             written = write_files(found, gearbox, [*train, *holdout], Path(folder))
             return MemberOutcome(row=_row(name, found), files={path.name: path.read_bytes() for path in written})
     except Exception as error:  # noqa: BLE001 - shown with its traceback at the end, when the others are done

@@ -21,6 +21,8 @@ def known_finding(
 
     Parameters
     ----------
+    gearbox : Gearbox
+        The definition, for the sizes that are typical of it
     network : ThermalNetwork
         Of the machine, with what is known of it already
     name : str

@@ -252,7 +252,19 @@ def _finite(heat: Array) -> Array:
 
 
 def heat_over_time(fit: Fit, term: Term) -> Array:
-    """Net heat of a term of the network in all pieces of a fit, times the root of the time it lasts, [W s^0.5]."""
+    """Net heat of a term of the network in every interval of a fit, times the root of its length, [W s^0.5].
+
+    So the inner product of two of them is their integral over the time.
+
+    Parameters
+    ----------
+    term : Term
+        In the network of the fit
+
+    Returns
+    -------
+    Array, shape (intervals of all pieces,)
+    """
     index, on_grid = fit.experiment.machine.parameter_index, term_on_grid(fit.experiment.machine.model, term)
     at, courses = [index[p.name] for p in term.parameters], list[Array]()
     for point in (part.point for part in fit.parts):

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from diagnosis.candidates.factors import SHAPE as SHAPE_OF
+from diagnosis.candidates.factors import SHAPE as SHAPE_PREFIX
 from diagnosis.forward.sensor_fault import channel_column
 from diagnosis.recordings.recording import Recording
 from diagnosis.results.result import Diagnosis
@@ -57,7 +57,7 @@ def correction_of(diagnosis: Diagnosis, gearbox: Gearbox) -> Correction:
         if name in calibrated:
             findings.append(Finding.of(
                 term, {name: estimates[name]}, mechanism=SHAPE, family="calibration",
-                place=name.removeprefix(SHAPE_OF), says=term.strength.description, grade="learnt",
+                place=name.removeprefix(SHAPE_PREFIX), says=term.strength.description, grade="learnt",
             ))  # fmt: skip
     findings += [
         Finding.of(term, {term.strength.name: (term.strength.start, term.strength.sd)}, mechanism=MODEL_ERROR,

@@ -162,11 +162,12 @@ class Finding(LawTable):
         )  # fmt: skip
 
     def with_estimates(self, estimates: Mapping[str, tuple[float, float]]) -> Finding:
-        """Return the finding with other values and standard errors of some of its parameters."""
-        parameters = tuple(
-            p.model_copy(update=dict(zip(("value", "stderr"), estimates.get(p.name, (p.value, p.stderr)), strict=True)))
-            for p in self.parameter
-        )
+        """Return the finding with other estimates: value and standard error, by the names of its parameters.
+
+        Parameters without an estimate, and estimates of other parameters, are left as they are.
+        """
+        values = {name: {"value": value, "stderr": stderr} for name, (value, stderr) in estimates.items()}
+        parameters = tuple(p.model_copy(update=values.get(p.name)) for p in self.parameter)
         return self.model_copy(update={"parameter": parameters})
 
     @property
@@ -331,8 +332,8 @@ class Correction(Section):
     def of_machine(self) -> Correction:
         """Return the part of the correction that is about the machine alone.
 
-        Instruments are of a recorder. Shapes of laws and model error are what some recordings left open, and every
-        diagnosis asks its own for them.
+        Instruments are of a recorder. Shapes of laws and model error are what some recordings left open; every
+        diagnosis estimates them again from its own.
         """
         kept = (f for f in self.findings if not f.of_measurement and f.mechanism not in (SHAPE, MODEL_ERROR))
         return self.model_copy(update={"findings": tuple(kept), "sensors": (), "inputs": ()})

@@ -11,7 +11,10 @@ from click.testing import CliRunner
 
 import diagnosis.recordings.read
 from builder.commands.diagnose import diagnose
+from builder.workflows import fleet
+from models.assembly.gearbox import Gearbox
 from models.base.errors import InputError
+from models.correction.correction import Correction, Estimate, write_correction
 
 
 class _ReadError(Exception):
@@ -130,3 +133,26 @@ def test_a_recording_is_never_replaced_by_its_prediction(tmp_path: Path) -> None
         assert isinstance(done.exception, InputError), done.output
         assert "is read as well and would be replaced" in str(done.exception)
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
+
+
+def test_what_is_known_reaches_the_diagnosis(fzg: Gearbox, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    known = Correction.of(fzg, calibration=[Estimate(name="h_air", value=1.1, stderr=0.1)])
+    write_correction(known, tmp_path / "known.toml")
+    given: list[object] = []
+
+    def run(*_: object, correction: object, **__: object) -> None:
+        given.append(correction)
+        raise InputError("no further")
+
+    monkeypatch.setattr(diagnosis.recordings.read, "read_by_role", lambda *_, **__: ((), (), ()))
+    monkeypatch.setattr(fleet, "read_by_role", lambda *_, **__: ((), (), ()))
+    monkeypatch.setattr(diagnosis, "diagnose", run)
+    monkeypatch.setattr(fleet, "diagnose", run)
+    (tmp_path / "machines/a").mkdir(parents=True)
+    (tmp_path / "machines/a/run.csv").touch()
+    for words in ((tmp_path / "run.csv",), (tmp_path / "machines", "--fleet", "--jobs", "1")):
+        done = CliRunner().invoke(diagnose, [
+            *map(str, words), "--correction", str(tmp_path / "known.toml"), "--output", str(tmp_path / "out"),
+        ])  # fmt: skip
+        assert "no further" in str(done.exception), done.output
+    assert given == [known, known]
