@@ -10,7 +10,7 @@ any time, of any parameter, answers through the same matrices.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -189,12 +189,11 @@ def stepped(
     switches, actuated, memories = model.switches, model.actuated, memory.copy()
     moving = [*switches, *actuated]
     felt = [moving.index(index) for index in model.acting]
-    corners = list(product((0.0, 1.0), repeat=len(felt)))
-    solutions = []
-    for corner in corners:
+    solutions = {}
+    for corner in product((0.0, 1.0), repeat=len(felt)):
         memories[:, model.acting] = corner
         solved = _linearised(model, piece, values, middle, tangent, memories)
-        solutions.append((solved.decay, solved.driven))
+        solutions[corner] = list(solved.decay), list(solved.driven)
     switching, actuation = model.switching(averaged=piece.guided and piece.slow), model.actuation
     power = tangent.at(middle[:, model.loss_nodes])
     given = np.broadcast_to(values, (len(memories), len(values)))
@@ -223,7 +222,7 @@ def stepped(
                 opening.append(state[index] + rate * 0.5 * h * float(exprel(0.5 * h * slope)))
                 state[index] += rate * h * float(exprel(h * slope))
         openings.append(opening)
-        now = _between(solutions, corners, [opening[place] for place in felt], k, now)
+        now = _between(solutions, tuple([opening[place] for place in felt]), k, now)
         result[k + 1] = now
     memories[:, moving] = openings
     memories[:, model.coupled] = 0.5 * (result[1:, n:] + result[:-1, n:])
@@ -231,16 +230,18 @@ def stepped(
 
 
 def _between(
-    solutions: Sequence[tuple[Array, Array]], corners: Sequence[tuple[float, ...]], positions: Sequence[float], k: int,
+    solutions: Mapping[tuple[float, ...], tuple[Sequence[Array], Sequence[Array]]], at: tuple[float, ...], k: int,
     now: Array,
 ) -> Array:  # fmt: skip
-    """One step between the solutions at the ends of what acts."""
-    result: Array | float = 0.0
-    for corner, (decay, driven) in zip(corners, solutions, strict=True):
-        weight = math.prod([z if end else 1.0 - z for z, end in zip(positions, corner, strict=True)])
-        if weight:
-            result = result + weight * (decay[k].dot(now) + driven[k])
-    return np.asarray(result)
+    """One step between the solutions at the ends of what acts, by corner."""
+    if at in solutions:
+        decay, driven = solutions[at]
+        return np.asarray(decay[k].dot(now) + driven[k])
+    result = np.zeros_like(now)
+    for corner, (decay, driven) in solutions.items():
+        weight = math.prod([z if end else 1.0 - z for z, end in zip(at, corner, strict=True)])
+        result += weight * (decay[k].dot(now) + driven[k])
+    return result
 
 
 def complete_start(model: NetworkOnGrid, start: Array) -> Array:

@@ -31,6 +31,7 @@ from diagnosis.results.predictions import Predicted, Predictions, predict_record
 from diagnosis.results.ratios_only import ratio_notes
 from diagnosis.results.result import Diagnosis, Verdict
 from diagnosis.results.result_parts import (
+    NO_CLAIM,
     Calibrated,
     CalibratedModel,
     Finding,
@@ -145,7 +146,7 @@ def assemble(
                          least_K=settings.matters_K + setup.noise_K)  # fmt: skip
     unfit = bool(spoiled) or train_fits.calibrated - train_fits.before > setup.noise_K
     verdict = verdict_of(posterior, answers, unseen, unfit=unfit)
-    location = locations_of(setup, posterior) if posterior.detected else ()
+    location = locations_of(setup, posterior) if posterior.detected or verdict in NO_CLAIM else ()
     inputs = setup.gearbox.network().inputs
     most_probable = best if others is None else others.posterior.nothing
     believed = (most_probable.fit if most_probable else None) or calibration.fit
@@ -182,7 +183,7 @@ def assemble(
             catalogue.keys() - {one.effect.name for one in posterior.expected} - {f.mechanism for f in known.findings}
         )),
         next_test=next_test(
-            verdict, findings, location, unseen, catalogue, assumed=assumed,
+            verdict, findings, location if posterior.detected else (), unseen, catalogue, assumed=assumed,
             free=without_sensor(setup.nominal, setup.channels),
             missed=holdout.far_beyond(train_fits, settings.matters_K),
         ),

@@ -24,15 +24,23 @@ GOOD_ENOUGH = 0.9  # of the intervals told rightly
 
 
 def locations_of(setup: InferenceSetup, posterior: Posterior) -> tuple[Location, ...]:
-    """Places by probability, over everything that was judged; the first that acts there as the best fit has it."""
+    """Places by probability, over everything that was judged; the first that acts there as the best fit has it.
+
+    Where nothing was detected: if something is missing all the same. None where the recordings speak against that.
+    """
+    if posterior.log_e <= 0.0:
+        return ()
     weights: dict[str, float] = {}
     best: dict[str, Judged] = {}
     nodes: dict[str, str] = {}
+    given = 1.0 if posterior.detected else posterior.something
     for judged, probability in posterior.ranked:
+        if judged.of_parameters and not posterior.detected:
+            continue
         for effect in judged.effects:
             nodes.setdefault(effect.label, node_in(setup.nominal, effect))
         for node in {nodes[effect.label] for effect in judged.effects}:
-            weights[node] = weights.get(node, 0.0) + probability
+            weights[node] = weights.get(node, 0.0) + probability / given
             if judged.fit is not None:
                 best.setdefault(node, judged)
     told = sorted(((n, w) for n, w in weights.items() if w >= LEAST_PLACE), key=lambda item: -item[1])

@@ -337,6 +337,18 @@ def test_nothing(assembled: Assemble, prepared: Prepared, windage: Judged) -> No
     assert assembled(posterior_of(plain, weak, log_e=-1.0, expected=blind), []).verdict == "insufficient_data"
 
 
+def test_where_nothing_is_detected_the_place_is_told_with_a_condition(
+    assembled: Assemble, prepared: Prepared, windage: Judged
+) -> None:
+    plain, parameter = prepared[2], replace(judged_of(prepared, "hot_neighbour", "housing_lower", 9.0), fit=None)
+    parameter = replace(parameter, effects=tuple(replace(one, term=None) for one in parameter.effects))
+    weak = replace(windage, log_bayes=2.0)
+    found = assembled(posterior_of(plain, weak, parameter, log_e=2.0, log_parameter=3.0), [])
+    assert found.verdict == "consistent" and [(one.node, one.probability) for one in found.location] == [("oil", 1.0)]
+    assert "Where? If something is missing all the same, most probably in oil (> 0.99)" in str(found)
+    assert "sensor" not in found.next_test
+
+
 def test_detected_without_an_answer_is_unexplained(
     assembled: Assemble, prepared: Prepared, windage: Judged, fzg: Gearbox
 ) -> None:
