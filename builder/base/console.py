@@ -19,10 +19,10 @@ err = Console(stderr=True, soft_wrap=True, highlight=False, markup=False)
 
 
 def table(title: str, header: Sequence[str], rows: Sequence[Sequence[str]], *, text_columns: int = 1) -> None:
-    """Print a table; the first columns are text, the others numbers."""
+    """Print a table; the first columns are text, which is folded where the width ends, the others numbers."""
     grid = Table(title=title, title_justify="left", title_style="bold", header_style="bold", pad_edge=False, box=None)
     for index, name in enumerate(header):
-        grid.add_column(name, justify="left" if index < text_columns else "right", no_wrap=True)
+        grid.add_column(name, justify="left" if index < text_columns else "right", no_wrap=index >= text_columns)
     for row in rows:
         grid.add_row(*row)
     out.print(grid)

@@ -178,11 +178,14 @@ def _dashed(name: str) -> str:
 
 def _show(result: Mapping[str, Any], output: Path) -> None:
     """Print the tables and write the files of scores."""
-    from builder.workflows.proof_files import write_scores
+    from builder.workflows.proof_files import PAGE, write_scores
     from diagnosis.proof.scoring.outcome import tables_of
 
-    for title, header, rows in tables_of(result):
-        console.table(title, header, rows, text_columns=1 if len(header) < 6 else 3)
+    kinds = list(result["cases"])
+    for title, header, rows in tables_of(result, kinds[:1]):
+        console.table(title, header, rows, text_columns=1 if len(header) < 6 else 5)
+    if len(kinds) > 1:
+        console.out.print(f"By kind of plant: {output / PAGE}")
     if result["role_of_seed"] not in (None, "proof"):
         console.out.print(f"These cases are open ({result['role_of_seed']}): their scores are no proof.")
     if result["failed"]:

@@ -49,7 +49,7 @@ def page_of(result: Mapping[str, Any]) -> str:
         parts.append(f"{made if s['plant'] != 'given' else 'Given recordings'}; code `{result['code'][:12]}`.")
     if result["failed"]:
         parts.append(f"{result['failed']} diagnoses ended without an answer; they count as wrong.")
-    for title, header, rows in tables_of(result):
+    for title, header, rows in tables_of(result, list(result["cases"])):
         lines = [f"| {' | '.join(row)} |" for row in (header, ["---"] * len(header), *rows)]
         parts += [f"## {title}", "\n".join(lines)]
     parts += ["## Rules", "\n".join(f"- **{rule['name']}**: {rule['meaning']}" for rule in result["rules"])]

@@ -12,7 +12,7 @@ from scipy.stats import binomtest
 
 from diagnosis.proof.scoring.answers import CERTAIN, read_answer
 from diagnosis.proof.scoring.lines import Settings, Task, kept_columns
-from diagnosis.proof.scoring.rules import RULES, Item, is_right
+from diagnosis.proof.scoring.rules import RULES, Item, Rule, is_right
 from diagnosis.proof.scoring.seeds import role_of
 from diagnosis.proof.scoring.truth import Truth
 from models.assembly.gearbox import Gearbox, load_gearbox
@@ -85,7 +85,7 @@ def outcome(
         "failed": sum(record["status"] != "answered" for record in records.values()),
         "rules": [
             {"name": rule.name, "meaning": rule.meaning, "bad": rule.bad,
-             "counts": {n: count([rule.right(i) for i in items if rule.when(i)]) for n, items in tables.items()}}
+             "counts": {n: _counted(rule, items) for n, items in tables.items()}}
             for rule in RULES
         ],
         "claims": {n: count([right for p, right in stated(items) if p >= CERTAIN]) for n, items in tables.items()},
@@ -94,6 +94,15 @@ def outcome(
         "misses": [_row(item) for item in sorted(whole, key=lambda i: i.case) if _missed(item)],
         "lines": [_row(item) for items in groups.values() for item in items],
     }  # fmt: skip
+
+
+def _counted(rule: Rule, items: Sequence[Item]) -> dict[str, Any]:
+    """Hits of a rule; where a random answer may be right, also how often it would be."""
+    asked = [item for item in items if rule.when(item)]
+    counted = count([rule.right(item) for item in asked])
+    if rule.chance is None or not asked:
+        return counted
+    return counted | {"chance": round(float(np.mean([rule.chance(item) for item in asked])), 4)}
 
 
 def near_nodes(gearbox: Gearbox) -> dict[str, frozenset[str]]:
@@ -171,9 +180,8 @@ def _label(item: Item) -> str:
     return f"{item.effect.label} at {places}" + (f", {item.effect.course}" if item.effect.course else "")
 
 
-def tables_of(result: Mapping[str, Any]) -> list[tuple[str, list[str], list[list[str]]]]:
-    """Title, header and rows of the tables that are printed and published."""
-    kinds = list(result["cases"])
+def tables_of(result: Mapping[str, Any], kinds: Sequence[str]) -> list[tuple[str, list[str], list[list[str]]]]:
+    """Title, header and rows of the tables that are printed and published, with a column per kind of plant."""
     rules = [
         [rule["name"], *(_share(rule["counts"][kind]) for kind in kinds)]
         for rule in result["rules"] if any(rule["counts"][kind]["of"] for kind in kinds)
@@ -188,8 +196,8 @@ def tables_of(result: Mapping[str, Any]) -> list[tuple[str, list[str], list[list
         for b in result["reliability"]
     ]
     misses = [
-        [m["case"], m["group"], m["truth"], _nats(m["D_plant_nats"]), _nats(m["D_tool_nats"]),
-         m["verdict"].replace("_", " "), "; ".join(m["answer"]) or "-"]
+        [m["case"], m["group"], m["truth"], m["verdict"].replace("_", " "), "; ".join(m["answer"]) or "-",
+         _nats(m["D_plant_nats"]), _nats(m["D_tool_nats"])]
         for m in result["misses"]
     ]  # fmt: skip
     header = ["rule", *(f"{k} ({result['cases'][k]} cases)" for k in kinds)]
@@ -197,14 +205,15 @@ def tables_of(result: Mapping[str, Any]) -> list[tuple[str, list[str], list[list
         ("Right, of all, with exact 95 % limits", header, rules),
         ("Stated probabilities", ["stated", "mean", "right"], bins),
         ("Misses, with the nats (D / 2) that the recordings hold",
-         ["case", "group", "truth", "plant", "tool", "verdict", "answer"], misses),
+         ["case", "group", "truth", "verdict", "answer", "plant", "tool"], misses),
     ]  # fmt: skip
 
 
 def _share(c: Mapping[str, Any]) -> str:
     if not c["of"]:
         return "-"
-    return f"{c['hits']}/{c['of']} ({100 * c['low']:.0f} to {100 * c['high']:.0f} %)"
+    chance = f"; {100 * c['chance']:.0f} % by chance" if "chance" in c else ""
+    return f"{c['hits']}/{c['of']} ({100 * c['low']:.0f} to {100 * c['high']:.0f} %{chance})"
 
 
 def _nats(value: float | None) -> str:

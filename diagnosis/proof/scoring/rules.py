@@ -64,8 +64,17 @@ class Item:
     @property
     def located(self) -> bool:
         """True if the most probable place or that of a finding is a node of the effect, or next to one."""
-        near = {n for node in self.concealed.nodes for n in self.near.get(node, {node})}
-        return self.answer.node in near or any(near & claim.nodes for claim in self.answer.claims)
+        return self.answer.node in self._around or any(self._around & claim.nodes for claim in self.answer.claims)
+
+    @property
+    def located_by_chance(self) -> float:
+        """Share of the machine's parts that are the right place: how often one drawn at random would be."""
+        return len(self._around & self.near.keys()) / len(self.near)
+
+    @property
+    def _around(self) -> frozenset[str]:
+        """Nodes of the effect, and those next to them."""
+        return frozenset(n for node in self.concealed.nodes for n in self.near.get(node, {node}))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -80,6 +89,8 @@ class Rule:
         True if the answer is right, or wrong where the rule counts errors
     bad : bool
         True if the rule counts errors
+    chance : callable, optional
+        Probability that an answer drawn at random is right
     """
 
     name: str
@@ -87,6 +98,7 @@ class Rule:
     when: Callable[[Item], bool]
     right: Callable[[Item], bool]
     bad: bool = False
+    chance: Callable[[Item], float] | None = None
 
 
 def acts_like(claim: Claim, truth: Changed) -> bool:
@@ -186,7 +198,7 @@ RULES = (
     Rule(name="acts like", when=has_effect, right=lambda i: i.alike,
          meaning="All effects: named, or the same kind of thing (loss, link, capacity, heat, sensor, input, clock) at "
                  "the same node or link is reported with the same sign."),
-    Rule(name="place right", when=in_machine, right=lambda i: i.located,
+    Rule(name="place right", when=in_machine, right=lambda i: i.located, chance=lambda i: i.located_by_chance,
          meaning="Effects in the machine: the most probable place or that of a finding is a node of the effect or "
                  "linked to it."),
     Rule(name="named or tied, visible", when=lambda i: in_catalogue(i) and visible(i), right=lambda i: i.tied,

@@ -213,7 +213,11 @@ def test_every_case_is_counted_by_kind_of_plant(fzg: Gearbox, tmp_path: Path) ->
     ]  # fmt: skip
     (last,) = [b for b in result["reliability"] if b["from"] == 0.9]
     assert (last["hits"], last["of"], last["stated"]) == (1, 3, pytest.approx((0.95 + 0.97 + 0.95) / 3))
-    assert any("1/2 (1 to 99 %)" in row for row in tables_of(result)[0][2])
+    assert any("1/2 (1 to 99 %)" in row for row in tables_of(result, list(result["cases"]))[0][2])
+    (places,) = [rule["counts"] for rule in result["rules"] if rule["name"] == "place right"]
+    assert places["zoo: ring"]["chance"] == 0.75  # nine of twelve parts are the oil or joined to it
+    assert any("1/1 (2 to 100 %; 75 % by chance)" in row for row in tables_of(result, list(result["cases"]))[0][2])
+    assert not any("chance" in c for r in result["rules"] if r["name"] != "place right" for c in r["counts"].values())
     with pytest.raises(InputError, match="'e' has an answer but no truth"):
         outcome(read_truths(tmp_path), {**records, Task(case="e"): records[Task(case="a")]}, fzg)
 
