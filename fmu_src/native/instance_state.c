@@ -163,7 +163,8 @@ Status instance_deserialize(Instance *self, const void *bytes, size_t size, void
 
 /* ------------------------------------------------------------------------------------------------------ derivatives */
 
-#define RELATIVE_STEP 1e-3 /* of a value or its nominal value: balances rounding with the fourth-order remainder */
+#define RELATIVE_STEP 1e-3 /* of a value: balances rounding with the fourth-order remainder */
+#define LEAST_SHARE 1e-3   /* of the nominal value, that a value counts for at least: knees lie near zero */
 
 /* Add the unknowns, weighted, with one known at `value`. */
 static Status add_unknowns_at(Instance *self, unsigned known, double value, const unsigned unknowns[],
@@ -181,7 +182,7 @@ static Status add_derivatives(Instance *self, unsigned known, double seed, const
     static const double WEIGHTS[] = {2.0 / 3.0, -2.0 / 3.0, -1.0 / 12.0, 1.0 / 12.0};
     const Variable *variable = &model_variables[known];
     const double value = self->values[known];
-    const double h = RELATIVE_STEP * fmax(fabs(value), variable->nominal);
+    const double h = RELATIVE_STEP * fmax(fabs(value), LEAST_SHARE * variable->nominal);
     /* Near a bound the places move inside: beyond it a value is held, and the slope would come out too small. */
     double centre = fmax(value, variable->minimum + 2.0 * h);
     Status status = STATUS_OK;

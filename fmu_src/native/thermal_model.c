@@ -10,6 +10,7 @@
 #include <string.h>
 
 #define RPM 0.10471975511965977 /* rad/s per 1/min */
+#define LEAST_POWER 1e-6 /* W; less is rounding at a shaft that stands */
 #define FIRST_STEP_S 0.1
 
 typedef struct {
@@ -163,23 +164,13 @@ ModelStatus model_step(Model *model, double duration) {
 #endif
 }
 
-/* Heat that the nodes hold above that of their start temperatures, J. */
-static double stored_heat(const Model *model, const ThermalState *thermal) {
-    const Network *network = model->scratch;
-    ThermalState first;
-    double stored = 0.0;
-    start_values(model, &first);
-    for (int i = 0; i < N_PARTS; i++) stored += network->capacity[i] * (thermal->T[i] - first.T[i]);
-    return stored;
-}
-
 #ifdef TORQUE_LOSS
 /* Loss torque, linear through zero below 1 rpm as the losses are, and efficiency. */
 static void shaft_outputs(Model *model, double speed, double torque, double loss) {
     const double omega = speed * RPM, power = omega * torque;
     const double useful = power < 0.0 ? -power : fmax(power - loss, 0.0), given = power < 0.0 ? loss - power : power;
     model->values[TORQUE_LOSS] = loss * ((omega > 0.0) - (omega < 0.0)) / fmax(fabs(omega), RPM);
-    model->values[EFFICIENCY] = given > 0.0 ? useful / given : 0.0;
+    model->values[EFFICIENCY] = given > LEAST_POWER ? useful / given : 0.0;
 }
 #endif
 
@@ -203,8 +194,8 @@ ModelStatus model_outputs(Model *model) {
         show(model, BOUNDARY_FLOW[i], flow[i]);
         show(model, BOUNDARY_HEAT[i], state->total.out[i]);
     }
-    model->values[HEAT_IN] = state->total.in;
-    model->values[HEAT_STORED] = stored_heat(model, &thermal);
+    model->values[HEAT_IN] = model->values[HEAT_STORED] = state->total.in;
+    for (int i = 0; i < N_BOUNDARIES; i++) model->values[HEAT_STORED] -= state->total.out[i];
 #ifdef TOTAL_LOSS
     model->values[TOTAL_LOSS] = 0.0;
     for (int i = 0; i < N_SOURCES; i++)

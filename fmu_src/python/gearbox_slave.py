@@ -104,6 +104,8 @@ class GearboxSlave(Fmi2Slave):  # type: ignore[misc,unused-ignore]
     def do_step(self, current_time: float, step_size: float) -> bool:
         """Simulate one step with the inputs held; False (Discard) if it cannot be done, then nothing has changed."""
         try:
+            if not step_size > 0.0:
+                raise ValueError(f"a step of {step_size:g} s; it must be longer than 0 s")
             system, inputs, before = self._present()
             with np.errstate(all="ignore"):
                 state = solver.advance(system, before, current_time, step_size, inputs, inputs)
@@ -198,11 +200,10 @@ class GearboxSlave(Fmi2Slave):  # type: ignore[misc,unused-ignore]
             point = (*system.operating(time, inputs, states), states[self._loss_nodes]) if laws.components else ()
             self._distance = float(self._losses.domain_distance(*point)) if point else 0.0
             flows = self._flows if self._flows is not None else system.balance(time, inputs, states).heat_out
-        stored = system.capacities @ (states[:n_parts] - self._start_temperatures())
         is_loss = np.array(laws.losses_of_sources, dtype=bool)
         loss = heats[is_loss].sum()
         found = {"total_loss": loss, "domain_distance": self._distance, "in_domain": self._distance <= 0.0}
-        found |= {"heat_in": state.heat_in, "heat_stored": stored}
+        found |= {"heat_in": state.heat_in, "heat_stored": state.heat_in - state.heat_out.sum()}
         if {"speed", "torque"} <= set(laws.inputs):
             speed, torque = (inputs[laws.inputs.index(name)] for name in ("speed", "torque"))
             found |= {"torque_loss": torque_loss(loss, speed), "efficiency": efficiency(loss, speed, torque)}

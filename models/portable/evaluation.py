@@ -18,6 +18,7 @@ from .solver import Balance, LossesAt, error_weights, times
 Array = NDArray[np.float64]
 RPM = np.pi / 30.0
 TORQUE_LOSS_FLOOR = RPM  # rad/s: below 1 rpm the loss torque goes linearly through zero, as the losses do
+LEAST_POWER = 1e-6  # W; less is rounding at a shaft that stands
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -276,7 +277,7 @@ def efficiency(loss: Any, speed: Any, torque: Any) -> Array:
     """Power out over power in, [-].
 
     Driving (speed times torque positive): ``1 - loss / P``, 0 where the loss exceeds the power given. Coasting: what
-    arrives at the input shaft over what the output shaft gave, ``P / (P + loss)``. Without power 0.
+    arrives at the input shaft over what the output shaft gave, ``P / (P + loss)``. Without power (at most 1e-6 W) 0.
 
     Parameters
     ----------
@@ -288,4 +289,5 @@ def efficiency(loss: Any, speed: Any, torque: Any) -> Array:
     power = np.asarray(speed) * RPM * torque
     useful = np.where(power < 0.0, -power, np.maximum(power - loss, 0.0))
     given = np.where(power < 0.0, loss - power, power)
-    return np.asarray(np.where(given > 0.0, useful / np.where(given > 0.0, given, 1.0), 0.0))
+    turns = given > LEAST_POWER
+    return np.asarray(np.where(turns, useful / np.where(turns, given, 1.0), 0.0))

@@ -161,6 +161,19 @@ def test_directional_derivatives_are_those_of_the_outputs(host: Host, known: str
     assert any(found) == (known != "air_speed")  # which acts on the temperatures of later moments only
 
 
+@pytest.mark.parametrize(("known", "value"), [("speed", 0.03), ("speed", 0.2), ("torque", 0.2)])
+def test_derivatives_near_a_knee_are_those_of_its_side(host: Host, known: str, value: float) -> None:
+    """Losses go linearly through zero below 1 1/min (0.105 rad/s), and turn with the sign of the torque."""
+    host.step(100.0)
+    host.set_all({known: value})
+    names = ["loss.total", "torque_loss"]
+    found, sides = derivative(host, names, known), []
+    for step in (-1e-4, 1e-4):
+        host.set_all({known: value * (1.0 + step)})
+        sides.append(np.array(host.get(*names)))
+    np.testing.assert_allclose(found, (sides[1] - sides[0]) / (2e-4 * value), rtol=1e-3, atol=1e-6)
+
+
 @pytest.mark.parametrize("bound", ["min", "max"])
 def test_derivatives_at_a_bound_are_those_inside(host: Host, bound: str) -> None:
     host.step(10.0)

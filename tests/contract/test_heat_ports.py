@@ -6,7 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from fmpy.fmi1 import FMICallException
 
+from models.assembly.gearbox import Gearbox
+from models.network.laws import symbol
 from tests.contract.fmu_host import Host, hosted
 
 TERMS = ("heat_in", "heat_stored", "air.heat", "frame.heat")
@@ -24,12 +27,40 @@ def ride(host: Host, step: float, steps: int) -> None:
 
 
 @pytest.mark.parametrize("step", [0.1, 1.0, 10.0, 60.0])
-def test_the_energy_balance_closes(path: Path, step: float) -> None:
+def test_the_energy_balance_closes(path: Path, step: float, fzg: Gearbox) -> None:
+    """What came in and did not go to a boundary is in the capacities of the definition, by the temperatures shown."""
+    network = fzg.network()
+    start = {symbol(parameter.name): parameter.start for parameter in network.parameters}
+    capacities = np.array([float(part.capacity.xreplace(start)) for part in network.parts if part.capacity is not None])
+    names = [f"{part.name}.T" for part in network.parts]
     with hosted(path) as host:
+        first = np.array(host.get(*names))
         ride(host, step, min(60, round(600.0 / step)))
         heat_in, stored, air, frame = host.get(*TERMS)
+        held = float(capacities @ (np.array(host.get(*names)) - first))
     assert heat_in > 0.0
-    assert heat_in - stored - air - frame == pytest.approx(0.0, abs=1e-9 * heat_in)
+    assert heat_in - held - air - frame == pytest.approx(0.0, abs=1e-9 * heat_in)
+    assert stored == pytest.approx(held, abs=1e-9 * heat_in)
+
+
+def test_a_capacity_that_is_tuned_in_a_run_stores_nothing_by_itself(path: Path) -> None:
+    with hosted(path) as host:
+        ride(host, 10.0, 20)
+        before = host.get(*TERMS)
+        host.set(**{"factor.C_oil": 2.0})
+        assert host.get(*TERMS) == before
+        ride(host, 10.0, 20)
+        heat_in, stored, air, frame = host.get(*TERMS)
+    assert stored > before[1] and heat_in - stored - air - frame == pytest.approx(0.0, abs=1e-9 * heat_in)
+
+
+def test_a_step_without_length_is_refused(path: Path) -> None:
+    with hosted(path) as host:
+        host.step(1.0)
+        kept = host.get(*TERMS, "air.heat_flow")
+        with pytest.raises(FMICallException):
+            host.slave.doStep(currentCommunicationPoint=host.time, communicationStepSize=0.0)
+        assert host.get(*TERMS, "air.heat_flow") == kept
 
 
 def test_flows_are_means_over_the_last_step(path: Path) -> None:
