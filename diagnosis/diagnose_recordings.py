@@ -135,9 +135,9 @@ def diagnose(
             rest = weigh(calibration.of_others)
         progress("predicting the recordings free-running")
         return assemble(
-            setup, experiment, posterior, decide(posterior, settings), plain=plain, calibration=calibration,
-            settings=settings,
-            others=None if rest is None else Others(fit=others, posterior=rest, channels=faulty, apart=tuple(apart)),
+            setup, experiment, posterior, decide(posterior, settings), plain=plain if rest is None else others,
+            calibration=calibration, settings=settings,
+            others=None if rest is None else Others(posterior=rest, channels=faulty, apart=tuple(apart)),
             catalogue=catalogue, known=known, train=train, held_out=held, healthy=healthy, switched_off=off, jobs=jobs,
         )  # fmt: skip
     except ArithmeticError as error:

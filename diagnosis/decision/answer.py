@@ -41,6 +41,8 @@ class Answer:
         True if this is only the nearest name: by names that look alike or act on the same thing, by what remains, by
         the kind of the effect (a course over the hours, a parameter where model error is large), because it begins
         together with another one, or because held-out recordings contradict it
+    discounted : bool
+        True if only the share :attr:`Rule.nearest` of the probability is stated
     one_event : bool
         True if another effect begins at the same time, or acts on the same thing at the same times: one cause is more
         probable than two
@@ -53,6 +55,7 @@ class Answer:
     joint: float
     tied: tuple[tuple[Hypothesis, float], ...] = ()
     acts_like: bool = False
+    discounted: bool = False
     one_event: bool = False
 
 
@@ -77,10 +80,9 @@ def decide(posterior: Posterior, settings: Settings) -> tuple[Answer, ...]:
 
 def withdraw_claim(answer: Answer, rule: Rule) -> Answer:
     """An answer that held-out recordings contradict: no claim and no tie, but the nearest name at most."""
-    if answer.acts_like:
-        return answer
-    return replace(answer, grade="likely", tied=(), acts_like=True, probability=rule.nearest * answer.probability,
-                   joint=rule.nearest * answer.joint)  # fmt: skip
+    stated = 1.0 if answer.discounted else rule.nearest
+    return replace(answer, grade="likely", tied=(), acts_like=True, discounted=True,
+                   probability=stated * answer.probability, joint=stated * answer.joint)  # fmt: skip
 
 
 def _best_fitted(posterior: Posterior) -> Judged:
@@ -112,7 +114,7 @@ def _answer(posterior: Posterior, best: Judged, effect: Hypothesis, enough: floa
     sure = posterior.rule.nearest if much else 1.0
     own = posterior.of_names([name])
     answer = Answer(best=best, effect=effect, grade="likely", probability=sure * own, joint=sure * own, acts_like=vague,
-                    one_event=together)  # fmt: skip
+                    discounted=much, one_event=together)  # fmt: skip
     if own >= enough:
         return answer if vague else replace(answer, grade="claim")
     names = _best_of_names(posterior, effect)

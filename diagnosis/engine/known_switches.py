@@ -48,7 +48,8 @@ def start_with_switches(
         others = tuple(finding for finding in gearbox.correction.findings if finding is not known)
         without = replace(gearbox, correction=gearbox.correction.model_copy(update={"findings": others}))
         with suppress(ArithmeticError):
-            fit = calibrate(prepare_experiment(without, recordings, holdout, baseline)[1])
+            lacking = prepare_experiment(without, recordings, holdout, baseline)[1]
+            fit = calibrate(replace(lacking, healthy=frozenset()))  # what is known acts in the baselines too
             best = np.array([1.0, *(p.start for p in term.parameters[1:])])
             points = min(int(VARIANTS ** (1.0 / len(rough))), POINTS)
             for width in (WIDTH, 2.0 * WIDTH / points):  # of the second grid: about two steps of the first

@@ -36,11 +36,13 @@ def refit(
         If there is no solution at any of the starts.
     """
     line = cache(lambda one: _straight_line(fit, candidate, one))
+    # The fit may be short of its own optimum: with other model error than it was fitted with, or with a channel back.
+    ended = fit.z + fit.covariance @ (fit.linearised.products[1:, 0] - fit.z)
 
     def rough_fit(which: int, size: float) -> list[Fit]:
         """A few steps from one start; empty if it has no solution."""
         aside, experiment, shape = line(which)
-        z = np.concatenate([fit.z + size * aside, [experiment.unknowns[len(fit.z)].z_of(size)], shape[1:]])
+        z = np.concatenate([ended + size * aside, [experiment.unknowns[len(fit.z)].z_of(size)], shape[1:]])
         try:
             return [experiment.fit(z, fit.trajectories, iterations=ROUGH)]
         except ArithmeticError:

@@ -222,7 +222,7 @@ def _pieces_of(recording: Recording, inputs: Sequence[str], channels: Sequence[s
             grid = time
         else:
             grid = np.arange(time[0], time[-1] + 0.5 * INTERVAL_S, INTERVAL_S)
-            grid = grid[grid <= time[-1] + 1e-9]
+            grid = np.minimum(grid[grid <= time[-1] + 1e-9], time[-1])
         if not even and native <= SLOW_S:
             driven = {name: recording.inputs[name][rows] for name in inputs}
             grid = _thinned(grid, time, driven, {n: values[n][rows] for n in channels if n in values})

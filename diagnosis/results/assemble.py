@@ -61,15 +61,12 @@ class Others:
 
     Attributes
     ----------
-    fit : Fit
-        The nominal machine calibrated by them, without model error
     channels : tuple of str
         The faulty ones
     apart : tuple of str
         All that were left out for the posterior
     """
 
-    fit: Fit
     posterior: Posterior
     channels: tuple[str, ...]
     apart: tuple[str, ...]
@@ -102,7 +99,7 @@ def assemble(
     answers : sequence of Answer
         Most important first
     plain : Fit
-        The nominal machine calibrated without model error
+        The nominal machine calibrated without model error, by all but faulty channels
     calibration : Calibration
         With model error
     others : Others or None
@@ -120,7 +117,7 @@ def assemble(
     counting = [name for name in setup.channels if name not in faulty]
     predicted = predict_recordings(
         experiment, held_out_experiment(setup, experiment), plain=plain,
-        found=_final(best, plain if others is None else others.fit, faulty),
+        found=_final(best, plain, faulty),
         explanation=None if faulty else best or posterior.nothing, near=calibration.near, counting=counting,
         jobs=jobs,
     )  # fmt: skip
@@ -175,7 +172,7 @@ def assemble(
         noise_K=setup.noise_K,
         floor=_floor(setup, calibration.near.experiment.random_heat),
         misfit=_misfit(final),
-        remaining_p_value=_bound_on_chance(posterior.left_by(best)),
+        remaining_p_value=1.0 if _looked_no_further(best) else _bound_on_chance(posterior.left_by(best)),
         remaining_note=_remaining(posterior, others, best),
         ranking=_ranking(posterior),
         unseen=unseen,
@@ -325,7 +322,7 @@ def _remaining(posterior: Posterior, others: Others | None, best: Judged | None)
             return (f"something else is missing too (evidence {rest.log_e:.0f} nat without {channels}): "
                     f"leave {channels} out of the recordings and diagnose again")  # fmt: skip
         return f"without {channels} nothing stands out of noise and model error (evidence {rest.log_e:.1f} nat)"
-    if best is not None and best.kind == "pair" and best.left is None:
+    if _looked_no_further(best):
         return (
             f"two effects were fitted (evidence {posterior.remainder:.0f} nat of the second), no third was looked for"
         )
@@ -333,6 +330,11 @@ def _remaining(posterior: Posterior, others: Others | None, best: Judged | None)
     if left > posterior.class_threshold:
         return f"a further effect would still help (evidence {left:.0f} nat)"
     return f"nothing stands out of noise and model error (evidence {left:.1f} nat of a further effect)"
+
+
+def _looked_no_further(best: Judged | None) -> bool:
+    """True if the answer is a pair, given which no scan looked for a third effect."""
+    return best is not None and best.kind == "pair" and best.left is None
 
 
 def _misfit(fit: Fit) -> float:

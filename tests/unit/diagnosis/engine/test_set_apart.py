@@ -2,20 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from diagnosis.candidates.hypotheses import hypothesis_of
 from diagnosis.engine.calibration import calibrate_with_error
 from diagnosis.engine.fit import Experiment, Fit, calibrate
 from diagnosis.engine.prepare import prepare_experiment
+from diagnosis.engine.refit import refit
+from diagnosis.engine.scan import scan
 from diagnosis.engine.set_apart import calibrate_apart, refit_to_predict, without_channels
 from diagnosis.engine.unknown import SensorBias
 from diagnosis.forward.whitening import AS_ASSUMED, RandomHeat
 from diagnosis.recordings.read import read_recordings
-from models.assembly.gearbox import load_gearbox
+from models.assembly.gearbox import Gearbox, load_gearbox
+from models.base.types import Array
+from models.mechanisms import CATALOGUE, Scale
+from tests.unit.diagnosis.inference_example import recorded
 
 DATA = Path(__file__).parents[4] / "examples" / "data"
 BROKEN = "cell_6__NTC7"
@@ -44,6 +52,32 @@ def test_sound_sensors_are_not_set_apart() -> None:
     fit, apart = calibrate_apart(sound, plain)
     assert apart == ()
     assert fit is plain
+
+
+def with_broken(fzg: Gearbox, broken: Callable[[Array, Array], Array]) -> Experiment:
+    """Five hours with a bearing's thermometer that reads something of its time and values; noise of 0.1 K."""
+    made = recorded(fzg, "made", hours=5.0, nodes=("oil", "housing_lower", "housing_upper", "bearing_1", "pinion"))
+    channels = [
+        replace(c, values=broken(made.time, c.values)) if c.name == "bearing_1" else c for c in made.channels
+    ]
+    return prepare_experiment(fzg, [replace(made, channels=tuple(channels))], [made])[1]
+
+
+def test_a_frozen_sensor_round_which_the_calibration_bends_is_set_apart(fzg: Gearbox) -> None:
+    frozen = with_broken(fzg, lambda time, T: np.where(time < 7200.0, T, T[720]))
+    assert calibrate_apart(frozen, calibrate(frozen))[1] == ("bearing_1",)
+
+
+def test_what_is_wrong_with_a_channel_that_was_apart_is_found(fzg: Gearbox) -> None:
+    """Its readings are back in a fit that never saw them, far from an optimum."""
+    too_high = with_broken(fzg, lambda _, T: 1.6 * T)
+    base = calibrate_with_error(too_high, calibrate(without_channels(too_high, ["bearing_1"])), ["bearing_1"]).fit
+    placed = CATALOGUE["sensor_gain"].placed(too_high.machine.model.network, Scale.of(fzg), too_high.pieces[0].channels)
+    scanned = scan(base, [hypothesis_of(one) for one in placed if one.place == "bearing_1"])
+    strength = float(scanned.singles(scanned.gram.given(scanned.unknowns)).value[0])
+    found = refit(base, scanned.candidates[0], scanned.best[0], strength)
+    assert found.experiment.unknowns[-1].value(float(found.z[-1])) == pytest.approx(0.6, abs=0.02)
+    assert found.log_evidence > base.log_evidence + 1000.0
 
 
 def test_how_far_a_session_may_deviate_the_sound_channels_say_for_all() -> None:

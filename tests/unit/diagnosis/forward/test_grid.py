@@ -228,3 +228,10 @@ def test_noise_of_a_channel_with_gaps_is_that_of_its_values() -> None:
     values = np.random.default_rng(0).normal(0.0, 0.3, 4000)
     sparse = np.where(np.arange(4000) % 5 == 0, values, np.nan)
     assert white_sd(sparse) == pytest.approx(0.3, rel=0.1)
+
+
+@pytest.mark.parametrize("unit_s", [60.0, 3600.0, 86400.0])
+def test_times_that_are_rounded_in_another_unit_end_with_the_last_row(unit_s: float) -> None:
+    for rows in range(101, 401, 7):
+        time = np.array([float(f"{2.0 * row / unit_s:.12g}") for row in range(rows)]) * unit_s
+        assert time[-1] - INTERVAL_S < piece_of(time).time[-1] <= time[-1]
