@@ -37,8 +37,10 @@ def add(file: Path, mechanism: str, gearbox: str, place: str | None, given: tupl
     if file.suffix != ENDING:
         raise InputError(f"{file}: a correction ends in {ENDING}; choose such a name")
     numbers = dict(map(_number, given))
+    if len(numbers) < len(given):
+        raise click.UsageError("--set gives a number twice; give each once")
     definition = load_gearbox(gearbox)
-    known = read_correction(file, definition) if file.exists() else Correction()
+    known = read_correction(file, definition) if file.exists() else Correction.of(definition)
     finding = known_finding(definition, known.apply(definition.network()), mechanism, numbers, place=place)
     if any(other.label == finding.label for other in known.findings):
         raise InputError(f"{file}: has {mechanism} at {finding.place} already; change its numbers there")

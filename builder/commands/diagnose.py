@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -111,7 +111,7 @@ def diagnose(
     with progress(LOADING):
         from diagnosis import diagnose as run
         from diagnosis.recordings.read import read_by_role
-        from diagnosis.report.write import left_from_earlier, names_of_files, write_files
+        from diagnosis.report.write import names_of_files, write_files, written_earlier
         from models.base.atomic_write import atomic_folder
         from models.mechanisms import CATALOGUE
         from models.mechanisms.user_files import check_placeable, load_mechanisms
@@ -146,20 +146,31 @@ def diagnose(
         Path(gearbox),
         *(file for file in (mapping, correction) if file),
     ]
-    refuse_to_replace(given, [output / name for name in names_of_files((*train, *held))])
+    names, earlier = names_of_files((*train, *held)), written_earlier(output)
+    refuse_to_replace(given, [output / name for name in names])
+    _refuse_to_replace_others(output, {*names} - earlier)
     _print_notes((*train, *held, *healthy))
-    old = [path for path in left_from_earlier(output, (*train, *held)) if path not in given]
+    old = [output / name for name in earlier.difference(names) if output / name not in given]
     with atomic_folder(output) as stage, progress("starting") as tell:
         found = run(train, definition, holdout=held, baseline=healthy, switched_off=switched_off, correction=known,
                     settings=settings, catalogue=catalogue, jobs=jobs, progress=tell)  # fmt: skip
         tell("writing the report")
-        names = [path.name for path in write_files(found, definition, [*train, *held], stage)]
+        written = [path.name for path in write_files(found, definition, [*train, *held], stage)]
     for path in old:
-        path.unlink()
+        path.unlink(missing_ok=True)
     console.out.print("\n".join(found.summary()))
     console.out.print()
-    for name in names:
+    for name in written:
         console.out.print(f"wrote {output / name}")
+
+
+def _refuse_to_replace_others(output: Path, names: Collection[str]) -> None:
+    """Refuse to write over files that no diagnosis wrote."""
+    there = [output / name for name in sorted(names) if (output / name).exists()]
+    if there:
+        raise InputError(
+            "\n".join(f"{file}: exists, and no diagnosis wrote it; choose another --output" for file in there)
+        )
 
 
 def _print_notes(recordings: Sequence[Recording]) -> None:

@@ -287,8 +287,9 @@ class _Table:
         yield from self._factors()
         for state in self.network.states:
             name, nominal = f"state.{fmi_name(state.name)}", max(abs(state.start), 1.0)
+            switches = state.update is not None and state.rate.is_zero
             yield Signal(name=name, role="state", of=state.name, causality="local", column=result_column(name),
-                         variability="continuous", initial="calculated", nominal=nominal,
+                         variability="discrete" if switches else "continuous", initial="calculated", nominal=nominal,
                          description=f"Memory {state.name} of the thermal network")  # fmt: skip
             yield Signal(name=f"initial.{name}", role="start_state", of=state.name, causality="parameter",
                          variability="fixed", initial="exact", start=state.start, nominal=nominal,

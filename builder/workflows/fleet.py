@@ -62,8 +62,8 @@ class Member:
 # probability, their mean heat or the unknown one, errors of held-out temperatures (free-running), why there is none.
 Row = dict[str, Any]
 NO_DIAGNOSIS: Mapping[str, Any] = {
-    "gearbox": "", "verdict": ERROR, "found": "", "heat_W": NAN, "p_value": NAN, "rmse_before_K": NAN,
-    "rmse_calibrated_K": NAN, "rmse_after_K": NAN, "error": "",
+    "gearbox": "", "verdict": ERROR, "found": "", "heat_W": NAN, "log_e_value": NAN, "threshold": NAN,
+    "rmse_before_K": NAN, "rmse_calibrated_K": NAN, "rmse_after_K": NAN, "error": "",
 }  # fmt: skip
 
 
@@ -261,7 +261,8 @@ def _row(name: str, found: Diagnosis) -> Row:
         "verdict": found.verdict,
         "found": "; ".join(f"{f.grade}: {f.title} ({f.sureness:.2f})" for f in found.findings),
         "heat_W": sum(f.heat_mean_W for f in found.findings) if found.findings else unknown,
-        "p_value": found.p_value,
+        "log_e_value": found.log_e_value,
+        "threshold": found.threshold,
         "rmse_before_K": found.holdout.before,
         "rmse_calibrated_K": found.holdout.calibrated,
         "rmse_after_K": found.holdout.after,

@@ -95,6 +95,11 @@ class Hypothesis:
         return self.term is not None and (self.term.of_measurement or self.term.kind == "sensor")
 
     @property
+    def holds_a_reading(self) -> bool:
+        """True if a reading stands still by it."""
+        return self.term is not None and self.term.form == "stuck"
+
+    @property
     def in_network(self) -> bool:
         """True if it is heat, and so becomes part of the network."""
         return self.term is not None and self.term.kind not in ("sensor", "signal")

@@ -80,9 +80,10 @@ def decide(posterior: Posterior, settings: Settings) -> tuple[Answer, ...]:
 
 def withdraw_claim(answer: Answer, rule: Rule) -> Answer:
     """An answer that held-out recordings contradict: no claim and no tie, but the nearest name at most."""
-    stated = 1.0 if answer.discounted else rule.nearest
+    if answer.discounted:
+        return answer
     return replace(answer, grade="likely", tied=(), acts_like=True, discounted=True,
-                   probability=stated * answer.probability, joint=stated * answer.joint)  # fmt: skip
+                   probability=rule.nearest * answer.probability, joint=rule.nearest * answer.joint)  # fmt: skip
 
 
 def _best_fitted(posterior: Posterior) -> Judged:

@@ -120,7 +120,8 @@ def infer(
         error_evidence=dict(calibration.evidence),
         session_s=chosen.session_s,
         scaled=tuple(
-            with_scaled_error(calibration, found, factor, first, settings.false_alarm_rate, least) for factor in SCALED
+            with_scaled_error(calibration, found, factor, first, settings.false_alarm_rate, least)
+            for factor in SCALED if any(calibration.near.error.amplitudes(one).any() for one in calibration.classes)
         ),
         repeating=repeating_of(first, error_class),
         expected=expected_of(first, chosen.error_class, settings),
@@ -146,10 +147,11 @@ def _raced(calibration: Calibration, found: Scanned, progress: Progress) -> dict
         if one.fit is not None:
             judged[one.label] = _fitted_on(calibration, one)
     best = max((judged[one.label] for one in ahead), key=_weight, default=None)
-    if best is not None and best.fit is not None and best.effects[0].how == "from_date":
+    if best is not None and best.fit is not None and best.effects[0].date is not None:
         progress(f"fitting what may have begun instead of {best.label}")
         for one in (judged[one.label] for one in ahead):
-            if one.fit is not None and one is not best and one.effects[0].ending == best.effects[0].ending:
+            first = one.effects[0]
+            if one.fit and one is not best and first.date and first.ending == best.effects[0].ending:
                 judged[one.label] = max(one, _with_course_of(calibration, best, one), key=_weight)
     return judged
 

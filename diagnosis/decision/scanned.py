@@ -153,11 +153,12 @@ def counts_less(candidates: Sequence[Hypothesis], nothing: ErrorClass, here: Err
     """Nats that changes over time count less: the mean of both classes, or what baselines bring if that is more.
 
     Both are about a model that is wrong in the very hours that a change over time can pick. Of what is trusted only
-    counts less what baselines bring beyond the mean of both classes.
+    counts less what baselines bring beyond the mean of both classes. No model is wrong as a reading that stands still.
     """
     of_class = 0.5 * (nothing.over_time + here.over_time)
     return np.array([
-        max(one.less, of_class) - of_class * one.trusted if one.how in OVER_TIME else 0.0 for one in candidates
+        max(one.less, of_class) - of_class * one.trusted if one.how in OVER_TIME and not one.holds_a_reading else 0.0
+        for one in candidates
     ])  # fmt: skip
 
 

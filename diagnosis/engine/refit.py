@@ -17,6 +17,7 @@ from models.base.types import Array
 
 START_SHARES = (1.0, 0.3, 0.03)  # of the strength that the scan promises
 ROUGH, ITERATIONS = 3, 10
+FAR_NAT = 20.0  # that a fit would gain by a further step: it is far from its optimum
 DATE_STEP_S = 10.0
 
 
@@ -36,8 +37,10 @@ def refit(
         If there is no solution at any of the starts.
     """
     line = cache(lambda one: _straight_line(fit, candidate, one))
-    # The fit may be short of its own optimum: with other model error than it was fitted with, or with a channel back.
-    ended = fit.z + fit.covariance @ (fit.linearised.products[1:, 0] - fit.z)
+    # The fit may be far from an optimum: readings of a channel may be back that it never saw.
+    step = fit.linearised.step(fit.z, 0.0, *fit.experiment.bounds)
+    gained = 0.5 * float(step @ (fit.linearised.products[1:, 0] - fit.z))
+    ended = fit.z + step if gained > FAR_NAT else fit.z
 
     def rough_fit(which: int, size: float) -> list[Fit]:
         """A few steps from one start; empty if it has no solution."""

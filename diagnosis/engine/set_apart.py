@@ -11,13 +11,15 @@ import numpy as np
 from diagnosis.engine.fit import Experiment, Fit, calibrate
 from diagnosis.engine.unknown import SensorBias, SensorLag, TermParameter, Unknown
 from diagnosis.forward.whitening import AS_ASSUMED
+from diagnosis.recordings.cleaning import stuck_rows
 from models.base.types import Array
 from models.quantities.quantities import is_total_loss
 from models.terms.term import Term
 
 SUSPECT, MANY = 3.0, 10.0  # times what the median channel is missed by: with the channel in the fit, and without it
-# At the start; of 57 machines by other authors and of the zoo, 56 miss their worst channel there by less than 2.7 times.
+# At the start: 56 of 57 machines by other authors and of the zoo miss their worst channel there by less than 2.7 times.
 SUSPECT_AT_START = 4.0
+STILL_ROWS = 10  # grid points in a row, between which a reading stands still
 MOST_SHARE = 0.25  # of the temperatures: more that are off are no fault of a sensor
 FEWEST = 4  # temperatures, for a median that means something
 
@@ -26,8 +28,9 @@ def calibrate_apart(experiment: Experiment, plain: Fit, start: Array | None = No
     """Calibrate the nominal machine without the channels that are at odds with all others.
 
     A channel is set apart if the machine, calibrated by the other ones, misses it by :data:`MANY` times what it misses
-    the median channel by. Asked are the worst channel of the calibration, and that of its start: a fit may have bent
-    itself round a broken sensor until all channels are missed alike. Its readings count again in the search: what is
+    the median channel by. Asked are the worst channel of the calibration, that of its start, and those that
+    stand still for a while: a fit may have bent itself round a broken sensor until all channels are missed alike. Its
+    readings count again in the search: what is
     wrong there is still to be found.
 
     Parameters
@@ -48,11 +51,11 @@ def calibrate_apart(experiment: Experiment, plain: Fit, start: Array | None = No
     names = [name for name in experiment.pieces[0].channels if not is_total_loss(name)]
     if len(names) < FEWEST:
         return fit, apart
-    first = experiment.fit(start, iterations=0)
+    first, still = experiment.fit(start, iterations=0), standing_still(experiment).keys()
     for _ in range(max(int(MOST_SHARE * len(names)), 1)):
         suspects = dict.fromkeys(
-            name for one, least in ((fit, SUSPECT), (first, SUSPECT_AT_START))
-            for name in _worst(_missed_by(experiment, one, apart), least)
+            [name for one, least in ((fit, SUSPECT), (first, SUSPECT_AT_START))
+             for name in _worst(_missed_by(experiment, one, apart), least)] + [*still - {*apart}]
         )  # fmt: skip
         for name in suspects:
             with suppress(ArithmeticError):  # no solution without it
@@ -63,6 +66,23 @@ def calibrate_apart(experiment: Experiment, plain: Fit, start: Array | None = No
         else:
             break
     return fit, apart
+
+
+def standing_still(experiment: Experiment) -> dict[str, list[tuple[float, float]]]:
+    """Times on the axis in which a thermometer stands still while another one moves, by channel, [s]."""
+    spans: dict[str, list[tuple[float, float]]] = {}
+    for piece in experiment.pieces:
+        if piece.recording in experiment.healthy:
+            continue
+        shown = {name: piece.measured[:, i] for i, name in enumerate(piece.channels) if not is_total_loss(name)}
+        start = experiment.starts_at.get(piece.recording, 0.0)
+        for name, (first, end, _, _) in stuck_rows(piece.time, shown, least_rows=STILL_ROWS).items():
+            # One that has not moved again by the last reading is held on.
+            goes_on = not np.isfinite(shown[name][end:]).any()
+            last = float(piece.time[-1 if goes_on else end - 1])
+            # It began to within the mean before the first of equal ones.
+            spans.setdefault(name, []).append((start + float(piece.time[max(first - 1, 0)]), start + last))
+    return spans
 
 
 def _worst(missed_by: Mapping[str, float], least: float) -> list[str]:

@@ -283,8 +283,13 @@ def _means_of_lines(time: Array, values: Array, edges: Array) -> Array:
     return np.asarray(np.diff(area, axis=1) / np.diff(edges, axis=1))
 
 
-def white_sd(values: Array) -> float:
+def white_sd(*pieces: Array) -> float:
     """White noise of a signal from the second differences of its known values, robust against steps and outliers.
+
+    Parameters
+    ----------
+    *pieces : Array, shape (rows,) each
+        Without gaps; all of one noise
 
     Examples
     --------
@@ -292,7 +297,7 @@ def white_sd(values: Array) -> float:
     >>> bool(abs(white_sd(np.linspace(0, 50, 4000) + rng.normal(0, 0.2, 4000)) - 0.2) < 0.01)
     True
     """
-    second = np.diff(values[np.isfinite(values)], 2)
+    second = np.concatenate([np.diff(values[np.isfinite(values)], 2) for values in pieces])
     if not second.size:
         return 0.0
     return float(1.4826 * np.median(np.abs(second - np.median(second))) / np.sqrt(6.0))

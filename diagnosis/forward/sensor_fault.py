@@ -40,8 +40,9 @@ def passed_on(term: Term, law: Array, time: Array, changes: Array, channels: Seq
         elif term.form == "clock":
             changes[:, index] = delayed(before, time, law)
         elif term.form == "stuck":
-            begin = int(np.argmax(law != 0.0))  # the reading is held as it was when the law set in
-            changes[:, index] = before + along * (before[begin] - before)
+            acts = law != 0.0  # the reading is held as it was when the law set in
+            sets_in = np.where(acts & ~np.concatenate([[False], acts[:-1]]), np.arange(len(law)), 0)
+            changes[:, index] = before + along * (before[np.maximum.accumulate(sets_in)] - before)
     if term.form == "swapped":
         changes[:, channels] += along[:, None] * (changes[:, channels[::-1]] - changes[:, channels])
     return changes

@@ -27,6 +27,7 @@ STEADY_INPUT = 0.02  # of an input's range: the loss may jump where inputs move 
 DROPOUT_JUMP_K, DROPOUT_SDS = 15.0, 20.0
 # A sensor hangs if it stays the same for so long while another one moves.
 STUCK_S, STUCK_ROWS, OTHER_MOVES_K = 1800.0, 20, 2.0
+ROUNDING_K = 1e-9  # of means of equal readings
 FINEST_RESOLUTION = 1e-4
 
 
@@ -180,7 +181,9 @@ def bridged(time: Array, values: Array, longest_s: float) -> tuple[Array, Mask]:
     return np.where(known, filled, np.nan), known
 
 
-def stuck_rows(time: Array, values: Mapping[str, Array]) -> dict[str, tuple[int, int, str, float]]:
+def stuck_rows(
+    time: Array, values: Mapping[str, Array], *, least_rows: int = STUCK_ROWS
+) -> dict[str, tuple[int, int, str, float]]:
     """Find channels that hang: first row, row after the last, the other channel that moves most meanwhile, by how much.
 
     Parameters
@@ -189,12 +192,14 @@ def stuck_rows(time: Array, values: Mapping[str, Array]) -> dict[str, tuple[int,
         [s]
     values : mapping of channel to Array, shape (rows,)
         [degC]
+    least_rows : int
+        For so many steps from row to row it stays the same, at least
     """
     found: dict[str, tuple[int, int, str, float]] = {}
     for name, own in values.items():
         good = np.flatnonzero(np.isfinite(own))
-        same = np.diff(own[good]) == 0.0
-        hanging = [(good[a], good[b] + 1) for a, b in runs(same) if b - a >= STUCK_ROWS]
+        same = np.abs(np.diff(own[good])) < ROUNDING_K
+        hanging = [(good[a], good[b] + 1) for a, b in runs(same) if b - a >= least_rows]
         if not hanging:
             continue
         first, end = max(hanging, key=lambda run: time[run[1] - 1] - time[run[0]])

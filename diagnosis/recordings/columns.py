@@ -60,7 +60,7 @@ def match_columns(
         Receives the columns that are not used
     """
     roles = _mapped_columns(present, mapping, network, problems)
-    taken = {column.quantity for column in mapping.columns.values()}
+    taken = {column.channel for column in mapping.columns.values()}
     lacking = []
     for quantity, known in quantities_of(network).items():
         name = known.column
@@ -76,12 +76,21 @@ def match_columns(
             roles[name] = Column(quantity=quantity)
         else:
             lacking.append(name)
-    found = taken | {column.quantity for column in roles.values()} | set(mapping.constants)
+    found = (
+        {column.quantity for column in mapping.columns.values()}
+        | {column.quantity for column in roles.values()}
+        | set(mapping.constants)
+    )
     for signal, given in network.inputs.items():
         if given.required and signal not in found:
             shown = ", ".join(other[:40] for other in sorted(present)[:20])
             problems.add(f"column {given.column} is missing; it has: {shown}")
     rest = [n for n in present if n not in roles and n not in mapping.columns and n != time_column]
+    double = [known.column for quantity, known in quantities_of(network).items()
+              if quantity in taken and known.column in rest]  # fmt: skip
+    if double:
+        notes.append(f"not used, because the mapping takes other columns for them: {', '.join(double)}")
+    rest = [n for n in rest if n not in double]
     _report_unused(rest, lacking, problems, notes)
     return roles
 

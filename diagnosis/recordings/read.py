@@ -37,6 +37,7 @@ HOT_AIR = 50.0  # degC on average, from which ambient air is more likely in anot
 LEAST_USABLE = 0.1  # share of the rows
 USUAL_SHARE = 0.99  # of the rows of an input,
 FAR_TIMES = 10.0  # which others exceed so many times that they may be codes of a logger
+CODES, CODE_TIMES = (999.0, 9999.0, 99999.0, 32767.0, 32768.0, 65535.0), 1.5  # of loggers; beyond what is usual
 ByRole: TypeAlias = tuple[tuple[Recording, ...], tuple[Recording, ...], tuple[Recording, ...]]
 
 
@@ -292,7 +293,7 @@ def _note_far_rows(found: RecordedRows, network: RecordedMachine) -> None:
     for name, given in network.inputs.items():
         size = np.abs(found.values[name])
         usual = float(np.nanquantile(size, USUAL_SHARE, method="lower")) if np.isfinite(size).any() else np.nan
-        far = size > FAR_TIMES * usual
+        far = (size > FAR_TIMES * usual) | (np.isin(size, CODES) & (size > CODE_TIMES * usual))
         if usual > 0.0 and far.any():
             first = int(np.flatnonzero(far)[0])
             found.notes.append(

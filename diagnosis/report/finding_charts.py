@@ -74,8 +74,8 @@ def _names(diagnosis: Diagnosis) -> list[tuple[str, str, float]]:
     for one in diagnosis.ranking:
         for law in dict.fromkeys(one.laws):
             sums[law] = sums.get(law, 0.0) + one.probability
-    for law, finding in reported.items():
-        sums[law] = max(sums.get(law, 0.0), finding.probability)
+    for law, finding in reported.items():  # of a nearest name less is stated than was calculated
+        sums[law] = finding.probability if finding.acts_like else max(sums.get(law, 0.0), finding.probability)
     # Names that explain the data only together with a finding.
     companions = {rival.law for one in diagnosis.findings for rival in one.confusable_with if not rival.instead}
     idle = set() if diagnosis.further_helps else companions

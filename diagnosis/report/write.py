@@ -28,15 +28,14 @@ def names_of_files(recordings: Sequence[Recording]) -> tuple[str, ...]:
     return REPORT, NUMBERS, CORRECTION, ALONE, POSTERIOR, *(f"{recording.name}.csv" for recording in recordings)
 
 
-def left_from_earlier(folder: Path, recordings: Sequence[Recording]) -> list[Path]:
-    """Predictions of recordings that an earlier diagnosis wrote into a folder and this one does not replace."""
+def written_earlier(folder: Path) -> frozenset[str]:
+    """Names of the files that an earlier diagnosis wrote into a folder."""
     try:
         inputs = json.loads((folder / NUMBERS).read_text(encoding="utf-8"))["inputs"]
-        names = [*inputs["recordings"], *inputs["held_out"]]
+        names = [f"{name}.csv" for name in (*inputs["recordings"], *inputs["held_out"])]
     except (OSError, ValueError, LookupError, TypeError):
-        return []  # no diagnosis, or not one of ours
-    now = names_of_files(recordings)
-    return [folder / f"{name}.csv" for name in names if f"{name}.csv" not in now and (folder / f"{name}.csv").is_file()]
+        return frozenset()  # no diagnosis, or not one of ours
+    return frozenset({*names_of_files(()), *names})
 
 
 def correction_of(diagnosis: Diagnosis, gearbox: Gearbox) -> Correction:

@@ -28,7 +28,7 @@ from models.terms.term import Term
 
 # In sentences about a change, whose strength shows which.
 EITHER = (("smaller or greater", "smaller", "greater"), ("more or less", "less", "more"))
-UNIT_SLIP = 8.0  # times its value or less that a parameter rarely is; units differ by 9.5, 60, 1000
+UNIT_SLIP = 6.0  # times its value or less that a factor of a loss rarely is; units differ by 9.5, 60, 1000
 FORM_ERROR = 0.1  # of a strength and its heat: laws of the literature are hardly known better
 SLOPE_STEP = 1e-4  # of a prior standard deviation
 BAND_SD = 2.0  # 95 %
@@ -56,13 +56,14 @@ def finding_of(
     found = {name: value for name, (value, _) in values.items()}
     units = {p.name: p.unit for p in (setup.nominal.parameters if term is None else term.parameters)}
     prefix = "" if term is None else f"{term.label}_"
+    of_heats = {symbol.name for source in setup.nominal.sources for symbol in source.heat.free_symbols}
     return Finding(
         mechanism=effect.mechanism,
         family=effect.family,
         place=effect.place,
         node=node_in(setup.nominal, effect),
         kind="parameter" if term is None else "sensor" if term.of_measurement else term.kind,
-        says=_says(answer, found, {parameter.name: parameter.start for parameter in setup.nominal.parameters}),
+        says=_says(answer, found, {p.name: p.start for p in setup.nominal.parameters if p.name in of_heats}),
         reference=term.mechanism.reference if isinstance(term, Placed) else "",
         equation=_equation(effect, found),
         probability=answer.probability,
@@ -87,7 +88,7 @@ def finding_of(
 
 
 def _says(answer: Answer, found: Mapping[str, float], stated: Mapping[str, float]) -> str:
-    """A sentence; `found` and `stated` are values of parameters by name."""
+    """A sentence; `found` are values of parameters by name, `stated` those of the definition that heats depend on."""
     effect = answer.effect
     if effect.is_open:
         says = f"A heat at {effect.place.replace('_', ' ')} that is like no law of the catalogue."

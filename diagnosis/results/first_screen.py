@@ -140,9 +140,9 @@ def _where(d: Diagnosis) -> tuple[str, ...]:
     if not d.location:
         return ()
     if d.verdict in NO_CLAIM:
-        told = [f"{' and '.join(place.nodes)} ({share(place.probability)})"
-                for place in d.location[:MOST_NEAREST] if place.probability >= NEAREST]  # fmt: skip
-        return (f"If something is missing all the same, most probably in {', '.join(told)}",) if told else ()
+        likely = [place for place in d.location[:MOST_NEAREST] if place.probability >= NEAREST]
+        told = ", ".join(f"{' and '.join(place.nodes)} ({share(place.probability)})" for place in likely)
+        return (f"If something is missing all the same, most probably in {told}",) if told else ()
     told = ", ".join(f"{' and '.join(place.nodes)} ({share(place.probability)})" for place in d.places)
     place = next((one for one in d.places if one.heat_max_W), None)
     if place is None:

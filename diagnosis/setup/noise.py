@@ -65,8 +65,9 @@ def channel_noise(recordings: Sequence[Recording], channels: Sequence[str]) -> M
         if stated and rows < FEWEST_ROWS:
             result[name] = max(stated)
         else:
-            seen = [white_sd(c.values[piece]) for r in recordings for c in r.channels if c.name == name
-                    for piece in r.segments]  # fmt: skip
+            # Of every recording by all its pieces: a few rows show a noise of any size.
+            seen = [white_sd(*(c.values[piece] for piece in r.segments))
+                    for r in recordings for c in r.channels if c.name == name]  # fmt: skip
             result[name] = max(max(seen, default=0.0), LOWEST_SD_K)
             if slow_rows(recordings):
                 result[name] = min(result[name], SLOW_SD_K)

@@ -33,6 +33,12 @@ def test_given_numbers_are_as_exact_as_said_and_the_others_are_typical(
     assert (pump.parameter[0].value, pump.parameter[0].stderr) == (20.0, 5.0)
 
 
+def test_the_file_is_of_one_gearbox(file: Path, run_cli: RunCli, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run_cli("add", file, "pump_heat", "--set", "strength=20") == 0
+    assert run_cli("add", file, *FAN, "--gearbox", "conveyor") == 2
+    assert "was made for 'FZG" in capsys.readouterr().err
+
+
 def test_a_simulation_has_it(file: Path, tmp_path: Path, run_cli: RunCli) -> None:
     cycle = tmp_path / "cycle.csv"
     pd.DataFrame({"time_s": np.arange(0.0, 14400.0, 60.0), "speed_rpm": 2500.0, "torque_Nm": 94.0}).to_csv(cycle)
@@ -53,6 +59,7 @@ def test_a_simulation_has_it(file: Path, tmp_path: Path, run_cli: RunCli) -> Non
     (("fan_thermostat", "--set", "strength=nan"), "strength = nan is outside"),
     (("fan_thermostat", "--set", "strength=1:-2"), "the standard error is -2; it is 0 or more"),
     (("fan_thermostat", "--set", "strength"), "is not NAME=VALUE"),
+    (("fan_thermostat", "--set", "strength=1", "--set", "strength=2"), "gives a number twice"),
     (("bearing_damage", "--set", "strength=1"), "may be at bearing_1, bearing_2, bearing_3, bearing_4; say where"),
     (("bearing_damage", "--place", "bearing_9", "--set", "strength=1"), "cannot be at 'bearing_9'; did you mean"),
     (("sensor_bias", "--set", "strength=1"), "is a fault of an instrument"),

@@ -135,6 +135,17 @@ def test_a_recording_is_never_replaced_by_its_prediction(tmp_path: Path) -> None
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
 
 
+def test_a_file_that_no_diagnosis_wrote_is_never_replaced(tmp_path: Path) -> None:
+    time = np.arange(0.0, 3600.0, 10.0)
+    pd.DataFrame({"time_s": time, "speed_rpm": 1500.0, "torque_Nm": 50.0, "T_ambient_degC": 20.0,
+                  "T_oil_degC": 30.0 + time / 600.0}).to_csv(tmp_path / "run.csv", index=False)  # fmt: skip
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "run.csv").write_text("mine")
+    done = CliRunner().invoke(diagnose, [str(tmp_path / "run.csv"), "--output", str(tmp_path / "out")])
+    assert isinstance(done.exception, InputError) and "exists, and no diagnosis wrote it" in str(done.exception)
+    assert (tmp_path / "out" / "run.csv").read_text() == "mine"
+
+
 def test_what_is_known_reaches_the_diagnosis(fzg: Gearbox, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     known = Correction.of(fzg, calibration=[Estimate(name="h_air", value=1.1, stderr=0.1)])
     write_correction(known, tmp_path / "known.toml")

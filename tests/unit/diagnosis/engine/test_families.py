@@ -23,7 +23,7 @@ from models.assembly.gearbox import Gearbox
 from models.base.types import Array
 from models.mechanisms import CATALOGUE
 from models.network.laws import symbol
-from tests.unit.diagnosis.inference_example import recording_of
+from tests.unit.diagnosis.inference_example import recorded, recording_of
 
 NODES = ("oil", "housing_lower", "housing_upper", "bearing_1", "pinion")
 CHANGE, SINCE_S = -0.25, 9_100.0
@@ -224,3 +224,17 @@ def test_prior_of_families(candidates: tuple[Hypothesis, ...]) -> None:
         if h.how == "always":
             of_name[h.name] += p
     assert np.ptp(list(of_name.values())) < 1e-12
+
+
+def test_a_reading_that_stands_still_is_a_candidate_in_those_times_only(fzg: Gearbox) -> None:
+    made = [recorded(fzg, name, hours=hours, seed=seed) for seed, (name, hours) in enumerate((("a", 3.0), ("b", 2.0)))]
+    values = made[0].channels[0].values
+    still = np.where(np.abs(made[0].time - 5000.0) <= 2000.0, values[300], values)
+    first = replace(made[0], channels=(replace(made[0].channels[0], values=still), *made[0].channels[1:]))
+    setup, experiment = prepare_experiment(fzg, [first, made[1]], [made[1]])
+    (found,) = [one for one in candidates_of(setup, experiment, CATALOGUE) if one.law == "sensor_stuck"]
+    assert (found.name, found.place) == ("sensor_stuck_for_a_while", made[0].channels[0].name)
+    assert found.term is not None
+    acts = sp.lambdify([symbol("time"), *(symbol(p.name) for p in found.term.parameters)], found.term.expression)
+    assert [float(acts(at, 1.0, 0.0)) for at in (2700.0, 3100.0, 6900.0, 7300.0)] == [0.0, 1.0, 1.0, 0.0]
+    assert acts(3600.0, 1.0, experiment.starts_at["b"]) == 0.0

@@ -57,9 +57,7 @@ def test_sound_sensors_are_not_set_apart() -> None:
 def with_broken(fzg: Gearbox, broken: Callable[[Array, Array], Array]) -> Experiment:
     """Five hours with a bearing's thermometer that reads something of its time and values; noise of 0.1 K."""
     made = recorded(fzg, "made", hours=5.0, nodes=("oil", "housing_lower", "housing_upper", "bearing_1", "pinion"))
-    channels = [
-        replace(c, values=broken(made.time, c.values)) if c.name == "bearing_1" else c for c in made.channels
-    ]
+    channels = [replace(c, values=broken(made.time, c.values)) if c.name == "bearing_1" else c for c in made.channels]
     return prepare_experiment(fzg, [replace(made, channels=tuple(channels))], [made])[1]
 
 
