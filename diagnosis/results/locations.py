@@ -26,7 +26,7 @@ GOOD_ENOUGH = 0.9  # of the intervals told rightly
 def locations_of(setup: InferenceSetup, posterior: Posterior) -> tuple[Location, ...]:
     """Places by probability, over everything that was judged; the first that acts there as the best fit has it.
 
-    Where nothing was detected: if something is missing all the same. None where the recordings speak against that.
+    Where nothing was detected: if something is missing all the same, and no place if the evidence is against that.
     """
     if posterior.log_e <= 0.0:
         return ()

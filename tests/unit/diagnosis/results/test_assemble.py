@@ -413,19 +413,6 @@ def test_a_sensor_fault(assembled: Assemble, prepared: Prepared, windage: Judged
     assert assembled(posterior_of(plain, judged), [tied]).verdict == "missing_physics"  # no verdict on the sensor
 
 
-def test_switch_temperatures_are_on_and_off(prepared: Prepared) -> None:
-    from diagnosis.results.findings import switching_of
-
-    setup, _, plain = prepared
-    for name, on, off in (("cooler_thermostat", 73.0, 67.0), ("heater_thermostat", 67.0, 73.0)):
-        network = plain.experiment.machine.model.network
-        term = next(p for p in CATALOGUE[name].placed(network, setup.scale, setup.channels))
-        values = {p.name: (p.start, 0.0) for p in term.parameters}
-        values |= {f"{term.label}_set_point": (70.0, 1.0), f"{term.label}_band": (6.0, 1.0)}
-        found = switching_of(values, hypothesis_of(term))
-        assert found is not None and (found.on_degC, found.off_degC) == (on, off), name
-
-
 def test_correction_keeps_grades(claimed: Diagnosis, fzg: Gearbox, tmp_path: Any) -> None:
     likely = replace(claimed, findings=tuple(replace(f, grade="likely") for f in claimed.findings))
     correction = correction_of(likely, fzg)
