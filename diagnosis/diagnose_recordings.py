@@ -164,5 +164,8 @@ def _refuse_unusable(recordings: Sequence[Recording]) -> None:
 
 def _refuse_too_short(recordings: Sequence[Recording], pieces: Sequence[Piece]) -> None:
     if not {r.name for r in recordings} & {piece.recording for piece in pieces}:
-        rows = ", ".join(f"{r.name}: {len(r.time)} rows" for r in recordings)
-        raise InputError(f"no piece of the recordings is long enough to simulate ({rows}); a few minutes are needed")
+        found = ", ".join(f"{r.path}: {len(r.time)} rows in {r.time[-1] - r.time[0]:.4g} s" for r in recordings)
+        raise InputError(
+            f"no piece of the recordings is long enough to simulate ({found}); a few minutes without gaps are needed. "
+            "If the times are hours or minutes, give the unit of [time] in a mapping file"
+        )

@@ -156,6 +156,8 @@ def _numbers(cells: pd.Series, name: str, decimal: str, problems: Problems) -> A
             'with decimal commas, columns are separated by semicolons: csv = { separator = ";", decimal = "," } in a '
             "mapping file"
         )
+    if decimal == "," and re.fullmatch(r"[+-]?\d+\.\d+", cell.strip()):
+        advice = 'its decimal sign is a point: leave out decimal = ","'
     if THOUSANDS.fullmatch(cell.strip()):
         advice = "write numbers without thousands separators"
     problems.add(

@@ -29,6 +29,7 @@ _ISO = re.compile(
     rf"{_DATE}(?:[T ]\d{{2}}:\d{{2}}(?::\d{{2}}(?:[.,]\d{{1,9}})?)?)?(?P<zone>Z|[+-]\d{{2}}(?::?\d{{2}})?)?"
 )
 SHORTEST_STEP = 1e-3  # s; no temperature is recorded faster, so smaller steps are another unit
+COARSE = 0.2  # of the steps: equal times are no slips any more
 LONGEST_STEP = 1800.0  # s; a gearbox warms within an hour or two
 LONGEST_TIME = 1e11  # s since 1970 or since the start: 3000 years
 LAST_YEAR = 2200  # later is the date of a clock that was not set
@@ -321,10 +322,17 @@ def check_time(values: pd.Series, seconds: Array, clock: Clock, problems: Proble
         row = int(same[0])
         problems.add(
             f"{name} is {values.iloc[row]} at row {rows[row]} and again at row {rows[row + 1]} ({len(same)} times in "
-            f"all); it must increase from row to row: remove the repeated rows{hint}"
+            f"all); it must increase from row to row: {_repeated(len(same), len(steps), hint)}"
         )
     if not len(back) and not len(same) and len(steps):
         _check_time_unit(name, seconds, float(np.median(steps)), clock, problems)
+
+
+def _repeated(times: int, of: int, hint: str) -> str:
+    """Return what to do about equal times."""
+    if times > COARSE * of:
+        return "the times are coarser than the rows lie apart; write them with more digits"
+    return f"remove the repeated rows{hint}"
 
 
 def _check_time_unit(name: str, seconds: Array, step: float, clock: Clock, problems: Problems) -> None:
