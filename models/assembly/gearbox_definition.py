@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -92,24 +92,27 @@ class Definition(Section):
         """Return the oil as the loss formulas use it."""
         return lubricant(self.oil)
 
+    @model_validator(mode="before")
+    @classmethod
+    def _is_of_one_stage(cls, values: Any) -> Any:
+        """Before keys of a second stage are asked for."""
+        for key, most in (("stage", 1), ("shaft", 2)):
+            entries = values.get(key) if isinstance(values, Mapping) else None
+            if isinstance(entries, list | tuple) and len(entries) > most:
+                raise ValueError(
+                    f"{key}: has {len(entries)} entries; more than {most} is not supported yet. "
+                    "Describe such a machine without geometry: python -m builder new FILE --like reducer"
+                )
+        return values
+
     @model_validator(mode="after")
     def _tables_agree(self) -> Self:
-        faults = [
-            *_unsupported(self),
-            *_duplicate_names(self),
-            *_unknown_names(self),
-        ]
+        faults = [*_duplicate_names(self), *_unknown_names(self)]
         # What follows reads the tables by their names.
         faults = faults or [*_load_shares(self), *_shafts_in_gears(self), *_oil_level(self)]
         if faults:
             raise ValueError("\n".join(faults))
         return self
-
-
-def _unsupported(definition: Definition) -> Iterator[str]:
-    for key, entries, most in (("stage", definition.stage, 1), ("shaft", definition.shaft, 2)):
-        if len(entries) > most:
-            yield f"{key}: has {len(entries)} entries; more than {most} is not supported yet"
 
 
 def _part_names(definition: Definition) -> list[str]:

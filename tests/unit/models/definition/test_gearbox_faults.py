@@ -145,7 +145,11 @@ FAULTS = [
     ("value = 19.0, sd", "value = 250.0, sd", "oil.level_below_axis_mm: 250 mm height_m is 0.215; -215 to 215 mm"),
     ("load_share = { value = 0.5,", "load_share = { value = 0.4,", "bearing: load_share on 'shaft_1' sum to 0.8"),
     ("[[bearing]]", THIRD_SHAFT, "shaft: has 3 entries; more than 2 is not supported yet"),
-    ("[[bearing]]", '[[stage]]\ndriver = "shaft_1"\n[[bearing]]', "stage #2.driven is missing"),
+    (
+        "[[bearing]]",
+        '[[stage]]\ndriver = "shaft_1"\n[[bearing]]',
+        "stage: has 2 entries; more than 1 is not supported yet",
+    ),
 ]
 
 
