@@ -176,31 +176,18 @@ class MeshContact:
         ArithmeticError
             If a film temperature is not found (never seen over the design space).
         """
-        u_1, u_2 = omega_1[:, None] * self.rho_1, (omega_1 / self.u)[:, None] * self.rho_2
-        V_s, V_e = np.abs(u_1 - u_2), 0.5 * (u_1 + u_2)
-        F = (torque / self.r_b1)[:, None] * self.share
-        b_H, p_H = ehl.hertz_line(F / self.b, self.R, self.E_red)
-        p_mean = 0.25 * np.pi * p_H
-
-        # The bulk temperatures are known, so the surfaces enter the contact with them (Arana eqs. 15-18, M = 0);
-        # the ratio of the surface speeds, hence T_in, varies along the path but not with speed.
-        weight_1 = self.rho_1 / (self.rho_1 + self.rho_2 / self.u)
-        T_in = T_1[:, None] * weight_1 + T_2[:, None] * (1.0 - weight_1)
-        eta_in, k_oil = self.oil.dynamic_viscosity(T_in), self.oil.conductivity(T_in)
-        h_isothermal = self._film(F, eta_in, self.oil.film_pressure_viscosity_coefficient(T_in), V_e)
-        L = ehl.thermal_loading(eta=eta_in, beta=self.oil.thermoviscosity(T_in), V_e=V_e, k_oil=k_oil)
-        phi_T = self._reduction(p_H, L, V_s / V_e)
-        h = phi_T * h_isothermal
+        inlet = self._inlet(omega_1=omega_1, torque=torque, T_1=T_1, T_2=T_2)
+        p_mean, T_in, V_s, h = 0.25 * np.pi * inlet.p_H, inlet.T_in, inlet.V_s, inlet.h
         xi = self._asperity_share(h)
 
         # Film temperature = inlet + rise per heat flux * mu * p * V_s (Arana eqs. 26-28).
-        flash = ehl.heat_partition(u_1, u_2) * ehl.band_source_resistance(
-            b_H=b_H, u=u_1, k=self.k_steel, chi=self.chi_steel
+        flash = ehl.heat_partition(inlet.u_1, inlet.u_2) * ehl.band_source_resistance(
+            b_H=inlet.b_H, u=inlet.u_1, k=self.k_steel, chi=self.chi_steel
         )
-        rise = (flash + h / (8.0 * k_oil)) * p_mean * V_s
+        rise = (flash + h / (8.0 * inlet.k_oil)) * p_mean * V_s
         limit = self.oil.limiting_shear_coefficient
 
-        pressures = np.stack((p_mean, p_H))
+        pressures = np.stack((p_mean, inlet.p_H))
 
         def friction(T_film: Array) -> Array:
             # Viscosity at the mean pressure, the local coefficient at the Hertz pressure (Bair, Winer 1989).
@@ -220,8 +207,8 @@ class MeshContact:
         T_film = decreasing_root(lambda T: T_in + rise * friction(T) - T, T_in, highest, f_tol=FILM_TEMPERATURE_TOL)
         mu = friction(T_film)
         return ContactState(
-            F=F, p_H=p_H, V_s=V_s, V_r=2.0 * V_e, h=h, phi_T=phi_T, asperity_share=xi, T_in=T_in, T_film=T_film,
-            residual=T_in + rise * mu - T_film, mu=mu,
+            F=inlet.F, p_H=inlet.p_H, V_s=V_s, V_r=inlet.V_r, h=h, phi_T=inlet.phi_T, asperity_share=xi, T_in=T_in,
+            T_film=T_film, residual=T_in + rise * mu - T_film, mu=mu,
         )  # fmt: skip
 
     def loss(self, *, omega_1: Array, torque: Array, T_1: Array, T_2: Array) -> tuple[Array, Array]:
@@ -232,9 +219,9 @@ class MeshContact:
         sliding, rolling : Array, shape (N,)
             [W]
         """
-        state = self.solve(omega_1=omega_1, torque=torque, T_1=T_1, T_2=T_2)
-        mu = state.mu
-        if self.friction == "schlenk":
+        state: Inlet | ContactState
+        if self.friction == "schlenk":  # needs no film temperature
+            state = self._inlet(omega_1=omega_1, torque=torque, T_1=T_1, T_2=T_2)
             # ISO/TR 14179-2 takes the oil sump's viscosity; the network knows the nearer one of the contact's inlet.
             mu = friction_schlenk(
                 F_bt_per_b=torque / self.r_b1 / self.b,
@@ -244,9 +231,29 @@ class MeshContact:
                 Ra=0.5 * (self.Ra[0] + self.Ra[1]),
                 X_L=self.oil.schlenk_X_L,
             )[:, None]
+        else:
+            state = self.solve(omega_1=omega_1, torque=torque, T_1=T_1, T_2=T_2)
+            mu = state.mu
         sliding = (mu * state.F * state.V_s) @ self.weight
         rolling = rolling_loss_anderson(h=state.h, v_r=state.V_r, b=self.b, constant=self.rolling_constant)
         return np.asarray(sliding), np.asarray(rolling @ self.weight)
+
+    def _inlet(self, *, omega_1: Array, torque: Array, T_1: Array, T_2: Array) -> Inlet:
+        """Loads, speeds and film at every contact point, which follow from the inlet alone."""
+        u_1, u_2 = omega_1[:, None] * self.rho_1, (omega_1 / self.u)[:, None] * self.rho_2
+        V_s, V_e = np.abs(u_1 - u_2), 0.5 * (u_1 + u_2)
+        F = (torque / self.r_b1)[:, None] * self.share
+        b_H, p_H = ehl.hertz_line(F / self.b, self.R, self.E_red)
+        # The bulk temperatures are known, so the surfaces enter the contact with them (Arana eqs. 15-18, M = 0);
+        # the ratio of the surface speeds, hence T_in, varies along the path but not with speed.
+        weight_1 = self.rho_1 / (self.rho_1 + self.rho_2 / self.u)
+        T_in = T_1[:, None] * weight_1 + T_2[:, None] * (1.0 - weight_1)
+        eta_in, k_oil = self.oil.dynamic_viscosity(T_in), self.oil.conductivity(T_in)
+        L = ehl.thermal_loading(eta=eta_in, beta=self.oil.thermoviscosity(T_in), V_e=V_e, k_oil=k_oil)
+        phi_T = self._reduction(p_H, L, V_s / V_e)
+        h = phi_T * self._film(F, eta_in, self.oil.film_pressure_viscosity_coefficient(T_in), V_e)
+        return Inlet(u_1=u_1, u_2=u_2, F=F, b_H=b_H, p_H=p_H, V_s=V_s, V_r=2.0 * V_e, h=h, phi_T=phi_T, T_in=T_in,
+                     k_oil=k_oil)  # fmt: skip
 
     def _film(self, F: Array, eta: Array, alpha: Array, V_e: Array) -> Array:
         if self.film == "hamrock_dowson":
@@ -276,6 +283,35 @@ class MeshContact:
 
 RQ_OVER_RA = 1.25  # of heights in a normal distribution: sqrt(pi / 2) = 1.253
 RZ_OVER_RA = 6.0  # customary for ground flanks; the paper gives Ra only
+
+
+@dataclass(frozen=True, kw_only=True)
+class Inlet:
+    """What the contact points are before their friction is known; every field of shape (N, n_points).
+
+    Attributes
+    ----------
+    u_1, u_2, V_s, V_r : Array
+        Surface speeds, sliding speed and sum, [m/s]
+    F, b_H, p_H : Array
+        Normal force [N], half width [m] and pressure [Pa] of Hertz
+    h, phi_T : Array
+        Film thickness [m], and its thermal reduction [-]
+    T_in, k_oil : Array
+        Temperature [degC] and conductivity [W/(m K)] of the oil at the inlet
+    """
+
+    u_1: Array
+    u_2: Array
+    F: Array
+    b_H: Array
+    p_H: Array
+    V_s: Array
+    V_r: Array
+    h: Array
+    phi_T: Array
+    T_in: Array
+    k_oil: Array
 
 
 @dataclass(frozen=True, kw_only=True)
