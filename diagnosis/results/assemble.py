@@ -129,10 +129,11 @@ def assemble(
     )
     if contradicted:
         answers = [withdraw_claim(answer, posterior.rule) for answer in answers]
-    findings = _distinct([
+    reported = _distinct([
         (answer, finding_of(answer, answer.best.fit or final, setup, posterior, catalogue, train))
         for answer in answers
     ])  # fmt: skip
+    findings = tuple(finding for _, finding in reported)
     told = {name for finding in findings for name in (finding.mechanism, *finding.tie_set)}
     told |= {rival.mechanism for finding in findings for rival in finding.confusable_with}
     if posterior.detected:  # nobody is silent about a name that looks like what is there
@@ -142,7 +143,7 @@ def assemble(
     spoiled = spoiled_in(train_fits, holdout, baselines=[r.name for r in healthy],
                          least_K=settings.matters_K + setup.noise_K)  # fmt: skip
     unfit = bool(spoiled) or train_fits.calibrated - train_fits.before > setup.noise_K
-    verdict = verdict_of(posterior, answers, unseen, unfit=unfit)
+    verdict = verdict_of(posterior, [answer for answer, _ in reported], unseen, unfit=unfit)
     location = locations_of(setup, posterior) if posterior.detected or verdict in NO_CLAIM else ()
     inputs = setup.gearbox.network().inputs
     most_probable = best if others is None else others.posterior.nothing
@@ -265,13 +266,13 @@ def _terms(best: Judged | None, final: Fit) -> tuple[Term, ...]:
     return tuple(replace(term, parameters=tuple(map(as_found, term.parameters))) for term in terms)
 
 
-def _distinct(found: Sequence[tuple[Answer, Finding]]) -> tuple[Finding, ...]:
+def _distinct(found: Sequence[tuple[Answer, Finding]]) -> list[tuple[Answer, Finding]]:
     """Without names that only act like something where another one acts on the same thing with more heat."""
     kept: list[Answer] = []
     for answer, _ in sorted(found, key=lambda one: (one[0].acts_like, -abs(one[1].heat_mean_W))):
         if not (answer.acts_like and any(act_on_the_same(answer.effect, one.effect) for one in kept)):
             kept.append(answer)
-    return tuple(finding for answer, finding in found if any(answer is one for one in kept))
+    return [(answer, finding) for answer, finding in found if any(answer is one for one in kept)]
 
 
 # ---------------------------------------------------------------------- verdict

@@ -311,7 +311,8 @@ def test_of_two_that_act_like_something_on_one_thing_the_larger_is_reported(
 
     def reported(*found: tuple[Answer, float]) -> list[float]:
         (finding,) = claimed.findings
-        return [one.heat_mean_W for one in _distinct([(a, replace(finding, heat_mean_W=heat)) for a, heat in found])]
+        pairs = [(a, replace(finding, heat_mean_W=heat)) for a, heat in found]
+        return [one.heat_mean_W for _, one in _distinct(pairs)]
 
     windy, pumped, foggy = (answer(name, place) for name, place in (
         ("windage", "oil"), ("pump_heat", "oil"), ("hot_neighbour", "housing_lower")))  # fmt: skip
