@@ -287,7 +287,7 @@ RZ_OVER_RA = 6.0  # customary for ground flanks; the paper gives Ra only
 
 @dataclass(frozen=True, kw_only=True)
 class Inlet:
-    """State of the contact points as far as it is known without friction; every field of shape (N, n_points).
+    """State of the contact points without their friction; every field of shape (N, n_points).
 
     Attributes
     ----------
