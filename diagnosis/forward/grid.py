@@ -297,7 +297,7 @@ def white_sd(*pieces: Array) -> float:
     >>> bool(abs(white_sd(np.linspace(0, 50, 4000) + rng.normal(0, 0.2, 4000)) - 0.2) < 0.01)
     True
     """
-    second = np.concatenate([np.diff(values[np.isfinite(values)], 2) for values in pieces])
+    second = np.concatenate([np.zeros(0), *(np.diff(values[np.isfinite(values)], 2) for values in pieces)])
     if not second.size:
         return 0.0
     return float(1.4826 * np.median(np.abs(second - np.median(second))) / np.sqrt(6.0))

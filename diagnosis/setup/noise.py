@@ -65,10 +65,10 @@ def channel_noise(recordings: Sequence[Recording], channels: Sequence[str]) -> M
         if stated and rows < FEWEST_ROWS:
             result[name] = max(stated)
         else:
-            # Of every recording by all its pieces: a few rows show a noise of any size.
-            seen = [white_sd(*(c.values[piece] for piece in r.segments))
-                    for r in recordings for c in r.channels if c.name == name]  # fmt: skip
-            result[name] = max(max(seen, default=0.0), LOWEST_SD_K)
+            # Of the noisiest long piece, or of all together: a few rows show a noise of any size.
+            pieces = [c.values[rows] for r in recordings for c in r.channels if c.name == name for rows in r.segments]
+            long = [white_sd(values) for values in pieces if len(values) >= FEWEST_ROWS]
+            result[name] = max(max(long) if long else white_sd(*pieces), LOWEST_SD_K)
             if slow_rows(recordings):
                 result[name] = min(result[name], SLOW_SD_K)
     return result

@@ -9,9 +9,10 @@ import pytest
 
 from diagnosis.forward.grid import Piece
 from diagnosis.forward.network_on_grid import NetworkOnGrid
-from diagnosis.setup.noise import display_noise, loss_noise, noise_of
+from diagnosis.setup.noise import channel_noise, display_noise, loss_noise, noise_of
+from models.assembly.gearbox import Gearbox
 from models.base.types import Array
-from tests.unit.diagnosis.inference_example import CHANNELS, recording_of
+from tests.unit.diagnosis.inference_example import CHANNELS, recorded, recording_of
 
 
 def test_loss_noise_has_a_constant_and_a_relative_part(ride: dict[str, Array]) -> None:
@@ -44,3 +45,11 @@ def test_a_display_is_off_by_up_to_half_its_step(ride: dict[str, Array]) -> None
     for every in ([tested], [tested, recording], [recording, tested]):  # one whose step is unknown is no finer one
         found = display_noise(every, ("oil", "bearing_1", "P_loss"))
         np.testing.assert_allclose(found, [0.5 / np.sqrt(12.0), 0.0, 0.0])
+
+
+def test_noise_of_many_short_pieces_is_that_of_all(fzg: Gearbox) -> None:
+    made = recorded(fzg, "made", hours=5.0)
+    pieces = tuple(slice(first, first + 5) for first in range(0, 1800, 6))
+    short = replace(made, segments=pieces)
+    assert channel_noise([short], ["oil"])["oil"] == pytest.approx(0.1, rel=0.1)
+    assert channel_noise([replace(made, segments=(*pieces[:10], slice(60, 1800)))], ["oil"])["oil"] < 0.12
