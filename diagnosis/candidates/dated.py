@@ -20,7 +20,6 @@ from models.base.types import Array
 from models.formulas.extremes import Max, Min
 from models.mechanisms import Placed
 from models.mechanisms.forms import EDGE_S, steps
-from models.mechanisms.mechanism import STRENGTH
 from models.network.laws import Parameter, symbol
 
 HOUR_S = 3600.0
@@ -119,6 +118,23 @@ def for_a_while(axis: Axis) -> DatedCourse:
     )  # fmt: skip
 
 
+def in_times(spans: Sequence[tuple[float, float]]) -> DatedCourse:
+    """In given times alone.
+
+    Parameters
+    ----------
+    spans : sequence of (float, float)
+        Beginnings and ends on the time axis, [s]
+    """
+    times = ", ".join(f"{first / HOUR_S:.2f} to {last / HOUR_S:.2f} h" for first, last in spans)
+    acts = (sp.Piecewise((1, first <= NOW), (0, True)) - sp.Piecewise((1, last < NOW), (0, True))
+            for first, last in spans)  # fmt: skip
+    return DatedCourse(
+        ending=WHILE, how="from_date", sentence=f"From {times} after the first row of the first recording",
+        parameters=(), variants=np.empty((1, 0)), law=sp.Add(*acts),
+    )  # fmt: skip
+
+
 def over_hours(axis: Axis) -> DatedCourse:
     """Slowly over the hours since the first row of the first recording: on and on, or until it has settled."""
     names = ("linear", "settling", "fading")
@@ -179,7 +195,7 @@ def changing(placed: Placed, course: DatedCourse, axis: Axis, *, sd: float | Non
     rows = [[1.0, *middle, *variant, clock.start] for variant in course.variants.tolist()]
     return Hypothesis(name=name, place=placed.place, family=placed.family, term=term, law=law, variants=np.array(rows),
                       how=course.how, ending=course.ending, clock=clock.name,
-                      date=f"{label}_since" if course.how == "from_date" else None)  # fmt: skip
+                      date=next((p.name for p in added if p.name == f"{label}_since"), None))  # fmt: skip
 
 
 def carried_on(placed: Placed, axis: Axis) -> Hypothesis:
@@ -236,32 +252,6 @@ def _renamed(placed: Placed, label: str) -> Placed:
             replace(s.with_laws(lambda law: law.xreplace(given)), name=names[s.name]) for s in placed.states
         ),
     )  # fmt: skip
-
-
-def held(placed: Placed, spans: Sequence[tuple[float, float]], axis: Axis) -> Hypothesis:
-    """A law that holds a reading, in the times in which it stands still.
-
-    Parameters
-    ----------
-    placed : Placed
-        Its strength is the share that is held
-    spans : sequence of (float, float)
-        Beginnings and ends on the time axis, [s]
-    """
-    label = f"{placed.label}_{WHILE}"
-    clock, strength = _clock(label, axis), replace(placed.strength, name=f"{label}_{STRENGTH}")
-    acts = sp.Add(*(sp.Piecewise((1, first <= NOW), (0, True)) - sp.Piecewise((1, last < NOW), (0, True))
-                    for first, last in spans))  # fmt: skip
-    times = ", ".join(f"{first / HOUR_S:.2f} to {last / HOUR_S:.2f} h" for first, last in spans)
-    says = f"The reading of {{place}} stands still: {times} after the first row of the first recording."
-    term = replace(
-        placed, label=label, parameters=(strength, clock), mechanism=replace(placed.mechanism, says=says),
-        expression=symbol(strength.name) * acts.xreplace({NOW: symbol("time") + symbol(clock.name)}),
-        written={"law": symbol(STRENGTH) * acts.xreplace({NOW: symbol("time") + symbol(START)})},
-    )  # fmt: skip
-    return Hypothesis(name=f"{placed.name}_{WHILE}", place=placed.place, family=placed.family, term=term,
-                      law=law_of(placed.name), variants=np.array([[1.0, clock.start]]), how="from_date", ending=WHILE,
-                      clock=clock.name)  # fmt: skip
 
 
 def has_clock(placed: Placed) -> bool:

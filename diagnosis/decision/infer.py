@@ -121,8 +121,7 @@ def infer(
         session_s=chosen.session_s,
         scaled=tuple(
             with_scaled_error(calibration, found, factor, first, settings.false_alarm_rate, least)
-            for factor in SCALED
-            if any(calibration.near.error.amplitudes(one).any() for one in calibration.classes)
+            for factor in (SCALED if calibration.assumes_error else ())
         ),
         repeating=repeating_of(first, error_class),
         expected=expected_of(first, chosen.error_class, settings),

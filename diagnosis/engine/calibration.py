@@ -198,6 +198,11 @@ class Calibration:
         """
         return error_classes() if self.of_others is None else (self.chosen.error_class,)
 
+    @property
+    def assumes_error(self) -> bool:
+        """True if there is any model error in the classes that candidates are judged in."""
+        return any(self.near.error.amplitudes(one).any() for one in self.classes)
+
     def in_class(self, one: ErrorClass) -> InClass:
         """The machine with model error of another class, at the same point: a start for fits in that class."""
         if one == self.chosen.error_class:

@@ -14,7 +14,7 @@ from diagnosis.candidates.dated import (
     changing,
     for_a_while,
     has_clock,
-    held,
+    in_times,
     may_change,
     over_hours,
     step,
@@ -57,15 +57,18 @@ def candidates_of(
               if one.strength.name not in known]  # fmt: skip
     factors = factors_of(network, setup.scale, setup.channels)
     axis = axis_of(experiment)
-    tested = {piece.recording for piece in experiment.pieces} - experiment.healthy
-    several = len(tested) > 1
+    several = len({piece.recording for piece in experiment.pieces} - experiment.healthy) > 1
     spans = standing_still(experiment)
     names = {law_of(name): name for name in catalogue} | {name: name for name in catalogue}
     return tuple(
         replace(one, known_as=names.get(one.name, names.get(one.law)))
         for one in (
             *(hypothesis_of(one) for one in placed if one.form != "stuck"),
-            *(held(one, spans[one.place], axis) for one in placed if one.form == "stuck" and one.place in spans),
+            *(
+                changing(one, in_times(spans[one.place]), axis)
+                for one in placed
+                if one.form == "stuck" and one.place in spans
+            ),
             *changes(factors, placed, axis, _sensor_sd(experiment)),
             *(carried_on(one, axis) for one in placed if several and has_clock(one)),
             *parameters_outside(experiment),

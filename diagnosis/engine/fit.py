@@ -153,7 +153,8 @@ class Experiment:
         if kept is not None:
             residual = kept.filter(point.residual_without_error[:, :, None])[:, 0]
             return Linear(point=point, filter=kept.filter, residual=residual, columns=kept.columns)
-        columns = self.columns(point, z)
+        with np.errstate(over="ignore", invalid="ignore"):  # what has no value is refused
+            columns = self.columns(point, z)
         if not np.isfinite(columns).all():
             raise ArithmeticError(
                 f"the laws of {self.pieces[index].recording} have no derivative with these parameters"

@@ -28,10 +28,9 @@ def calibrate_apart(experiment: Experiment, plain: Fit, start: Array | None = No
     """Calibrate the nominal machine without the channels that are at odds with all others.
 
     A channel is set apart if the machine, calibrated by the other ones, misses it by :data:`MANY` times what it misses
-    the median channel by. Asked are the worst channel of the calibration, that of its start, and those that
-    stand still for a while: a fit may have bent itself round a broken sensor until all channels are missed alike. Its
-    readings count again in the search: what is
-    wrong there is still to be found.
+    the median channel by. Suspects are the channel that the calibration misses most, the one that its start misses
+    most, and those that stand still for a while: a fit may have bent itself round a broken sensor until it misses all
+    channels alike. Its readings count again in the search: what is wrong there is still to be found.
 
     Parameters
     ----------
@@ -51,11 +50,12 @@ def calibrate_apart(experiment: Experiment, plain: Fit, start: Array | None = No
     names = [name for name in experiment.pieces[0].channels if not is_total_loss(name)]
     if len(names) < FEWEST:
         return fit, apart
-    first, still = experiment.fit(start, iterations=0), standing_still(experiment).keys()
+    first, still = experiment.fit(start, iterations=0), [name for name in standing_still(experiment) if name in names]
     for _ in range(max(int(MOST_SHARE * len(names)), 1)):
         suspects = dict.fromkeys(
             [name for one, least in ((fit, SUSPECT), (first, SUSPECT_AT_START))
-             for name in _worst(_missed_by(experiment, one, apart), least)] + [*still - {*apart}]
+             for name in _worst(_missed_by(experiment, one, apart), least)]
+            + [name for name in still if name not in apart]
         )  # fmt: skip
         for name in suspects:
             with suppress(ArithmeticError):  # no solution without it
@@ -69,18 +69,31 @@ def calibrate_apart(experiment: Experiment, plain: Fit, start: Array | None = No
 
 
 def standing_still(experiment: Experiment) -> dict[str, list[tuple[float, float]]]:
-    """Times on the axis in which a thermometer stands still while another one moves, by channel, [s]."""
+    """Times on the axis in which a channel stands still while a thermometer moves, [s].
+
+    Returns
+    -------
+    dict of channel to list of (float, float)
+        Beginning and end, at most one of every piece; none of healthy recordings
+    """
     spans: dict[str, list[tuple[float, float]]] = {}
     for piece in experiment.pieces:
         if piece.recording in experiment.healthy:
             continue
-        shown = {name: piece.measured[:, i] for i, name in enumerate(piece.channels) if not is_total_loss(name)}
+        shown = {name: piece.measured[:, i] for i, name in enumerate(piece.channels)}
+        thermometers = {name: values for name, values in shown.items() if not is_total_loss(name)}
+        hanging = stuck_rows(piece.time, thermometers, least_rows=STILL_ROWS)
+        for name in shown.keys() - thermometers.keys():
+            losing = np.where(shown[name] == 0.0, np.nan, shown[name])  # a machine that stands loses nothing
+            with_loss = stuck_rows(piece.time, thermometers | {name: losing}, least_rows=STILL_ROWS)
+            if name in with_loss:
+                hanging[name] = with_loss[name]
         start = experiment.starts_at.get(piece.recording, 0.0)
-        for name, (first, end, _, _) in stuck_rows(piece.time, shown, least_rows=STILL_ROWS).items():
-            # One that has not moved again by the last reading is held on.
+        for name, (first, end, _, _) in hanging.items():
+            # What has not moved again by the last reading stands still until the end.
             goes_on = not np.isfinite(shown[name][end:]).any()
             last = float(piece.time[-1 if goes_on else end - 1])
-            # It began to within the mean before the first of equal ones.
+            # It began within the interval of the mean before the first of the equal ones.
             spans.setdefault(name, []).append((start + float(piece.time[max(first - 1, 0)]), start + last))
     return spans
 

@@ -86,12 +86,11 @@ def match_columns(
             shown = ", ".join(other[:40] for other in sorted(present)[:20])
             problems.add(f"column {given.column} is missing; it has: {shown}")
     rest = [n for n in present if n not in roles and n not in mapping.columns and n != time_column]
-    double = [known.column for quantity, known in quantities_of(network).items()
+    replaced = [known.column for quantity, known in quantities_of(network).items()
               if quantity in taken and known.column in rest]  # fmt: skip
-    if double:
-        notes.append(f"not used, because the mapping takes other columns for them: {', '.join(double)}")
-    rest = [n for n in rest if n not in double]
-    _report_unused(rest, lacking, problems, notes)
+    if replaced:
+        notes.append(f"not used, because the mapping takes other columns for them: {', '.join(replaced)}")
+    _report_unused([n for n in rest if n not in replaced], lacking, problems, notes)
     return roles
 
 

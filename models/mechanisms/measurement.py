@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-import sympy as sp
-
-from models.mechanisms.forms import moment, plain, share, strength
+from models.mechanisms.forms import plain, share, strength
 from models.mechanisms.mechanism import Mechanism, Parameters
 from models.network.laws import LawLike, Parameter
 from models.terms.term import Form
@@ -86,9 +84,9 @@ sensor_stuck = _sensor(
     "sensor_stuck",
     "stuck",
     places="each sensor",
-    parameters=lambda scale: (share("share of the reading that is held"), moment(scale)),
-    law=lambda s: sp.Piecewise((s.strength, s.time >= s.moment), (0, True)),
-    says="From a moment on the reading of {place} no longer moves.",
+    parameters=lambda _: (share("share of the reading that is held"),),
+    law=lambda s: s.strength,
+    says="The reading of {place} stands still.",
     reference="frozen channel of a logger",
     experiment="restart the logger",
     signed=False,

@@ -9,8 +9,9 @@ import pytest
 
 from builder.workflows.known_physics import known_finding
 from diagnosis import diagnose
+from diagnosis.engine import known_switches
 from diagnosis.engine.families import candidates_of
-from diagnosis.engine.fit import Fit, calibrate
+from diagnosis.engine.fit import Experiment, Fit, calibrate
 from diagnosis.engine.known_switches import start_with_switches
 from diagnosis.engine.prepare import prepare_experiment
 from diagnosis.recordings.recording import Recording
@@ -63,6 +64,23 @@ def test_without_uncertain_switches_a_calibration_begins_in_the_middle(fzg: Gear
     known = corrected_gearbox(fzg, fan(fzg, strength=1.0))
     _, experiment = prepare_experiment(known, rides[:1], rides[1:2])
     assert start_with_switches(known, experiment, rides[:1], rides[1:2], []) is None
+
+
+def test_what_is_known_acts_in_baselines_too(
+    fzg: Gearbox, rides: list[Recording], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where its set-point is looked for no baseline is taken to be without it."""
+    known = corrected_gearbox(fzg, fan(fzg, set_point=2.7))
+    _, experiment = prepare_experiment(known, rides[:1], rides[1:2], rides[2:])
+    seen: list[frozenset[str]] = []
+
+    def looked_at(there: Experiment) -> Fit:
+        seen.append(there.healthy)
+        raise ArithmeticError
+
+    monkeypatch.setattr(known_switches, "calibrate", looked_at)
+    start_with_switches(known, experiment, rides[:1], rides[1:2], rides[2:])
+    assert experiment.healthy and seen == [frozenset()]
 
 
 def looked_for(rides: list[Recording], fzg: Gearbox, known: Correction) -> Diagnosis:

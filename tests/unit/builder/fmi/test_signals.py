@@ -79,6 +79,7 @@ def test_terms_of_a_user_get_signals(fzg: Gearbox) -> None:
         .with_input("flow", 2.5)
         .with_parameter(Parameter(name="cooling", unit="W/K", start=4.0, lower=0.0, upper=10.0))
         .with_state("memory", start=3.0)
+        .with_state("switch", start=0.0, update=lambda s: s.switch)
         .with_source("oil", lambda s: -s.cooling * s.flow * s.T_ambient, name="oil-cooler 1")
     )
     table = signal_table(network)
@@ -90,6 +91,7 @@ def test_terms_of_a_user_get_signals(fzg: Gearbox) -> None:
     assert heat.column is None
     assert heat.minimum == -math.inf
     assert table["state.memory"].causality == "local"
+    assert table["state.switch"].variability == "discrete"
 
 
 def test_start_outside_its_bounds_widens_them(fzg: Gearbox) -> None:

@@ -246,6 +246,7 @@ def test_of_names_that_act_on_one_thing_the_joint_probability_is_told() -> None:
     drift, lag = (effect(name, "oil", kind="sensor") for name in ("sensor_drift", "sensor_lag"))
     (answer,) = decide(posterior(*(judged(STRONG, one) for one in (bias, gain, drift, lag))), Settings())
     assert answer.acts_like and answer.probability < 0.3 < ENOUGH < answer.joint
+    assert withdraw_claim(answer, rule()).joint == pytest.approx(rule().nearest * answer.joint)  # only once
 
 
 def test_both_effects_of_a_pair_are_answered() -> None:

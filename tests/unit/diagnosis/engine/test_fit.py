@@ -107,7 +107,7 @@ def test_faulty_sensors_show_every_change_as_they_show_the_truth(
 ) -> None:
     """Derivatives go through the fault as well: by a clock an hour late everything comes an hour late."""
     term = CATALOGUE[name].placed(experiment.machine.model.network, Scale.of(fzg), CHANNELS)[0]
-    size = {"clock_offset": 700.0, "sensor_lag": 300.0, "swapped_channels": 0.6, "sensor_stuck": 1.0}[name]
+    size = {"clock_offset": 700.0, "sensor_lag": 300.0, "swapped_channels": 0.6, "sensor_stuck": 0.7}[name]
     faulty, _ = with_candidate(fit, hypothesis_of(term), 0)
     own = {p.name: p.grid[0] if p.grid else p.start for p in term.parameters} | {term.strength.name: size}
     z = at(faulty, own)

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from diagnosis.candidates.hypotheses import hypothesis_of
+from diagnosis.engine import set_apart
 from diagnosis.engine.calibration import calibrate_with_error
 from diagnosis.engine.fit import Experiment, Fit, calibrate
 from diagnosis.engine.prepare import prepare_experiment
@@ -61,9 +62,18 @@ def with_broken(fzg: Gearbox, broken: Callable[[Array, Array], Array]) -> Experi
     return prepare_experiment(fzg, [replace(made, channels=tuple(channels))], [made])[1]
 
 
-def test_a_frozen_sensor_round_which_the_calibration_bends_is_set_apart(fzg: Gearbox) -> None:
-    frozen = with_broken(fzg, lambda time, T: np.where(time < 7200.0, T, T[720]))
-    assert calibrate_apart(frozen, calibrate(frozen))[1] == ("bearing_1",)
+@pytest.mark.parametrize(("broken", "bent"), [
+    (lambda time, T: T + 25.0 * (time > 7200.0), ("SUSPECT",)),  # the start misses it most
+    (lambda time, T: np.where(np.abs(time - 7200.0) < 3600.0, T[360], T), ("SUSPECT", "SUSPECT_AT_START")),
+])  # fmt: skip
+def test_a_broken_sensor_is_a_suspect_by_the_start_and_by_standing_still(
+    fzg: Gearbox, broken: Callable[[Array, Array], Array], bent: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also where a calibration has bent itself round it, so that the other signs are missing."""
+    for name in bent:
+        monkeypatch.setattr(set_apart, name, np.inf)
+    experiment = with_broken(fzg, broken)
+    assert calibrate_apart(experiment, calibrate(experiment))[1] == ("bearing_1",)
 
 
 def test_what_is_wrong_with_a_channel_that_was_apart_is_found(fzg: Gearbox) -> None:

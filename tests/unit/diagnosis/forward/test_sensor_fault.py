@@ -35,6 +35,21 @@ def fault(form: Form, *target: str, law: str, size: float) -> Term:
             [fault("stuck", "oil", law="Piecewise((size, time >= 495), (0, True))", size=1.0)],
             {OIL_READ: np.where(TIME < 495.0, OIL, OIL[50])},
         ),
+        (  # from 95 to 295 s and from 495 s on, each time as it was at the beginning
+            [
+                fault(
+                    "stuck",
+                    "oil",
+                    law="Piecewise((0, time < 95), (size, time < 295), (0, time < 495), (size, True))",
+                    size=1.0,
+                )
+            ],
+            {
+                OIL_READ: np.where(
+                    TIME < 95.0, OIL, np.where(TIME < 295.0, OIL[10], np.where(TIME < 495.0, OIL, OIL[50]))
+                )
+            },
+        ),
         ([fault("swapped", "oil", "pinion", law="size", size=1.0)], {OIL_READ: PINION, PINION_READ: OIL}),
         (
             [fault("shift", "oil", law="size", size=2.0), fault("stuck", "oil", law="size", size=1.0)],

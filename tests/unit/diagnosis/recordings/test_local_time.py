@@ -138,3 +138,31 @@ def test_thousands_are_no_decimals(tmp_path: Path, network: ThermalNetwork) -> N
     rows.to_csv(tmp_path / "run.csv", index=False)
     with pytest.raises(InputError, match="time_s is '1,000' at row 1; 200 of 200 rows hold no time"):
         read(tmp_path / "run.csv", network, "")
+
+
+def test_a_code_is_noted_where_it_is_beyond_what_is_usual(tmp_path: Path, network: ThermalNetwork) -> None:
+    for code, noted in ((-9999.0, True), (-9000.0, False)):  # of 4670 1/min both are possible
+        rows = table().assign(speed_rpm=4670.0)
+        rows.loc[20, "speed_rpm"] = code
+        rows.to_csv(tmp_path / "run.csv", index=False)
+        found = read(tmp_path / "run.csv", network, "")
+        assert any("speed_rpm: -9999 1/min" in note and "code of the logger" in note for note in found.notes) is noted
+
+
+def test_columns_next_to_mapped_ones(tmp_path: Path, network: ThermalNetwork) -> None:
+    """A second sensor stands next to the standard column; a column that replaces it is named."""
+    rows = table().assign(second=table()["T_oil_degC"] + 1.0, n=table()["speed_rpm"])
+    rows.to_csv(tmp_path / "run.csv", index=False)
+    found = read(tmp_path / "run.csv", network, """
+        [columns]
+        second = { quantity = "T_oil", sensor = "B" }
+        n = { quantity = "speed" }
+        """)  # fmt: skip
+    assert {"oil", "oil__B"} <= {channel.name for channel in found.channels}
+    assert "not used, because the mapping takes other columns for them: speed_rpm" in found.notes
+
+
+def test_a_decimal_point_where_a_comma_is_stated(tmp_path: Path, network: ThermalNetwork) -> None:
+    table().to_csv(tmp_path / "run.csv", index=False, sep=";")
+    with pytest.raises(InputError, match="its decimal sign is a point"):
+        read(tmp_path / "run.csv", network, 'csv = { separator = ";", decimal = "," }')

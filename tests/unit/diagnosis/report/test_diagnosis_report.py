@@ -294,6 +294,13 @@ def test_names_stand_by_grade() -> None:
     assert bars == {"likely": {"windage": 0.914, "pocketing": 0.061}, "not reported": {"churning swirl": 0.019}}
 
 
+def test_the_bar_of_a_nearest_name_is_what_is_stated_of_it() -> None:
+    nearest = replace(missing_physics().findings[0], grade="likely", acts_like=True, probability=0.2)
+    bars = {bar.name: dict(zip(bar.y, bar.x, strict=True)) for bar in
+            figure_of(names_by_grade(replace(missing_physics(), findings=(nearest,)))).data}  # fmt: skip
+    assert bars["likely"] == {"windage": 0.2}
+
+
 def test_a_name_that_only_comes_with_another_is_shown_if_the_data_ask_for_more() -> None:
     finding = missing_physics().findings[0]
     rivals = (finding.confusable_with[0], replace(finding.confusable_with[1], instead=False))
