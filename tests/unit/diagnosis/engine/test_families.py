@@ -234,7 +234,7 @@ def test_a_reading_that_stands_still_is_a_candidate_in_those_times_only(fzg: Gea
     setup, experiment = prepare_experiment(fzg, [first, made[1]], [made[1]])
     (found,) = [one for one in candidates_of(setup, experiment, CATALOGUE) if one.law == "sensor_stuck"]
     assert (found.name, found.place) == ("sensor_stuck_for_a_while", made[0].channels[0].name)
-    assert found.term is not None
+    assert found.term is not None and found.date is None
     acts = sp.lambdify([symbol("time"), *(symbol(p.name) for p in found.term.parameters)], found.term.expression)
     assert [float(acts(at, 1.0, 0.0)) for at in (2700.0, 3100.0, 6900.0, 7300.0)] == [0.0, 1.0, 1.0, 0.0]
     assert acts(3600.0, 1.0, experiment.starts_at["b"]) == 0.0

@@ -7,10 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from diagnosis.engine.prepare import CAPACITY_SD, usual_unknowns
+from diagnosis.engine.prepare import CAPACITY_SD, held_out_experiment, prepare_experiment, usual_unknowns
 from diagnosis.engine.unknown import ClockOffset, LossDelay, SensorLag
 from diagnosis.forward.network_on_grid import NetworkOnGrid
 from diagnosis.recordings.recording import Recording
+from models.assembly.gearbox import Gearbox
 from tests.unit.diagnosis.inference_example import CHANNELS
 
 
@@ -40,3 +41,9 @@ def test_a_temperature_represents_a_body_that_has_many(model: NetworkOnGrid, rec
     assert found["mesh"] == pytest.approx(stated["mesh"])
     assert set(found) >= {name for name, sd in stated.items() if sd > 0.0}
     assert np.isfinite(list(found.values())).all()
+
+
+def test_held_out_pieces_have_the_same_unknowns(fzg: Gearbox, recorded: Recording) -> None:
+    setup, experiment = prepare_experiment(fzg, [recorded], [replace(recorded, name="judged")])
+    judged = held_out_experiment(setup, experiment)
+    assert judged.unknowns == experiment.unknowns and [p.recording for p in judged.pieces] == ["judged"]

@@ -97,7 +97,7 @@ def test_torque_loss_and_efficiency() -> None:
     assert torque_loss(loss, speed) == pytest.approx([500 * 100 / P, -500 * 100 / P, 500 * 100 / P, 0.0])
     assert efficiency(loss, speed, torque) == pytest.approx([1 - 500 / P, 1 - 500 / P, P / (P + 500), 0.0])
     assert efficiency(1e9, 1500.0, 1.0) == 0.0
-    assert efficiency(1e-12, 1e-13, 90.0) == 0.0  # a speed that is rounding
+    assert efficiency(1e-14, 1e-13, 90.0) == 0.0  # a speed that is rounding
 
 
 @pytest.mark.parametrize(
