@@ -136,14 +136,16 @@ def _start(experiment: Experiment, index: int, setting: Setting, until: float) -
 def _likely_start(experiment: Experiment, index: int) -> tuple[Array, Array]:
     """Start temperatures by the first rows alone, and their standard deviations, (unknown,) each.
 
-    A state that is solved with the temperatures, as oil in a tank, may have been left as it was declared, or have
-    followed the gearbox.
+    A state that is solved with the temperatures, as the rise of oil in a tank above the air, may be as it was
+    declared, or have risen as much as the gearbox.
     """
     model, parts = experiment.machine.model, experiment.starts[index]
-    declared = complete_start(model, parts)[model.n :]
-    warm = float(np.mean(parts))
-    start = np.concatenate([parts, 0.5 * (declared + warm)])
-    sd = np.concatenate([experiment.noise[index].start_sd, LEFT_ALONE_SD_K + 0.5 * np.abs(warm - declared)])
+    declared, inputs = complete_start(model, parts)[model.n :], tuple(model.laws.inputs)
+    risen = 0.0
+    if "T_ambient" in inputs:
+        risen = float(np.mean(parts) - experiment.pieces[index].inputs[0, inputs.index("T_ambient")])
+    start = np.concatenate([parts, declared + 0.5 * risen])
+    sd = np.concatenate([experiment.noise[index].start_sd, np.full(len(declared), LEFT_ALONE_SD_K + 0.5 * abs(risen))])
     return start, sd
 
 

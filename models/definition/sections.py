@@ -257,7 +257,7 @@ MAUZ_WIDEST_MM = 60.0  # at 100 mm, 2166 1/min and 94 N m it would be ten times 
 class Churning(Section):
     """``[stage.churning]``: the gears in the oil bath; ``C_Sp`` is the splash factor of the Mauz formula."""
 
-    model: Literal["niemann", "niemann_printed", "mauz", "changenet_velex"]
+    model: Literal["niemann", "niemann_printed", "mauz", "changenet_velex", "changenet_2011"]
     C_Sp: Annotated[float, between(0.05, 10.0)] = 1.0
 
 
@@ -326,7 +326,7 @@ class Stage(Section):
         if self.churning.model == "mauz" and self.face_width_mm > MAUZ_WIDEST_MM:
             raise ValueError(
                 f"churning.model = 'mauz' with face_width_mm = {self.face_width_mm:g}: its torque goes with the cube "
-                f"of the face width and is refused beyond {MAUZ_WIDEST_MM:g} mm; take 'changenet_velex'"
+                f"of the face width and is refused beyond {MAUZ_WIDEST_MM:g} mm; take 'changenet_2011'"
             )
         return self
 

@@ -171,12 +171,11 @@ motor_flange = Mechanism(
     ),
     states=(
         Memory(
-            name="motor",
-            start=lambda scale: scale.ambient,
-            rate=lambda s: (s.T_ambient + s.rise * s.m**2 - s.motor) / s.lag,
+            name="motor",  # its rise above the air: it starts at the temperature of the air, whatever that is
+            rate=lambda s: (s.rise * s.m**2 - s.motor) / s.lag,
         ),
     ),
-    law=lambda s: s.strength * (s.motor - s.T_here),
+    law=lambda s: s.strength * (s.T_ambient + s.motor - s.T_here),
     says="The motor, generator or brake at the flange warms with its load and passes heat on ({place}).",
     reference="copper loss ~ current^2 ~ torque^2, one thermal time constant; estimate",
     experiment="measure the flange, or hold a high torque at standstill or creep speed",

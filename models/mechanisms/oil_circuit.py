@@ -185,12 +185,11 @@ oil_tank = Mechanism(
     ),
     states=(
         Memory(
-            name="tank",
-            start=lambda scale: scale.ambient,
-            rate=lambda s: (_pumped(s) * (s.T_oil - s.tank) - s.leak * (s.tank - s.T_ambient)) / s.lag,
+            name="tank",  # its rise above the air: it starts at the temperature of the air, whatever that is
+            rate=lambda s: (_pumped(s) * (s.T_oil - s.T_ambient - s.tank) - s.leak * s.tank) / s.lag,
         ),
     ),
-    law=lambda s: s.strength * _pumped(s) * (s.tank - s.T_oil),
+    law=lambda s: s.strength * _pumped(s) * (s.T_ambient + s.tank - s.T_oil),
     says="Oil circulates through a tank or long pipes outside, which warm late and give heat to the air.",
     reference="stirred tank: lag = its capacity over the heat capacity flow; leak = its loss to air over it",
     experiment=RETURN + " after a step of load",

@@ -280,6 +280,19 @@ class TestInANetwork:
         assert {p.name: (p.start, p.sd) for p in read.findings[0].term.parameters} == estimates
 
 
+@pytest.mark.parametrize("name", ["oil_tank", "motor_flange"])
+def test_what_stands_still_as_cold_as_the_air_stays_so(name: str) -> None:
+    """A machine is defined at 20 degC and started at -30: tank and motor are as cold as the air, too."""
+    scale, term = SCALES["conveyor"], placed(name, "conveyor")[0]
+    at_rest = Cycle(
+        np.array([0.0, 3600.0]), {"speed": np.zeros(2), "torque": np.zeros(2), "T_ambient": np.full(2, -30.0)}
+    )
+    network = term.apply(NETWORKS["conveyor"], usual(term), as_recorded=True)
+    result = network.simulate(at_rest, losses=losses("conveyor"), initial=-30.0)
+    assert scale.ambient == 20.0
+    np.testing.assert_allclose(parts(network, result), -30.0, atol=1e-6)
+
+
 @PHYSICAL
 def test_a_fault_of_an_instrument_is_none_of_the_gearbox(name: str) -> None:
     for term in placed(name):

@@ -34,6 +34,10 @@ RISING: dict[str, tuple[Law, Array]] = {
     "drag with oil level": (lambda H: drag(H=H), LEVELS),
     "drag with viscosity": (lambda nu: drag(nu=nu), np.geomspace(5.0, 5000.0, 20)),
     "Changenet and Velex": (lambda w: churning.churning_changenet_velex(**GEAR, omega=w), np.linspace(0.1, 1e3, 99)),
+    "Changenet, 2011": (
+        lambda w: churning.churning_changenet_2011(**GEAR, module=4e-3, omega=w),
+        np.arange(1.0, 400.0),
+    ),
     "Niemann": (lambda v: churning.churning_niemann(e=0.02, b=0.014, v_t=v), np.linspace(0.0, 40.0, 50)),
 }
 FALLING: dict[str, tuple[Law, Array]] = {
@@ -97,6 +101,10 @@ def test_laws_with_two_regimes_are_continuous() -> None:
          [disk_speed(Re) for Re in (heat_transfer.RE_DISK_LAMINAR, heat_transfer.RE_DISK_TURBULENT)]),
         (lambda w: churning.churning_changenet_velex(**GEAR, omega=w),
          [Re * 15.41e-6 / (0.05 * 0.014) for Re in (churning.RE_LAMINAR, churning.RE_TURBULENT)]),
+        (lambda w: churning.churning_changenet_2011(**GEAR, module=4e-3, omega=w),
+         [churning.RE_2011 * 15.41e-6 / (0.05 * 0.014),
+          *(np.sqrt(gamma / (0.05 * 0.014 * 4e-3) ** (1 / 3))
+            for gamma in (churning.GAMMA_CALM, churning.GAMMA_SWIRLING))]),
     ):  # fmt: skip
         for edge in edges:
             assert law(edge * (1 - 1e-9)) == pytest.approx(law(edge * (1 + 1e-9)), rel=1e-6)
@@ -109,6 +117,7 @@ def test_what_is_dry_or_at_rest_loses_nothing() -> None:
     assert churning.churning_mauz(e=(-1e-3, -1e-3), omega_2=v, **dry).tolist() == [0.0, 0.0]
     assert churning.churning_changenet_velex(**GEAR | {"h": -1e-3, "nu": np.full(2, 15.0)}, omega=v).tolist() == [0, 0]
     assert np.isfinite(churning.churning_changenet_velex(**GEAR | {"h": 0.2}, omega=100.0))
+    assert churning.churning_changenet_2011(**GEAR | {"h": -1e-3}, module=4e-3, omega=v).tolist() == [0.0, 0.0]
     assert seal.seal_loss_linke(d_mm=20.0, n_rpm=0.0, T_oil=50.0, nu_40=68.0) == 0.0
     assert seal.seal_loss_iso_simple(d_mm=10.0, n_rpm=0.0) == 0.0
     assert float(heat_transfer.rotating_disk(omega=0.0, **DISK)) == 0.0

@@ -29,14 +29,32 @@ def test_table_of_the_rig(model: str, watts: list[float], half_digit: float) -> 
     assert loss == pytest.approx(watts, abs=half_digit)
 
 
-def test_changenet_velex_on_the_rig() -> None:
-    """A second evaluation of the formula, by other hands: 0.9 l at 60 degC."""
-    losses = GEARBOX.with_values({"stage.0.churning.model": "changenet_velex", "oil.volume_l": 0.9}).losses()
-    loss = losses.breakdown(speed=SPEED[[0, 2, 3, 4, 5]], torque=94.0, temperatures=60.0)["churning"]
-    assert loss == pytest.approx([0.49, 6.3, 21.1, 57.8, 82.6], rel=0.01)
+@pytest.mark.parametrize(
+    ("model", "watts"),
+    [
+        ("changenet_velex", [0.49, 1.47, 6.31, 21.1, 57.8, 82.6]),
+        ("changenet_2011", [0.49, 1.47, 6.47, 16.1, 55.1, 82.6]),
+    ],
+)
+def test_changenet_on_the_rig(model: str, watts: list[float]) -> None:
+    """A second evaluation of the formulas, by other hands: 0.9 l at 60 degC."""
+    losses = GEARBOX.with_values({"stage.0.churning.model": model, "oil.volume_l": 0.9}).losses()
+    loss = losses.breakdown(speed=SPEED, torque=94.0, temperatures=60.0)["churning"]
+    assert loss == pytest.approx(watts, rel=0.01)
 
 
-MODELS = ("niemann", "niemann_printed", "mauz", "changenet_velex")
+def test_the_regimes_of_2011_meet_on_a_wheel_on_which_those_of_2007_do_not() -> None:
+    """The conveyor at 1500 1/min, where Re of its wheel reaches 6000 to 9000 in hot oil."""
+    oil = np.arange(60.0, 131.0, 5.0)
+    worst = {}
+    for model in ("changenet_velex", "changenet_2011"):
+        losses = load_gearbox("conveyor").with_values({"stage.0.churning.model": model}).losses()
+        churning = losses.breakdown(speed=1500.0, torque=100.0, temperatures=oil)["churning"]
+        worst[model] = float(np.max(churning[1:] / churning[:-1]))
+    assert worst["changenet_velex"] > 1.5 and worst["changenet_2011"] <= 1.0
+
+
+MODELS = ("niemann", "niemann_printed", "mauz", "changenet_velex", "changenet_2011")
 
 
 def churning(pair: GearPair, model: str, speed: float, level_below_axis: float) -> float:
@@ -63,5 +81,5 @@ def test_a_gear_under_oil_is_under_oil(model: str) -> None:
 
 
 def test_mauz_is_refused_for_wide_gears() -> None:
-    with pytest.raises(InputError, match="cube of the face width and is refused beyond 60 mm; take 'changenet_velex'"):
+    with pytest.raises(InputError, match="cube of the face width and is refused beyond 60 mm; take 'changenet_2011'"):
         GEARBOX.with_values({"stage.0.churning.model": "mauz", "stage.0.face_width_mm": 61.0})
