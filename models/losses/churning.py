@@ -150,12 +150,12 @@ def churning_changenet_velex(
     from memory. Which constant goes with which exponents is confirmed by the four formulas of Changenet, Leprince,
     Ville, Velex, J. Mech. Des. 133 (2011): there 1.366 Re^-.21 ends as 0.239 and 20.797 Re^-.21 as 3.644 at Re = 4000.
     """
-    Re = np.asarray(omega) * r_p * b / (np.asarray(nu) * 1e-6)
+    omega = np.asarray(omega)
+    Re = omega * r_p * b / (np.asarray(nu) * 1e-6)
     share = np.clip((Re - RE_LAMINAR) / (RE_TURBULENT - RE_LAMINAR), 0.0, 1.0)
-    calm = 1.366 * np.minimum(Re, RE_TURBULENT) ** -0.21
-    bath = {"h": h, "r_p": r_p, "b": b, "V_oil": V_oil, "omega": omega}
-    C_m = (1.0 - share) * calm * _calm(**bath) + share * 3.644 * _swirling(**bath)
-    return np.asarray(0.5 * rho * np.asarray(omega) ** 3 * _wetted(h, r_p, b, z, tooth_height, alpha) * r_p**3 * C_m)
+    calm, swirling = _regimes(h, r_p, b, V_oil, omega)
+    C_m = (1.0 - share) * 1.366 * calm * np.minimum(Re, RE_TURBULENT) ** -0.21 + share * 3.644 * swirling
+    return np.asarray(0.5 * rho * omega**3 * _wetted(h, r_p, b, z, tooth_height, alpha) * r_p**3 * C_m)
 
 
 def churning_changenet_2011(
@@ -164,8 +164,8 @@ def churning_changenet_2011(
 ) -> Array:  # fmt: skip
     r"""Churning loss of one dipping gear after Changenet, Leprince, Ville and Velex (2011).
 
-    As :func:`churning_changenet_velex`, but the acceleration ``gamma = omega^2 (R_p b m)^(1/3)`` of the oil tells the
-    regimes apart: the first formula up to 750 m/s^2, the second from 1250 on, linear in gamma between. In both
+    As :func:`churning_changenet_velex`, but the acceleration ``gamma = omega^2 (R_p b m)^(1/3)`` of the oil sets the
+    regime: the first formula up to 750 m/s^2, the second from 1250 on, linear in gamma between. In both
     ``Re^-.21`` ends at Re = 4000: ``0.239`` is ``1.366 Re^-.21`` there, and ``3.644`` is ``20.797 Re^-.21``.
 
     Parameters
@@ -187,9 +187,8 @@ def churning_changenet_2011(
     Re = omega * r_p * b / (np.asarray(nu) * 1e-6)
     gamma = omega**2 * (r_p * b * module) ** (1.0 / 3.0)
     share = np.clip((gamma - GAMMA_CALM) / (GAMMA_SWIRLING - GAMMA_CALM), 0.0, 1.0)
-    falls = np.minimum(Re, RE_2011) ** -0.21
-    bath = {"h": h, "r_p": r_p, "b": b, "V_oil": V_oil, "omega": omega}
-    C_m = falls * ((1.0 - share) * 1.366 * _calm(**bath) + share * 20.797 * _swirling(**bath))
+    calm, swirling = _regimes(h, r_p, b, V_oil, omega)
+    C_m = np.minimum(Re, RE_2011) ** -0.21 * ((1.0 - share) * 1.366 * calm + share * 20.797 * swirling)
     return np.asarray(0.5 * rho * omega**3 * _wetted(h, r_p, b, z, tooth_height, alpha) * r_p**3 * C_m)
 
 
@@ -200,16 +199,13 @@ def _wetted(h: float, r_p: float, b: float, z: int, tooth_height: float, alpha: 
     return float(r_p**2 * (2.0 * theta - np.sin(2.0 * theta)) + 2.0 * r_p * b * theta + flanks)
 
 
-def _calm(*, h: float, r_p: float, b: float, V_oil: float, omega: Numeric) -> Array:
-    """Geometry and Froude number in the drag of a gear that throws the oil off."""
-    D, Fr = 2.0 * r_p, np.square(omega) * r_p / GRAVITY
-    return np.asarray((max(h, 0.0) / D) ** 0.45 * (V_oil / D**3) ** 0.1 * (b / D) ** 0.21 * Fr**-0.6)
-
-
-def _swirling(*, h: float, r_p: float, b: float, V_oil: float, omega: Numeric) -> Array:
-    """Geometry and Froude number in the drag of a gear that takes the oil round."""
-    D, Fr = 2.0 * r_p, np.square(omega) * r_p / GRAVITY
-    return np.asarray((max(h, 0.0) / D) ** 0.1 * (V_oil / D**3) ** -0.35 * (b / D) ** 0.85 * Fr**-0.88)
+def _regimes(h: float, r_p: float, b: float, V_oil: float, omega: Array) -> tuple[Array, Array]:
+    """Geometry and Froude number in the drag of a gear that throws the oil off, and of one that takes it round."""
+    D, Fr = 2.0 * r_p, omega**2 * r_p / GRAVITY
+    dips, volume, width = max(h, 0.0) / D, V_oil / D**3, b / D
+    calm = dips**0.45 * volume**0.1 * width**0.21 * Fr**-0.6
+    swirling = dips**0.1 * volume**-0.35 * width**0.85 * Fr**-0.88
+    return np.asarray(calm), np.asarray(swirling)
 
 
 @dataclass(frozen=True, kw_only=True)
