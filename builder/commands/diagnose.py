@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,7 +17,6 @@ from builder.base.workers import worker_options
 from models.assembly.gearbox import known_gearboxes, load_gearbox
 from models.base.errors import InputError, did_you_mean
 from models.correction.correction import Correction, read_correction
-from models.files.output_files import refuse_to_replace
 
 if TYPE_CHECKING:
     from diagnosis.decision.settings import Settings
@@ -111,7 +110,7 @@ def diagnose(
     with progress(LOADING):
         from diagnosis import diagnose as run
         from diagnosis.recordings.read import read_by_role
-        from diagnosis.report.write import names_of_files, write_files, written_earlier
+        from diagnosis.report.write import files_left_over, write_files
         from models.base.atomic_write import atomic_folder
         from models.mechanisms import CATALOGUE
         from models.mechanisms.user_files import check_placeable, load_mechanisms
@@ -146,11 +145,8 @@ def diagnose(
         Path(gearbox),
         *(file for file in (mapping, correction) if file),
     ]
-    names, earlier = names_of_files((*train, *held)), written_earlier(output)
-    refuse_to_replace(given, [output / name for name in names])
-    _refuse_to_replace_others(output, {*names} - earlier)
+    old = files_left_over(output, (*train, *held), given)
     _print_notes((*train, *held, *healthy))
-    old = [output / name for name in earlier.difference(names) if output / name not in given]
     with atomic_folder(output) as stage, progress("starting") as tell:
         found = run(train, definition, holdout=held, baseline=healthy, switched_off=switched_off, correction=known,
                     settings=settings, catalogue=catalogue, jobs=jobs, progress=tell)  # fmt: skip
@@ -162,15 +158,6 @@ def diagnose(
     console.out.print()
     for name in written:
         console.out.print(f"wrote {output / name}")
-
-
-def _refuse_to_replace_others(output: Path, names: Collection[str]) -> None:
-    """Refuse to write over files that no diagnosis wrote."""
-    there = [output / name for name in sorted(names) if (output / name).exists()]
-    if there:
-        raise InputError(
-            "\n".join(f"{file}: exists, and no diagnosis wrote it; choose another --output" for file in there)
-        )
 
 
 def _print_notes(recordings: Sequence[Recording]) -> None:

@@ -20,14 +20,14 @@ from diagnosis import diagnose
 from diagnosis.decision.settings import Settings
 from diagnosis.recordings.read import ByRole, read_by_role
 from diagnosis.recordings.time_axis import RECORDING_KINDS
-from diagnosis.report.write import names_of_files, write_files
+from diagnosis.report.write import files_left_over, write_files
 from diagnosis.results.result import Diagnosis
 from models.assembly.gearbox import Gearbox
 from models.base.atomic_write import atomic_folder
 from models.base.errors import InputError
 from models.base.parallel import iterate_parallel
 from models.correction.correction import Correction
-from models.files.output_files import refuse_to_replace, write_table
+from models.files.output_files import write_table
 from models.mechanisms import Mechanism
 
 HELD_OUT = "hold"  # prefix of held-out recordings, or of a folder with them
@@ -182,7 +182,8 @@ def diagnose_fleet(
     InputError
         If the output cannot be written to, or no scheduler answers.
     """
-    outcomes: dict[str, MemberOutcome] = {}
+    _refuse_to_replace_summary(output / SUMMARY)
+    outcomes, old = dict[str, MemberOutcome](), dict[str, list[Path]]()
     inside = jobs if len(members) == 1 and dask is None else 1
 
     def readable() -> Iterator[tuple[object, ...]]:
@@ -194,11 +195,8 @@ def diagnose_fleet(
                 train, held, healthy = read_by_role(
                     member.train, member.holdout, member.baseline, network, mapping=mapping
                 )
-                files = names_of_files((*train, *held))
-                refuse_to_replace(
-                    [p for r in (*train, *held, *healthy) for p in r.files],
-                    [output / member.name / name for name in files],
-                )
+                read = [p for r in (*train, *held, *healthy) for p in r.files]
+                old[member.name] = files_left_over(output / member.name, (*train, *held), read)
                 recordings = (train, held, healthy)
                 yield member.name, recordings, gearbox, catalogue, correction, switched_off, settings, inside
             except InputError as error:
@@ -208,7 +206,8 @@ def diagnose_fleet(
         show("diagnosing the fleet", 0, len(members))
         try:
             for outcome in iterate_parallel(_diagnose, readable(), jobs=min(jobs, len(members)), dask=dask):
-                outcomes[outcome.row["gearbox"]] = _write(outcome, output)
+                name = outcome.row["gearbox"]
+                outcomes[name] = _write(outcome, output, old[name])
                 show("diagnosing the fleet", len(outcomes), len(members))
         except InputError:
             raise
@@ -241,7 +240,18 @@ def _without_diagnosis(name: str, error: Exception) -> MemberOutcome:
     return MemberOutcome(row={**NO_DIAGNOSIS, "gearbox": name, "error": text}, fault=fault)
 
 
-def _write(outcome: MemberOutcome, output: Path) -> MemberOutcome:
+def _refuse_to_replace_summary(path: Path) -> None:
+    """Refuse to write over a table that no fleet wrote."""
+    try:
+        with path.open(encoding="utf-8") as file:
+            header = file.readline()
+    except (OSError, ValueError):
+        header = ""
+    if path.exists() and not header.startswith("gearbox,verdict,found"):
+        raise InputError(f"{path}: exists, and no fleet wrote it; choose another --output")
+
+
+def _write(outcome: MemberOutcome, output: Path, old: Sequence[Path]) -> MemberOutcome:
     if not outcome.files:
         return outcome
     try:
@@ -250,6 +260,8 @@ def _write(outcome: MemberOutcome, output: Path) -> MemberOutcome:
                 (stage / name).write_bytes(content)
     except InputError as error:
         return _without_diagnosis(outcome.row["gearbox"], error)
+    for path in old:
+        path.unlink(missing_ok=True)
     return outcome
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +14,9 @@ from diagnosis.forward.sensor_fault import channel_column
 from diagnosis.recordings.recording import Recording
 from diagnosis.results.result import Diagnosis
 from models.assembly.gearbox import Gearbox
+from models.base.errors import InputError
 from models.correction.correction import MODEL_ERROR, SHAPE, Correction, Estimate, Finding, write_correction
+from models.files.output_files import refuse_to_replace
 from models.terms.term import Term
 
 UNNAMED, IMPROVES = "without a name", "It improves the prediction; what it is, the data do not say."
@@ -28,7 +30,30 @@ def names_of_files(recordings: Sequence[Recording]) -> tuple[str, ...]:
     return REPORT, NUMBERS, CORRECTION, ALONE, POSTERIOR, *(f"{recording.name}.csv" for recording in recordings)
 
 
-def written_earlier(folder: Path) -> frozenset[str]:
+def files_left_over(folder: Path, recordings: Sequence[Recording], given: Iterable[Path]) -> list[Path]:
+    """Files of an earlier diagnosis in a folder that a diagnosis of these recordings will not replace.
+
+    Parameters
+    ----------
+    given : iterable of Path
+        Files that are read
+
+    Raises
+    ------
+    InputError
+        If the diagnosis would replace a file that is read, or one that no diagnosis wrote.
+    """
+    given, names, earlier = list(given), names_of_files(recordings), _written_earlier(folder)
+    refuse_to_replace(given, [folder / name for name in names])
+    others = [folder / name for name in sorted({*names} - earlier) if (folder / name).exists()]
+    if others:
+        raise InputError(
+            "\n".join(f"{file}: exists, and no diagnosis wrote it; choose another --output" for file in others)
+        )
+    return [folder / name for name in sorted(earlier.difference(names)) if folder / name not in given]
+
+
+def _written_earlier(folder: Path) -> frozenset[str]:
     """Names of the files that an earlier diagnosis wrote into a folder."""
     try:
         inputs = json.loads((folder / NUMBERS).read_text(encoding="utf-8"))["inputs"]

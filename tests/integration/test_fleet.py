@@ -136,6 +136,23 @@ def test_the_table_is_shown_and_the_faults_are_told(
     assert [p.name for p in (tmp_path / "out").iterdir()] == ["summary.csv"]
 
 
+def test_what_no_diagnosis_wrote_is_not_replaced(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shutil.copytree(folder / "sound", tmp_path / "fleet/sound")
+    out, report = tmp_path / "out", tmp_path / "out/sound/report.html"
+    report.parent.mkdir(parents=True)
+    report.write_text("my own")
+    assert run("diagnose", tmp_path / "fleet", "--fleet", "--output", out) == 2
+    assert "report.html: exists, and no diagnosis wrote it" in capsys.readouterr().err
+    assert report.read_text() == "my own" and pd.read_csv(out / "summary.csv").loc[0, "verdict"] == "error"
+    assert run("diagnose", tmp_path / "fleet", "--fleet", "--output", out) == 2  # its own table is replaced
+    (out / "summary.csv").write_text("mine\n")
+    assert run("diagnose", tmp_path / "fleet", "--fleet", "--output", out) == 2
+    assert "summary.csv: exists, and no fleet wrote it; choose another --output" in capsys.readouterr().err
+    assert (out / "summary.csv").read_text() == "mine\n"
+
+
 def test_our_own_fault_with_one_leaves_the_others_and_ends_with_status_1(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

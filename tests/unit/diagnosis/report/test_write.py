@@ -4,16 +4,38 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
-from diagnosis.report.write import NUMBERS, names_of_files, written_earlier
+import pytest
+
+from diagnosis.report.write import ALONE, NUMBERS, REPORT, files_left_over
+from models.base.errors import InputError
+
+
+def recording(name: str) -> Any:
+    return SimpleNamespace(name=name)
 
 
 def test_files_of_an_earlier_diagnosis_are_known(tmp_path: Path) -> None:
     """What somebody else put there is not among them."""
     (tmp_path / "mine.csv").write_text("time_s\n")
-    assert written_earlier(tmp_path) == frozenset()
+    assert files_left_over(tmp_path, [recording("run_1")], []) == []
     inputs = {"recordings": {"run_1": "", "run_2": ""}, "held_out": {"hold_a": ""}}
     (tmp_path / NUMBERS).write_text(json.dumps({"inputs": inputs}))
-    assert written_earlier(tmp_path) == {*names_of_files(()), "run_1.csv", "run_2.csv", "hold_a.csv"}
+    (tmp_path / "run_1.csv").write_text("time_s\n")
+    left = files_left_over(tmp_path, [recording("run_1")], [tmp_path / "run_2.csv"])
+    assert left == [tmp_path / "hold_a.csv"]  # the other one is read now
+
+
+def test_what_no_diagnosis_wrote_is_not_replaced(tmp_path: Path) -> None:
     (tmp_path / NUMBERS).write_text("[]")
-    assert written_earlier(tmp_path) == frozenset()
+    (tmp_path / ALONE).touch()
+    with pytest.raises(InputError, match=f"{ALONE}: exists, and no diagnosis wrote it.*\\n.*{NUMBERS}: exists"):
+        files_left_over(tmp_path, [], [])
+
+
+def test_what_is_read_is_not_replaced(tmp_path: Path) -> None:
+    (tmp_path / REPORT).touch()
+    with pytest.raises(InputError, match=REPORT):
+        files_left_over(tmp_path, [], [tmp_path / REPORT])
