@@ -35,7 +35,6 @@ from diagnosis.proof.scoring.truth import CONTROL, Truth, read_truths
 from diagnosis.recordings.read import read_recordings
 from models.assembly.gearbox import load_gearbox
 from models.base.parallel import iterate_parallel
-from models.mechanisms import CATALOGUE
 
 AS_IT_IS = "as it is"
 FINE = {"law_deg5", "loss_own", "lag", "hours"}
@@ -77,7 +76,7 @@ def scan_case(folder: Path, gearbox: str) -> dict[str, Any]:
     )
     setup, experiment = prepare_experiment(machine, train, held)
     calibration = calibrate_with_error(experiment, calibrate(experiment))
-    candidates = candidates_of(setup, experiment, CATALOGUE)
+    candidates = candidates_of(setup, experiment)
     found, prior = scan(calibration.fit, candidates, calibration.near.columns), log_prior(candidates)
     result: dict[str, Any] = {"case": folder.name}
     for name, classes in variants().items():

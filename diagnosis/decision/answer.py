@@ -9,7 +9,6 @@ import numpy as np
 
 from diagnosis.candidates.hypotheses import Hypothesis
 from diagnosis.decision.posterior import Judged, Posterior
-from diagnosis.decision.settings import Settings
 from diagnosis.engine.learnt import Rule
 from diagnosis.engine.scan import heat_over_time
 from models.network.laws import symbol
@@ -59,7 +58,7 @@ class Answer:
     one_event: bool = False
 
 
-def decide(posterior: Posterior, settings: Settings) -> tuple[Answer, ...]:
+def decide(posterior: Posterior) -> tuple[Answer, ...]:
     """The answers of a posterior: empty if nothing is missing and no parameter outside its prior, or without a name.
 
     A name is a claim if its probability reaches :attr:`Settings.claim_from`. Else at most three names that reach it
@@ -74,7 +73,7 @@ def decide(posterior: Posterior, settings: Settings) -> tuple[Answer, ...]:
     if not posterior.detected and not posterior.parameter_outside:
         return ()
     best = _best_fitted(posterior)
-    answers = (_answer(posterior, best, effect, settings.claim_from) for effect in best.effects)
+    answers = (_answer(posterior, best, effect) for effect in best.effects)
     return tuple(answer for answer in answers if answer is not None)
 
 
@@ -104,9 +103,9 @@ def _best_fitted(posterior: Posterior) -> Judged:
     return max(there or fitted, key=lambda one: one.log_bayes + one.log_prior, default=first)
 
 
-def _answer(posterior: Posterior, best: Judged, effect: Hypothesis, enough: float) -> Answer | None:
+def _answer(posterior: Posterior, best: Judged, effect: Hypothesis) -> Answer | None:
     """The narrowest set of names that holds enough probability."""
-    name = effect.law
+    name, enough = effect.law, posterior.settings.claim_from
     doubtful = effect.term is None or posterior.log_e < posterior.rule.named_if_large
     chance, overlap = posterior.rule.one_event
     together = _begin_together(best, chance) or _act_together(best, overlap)

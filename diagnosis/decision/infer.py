@@ -33,6 +33,7 @@ from diagnosis.decision.scanned import (
 )
 from diagnosis.decision.settings import Settings
 from diagnosis.engine.calibration import Calibration
+from diagnosis.engine.families import log_prior
 from diagnosis.engine.fit import Fit
 from diagnosis.engine.learnt import ErrorClass, rule
 from diagnosis.engine.outside import judge_outside
@@ -41,7 +42,6 @@ from diagnosis.engine.scan import scan
 from diagnosis.engine.sessions import fit_over_sessions
 from models.base.errors import InputError
 from models.base.progress import Progress, silent
-from models.base.types import Array
 
 RACED, PLACES, RACE_STEPS = 18, 2, 4
 NEAR_PLACE = 3.0  # nats behind the best place of its name, up to which a second place is raced
@@ -54,15 +54,13 @@ WORTH, WORTH_SHARE = 1.0, 0.1  # nats, and share of the best, from which a candi
 
 
 def infer(
-    calibration: Calibration, candidates: Sequence[Hypothesis], log_prior: Array, settings: Settings, *,
+    calibration: Calibration, candidates: Sequence[Hypothesis], settings: Settings, *,
     outside: Sequence[Hypothesis] = (), candidates_in: CandidatesIn = lambda _: (), progress: Progress = silent,
 ) -> Posterior:  # fmt: skip
     """Weigh all explanations.
 
     Parameters
     ----------
-    log_prior : Array, shape (candidates,)
-        Of every candidate, to 1 of nothing
     outside : sequence of Hypothesis
         Unknown heats, judged where something is missing
     candidates_in : callable
@@ -75,8 +73,8 @@ def infer(
         progress("judging the baselines as if they were tested")
     placebo, candidates = judge_baselines(calibration, candidates, candidates_in)
     progress(f"scanning {len(candidates)} candidates")
-    found = scan(base, candidates, calibration.near.columns)
-    first = scan_in_classes(calibration, found, log_prior)
+    found, prior = scan(base, candidates, calibration.near.columns), log_prior(candidates)
+    first = scan_in_classes(calibration, found, prior)
     judged = _raced(calibration, first, progress)
     alone = {one.label: float(value) for one, value in zip(first.candidates, first.log_bayes, strict=True)}
     gained, pairs, elsewhere = 0.0, list[Judged](), None
@@ -86,12 +84,12 @@ def infer(
     least = -np.inf if placebo is None else placebo.log_e_value
     if best is not None and best.fit is not None and best.log_bayes > 0.0:
         progress(f"scanning again, given {best.label}")
-        second = scan_given(calibration, best, candidates, log_prior)
+        second = scan_given(calibration, best, candidates, prior)
         judged[best.label] = replace(best, left=second.most)
         pairs = sorted(_pairs(calibration, best, second), key=_weight, reverse=True)
         if pairs and second.most > of_class and base.experiment.healthy:
             progress(f"scanning once more, given {pairs[0].label}")
-            pairs[0] = replace(pairs[0], left=scan_given(calibration, pairs[0], candidates, log_prior).most)
+            pairs[0] = replace(pairs[0], left=scan_given(calibration, pairs[0], candidates, prior).most)
         if not best.of_parameters:  # else the wider prior would stay in what is called nothing
             there = judge_alone(calibration, best, second, first.in_class(best.error_class).ahead)
             alone |= {label: min(alone[label], value) for label, value in there.items()}
@@ -115,7 +113,7 @@ def infer(
         class_threshold=of_class,
         rule=rule(),
         likeness=likeness_of(first, error_class),
-        odds_unknown=settings.odds_unknown,
+        settings=settings,
         error_class=(error_class if missing else chosen.error_class).name,
         error_evidence=dict(calibration.evidence),
         session_s=chosen.session_s,

@@ -21,6 +21,7 @@ import numpy as np
 from scipy.special import expit, logsumexp, softmax
 
 from diagnosis.candidates.hypotheses import Hypothesis
+from diagnosis.decision.settings import Settings
 from diagnosis.engine.fit import Fit
 from diagnosis.engine.learnt import ErrorClass, Rule
 from models.base.types import Array
@@ -219,8 +220,8 @@ class Posterior:
     threshold, class_threshold : float
         From which something is missing, [nat]; that of the class of model error, from which a parameter is outside its
         prior and a further effect competes
-    odds_unknown : float
-        Prior odds of a cause that is in no catalogue, see :class:`~diagnosis.decision.settings.Settings`
+    settings : Settings
+        As asked for
     error_class : str
         Class of model error of the best explanation; of nothing where nothing is missing
     error_evidence : mapping of str to float
@@ -244,7 +245,7 @@ class Posterior:
     rule: Rule
     log_parameter: float = -np.inf
     likeness: Likeness = Likeness(labels=(), cosines=np.zeros((0, 0)))
-    odds_unknown: float = 0.1
+    settings: Settings = field(default_factory=Settings)
     error_class: str = ""
     error_evidence: dict[str, float] = field(default_factory=dict)
     session_s: float = 0.0
@@ -356,7 +357,7 @@ class Posterior:
             return 0.0
         unknown = {one.names for one in self.judged if one.kind == "outside"}
         known = {one.names for one in self.judged if len(one.effects) == 1 and one.kind not in ("outside", "parameter")}
-        return float(np.log(self.odds_unknown * max(len(known), 1) / max(len(unknown), 1)))
+        return float(np.log(self.settings.odds_unknown * max(len(known), 1) / max(len(unknown), 1)))
 
     @cached_property
     def ranked(self) -> tuple[tuple[Judged, float], ...]:

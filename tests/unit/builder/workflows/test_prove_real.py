@@ -13,7 +13,6 @@ from builder.workflows import prove_real as workflow
 from builder.workflows.held_out_fmu import overall
 from builder.workflows.prove_real import BY_SOUND, PLANTS, data_file, prove_real, rows_of
 from diagnosis.decision.posterior import Judged, Posterior
-from diagnosis.decision.settings import Settings
 from diagnosis.engine.calibration import Calibration, NearReadings
 from diagnosis.engine.fit import calibrate
 from diagnosis.engine.learnt import error_classes, rule
@@ -23,8 +22,6 @@ from diagnosis.engine.set_apart import calibrate_apart
 from diagnosis.results.assemble import Others, assemble
 from diagnosis.results.result import Diagnosis
 from models.base.errors import InputError
-from models.correction.correction import Correction
-from models.mechanisms import CATALOGUE
 
 SHORT = replace(PLANTS["rod"], train="0..10800", hold="10800..14400")
 
@@ -41,7 +38,6 @@ def calibrated(train: Any, gearbox: Any, *, holdout: Any, **_: object) -> Diagno
     return assemble(
         setup, experiment, posterior, (), plain=fit, calibration=calibration,
         others=Others(posterior=posterior, channels=apart, apart=apart),
-        settings=Settings(), catalogue=CATALOGUE, known=Correction(), train=train, held_out=holdout,
     )  # fmt: skip
 
 

@@ -26,7 +26,7 @@ from diagnosis.decision.posterior import KINDS, Judged, Posterior
 from diagnosis.decision.scanned import ScanInClass, Scanned, counts_less, hardly_there, in_best_classes, scan_in_classes
 from diagnosis.decision.settings import Settings
 from diagnosis.engine.calibration import Calibration, calibrate_with_error, recalibrate
-from diagnosis.engine.families import axis_of, changes, log_prior, parameters_outside
+from diagnosis.engine.families import axis_of, changes, parameters_outside
 from diagnosis.engine.fit import Experiment, Fit, calibrate
 from diagnosis.engine.learnt import ErrorClass, error_classes, rule
 from diagnosis.engine.prepare import prepare_experiment
@@ -66,7 +66,7 @@ def inferred(
                 *parameters_outside(there)]  # fmt: skip
 
     candidates = candidates_in(experiment)
-    return infer(calibrate_with_error(experiment, calibrate(experiment)), candidates, log_prior(candidates), Settings(),
+    return infer(calibrate_with_error(experiment, calibrate(experiment)), candidates, Settings(),
                  candidates_in=candidates_in)  # fmt: skip
 
 
@@ -82,7 +82,7 @@ def concealed(fzg: Gearbox) -> Posterior:
 
 def test_a_healthy_machine_stays_silent(healthy: Posterior) -> None:
     assert not healthy.detected and healthy.of("nothing") > 0.9
-    assert decide(healthy, Settings()) == ()
+    assert decide(healthy) == ()
 
 
 def test_a_concealed_effect_is_detected_and_first(concealed: Posterior) -> None:
@@ -92,7 +92,7 @@ def test_a_concealed_effect_is_detected_and_first(concealed: Posterior) -> None:
     assert sum(concealed.of(kind) for kind in KINDS) == pytest.approx(1.0)
     assert concealed.nothing.fit is not None  # a single baseline does not say how well the machine repeats
     assert concealed.nothing.fit.experiment.most_deviation == 0.2
-    answers = decide(concealed, Settings())
+    answers = decide(concealed)
     assert [one.effect.label for one in answers] == ["windage@oil"]
 
 
@@ -178,7 +178,7 @@ def test_nothing_gets_the_evidence_that_it_has_from_the_point_of_an_explanation(
     worse = replace(settled, chosen=replace(settled.chosen, log_evidence=settled.chosen.log_evidence - 50.0))
     placed = CATALOGUE["windage"].placed(experiment.machine.model.network, setup.scale, setup.channels)
     candidates = [hypothesis_of(one) for one in placed]
-    right, found = (infer(one, candidates, log_prior(candidates), Settings()) for one in (settled, worse))
+    right, found = (infer(one, candidates, Settings()) for one in (settled, worse))
     assert right.log_e > 10.0 and found.log_e == pytest.approx(right.log_e, abs=3.0)
     assert right.elsewhere is None and found.elsewhere is not None
     again = recalibrate(worse, found.elsewhere).chosen

@@ -14,7 +14,6 @@ import pytest
 from diagnosis.candidates.hypotheses import Hypothesis, hypothesis_of
 from diagnosis.decision.answer import Answer
 from diagnosis.decision.posterior import Expected, Judged, Placebo, Posterior
-from diagnosis.decision.settings import Settings
 from diagnosis.engine.calibration import Calibration, NearReadings
 from diagnosis.engine.families import candidates_of
 from diagnosis.engine.fit import Experiment, Fit, calibrate
@@ -36,7 +35,7 @@ from diagnosis.results.findings import estimates_of
 from diagnosis.results.result import Diagnosis
 from diagnosis.setup.inference_setup import InferenceSetup
 from models.assembly.gearbox import Gearbox
-from models.correction.correction import MODEL_ERROR, Correction, correction_text, read_correction, write_correction
+from models.correction.correction import MODEL_ERROR, correction_text, read_correction, write_correction
 from models.files.cycle import Cycle
 from models.mechanisms import CATALOGUE, Scale
 from tests.unit.diagnosis.inference_example import recording_of
@@ -124,14 +123,13 @@ def calibration(prepared: Prepared) -> Calibration:
 
 
 @pytest.fixture(scope="module")
-def assembled(prepared: Prepared, calibration: Calibration, recordings: tuple[Recording, Recording]) -> Assemble:
+def assembled(prepared: Prepared, calibration: Calibration) -> Assemble:
     setup, experiment, plain = prepared
 
     def result(posterior: Posterior, answers: list[Answer], **given: Any) -> Diagnosis:
         return assemble(
             setup, given.pop("experiment", experiment), posterior, answers, plain=plain,
-            calibration=calibration, settings=Settings(),
-            catalogue=CATALOGUE, known=Correction(), train=recordings[:1], held_out=recordings[1:], **given,
+            calibration=calibration, **given,
         )  # fmt: skip
 
     return result
@@ -260,9 +258,7 @@ def test_a_link_that_changes_at_a_date_acts_like(
     setup, experiment, plain = prepared
     starts = {RECORDED: starts_at, "judged": 0.0}
     own = replace(experiment, starts_at=starts)
-    effect = next(
-        one for one in candidates_of(setup, own, CATALOGUE) if one.label == "radiation_for_a_while@housing_air"
-    )
+    effect = next(one for one in candidates_of(setup, own) if one.label == "radiation_for_a_while@housing_air")
     assert effect.term is not None and effect.clock is not None
     values = {"strength": -0.4, "since": starts_at + DATE_S, "lasting": 1800.0, "start": 0.0}
     variant = np.array([[values[p.name.removeprefix(f"{effect.term.label}_")] for p in effect.term.parameters]])
