@@ -24,8 +24,8 @@ from diagnosis.recordings.recording import Recording
 from diagnosis.recordings.shared_rows import check_shared_rows
 from diagnosis.results.assemble import Others, assemble, faulty_channels
 from diagnosis.results.result import Diagnosis
-from diagnosis.setup.baselines import check_baselines
 from diagnosis.setup.plausibility import check_plausible
+from diagnosis.setup.sessions import check_baselines
 from diagnosis.setup.shaft import shafts, with_shaft
 from models.assembly.gearbox import Gearbox, load_gearbox
 from models.base.errors import InputError

@@ -10,7 +10,7 @@ import numpy as np
 from diagnosis.candidates.hypotheses import Hypothesis
 from diagnosis.decision.posterior import Judged, Posterior
 from diagnosis.engine.learnt import Rule
-from diagnosis.engine.scan import heat_over_time
+from diagnosis.engine.scan import course_of_heat
 from models.network.laws import symbol
 from models.terms.term import Term
 
@@ -152,7 +152,7 @@ def _act_together(best: Judged, overlap: float) -> bool:
     of_time = [term for term in terms if symbol("time") in term.expression.free_symbols]
     if best.fit is None or len(of_time) < 2 or _changed(of_time[0]).isdisjoint(_changed(of_time[1])):
         return False
-    first, second = (heat_over_time(best.fit, term) for term in of_time)
+    first, second = (course_of_heat(best.fit, term) for term in of_time)
     return abs(float(first @ second)) > overlap * float(np.linalg.norm(first) * np.linalg.norm(second))
 
 

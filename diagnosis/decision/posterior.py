@@ -255,13 +255,11 @@ class Posterior:
     placebo: Placebo | None = None
     elsewhere: Fit | None = None
 
-    @property
-    def remainder(self) -> float:
-        """Log Bayes factor of the best further effect, given the best single one, [nat]; 0 if none was looked for."""
-        return self.left_by(None)
+    def left_by(self, one: Judged | None = None) -> float:
+        """Log Bayes factor of the best further effect, given an explanation or else the best single one, [nat].
 
-    def left_by(self, one: Judged | None) -> float:
-        """Log Bayes factor of the best further effect, given an explanation or else the best single one, [nat]."""
+        0 if none was looked for.
+        """
         return self._scanned_beyond(one).left or 0.0
 
     def _scanned_beyond(self, one: Judged | None) -> Judged:
@@ -317,7 +315,7 @@ class Posterior:
             of_names.setdefault(one.names, []).append(one)
         log_bayes = np.array([self._mean_log_bayes(names, members) for names, members in of_names.items()])
         able = np.ones(len(log_bayes), dtype=bool)
-        if self.remainder <= self.class_threshold:  # a second effect needs evidence of its own
+        if self.left_by() <= self.class_threshold:  # a second effect needs evidence of its own
             able = np.array([len(names) == 1 for names in of_names], dtype=bool)
         parameter = np.array([members[0].of_parameters for members in of_names.values()], dtype=bool)
         log_prior = np.array([self._log_odds(members[0].kind) for members in of_names.values()])

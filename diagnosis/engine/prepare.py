@@ -20,11 +20,10 @@ from diagnosis.engine.unknown import (
 )
 from diagnosis.forward.grid import slow_rows
 from diagnosis.recordings.recording import Recording
-from diagnosis.setup.baselines import session_by_recording
 from diagnosis.setup.inference_setup import InferenceSetup, prepare
 from diagnosis.setup.noise import start_guess
+from diagnosis.setup.sessions import session_by_recording, start_times
 from diagnosis.setup.shaft import torque_gain
-from diagnosis.setup.time_axis import start_times
 from models.assembly.gearbox import Gearbox
 from models.mechanisms import CATALOGUE, Mechanism
 from models.network.laws import Parameter

@@ -250,7 +250,7 @@ def _finite(heat: Array) -> Array:
     return heat if np.isfinite(heat.sum()) else np.nan_to_num(heat, nan=0.0, posinf=0.0, neginf=0.0)
 
 
-def heat_over_time(fit: Fit, term: Term) -> Array:
+def course_of_heat(fit: Fit, term: Term) -> Array:
     """Net heat of a term of the network in every interval of a fit, times the root of its length, [W s^0.5].
 
     So the inner product of two of them is their integral over the time.

@@ -20,13 +20,12 @@ from diagnosis.engine.set_apart import refit_to_predict
 from diagnosis.forward.grid import too_short
 from diagnosis.forward.whitening import RandomHeat
 from diagnosis.results.advice import next_test
-from diagnosis.results.baseline_notes import baseline_notes
 from diagnosis.results.findings import estimates_of, finding_of, joint_estimate_of, switch_errors
 from diagnosis.results.instruments import sensors_and_inputs_of
 from diagnosis.results.locations import locations_of
+from diagnosis.results.notes import baseline_notes, ratio_notes
 from diagnosis.results.predicted_run import PredictedRun
 from diagnosis.results.predictions import Predicted, Predictions, predict_recordings, temperatures
-from diagnosis.results.ratios_only import ratio_notes
 from diagnosis.results.result import Diagnosis, Verdict
 from diagnosis.results.result_parts import (
     NO_CLAIM,
@@ -36,7 +35,7 @@ from diagnosis.results.result_parts import (
     Fits,
     NotDetectable,
     Ranked,
-    law_of,
+    called,
     spoiled_in,
 )
 from diagnosis.setup.inference_setup import InferenceSetup
@@ -311,7 +310,7 @@ def _remaining(posterior: Posterior, others: Others | None, best: Judged | None)
         return f"without {channels} nothing stands out of noise and model error (evidence {rest.log_e:.1f} nat)"
     if _looked_no_further(best):
         return (
-            f"two effects were fitted (evidence {posterior.remainder:.0f} nat of the second), no third was looked for"
+            f"two effects were fitted (evidence {posterior.left_by():.0f} nat of the second), no third was looked for"
         )
     left = posterior.left_by(best)
     if left > posterior.class_threshold:
@@ -427,7 +426,7 @@ def _ranking(posterior: Posterior) -> tuple[Ranked, ...]:
             place=" + ".join(effect.place for effect in one.effects),
             family=" + ".join(dict.fromkeys(effect.family for effect in one.effects)), log_bayes=one.log_bayes,
             probability=probability,
-            laws=tuple(law_of(effect.mechanism, effect.place) for effect in one.effects),
+            laws=tuple(called(effect.mechanism, effect.place) for effect in one.effects),
         )
         for one, probability in ranked[:MOST_RANKED]
     )  # fmt: skip

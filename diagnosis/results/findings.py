@@ -14,13 +14,14 @@ from diagnosis.decision.answer import Answer
 from diagnosis.decision.posterior import Posterior
 from diagnosis.engine.fit import Experiment, Fit
 from diagnosis.engine.unknown import SensorBias, Unknown
+from diagnosis.forward.grid import Piece
 from diagnosis.forward.term_on_grid import TermOnGrid
 from diagnosis.recordings.recording import Recording
 from diagnosis.results.advice import separation
 from diagnosis.results.joint_estimate import JointEstimate
 from diagnosis.results.places import node_in
-from diagnosis.results.result_parts import LEAST_RIVAL, Change, Finding, ParameterValue, Rival, Switching, law_of
-from diagnosis.setup.inference_setup import InferenceSetup, heat_over_time
+from diagnosis.results.result_parts import LEAST_RIVAL, Change, Finding, ParameterValue, Rival, Switching, called
+from diagnosis.setup.inference_setup import InferenceSetup
 from models.base.types import Array
 from models.mechanisms import Placed
 from models.network.laws import symbol
@@ -65,10 +66,10 @@ def finding_of(answer: Answer, fit: Fit, setup: InferenceSetup, posterior: Poste
         heat_mean_W=mean,
         heat_stderr_W=stderr,
         heat_max_W=max((float(np.abs(heat).max()) for heat in heats), default=0.0),
-        heat=heat_over_time(pieces, heats) if heats else {},
+        heat=_over_time(pieces, heats) if heats else {},
         term=None if term is None else term.with_values(found),
         grade=answer.grade,
-        tie_set=tuple(dict.fromkeys(law_of(one.mechanism, one.place) for one, _ in answer.tied)),
+        tie_set=tuple(dict.fromkeys(called(one.mechanism, one.place) for one, _ in answer.tied)),
         joint_probability=answer.joint,
         acts_like=answer.acts_like,
         date=change_of(values, effect, fit.experiment, setup.recordings),
@@ -262,6 +263,16 @@ def heats_of(fit: Fit, effect: Hypothesis) -> list[Array]:
         return []
     values = np.array([[values_of(fit, effect)[name][0] for name in names_of(effect)]])
     return [heat[:, 0] for heat in _heats_with(fit, effect, values)]
+
+
+def _over_time(pieces: Sequence[Piece], heats: Sequence[Array]) -> dict[str, tuple[Array, Array]]:
+    """Heats of pieces [W] by recording: time at the middles of the intervals [s], and heat."""
+    result: dict[str, tuple[Array, Array]] = {}
+    for piece, heat in zip(pieces, heats, strict=True):
+        time, before = piece.middle, result.get(piece.recording)
+        result[piece.recording] = (time, heat) if before is None else (
+            np.concatenate([before[0], time]), np.concatenate([before[1], heat]))  # fmt: skip
+    return result
 
 
 def mean_heat_of(fit: Fit, effect: Hypothesis) -> tuple[float, float]:

@@ -202,13 +202,3 @@ def typical_loss(model: NetworkOnGrid, recordings: Sequence[Recording]) -> float
         values.append(power[np.abs(speed) > STANDSTILL_RPM])
     found = np.concatenate(values) if values else np.zeros(0)
     return float(np.median(found)) if len(found) else 1.0
-
-
-def heat_over_time(parts: Sequence[Piece], heats: Sequence[Array]) -> dict[str, tuple[Array, Array]]:
-    """Heats of pieces [W] by recording: time at the middles of the intervals [s], and heat."""
-    result: dict[str, tuple[Array, Array]] = {}
-    for piece, heat in zip(parts, heats, strict=True):
-        time, before = piece.middle, result.get(piece.recording)
-        result[piece.recording] = (time, heat) if before is None else (
-            np.concatenate([before[0], time]), np.concatenate([before[1], heat]))  # fmt: skip
-    return result

@@ -289,7 +289,7 @@ def test_two_that_come_and_go_together_are_no_claims(
 
     pair = law("first", "oil"), law("second", second)
     heats = {"first_oil": np.array([2.0, 0.0]), f"second_{second}": np.array([cosine, np.sqrt(1.0 - cosine**2)])}
-    monkeypatch.setattr(answer_module, "heat_over_time", lambda _, term: heats[term.label])
+    monkeypatch.setattr(answer_module, "course_of_heat", lambda _, term: heats[term.label])
     fit = cast(Fit, SimpleNamespace(experiment=SimpleNamespace(unknowns=[], pieces=[], healthy=set()), z=np.zeros(0)))
     both = replace(judged(2.0 * STRONG, *pair), fit=fit, left=0.0)
     answers = decide(posterior(*(judged(STRONG, one) for one in pair), both, remainder=10.0))

@@ -16,7 +16,7 @@ from diagnosis.engine.refit import refit
 from diagnosis.engine.scan import scan
 from diagnosis.engine.sessions import over_sessions, sessions_apart
 from diagnosis.recordings.recording import Recording
-from diagnosis.results.baseline_notes import evidence_in_baselines
+from diagnosis.results.notes import evidence_in_baselines
 from diagnosis.setup.inference_setup import InferenceSetup
 from models.assembly.gearbox import Gearbox
 from models.mechanisms import CATALOGUE, Scale

@@ -1,18 +1,22 @@
-"""Notes on baselines: an effect that acts in them too, and sessions that look like another machine."""
+"""Notes: baselines with the effect or of another machine, and recordings that identify ratios only."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from diagnosis.candidates.hypotheses import Hypothesis
 from diagnosis.decision.answer import Answer
 from diagnosis.decision.posterior import Placebo, Posterior
 from diagnosis.engine.fit import Experiment, Fit
+from diagnosis.engine.scale import scale_direction
 from diagnosis.engine.scan import scan
 from diagnosis.engine.sessions import sessions_apart
 
 NOTED_FROM = 5.0  # nats
+LITTLE = 0.01  # of what the recordings know about the sizes one by one: a small part of fixed capacity pretends so much
 
 
 def baseline_notes(experiment: Experiment, posterior: Posterior, answers: Sequence[Answer]) -> tuple[str, ...]:
@@ -94,3 +98,24 @@ def baselines_told(
             "(for as many hours as are tested) do not count. If it may have changed there, leave the session out."
         )
     return tuple(notes)
+
+
+def ratio_notes(fit: Fit) -> tuple[str, ...]:
+    """One sentence if recordings identify ratios only, so that every watt rests on the priors; else nothing.
+
+    The information that they have along the common factor of all sizes is compared with what they have on the sizes
+    one by one.
+    """
+    direction = scale_direction(fit.experiment.machine.model.network, fit.experiment.unknowns)
+    each = np.concatenate([part.columns for part in fit.parts]) * direction
+    together, alone = each.sum(axis=1), np.square(each).sum(axis=0)[direction != 0.0]
+    if not len(alone) or float(together @ together) > LITTLE * float(alone.sum()):
+        return ()
+    sd = 1.0 / np.sqrt(float(direction @ direction))
+    text = (
+        "only ratios are identified: all heats, conductances and heat capacities together may be larger or smaller by "
+        f"one factor without any change of a temperature. That factor rests on the definition's priors (a factor of "
+        f"{np.exp(sd):.2f} either way, one standard deviation), and so does every number in W, W/K or J/K; measure the "
+        "loss, or one heat flow, to fix it"
+    )
+    return (text,)
