@@ -100,7 +100,7 @@ def _best_fitted(posterior: Posterior) -> Judged:
     fitted = [one for one in posterior.judged if one.fit is not None and set(explanation.names) <= set(one.names)]
     labels = {effect.label for effect in first.effects}
     there = [one for one in fitted if labels <= {effect.label for effect in one.effects}]
-    return max(there or fitted, key=lambda one: one.log_bayes + one.log_prior, default=first)
+    return max(there or fitted, key=lambda one: one.weight, default=first)
 
 
 def _answer(posterior: Posterior, best: Judged, effect: Hypothesis) -> Answer | None:

@@ -11,7 +11,7 @@ from diagnosis.candidates.hypotheses import Hypothesis
 from diagnosis.decision.posterior import Placebo
 from diagnosis.decision.scanned import OVER_TIME, Scanned, counts_less, scan_in_classes
 from diagnosis.engine.calibration import Calibration
-from diagnosis.engine.families import log_prior
+from diagnosis.engine.families import with_priors
 from diagnosis.engine.fit import Experiment
 from diagnosis.engine.learnt import rule
 from diagnosis.engine.scan import scan
@@ -61,8 +61,8 @@ def judge_baselines(
         tried = [one for one in candidates_in(swapped) if one.term is None or whole.scope_of(one.name) is not None]
         if not any(one.how == "always" for one in tried):  # what is switched off has no place in this machine
             continue
-        there = scan(replace(fit, experiment=swapped), tried, columns)
-        judged = scan_in_classes(calibration, there, log_prior(tried))
+        there = scan(replace(fit, experiment=swapped), with_priors(tried), columns)
+        judged = scan_in_classes(calibration, there)
         longer = max(tested / sum(hours[name] for name in starts), 1.0)
         always = _part(judged, [i for i, one in enumerate(judged.candidates) if one.how not in OVER_TIME])
         best = next(one for one in map(always.candidates.__getitem__, always.order) if one.term is not None)
@@ -90,5 +90,5 @@ def are_trusted(sessions: int, lasting: float, tested: float) -> bool:
 
 
 def _part(scanned: Scanned, at: Sequence[int]) -> Scanned:
-    return replace(scanned, candidates=tuple(scanned.candidates[i] for i in at), log_prior=scanned.log_prior[at],
+    return replace(scanned, candidates=tuple(scanned.candidates[i] for i in at),
                    log_bayes=scanned.log_bayes[np.array(at)], best=tuple(scanned.best[i] for i in at))  # fmt: skip

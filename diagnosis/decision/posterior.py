@@ -38,8 +38,6 @@ class Judged:
     ----------
     effects : tuple of Hypothesis
         What it adds to the machine: nothing, one thing, or two; each with one variant left: the most probable shape
-    log_prior : float
-        Of this effect at this place, [nat]
     log_bayes : float
         Log Bayes factor against nothing, model error and deviations between sessions marginalised, [nat]
     error_class : ErrorClass
@@ -51,11 +49,26 @@ class Judged:
     """
 
     effects: tuple[Hypothesis, ...]
-    log_prior: float
     log_bayes: float
     error_class: ErrorClass
     fit: Fit | None = None
     left: float | None = None
+
+    @property
+    def log_prior(self) -> float:
+        """Of its effects at their places, [nat]."""
+        return float(sum(effect.log_prior for effect in self.effects))
+
+    @property
+    def weight(self) -> float:
+        """Evidence and prior, [nat]."""
+        return self.log_bayes + self.log_prior
+
+    @property
+    def fitted(self) -> Fit:
+        """The fit of one that has one."""
+        assert self.fit is not None, self.label  # noqa: S101
+        return self.fit
 
     @property
     def kind(self) -> Kind:
@@ -111,13 +124,15 @@ class Expected:
     ----------
     log_bayes : float
         Expected evidence for it, [nat]
-    log_prior : float
-        To 1 of nothing, [nat]; both together are what may reach the threshold
     """
 
     effect: Hypothesis
     log_bayes: float
-    log_prior: float
+
+    @property
+    def weight(self) -> float:
+        """Evidence and prior, which may reach the threshold, [nat]."""
+        return self.log_bayes + self.effect.log_prior
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -327,7 +342,7 @@ class Posterior:
             if len(left):
                 chance[left] = whole * softmax(log_prior[left] + log_bayes[left] / (a + b * most))
         found = [
-            Explanation(names=names, members=tuple(sorted(members, key=lambda one: -one.log_prior - one.log_bayes)),
+            Explanation(names=names, members=tuple(sorted(members, key=lambda one: -one.weight)),
                         log_bayes=value, probability=p)
             for (names, members), value, p in zip(of_names.items(), log_bayes.tolist(), chance.tolist(), strict=True)
         ]  # fmt: skip
@@ -345,7 +360,7 @@ class Posterior:
     def _mean_log_bayes(self, names: tuple[str, ...], members: Sequence[Judged]) -> float:
         """Evidence of a name over its places and shapes; of a pair with the prior of a second effect, [nat]."""
         within = sum(np.log(self._known_names.get(name, 1.0)) for name in names)
-        mean = float(logsumexp([one.log_prior + one.log_bayes for one in members]) - within)
+        mean = float(logsumexp([one.weight for one in members]) - within)
         pair = float(np.log(self.rule.pair / max(len(self._known_names), 1)))
         return mean + (pair if len(names) > 1 else 0.0)
 
@@ -362,7 +377,7 @@ class Posterior:
         """Everything judged with its probability, most probable first."""
         result = []
         for explanation in self.explanations:
-            log = np.array([one.log_prior + one.log_bayes for one in explanation.members])
+            log = np.array([one.weight for one in explanation.members])
             shares = explanation.probability * np.exp(log - logsumexp(log))
             result += list(zip(explanation.members, shares.tolist(), strict=True))
         return tuple(sorted(result, key=lambda one: -one[1]))

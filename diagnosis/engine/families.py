@@ -28,7 +28,6 @@ from diagnosis.engine.set_apart import standing_still
 from diagnosis.engine.unknown import NetworkParameter, SensorBias
 from diagnosis.forward.grid import Piece
 from diagnosis.setup.inference_setup import STANDSTILL_RPM, InferenceSetup
-from models.base.types import Array
 from models.mechanisms import Placed
 from models.mechanisms.ageing import FAMILY as AGEING
 from models.mechanisms.forms import EDGE_S
@@ -152,16 +151,14 @@ def _running(pieces: Sequence[Piece]) -> list[float]:
     return [float(t) for t in begin[at] + wanted - passed[at]]
 
 
-def log_prior(hypotheses: Sequence[Hypothesis]) -> Array:
-    """Prior of every hypothesis, [nat]: its family's share, uniform over names and then over places.
+def with_priors(hypotheses: Sequence[Hypothesis]) -> tuple[Hypothesis, ...]:
+    """All hypotheses with their priors: the share of the family, uniform over its names and then over places.
 
-    Returns
-    -------
-    Array, shape (hypotheses,)
-        Normalised over all
+    The priors of all together are 1.
     """
     places = Counter((h.how, h.name) for h in hypotheses)
     names = Counter(how for how, _ in places)
     shares = family_priors()
     log = np.array([np.log(shares[h.how] / names[h.how] / places[h.how, h.name]) for h in hypotheses])
-    return np.asarray(log - np.logaddexp.reduce(log))
+    log = log - np.logaddexp.reduce(log)
+    return tuple(replace(h, log_prior=value) for h, value in zip(hypotheses, log.tolist(), strict=True))

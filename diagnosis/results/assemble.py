@@ -290,12 +290,12 @@ def verdict_of(
 def _unseen(posterior: Posterior, catalogue: Mapping[str, Mechanism]) -> tuple[NotDetectable, ...]:
     """Mechanisms that would not have been seen at the size that matters, at their best place."""
     best: dict[str, Expected] = {}
-    for one in sorted(posterior.expected, key=lambda one: one.log_bayes + one.log_prior):
+    for one in sorted(posterior.expected, key=lambda one: one.weight):
         if one.effect.name in catalogue:
             best[one.effect.name] = one
     return tuple(
         NotDetectable(mechanism=name, place=one.effect.place, needed=catalogue[name].experiment, expected=one.log_bayes)
-        for name, one in sorted(best.items()) if one.log_bayes + one.log_prior < posterior.threshold
+        for name, one in sorted(best.items()) if one.weight < posterior.threshold
     )  # fmt: skip
 
 

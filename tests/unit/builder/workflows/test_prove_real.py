@@ -31,7 +31,7 @@ def calibrated(train: Any, gearbox: Any, *, holdout: Any, **_: object) -> Diagno
     setup, experiment = prepare_experiment(gearbox, train, holdout)
     plain = calibrate(experiment)
     fit, apart = calibrate_apart(experiment, plain)
-    nothing = Judged(effects=(), log_prior=0.0, log_bayes=0.0, fit=fit, error_class=error_classes()[0])
+    nothing = Judged(effects=(), log_bayes=0.0, fit=fit, error_class=error_classes()[0])
     posterior = Posterior(nothing=nothing, judged=(), log_e=-1.0, threshold=5.0, class_threshold=5.0, rule=rule())
     near = NearReadings.of(experiment, ModelError.of(experiment), plain)
     calibration = Calibration(chosen=near.fitted(nothing.error_class, plain, iterations=0), evidence={}, near=near)

@@ -36,7 +36,7 @@ def effect(
     term = Term(label=label, kind=kind, target=target or (place,), expression=symbol(strength.name),
                 parameters=(strength,))  # fmt: skip
     return Hypothesis(**({"name": name, "place": place, "family": "heat", "term": term, "law": name,
-                          "variants": np.ones((1, 1))} | given))  # fmt: skip
+                          "variants": np.ones((1, 1)), "log_prior": EACH} | given))  # fmt: skip
 
 
 def outside(parameter: str) -> Hypothesis:
@@ -48,9 +48,8 @@ def over_hours(law: str) -> Hypothesis:
     return effect(f"{law}_over_hours", law=law, how="over_hours", clock="start")
 
 
-def judged(log_bayes: float, *effects: Hypothesis, log_prior: float | None = None) -> Judged:
-    prior = EACH * len(effects) if log_prior is None else log_prior
-    return Judged(effects=effects, log_prior=prior, log_bayes=log_bayes, error_class=error_classes()[0])
+def judged(log_bayes: float, *effects: Hypothesis) -> Judged:
+    return Judged(effects=effects, log_bayes=log_bayes, error_class=error_classes()[0])
 
 
 def posterior(*each: Judged, remainder: float | None = None, **given: Any) -> Posterior:
@@ -84,7 +83,7 @@ def test_the_evidence_of_a_name_is_the_mean_over_its_places() -> None:
 
 
 def test_places_weigh_in_the_mean_by_their_priors() -> None:
-    likely, unlikely = judged(STRONG, effect("law", "a")), judged(0.0, effect("law", "b"), log_prior=EACH - np.log(3.0))
+    likely, unlikely = judged(STRONG, effect("law", "a")), judged(0.0, effect("law", "b", log_prior=EACH - np.log(3.0)))
     (found,) = posterior(likely, unlikely).explanations
     assert found.log_bayes == pytest.approx(STRONG + np.log(0.75))
     assert found.members == (likely, unlikely)
@@ -104,7 +103,7 @@ def test_between_names_the_evidence_is_tempered() -> None:
 
 def test_the_prior_of_a_name_does_not_count_between_names() -> None:
     """Only the evidence separates names; more places or a larger family make none of them more probable."""
-    found = chances(posterior(judged(STRONG, effect("first"), log_prior=2.0 * EACH), judged(STRONG, effect("second"))))
+    found = chances(posterior(judged(STRONG, effect("first", log_prior=2.0 * EACH)), judged(STRONG, effect("second"))))
     assert found["first"] == pytest.approx(found["second"])
 
 
@@ -121,7 +120,7 @@ def test_probabilities_sum_to_one_with_nothing() -> None:
     sensor = effect("sensor_bias", kind="sensor")
     pair = judged(STRONG + 8.0, effect("first"), effect("second"))
     every = [judged(STRONG, effect("first")), judged(STRONG, sensor), judged(50.0, parameter), pair,
-             judged(STRONG, effect("unknown_heat", family=OPEN_FORM), log_prior=0.0)]  # fmt: skip
+             judged(STRONG, effect("unknown_heat", family=OPEN_FORM, log_prior=0.0))]  # fmt: skip
     found = posterior(*every, log_e=6.0, log_parameter=4.0, remainder=10.0)
     of_kind = {kind: found.of(kind) for kind in KINDS}
     assert sum(of_kind.values()) == pytest.approx(1.0)
@@ -151,7 +150,7 @@ def test_a_machine_that_fits_badly_without_the_effect_needs_more_evidence() -> N
 
 @pytest.mark.parametrize("odds", [0.01, 0.5])
 def test_a_cause_outside_the_catalogue_has_the_odds_of_the_user(odds: float) -> None:
-    unknown = judged(STRONG, effect("unknown_heat", family=OPEN_FORM), log_prior=0.0)
+    unknown = judged(STRONG, effect("unknown_heat", family=OPEN_FORM, log_prior=0.0))
     found = posterior(*several(4), unknown, settings=Settings(odds_unknown=odds))
     assert found.of("outside") / found.of("mechanism") == pytest.approx(odds)
 
@@ -386,7 +385,7 @@ def test_a_parameter_outside_its_prior_goes_behind_something_that_is_missing() -
 
 
 def test_an_unknown_heat_is_never_a_claim() -> None:
-    (answer,) = decide(posterior(judged(STRONG, effect("unknown_heat", family=OPEN_FORM), log_prior=0.0)))
+    (answer,) = decide(posterior(judged(STRONG, effect("unknown_heat", family=OPEN_FORM, log_prior=0.0))))
     assert answer.probability > ENOUGH and (answer.grade, answer.acts_like) == ("likely", True)
 
 

@@ -11,7 +11,7 @@ import sympy as sp
 
 from diagnosis.candidates.dated import Axis
 from diagnosis.candidates.hypotheses import How, Hypothesis
-from diagnosis.engine.families import axis_of, candidates_of, log_prior
+from diagnosis.engine.families import axis_of, candidates_of, with_priors
 from diagnosis.engine.fit import Experiment, Fit, calibrate
 from diagnosis.engine.outside import judge_outside, outside_of
 from diagnosis.engine.prepare import prepare_experiment
@@ -213,7 +213,7 @@ def test_a_loss_that_changes_has_the_name_of_its_parameter(candidates: tuple[Hyp
 
 def test_prior_of_families(candidates: tuple[Hypothesis, ...]) -> None:
     """Shares of the families; names in a family are alike, and so are places of a name."""
-    prior = np.exp(log_prior(candidates))
+    prior = np.exp([one.log_prior for one in with_priors(candidates)])
     assert prior.sum() == pytest.approx(1.0)
     share = {how: sum(p for p, h in zip(prior, candidates, strict=True) if h.how == how) for how in get_args(How)}
     assert share["from_date"] / share["always"] == pytest.approx(0.2 / 0.6)
