@@ -24,7 +24,7 @@ from rich.table import Table
 from diagnosis.decision.scanned import scan_in_classes
 from diagnosis.decision.settings import Settings
 from diagnosis.engine.calibration import calibrate_with_error
-from diagnosis.engine.families import candidates_of, log_prior
+from diagnosis.engine.families import candidates_of, with_priors
 from diagnosis.engine.fit import calibrate
 from diagnosis.engine.learnt import ErrorClass, error_classes
 from diagnosis.engine.model_error.groups import GROUPS
@@ -35,7 +35,6 @@ from diagnosis.proof.scoring.truth import CONTROL, Truth, read_truths
 from diagnosis.recordings.read import read_recordings
 from models.assembly.gearbox import load_gearbox
 from models.base.parallel import iterate_parallel
-from models.mechanisms import CATALOGUE
 
 AS_IT_IS = "as it is"
 FINE = {"law_deg5", "loss_own", "lag", "hours"}
@@ -77,15 +76,15 @@ def scan_case(folder: Path, gearbox: str) -> dict[str, Any]:
     )
     setup, experiment = prepare_experiment(machine, train, held)
     calibration = calibrate_with_error(experiment, calibrate(experiment))
-    candidates = candidates_of(setup, experiment, CATALOGUE)
-    found, prior = scan(calibration.fit, candidates, calibration.near.columns), log_prior(candidates)
+    candidates = with_priors(candidates_of(setup, experiment))
+    found = scan(calibration.fit, candidates, calibration.near.columns)
     result: dict[str, Any] = {"case": folder.name}
     for name, classes in variants().items():
-        scanned = scan_in_classes(calibration, found, prior, classes)
+        scanned = scan_in_classes(calibration, found, classes)
         nothing = max(float(np.log(one.error_class.prior)) + one.over.log_evidence for one in scanned.classes)
         scanned, threshold = scanned.to_its_best(RATE)
         names: dict[str, float] = {}
-        for candidate, weight in zip(candidates, (scanned.log_bayes + prior).tolist(), strict=True):
+        for candidate, weight in zip(candidates, scanned.weights.tolist(), strict=True):
             names[candidate.mechanism] = max(weight, names.get(candidate.mechanism, -np.inf))
         result[name] = {"nothing": nothing, "log_e": scanned.log_e, "threshold": threshold, "names": names}
     return result

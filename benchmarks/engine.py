@@ -23,12 +23,11 @@ from benchmarks.diagnose import make_recordings
 from diagnosis.decision.infer import infer
 from diagnosis.decision.settings import Settings
 from diagnosis.engine.calibration import calibrate_with_error
-from diagnosis.engine.families import candidates_of, log_prior
+from diagnosis.engine.families import candidates_of
 from diagnosis.engine.fit import calibrate
 from diagnosis.engine.prepare import prepare_experiment
 from diagnosis.recordings.read import read_recordings
 from models.assembly.gearbox import load_gearbox
-from models.mechanisms import CATALOGUE
 
 CONTRACT_H, WEEK_H, STEP_S = (20.0, 6.0), (168.0,), 10.0
 TARGET_S, TARGET_GB, TARGET_WEEK_GB = 30.0, 2.0, 3.0
@@ -67,10 +66,9 @@ def stages_of(gearbox: str, recordings: Sequence[str]) -> dict[str, float]:
     clock.mark("preparation")
     calibration = calibrate_with_error(experiment, calibrate(experiment))
     clock.mark("calibration")
-    candidates = candidates_of(setup, experiment, CATALOGUE)
-    prior = log_prior(candidates)
+    candidates = candidates_of(setup, experiment)
     clock.mark("candidates placed")
-    infer(calibration, candidates, prior, Settings(), progress=clock.told)
+    infer(calibration, candidates, Settings(), progress=clock.told)
     clock.end()
     return clock.stages
 

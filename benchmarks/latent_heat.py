@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from diagnosis.engine.fit import Fit
-from diagnosis.engine.products import base_of, gram_of
+from diagnosis.engine.gram import base_of, gram_of
 from diagnosis.forward.grid import Piece
 from models.base.types import Array
 

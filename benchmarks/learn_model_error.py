@@ -21,11 +21,10 @@ import numpy as np
 
 from diagnosis.engine.calibration import WIDEST_CLASS, calibrate_with_error
 from diagnosis.engine.fit import calibrate
-from diagnosis.engine.gram import Given
+from diagnosis.engine.gram import Given, gram_of, whitened_base
 from diagnosis.engine.learnt import error_classes
 from diagnosis.engine.model_error import ModelError
 from diagnosis.engine.prepare import prepare_experiment
-from diagnosis.engine.products import gram_of, whitened_base
 from diagnosis.proof.zoo.conceal_zoo import write_zoo_case
 from diagnosis.proof.zoo.draw import draw_case
 from diagnosis.proof.zoo.families import FAMILIES

@@ -12,7 +12,7 @@ from diagnosis.decision.answer import decide
 from diagnosis.decision.infer import infer
 from diagnosis.decision.settings import Settings
 from diagnosis.engine.calibration import calibrate_with_error, recalibrate
-from diagnosis.engine.families import candidates_of, log_prior
+from diagnosis.engine.families import candidates_of
 from diagnosis.engine.fit import calibrate
 from diagnosis.engine.known_switches import start_with_switches
 from diagnosis.engine.outside import outside_of
@@ -24,8 +24,8 @@ from diagnosis.recordings.recording import Recording
 from diagnosis.recordings.shared_rows import check_shared_rows
 from diagnosis.results.assemble import Others, assemble, faulty_channels
 from diagnosis.results.result import Diagnosis
-from diagnosis.setup.baselines import check_baselines
 from diagnosis.setup.plausibility import check_plausible
+from diagnosis.setup.sessions import check_baselines
 from diagnosis.setup.shaft import shafts, with_shaft
 from models.assembly.gearbox import Gearbox, load_gearbox
 from models.base.errors import InputError
@@ -91,8 +91,7 @@ def diagnose(
     """
     catalogue = CATALOGUE if catalogue is None else catalogue
     gearbox = gearbox if isinstance(gearbox, Gearbox) else load_gearbox(gearbox)
-    known = Correction() if correction is None else correction.of_machine()
-    gearbox = corrected_gearbox(gearbox, known)
+    gearbox = corrected_gearbox(gearbox, Correction() if correction is None else correction.of_machine())
     train, held, healthy = named_apart(*(_read(given, gearbox) for given in (recordings, holdout, baseline)))
     off = (switched_off,) if isinstance(switched_off, str) else tuple(switched_off)
     if not train:
@@ -107,19 +106,18 @@ def diagnose(
         judge_temperatures=not gearbox.is_parametric,
     )  # fmt: skip
     progress("reading the recordings and setting up the inference")
-    setup, experiment = prepare_experiment(gearbox, train, held, healthy, switched_off=off)
+    setup, experiment = prepare_experiment(gearbox, train, held, healthy, switched_off=off, catalogue=catalogue)
     _refuse_too_short(train, experiment.pieces)
     try:
         progress("calibrating the model")
-        start = start_with_switches(gearbox, experiment, train, held, healthy)
+        start = start_with_switches(setup, experiment)
         plain = calibrate(experiment, start)
         others, apart = calibrate_apart(experiment, plain, start)
         progress("calibrating with model error")
         calibration = calibrate_with_error(experiment, others, apart)
-        candidates = candidates_of(setup, experiment, catalogue)
         weigh = partial(
-            infer, candidates=candidates, log_prior=log_prior(candidates), settings=settings, progress=progress,
-            candidates_in=lambda there: candidates_of(setup, there, catalogue),
+            infer, candidates=candidates_of(setup, experiment), settings=settings, progress=progress,
+            candidates_in=partial(candidates_of, setup),
         )  # fmt: skip
         outside = outside_of(setup, experiment)
         posterior = weigh(calibration, outside=outside)
@@ -135,10 +133,9 @@ def diagnose(
             rest = weigh(calibration.of_others)
         progress("predicting the recordings free-running")
         return assemble(
-            setup, experiment, posterior, decide(posterior, settings), plain=plain if rest is None else others,
-            calibration=calibration, settings=settings,
+            setup, experiment, posterior, decide(posterior), plain=plain if rest is None else others,
+            calibration=calibration, jobs=jobs,
             others=None if rest is None else Others(posterior=rest, channels=faulty, apart=tuple(apart)),
-            catalogue=catalogue, known=known, train=train, held_out=held, healthy=healthy, switched_off=off, jobs=jobs,
         )  # fmt: skip
     except ArithmeticError as error:
         if type(error) is not ArithmeticError:

@@ -47,6 +47,8 @@ class Hypothesis:
         Parameter of the term that is the moment at which it begins, on that time axis, [s]
     less : float
         What baselines bring of its law over time, which does not count, [nat]
+    log_prior : float
+        Of it at its place, to 1 of nothing, [nat]; see :func:`diagnosis.engine.families.with_priors`
     trusted : bool
         True if baselines alone say how much of a change over time counts, not also the class of model error
     """
@@ -63,6 +65,7 @@ class Hypothesis:
     ending: str = ""
     clock: str | None = None
     date: str | None = None
+    log_prior: float = 0.0
     less: float = 0.0
     trusted: bool = False
 

@@ -9,9 +9,8 @@ import numpy as np
 
 from diagnosis.candidates.hypotheses import Hypothesis
 from diagnosis.decision.posterior import Judged, Posterior
-from diagnosis.decision.settings import Settings
 from diagnosis.engine.learnt import Rule
-from diagnosis.engine.scan import heat_over_time
+from diagnosis.engine.scan import course_of_heat
 from models.network.laws import symbol
 from models.terms.term import Term
 
@@ -59,7 +58,7 @@ class Answer:
     one_event: bool = False
 
 
-def decide(posterior: Posterior, settings: Settings) -> tuple[Answer, ...]:
+def decide(posterior: Posterior) -> tuple[Answer, ...]:
     """The answers of a posterior: empty if nothing is missing and no parameter outside its prior, or without a name.
 
     A name is a claim if its probability reaches :attr:`Settings.claim_from`. Else at most three names that reach it
@@ -74,7 +73,7 @@ def decide(posterior: Posterior, settings: Settings) -> tuple[Answer, ...]:
     if not posterior.detected and not posterior.parameter_outside:
         return ()
     best = _best_fitted(posterior)
-    answers = (_answer(posterior, best, effect, settings.claim_from) for effect in best.effects)
+    answers = (_answer(posterior, best, effect) for effect in best.effects)
     return tuple(answer for answer in answers if answer is not None)
 
 
@@ -101,12 +100,12 @@ def _best_fitted(posterior: Posterior) -> Judged:
     fitted = [one for one in posterior.judged if one.fit is not None and set(explanation.names) <= set(one.names)]
     labels = {effect.label for effect in first.effects}
     there = [one for one in fitted if labels <= {effect.label for effect in one.effects}]
-    return max(there or fitted, key=lambda one: one.log_bayes + one.log_prior, default=first)
+    return max(there or fitted, key=lambda one: one.weight, default=first)
 
 
-def _answer(posterior: Posterior, best: Judged, effect: Hypothesis, enough: float) -> Answer | None:
+def _answer(posterior: Posterior, best: Judged, effect: Hypothesis) -> Answer | None:
     """The narrowest set of names that holds enough probability."""
-    name = effect.law
+    name, enough = effect.law, posterior.settings.claim_from
     doubtful = effect.term is None or posterior.log_e < posterior.rule.named_if_large
     chance, overlap = posterior.rule.one_event
     together = _begin_together(best, chance) or _act_together(best, overlap)
@@ -143,7 +142,7 @@ def _begin_together(best: Judged, chance: float) -> bool:
         unknown.value(z) for unknown, z in zip(experiment.unknowns, best.fit.z.tolist(), strict=True)
         if unknown.parameter.name in names
     )  # fmt: skip
-    tested = sum(float(piece.steps.sum()) for piece in experiment.pieces if piece.recording not in experiment.healthy)
+    tested = sum(float(experiment.pieces[i].steps.sum()) for i in experiment.tested)
     return abs(first - second) < 0.5 * chance * tested
 
 
@@ -153,7 +152,7 @@ def _act_together(best: Judged, overlap: float) -> bool:
     of_time = [term for term in terms if symbol("time") in term.expression.free_symbols]
     if best.fit is None or len(of_time) < 2 or _changed(of_time[0]).isdisjoint(_changed(of_time[1])):
         return False
-    first, second = (heat_over_time(best.fit, term) for term in of_time)
+    first, second = (course_of_heat(best.fit, term) for term in of_time)
     return abs(float(first @ second)) > overlap * float(np.linalg.norm(first) * np.linalg.norm(second))
 
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
+from operator import attrgetter
 
 import numpy as np
 from scipy.special import log_ndtr
@@ -33,6 +34,7 @@ from diagnosis.decision.scanned import (
 )
 from diagnosis.decision.settings import Settings
 from diagnosis.engine.calibration import Calibration
+from diagnosis.engine.families import with_priors
 from diagnosis.engine.fit import Fit
 from diagnosis.engine.learnt import ErrorClass, rule
 from diagnosis.engine.outside import judge_outside
@@ -41,8 +43,8 @@ from diagnosis.engine.scan import scan
 from diagnosis.engine.sessions import fit_over_sessions
 from models.base.errors import InputError
 from models.base.progress import Progress, silent
-from models.base.types import Array
 
+WEIGHT = attrgetter("weight")
 RACED, PLACES, RACE_STEPS = 18, 2, 4
 NEAR_PLACE = 3.0  # nats behind the best place of its name, up to which a second place is raced
 REFITTED, SECONDS = 6, 2
@@ -54,15 +56,13 @@ WORTH, WORTH_SHARE = 1.0, 0.1  # nats, and share of the best, from which a candi
 
 
 def infer(
-    calibration: Calibration, candidates: Sequence[Hypothesis], log_prior: Array, settings: Settings, *,
+    calibration: Calibration, candidates: Sequence[Hypothesis], settings: Settings, *,
     outside: Sequence[Hypothesis] = (), candidates_in: CandidatesIn = lambda _: (), progress: Progress = silent,
 ) -> Posterior:  # fmt: skip
     """Weigh all explanations.
 
     Parameters
     ----------
-    log_prior : Array, shape (candidates,)
-        Of every candidate, to 1 of nothing
     outside : sequence of Hypothesis
         Unknown heats, judged where something is missing
     candidates_in : callable
@@ -73,25 +73,25 @@ def infer(
     base, chosen = calibration.fit, calibration.chosen
     if base.experiment.healthy:
         progress("judging the baselines as if they were tested")
-    placebo, candidates = judge_baselines(calibration, candidates, candidates_in)
+    placebo, candidates = judge_baselines(calibration, with_priors(candidates), candidates_in)
     progress(f"scanning {len(candidates)} candidates")
     found = scan(base, candidates, calibration.near.columns)
-    first = scan_in_classes(calibration, found, log_prior)
+    first = scan_in_classes(calibration, found)
     judged = _raced(calibration, first, progress)
     alone = {one.label: float(value) for one, value in zip(first.candidates, first.log_bayes, strict=True)}
     gained, pairs, elsewhere = 0.0, list[Judged](), None
-    best = max(judged.values(), key=_weight, default=None)
+    best = max(judged.values(), key=WEIGHT, default=None)
     error_class = chosen.error_class if best is None else best.error_class
     detection, of_class = rule().thresholds(chosen.error_class, error_class, settings.false_alarm_rate)
     least = -np.inf if placebo is None else placebo.log_e_value
     if best is not None and best.fit is not None and best.log_bayes > 0.0:
         progress(f"scanning again, given {best.label}")
-        second = scan_given(calibration, best, candidates, log_prior)
+        second = scan_given(calibration, best, candidates)
         judged[best.label] = replace(best, left=second.most)
-        pairs = sorted(_pairs(calibration, best, second), key=_weight, reverse=True)
+        pairs = sorted(_pairs(calibration, best, second), key=WEIGHT, reverse=True)
         if pairs and second.most > of_class and base.experiment.healthy:
             progress(f"scanning once more, given {pairs[0].label}")
-            pairs[0] = replace(pairs[0], left=scan_given(calibration, pairs[0], candidates, log_prior).most)
+            pairs[0] = replace(pairs[0], left=scan_given(calibration, pairs[0], candidates).most)
         if not best.of_parameters:  # else the wider prior would stay in what is called nothing
             there = judge_alone(calibration, best, second, first.in_class(best.error_class).ahead)
             alone |= {label: min(alone[label], value) for label, value in there.items()}
@@ -100,14 +100,14 @@ def infer(
     for index, candidate in enumerate(first.candidates):
         judged.setdefault(candidate.label, _by_scan(first, index, alone[candidate.label]))
     every = (*judged.values(), *pairs)
-    parameters = [_weight(one) for one in every if one.of_parameters]
-    effects = [_weight(one) for one in every if sum(effect.term is not None for effect in one.effects) == 1]
+    parameters = [one.weight for one in every if one.of_parameters]
+    effects = [one.weight for one in every if sum(effect.term is not None for effect in one.effects) == 1]
     log_e = log_sum(effects) - log_sum([gained, *parameters])
     threshold = max(detection, least)
     missing = log_e > threshold
     unknown = _unknown(calibration, error_class, outside) if missing else []
     return Posterior(
-        nothing=Judged(effects=(), log_prior=0.0, log_bayes=0.0, error_class=chosen.error_class, fit=base),
+        nothing=Judged(effects=(), log_bayes=0.0, error_class=chosen.error_class, fit=base),
         judged=tuple(replace(one, log_bayes=one.log_bayes - gained) for one in (*every, *unknown)),
         log_e=log_e,
         log_parameter=log_sum(parameters) - gained,
@@ -115,7 +115,7 @@ def infer(
         class_threshold=of_class,
         rule=rule(),
         likeness=likeness_of(first, error_class),
-        odds_unknown=settings.odds_unknown,
+        settings=settings,
         error_class=(error_class if missing else chosen.error_class).name,
         error_evidence=dict(calibration.evidence),
         session_s=chosen.session_s,
@@ -141,29 +141,27 @@ def _raced(calibration: Calibration, found: Scanned, progress: Progress) -> dict
         start = calibration.in_class(found.best[index].error_class).fit
         one = _refitted(start, found, index, RACE_STEPS)
         judged[label] = one if one.fit is None else _judged(calibration, one, _spread(found, index))
-    ahead = sorted(judged.values(), key=_weight, reverse=True)[:REFITTED]
+    ahead = sorted(judged.values(), key=WEIGHT, reverse=True)[:REFITTED]
     for step, one in enumerate(ahead):
         progress(f"fitting {one.label} to the end", step, len(ahead))
         if one.fit is not None:
             judged[one.label] = _fitted_on(calibration, one)
-    best = max((judged[one.label] for one in ahead), key=_weight, default=None)
+    best = max((judged[one.label] for one in ahead), key=WEIGHT, default=None)
     if best is not None and best.fit is not None and best.effects[0].date is not None:
         progress(f"fitting what may have begun instead of {best.label}")
         for one in (judged[one.label] for one in ahead):
             first = one.effects[0]
             if one.fit and one is not best and first.date and first.ending == best.effects[0].ending:
-                judged[one.label] = max(one, _with_course_of(calibration, best, one), key=_weight)
+                judged[one.label] = max(one, _with_course_of(calibration, best, one), key=WEIGHT)
     return judged
 
 
 def _with_course_of(calibration: Calibration, best: Judged, one: Judged) -> Judged:
     """A change that is fitted once more from the course of the best one: dates and durations have several optima."""
-    assert best.fit is not None  # noqa: S101
-    assert one.fit is not None  # noqa: S101
     first = len(calibration.fit.z)
     of_best, own = (
         [unknown.value(z) for unknown, z in zip(fit.experiment.unknowns[first:], fit.z[first:].tolist(), strict=True)]
-        for fit in (best.fit, one.fit)
+        for fit in (best.fitted, one.fitted)
     )
     shape = np.array([[1.0, *own[1:-3], *of_best[-3:-1], own[-1]]])  # last are date, duration and clock
     start = calibration.in_class(one.error_class).fit
@@ -219,15 +217,14 @@ def _by_scan(found: Scanned, index: int, log_bayes: float) -> Judged:
     candidate = found.candidates[index]
     variant = found.best[index].scan.best[index]
     return Judged(
-        effects=(replace(candidate, variants=candidate.variants[[variant]]),), log_prior=float(found.log_prior[index]),
-        log_bayes=log_bayes, error_class=found.best[index].error_class,
+        effects=(replace(candidate, variants=candidate.variants[[variant]]),), log_bayes=log_bayes,
+        error_class=found.best[index].error_class,
     )  # fmt: skip
 
 
 def _fitted_on(calibration: Calibration, one: Judged) -> Judged:
     """A raced fit continued to its end."""
-    fit = one.fit
-    assert fit is not None  # noqa: S101
+    fit = one.fitted
     reached, base = fit, len(calibration.fit.z)
     try:
         for _ in range(MOST_TURNS):
@@ -246,8 +243,7 @@ def _fitted_on(calibration: Calibration, one: Judged) -> Judged:
 
 def _judged(calibration: Calibration, one: Judged, spread: float) -> Judged:
     """A fitted explanation with its evidence against nothing."""
-    fit = one.fit
-    assert fit is not None  # noqa: S101
+    fit = one.fitted
     at = len(calibration.fit.z)  # where the effects' unknowns begin
     log_evidence = fit_over_sessions(fit, at).log_evidence + float(np.log(one.error_class.prior))
     log_bayes = log_evidence - calibration.chosen.log_evidence - spread
@@ -272,21 +268,15 @@ def _spread(found: Scanned, index: int) -> float:
     return float(found.best[index].scan.spread[index])
 
 
-def _weight(one: Judged) -> float:
-    """Evidence and prior of an explanation, [nat]."""
-    return one.log_bayes + one.log_prior
-
-
 def _pairs(calibration: Calibration, best: Judged, second: Scanned) -> list[Judged]:
     """The best explanation with the best second effects of other names, fitted."""
-    fit, pairs = best.fit, []
-    assert fit is not None  # noqa: S101
+    pairs = []
     others = [index for index in second.order if second.candidates[index].law not in best.names]
     for index in others[:SECONDS]:
-        one = _refitted(fit, second, index, RACE_STEPS + 2)
+        one = _refitted(best.fitted, second, index, RACE_STEPS + 2)
         if one.fit is None:
             continue
-        both = replace(one, effects=(*best.effects, *one.effects), log_prior=best.log_prior + one.log_prior)
+        both = replace(one, effects=(*best.effects, *one.effects))
         both = _judged(calibration, both, _spread(second, index))
         pairs.append(_fitted_on(calibration, both))
     return pairs
@@ -297,8 +287,7 @@ def _nothing_gains(calibration: Calibration, best: Judged) -> tuple[float, Fit |
 
     The calibration may have ended in another basin, and its classes are compared by straight lines.
     """
-    assert best.fit is not None  # noqa: S101
-    fit, known = best.fit, calibration.in_class(best.error_class)
+    fit, known = best.fitted, calibration.in_class(best.error_class)
     found, alone = max(calibration.chosen.log_evidence, known.log_evidence), None
     try:
         there = known.fit.experiment.fit(fit.z_in(known.fit.experiment), fit.trajectories)
@@ -315,7 +304,7 @@ def _unknown(calibration: Calibration, error_class: ErrorClass, outside: Sequenc
     names, here = Counter(one.name for one in outside), calibration.in_class(error_class)
     ahead = here.log_evidence - calibration.chosen.log_evidence
     return [
-        Judged(effects=(heat,), log_prior=-float(np.log(names[heat.name])), log_bayes=log_bayes + ahead,
+        Judged(effects=(replace(heat, log_prior=-float(np.log(names[heat.name]))),), log_bayes=log_bayes + ahead,
                error_class=error_class)
         for heat, log_bayes in judge_outside(here.fit, outside)
     ]  # fmt: skip

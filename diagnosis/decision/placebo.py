@@ -10,13 +10,11 @@ import numpy as np
 from diagnosis.candidates.hypotheses import Hypothesis
 from diagnosis.decision.posterior import Placebo
 from diagnosis.decision.scanned import OVER_TIME, Scanned, counts_less, scan_in_classes
-from diagnosis.engine.baselines import baselines_of
 from diagnosis.engine.calibration import Calibration
-from diagnosis.engine.families import log_prior
+from diagnosis.engine.families import with_priors
 from diagnosis.engine.fit import Experiment
 from diagnosis.engine.learnt import rule
 from diagnosis.engine.scan import scan
-from diagnosis.engine.sessions import sessions_of
 
 CandidatesIn = Callable[[Experiment], Sequence[Hypothesis]]
 
@@ -52,11 +50,10 @@ def judge_baselines(
     for piece in whole.pieces:
         hours[piece.recording] += float(piece.steps.sum())
     tested = sum(value for name, value in hours.items() if name not in whole.healthy)
-    at, fit = baselines_of(calibration.fit)
+    fit = calibration.fit.part(whole.baselines)
     calibration = replace(calibration, chosen=replace(calibration.chosen, fit=fit))
-    experiment, columns = fit.experiment, [calibration.near.columns[i] for i in at]
-    sessions = sessions_of(experiment)
-    for pieces in sessions:
+    experiment, columns = fit.experiment, [calibration.near.columns[i] for i in whole.baselines]
+    for pieces in experiment.sessions:
         starts, now = dict[str, float](), 0.0
         for piece in map(experiment.pieces.__getitem__, pieces):
             now = starts.setdefault(piece.recording, now) + float(piece.time[-1])
@@ -64,8 +61,8 @@ def judge_baselines(
         tried = [one for one in candidates_in(swapped) if one.term is None or whole.scope_of(one.name) is not None]
         if not any(one.how == "always" for one in tried):  # what is switched off has no place in this machine
             continue
-        there = scan(replace(fit, experiment=swapped), tried, columns)
-        judged = scan_in_classes(calibration, there, log_prior(tried))
+        there = scan(replace(fit, experiment=swapped), with_priors(tried), columns)
+        judged = scan_in_classes(calibration, there)
         longer = max(tested / sum(hours[name] for name in starts), 1.0)
         always = _part(judged, [i for i, one in enumerate(judged.candidates) if one.how not in OVER_TIME])
         best = next(one for one in map(always.candidates.__getitem__, always.order) if one.term is not None)
@@ -77,7 +74,7 @@ def judge_baselines(
             if one.how in OVER_TIME:
                 taken = float(counts_less([one], calibration.chosen.error_class, here.error_class)[0])
                 over_time[one.law] = max((value + taken) * longer, over_time.get(one.law, 0.0))
-    trusted = are_trusted(len(sessions), sum(hours[name] for name in whole.healthy), tested)
+    trusted = are_trusted(len(experiment.sessions), sum(hours[name] for name in whole.healthy), tested)
     less = tuple(
         replace(one, less=over_time.get(one.law, 0.0), trusted=trusted and not one.of_measurement)
         if one.how in OVER_TIME else one
@@ -93,5 +90,5 @@ def are_trusted(sessions: int, lasting: float, tested: float) -> bool:
 
 
 def _part(scanned: Scanned, at: Sequence[int]) -> Scanned:
-    return replace(scanned, candidates=tuple(scanned.candidates[i] for i in at), log_prior=scanned.log_prior[at],
+    return replace(scanned, candidates=tuple(scanned.candidates[i] for i in at),
                    log_bayes=scanned.log_bayes[np.array(at)], best=tuple(scanned.best[i] for i in at))  # fmt: skip

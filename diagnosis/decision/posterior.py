@@ -21,6 +21,7 @@ import numpy as np
 from scipy.special import expit, logsumexp, softmax
 
 from diagnosis.candidates.hypotheses import Hypothesis
+from diagnosis.decision.settings import Settings
 from diagnosis.engine.fit import Fit
 from diagnosis.engine.learnt import ErrorClass, Rule
 from models.base.types import Array
@@ -37,8 +38,6 @@ class Judged:
     ----------
     effects : tuple of Hypothesis
         What it adds to the machine: nothing, one thing, or two; each with one variant left: the most probable shape
-    log_prior : float
-        Of this effect at this place, [nat]
     log_bayes : float
         Log Bayes factor against nothing, model error and deviations between sessions marginalised, [nat]
     error_class : ErrorClass
@@ -50,11 +49,26 @@ class Judged:
     """
 
     effects: tuple[Hypothesis, ...]
-    log_prior: float
     log_bayes: float
     error_class: ErrorClass
     fit: Fit | None = None
     left: float | None = None
+
+    @property
+    def log_prior(self) -> float:
+        """Of its effects at their places, [nat]."""
+        return float(sum(effect.log_prior for effect in self.effects))
+
+    @property
+    def weight(self) -> float:
+        """Evidence and prior, [nat]."""
+        return self.log_bayes + self.log_prior
+
+    @property
+    def fitted(self) -> Fit:
+        """The fit of one that has one."""
+        assert self.fit is not None, self.label  # noqa: S101
+        return self.fit
 
     @property
     def kind(self) -> Kind:
@@ -110,13 +124,15 @@ class Expected:
     ----------
     log_bayes : float
         Expected evidence for it, [nat]
-    log_prior : float
-        To 1 of nothing, [nat]; both together are what may reach the threshold
     """
 
     effect: Hypothesis
     log_bayes: float
-    log_prior: float
+
+    @property
+    def weight(self) -> float:
+        """Evidence and prior, which may reach the threshold, [nat]."""
+        return self.log_bayes + self.effect.log_prior
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -219,8 +235,8 @@ class Posterior:
     threshold, class_threshold : float
         From which something is missing, [nat]; that of the class of model error, from which a parameter is outside its
         prior and a further effect competes
-    odds_unknown : float
-        Prior odds of a cause that is in no catalogue, see :class:`~diagnosis.decision.settings.Settings`
+    settings : Settings
+        As asked for
     error_class : str
         Class of model error of the best explanation; of nothing where nothing is missing
     error_evidence : mapping of str to float
@@ -244,7 +260,7 @@ class Posterior:
     rule: Rule
     log_parameter: float = -np.inf
     likeness: Likeness = Likeness(labels=(), cosines=np.zeros((0, 0)))
-    odds_unknown: float = 0.1
+    settings: Settings = field(default_factory=Settings)
     error_class: str = ""
     error_evidence: dict[str, float] = field(default_factory=dict)
     session_s: float = 0.0
@@ -254,13 +270,11 @@ class Posterior:
     placebo: Placebo | None = None
     elsewhere: Fit | None = None
 
-    @property
-    def remainder(self) -> float:
-        """Log Bayes factor of the best further effect, given the best single one, [nat]; 0 if none was looked for."""
-        return self.left_by(None)
+    def left_by(self, one: Judged | None = None) -> float:
+        """Log Bayes factor of the best further effect, given an explanation or else the best single one, [nat].
 
-    def left_by(self, one: Judged | None) -> float:
-        """Log Bayes factor of the best further effect, given an explanation or else the best single one, [nat]."""
+        0 if none was looked for.
+        """
         return self._scanned_beyond(one).left or 0.0
 
     def _scanned_beyond(self, one: Judged | None) -> Judged:
@@ -316,7 +330,7 @@ class Posterior:
             of_names.setdefault(one.names, []).append(one)
         log_bayes = np.array([self._mean_log_bayes(names, members) for names, members in of_names.items()])
         able = np.ones(len(log_bayes), dtype=bool)
-        if self.remainder <= self.class_threshold:  # a second effect needs evidence of its own
+        if self.left_by() <= self.class_threshold:  # a second effect needs evidence of its own
             able = np.array([len(names) == 1 for names in of_names], dtype=bool)
         parameter = np.array([members[0].of_parameters for members in of_names.values()], dtype=bool)
         log_prior = np.array([self._log_odds(members[0].kind) for members in of_names.values()])
@@ -328,7 +342,7 @@ class Posterior:
             if len(left):
                 chance[left] = whole * softmax(log_prior[left] + log_bayes[left] / (a + b * most))
         found = [
-            Explanation(names=names, members=tuple(sorted(members, key=lambda one: -one.log_prior - one.log_bayes)),
+            Explanation(names=names, members=tuple(sorted(members, key=lambda one: -one.weight)),
                         log_bayes=value, probability=p)
             for (names, members), value, p in zip(of_names.items(), log_bayes.tolist(), chance.tolist(), strict=True)
         ]  # fmt: skip
@@ -346,7 +360,7 @@ class Posterior:
     def _mean_log_bayes(self, names: tuple[str, ...], members: Sequence[Judged]) -> float:
         """Evidence of a name over its places and shapes; of a pair with the prior of a second effect, [nat]."""
         within = sum(np.log(self._known_names.get(name, 1.0)) for name in names)
-        mean = float(logsumexp([one.log_prior + one.log_bayes for one in members]) - within)
+        mean = float(logsumexp([one.weight for one in members]) - within)
         pair = float(np.log(self.rule.pair / max(len(self._known_names), 1)))
         return mean + (pair if len(names) > 1 else 0.0)
 
@@ -356,14 +370,14 @@ class Posterior:
             return 0.0
         unknown = {one.names for one in self.judged if one.kind == "outside"}
         known = {one.names for one in self.judged if len(one.effects) == 1 and one.kind not in ("outside", "parameter")}
-        return float(np.log(self.odds_unknown * max(len(known), 1) / max(len(unknown), 1)))
+        return float(np.log(self.settings.odds_unknown * max(len(known), 1) / max(len(unknown), 1)))
 
     @cached_property
     def ranked(self) -> tuple[tuple[Judged, float], ...]:
         """Everything judged with its probability, most probable first."""
         result = []
         for explanation in self.explanations:
-            log = np.array([one.log_prior + one.log_bayes for one in explanation.members])
+            log = np.array([one.weight for one in explanation.members])
             shares = explanation.probability * np.exp(log - logsumexp(log))
             result += list(zip(explanation.members, shares.tolist(), strict=True))
         return tuple(sorted(result, key=lambda one: -one[1]))

@@ -41,15 +41,19 @@ class Scanned:
     """Everything judged by straight lines at one point, in the class of model error that suits each candidate best."""
 
     candidates: tuple[Hypothesis, ...]
-    log_prior: Array
     log_bayes: Array
     classes: tuple[ScanInClass, ...]
     best: tuple[ScanInClass, ...]
 
     @property
+    def weights(self) -> Array:
+        """Evidence and prior of every candidate, [nat]."""
+        return np.asarray(self.log_bayes + [one.log_prior for one in self.candidates])
+
+    @property
     def order(self) -> list[int]:
         """Indices of the candidates, most probable first."""
-        return [int(index) for index in np.argsort(-(self.log_bayes + self.log_prior))]
+        return [int(index) for index in np.argsort(-self.weights)]
 
     @property
     def most(self) -> float:
@@ -59,9 +63,8 @@ class Scanned:
     @property
     def log_e(self) -> float:
         """Log odds of all effects to none, parameters as they may be, [nat]."""
-        log = self.log_prior + self.log_bayes
         parameter = np.array([one.how == "parameter" for one in self.candidates], dtype=bool)
-        return log_sum(log[~parameter]) - log_sum([0.0, *log[parameter]])
+        return log_sum(self.weights[~parameter]) - log_sum([0.0, *self.weights[parameter]])
 
     def to_its_best(self, rate: float) -> tuple[Scanned, float]:
         """All against nothing in the class that suits nothing best; evidence from which something is missing, [nat].
@@ -80,9 +83,7 @@ class Scanned:
         return next(one for one in self.classes if one.error_class == error_class)
 
 
-def scan_in_classes(
-    calibration: Calibration, found: Scan, log_prior: Array, classes: Sequence[ErrorClass] = ()
-) -> Scanned:
+def scan_in_classes(calibration: Calibration, found: Scan, classes: Sequence[ErrorClass] = ()) -> Scanned:
     """The scan at the calibrated point with model error of all classes, or of others in their place."""
     judged = []
     for one in classes or calibration.classes:
@@ -92,23 +93,20 @@ def scan_in_classes(
     chosen = [one for one in judged if one[0].name == calibration.chosen.error_class.name] or judged
     nothing, *_, reached = max(chosen, key=lambda one: one[-1])
     each = [_in_class(one, here, over, evidence - reached, nothing) for one, here, over, evidence in judged]
-    return in_best_classes(each, log_prior)
+    return in_best_classes(each)
 
 
-def scan_given(calibration: Calibration, given: Judged, candidates: Sequence[Hypothesis], log_prior: Array) -> Scanned:
+def scan_given(calibration: Calibration, given: Judged, candidates: Sequence[Hypothesis]) -> Scanned:
     """All others scanned at the fit of an explanation, against that explanation, with model error of its class."""
-    fit, mine = given.fit, {effect.label for effect in given.effects}
-    assert fit is not None  # noqa: S101
-    left = [index for index, one in enumerate(candidates) if one.label not in mine]
-    found, base = scan(fit, [candidates[index] for index in left]), len(calibration.fit.z)
+    fit, mine = given.fitted, {effect.label for effect in given.effects}
+    found, base = scan(fit, [one for one in candidates if one.label not in mine]), len(calibration.fit.z)
     over = over_sessions(found.gram, fit.experiment, [*range(base), *found.further], range(base, len(fit.z)))
-    return in_best_classes([_in_class(given.error_class, found, over, 0.0, given.error_class)], log_prior[left])
+    return in_best_classes([_in_class(given.error_class, found, over, 0.0, given.error_class)])
 
 
 def judge_alone(calibration: Calibration, best: Judged, second: Scanned, ahead: float) -> dict[str, float]:
     """Log Bayes factors of all other candidates against nothing, by the scan at the best explanation, without it."""
-    fit, found = best.fit, second.classes[0].scan
-    assert fit is not None  # noqa: S101
+    fit, found = best.fitted, second.classes[0].scan
     without = over_sessions(found.gram, fit.experiment, [*range(len(calibration.fit.z)), *found.further])
     log_bayes = _weighed(found, without) + ahead
     log_bayes -= counts_less(second.candidates, calibration.chosen.error_class, best.error_class)
@@ -140,11 +138,11 @@ def hardly_there(candidates: Sequence[Hypothesis], strengths: Array) -> NDArray[
     ], dtype=np.intp)  # fmt: skip
 
 
-def in_best_classes(classes: Sequence[ScanInClass], log_prior: Array) -> Scanned:
+def in_best_classes(classes: Sequence[ScanInClass]) -> Scanned:
     """Every candidate in the class that suits it best."""
     table = np.stack([one.log_bayes for one in classes])
     return Scanned(
-        candidates=classes[0].scan.candidates, log_prior=log_prior, log_bayes=table.max(axis=0),
+        candidates=classes[0].scan.candidates, log_bayes=table.max(axis=0),
         classes=tuple(classes), best=tuple(classes[at] for at in table.argmax(axis=0).tolist()),
     )  # fmt: skip
 
@@ -189,7 +187,7 @@ def with_scaled_error(
 ) -> ScaledError:
     """Evidence of the scan if all model error were larger or smaller than assumed."""
     scaled = [one.scaled(factor) for one in calibration.classes]
-    there = first if factor == 1.0 else scan_in_classes(calibration, found, first.log_prior, scaled)
+    there = first if factor == 1.0 else scan_in_classes(calibration, found, scaled)
     there, detection = there.to_its_best(rate)
     best = there.candidates[there.order[0]]
     return ScaledError(factor=factor, log_e_value=there.log_e, threshold=max(detection, least),
@@ -219,6 +217,5 @@ def expected_of(scanned: Scanned, error_class: ErrorClass, settings: Settings) -
     size = np.where(np.isfinite(size), size, sd)
     log_bayes = 0.5 * np.square(b * size) / (b + 1.0 / np.square(sd)) - 0.5 * np.log1p(b * np.square(sd))
     log_bayes -= counts_less(found.candidates, error_class, error_class)
-    each = zip(found.candidates, log_bayes.tolist(), scanned.log_prior.tolist(), strict=True)
-    return tuple(Expected(effect=one, log_bayes=value, log_prior=prior) for one, value, prior in each
-                 if one.term is not None)  # fmt: skip
+    each = zip(found.candidates, log_bayes.tolist(), strict=True)
+    return tuple(Expected(effect=one, log_bayes=value) for one, value in each if one.term is not None)

@@ -9,12 +9,11 @@ from functools import cache
 import numpy as np
 
 from diagnosis.engine.fit import FIRST_ITERATIONS, ITERATIONS, Experiment, Fit, Linear
-from diagnosis.engine.gram import Gram
+from diagnosis.engine.gram import Gram, gram_of, whitened_base
 from diagnosis.engine.learnt import ErrorClass, error_classes
 from diagnosis.engine.metric import Metric, leading_directions
 from diagnosis.engine.model_error import ModelError
-from diagnosis.engine.products import gram_of, whitened_base
-from diagnosis.engine.sessions import fit_over_sessions, most_deviation, over_sessions, sessions_of
+from diagnosis.engine.sessions import fit_over_sessions, most_deviation, over_sessions
 from diagnosis.engine.set_apart import without_channels
 from diagnosis.forward.whitening import RandomHeat, Whitening
 from models.base.types import Array
@@ -151,7 +150,7 @@ class NearReadings:
         directions = self.directions(one)
         shared, count = tuple(N @ directions for N in self.columns), directions.shape[1]
         metric = Metric(
-            sessions=sessions_of(self.experiment), columns=shared, shared=count, own=count,
+            sessions=self.experiment.sessions, columns=shared, shared=count, own=count,
             courses=tuple(self.error.courses(part.point, directions) for part in self.parts),
         )  # fmt: skip
         if deviation > 0.0:

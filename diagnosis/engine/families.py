@@ -28,8 +28,7 @@ from diagnosis.engine.set_apart import standing_still
 from diagnosis.engine.unknown import NetworkParameter, SensorBias
 from diagnosis.forward.grid import Piece
 from diagnosis.setup.inference_setup import STANDSTILL_RPM, InferenceSetup
-from models.base.types import Array
-from models.mechanisms import Mechanism, Placed
+from models.mechanisms import Placed
 from models.mechanisms.ageing import FAMILY as AGEING
 from models.mechanisms.forms import EDGE_S
 from models.quantities.quantities import is_total_loss
@@ -40,9 +39,7 @@ SENSOR_SD_K, TOLERANCES = 1.0, 3.0  # of a step of a thermometer: at least, and 
 RADIATION = "radiation_error"  # the one law of the model that is part of a link
 
 
-def candidates_of(
-    setup: InferenceSetup, experiment: Experiment, catalogue: Mapping[str, Mechanism]
-) -> tuple[Hypothesis, ...]:
+def candidates_of(setup: InferenceSetup, experiment: Experiment) -> tuple[Hypothesis, ...]:
     """All that may be missing, wrong, or changed.
 
     Returns
@@ -53,13 +50,13 @@ def candidates_of(
     """
     network = experiment.machine.model.network
     known = {p.name for p in network.parameters}  # what the machine is known to have is there once
-    placed = [one for m in catalogue.values() for one in m.placed(network, setup.scale, setup.channels)
+    placed = [one for m in setup.catalogue.values() for one in m.placed(network, setup.scale, setup.channels)
               if one.strength.name not in known]  # fmt: skip
     factors = factors_of(network, setup.scale, setup.channels)
     axis = axis_of(experiment)
     several = len({piece.recording for piece in experiment.pieces} - experiment.healthy) > 1
     spans = standing_still(experiment)
-    names = {law_of(name): name for name in catalogue} | {name: name for name in catalogue}
+    names = {law_of(name): name for name in setup.catalogue} | {name: name for name in setup.catalogue}
     return tuple(
         replace(one, known_as=names.get(one.name, names.get(one.law)))
         for one in (
@@ -154,16 +151,14 @@ def _running(pieces: Sequence[Piece]) -> list[float]:
     return [float(t) for t in begin[at] + wanted - passed[at]]
 
 
-def log_prior(hypotheses: Sequence[Hypothesis]) -> Array:
-    """Prior of every hypothesis, [nat]: its family's share, uniform over names and then over places.
+def with_priors(hypotheses: Sequence[Hypothesis]) -> tuple[Hypothesis, ...]:
+    """All hypotheses with their priors: the share of the family, uniform over its names and then over places.
 
-    Returns
-    -------
-    Array, shape (hypotheses,)
-        Normalised over all
+    The priors of all together are 1.
     """
     places = Counter((h.how, h.name) for h in hypotheses)
     names = Counter(how for how, _ in places)
     shares = family_priors()
     log = np.array([np.log(shares[h.how] / names[h.how] / places[h.how, h.name]) for h in hypotheses])
-    return np.asarray(log - np.logaddexp.reduce(log))
+    log = log - np.logaddexp.reduce(log)
+    return tuple(replace(h, log_prior=value) for h, value in zip(hypotheses, log.tolist(), strict=True))

@@ -24,6 +24,7 @@ LEAST_GAIN = 0.02  # of the objective
 NEAR = 0.5  # of a prior sd: every other time, after so short a step, the columns are kept
 FARTHEST_STEP = 3.0  # of the z in one iteration
 SLOW_PATIENCE = 3  # times as many iterations where switches follow slow measurements: steps are small there
+NOISE_ALONE = Metric()
 Guess = Trajectory | Array | None
 
 
@@ -48,8 +49,8 @@ class Experiment:
         Recordings in which the effect that is looked for cannot act
     switched_off : frozenset of str
         Names of the only effects that cannot act in them; empty: none can
-    metric : Metric or None
-        In which residuals are judged, if there is more than noise; of whitened readings under `filters`
+    metric : Metric
+        In which residuals are judged; of whitened readings under `filters`
     random_heat : RandomHeat
         Factors on those assumed, which `noise` has
     most_deviation : float
@@ -66,7 +67,7 @@ class Experiment:
     session_of: Mapping[str, str] = field(default_factory=dict)
     healthy: frozenset[str] = frozenset()
     switched_off: frozenset[str] = frozenset()
-    metric: Metric | None = None
+    metric: Metric = NOISE_ALONE
     random_heat: RandomHeat = AS_ASSUMED
     most_deviation: float = np.inf
 
@@ -74,6 +75,37 @@ class Experiment:
     def slow(self) -> bool:
         """True if the rows of any piece lie minutes apart."""
         return any(piece.slow for piece in self.pieces)
+
+    @cached_property
+    def sessions(self) -> tuple[tuple[int, ...], ...]:
+        """Places of the pieces of every test session."""
+        names = [self.session_of.get(piece.recording, "") for piece in self.pieces]
+        return tuple(tuple(i for i, name in enumerate(names) if name == one) for one in dict.fromkeys(names))
+
+    @property
+    def baselines(self) -> list[int]:
+        """Places of the pieces in which the effect that is looked for cannot act."""
+        return [i for i, piece in enumerate(self.pieces) if piece.recording in self.healthy]
+
+    @property
+    def tested(self) -> list[int]:
+        """Places of the other pieces."""
+        return [i for i, piece in enumerate(self.pieces) if piece.recording not in self.healthy]
+
+    def part(self, at: Sequence[int]) -> Experiment:
+        """Some of the pieces, with all that belongs to them."""
+        some = replace(
+            self, pieces=tuple(self.pieces[i] for i in at), noise=tuple(self.noise[i] for i in at),
+            starts=tuple(self.starts[i] for i in at),
+            filters=None if self.filters is None else tuple(self.filters[i] for i in at),
+        )  # fmt: skip
+        metric = self.metric
+        if not metric.columns:
+            return some
+        return replace(some, metric=replace(
+            metric, sessions=some.sessions, columns=tuple(metric.columns[i] for i in at),
+            courses=tuple(metric.courses[i] for i in at if metric.courses),
+        ))  # fmt: skip
 
     def scope_of(self, effect: str, *, dated: bool = False) -> Scope:
         """Recordings in which an effect may act, those to be predicted too; None for all.
@@ -257,7 +289,7 @@ class Experiment:
 
     def _errors(self, at: Linearised, step: Array) -> Sequence[ErrorCourse | None] | None:
         """The most probable model error in every piece after a step of the unknowns, if the metric has any."""
-        if self.metric is None or not self.metric.courses:
+        if not self.metric.courses:
             return None
         found = self.metric.explained([part.residual - part.columns @ step for part in at.parts])
         shared = self.metric.shared
@@ -282,7 +314,7 @@ class Experiment:
 
     def _assumed(self, guess: Guess) -> ErrorCourse | None:
         """Model error that a guess was simulated with, if the metric has any."""
-        return guess.piece.error if isinstance(guess, Trajectory) and self.metric is not None else None
+        return guess.piece.error if isinstance(guess, Trajectory) and self.metric.columns else None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -316,11 +348,10 @@ class Linearised:
     products: Array
 
     @classmethod
-    def of(cls, parts: Sequence[Linear], metric: Metric | None) -> Linearised:
+    def of(cls, parts: Sequence[Linear], metric: Metric) -> Linearised:
         """Inner products of linearised pieces."""
         columns = [np.column_stack([part.residual, part.columns]) for part in parts]
-        products = np.sum([X.T @ X for X in columns], axis=0) if metric is None else metric.products(columns)
-        return cls(parts=tuple(parts), products=products)
+        return cls(parts=tuple(parts), products=metric.products(columns))
 
     @property
     def trajectories(self) -> list[Trajectory]:
@@ -369,6 +400,12 @@ class Fit:
         """Squared residuals and priors."""
         return self.linearised.objective(self.z)
 
+    def part(self, at: Sequence[int]) -> Fit:
+        """The part of the fit that is about some pieces."""
+        experiment = self.experiment.part(at)
+        return Fit(experiment=experiment, z=self.z,
+                   linearised=Linearised.of([self.parts[i] for i in at], experiment.metric))  # fmt: skip
+
     @cached_property
     def covariance(self) -> Array:
         """Of ``z``, from the curvature, shape (unknowns, unknowns)."""
@@ -379,8 +416,7 @@ class Fit:
     def log_evidence(self) -> float:
         """Laplace approximation, determinants of noise and metric included, up to ``-M/2 ln 2 pi``."""
         determinants = sum(part.filter.log_determinant for part in self.parts)
-        if self.experiment.metric is not None:
-            determinants += self.experiment.metric.log_determinant
+        determinants += self.experiment.metric.log_determinant
         return -0.5 * (self.objective + determinants) - float(np.log(np.diag(self.root)).sum())
 
     def z_in(self, experiment: Experiment) -> Array:

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from scipy.linalg import cholesky, solve_triangular
 from scipy.special import log_ndtr
 
+from diagnosis.engine.fit import Fit, Linear
 from models.base.types import Array
 
 Index = Sequence[int] | NDArray[np.intp]
@@ -172,3 +173,46 @@ def strengths(a: Array, b: Array, sd: Array | float, sign: Signs | int = 0) -> S
     log_bayes = 0.5 * a * value - 0.5 * np.log1p(b * np.square(sd))
     log_bayes = log_bayes + np.where(sign != 0, np.log(2.0) + log_ndtr(sign * value / own), 0.0)
     return Strengths(log_bayes=np.where(b > LEAST, log_bayes, 0.0), value=value, sd=own)
+
+
+def whitened_base(parts: Sequence[Linear], z: Array, error: Sequence[Array] = ()) -> list[Array]:
+    """Residual at the priors' middles, unknowns and model error of every piece, shape (M, 1 + unknowns + n).
+
+    Parameters
+    ----------
+    z : Array, shape (unknowns,)
+        Where they are linearised
+    error : sequence of Array, shape (M, n) each
+        Whitened columns of model error
+    """
+    return [np.column_stack([part.residual + part.columns @ z, part.columns, *error[index : index + 1]])
+            for index, part in enumerate(parts)]  # fmt: skip
+
+
+def base_of(fit: Fit) -> list[Array]:
+    """Whitened columns of a fit, with the model error of its metric."""
+    return whitened_base(fit.parts, fit.z, fit.experiment.metric.shared_columns)
+
+
+def gram_of(parts: Sequence[Linear], base: Sequence[Array], chosen: Sequence[Array] = ()) -> Gram:
+    """Gram matrices by recording.
+
+    Parameters
+    ----------
+    base : sequence of Array, shape (M, m) each
+        Residual first
+    chosen : sequence of Array, shape (M, n) each
+        Further columns
+    """
+    of_recording: dict[str, Array] = {}
+    determinants: dict[str, float] = {}
+    for index, (part, W) in enumerate(zip(parts, base, strict=True)):
+        name = part.point.trajectory.piece.recording
+        whole = W.T @ W
+        if chosen:
+            X = chosen[index]
+            across = W.T @ X
+            whole = np.block([[whole, across], [across.T, X.T @ X]])
+        of_recording[name] = of_recording.get(name, 0.0) + whole
+        determinants[name] = determinants.get(name, 0.0) + part.filter.log_determinant
+    return Gram(of_recording=of_recording, log_determinants=determinants)

@@ -18,37 +18,27 @@ from diagnosis.candidates.hypotheses import Hypothesis
 from diagnosis.engine.fit import Experiment, calibrate
 from diagnosis.engine.prepare import prepare_experiment
 from diagnosis.engine.scan import scan
-from diagnosis.recordings.recording import Recording
+from diagnosis.setup.inference_setup import InferenceSetup
 from models.base.types import Array
-from models.correction.corrected_gearbox import CorrectedGearbox
+from models.correction.corrected_gearbox import corrected_gearbox
 from models.terms.term import Term
 
 WIDTH, VARIANTS, POINTS = 2.0, 700, 61  # prior sd to either side; how many places a grid has, and in one direction
 
 
-def start_with_switches(
-    gearbox: CorrectedGearbox, experiment: Experiment, recordings: Sequence[Recording], holdout: Sequence[Recording],
-    baseline: Sequence[Recording],
-) -> Array | None:  # fmt: skip
-    """Unknowns to start from, shape (unknowns,); None if no switch has uncertain numbers: the middles of the priors.
-
-    Parameters
-    ----------
-    gearbox : CorrectedGearbox
-        With what is known
-    experiment : Experiment
-        Of this machine and these recordings
-    """
+def start_with_switches(setup: InferenceSetup, experiment: Experiment) -> Array | None:
+    """Unknowns to start from, shape (unknowns,); None if no switch has uncertain numbers: the middles of the priors."""
     values: dict[str, float] = {}
-    for known in gearbox.correction.findings:
+    findings = setup.known.findings
+    for known in findings:
         term = _may_be_absent(known.term)
         rough = _roughly_known(term)
         if not rough:
             continue
-        others = tuple(finding for finding in gearbox.correction.findings if finding is not known)
-        without = replace(gearbox, correction=gearbox.correction.model_copy(update={"findings": others}))
+        others = tuple(finding for finding in findings if finding is not known)
+        without = corrected_gearbox(setup.gearbox, setup.known.model_copy(update={"findings": others}))
         with suppress(ArithmeticError):
-            lacking = prepare_experiment(without, recordings, holdout, baseline)[1]
+            lacking = prepare_experiment(without, setup.recordings, setup.holdout, setup.baseline)[1]
             fit = calibrate(replace(lacking, healthy=frozenset()))  # what is known acts in the baselines too
             best = np.array([1.0, *(p.start for p in term.parameters[1:])])
             points = min(int(VARIANTS ** (1.0 / len(rough))), POINTS)

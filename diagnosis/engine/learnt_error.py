@@ -90,10 +90,8 @@ def with_learnt_error(fit: Fit, near: NearReadings, error_class: ErrorClass) -> 
         What is written into the network
     """
     experiment, metric = fit.experiment, fit.experiment.metric
-    assert metric is not None  # noqa: S101
     directions = near.directions(error_class)
-    tested = next(i for i, piece in enumerate(experiment.pieces) if piece.recording not in experiment.healthy)
-    found = metric.explained([part.residual for part in fit.parts])[tested]
+    found = metric.explained([part.residual for part in fit.parts])[experiment.tested[0]]
     z = fit.z.copy()  # in the session that is predicted
     z[: len(found) - metric.shared] += found[metric.shared :]
 

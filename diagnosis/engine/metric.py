@@ -47,7 +47,7 @@ class ErrorCourses:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Metric:
-    """Inner products of whitened readings of all pieces.
+    """Inner products of whitened readings of all pieces; by default noise is all that there is.
 
     Attributes
     ----------
@@ -65,10 +65,10 @@ class Metric:
         What the shared columns do along every piece, for simulations with model error; empty: none
     """
 
-    sessions: tuple[tuple[int, ...], ...]
-    columns: tuple[Array, ...]
-    shared: int
-    own: int
+    sessions: tuple[tuple[int, ...], ...] = ()
+    columns: tuple[Array, ...] = ()
+    shared: int = 0
+    own: int = 0
     deviation: float = 0.0
     courses: tuple[ErrorCourses, ...] = ()
 

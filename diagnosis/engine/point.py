@@ -12,6 +12,7 @@ from diagnosis.engine.slopes import Heat, LawSlopes
 from diagnosis.forward.grid import Piece
 from diagnosis.forward.network_on_grid import Balance, NetworkOnGrid
 from diagnosis.forward.observation import Sensors, reading_columns, readings
+from diagnosis.forward.recorder import PASSES
 from diagnosis.forward.sensor_fault import delayed
 from diagnosis.forward.term_on_grid import TermOnGrid, moved_heat
 from diagnosis.forward.trajectory import Trajectory, parameter_heat, settled_balance
@@ -22,7 +23,6 @@ from models.terms.term import Term
 
 FEWEST_AT_ONCE, AT_ONCE = 16, 256  # columns that go through the network and the filter together
 VALUES_AT_ONCE = 800_000  # of heats that are held together, per part: bounds the memory of long recordings
-PASSES = 3  # simulations of a piece whose inputs follow its own temperatures, before there is a trajectory
 MEMORY_STEP = 0.02  # of a prior sd, for parameters that decide on switches and memories
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from diagnosis.engine.fit import Experiment, Fit, Linear
+from diagnosis.engine.fit import NOISE_ALONE, Experiment, Fit, Linear
 from diagnosis.engine.point import Setting
 from diagnosis.forward.free_running import free_running
 from diagnosis.forward.grid import Piece, stands_for
@@ -183,8 +183,9 @@ def overall_rmse(predictions: Sequence[Prediction], columns: Sequence[int]) -> f
 def with_pieces_of(experiment: Experiment, other: Experiment) -> Experiment:
     """Machine and unknowns of one experiment with the recordings of another one, judged by noise alone."""
     return replace(
-        experiment, pieces=other.pieces, noise=other.noise, starts=other.starts, filters=other.filters, metric=None,
-        starts_at=other.starts_at or experiment.starts_at, session_of=other.session_of or experiment.session_of,
+        experiment, pieces=other.pieces, noise=other.noise, starts=other.starts, filters=other.filters,
+        metric=NOISE_ALONE, starts_at=other.starts_at or experiment.starts_at,
+        session_of=other.session_of or experiment.session_of,
     )  # fmt: skip
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 from diagnosis.engine.fit import Experiment
@@ -20,12 +20,12 @@ from diagnosis.engine.unknown import (
 )
 from diagnosis.forward.grid import slow_rows
 from diagnosis.recordings.recording import Recording
-from diagnosis.setup.baselines import session_by_recording
 from diagnosis.setup.inference_setup import InferenceSetup, prepare
 from diagnosis.setup.noise import start_guess
+from diagnosis.setup.sessions import session_by_recording, start_times
 from diagnosis.setup.shaft import torque_gain
-from diagnosis.setup.time_axis import start_times
 from models.assembly.gearbox import Gearbox
+from models.mechanisms import CATALOGUE, Mechanism
 from models.network.laws import Parameter
 from models.quantities.quantities import TOTAL_LOSS, is_total_loss
 from models.simulation.thermal_network import ThermalNetwork
@@ -47,28 +47,11 @@ def prepare_experiment(
     baseline: Sequence[Recording] = (),
     *,
     switched_off: Collection[str] = (),
+    catalogue: Mapping[str, Mechanism] = CATALOGUE,
     even: bool = False,
 ) -> tuple[InferenceSetup, Experiment]:
-    """Set up an experiment with the recordings to learn from.
-
-    Parameters
-    ----------
-    recordings, holdout : sequence of Recording
-        Without any held out, the last quarter of every recording is
-    baseline : sequence of Recording
-        Other sessions of the same machine, in which the effect that is looked for cannot act; they calibrate as well
-    switched_off : collection of str
-        The only mechanisms that are known to be off in the baselines; empty: all are
-    even : bool
-        True for intervals of one length, see :func:`diagnosis.forward.grid.pieces`
-
-    Returns
-    -------
-    setup : InferenceSetup
-        Scale, channels and held-out pieces
-    experiment : Experiment
-    """
-    setup = prepare(gearbox, recordings, holdout, baseline, even=even)
+    """Set up an experiment with the recordings to learn from; see :func:`diagnosis.setup.inference_setup.prepare`."""
+    setup = prepare(gearbox, recordings, holdout, baseline, switched_off=switched_off, catalogue=catalogue, even=even)
     unknowns = usual_unknowns(
         setup.model.network, (*recordings, *baseline), setup.channels, interval=setup.scale.interval,
         gain_of_torque=torque_gain(gearbox.network()),

@@ -13,11 +13,10 @@ from numpy.typing import NDArray
 
 from diagnosis.candidates.hypotheses import Hypothesis, chunks
 from diagnosis.engine.fit import Experiment, Fit, Linear
-from diagnosis.engine.gram import Given, Gram, Strengths, strengths
+from diagnosis.engine.gram import Given, Gram, Strengths, base_of, gram_of, strengths, whitened_base
 from diagnosis.engine.learnt import rule
 from diagnosis.engine.metric import Metric
 from diagnosis.engine.point import Point, columns_at_once
-from diagnosis.engine.products import base_of, gram_of, whitened_base
 from diagnosis.engine.unknown import Scope
 from diagnosis.forward.network_on_grid import NetworkOnGrid
 from diagnosis.forward.observation import readings
@@ -181,7 +180,7 @@ def _further_starts(term: Term, sizes: Array, found: Strengths, best: int) -> St
 def _with_unknowns(fit: Fit) -> Metric:
     """The metric of a fit, with its unknowns marginalised as well."""
     metric, columns, count = fit.experiment.metric, [part.columns for part in fit.parts], len(fit.z)
-    if metric is None:
+    if not metric.columns:
         return Metric(sessions=(tuple(range(len(columns))),), columns=tuple(columns), shared=count, own=count)
     both = tuple(np.column_stack(pair) for pair in zip(columns, metric.columns, strict=True))
     return replace(metric, columns=both, shared=count + metric.shared, own=count + metric.own)
@@ -251,7 +250,7 @@ def _finite(heat: Array) -> Array:
     return heat if np.isfinite(heat.sum()) else np.nan_to_num(heat, nan=0.0, posinf=0.0, neginf=0.0)
 
 
-def heat_over_time(fit: Fit, term: Term) -> Array:
+def course_of_heat(fit: Fit, term: Term) -> Array:
     """Net heat of a term of the network in every interval of a fit, times the root of its length, [W s^0.5].
 
     So the inner product of two of them is their integral over the time.

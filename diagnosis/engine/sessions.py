@@ -8,15 +8,14 @@ weigh it, under nothing as under every candidate.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.special import logsumexp
 
 from diagnosis.engine.fit import Experiment, Fit
-from diagnosis.engine.gram import Given, Gram
+from diagnosis.engine.gram import Given, Gram, base_of, gram_of
 from diagnosis.engine.learnt import deviation_priors, rule
-from diagnosis.engine.products import base_of, gram_of
 from models.base.types import Array
 
 SURE, ROUNDING = 0.95, 1e-9  # probability that a machine does not repeat worse
@@ -62,12 +61,6 @@ class OverSessions:
         return np.asarray(logsumexp(self.weights[:, None] + np.stack(log_bayes), axis=0) - self.log_evidence)
 
 
-def sessions_of(experiment: Experiment) -> tuple[tuple[int, ...], ...]:
-    """Pieces of every test session."""
-    names = [experiment.session_of.get(piece.recording, "") for piece in experiment.pieces]
-    return tuple(tuple(i for i, name in enumerate(names) if name == one) for one in dict.fromkeys(names))
-
-
 def over_sessions(
     gram: Gram, experiment: Experiment, unknowns: Sequence[int], fixed: Sequence[int] = ()
 ) -> OverSessions:
@@ -82,7 +75,7 @@ def over_sessions(
     fixed : sequence of int
         Columns with prior N(0, 1) that do not
     """
-    recordings = [{experiment.pieces[p].recording for p in pieces} for pieces in sessions_of(experiment)]
+    recordings = [{experiment.pieces[p].recording for p in pieces} for pieces in experiment.sessions]
     prior = deviation_priors() if len(recordings) > 1 else {0.0: 1.0}
     every = np.array([*unknowns, *fixed], dtype=int)
     found = []
@@ -117,9 +110,8 @@ def most_deviation(gram: Gram, experiment: Experiment) -> float:
     """
     if not experiment.healthy:
         return np.inf
-    healthy = tuple(piece for piece in experiment.pieces if piece.recording in experiment.healthy)
-    alone, prior = replace(experiment, pieces=healthy), deviation_priors()
-    repeated = len(sessions_of(alone)) > 1
+    alone, prior = experiment.part(experiment.baselines), deviation_priors()
+    repeated = len(alone.sessions) > 1
     weights = over_sessions(gram, alone, range(gram.count)).weights if repeated else np.log(list(prior.values()))
     below = np.cumsum(np.exp(weights - logsumexp(weights)))
     return max(rule().repeats, float(np.array(list(prior))[np.searchsorted(below, SURE - ROUNDING)]))
@@ -137,3 +129,33 @@ def fit_over_sessions(fit: Fit, base: int) -> OverSessions:
     gram = gram_of(fit.parts, base_of(fit))
     error = range(count, gram.count)
     return over_sessions(gram, fit.experiment, [*range(base), *error], range(base, count))
+
+
+def sessions_apart(fit: Fit) -> dict[str, float]:
+    """Log Bayes factor for every session of baselines on another machine, against the machine of all other recordings.
+
+    That machine may differ between sessions by :func:`diagnosis.engine.learnt.deviation_priors`.
+
+    Parameters
+    ----------
+    fit : Fit
+        Best explanation, its effects included: what acts in the recordings alone makes no baseline another machine
+
+    Returns
+    -------
+    dict of session to float
+        [nat]
+    """
+    experiment, gram = fit.experiment, gram_of(fit.parts, base_of(fit))
+    sessions = [experiment.session_of.get(piece.recording, "") for piece in experiment.pieces]
+    found = {}
+
+    def log_evidence(at: Sequence[int]) -> float:
+        return over_sessions(gram, experiment.part(at), range(gram.count)).log_evidence
+
+    together = log_evidence(range(len(sessions)))
+    for name in dict.fromkeys(experiment.session_of.get(r, "") for r in sorted(experiment.healthy)):
+        mine, others = ([i for i, one in enumerate(sessions) if (one == name) is it] for it in (True, False))
+        if mine and others:
+            found[name] = log_evidence(mine) + log_evidence(others) - together
+    return found

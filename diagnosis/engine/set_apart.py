@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from diagnosis.engine.fit import Experiment, Fit, calibrate
+from diagnosis.engine.fit import NOISE_ALONE, Experiment, Fit, calibrate
 from diagnosis.engine.unknown import SensorBias, SensorLag, TermParameter, Unknown
 from diagnosis.forward.whitening import AS_ASSUMED
 from diagnosis.recordings.cleaning import stuck_rows
@@ -141,7 +141,9 @@ def refit_to_predict(fit: Fit, plain: Fit, apart: Collection[str] = ()) -> Fit:
     ArithmeticError
         If there is no solution.
     """
-    every = replace(fit.experiment, noise=plain.experiment.noise, random_heat=AS_ASSUMED, filters=None, metric=None)
+    every = replace(
+        fit.experiment, noise=plain.experiment.noise, random_heat=AS_ASSUMED, filters=None, metric=NOISE_ALONE
+    )
     counting = without_channels(every, apart) if apart else every
     nominal = fit.z.copy()
     nominal[: len(plain.z)] = plain.z_in(every)

@@ -18,7 +18,7 @@ from models.files.cycle import Cycle
 from models.files.cycle_file import RecordedStart
 from models.quantities.quantities import TOTAL_LOSS, column_of_input, is_total_loss, node_columns, node_of_channel
 
-PASSES = 3  # simulations where a shift of an input follows the machine's temperatures
+PASSES = 3  # simulations where an input follows the machine's own temperatures
 Columns = Mapping[str, Array]
 
 

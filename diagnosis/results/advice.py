@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Sequence
 
 from diagnosis.candidates.hypotheses import Hypothesis
 from diagnosis.results.places import node_in
 from diagnosis.results.result import Verdict
 from diagnosis.results.result_parts import Finding, Location, NotDetectable
-from models.mechanisms import Mechanism
+from diagnosis.setup.inference_setup import InferenceSetup
 from models.quantities.quantities import is_total_loss, node_of_channel
-from models.simulation.thermal_network import ThermalNetwork
 
 OTHER_OPERATION = "a second recording with other speeds and torques"
 TURNING = ("mesh", "pinion", "wheel", "gear", "shaft", "sun", "planet", "carrier")  # no wire leads there
@@ -19,27 +18,19 @@ WORTH_ASKING = 0.05  # probability of a rival, from which telling it apart is th
 OTHER_PLACE = 0.1  # probability of a further place, from which a sensor there is
 
 
-def without_sensor(network: ThermalNetwork, channels: Sequence[str]) -> frozenset[str]:
+def without_sensor(setup: InferenceSetup) -> frozenset[str]:
     """Parts that have no thermometer and can have one."""
-    parts = [part.name for part in network.parts]
-    measured = {node_of_channel(name, parts) for name in channels if not is_total_loss(name)}
+    parts = [part.name for part in setup.nominal.parts]
+    measured = {node_of_channel(name, parts) for name in setup.channels if not is_total_loss(name)}
     return frozenset(p for p in parts if p not in measured and not p.startswith(TURNING))
 
 
-def separation(
-    own: Hypothesis, other: Hypothesis, catalogue: Mapping[str, Mechanism], network: ThermalNetwork,
-    free: Collection[str],
-) -> str:  # fmt: skip
-    """The experiment, or the sensor, that distinguishes two effects.
-
-    Parameters
-    ----------
-    free : collection of str
-        Parts that can have a sensor, see :func:`without_sensor`
-    """
+def separation(setup: InferenceSetup, own: Hypothesis, other: Hypothesis) -> str:
+    """The experiment, or the sensor, that distinguishes two effects."""
     if own.name == other.name:
-        node = node_in(network, other)
+        node, free = node_in(setup.nominal, other), without_sensor(setup)
         return f"a temperature sensor at {node.replace('_', ' ')}" if node in free else OTHER_OPERATION
+    catalogue = setup.catalogue
     known = [(catalogue[a], b) for a, b in ((own.mechanism, other.mechanism), (other.mechanism, own.mechanism))
              if a in catalogue]  # fmt: skip
     for mechanism, rival in known:
@@ -51,8 +42,8 @@ def separation(
 
 
 def next_test(
-    verdict: Verdict, findings: Sequence[Finding], location: Sequence[Location], unseen: Sequence[NotDetectable],
-    catalogue: Mapping[str, Mechanism], *, assumed: Collection[str], free: Collection[str], missed: Sequence[str],
+    setup: InferenceSetup, verdict: Verdict, findings: Sequence[Finding], location: Sequence[Location],
+    unseen: Sequence[NotDetectable], *, missed: Sequence[str],
 ) -> str:  # fmt: skip
     """The next measurement; empty if there is nothing to ask for.
 
@@ -60,22 +51,20 @@ def next_test(
     ----------
     location : sequence of Location
         Most probable first
-    assumed : collection of str
-        Inputs that were not recorded
-    free : collection of str
-        Parts that can have a sensor
     missed : sequence of str
         Held-out recordings that are missed, worst first
     """
     if verdict == "consistent" and missed:
         return (f"diagnose {missed[0]} with the recordings that agree as baselines (--baseline): it shows what changed "
                 "between them")  # fmt: skip
+    assumed = {name for recording in (*setup.recordings, *setup.holdout) for name in recording.assumed}
     if verdict == "unexplained" and "T_ambient" in assumed:
         return "record T_ambient_degC: it is taken as constant, so changes of the air look like heat at other parts"
     for finding in findings:
         rivals = [rival for rival in finding.confusable_with if rival.instead]
         if rivals and rivals[0].probability >= WORTH_ASKING:
             return rivals[0].separate_by
+    free = without_sensor(setup)
     for place in location[1:]:
         if place.probability >= OTHER_PLACE and place.node in free:
             return f"a temperature sensor at {place.node.replace('_', ' ')}: it shows if the heat is there"
@@ -84,6 +73,6 @@ def next_test(
         return f"{wanted} (it would show {shown} effect{'s' if shown > 1 else ''} that these data cannot)"
     if verdict == "unexplained":
         return "repeat the operation in which the model is wrong, and change one input at a time"
-    if findings and findings[0].mechanism in catalogue:
-        return catalogue[findings[0].mechanism].experiment
+    if findings and findings[0].mechanism in setup.catalogue:
+        return setup.catalogue[findings[0].mechanism].experiment
     return ""

@@ -11,7 +11,6 @@ import numpy as np
 from diagnosis.candidates.hypotheses import Hypothesis
 from diagnosis.decision.answer import Answer, act_on_the_same, withdraw_claim
 from diagnosis.decision.posterior import KINDS, Expected, Judged, Posterior
-from diagnosis.decision.settings import Settings
 from diagnosis.engine.calibration import Calibration
 from diagnosis.engine.fit import Experiment, Fit
 from diagnosis.engine.predict import overall_rmse, rmse
@@ -20,15 +19,13 @@ from diagnosis.engine.scale import at_stated_size
 from diagnosis.engine.set_apart import refit_to_predict
 from diagnosis.forward.grid import too_short
 from diagnosis.forward.whitening import RandomHeat
-from diagnosis.recordings.recording import Recording
-from diagnosis.results.advice import next_test, without_sensor
-from diagnosis.results.baseline_notes import baseline_notes
+from diagnosis.results.advice import next_test
 from diagnosis.results.findings import estimates_of, finding_of, joint_estimate_of, switch_errors
 from diagnosis.results.instruments import sensors_and_inputs_of
 from diagnosis.results.locations import locations_of
+from diagnosis.results.notes import baseline_notes, ratio_notes
 from diagnosis.results.predicted_run import PredictedRun
 from diagnosis.results.predictions import Predicted, Predictions, predict_recordings, temperatures
-from diagnosis.results.ratios_only import ratio_notes
 from diagnosis.results.result import Diagnosis, Verdict
 from diagnosis.results.result_parts import (
     NO_CLAIM,
@@ -38,14 +35,13 @@ from diagnosis.results.result_parts import (
     Fits,
     NotDetectable,
     Ranked,
-    law_of,
+    called,
     spoiled_in,
 )
 from diagnosis.setup.inference_setup import InferenceSetup
 from diagnosis.setup.noise import HEAT_FRACTION, HEAT_TIME_S, PARAMETRIC_FRACTION, PARAMETRIC_K, WANDER
 from models.base.types import Array
 from models.base.version import project_version
-from models.correction.correction import Correction
 from models.mechanisms import Mechanism
 from models.network.laws import Parameter
 from models.terms.term import Term
@@ -81,13 +77,6 @@ def assemble(
     plain: Fit,
     calibration: Calibration,
     others: Others | None = None,
-    settings: Settings,
-    catalogue: Mapping[str, Mechanism],
-    known: Correction,
-    train: Sequence[Recording],
-    held_out: Sequence[Recording],
-    healthy: Sequence[Recording] = (),
-    switched_off: Sequence[str] = (),
     jobs: int = 1,
 ) -> Diagnosis:
     """The result of a decision.
@@ -104,14 +93,10 @@ def assemble(
         With model error
     others : Others or None
         What all but faulty channels say, if there are any
-    known : Correction
-        What was known of the machine before
-    train, held_out, healthy : sequence of Recording
-    switched_off : sequence of str
-        Mechanisms that are off in `healthy`; all if empty
     jobs : int
         Processes
     """
+    settings, known, baselines = posterior.settings, setup.known, {r.name: r.sha256 for r in setup.baseline}
     faulty = () if others is None else others.channels
     best = _best(posterior, answers)
     counting = [name for name in setup.channels if name not in faulty]
@@ -130,7 +115,7 @@ def assemble(
     if contradicted:
         answers = [withdraw_claim(answer, posterior.rule) for answer in answers]
     reported = _distinct([
-        (answer, finding_of(answer, answer.best.fit or final, setup, posterior, catalogue, train))
+        (answer, finding_of(answer, answer.best.fit or final, setup, posterior))
         for answer in answers
     ])  # fmt: skip
     findings = tuple(finding for _, finding in reported)
@@ -138,9 +123,9 @@ def assemble(
     told |= {rival.mechanism for finding in findings for rival in finding.confusable_with}
     if posterior.detected:  # nobody is silent about a name that looks like what is there
         told |= {one.effects[0].name for one in posterior.judged if one.log_bayes > posterior.threshold}
-    unseen = tuple(one for one in _unseen(posterior, catalogue) if one.mechanism not in told)
+    unseen = tuple(one for one in _unseen(posterior, setup.catalogue) if one.mechanism not in told)
     train_fits = _fits(setup, predicted.train, counting)
-    spoiled = spoiled_in(train_fits, holdout, baselines=[r.name for r in healthy],
+    spoiled = spoiled_in(train_fits, holdout, baselines=baselines,
                          least_K=settings.matters_K + setup.noise_K)  # fmt: skip
     unfit = bool(spoiled) or train_fits.calibrated - train_fits.before > setup.noise_K
     verdict = verdict_of(posterior, [answer for answer, _ in reported], unseen, unfit=unfit)
@@ -149,7 +134,6 @@ def assemble(
     most_probable = best if others is None else others.posterior.nothing
     believed = (most_probable.fit if most_probable else None) or calibration.fit
     model = _calibrated(final, believed, plain, inputs, best.effects if best else ())
-    assumed = {name for r in (*train, *held_out) for name in r.assumed}
     return Diagnosis(
         verdict=verdict,
         gearbox=setup.gearbox.name,
@@ -178,11 +162,11 @@ def assemble(
         ranking=_ranking(posterior),
         unseen=unseen,
         not_tried=tuple(sorted(
-            catalogue.keys() - {one.effect.name for one in posterior.expected} - {f.mechanism for f in known.findings}
+            setup.catalogue.keys() - {one.effect.name for one in posterior.expected}
+            - {f.mechanism for f in known.findings}
         )),
         next_test=next_test(
-            verdict, findings, location if posterior.detected else (), unseen, catalogue, assumed=assumed,
-            free=without_sensor(setup.nominal, setup.channels),
+            setup, verdict, findings, location if posterior.detected else (), unseen,
             missed=holdout.far_beyond(train_fits, settings.matters_K),
         ),
         courses=_courses(setup, predicted),
@@ -190,18 +174,19 @@ def assemble(
         shapes=setup.shapes,
         learnt=predicted.learnt,
         inputs={
-            "recordings": {r.name: r.sha256 for r in train},
-            "held_out": {r.name: r.sha256 for r in held_out},
-            "baselines": {r.name: r.sha256 for r in healthy},
-            "switched_off": list(switched_off),
+            "recordings": {r.name: r.sha256 for r in setup.recordings},
+            "held_out": {r.name: r.sha256 for r in setup.holdout},
+            "baselines": baselines,
+            "switched_off": list(setup.switched_off),
             "gearbox": setup.gearbox.hash,
             "correction": known.summary()["sha256"] if known.has_physics else None,
             "version": project_version(),
         },
         notes=(
             *ratio_notes(final), *baseline_notes(experiment, posterior, answers),
-            *too_short((*train, *healthy), experiment.pieces), *too_short(held_out, setup.held_out),
-            *(f"{r.name}: {note}" for r in (*train, *held_out, *healthy) for note in r.notes),
+            *too_short((*setup.recordings, *setup.baseline), experiment.pieces),
+            *too_short(setup.holdout, setup.held_out),
+            *(f"{r.name}: {note}" for r in (*setup.recordings, *setup.holdout, *setup.baseline) for note in r.notes),
         ),
         kinds={kind: posterior.of(kind) for kind in KINDS},
         settings=settings,
@@ -305,12 +290,12 @@ def verdict_of(
 def _unseen(posterior: Posterior, catalogue: Mapping[str, Mechanism]) -> tuple[NotDetectable, ...]:
     """Mechanisms that would not have been seen at the size that matters, at their best place."""
     best: dict[str, Expected] = {}
-    for one in sorted(posterior.expected, key=lambda one: one.log_bayes + one.log_prior):
+    for one in sorted(posterior.expected, key=lambda one: one.weight):
         if one.effect.name in catalogue:
             best[one.effect.name] = one
     return tuple(
         NotDetectable(mechanism=name, place=one.effect.place, needed=catalogue[name].experiment, expected=one.log_bayes)
-        for name, one in sorted(best.items()) if one.log_bayes + one.log_prior < posterior.threshold
+        for name, one in sorted(best.items()) if one.weight < posterior.threshold
     )  # fmt: skip
 
 
@@ -325,7 +310,7 @@ def _remaining(posterior: Posterior, others: Others | None, best: Judged | None)
         return f"without {channels} nothing stands out of noise and model error (evidence {rest.log_e:.1f} nat)"
     if _looked_no_further(best):
         return (
-            f"two effects were fitted (evidence {posterior.remainder:.0f} nat of the second), no third was looked for"
+            f"two effects were fitted (evidence {posterior.left_by():.0f} nat of the second), no third was looked for"
         )
     left = posterior.left_by(best)
     if left > posterior.class_threshold:
@@ -441,7 +426,7 @@ def _ranking(posterior: Posterior) -> tuple[Ranked, ...]:
             place=" + ".join(effect.place for effect in one.effects),
             family=" + ".join(dict.fromkeys(effect.family for effect in one.effects)), log_bayes=one.log_bayes,
             probability=probability,
-            laws=tuple(law_of(effect.mechanism, effect.place) for effect in one.effects),
+            laws=tuple(called(effect.mechanism, effect.place) for effect in one.effects),
         )
         for one, probability in ranked[:MOST_RANKED]
     )  # fmt: skip

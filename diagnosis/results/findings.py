@@ -14,15 +14,16 @@ from diagnosis.decision.answer import Answer
 from diagnosis.decision.posterior import Posterior
 from diagnosis.engine.fit import Experiment, Fit
 from diagnosis.engine.unknown import SensorBias, Unknown
+from diagnosis.forward.grid import Piece
 from diagnosis.forward.term_on_grid import TermOnGrid
 from diagnosis.recordings.recording import Recording
-from diagnosis.results.advice import separation, without_sensor
+from diagnosis.results.advice import separation
 from diagnosis.results.joint_estimate import JointEstimate
 from diagnosis.results.places import node_in
-from diagnosis.results.result_parts import LEAST_RIVAL, Change, Finding, ParameterValue, Rival, Switching, law_of
-from diagnosis.setup.inference_setup import InferenceSetup, heat_over_time
+from diagnosis.results.result_parts import LEAST_RIVAL, Change, Finding, ParameterValue, Rival, Switching, called
+from diagnosis.setup.inference_setup import InferenceSetup
 from models.base.types import Array
-from models.mechanisms import Mechanism, Placed
+from models.mechanisms import Placed
 from models.network.laws import symbol
 from models.terms.term import Term
 
@@ -36,19 +37,8 @@ HOT_DEGC = 1e6
 Values = Mapping[str, tuple[float, float]]
 
 
-def finding_of(
-    answer: Answer, fit: Fit, setup: InferenceSetup, posterior: Posterior, catalogue: Mapping[str, Mechanism],
-    recordings: Sequence[Recording],
-) -> Finding:  # fmt: skip
-    """An answer with the numbers of a fit.
-
-    Parameters
-    ----------
-    fit : Fit
-        With the effect of the answer among its unknowns
-    recordings : sequence of Recording
-        Learnt from
-    """
+def finding_of(answer: Answer, fit: Fit, setup: InferenceSetup, posterior: Posterior) -> Finding:
+    """An answer with the numbers of a fit, which has the effect of the answer among its unknowns."""
     effect, term = answer.effect, answer.effect.term
     values, heats = values_of(fit, effect), heats_of(fit, effect)
     pieces = [part.point.trajectory.piece for part in fit.parts]
@@ -72,17 +62,17 @@ def finding_of(
             ParameterValue(name=name.removeprefix(prefix), value=value, stderr=sd, unit=units.get(name, "1"))
             for name, (value, sd) in values.items() if name != effect.clock
         ),
-        confusable_with=_rivals(answer, setup, posterior, catalogue),
+        confusable_with=_rivals(answer, setup, posterior),
         heat_mean_W=mean,
         heat_stderr_W=stderr,
         heat_max_W=max((float(np.abs(heat).max()) for heat in heats), default=0.0),
-        heat=heat_over_time(pieces, heats) if heats else {},
+        heat=_over_time(pieces, heats) if heats else {},
         term=None if term is None else term.with_values(found),
         grade=answer.grade,
-        tie_set=tuple(dict.fromkeys(law_of(one.mechanism, one.place) for one, _ in answer.tied)),
+        tie_set=tuple(dict.fromkeys(called(one.mechanism, one.place) for one, _ in answer.tied)),
         joint_probability=answer.joint,
         acts_like=answer.acts_like,
-        date=change_of(values, effect, fit.experiment, recordings),
+        date=change_of(values, effect, fit.experiment, setup.recordings),
         switching=switching_of(values, effect),
     )  # fmt: skip
 
@@ -129,15 +119,13 @@ def _equation(effect: Hypothesis, found: Mapping[str, float]) -> str:
     return term.with_values(found).equation(known)
 
 
-def _rivals(
-    answer: Answer, setup: InferenceSetup, posterior: Posterior, catalogue: Mapping[str, Mechanism]
-) -> tuple[Rival, ...]:
+def _rivals(answer: Answer, setup: InferenceSetup, posterior: Posterior) -> tuple[Rival, ...]:
     """Other names at their most probable places: those of the tie set with its probabilities, then everything else."""
 
     def key(effect: Hypothesis) -> str:
         return effect.label if effect.term is None else effect.mechanism
 
-    own, free = answer.effect, without_sensor(setup.nominal, setup.channels)
+    own = answer.effect
     others = {effect.label for effect in answer.best.effects}
     odds: dict[str, float] = {}
     alone: dict[str, float] = {}
@@ -157,7 +145,7 @@ def _rivals(
     return tuple(
         Rival(
             mechanism=where[name].mechanism, place=where[name].place, probability=probability,
-            separate_by=separation(own, where[name], catalogue, setup.nominal, free),
+            separate_by=separation(setup, own, where[name]),
             instead=name in tied or alone[name] >= LEAST_RIVAL,
         )
         for name, probability in sorted({**odds, **tied}.items(), key=lambda one: (one[0] not in tied, -one[1]))
@@ -275,6 +263,16 @@ def heats_of(fit: Fit, effect: Hypothesis) -> list[Array]:
         return []
     values = np.array([[values_of(fit, effect)[name][0] for name in names_of(effect)]])
     return [heat[:, 0] for heat in _heats_with(fit, effect, values)]
+
+
+def _over_time(pieces: Sequence[Piece], heats: Sequence[Array]) -> dict[str, tuple[Array, Array]]:
+    """Heats of pieces [W] by recording: time at the middles of the intervals [s], and heat."""
+    result: dict[str, tuple[Array, Array]] = {}
+    for piece, heat in zip(pieces, heats, strict=True):
+        time, before = piece.middle, result.get(piece.recording)
+        result[piece.recording] = (time, heat) if before is None else (
+            np.concatenate([before[0], time]), np.concatenate([before[1], heat]))  # fmt: skip
+    return result
 
 
 def mean_heat_of(fit: Fit, effect: Hypothesis) -> tuple[float, float]:

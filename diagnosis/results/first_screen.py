@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
+from diagnosis.decision.posterior import Repeating, ScaledError
 from diagnosis.results.number_format import MINUS, number, share, with_error
 from diagnosis.results.result_parts import (
     LEAST_RIVAL,
@@ -16,7 +17,6 @@ from diagnosis.results.result_parts import (
     named,
     title_of,
 )
-from diagnosis.results.robustness import repeating_told, robustness_told
 from models.mechanisms import OPEN_FORM
 from models.mechanisms.measurement import FAMILY as MEASUREMENT
 
@@ -40,6 +40,7 @@ LIKELY_TEXT: Mapping[str, str] = {  # of the same verdicts where no name is a cl
 EITHER = "The measurement is at fault, or the model leaves out physics: these data do not separate the two."
 MISSED = "What was learnt from agrees with the model; held-out {names} not."
 UNFIT = "The model cannot be brought to fit these recordings, and why has no name."
+SIZES = {0.5: "half as large", 1.0: "as assumed", 2.0: "twice as large"}  # of model error, by factor
 LARGEST_ERROR = "full"  # class of model error
 FAR_SD, MOST_FAR = 3.0, 3  # standard deviations of a prior, beyond which the summary tells of a parameter; how many
 MOST_UNSEEN = 6  # effects that the summary names of those that cannot be seen
@@ -311,3 +312,50 @@ def _time(seconds: float) -> str:
 def _unit(symbol: str) -> str:
     """A unit behind a number."""
     return "" if symbol == "1" else f" {symbol}"
+
+
+def size_of(one: ScaledError) -> str:
+    """Size of the model error, in words."""
+    return SIZES[one.factor]
+
+
+def ahead_in(one: ScaledError) -> str:
+    """The candidate ahead, or that nothing stands out."""
+    return named(one.mechanism, one.place) if one.log_e_value > one.threshold else "nothing"
+
+
+def repeating_told(supported: Repeating, worse: Repeating) -> str:
+    """Sentence on what the scan would say if the machine repeated worse.
+
+    Examples
+    --------
+    >>> from dataclasses import replace
+    >>> one = Repeating(deviation_in_sd=0.05, log_e_value=40.2, mechanism="windage", place="oil")
+    >>> repeating_told(one, replace(one, deviation_in_sd=0.1, log_e_value=31.0))
+    'Quick scan: 40 nat; 31 nat if sessions differ by 0.1 prior widths instead of 0.05: windage at oil ahead.'
+    """
+    ahead = ", then ".join(dict.fromkeys(named(one.mechanism, one.place) for one in (supported, worse)))
+    return (
+        f"Quick scan: {supported.log_e_value:.0f} nat; {worse.log_e_value:.0f} nat if sessions differ by "
+        f"{worse.deviation_in_sd:g} prior widths instead of {supported.deviation_in_sd:g}: {ahead} ahead."
+    )
+
+
+def robustness_told(every: Sequence[ScaledError]) -> str:
+    """Sentence on the evidence that the scan gives with model error of all sizes.
+
+    Examples
+    --------
+    >>> from dataclasses import replace
+    >>> one = ScaledError(factor=0.5, log_e_value=40.2, threshold=5.0, mechanism="windage", place="oil")
+    >>> robustness_told([one, replace(one, factor=2.0, log_e_value=31.0)])
+    'Quick scan (before fits) with model error half as large 40 nat, twice as large 31 nat: windage at oil ahead.'
+    >>> robustness_told([one, replace(one, factor=2.0, log_e_value=3.0)])
+    'Quick scan (before fits) with model error half as large 40 nat (windage at oil), twice as large 3 nat (nothing).'
+    """
+    ahead = {ahead_in(one) for one in every}
+    told = [
+        f"{size_of(one)} {one.log_e_value:.0f} nat{f' ({ahead_in(one)})' if len(ahead) > 1 else ''}" for one in every
+    ]
+    together = f": {ahead.pop()} ahead" if len(ahead) == 1 else ""
+    return f"Quick scan (before fits) with model error {', '.join(told)}{together}."

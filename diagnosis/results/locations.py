@@ -57,8 +57,8 @@ def _place(
     if fit is None or not warm:
         return Location(nodes=(node,), probability=min(weight, 1.0), heat_mean_W=0.0, heat_max_W=0.0, when=(),
                         regime="always")  # fmt: skip
-    tested = [i for i, one in enumerate(fit.trajectories) if one.piece.recording not in fit.experiment.healthy]
     here, heat = warm[0]
+    tested = fit.experiment.tested
     heats = [heat[i] for i in tested]
     trajectories = [fit.trajectories[i] for i in tested]
     pieces = [trajectory.piece for trajectory in trajectories]

@@ -55,7 +55,7 @@ class Rival:
     @property
     def law(self) -> str:
         """Name of the law; of a parameter its own."""
-        return law_of(self.mechanism, self.place)
+        return called(self.mechanism, self.place)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -163,7 +163,7 @@ class Finding:
     @property
     def law(self) -> str:
         """Name of the law; of a parameter its own."""
-        return law_of(self.mechanism, self.place)
+        return called(self.mechanism, self.place)
 
     @property
     def title(self) -> str:
@@ -413,12 +413,12 @@ def title_of(item: Sequence[Finding]) -> str:
     return first.title if len(names) == 1 else f"acts like {named(' with '.join(names), first.place)}"
 
 
-def law_of(mechanism: str, place: str) -> str:
+def called(mechanism: str, place: str) -> str:
     """Name of a law; of a parameter its own.
 
     Examples
     --------
-    >>> law_of("windage", "oil"), law_of("parameter", "h_air")
+    >>> called("windage", "oil"), called("parameter", "h_air")
     ('windage', 'parameter h_air')
     """
     return named(mechanism, place) if mechanism == PARAMETER else mechanism

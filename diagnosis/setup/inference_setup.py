@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,7 +16,9 @@ from diagnosis.setup.shaft import shafts, with_shaft
 from diagnosis.setup.shapes import shape_terms
 from models.assembly.gearbox import Gearbox
 from models.base.types import Array
-from models.mechanisms import Scale
+from models.correction.corrected_gearbox import CorrectedGearbox
+from models.correction.correction import Correction
+from models.mechanisms import CATALOGUE, Mechanism, Scale
 from models.quantities.quantities import GEARBOX_INPUTS, TOTAL_LOSS, is_total_loss
 from models.simulation.thermal_network import ThermalNetwork
 from models.terms.term import Term
@@ -28,10 +30,18 @@ START_S = 600.0  # readings that only serve to find the start temperatures of a 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class InferenceSetup:
-    """A gearbox and its recordings.
+    """A gearbox, its recordings, and what may be missing.
 
     Attributes
     ----------
+    gearbox : Gearbox
+        With what is known of the machine before
+    recordings, holdout, baseline : tuple of Recording
+        To learn from, to judge by, and those in which the effect that is looked for cannot act
+    switched_off : tuple of str
+        The only mechanisms that are known to be off in the baselines; empty: all are
+    catalogue : mapping of str to Mechanism
+        What is looked for
     nominal : ThermalNetwork
         As the definition has it
     model : NetworkOnGrid
@@ -53,6 +63,11 @@ class InferenceSetup:
     """
 
     gearbox: Gearbox
+    recordings: tuple[Recording, ...]
+    holdout: tuple[Recording, ...]
+    baseline: tuple[Recording, ...]
+    switched_off: tuple[str, ...]
+    catalogue: Mapping[str, Mechanism]
     nominal: ThermalNetwork
     model: NetworkOnGrid
     shapes: tuple[Term, ...]
@@ -64,6 +79,11 @@ class InferenceSetup:
     white_K: Mapping[str, float]
     white_loss: tuple[float, float]
     display: Array
+
+    @property
+    def known(self) -> Correction:
+        """Physics of the machine that its definition lacks."""
+        return self.gearbox.correction if isinstance(self.gearbox, CorrectedGearbox) else Correction()
 
     @property
     def noise_K(self) -> float:
@@ -88,14 +108,16 @@ def prepare(
     holdout: Sequence[Recording],
     baseline: Sequence[Recording] = (),
     *,
+    switched_off: Collection[str] = (),
+    catalogue: Mapping[str, Mechanism] = CATALOGUE,
     even: bool = False,
 ) -> InferenceSetup:
-    """Set up the inference.
+    """Set up the inference; see :class:`InferenceSetup` for what is given.
 
     Parameters
     ----------
-    recordings, holdout : sequence of Recording
-        To learn from, and to judge by
+    holdout : sequence of Recording
+        Without any the last quarter of every recording is held out
     baseline : sequence of Recording
         To learn from as well, as a whole; they do not decide on the scale
     even : bool
@@ -103,9 +125,9 @@ def prepare(
     """
     as_defined = gearbox.network()
     nominal = with_shaft(as_defined)
-    recordings, holdout, baseline = (shafts(given, as_defined) for given in (recordings, holdout, baseline))
-    everything = (*recordings, *baseline)
-    scale = scale_of(gearbox, recordings)
+    train, held, healthy = (shafts(given, as_defined) for given in (recordings, holdout, baseline))
+    everything = (*train, *healthy)
+    scale = scale_of(gearbox, train)
     shapes = shape_terms(nominal, scale)
     network = nominal
     for term in shapes:
@@ -114,14 +136,16 @@ def prepare(
     measured = {c.name for r in everything for c in r.channels}
     temperatures = sorted((c for c in measured if not is_total_loss(c)), key=lambda c: (model.part_index(c), c))
     channels = (*temperatures, *([TOTAL_LOSS] if TOTAL_LOSS in measured else []))
-    learnt, held_out, healthy = (
-        pieces(given, model.laws.inputs, channels, even=even) for given in (recordings, holdout, baseline)
+    learnt, held_out, of_baselines = (
+        pieces(given, model.laws.inputs, channels, even=even) for given in (train, held, healthy)
     )
     if not holdout:
         learnt, held_out = tuple(map(first_part, learnt)), tuple(map(last_part, learnt))
     return InferenceSetup(
-        gearbox=gearbox, nominal=nominal, model=model, shapes=shapes, scale=scale, channels=channels,
-        learnt=(*learnt, *healthy), held_out=held_out, loss_W=typical_loss(model, recordings),
+        gearbox=gearbox, recordings=tuple(recordings), holdout=tuple(holdout), baseline=tuple(baseline),
+        switched_off=tuple(switched_off), catalogue=catalogue,
+        nominal=nominal, model=model, shapes=shapes, scale=scale, channels=channels,
+        learnt=(*learnt, *of_baselines), held_out=held_out, loss_W=typical_loss(model, train),
         white_K=channel_noise(everything, channels),
         white_loss=loss_noise(everything) if TOTAL_LOSS in channels else (0.0, 0.0),
         display=display_noise(everything, channels),
@@ -178,13 +202,3 @@ def typical_loss(model: NetworkOnGrid, recordings: Sequence[Recording]) -> float
         values.append(power[np.abs(speed) > STANDSTILL_RPM])
     found = np.concatenate(values) if values else np.zeros(0)
     return float(np.median(found)) if len(found) else 1.0
-
-
-def heat_over_time(parts: Sequence[Piece], heats: Sequence[Array]) -> dict[str, tuple[Array, Array]]:
-    """Heats of pieces [W] by recording: time at the middles of the intervals [s], and heat."""
-    result: dict[str, tuple[Array, Array]] = {}
-    for piece, heat in zip(parts, heats, strict=True):
-        time, before = piece.middle, result.get(piece.recording)
-        result[piece.recording] = (time, heat) if before is None else (
-            np.concatenate([before[0], time]), np.concatenate([before[1], heat]))  # fmt: skip
-    return result

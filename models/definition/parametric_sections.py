@@ -3,7 +3,7 @@
 A user who has a recording of a gearbox mostly has no drawings of it. The forms of losses and heat paths are known
 nevertheless: a loss has a part that depends on the load and one that does not, heat flows from part to part and out,
 oil returns from a circuit. The sizes are guesses with wide priors, which a recording narrows. Temperatures alone
-determine only ratios of heats, conductances and capacities; see :mod:`diagnosis.results.ratios_only`.
+determine only ratios of heats, conductances and capacities; see :func:`diagnosis.results.notes.ratio_notes`.
 
 The tables are ``[[input]]``, ``[[boundary]]``, ``[[part]]``, ``[[link]]``, ``[[heat]]``, ``[[loss]]`` with
 ``[reference]`` and ``[oil]``, ``[torque]``, ``[[parameter]]``, ``[ambient]`` and ``[recording]``. A machine without

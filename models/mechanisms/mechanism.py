@@ -155,10 +155,6 @@ class Mechanism:
             p for p in placed if p.target and not any(ABSENT in law.free_symbols for law in p.written.values())
         )
 
-    def separation(self, other: str) -> str:
-        """Return the experiment that would distinguish this mechanism from another one."""
-        return self.separate_by.get(other, self.experiment)
-
     def _at(
         self, network: ThermalNetwork, scale: Scale, placement: Placement, common: Mapping[str, sp.Expr], traced: Traced
     ) -> Placed:  # fmt: skip

@@ -15,8 +15,8 @@ from diagnosis.engine.prepare import prepare_experiment
 from diagnosis.engine.scale import scale_direction
 from diagnosis.recordings.read import read_recordings
 from diagnosis.recordings.recording import Recording
+from diagnosis.results.notes import ratio_notes
 from diagnosis.results.predicted_run import PredictedRun
-from diagnosis.results.ratios_only import ratio_notes
 from diagnosis.results.result import Diagnosis
 from models.assembly.gearbox import load_gearbox
 

@@ -94,7 +94,7 @@ class Standard:
     heat: float
     conductance: float
 
-    def law_of(self, coordinate: str) -> sp.Expr:
+    def coordinate_law(self, coordinate: str) -> sp.Expr:
         """A standardised coordinate as an expression of the network's signals."""
         raw = symbol(coordinate)
         if coordinate == TEMPERATURE:
@@ -212,7 +212,7 @@ class Smooth:
 
     def law(self, standard: Standard, values: Array) -> sp.Expr:
         """Sum of the functions times `values`, shape (functions,), of the network's signals."""
-        c = [standard.law_of(name) for name in self.coordinates]
+        c = [standard.coordinate_law(name) for name in self.coordinates]
         terms = (
             value / _scale(powers) * sp.Mul(*(x**power for x, power in zip(c, powers, strict=True)))
             for value, powers in zip(values.tolist(), self.powers, strict=True)

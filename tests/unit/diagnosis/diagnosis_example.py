@@ -186,7 +186,8 @@ def _windage() -> Finding:
         ),
         confusable_with=(
             *(
-                Rival(mechanism=other, place="oil", probability=p, separate_by=windage.mechanism.separation(other))
+                Rival(mechanism=other, place="oil", probability=p,
+                      separate_by=windage.mechanism.separate_by.get(other, windage.mechanism.experiment))
                 for other, p in (("pocketing", 0.061), ("churning_swirl", 0.019))
             ),
         ),

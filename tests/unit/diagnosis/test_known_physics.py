@@ -51,8 +51,8 @@ def test_numbers_known_roughly_are_calibrated_and_exact_ones_stay(fzg: Gearbox) 
     known = fan(fzg, {"strength": 15.0}, strength=-3.0, set_point=2.7)
     pump = known_finding(fzg, fzg.network(), "pump_heat", {"strength": (0.1, 0.0)})
     rough = corrected_gearbox(fzg, known.model_copy(update={"findings": (*known.findings, pump)}))
-    _, experiment = prepare_experiment(rough, [ride], [ride])
-    start = start_with_switches(rough, experiment, [ride], [ride], [])
+    setup, experiment = prepare_experiment(rough, [ride], [ride])
+    start = start_with_switches(setup, experiment)
     found, from_middles = values_of(calibrate(experiment, start)), values_of(calibrate(experiment))
     assert found["set_point"] == pytest.approx(TRUE["set_point"], abs=0.2)
     assert abs(from_middles["set_point"] - TRUE["set_point"]) > 0.5  # one of its many minima
@@ -62,8 +62,7 @@ def test_numbers_known_roughly_are_calibrated_and_exact_ones_stay(fzg: Gearbox) 
 
 def test_without_uncertain_switches_a_calibration_begins_in_the_middle(fzg: Gearbox, rides: list[Recording]) -> None:
     known = corrected_gearbox(fzg, fan(fzg, strength=1.0))
-    _, experiment = prepare_experiment(known, rides[:1], rides[1:2])
-    assert start_with_switches(known, experiment, rides[:1], rides[1:2], []) is None
+    assert start_with_switches(*prepare_experiment(known, rides[:1], rides[1:2])) is None
 
 
 def test_what_is_known_acts_in_baselines_too(
@@ -71,7 +70,7 @@ def test_what_is_known_acts_in_baselines_too(
 ) -> None:
     """Where its set-point is looked for no baseline is taken to be without it."""
     known = corrected_gearbox(fzg, fan(fzg, set_point=2.7))
-    _, experiment = prepare_experiment(known, rides[:1], rides[1:2], rides[2:])
+    setup, experiment = prepare_experiment(known, rides[:1], rides[1:2], rides[2:])
     seen: list[frozenset[str]] = []
 
     def looked_at(there: Experiment) -> Fit:
@@ -79,7 +78,7 @@ def test_what_is_known_acts_in_baselines_too(
         raise ArithmeticError
 
     monkeypatch.setattr(known_switches, "calibrate", looked_at)
-    start_with_switches(known, experiment, rides[:1], rides[1:2], rides[2:])
+    start_with_switches(setup, experiment)
     assert experiment.healthy and seen == [frozenset()]
 
 
@@ -123,8 +122,8 @@ def test_what_is_known_is_no_candidate_a_second_time(fzg: Gearbox, rides: list[R
     catalogue = {name: CATALOGUE[name] for name in ("fan_thermostat", "foundation_conduction")}
     names = []
     for known in (Correction(), fan(fzg)):
-        setup, experiment = prepare_experiment(corrected_gearbox(fzg, known), rides[:1], rides[1:2])
-        found = candidates_of(setup, experiment, catalogue)
+        gearbox = corrected_gearbox(fzg, known)
+        found = candidates_of(*prepare_experiment(gearbox, rides[:1], rides[1:2], catalogue=catalogue))
         names.append({one.name for one in found if one.how == "always"})
         changes = {one.place for one in found if one.name.startswith("air_cooling") and one.how == "from_date"}
     assert names[0] - names[1] == {"fan_thermostat"} and "foundation_conduction" in names[1]

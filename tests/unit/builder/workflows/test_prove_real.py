@@ -13,7 +13,6 @@ from builder.workflows import prove_real as workflow
 from builder.workflows.held_out_fmu import overall
 from builder.workflows.prove_real import BY_SOUND, PLANTS, data_file, prove_real, rows_of
 from diagnosis.decision.posterior import Judged, Posterior
-from diagnosis.decision.settings import Settings
 from diagnosis.engine.calibration import Calibration, NearReadings
 from diagnosis.engine.fit import calibrate
 from diagnosis.engine.learnt import error_classes, rule
@@ -23,8 +22,6 @@ from diagnosis.engine.set_apart import calibrate_apart
 from diagnosis.results.assemble import Others, assemble
 from diagnosis.results.result import Diagnosis
 from models.base.errors import InputError
-from models.correction.correction import Correction
-from models.mechanisms import CATALOGUE
 
 SHORT = replace(PLANTS["rod"], train="0..10800", hold="10800..14400")
 
@@ -34,14 +31,13 @@ def calibrated(train: Any, gearbox: Any, *, holdout: Any, **_: object) -> Diagno
     setup, experiment = prepare_experiment(gearbox, train, holdout)
     plain = calibrate(experiment)
     fit, apart = calibrate_apart(experiment, plain)
-    nothing = Judged(effects=(), log_prior=0.0, log_bayes=0.0, fit=fit, error_class=error_classes()[0])
+    nothing = Judged(effects=(), log_bayes=0.0, fit=fit, error_class=error_classes()[0])
     posterior = Posterior(nothing=nothing, judged=(), log_e=-1.0, threshold=5.0, class_threshold=5.0, rule=rule())
     near = NearReadings.of(experiment, ModelError.of(experiment), plain)
     calibration = Calibration(chosen=near.fitted(nothing.error_class, plain, iterations=0), evidence={}, near=near)
     return assemble(
         setup, experiment, posterior, (), plain=fit, calibration=calibration,
         others=Others(posterior=posterior, channels=apart, apart=apart),
-        settings=Settings(), catalogue=CATALOGUE, known=Correction(), train=train, held_out=holdout,
     )  # fmt: skip
 
 

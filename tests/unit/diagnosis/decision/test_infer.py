@@ -26,7 +26,7 @@ from diagnosis.decision.posterior import KINDS, Judged, Posterior
 from diagnosis.decision.scanned import ScanInClass, Scanned, counts_less, hardly_there, in_best_classes, scan_in_classes
 from diagnosis.decision.settings import Settings
 from diagnosis.engine.calibration import Calibration, calibrate_with_error, recalibrate
-from diagnosis.engine.families import axis_of, changes, log_prior, parameters_outside
+from diagnosis.engine.families import axis_of, changes, parameters_outside
 from diagnosis.engine.fit import Experiment, Fit, calibrate
 from diagnosis.engine.learnt import ErrorClass, error_classes, rule
 from diagnosis.engine.prepare import prepare_experiment
@@ -66,7 +66,7 @@ def inferred(
                 *parameters_outside(there)]  # fmt: skip
 
     candidates = candidates_in(experiment)
-    return infer(calibrate_with_error(experiment, calibrate(experiment)), candidates, log_prior(candidates), Settings(),
+    return infer(calibrate_with_error(experiment, calibrate(experiment)), candidates, Settings(),
                  candidates_in=candidates_in)  # fmt: skip
 
 
@@ -82,7 +82,7 @@ def concealed(fzg: Gearbox) -> Posterior:
 
 def test_a_healthy_machine_stays_silent(healthy: Posterior) -> None:
     assert not healthy.detected and healthy.of("nothing") > 0.9
-    assert decide(healthy, Settings()) == ()
+    assert decide(healthy) == ()
 
 
 def test_a_concealed_effect_is_detected_and_first(concealed: Posterior) -> None:
@@ -92,7 +92,7 @@ def test_a_concealed_effect_is_detected_and_first(concealed: Posterior) -> None:
     assert sum(concealed.of(kind) for kind in KINDS) == pytest.approx(1.0)
     assert concealed.nothing.fit is not None  # a single baseline does not say how well the machine repeats
     assert concealed.nothing.fit.experiment.most_deviation == 0.2
-    answers = decide(concealed, Settings())
+    answers = decide(concealed)
     assert [one.effect.label for one in answers] == ["windage@oil"]
 
 
@@ -134,10 +134,11 @@ def test_a_baseline_shows_nothing_of_what_has_no_place_in_the_machine(fzg: Gearb
 
 def test_a_parameter_outside_its_prior_is_no_sign_that_something_is_missing() -> None:
     """What an effect explains less well than a parameter does is no evidence for it."""
-    mechanism = Hypothesis(name="windage", place="oil", family="no-load loss", law="windage", variants=np.ones((1, 1)))
+    mechanism = Hypothesis(name="windage", place="oil", family="no-load loss", law="windage", variants=np.ones((1, 1)),
+                           log_prior=np.log(0.9))  # fmt: skip
     parameter = Hypothesis(name="parameter", place="h_air", family="parameter", unknown=0, variants=np.ones((1, 1)),
-                           law="parameter h_air", how="parameter")  # fmt: skip
-    found = Scanned(candidates=(mechanism, parameter), log_prior=np.log([0.9, 0.1]), log_bayes=np.array([60.0, 80.0]),
+                           law="parameter h_air", how="parameter", log_prior=np.log(0.1))  # fmt: skip
+    found = Scanned(candidates=(mechanism, parameter), log_bayes=np.array([60.0, 80.0]),
                     classes=(), best=())  # fmt: skip
     assert found.log_e == pytest.approx(60.0 - 80.0 + np.log(9.0))
     unlikely = replace(found, log_bayes=np.array([60.0, -50.0]))
@@ -178,7 +179,7 @@ def test_nothing_gets_the_evidence_that_it_has_from_the_point_of_an_explanation(
     worse = replace(settled, chosen=replace(settled.chosen, log_evidence=settled.chosen.log_evidence - 50.0))
     placed = CATALOGUE["windage"].placed(experiment.machine.model.network, setup.scale, setup.channels)
     candidates = [hypothesis_of(one) for one in placed]
-    right, found = (infer(one, candidates, log_prior(candidates), Settings()) for one in (settled, worse))
+    right, found = (infer(one, candidates, Settings()) for one in (settled, worse))
     assert right.log_e > 10.0 and found.log_e == pytest.approx(right.log_e, abs=3.0)
     assert right.elsewhere is None and found.elsewhere is not None
     again = recalibrate(worse, found.elsewhere).chosen
@@ -212,7 +213,7 @@ def test_candidates_are_judged_with_the_classes_that_are_given(fzg: Gearbox) -> 
     none, splits = error_classes()[:2]
 
     def scanned(one: ErrorClass) -> tuple[float, float]:
-        without, there = scan_in_classes(calibration, found, np.zeros(len(candidates)), [none, one]).classes
+        without, there = scan_in_classes(calibration, found, [none, one]).classes
         return there.ahead - without.ahead, float(there.log_bayes[0] - there.ahead)
 
     half = replace(splits, amplitudes={"b_split": 0.05, "c_sensor": 0.005, "c_lag": 0.025})
@@ -261,13 +262,11 @@ def test_a_change_is_fitted_from_the_date_of_the_best_one(fzg: Gearbox, monkeypa
         z[0] = experiment.unknowns[-len(z)].z_of(heat_W)
         fit = experiment.fit(np.concatenate([calibration.fit.z, z]), iterations=0)
         error_class = found.best[index].error_class
-        return Judged(
-            effects=(found.candidates[index],), log_prior=0.0, log_bayes=0.0, error_class=error_class, fit=fit
-        )
+        return Judged(effects=(found.candidates[index],), log_bayes=0.0, error_class=error_class, fit=fit)
 
     monkeypatch.setattr(infer_module, "_refitted", settled)
     monkeypatch.setattr(infer_module, "MOST_TURNS", 0)
-    found = scan_in_classes(calibration, scan(calibration.fit, effects, calibration.near.columns), np.zeros(2))
+    found = scan_in_classes(calibration, scan(calibration.fit, effects, calibration.near.columns))
     raced = infer_module._raced(calibration, replace(found, log_bayes=np.array([50.0, 40.0])), silent)
     right, wrong = (raced[one.label] for one in effects)
     assert right.fit is not None and wrong.fit is not None and right.log_bayes > 50.0
@@ -282,7 +281,7 @@ def test_every_candidate_is_judged_and_the_best_are_fitted(healthy: Posterior, c
     assert len(labels) == len(set(labels)) and {one.label for one in healthy.judged} <= set(labels)
     fitted = [one for one in concealed.judged if one.fit is not None]
     assert 1 <= len(fitted) < len(labels)
-    assert max(concealed.judged, key=lambda one: one.log_bayes + one.log_prior) in fitted
+    assert max(concealed.judged, key=lambda one: one.weight) in fitted
     pairs = [one.names for one in concealed.judged if one.kind == "pair"]
     assert pairs and all(first != second for first, second in pairs)  # one law at two places is one name
 
@@ -295,8 +294,7 @@ def named(name: str, place: str) -> Hypothesis:
 
 
 def scanned_as(candidates: list[Hypothesis], log_bayes: Array) -> Scanned:
-    return Scanned(candidates=tuple(candidates), log_bayes=log_bayes, log_prior=np.zeros(len(candidates)),
-                    classes=(), best=())  # fmt: skip
+    return Scanned(candidates=tuple(candidates), log_bayes=log_bayes, classes=(), best=())
 
 
 def test_a_name_is_fitted_at_its_best_place_and_at_a_near_one() -> None:
@@ -330,7 +328,7 @@ def test_every_candidate_is_judged_in_the_class_that_suits_it() -> None:
         error = ErrorClass(name=name, prior=0.5, threshold=5.0, amplitudes={})
         return cast(ScanInClass, SimpleNamespace(error_class=error, scan=scanned, log_bayes=np.array(log_bayes)))
 
-    found = in_best_classes([in_class("full", [18.0, 4.0]), in_class("small", [78.0, -500.0])], np.zeros(2))
+    found = in_best_classes([in_class("full", [18.0, 4.0]), in_class("small", [78.0, -500.0])])
     assert [one.error_class.name for one in found.best] == ["small", "full"]
     np.testing.assert_array_equal(found.log_bayes, [78.0, 4.0])
 
@@ -363,7 +361,7 @@ def test_a_share_of_a_swap_or_of_a_held_reading_is_refused_with_a_number(
     fit = SimpleNamespace(z=np.array([share]), covariance=np.eye(1), experiment=experiment)
     monkeypatch.setattr(infer_module, "fit_over_sessions", lambda *_: SimpleNamespace(log_evidence=50.0))
     sure = ErrorClass(name="sure", prior=1.0, threshold=5.0, amplitudes={})
-    one = Judged(effects=(swap,), log_prior=-5.0, log_bayes=40.0, fit=cast(Fit, fit), error_class=sure)
+    one = Judged(effects=(swap,), log_bayes=40.0, fit=cast(Fit, fit), error_class=sure)
     chosen = SimpleNamespace(log_evidence=10.0, error_class=sure)
     calibration = SimpleNamespace(chosen=chosen, fit=SimpleNamespace(z=np.zeros(0)))
     found = _judged(cast(Calibration, calibration), one, 0.0)

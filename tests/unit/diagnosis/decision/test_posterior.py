@@ -36,7 +36,7 @@ def effect(
     term = Term(label=label, kind=kind, target=target or (place,), expression=symbol(strength.name),
                 parameters=(strength,))  # fmt: skip
     return Hypothesis(**({"name": name, "place": place, "family": "heat", "term": term, "law": name,
-                          "variants": np.ones((1, 1))} | given))  # fmt: skip
+                          "variants": np.ones((1, 1)), "log_prior": EACH} | given))  # fmt: skip
 
 
 def outside(parameter: str) -> Hypothesis:
@@ -48,9 +48,8 @@ def over_hours(law: str) -> Hypothesis:
     return effect(f"{law}_over_hours", law=law, how="over_hours", clock="start")
 
 
-def judged(log_bayes: float, *effects: Hypothesis, log_prior: float | None = None) -> Judged:
-    prior = EACH * len(effects) if log_prior is None else log_prior
-    return Judged(effects=effects, log_prior=prior, log_bayes=log_bayes, error_class=error_classes()[0])
+def judged(log_bayes: float, *effects: Hypothesis) -> Judged:
+    return Judged(effects=effects, log_bayes=log_bayes, error_class=error_classes()[0])
 
 
 def posterior(*each: Judged, remainder: float | None = None, **given: Any) -> Posterior:
@@ -84,7 +83,7 @@ def test_the_evidence_of_a_name_is_the_mean_over_its_places() -> None:
 
 
 def test_places_weigh_in_the_mean_by_their_priors() -> None:
-    likely, unlikely = judged(STRONG, effect("law", "a")), judged(0.0, effect("law", "b"), log_prior=EACH - np.log(3.0))
+    likely, unlikely = judged(STRONG, effect("law", "a")), judged(0.0, effect("law", "b", log_prior=EACH - np.log(3.0)))
     (found,) = posterior(likely, unlikely).explanations
     assert found.log_bayes == pytest.approx(STRONG + np.log(0.75))
     assert found.members == (likely, unlikely)
@@ -104,7 +103,7 @@ def test_between_names_the_evidence_is_tempered() -> None:
 
 def test_the_prior_of_a_name_does_not_count_between_names() -> None:
     """Only the evidence separates names; more places or a larger family make none of them more probable."""
-    found = chances(posterior(judged(STRONG, effect("first"), log_prior=2.0 * EACH), judged(STRONG, effect("second"))))
+    found = chances(posterior(judged(STRONG, effect("first", log_prior=2.0 * EACH)), judged(STRONG, effect("second"))))
     assert found["first"] == pytest.approx(found["second"])
 
 
@@ -121,7 +120,7 @@ def test_probabilities_sum_to_one_with_nothing() -> None:
     sensor = effect("sensor_bias", kind="sensor")
     pair = judged(STRONG + 8.0, effect("first"), effect("second"))
     every = [judged(STRONG, effect("first")), judged(STRONG, sensor), judged(50.0, parameter), pair,
-             judged(STRONG, effect("unknown_heat", family=OPEN_FORM), log_prior=0.0)]  # fmt: skip
+             judged(STRONG, effect("unknown_heat", family=OPEN_FORM, log_prior=0.0))]  # fmt: skip
     found = posterior(*every, log_e=6.0, log_parameter=4.0, remainder=10.0)
     of_kind = {kind: found.of(kind) for kind in KINDS}
     assert sum(of_kind.values()) == pytest.approx(1.0)
@@ -151,8 +150,8 @@ def test_a_machine_that_fits_badly_without_the_effect_needs_more_evidence() -> N
 
 @pytest.mark.parametrize("odds", [0.01, 0.5])
 def test_a_cause_outside_the_catalogue_has_the_odds_of_the_user(odds: float) -> None:
-    unknown = judged(STRONG, effect("unknown_heat", family=OPEN_FORM), log_prior=0.0)
-    found = posterior(*several(4), unknown, odds_unknown=odds)
+    unknown = judged(STRONG, effect("unknown_heat", family=OPEN_FORM, log_prior=0.0))
+    found = posterior(*several(4), unknown, settings=Settings(odds_unknown=odds))
     assert found.of("outside") / found.of("mechanism") == pytest.approx(odds)
 
 
@@ -160,15 +159,15 @@ def test_a_cause_outside_the_catalogue_has_the_odds_of_the_user(odds: float) -> 
 
 
 def test_without_enough_evidence_nothing_is_answered() -> None:
-    assert decide(posterior(*several(1), log_e=4.9), Settings()) == ()
-    assert decide(posterior(*several(1)), Settings()) != ()
+    assert decide(posterior(*several(1), log_e=4.9)) == ()
+    assert decide(posterior(*several(1))) != ()
 
 
 def test_a_claim_begins_at_the_probability_of_the_user() -> None:
     found = posterior(judged(STRONG, effect("first")), judged(STRONG - 10.0, effect("second", "mesh")))
     own = found.of_names(["first"])
     assert 0.6 < own < 0.9
-    (claim,), (tie,) = (decide(found, Settings(claim_from=own + more)) for more in (-1e-6, 1e-6))
+    (claim,), (tie,) = (decide(replace(found, settings=Settings(claim_from=own + more))) for more in (-1e-6, 1e-6))
     assert (claim.grade, claim.tied, claim.acts_like) == ("claim", (), False)
     assert claim.probability == pytest.approx(own)
     assert tie.grade == "likely" and len(tie.tied) == 2
@@ -176,21 +175,21 @@ def test_a_claim_begins_at_the_probability_of_the_user() -> None:
 
 @pytest.mark.parametrize("count", [2, 3])
 def test_up_to_three_names_are_a_tie(count: int) -> None:
-    (answer,) = decide(posterior(*several(count)), Settings())
+    (answer,) = decide(posterior(*several(count)))
     assert (answer.grade, answer.acts_like, len(answer.tied)) == ("likely", False, count)
     assert answer.tied[0][0] is answer.effect
     assert sum(p for _, p in answer.tied) >= ENOUGH
 
 
 def test_four_names_are_no_answer() -> None:
-    assert decide(posterior(*several(4)), Settings()) == ()
+    assert decide(posterior(*several(4))) == ()
 
 
 @pytest.mark.parametrize(("cosine", "answered"), [(0.95, True), (0.85, False)])
 def test_it_acts_like_names_that_look_alike(cosine: float, answered: bool) -> None:
     names = several(4)
     likeness = Likeness(labels=tuple(one.label for one in names), cosines=np.full((4, 4), cosine))
-    answers = decide(posterior(*names, likeness=likeness), Settings())
+    answers = decide(posterior(*names, likeness=likeness))
     assert [(one.grade, one.acts_like, one.tied) for one in answers] == [("likely", True, ())] * answered
 
 
@@ -200,15 +199,12 @@ def test_it_acts_like_names_that_look_alike(cosine: float, answered: bool) -> No
 )
 def test_it_acts_like_names_that_act_on_the_same(kind: Kind, target: tuple[str, ...], answered: bool) -> None:
     others = [judged(STRONG - 0.1, effect(f"law_{i}", f"part_{i}", kind=kind, target=target)) for i in range(3)]
-    answers = decide(posterior(judged(STRONG, effect("best", "oil")), *others), Settings())
+    answers = decide(posterior(judged(STRONG, effect("best", "oil")), *others))
     assert [one.acts_like for one in answers] == [True] * answered
 
 
 def test_a_course_over_the_hours_is_never_a_claim() -> None:
-    (answer,) = decide(
-        posterior(judged(STRONG, over_hours("windage"))),
-        Settings(),
-    )
+    (answer,) = decide(posterior(judged(STRONG, over_hours("windage"))))
     assert answer.probability > ENOUGH and (answer.grade, answer.acts_like) == ("likely", True)
 
 
@@ -217,7 +213,7 @@ def test_where_much_is_left_there_is_no_claim(gain: float, limit: float) -> None
     """And of the name only the share is stated that turned out right in such cases."""
 
     def answered(remainder: float) -> Answer:
-        (answer,) = decide(posterior(judged(gain, effect("law")), remainder=remainder), Settings())
+        (answer,) = decide(posterior(judged(gain, effect("law")), remainder=remainder))
         return answer
 
     little, much = answered(limit - 0.1), answered(limit + 0.1)
@@ -229,13 +225,13 @@ def test_where_much_is_left_there_is_no_claim(gain: float, limit: float) -> None
 def test_a_claim_that_is_withdrawn_is_the_nearest_name_at_most() -> None:
     found = posterior(*several(3))
     for asked, tied in ((0.5, 2), (0.9, 3)):
-        (tie,) = decide(found, Settings(claim_from=asked))
+        (tie,) = decide(replace(found, settings=Settings(claim_from=asked)))
         assert len(tie.tied) == tied
         left = withdraw_claim(tie, rule())
         assert (left.grade, left.acts_like, left.tied) == ("likely", True, ())
         assert left.joint == pytest.approx(rule().nearest * tie.joint)
         assert withdraw_claim(left, rule()) is left
-    (claim,) = decide(posterior(judged(STRONG, effect("law"))), Settings())
+    (claim,) = decide(posterior(judged(STRONG, effect("law"))))
     left = withdraw_claim(claim, rule())
     assert claim.grade == "claim" and left.grade == "likely"
     assert left.probability == pytest.approx(rule().nearest * claim.probability)
@@ -244,7 +240,7 @@ def test_a_claim_that_is_withdrawn_is_the_nearest_name_at_most() -> None:
 def test_of_names_that_act_on_one_thing_the_joint_probability_is_told() -> None:
     bias, gain = (effect(name, "oil", kind="sensor") for name in ("sensor_bias", "sensor_gain"))
     drift, lag = (effect(name, "oil", kind="sensor") for name in ("sensor_drift", "sensor_lag"))
-    (answer,) = decide(posterior(*(judged(STRONG, one) for one in (bias, gain, drift, lag))), Settings())
+    (answer,) = decide(posterior(*(judged(STRONG, one) for one in (bias, gain, drift, lag))))
     assert answer.acts_like and answer.probability < 0.3 < ENOUGH < answer.joint
     assert withdraw_claim(answer, rule()).joint == pytest.approx(rule().nearest * answer.joint)  # only once
 
@@ -253,7 +249,7 @@ def test_both_effects_of_a_pair_are_answered() -> None:
     first, second = effect("first"), effect("second", "mesh")
     found = posterior(judged(STRONG, first), judged(STRONG, second), judged(2.0 * STRONG, first, second),
                       remainder=10.0)  # fmt: skip
-    answers = decide(found, Settings())
+    answers = decide(found)
     assert [one.effect for one in answers] == [first, second] and found.of("pair") > ENOUGH
     assert [one.grade for one in answers] == ["claim", "claim"]
 
@@ -265,11 +261,11 @@ def test_two_that_begin_at_the_same_time_are_no_claims(apart_s: float, grade: st
     unknowns = [SimpleNamespace(parameter=SimpleNamespace(name=name), value=float)
                 for name in ("first_since", "other", "second_since")]  # fmt: skip
     pieces = [SimpleNamespace(recording=name, steps=np.full(100, 1000.0)) for name in ("tested", "healthy")]
-    experiment = SimpleNamespace(unknowns=unknowns, pieces=pieces, healthy={"healthy"})
+    experiment = SimpleNamespace(unknowns=unknowns, pieces=pieces, tested=[0])
     fit = cast(Fit, SimpleNamespace(experiment=experiment, z=np.array([1000.0, 3.0, 1000.0 + apart_s])))
     both = replace(judged(2.0 * STRONG, *pair), fit=fit, left=0.0)
     found = posterior(*(judged(STRONG, one) for one in pair), both, remainder=10.0)
-    answers = decide(found, Settings())
+    answers = decide(found)
     assert [(one.grade, one.acts_like, one.one_event) for one in answers] == [
         (grade, grade == "likely", grade == "likely")
     ] * 2
@@ -292,10 +288,10 @@ def test_two_that_come_and_go_together_are_no_claims(
 
     pair = law("first", "oil"), law("second", second)
     heats = {"first_oil": np.array([2.0, 0.0]), f"second_{second}": np.array([cosine, np.sqrt(1.0 - cosine**2)])}
-    monkeypatch.setattr(answer_module, "heat_over_time", lambda _, term: heats[term.label])
+    monkeypatch.setattr(answer_module, "course_of_heat", lambda _, term: heats[term.label])
     fit = cast(Fit, SimpleNamespace(experiment=SimpleNamespace(unknowns=[], pieces=[], healthy=set()), z=np.zeros(0)))
     both = replace(judged(2.0 * STRONG, *pair), fit=fit, left=0.0)
-    answers = decide(posterior(*(judged(STRONG, one) for one in pair), both, remainder=10.0), Settings())
+    answers = decide(posterior(*(judged(STRONG, one) for one in pair), both, remainder=10.0))
     assert [(one.grade, one.one_event) for one in answers] == [(grade, grade == "likely")] * 2
 
 
@@ -305,14 +301,14 @@ def test_a_pair_is_judged_by_what_it_leaves_itself(left: float | None, grade: st
     first, second = effect("first"), effect("second", "mesh")
     both = replace(judged(2.0 * STRONG, first, second), left=left)
     found = posterior(judged(STRONG, first), judged(STRONG, second), both, remainder=STRONG)
-    assert [one.grade for one in decide(found, Settings())] == [grade, grade]
+    assert [one.grade for one in decide(found)] == [grade, grade]
 
 
 def test_a_pair_that_is_not_allowed_refutes_no_single_name() -> None:
     first, second = effect("first"), effect("second")
     found = posterior(judged(20.0, first), judged(18.0, second), judged(100.0, first, second), remainder=4.0)
     assert sum(chances(found).values()) == pytest.approx(found.something) and found.of("pair") == 0.0
-    assert decide(found, Settings())
+    assert decide(found)
 
 
 def test_a_pair_has_less_prior_than_one_effect() -> None:
@@ -328,7 +324,7 @@ def test_a_second_effect_is_no_rival_of_the_first() -> None:
     found = posterior(judged(STRONG, first), judged(1.0, second), judged(STRONG + 6.0, first, second),
                       remainder=10.0)  # fmt: skip
     assert 0.1 < found.of("pair") < ENOUGH < found.of_names(["first"])
-    answers = decide(found, Settings())
+    answers = decide(found)
     assert [(one.effect.name, one.grade) for one in answers] == [("first", "claim")]
 
 
@@ -344,7 +340,7 @@ def test_two_faults_of_one_sensor_are_known_by_the_sensor() -> None:
     found = posterior(judged(STRONG, bias), judged(STRONG, gain), judged(STRONG + 2.0 * WIDTH, bias, gain),
                       remainder=10.0)  # fmt: skip
     assert found.of_names(["sensor_bias"]) < ENOUGH and found.of_names(["sensor_gain"]) < ENOUGH
-    answers = decide(found, Settings())
+    answers = decide(found)
     assert [(one.effect.place, one.grade, one.acts_like) for one in answers] == [("oil", "likely", True)] * 2
 
 
@@ -354,7 +350,7 @@ def test_a_fit_at_the_best_place_goes_before_others() -> None:
     pair = replace(judged(2.0 * STRONG, there, second), fit=fit)
     at_the_place = replace(judged(STRONG - 9.0, here, second), fit=fit)
     found = posterior(judged(3.0 * STRONG, here), pair, at_the_place)
-    assert next(one.best for one in decide(found, Settings())) is at_the_place
+    assert next(one.best for one in decide(found)) is at_the_place
 
 
 def test_a_parameter_outside_its_prior_is_answered_by_its_name() -> None:
@@ -363,12 +359,12 @@ def test_a_parameter_outside_its_prior_is_answered_by_its_name() -> None:
         for i, name in enumerate(("air", "oil"))
     )
     found = posterior(judged(STRONG, h_air), judged(0.0, h_oil), log_e=-1.0, log_parameter=100.0)
-    (answer,) = decide(found, Settings())
+    (answer,) = decide(found)
     assert answer.effect is h_air and answer.grade == "claim"
     assert found.of("parameter") == pytest.approx(found.of_names(["parameter air"]))
     # Where model error is large it stands in for another structure of the machine.
     large = next(one for one in error_classes() if one.is_large)
-    (nearest,) = decide(replace(found, judged=(replace(found.judged[0], error_class=large),)), Settings())
+    (nearest,) = decide(replace(found, judged=(replace(found.judged[0], error_class=large),)))
     assert (nearest.effect, nearest.grade, nearest.acts_like) == (h_air, "likely", True)
     assert nearest.probability < rule().nearest
 
@@ -377,19 +373,19 @@ def test_a_parameter_outside_its_prior_goes_behind_something_that_is_missing() -
     """Next to an effect that is detected a parameter has only what that leaves."""
     parameter = judged(STRONG + 20.0, outside("air"))
     found = posterior(judged(STRONG, effect("windage")), parameter, log_e=9.0, log_parameter=100.0)
-    (answer,) = decide(found, Settings())
+    (answer,) = decide(found)
     assert answer.effect.name == "windage" and found.evidence == 9.0
     assert found.of("parameter") == pytest.approx(1.0 - found.something)
     two = judged(STRONG + 40.0, *map(outside, ("air", "oil")))
-    (answer,) = decide(replace(found, judged=(replace(found.judged[0], left=50.0), parameter, two)), Settings())
+    (answer,) = decide(replace(found, judged=(replace(found.judged[0], left=50.0), parameter, two)))
     assert answer.effect.name == "windage"  # two of them are no effect either
     silent = replace(found, log_e=4.0)
     assert silent.parameter_outside and silent.evidence == 100.0
-    assert decide(silent, Settings())[0].effect.name == "parameter"
+    assert decide(silent)[0].effect.name == "parameter"
 
 
 def test_an_unknown_heat_is_never_a_claim() -> None:
-    (answer,) = decide(posterior(judged(STRONG, effect("unknown_heat", family=OPEN_FORM), log_prior=0.0)), Settings())
+    (answer,) = decide(posterior(judged(STRONG, effect("unknown_heat", family=OPEN_FORM, log_prior=0.0))))
     assert answer.probability > ENOUGH and (answer.grade, answer.acts_like) == ("likely", True)
 
 
@@ -411,17 +407,17 @@ def test_an_answer_is_read_off_the_fit_with_most_evidence_for_its_name() -> None
     fan, other, drag = effect("fan", "oil"), effect("fan", "air"), effect("drag", "shaft")
     unfitted, weak = judged(80.0, fan), replace(judged(20.0, other), fit=fit)
     pair = replace(judged(60.0, drag, fan), fit=fit)
-    answers = decide(posterior(unfitted, weak, pair), Settings())
+    answers = decide(posterior(unfitted, weak, pair))
     assert [(one.best, one.effect) for one in answers] == [(pair, fan)]
     fitted = replace(unfitted, fit=fit)
-    assert [one.best for one in decide(posterior(fitted, weak, pair), Settings())] == [fitted]
+    assert [one.best for one in decide(posterior(fitted, weak, pair))] == [fitted]
 
 
 @pytest.mark.parametrize(("more", "grade"), [(0.1, "claim"), (-0.1, "likely")])
 def test_where_model_error_is_large_a_claim_needs_more_evidence(more: float, grade: str) -> None:
     large = next(one for one in error_classes() if one.is_large)
     best = replace(judged(STRONG, effect("law")), error_class=large)
-    (answer,) = decide(posterior(best, log_e=rule().named_if_large + more), Settings())
+    (answer,) = decide(posterior(best, log_e=rule().named_if_large + more))
     assert (answer.grade, answer.acts_like) == (grade, more < 0.0)
     assert answer.probability == pytest.approx((1.0 if more > 0.0 else rule().nearest), abs=1e-6)
 
@@ -434,5 +430,5 @@ def test_a_name_that_mostly_stands_alone_stands_in_place_of_another_one(gain: fl
                       judged(STRONG + gain, first, second), remainder=15.0)  # fmt: skip
     both = sum(one.probability for one in found.explanations if one.names == ("first", "second"))
     assert (0.0 < both < chances(found)["second"]) == stands
-    (answer, *_) = decide(found, Settings())
+    (answer, *_) = decide(found)
     assert ("second" in [one.law for one, _ in answer.tied]) == stands

@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 
 from diagnosis.candidates.hypotheses import Hypothesis, hypothesis_of
-from diagnosis.engine.baselines import effects_in_baselines, sessions_apart
 from diagnosis.engine.calibration import calibrate_with_error
 from diagnosis.engine.fit import Experiment, Fit, calibrate
 from diagnosis.engine.outside import SIZES, judge_outside, outside_of
 from diagnosis.engine.prepare import prepare_experiment
 from diagnosis.engine.refit import refit
 from diagnosis.engine.scan import scan
-from diagnosis.engine.sessions import over_sessions
+from diagnosis.engine.sessions import over_sessions, sessions_apart
 from diagnosis.recordings.recording import Recording
+from diagnosis.results.notes import evidence_in_baselines
 from diagnosis.setup.inference_setup import InferenceSetup
 from models.assembly.gearbox import Gearbox
 from models.mechanisms import CATALOGUE, Scale
@@ -108,7 +108,7 @@ def test_an_effect_that_acts_in_the_baseline_is_seen_there(fzg: Gearbox, drift: 
     found = {}
     for kelvin in (0.0, 3.0):
         fit = calibrated(fzg, train, recorded(fzg, "april", drift_K=kelvin, seed=2))
-        found[kelvin] = float(effects_in_baselines(fit, [drift])[0])
+        found[kelvin] = evidence_in_baselines(fit, drift)
     assert found[0.0] < 2.0 < 20.0 < found[3.0]
 
 

@@ -11,7 +11,7 @@ import sympy as sp
 
 from diagnosis.candidates.dated import Axis
 from diagnosis.candidates.hypotheses import How, Hypothesis
-from diagnosis.engine.families import axis_of, candidates_of, log_prior
+from diagnosis.engine.families import axis_of, candidates_of, with_priors
 from diagnosis.engine.fit import Experiment, Fit, calibrate
 from diagnosis.engine.outside import judge_outside, outside_of
 from diagnosis.engine.prepare import prepare_experiment
@@ -74,7 +74,7 @@ def axis(fit: Fit) -> Axis:
 @pytest.fixture(scope="module")
 def candidates(prepared: tuple[InferenceSetup, Experiment]) -> tuple[Hypothesis, ...]:
     setup, experiment = prepared
-    return candidates_of(setup, experiment, {name: CATALOGUE[name] for name in LOOKED_FOR})
+    return candidates_of(replace(setup, catalogue={name: CATALOGUE[name] for name in LOOKED_FOR}), experiment)
 
 
 @pytest.fixture(scope="module")
@@ -213,7 +213,7 @@ def test_a_loss_that_changes_has_the_name_of_its_parameter(candidates: tuple[Hyp
 
 def test_prior_of_families(candidates: tuple[Hypothesis, ...]) -> None:
     """Shares of the families; names in a family are alike, and so are places of a name."""
-    prior = np.exp(log_prior(candidates))
+    prior = np.exp([one.log_prior for one in with_priors(candidates)])
     assert prior.sum() == pytest.approx(1.0)
     share = {how: sum(p for p, h in zip(prior, candidates, strict=True) if h.how == how) for how in get_args(How)}
     assert share["from_date"] / share["always"] == pytest.approx(0.2 / 0.6)
@@ -232,7 +232,7 @@ def test_a_reading_that_stands_still_is_a_candidate_in_those_times_only(fzg: Gea
     still = np.where(np.abs(made[0].time - 5000.0) <= 2000.0, values[300], values)
     first = replace(made[0], channels=(replace(made[0].channels[0], values=still), *made[0].channels[1:]))
     setup, experiment = prepare_experiment(fzg, [first, made[1]], [made[1]])
-    (found,) = [one for one in candidates_of(setup, experiment, CATALOGUE) if one.law == "sensor_stuck"]
+    (found,) = [one for one in candidates_of(setup, experiment) if one.law == "sensor_stuck"]
     assert (found.name, found.place) == ("sensor_stuck_for_a_while", made[0].channels[0].name)
     assert found.term is not None and found.date is None
     acts = sp.lambdify([symbol("time"), *(symbol(p.name) for p in found.term.parameters)], found.term.expression)

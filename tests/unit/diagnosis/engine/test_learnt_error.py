@@ -130,7 +130,6 @@ def test_the_session_that_is_predicted_deviates_from_what_all_share() -> None:
     splits = next(one for one in error_classes() if one.name == "splits")
     fit = near.fitted(splits, plain, 0.4, iterations=0).fit
     metric = fit.experiment.metric
-    assert metric is not None
     (found,) = metric.explained([part.residual for part in fit.parts])
     deviation = found[metric.shared :]
     assert len(deviation) == len(fit.z) and np.abs(deviation).max() > 0.01

@@ -81,8 +81,7 @@ def test_leading_directions_keep_what_columns_do():
 
 def test_deviations_between_sessions_equal_the_normal_density(columns):
     experiment = SimpleNamespace(
-        pieces=[SimpleNamespace(recording=name) for name in "abc"], session_of={"a": "one", "b": "two", "c": "one"},
-        most_deviation=np.inf,
+        pieces=[SimpleNamespace(recording=name) for name in "abc"], sessions=SESSIONS, most_deviation=np.inf,
     )  # fmt: skip
     gram = Gram(of_recording={name: W.T @ W for name, W in zip("abc", columns, strict=True)},
                 log_determinants=dict.fromkeys("abc", 1.0))  # fmt: skip

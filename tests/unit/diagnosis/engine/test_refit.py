@@ -8,7 +8,7 @@ import pytest
 from diagnosis.candidates.hypotheses import hypothesis_of
 from diagnosis.engine.fit import Experiment, Fit, calibrate
 from diagnosis.engine.refit import refit
-from diagnosis.engine.scan import SHAPES_TRIED, Scan, heat_over_time, scan
+from diagnosis.engine.scan import SHAPES_TRIED, Scan, course_of_heat, scan
 from diagnosis.results.findings import switch_errors
 from models.assembly.gearbox import Gearbox
 from models.mechanisms import CATALOGUE, Placed, Scale
@@ -137,6 +137,6 @@ def test_the_heat_of_a_term_over_the_time(experiment: Experiment, scale: Scale) 
     noon, length = 0.4 * piece.time[-1], 0.2 * piece.time[-1]
     given = dict(zip((p.name for p in placed.parameters), (80.0, noon, length), strict=True))
     sunny = with_term(experiment, placed)
-    heat = heat_over_time(sunny.fit(at(sunny, given), iterations=0), placed)
+    heat = course_of_heat(sunny.fit(at(sunny, given), iterations=0), placed)
     bell = 80.0 * np.exp(-(((piece.middle - noon) / length) ** 2))
     assert heat == pytest.approx(bell * np.sqrt(piece.steps), rel=1e-6, abs=1e-6)

@@ -14,7 +14,6 @@ import pytest
 from diagnosis.candidates.hypotheses import Hypothesis, hypothesis_of
 from diagnosis.decision.answer import Answer
 from diagnosis.decision.posterior import Expected, Judged, Placebo, Posterior
-from diagnosis.decision.settings import Settings
 from diagnosis.engine.calibration import Calibration, NearReadings
 from diagnosis.engine.families import candidates_of
 from diagnosis.engine.fit import Experiment, Fit, calibrate
@@ -36,7 +35,7 @@ from diagnosis.results.findings import estimates_of
 from diagnosis.results.result import Diagnosis
 from diagnosis.setup.inference_setup import InferenceSetup
 from models.assembly.gearbox import Gearbox
-from models.correction.correction import MODEL_ERROR, Correction, correction_text, read_correction, write_correction
+from models.correction.correction import MODEL_ERROR, correction_text, read_correction, write_correction
 from models.files.cycle import Cycle
 from models.mechanisms import CATALOGUE, Scale
 from tests.unit.diagnosis.inference_example import recording_of
@@ -83,7 +82,7 @@ def effect_of(setup: InferenceSetup, fit: Fit, name: str, place: str) -> Hypothe
     network = fit.experiment.machine.model.network
     found = next(p for p in CATALOGUE[name].placed(network, setup.scale, setup.channels) if p.place == place)
     h = hypothesis_of(found)
-    return replace(h, variants=h.variants[[len(h.variants) // 2]])
+    return replace(h, variants=h.variants[[len(h.variants) // 2]], log_prior=-5.0)
 
 
 @pytest.fixture(scope="module")
@@ -91,12 +90,12 @@ def windage(prepared: Prepared) -> Judged:
     setup, _, plain = prepared
     effect = effect_of(setup, plain, "windage", "oil")
     fit = refit(plain, effect, 0, 50.0)
-    return Judged(effects=(effect,), log_prior=-5.0, log_bayes=90.0, fit=fit, error_class=error_classes()[0])
+    return Judged(effects=(effect,), log_bayes=90.0, fit=fit, error_class=error_classes()[0])
 
 
 def judged_of(prepared: Prepared, name: str, place: str, log_bayes: float) -> Judged:
     setup, _, plain = prepared
-    return Judged(effects=(effect_of(setup, plain, name, place),), log_prior=-5.0, log_bayes=log_bayes,
+    return Judged(effects=(effect_of(setup, plain, name, place),), log_bayes=log_bayes,
                   error_class=error_classes()[0])  # fmt: skip
 
 
@@ -106,7 +105,7 @@ def posterior_of(
     if remainder is not None:
         judged = (replace(judged[0], left=remainder), *judged[1:])
     return Posterior(
-        nothing=Judged(effects=(), log_prior=0.0, log_bayes=0.0, fit=nothing, error_class=error_classes()[0]),
+        nothing=Judged(effects=(), log_bayes=0.0, fit=nothing, error_class=error_classes()[0]),
         judged=judged, log_e=log_e,
         threshold=4.0, class_threshold=4.0, rule=replace(rule(), temper=(3.0, 0.0)), **given,
     )  # fmt: skip
@@ -124,14 +123,13 @@ def calibration(prepared: Prepared) -> Calibration:
 
 
 @pytest.fixture(scope="module")
-def assembled(prepared: Prepared, calibration: Calibration, recordings: tuple[Recording, Recording]) -> Assemble:
+def assembled(prepared: Prepared, calibration: Calibration) -> Assemble:
     setup, experiment, plain = prepared
 
     def result(posterior: Posterior, answers: list[Answer], **given: Any) -> Diagnosis:
         return assemble(
             setup, given.pop("experiment", experiment), posterior, answers, plain=plain,
-            calibration=calibration, settings=Settings(),
-            catalogue=CATALOGUE, known=Correction(), train=recordings[:1], held_out=recordings[1:], **given,
+            calibration=calibration, **given,
         )  # fmt: skip
 
     return result
@@ -260,16 +258,14 @@ def test_a_link_that_changes_at_a_date_acts_like(
     setup, experiment, plain = prepared
     starts = {RECORDED: starts_at, "judged": 0.0}
     own = replace(experiment, starts_at=starts)
-    effect = next(
-        one for one in candidates_of(setup, own, CATALOGUE) if one.label == "radiation_for_a_while@housing_air"
-    )
+    effect = next(one for one in candidates_of(setup, own) if one.label == "radiation_for_a_while@housing_air")
     assert effect.term is not None and effect.clock is not None
     values = {"strength": -0.4, "since": starts_at + DATE_S, "lasting": 1800.0, "start": 0.0}
     variant = np.array([[values[p.name.removeprefix(f"{effect.term.label}_")] for p in effect.term.parameters]])
-    effect = replace(effect, variants=variant)
+    effect = replace(effect, variants=variant, log_prior=-5.0)
     changed, z = with_candidate(replace(plain, experiment=replace(plain.experiment, starts_at=starts)), effect, 0)
     fit = changed.fit(np.concatenate([plain.z, z]), plain.trajectories, iterations=0)
-    judged = Judged(effects=(effect,), log_prior=-5.0, log_bayes=60.0, fit=fit, error_class=error_classes()[0])
+    judged = Judged(effects=(effect,), log_bayes=60.0, fit=fit, error_class=error_classes()[0])
     answer = Answer(best=judged, effect=effect, grade="likely", probability=0.97, joint=0.97, acts_like=True)
     found = assembled(posterior_of(plain, judged), [answer], experiment=own)
     (finding,) = found.findings
@@ -325,7 +321,7 @@ def test_nothing(assembled: Assemble, prepared: Prepared, windage: Judged) -> No
     weak = replace(windage, log_bayes=1.0, fit=None)
     setup, _, plain = prepared
     fog = effect_of(setup, plain, "hot_neighbour", "housing_lower")
-    there = Expected(effect=windage.effects[0], log_bayes=40.0, log_prior=-5.0)
+    there = Expected(effect=windage.effects[0], log_bayes=40.0)
     dim = replace(there, effect=fog, log_bayes=8.5)  # 4 nat are needed, and its prior is small
     expected = (there, dim, replace(dim, effect=replace(fog, place="oil"), log_bayes=1.0))
     found = assembled(posterior_of(plain, weak, log_e=-1.0, expected=expected), [])
@@ -375,8 +371,8 @@ def test_a_parameter(assembled: Assemble, prepared: Prepared) -> None:
     z[index] = wide.z_of(value)
     fit = replace(plain.experiment, unknowns=unknowns).fit(z, iterations=0)
     effect = Hypothesis(name="parameter", place=name, family="parameter", unknown=index, law=f"parameter {name}",
-                        variants=np.ones((1, 1)), how="parameter")  # fmt: skip
-    judged = Judged(effects=(effect,), log_prior=-3.0, log_bayes=40.0, fit=fit, error_class=error_classes()[0])
+                        variants=np.ones((1, 1)), how="parameter", log_prior=-3.0)  # fmt: skip
+    judged = Judged(effects=(effect,), log_bayes=40.0, fit=fit, error_class=error_classes()[0])
     answer = Answer(best=judged, effect=effect, grade="claim", probability=0.95, joint=0.95)
     raised = replace(posterior_of(plain, judged, log_e=1.0, log_parameter=40.0), threshold=238.0)  # by a baseline
     found = assembled(raised, [answer])
@@ -394,10 +390,10 @@ def test_a_parameter(assembled: Assemble, prepared: Prepared) -> None:
 
 def test_a_sensor_fault(assembled: Assemble, prepared: Prepared, windage: Judged, fzg: Gearbox) -> None:
     setup, _, plain = prepared
-    effect = effect_of(setup, plain, "sensor_bias", "oil")
+    effect = replace(effect_of(setup, plain, "sensor_bias", "oil"), log_prior=-3.0)
     assert effect.term is not None
     fit = _fit_with(plain, effect, {effect.term.strength.name: 3.0})
-    judged = Judged(effects=(effect,), log_prior=-3.0, log_bayes=70.0, fit=fit, error_class=error_classes()[0])
+    judged = Judged(effects=(effect,), log_bayes=70.0, fit=fit, error_class=error_classes()[0])
     claim = Answer(best=judged, effect=effect, grade="claim", probability=0.98, joint=0.98)
     found = assembled(posterior_of(plain, judged), [claim])
     (finding,) = found.findings

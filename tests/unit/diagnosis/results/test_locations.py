@@ -39,7 +39,7 @@ def test_the_hours_of_a_baseline_do_not_count(fzg: Gearbox) -> None:
     at = next(i for i, u in enumerate(fit.experiment.unknowns) if u.parameter.name == term.strength.name)
     z = fit.z.copy()
     z[at] = fit.experiment.unknowns[at].z_of(30.0)
-    judged = Judged(effects=(effect,), log_prior=0.0, log_bayes=50.0, fit=replace(fit, z=z),
+    judged = Judged(effects=(effect,), log_bayes=50.0, fit=replace(fit, z=z),
                     error_class=error_classes()[0])  # fmt: skip
     nothing = replace(judged, effects=(), log_bayes=0.0, fit=plain)
     posterior = Posterior(nothing=nothing, judged=(judged,), log_e=50.0, threshold=4.0, class_threshold=4.0,

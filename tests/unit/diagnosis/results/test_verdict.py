@@ -16,7 +16,7 @@ from tests.unit.diagnosis.diagnosis_example import consistent
 
 @pytest.mark.parametrize(("unfit", "verdict"), [(False, "consistent"), (True, "unexplained")])
 def test_a_model_that_calibration_makes_worse_is_not_consistent(unfit: bool, verdict: str) -> None:
-    nothing = Judged(effects=(), log_prior=0.0, log_bayes=0.0, error_class=error_classes()[0])
+    nothing = Judged(effects=(), log_bayes=0.0, error_class=error_classes()[0])
     silent = Posterior(nothing=nothing, judged=(), log_e=-2.0, threshold=10.0, class_threshold=5.0, rule=rule())
     assert verdict_of(silent, (), (), unfit=unfit) == verdict
 

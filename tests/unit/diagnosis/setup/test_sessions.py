@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from diagnosis.recordings.recording import Recording
-from diagnosis.setup.baselines import check_baselines, session_by_recording
+from diagnosis.setup.sessions import check_baselines, session_by_recording
 from models.base.errors import InputError
 from models.base.types import Array
 from tests.unit.diagnosis.inference_example import recording_of

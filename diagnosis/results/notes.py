@@ -1,16 +1,22 @@
-"""Notes on baselines: an effect that acts in them too, and sessions that look like another machine."""
+"""Notes: baselines with the effect or of another machine, and recordings that identify ratios only."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
 
 from diagnosis.candidates.hypotheses import Hypothesis
 from diagnosis.decision.answer import Answer
 from diagnosis.decision.posterior import Placebo, Posterior
-from diagnosis.engine.baselines import effects_in_baselines, sessions_apart
-from diagnosis.engine.fit import Experiment
+from diagnosis.engine.fit import Experiment, Fit
+from diagnosis.engine.scale import scale_direction
+from diagnosis.engine.scan import scan
+from diagnosis.engine.sessions import sessions_apart
 
 NOTED_FROM = 5.0  # nats
+LITTLE = 0.01  # of what the recordings know about the sizes one by one: a small part of fixed capacity pretends so much
 
 
 def baseline_notes(experiment: Experiment, posterior: Posterior, answers: Sequence[Answer]) -> tuple[str, ...]:
@@ -18,16 +24,29 @@ def baseline_notes(experiment: Experiment, posterior: Posterior, answers: Sequen
     nothing = posterior.nothing.fit
     if not experiment.healthy or nothing is None:
         return ()
-    effects = [answer.effect for answer in answers[:1] if answer.effect.term is not None]
-    acting = effects_in_baselines(nothing, effects) if effects else [0.0]
+    effect = next((answer.effect for answer in answers[:1] if answer.effect.term is not None), None)
     best = (answers[0].best.fit if answers else None) or nothing
     single = [one for one in posterior.judged if len(one.effects) == 1]
-    ahead = max(single, key=lambda one: one.log_bayes + one.log_prior + one.effects[0].less, default=None)
+    ahead = max(single, key=lambda one: one.weight + one.effects[0].less, default=None)
     placebo = posterior.placebo
     raised = placebo is not None and posterior.threshold == placebo.log_e_value
-    return baselines_told(float(acting[0]), sessions_apart(best), effects[0].name if effects else "",
+    return baselines_told(0.0 if effect is None else evidence_in_baselines(nothing, effect), sessions_apart(best),
+                          "" if effect is None else effect.name,
                           placebo if raised else None, ahead.effects[0] if ahead else None,
                           posterior.class_threshold)  # fmt: skip
+
+
+def evidence_in_baselines(fit: Fit, effect: Hypothesis) -> float:
+    """Log Bayes factor of an effect in the baselines alone, as if it acted there, [nat].
+
+    Parameters
+    ----------
+    fit : Fit
+        Machine without the effect; its model error counts
+    """
+    alone = fit.part(fit.experiment.baselines)
+    everywhere = replace(alone, experiment=replace(alone.experiment, healthy=frozenset()))
+    return float(scan(everywhere, [effect]).log_bayes[0])
 
 
 def baselines_told(
@@ -43,7 +62,7 @@ def baselines_told(
     Parameters
     ----------
     acting : float
-        Evidence in the baselines for the effect that is reported, see :func:`effects_in_baselines`, [nat]
+        Evidence in the baselines for the effect that is reported, see :func:`evidence_in_baselines`, [nat]
     apart : mapping of session to float
         See :func:`sessions_apart`, [nat]
     effect : str
@@ -79,3 +98,24 @@ def baselines_told(
             "(for as many hours as are tested) do not count. If it may have changed there, leave the session out."
         )
     return tuple(notes)
+
+
+def ratio_notes(fit: Fit) -> tuple[str, ...]:
+    """One sentence if recordings identify ratios only, so that every watt rests on the priors; else nothing.
+
+    The information that they have along the common factor of all sizes is compared with what they have on the sizes
+    one by one.
+    """
+    direction = scale_direction(fit.experiment.machine.model.network, fit.experiment.unknowns)
+    each = np.concatenate([part.columns for part in fit.parts]) * direction
+    together, alone = each.sum(axis=1), np.square(each).sum(axis=0)[direction != 0.0]
+    if not len(alone) or float(together @ together) > LITTLE * float(alone.sum()):
+        return ()
+    sd = 1.0 / np.sqrt(float(direction @ direction))
+    text = (
+        "only ratios are identified: all heats, conductances and heat capacities together may be larger or smaller by "
+        f"one factor without any change of a temperature. That factor rests on the definition's priors (a factor of "
+        f"{np.exp(sd):.2f} either way, one standard deviation), and so does every number in W, W/K or J/K; measure the "
+        "loss, or one heat flow, to fix it"
+    )
+    return (text,)

@@ -8,7 +8,7 @@ from datetime import UTC, datetime
 import numpy as np
 
 from diagnosis.recordings.recording import Recording
-from diagnosis.setup.time_axis import start_times
+from diagnosis.setup.sessions import start_times
 from tests.unit.diagnosis.inference_example import recording_of
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from diagnosis.candidates.hypotheses import Hypothesis
 from diagnosis.decision.posterior import Placebo
-from diagnosis.results.baseline_notes import baselines_told
+from diagnosis.results.notes import baselines_told
 
 
 def test_an_effect_that_acts_in_the_baselines_is_noted() -> None:
