@@ -87,7 +87,7 @@ def _is_recording(text: Path, needed: Set[str], usual: RecordingMapping) -> bool
 
 
 def _named(mapping: RecordingMapping) -> set[str]:
-    return {*mapping.columns, *([mapping.time.column] if mapping.time is not None else [])}
+    return {*mapping.columns, *(mapping.time.columns if mapping.time is not None else ())}
 
 
 def _clock_notes(recording: Recording) -> list[str]:

@@ -10,20 +10,25 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from diagnosis.recordings.cleaning import rows_text
+from diagnosis.recordings.header_units import named_with_unit
 from diagnosis.recordings.machine import RecordedMachine
-from diagnosis.recordings.mapping import AUXILIARY, IGNORE, Column, RecordingMapping, looks_like_kelvin
+from diagnosis.recordings.mapping import AUXILIARY, IGNORE, Column, Csv, RecordingMapping, looks_like_kelvin
 from models.base.errors import Problems, did_you_mean
 from models.base.types import Array
+from models.files.numbers import numbers_of
 from models.quantities.column_names import meant
 from models.quantities.quantities import TOTAL_LOSS, Quantity, node_of_channel, quantity_of
 from models.quantities.units import units_in_files
 
 NEAR = 0.85  # likeness of names that makes one a slip of the other
-SWAPPED = str.maketrans(",.", ".,")
 MOST_NAMED = 12  # unused columns in a note
 FEW = 0.01  # share of rows that may be impossible
-# Both signs, or groups of three digits with gaps between them: 1,500.0  1.500,0  1'500  1 500
-THOUSANDS = re.compile(r"[+-]?\d{1,3}((,\d{3})+\.\d+|(\.\d{3})+,\d+|(['\u2019\s]\d{3})+([.,]\d+)?)")
+MOST_TEXTS = 10  # that may mean a missing value, in a message
+# Groups of three digits, and decimals behind another sign: 1,500.0  1.500,0  1'500  1 500
+THOUSANDS = re.compile(
+    r"[+-]?\d{1,3}(?:(?P<comma>,)\d{3}(,\d{3})*(\.\d*)?|(?P<point>\.)\d{3}(\.\d{3})*(,\d*)?"
+    r"|(?P<other>['\u2019\s])\d{3}((?P=other)\d{3})*([.,]\d*)?)"
+)
 CODES, CODED = 3, 0.5  # so many different impossible values, in up to this share of rows, are codes of a logger
 
 
@@ -61,7 +66,7 @@ def match_columns(
     """
     roles = _mapped_columns(present, mapping, network, problems)
     taken = {column.channel for column in mapping.columns.values()}
-    lacking = []
+    lacking: list[Quantity] = []
     for quantity, known in quantities_of(network).items():
         name = known.column
         if name in mapping.columns or quantity in taken:
@@ -75,7 +80,13 @@ def match_columns(
         elif name in present:
             roles[name] = Column(quantity=quantity)
         else:
-            lacking.append(name)
+            lacking.append(known)
+    free = [name for name in present if name not in roles and name not in mapping.columns and name != time_column]
+    with_unit = named_with_unit(free, lacking)
+    if with_unit:
+        shown = ", ".join(f"{name} ({column.quantity} in {column.unit})" for name, column in with_unit.items())
+        notes.append(f"taken from the names of columns: {shown}")
+        roles |= with_unit
     found = (
         {column.quantity for column in mapping.columns.values()}
         | {column.quantity for column in roles.values()}
@@ -90,7 +101,8 @@ def match_columns(
               if quantity in taken and known.column in rest]  # fmt: skip
     if replaced:
         notes.append(f"not used, because the mapping takes other columns for them: {', '.join(replaced)}")
-    _report_unused([n for n in rest if n not in replaced], lacking, problems, notes)
+    still_lacking = [known for known in lacking if known.name not in found]
+    _report_unused([n for n in rest if n not in replaced], still_lacking, problems, notes)
     return roles
 
 
@@ -116,14 +128,16 @@ def _mapped_columns(
     return roles
 
 
-def _report_unused(rest: Sequence[str], lacking: Sequence[str], problems: Problems, notes: list[str]) -> None:
+def _report_unused(rest: Sequence[str], lacking: Sequence[Quantity], problems: Problems, notes: list[str]) -> None:
     unused = []
+    by_column = {known.column: known for known in lacking}
     for name in rest:
-        slip = meant(name, lacking, near=NEAR, with_kind=True)
+        slip = meant(name, by_column, near=NEAR, with_kind=True)
         if slip:
+            known = by_column[slip]
             problems.add(
-                f"column {name[:80]} is not known; did you mean {slip!r}? Rename it, or name it in a mapping file "
-                f'(quantity = "{AUXILIARY}" if it is something else)'
+                f"column {name[:80]} is not known; did you mean {slip!r}? Rename it if it is in {known.unit}, or name "
+                f'it in a mapping file: quantity = "{known.name}" and its unit, or "{AUXILIARY}" for something else'
             )
         else:
             unused.append(name[:80])
@@ -132,38 +146,45 @@ def _report_unused(rest: Sequence[str], lacking: Sequence[str], problems: Proble
         notes.append(f"not used, being no input and no node of this gearbox: {', '.join(unused[:MOST_NAMED])}{more}")
 
 
-def _numbers(cells: pd.Series, name: str, decimal: str, problems: Problems) -> Array | None:
+def _numbers(cells: pd.Series, name: str, csv: Csv, problems: Problems) -> Array | None:
     """Return a column as numbers, shape (rows,), in the unit of the file; None and a problem if a cell is no number."""
     rows = np.asarray(cells.index) + 1
     if pd.api.types.is_bool_dtype(cells.dtype) or pd.api.types.is_datetime64_any_dtype(cells.dtype):
         problems.add(f"{name} holds {cells.dtype} values (rows {rows[0]}-{rows[-1]}), not numbers")
         return None
-    if pd.api.types.is_numeric_dtype(cells.dtype):
-        return np.array(cells.to_numpy(dtype=np.float64, na_value=np.nan))
-    texts = cells.astype(object)
-    if decimal == ",":  # a single cell that is no number leaves the others as texts with commas
-        texts = texts.map(lambda cell: cell.translate(SWAPPED) if isinstance(cell, str) else cell)
-    parsed = pd.to_numeric(texts, errors="coerce")
-    wrong = np.flatnonzero((parsed.isna() & cells.notna()).to_numpy(dtype=bool))
+    values = numbers_of(cells, decimal=csv.decimal, thousands=csv.thousands)
+    wrong = np.flatnonzero(np.isnan(values) & cells.notna().to_numpy(dtype=bool))
     if not len(wrong):
-        return np.array(parsed.to_numpy(dtype=np.float64, na_value=np.nan))
-    cell = str(cells.iloc[int(wrong[0])])[:40]
-    advice = "if it means a missing value, name it under 'missing' in a mapping file"
-    whole, comma, rest = cell.strip().partition(",")
-    if decimal == "." and comma and whole.lstrip("+-").isdigit() and rest.isdigit():
-        advice = (
-            'with decimal commas, columns are separated by semicolons: csv = { separator = ";", decimal = "," } in a '
-            "mapping file"
-        )
-    if decimal == "," and re.fullmatch(r"[+-]?\d+\.\d+", cell.strip()):
-        advice = 'its decimal sign is a point: leave out decimal = ","'
-    if THOUSANDS.fullmatch(cell.strip()):
-        advice = "write numbers without thousands separators"
+        return values
+    texts = [str(cell).strip()[:40] for cell in cells.iloc[wrong].unique()[:MOST_TEXTS]]
+    has_points = bool(cells[np.isfinite(values)].astype(str).str.contains(".", regex=False).any())
     problems.add(
-        f"{name} holds {cell!r} at row {rows[wrong[0]]}, which is no number ({len(wrong)} such cells, "
-        f"{rows_text(rows[wrong])}); {advice}"
+        f"{name} holds {str(cells.iloc[int(wrong[0])])[:40]!r} at row {rows[wrong[0]]}, which is no number "
+        f"({len(wrong)} such cells, {rows_text(rows[wrong])}); {_advice(texts, csv, has_points=has_points)}"
     )
     return None
+
+
+def _advice(texts: Sequence[str], csv: Csv, *, has_points: bool) -> str:
+    """Return what to do about cells that are no numbers, among others with decimal points or not."""
+    text = texts[0]
+    if csv.decimal == "." and re.fullmatch(r"[+-]?\d+,(\d{1,2}|\d{4,})", text):
+        if has_points:
+            return "decimal commas among decimal points; write all numbers alike"
+        return 'its decimal sign is a comma: give csv = { decimal = "," } in a mapping file'
+    if csv.decimal == "," and re.fullmatch(r"[+-]?\d+\.(\d{1,2}|\d{4,})", text):
+        return 'its decimal sign is a point: leave out decimal = ","'
+    grouped = THOUSANDS.fullmatch(text)
+    if grouped:
+        sign = next(filter(None, grouped.group("comma", "point", "other")))
+        may_be = sign in ",." and csv.decimal not in text
+        either = f', or decimal = "{sign}" if that is its decimal sign' if may_be else ""
+        stated = f'csv = {{ thousands = "{sign}" }} in a mapping file{either}'
+        return f"write numbers without thousands separators, or give {stated}"
+    if re.match(r"[+-]?\d+([.,]\d+)?\s*[^\d\s.,:/-]{1,5}$", text):
+        return "write the unit in the header or in a mapping file, not in the cells"
+    named = ", ".join(f'"{text}"' for text in texts if not re.search(r"\d", text)) or f'"{text}"'
+    return f"if it means a missing value, give missing = [{named}] in a mapping file"
 
 
 def quantity_values(
@@ -172,7 +193,7 @@ def quantity_values(
     column: Column,
     quantity: Quantity,
     unit_of_file: str | None,
-    decimal: str,
+    csv: Csv,
     outside: NDArray[np.bool_],
     problems: Problems,
     notes: list[str],
@@ -189,8 +210,8 @@ def quantity_values(
         What the mapping states of it
     unit_of_file : str or None
         Unit that the file itself names
-    decimal : str
-        Sign in numbers that are texts
+    csv : Csv
+        How texts are written
     outside : array of bool, shape (rows,)
         Rows that the mapping leaves out
 
@@ -199,7 +220,7 @@ def quantity_values(
     Array or None
         None, and a problem, if the column cannot be used
     """
-    values = _numbers(cells, name, decimal, problems)
+    values = _numbers(cells, name, csv, problems)
     rows = np.asarray(cells.index) + 1
     if values is None or not _keep_valid(values, name, column, rows, problems, notes):
         return None
