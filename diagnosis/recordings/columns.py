@@ -16,6 +16,7 @@ from diagnosis.recordings.mapping import AUXILIARY, IGNORE, Column, Csv, Recordi
 from models.base.errors import Problems, did_you_mean
 from models.base.types import Array
 from models.files.numbers import numbers_of
+from models.files.table_file import copies_of
 from models.quantities.column_names import meant
 from models.quantities.quantities import TOTAL_LOSS, Quantity, node_of_channel, quantity_of
 from models.quantities.units import units_in_files
@@ -66,6 +67,38 @@ def match_columns(
     """
     roles = _mapped_columns(present, mapping, network, problems)
     taken = {column.channel for column in mapping.columns.values()}
+    lacking = _standard_columns(present, mapping, network, roles, problems)
+    free = [name for name in present if name not in roles and name not in mapping.columns and name != time_column]
+    with_unit = named_with_unit(free, lacking)
+    if with_unit:
+        shown = ", ".join(f"{name} ({column.quantity} in {column.unit})" for name, column in with_unit.items())
+        notes.append(f"taken from the names of columns: {shown}")
+        roles |= with_unit
+    found = (
+        {column.quantity for column in mapping.columns.values()}
+        | {column.quantity for column in roles.values()}
+        | set(mapping.constants)
+    )
+    for signal, given in network.inputs.items():
+        if given.required and signal not in found and not copies_of(given.column, present):
+            shown = ", ".join(other[:40] for other in sorted(present)[:20])
+            problems.add(f"column {given.column} is missing; it has: {shown}")
+    rest = [n for n in present if n not in roles and n not in mapping.columns and n != time_column]
+    replaced = [known.column for quantity, known in quantities_of(network).items()
+              if quantity in taken and known.column in rest]  # fmt: skip
+    if replaced:
+        notes.append(f"not used, because the mapping takes other columns for them: {', '.join(replaced)}")
+    still_lacking = [known for known in lacking if known.name not in found]
+    _report_unused([n for n in rest if n not in replaced], still_lacking, problems, notes)
+    return roles
+
+
+def _standard_columns(
+    present: Sequence[str], mapping: RecordingMapping, network: RecordedMachine, roles: dict[str, Column],
+    problems: Problems,
+) -> list[Quantity]:  # fmt: skip
+    """Add the columns of standard names that the mapping does not name to `roles`; return quantities without one."""
+    taken = {column.channel for column in mapping.columns.values()}
     lacking: list[Quantity] = []
     for quantity, known in quantities_of(network).items():
         name = known.column
@@ -81,29 +114,13 @@ def match_columns(
             roles[name] = Column(quantity=quantity)
         else:
             lacking.append(known)
-    free = [name for name in present if name not in roles and name not in mapping.columns and name != time_column]
-    with_unit = named_with_unit(free, lacking)
-    if with_unit:
-        shown = ", ".join(f"{name} ({column.quantity} in {column.unit})" for name, column in with_unit.items())
-        notes.append(f"taken from the names of columns: {shown}")
-        roles |= with_unit
-    found = (
-        {column.quantity for column in mapping.columns.values()}
-        | {column.quantity for column in roles.values()}
-        | set(mapping.constants)
-    )
-    for signal, given in network.inputs.items():
-        if given.required and signal not in found:
-            shown = ", ".join(other[:40] for other in sorted(present)[:20])
-            problems.add(f"column {given.column} is missing; it has: {shown}")
-    rest = [n for n in present if n not in roles and n not in mapping.columns and n != time_column]
-    replaced = [known.column for quantity, known in quantities_of(network).items()
-              if quantity in taken and known.column in rest]  # fmt: skip
-    if replaced:
-        notes.append(f"not used, because the mapping takes other columns for them: {', '.join(replaced)}")
-    still_lacking = [known for known in lacking if known.name not in found]
-    _report_unused([n for n in rest if n not in replaced], still_lacking, problems, notes)
-    return roles
+            copies = copies_of(name, present)
+            if copies:
+                problems.add(
+                    f"column {name} is there twice; remove one, or name the right one in a mapping file as "
+                    + " or ".join(repr(copy) for copy in copies)
+                )
+    return lacking
 
 
 def _mapped_columns(
@@ -274,7 +291,7 @@ def _possible(
     if len(infinite):
         problems.add(
             f"{name} is {values[infinite[0]]} in {rows_text(rows[infinite])}; leave a cell empty where the value is "
-            "unknown"
+            f'unknown, or give missing = ["inf", "-inf"] in a mapping file'
         )
         return values
     good = values[np.isfinite(values)]

@@ -16,7 +16,7 @@ from diagnosis.recordings.columns import is_measurable, match_columns, quantitie
 from diagnosis.recordings.file import RecordingFile
 from diagnosis.recordings.machine import RecordedMachine
 from diagnosis.recordings.mapping import AUXILIARY, IGNORE, Column
-from diagnosis.recordings.time_axis import STANDARD, Clock, Part, check_time, moment_text
+from diagnosis.recordings.time_axis import ISO_NAMES, STANDARD, Clock, Part, check_time, moment_text
 from models.base.errors import InputError
 from models.base.types import Array
 
@@ -71,9 +71,12 @@ def read_rows(
     """
     clock, problems, notes = file.clock, file.problems, list[str]()
     table = file.table(parts, first_s)
-    if clock is not None:
-        table = _oldest_first(_without_footer(table, file, notes), file, notes)
+    table = _without_footer(table, file, notes)
     seconds = file.seconds(table)
+    if len(table) > 1 and (np.diff(seconds) < 0.0).all():
+        notes.append("its newest row comes first: the rows are turned round, and keep their numbers of the file")
+        table = table[::-1]
+        seconds = file.seconds(table)
     found = RecordedRows(
         path=file.path, files=[file.path], clock=clock, seconds=seconds, rows=np.asarray(table.index) + 1, notes=notes
     )
@@ -82,8 +85,8 @@ def read_rows(
         return found
     if clock is not None:
         check_time(table[clock.column], seconds, clock, problems)
-        if file.mapping.time is None and clock.column != STANDARD and not clock.is_date:
-            notes.append(f"{clock.column} is taken as the time in {clock.unit}")
+        if file.mapping.time is None and clock.column not in (STANDARD, *ISO_NAMES):
+            notes.append(f"{clock.column} is taken as the time{'' if clock.is_date else f' in {clock.unit}'}")
         if clock.lacks_zone(table[clock.column]):
             notes.append(
                 f"{clock.column} has no time zone: it is taken as UTC, and dates marked UTC are the file's own"
@@ -112,9 +115,8 @@ def read_rows(
 
 def _without_footer(table: pd.DataFrame, file: RecordingFile, notes: list[str]) -> pd.DataFrame:
     """Leave out rows at the end that hold a text in place of the time, and nothing else."""
-    count = min(MOST_FOOTERS, len(table) - 1)
-    end = table.iloc[len(table) - count :] if file.clock is not None and count > 0 else table[:0]
-    if not len(end) or file.clock is None:
+    end = table.iloc[1:][-MOST_FOOTERS:]
+    if file.clock is None or not len(end):
         return table
     times = end[file.clock.column]
     is_text = np.isnan(file.seconds(end)) & times.map(lambda cell: isinstance(cell, str)).to_numpy(dtype=bool)
@@ -126,15 +128,6 @@ def _without_footer(table: pd.DataFrame, file: RecordingFile, notes: list[str]) 
             f"{rows_text(np.asarray(end.index[-footers:]) + 1)} at the end with a text only ({first!r}) left out"
         )
     return table.iloc[: len(table) - footers]
-
-
-def _oldest_first(table: pd.DataFrame, file: RecordingFile, notes: list[str]) -> pd.DataFrame:
-    """Turn a table round whose every row is older than the row before."""
-    seconds = file.seconds(table)
-    if len(table) < 2 or not (np.diff(seconds) < 0.0).all():
-        return table
-    notes.append("its newest row comes first: the order of the rows is turned round, row numbers are those of the file")
-    return table[::-1]
 
 
 def joined(tables: Sequence[RecordedRows]) -> RecordedRows:

@@ -193,7 +193,7 @@ class Clock:
             stamps = self._zoned(pd.to_datetime(texts, format=self.unit, utc=has_zone, errors="coerce"))
         else:
             texts = values.astype(str).str.strip().str.replace(",", ".")
-            found = [_ISO.fullmatch(text) for text in texts]
+            found = [_ISO.fullmatch(text) for text in texts.tolist()]  # quicker than a Series
             aware = np.array([match is not None and match["zone"] is not None for match in found], dtype=bool)
             naive = np.array([match is not None and match["zone"] is None for match in found], dtype=bool)
             stamps = pd.to_datetime(texts.where(aware), format="ISO8601", utc=True, errors="coerce")
@@ -236,7 +236,10 @@ def moment_text(seconds: float, clock: Clock | None) -> str:
 
 
 def clock_of(table: pd.DataFrame, units: Mapping[str, str]) -> Clock:
-    """Find the time column without a mapping: ``time_s``, ISO 8601 times under a usual name, or times with their unit.
+    """Find the time column without a mapping.
+
+    It is ``time_s``, else ISO 8601 times under a usual name, times with their unit, or the only column of ISO 8601
+    times.
 
     Parameters
     ----------
@@ -259,6 +262,13 @@ def clock_of(table: pd.DataFrame, units: Mapping[str, str]) -> Clock:
         is_time = name.lower() in ISO_NAMES or unit_of_name(name, "time", "time", "s") is not None
         if is_time and with_unit[name] in known:
             return Clock(column=name, unit=with_unit[name])
+    dated = [
+        name
+        for name in columns
+        if holds_dates(table[name]) and len(table) and table[name].iloc[0] != table[name].iloc[-1]
+    ]
+    if len(dated) == 1:
+        return Clock(column=dated[0], unit=ISO)
     advice = time_advice(table)
     for name in columns:
         if name.lower() in ISO_NAMES:

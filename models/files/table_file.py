@@ -8,6 +8,7 @@ import gzip
 import io
 import re
 import zlib
+from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -87,10 +88,10 @@ def column_names(path: Path, form: TextForm = PLAIN) -> tuple[str, ...]:
         if kind_of(path) == ".parquet":
             from pyarrow import parquet
 
-            return tuple(parquet.read_schema(path).names)
+            return tuple(distinct(parquet.read_schema(path).names))
         with _open_text(path, form) as text:
             _, header = next(iter(_Lines(path, text, form).ahead(1)))
-            return tuple(_fields(header, form.separator))
+            return tuple(distinct(_fields(header, form.separator)))
     except (InputError, ImportError, StopIteration, csv.Error, *UNREADABLE):
         return ()
 
@@ -102,10 +103,10 @@ def column_units(path: Path, form: TextForm) -> dict[str, str]:
     try:
         with _open_text(path, form) as text:
             lines = _Lines(path, text, form)
-            names = [name.strip() for name in _check_head(path, lines, form)]
+            names = _check_head(path, lines, form)[0]
     except (csv.Error, *UNREADABLE):  # reading reports why
         return {}
-    return {name: unit for name, unit in zip(names, lines.units, strict=False) if name and unit}
+    return {name: unit for name, unit in zip(names, lines.units, strict=False) if unit}
 
 
 def read_table(path: Path) -> pd.DataFrame:
@@ -173,10 +174,26 @@ def without(missing: Collection[str], table: pd.DataFrame) -> pd.DataFrame:
     return table.mask(table.apply(marked)) if len(table) else table
 
 
-def _check_names(path: Path, names: list[str]) -> None:
-    repeated = sorted({name for name in names if name and names.count(name) > 1})
-    if repeated:
-        raise InputError("\n".join(f"{path}: column {name[:80]} is there twice; remove one" for name in repeated[:10]))
+def distinct(names: Sequence[str]) -> list[str]:
+    """Return names of columns with the place of those that come twice; those that are empty as pandas names them.
+
+    Examples
+    --------
+    >>> distinct(["n", "Status", "Status", ""])
+    ['n', 'Status (column 2)', 'Status (column 3)', 'Unnamed: 3']
+    """
+    count = Counter(names)
+    placed = enumerate(names, start=1)
+    return [
+        f"Unnamed: {place - 1}" if not name else name if count[name] == 1 else f"{name} (column {place})"
+        for place, name in placed
+    ]
+
+
+def copies_of(name: str, names: Iterable[str]) -> list[str]:
+    """Return what :func:`distinct` makes of a name that comes twice, among `names`; also for groups of an MDF file."""
+    copy = re.compile(re.escape(name) + r" \((?:column|group) \d+\)")
+    return [other for other in names if copy.fullmatch(other)]
 
 
 # ---------------------------------------------------------------------- text
@@ -281,19 +298,19 @@ def _fields(line: str, separator: str) -> list[str]:
 def _text_chunks(path: Path, form: TextForm) -> Iterator[pd.DataFrame]:
     with _open_text(path, form) as text:
         lines = _Lines(path, text, form)
-        names = _check_head(path, lines, form)
+        names, width = _check_head(path, lines, form)
         try:
             for chunk in pd.read_csv(
-                cast(Any, lines), sep=form.separator, decimal=form.decimal, na_values=[*MISSING, *form.missing],
-                dtype={name: str for name in names if name.strip() in form.texts}, skipinitialspace=True,
-                index_col=False, chunksize=CHUNK_ROWS, low_memory=False,
+                cast(Any, lines), names=names, header=0, sep=form.separator, decimal=form.decimal,
+                na_values=[*MISSING, *form.missing], dtype={name: str for name in names if name in form.texts},
+                skipinitialspace=True, index_col=False, chunksize=CHUNK_ROWS, low_memory=False,
             ):  # fmt: skip
-                beyond = chunk.index[chunk.iloc[:, len(names) :].notna().any(axis=1)]
+                beyond = chunk.index[chunk.iloc[:, width:].notna().any(axis=1)]
                 if len(beyond):
                     raise InputError(
                         f"{path}: row {beyond[0] + 1} has more fields than the header; remove what is too much"
                     )
-                yield chunk.iloc[:, : len(names)].rename(columns=lambda name: str(name).strip())
+                yield chunk.iloc[:, :width]
         except pd.errors.ParserError as error:
             uneven = _PANDAS_UNEVEN.search(str(error))
             if uneven is None:
@@ -302,16 +319,16 @@ def _text_chunks(path: Path, form: TextForm) -> Iterator[pd.DataFrame]:
             raise InputError(f"{path}: {_too_many_fields(line, count, expected, form)}") from error
 
 
-def _check_head(path: Path, lines: _Lines, form: TextForm) -> list[str]:
-    """Return the names of the columns as they stand there.
+def _check_head(path: Path, lines: _Lines, form: TextForm) -> tuple[list[str], int]:
+    """Return the names of all columns, none twice, and the number of those that the header has.
 
-    Refused are another separator, no header, lines above it, repeated names, and rows of texts or too many fields below
-    it. A row of units below it, and separators at the ends of the rows, are taken as such.
+    Refused are another separator, no header, lines above it, and rows of texts or too many fields below it. A row of
+    units below it, and separators at the ends of the rows, are taken as such.
     """
     rows = [(number, line, _fields(line, form.separator)) for number, line in lines.ahead(HEAD_LINES)]
     if not rows:
         raise InputError(f"{path}: {EMPTY}")
-    at, header, names = rows[0]
+    at, _, names = rows[0]
     if len(names) == 1:
         _check_separator(path, [line for _, line, _ in rows], form)
     above = _rows_above_header([cells for _, _, cells in rows])
@@ -322,7 +339,6 @@ def _check_head(path: Path, lines: _Lines, form: TextForm) -> list[str]:
         raise InputError(f"{path}: {texts}: no part of the table; {_to_skip([n for n, _, _ in rows[:above]], form)}")
     if all(is_number(name) for name in names):
         raise InputError(f"{path}: its first line holds numbers; a header line with column names is needed")
-    _check_names(path, names)
     below = [(number, cells) for number, _, cells in rows[1:]]
     texts_below = list(takewhile(lambda row: _holds_texts(row[1]) or _are_units(row[1]), below))
     if texts_below and _are_units(texts_below[0][1]):
@@ -335,13 +351,12 @@ def _check_head(path: Path, lines: _Lines, form: TextForm) -> list[str]:
             f"{path}: line {number} (below the header) holds units or texts ({_shown(cells)}) and no number; "
             + _to_skip([number for number, _ in texts_below], form)
         )
-    first_row = next((row for row in below if len(row[1]) > len(names)), None)
-    if first_row is not None:
-        number, cells = first_row
-        if any(cells[len(names) :]):
-            raise InputError(f"{path}: {_too_many_fields(number, len(cells), len(names), form)}")
-        lines.replace(at, header.rstrip("\r\n") + form.separator * (len(cells) - len(names)) + "\n")
-    return next(csv.reader(io.StringIO(header), delimiter=form.separator, skipinitialspace=True))
+    width = len(names)
+    longest = max((len(cells) for _, cells in below), default=width)
+    for number, cells in below:
+        if any(cells[width:]):
+            raise InputError(f"{path}: {_too_many_fields(number, len(cells), width, form)}")
+    return distinct([*names, *[""] * (longest - width)]), width
 
 
 def _check_separator(path: Path, lines: Sequence[str], form: TextForm) -> None:
@@ -427,7 +442,7 @@ def _parquet_chunks(path: Path) -> Iterator[pd.DataFrame]:
 
     with parquet.ParquetFile(path) as file:
         schema = file.schema_arrow
-        _check_names(path, list(schema.names))
+        names = distinct(schema.names)
         nested = [f for f in schema if pa.types.is_nested(f.type) or pa.types.is_binary(f.type)]
         if nested:
             raise InputError("\n".join(
@@ -437,8 +452,8 @@ def _parquet_chunks(path: Path) -> Iterator[pd.DataFrame]:
         row = 0
         for batch in file.iter_batches(batch_size=CHUNK_ROWS):
             chunk = batch.to_pandas(ignore_metadata=True)
-            chunk.index = pd.RangeIndex(row, row + len(chunk))
+            chunk = chunk.set_axis(names, axis=1).set_axis(pd.RangeIndex(row, row + len(chunk)))
             row += len(chunk)
             yield chunk
         if row == 0:
-            yield schema.empty_table().to_pandas(ignore_metadata=True)
+            yield schema.empty_table().to_pandas(ignore_metadata=True).set_axis(names, axis=1)

@@ -150,6 +150,17 @@ def test_lines_above_the_header_are_named_all_at_once(tmp_path: Path, network: T
     check(read(tmp_path, network, above + plain(), advice))
 
 
+def test_names_that_come_twice(tmp_path: Path, network: ThermalNetwork) -> None:
+    """They do no harm where nothing needs them; one that is needed is chosen in the mapping."""
+    source = table().assign(a=1.0, b=2.0, c=30.0)
+    text = plain(source).replace("a,b,c", "Status,Status,T_oil_degC", 1)
+    with pytest.raises(InputError) as caught:
+        read(tmp_path, network, text)
+    named = "name the right one in a mapping file as 'T_oil_degC (column 4)' or 'T_oil_degC (column 8)'"
+    assert f"column T_oil_degC is there twice; remove one, or {named}" in str(caught.value)
+    check(read(tmp_path, network, text, '[columns."T_oil_degC (column 4)"]\nquantity = "T_oil"'))
+
+
 def test_a_comma_within_a_number_does_not_shift_a_row(tmp_path: Path, network: ThermalNetwork) -> None:
     """Separators behind every row make room for one field more."""
     text = plain().replace("\n", ",\n").replace("P_loss_W,\n", "P_loss_W\n")

@@ -47,17 +47,28 @@ def test_the_unit_in_the_name_of_the_time(
 
 @pytest.mark.parametrize("form", [
     "%d.%m.%Y %H:%M:%S", "%d.%m.%y %H:%M:%S", "%m/%d/%Y %I:%M:%S %p", "%d/%m/%Y %H:%M:%S", "%Y/%m/%d %H:%M:%S",
-    "%d-%b-%Y %H:%M:%S", "%Y%m%dT%H%M%S", "%d.%m.%Y %H:%M:%S,%f", "iso8601",
+    "%d-%b-%Y %H:%M:%S", "%Y%m%dT%H%M%S", "%d.%m.%Y %H:%M:%S,%f",
 ])  # fmt: skip
 @pytest.mark.parametrize("name", ["Zeit", "time"])
 def test_the_form_of_dates_is_advised_and_works(tmp_path: Path, network: ThermalNetwork, form: str, name: str) -> None:
-    texts = STAMPS.strftime("%Y-%m-%d %H:%M:%S" if form == "iso8601" else form)
-    if form != "iso8601" or name != "time":  # which needs no mapping
-        with pytest.raises(InputError) as caught:
-            read(tmp_path, network, {name: texts})
-        advice = f'time = {{ column = "{name}", unit = "{form}" }}'
-        assert f"give {advice} in a mapping file" in str(caught.value)
-        assert (read(tmp_path, network, {name: texts}, advice).time == TIME).all()
+    texts = STAMPS.strftime(form)
+    with pytest.raises(InputError) as caught:
+        read(tmp_path, network, {name: texts})
+    advice = f'time = {{ column = "{name}", unit = "{form}" }}'
+    assert f"give {advice} in a mapping file" in str(caught.value)
+    assert (read(tmp_path, network, {name: texts}, advice).time == TIME).all()
+
+
+def test_the_only_column_of_dates_is_the_time(tmp_path: Path, network: ThermalNetwork) -> None:
+    """The nameless one of a pandas index too, in CSV and Parquet."""
+    dates = STAMPS.strftime("%Y-%m-%d %H:%M:%S")
+    for name, shown in (("Zeit", "Zeit"), ("", "Unnamed: 0")):
+        recording = read(tmp_path, network, {name: dates, "calibrated": "2024-01-01"})
+        assert (recording.time == TIME).all() and f"{shown} is taken as the time" in recording.notes
+    with pytest.raises(InputError, match=r'give time = \{ column = "begin", unit = "iso8601" \}'):
+        read(tmp_path, network, {"begin": dates, "end": dates[::-1]})
+    pd.read_csv(tmp_path / "run.csv").iloc[:, 2:].set_index(STAMPS).to_parquet(tmp_path / "run.parquet")
+    assert (read_recordings(tmp_path / "run.parquet", network)[0].time == TIME).all()
 
 
 def test_a_day_that_may_be_a_month_is_left_to_the_reader() -> None:
