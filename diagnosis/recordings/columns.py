@@ -174,30 +174,30 @@ def _numbers(cells: pd.Series, name: str, csv: Csv, problems: Problems) -> Array
     if not len(wrong):
         return values
     texts = [str(cell).strip()[:40] for cell in cells.iloc[wrong].unique()[:MOST_TEXTS]]
-    has_points = bool(cells[np.isfinite(values)].astype(str).str.contains(".", regex=False).any())
+    others = cells[np.isfinite(values)].astype(str)
+    is_mixed = bool(others.str.contains(csv.decimal, regex=False).any())
     problems.add(
         f"{name} holds {str(cells.iloc[int(wrong[0])])[:40]!r} at row {rows[wrong[0]]}, which is no number "
-        f"({len(wrong)} such cells, {rows_text(rows[wrong])}); {_advice(texts, csv, has_points=has_points)}"
+        f"({len(wrong)} such cells, {rows_text(rows[wrong])}); {_advice(texts[0], csv, texts, is_mixed=is_mixed)}"
     )
     return None
 
 
-def _advice(texts: Sequence[str], csv: Csv, *, has_points: bool) -> str:
-    """Return what to do about cells that are no numbers, among others with decimal points or not."""
-    text = texts[0]
-    if csv.decimal == "." and re.fullmatch(r"[+-]?\d+,(\d{1,2}|\d{4,})", text):
-        if has_points:
-            return "decimal commas among decimal points; write all numbers alike"
-        return 'its decimal sign is a comma: give csv = { decimal = "," } in a mapping file'
-    if csv.decimal == "," and re.fullmatch(r"[+-]?\d+\.(\d{1,2}|\d{4,})", text):
-        return 'its decimal sign is a point: leave out decimal = ","'
+def _advice(text: str, csv: Csv, texts: Sequence[str], *, is_mixed: bool) -> str:
+    """Return what to do about cells that are no numbers, among others with the stated decimal sign or not."""
     grouped = THOUSANDS.fullmatch(text)
     if grouped:
         sign = next(filter(None, grouped.group("comma", "point", "other")))
-        may_be = sign in ",." and csv.decimal not in text
+        may_be = sign in ",." and csv.decimal not in text and not is_mixed
         either = f', or decimal = "{sign}" if that is its decimal sign' if may_be else ""
         stated = f'csv = {{ thousands = "{sign}" }} in a mapping file{either}'
         return f"write numbers without thousands separators, or give {stated}"
+    if re.fullmatch(r"[+-]?\d+[.,]\d+", text) and csv.decimal not in text:
+        if is_mixed:
+            return "decimal commas and decimal points are mixed; write all numbers alike"
+        if csv.decimal == ".":
+            return 'its decimal sign is a comma: give csv = { decimal = "," } in a mapping file'
+        return 'its decimal sign is a point: leave out decimal = ","'
     if re.match(r"[+-]?\d+([.,]\d+)?\s*[^\d\s.,:/-]{1,5}$", text):
         return "write the unit in the header or in a mapping file, not in the cells"
     named = ", ".join(f'"{text}"' for text in texts if not re.search(r"\d", text)) or f'"{text}"'
@@ -250,6 +250,11 @@ def quantity_values(
         )
         return None
     factor, offset = units.get(unit, (1.0, 0.0)) if unit else (1.0, 0.0)
+    named = units.get(unit_of_file or "", (factor, offset))
+    if column.unit is not None and named != (factor, offset):
+        notes.append(f"{name}: its unit is {unit}, as in the mapping file; the file itself names {unit_of_file}")
+    elif column.unit is None and (factor, offset) != (1.0, 0.0):
+        notes.append(f"{name}: its unit is {unit}, as the file names it")
     return _possible(values * (column.scale * factor) + offset, quantity, name, rows, problems, notes)
 
 

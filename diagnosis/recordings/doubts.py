@@ -21,6 +21,7 @@ USUAL_SHARE = 0.99  # of the rows of an input,
 FAR_TIMES = 10.0  # which others exceed so many times that they may be codes of a logger
 CODES, CODE_TIMES = (999.0, 9999.0, 99999.0, 32767.0, 32768.0, 65535.0), 1.5  # of loggers; beyond what is usual
 COLDER_K = 3.0  # below the ambient air on average
+LEAST_LOSS = 1e-3  # of the power, on average
 BRIEF_S, WARMED_K = 300.0, 15.0  # no gearbox warms that fast
 MILLISECONDS = (100.0, 200.0, 500.0, 1000.0, 2000.0)  # s from row to row that are more likely so many milliseconds
 
@@ -34,7 +35,7 @@ def doubts(found: RecordedRows, network: RecordedMachine) -> list[str]:
         In the units inside, impossible values and outliers taken out
     """
     return [*_time_in_another_unit(found, network), *_hot(found, network), *_colder_than_ambient(found, network),
-            *_more_loss_than_power(found), *_far_rows(found, network)]  # fmt: skip
+            *_loss_and_power(found), *_far_rows(found, network)]  # fmt: skip
 
 
 def _temperatures(found: RecordedRows, network: RecordedMachine) -> dict[str, Array]:
@@ -89,13 +90,14 @@ def _colder_than_ambient(found: RecordedRows, network: RecordedMachine) -> Itera
             )
 
 
-def _more_loss_than_power(found: RecordedRows) -> Iterator[str]:
+def _loss_and_power(found: RecordedRows) -> Iterator[str]:
     if not {TOTAL_LOSS, "speed", "torque"} <= {*found.names}:
         return
     power = np.abs(found.values["speed"] * found.values["torque"]) * np.pi / 30.0
     loss = found.values[TOTAL_LOSS]
     both = np.isfinite(power) & np.isfinite(loss)
-    if both.any() and np.mean(loss[both]) > np.mean(power[both]):
+    share = np.mean(loss[both]) / np.mean(power[both]) if both.any() and power[both].any() else np.inf
+    if both.any() and not LEAST_LOSS < share < 1.0:
         yield (
             f"{found.names[TOTAL_LOSS]} is {np.mean(loss[both]):.3g} W on average, but {found.names['speed']} and "
             f"{found.names['torque']} give {np.mean(power[both]):.3g} W: see if one of them is in another unit"

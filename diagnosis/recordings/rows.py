@@ -152,7 +152,7 @@ def joined(tables: Sequence[RecordedRows]) -> RecordedRows:
     before_rows = np.cumsum([0, *(int(table.rows.max()) for table in tables[:-1])])
     numbered = [table.rows + start for table, start in zip(tables, before_rows, strict=True)]
     ranges = ", ".join(
-        f"{table.path.name} (rows {rows[0]}-{rows[-1]})" for table, rows in zip(tables, numbered, strict=True)
+        f"{table.path.name} (rows {rows.min()}-{rows.max()})" for table, rows in zip(tables, numbered, strict=True)
     )
     notes = [f"{table.path.name}: {note}" for table in tables for note in table.notes]
     return RecordedRows(

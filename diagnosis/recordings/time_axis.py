@@ -253,6 +253,11 @@ def clock_of(table: pd.DataFrame, units: Mapping[str, str]) -> Clock:
     """
     columns = [str(column) for column in table.columns]
     if STANDARD in columns:
+        if units.get(STANDARD, "s") not in ("s", "sec"):
+            raise InputError(
+                f"column {STANDARD} has the unit {units[STANDARD]!r} in the file; give time = {{ column = "
+                f'"{STANDARD}", unit = ... }} in a mapping file'
+            )
         return Clock(column=STANDARD, unit=ISO if holds_dates(table[STANDARD]) else "s")
     known = units_in_files("time", "s")
     with_unit = {name: unit_of_name(name, "time", "time", "s") or units.get(name, "") for name in columns}

@@ -323,7 +323,7 @@ def _check_head(path: Path, lines: _Lines, form: TextForm) -> tuple[list[str], i
     """Return the names of all columns, none twice, and the number of those that the header has.
 
     Refused are another separator, no header, lines above it, and rows of texts or too many fields below it. A row of
-    units below it, and separators at the ends of the rows, are taken as such.
+    units below it (where a mapping file could be there), and separators at the ends of the rows, are taken as such.
     """
     rows = [(number, line, _fields(line, form.separator)) for number, line in lines.ahead(HEAD_LINES)]
     if not rows:
@@ -341,7 +341,7 @@ def _check_head(path: Path, lines: _Lines, form: TextForm) -> tuple[list[str], i
         raise InputError(f"{path}: its first line holds numbers; a header line with column names is needed")
     below = [(number, cells) for number, _, cells in rows[1:]]
     texts_below = list(takewhile(lambda row: _holds_texts(row[1]) or _are_units(row[1]), below))
-    if texts_below and _are_units(texts_below[0][1]):
+    if form.by_mapping and texts_below and _are_units(texts_below[0][1]):
         number, cells = texts_below.pop(0)
         lines.units = [cell.strip("[]()") for cell in cells]
         lines.replace(number, "\n")

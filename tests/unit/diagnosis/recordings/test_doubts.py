@@ -41,6 +41,8 @@ DOUBTS: dict[str, tuple[pd.DataFrame, str]] = {
                                 "T_oil_degC is 26 K below T_ambient_degC on average, although a gearbox gives heat"),
     "torque in kN m": (table().assign(torque_Nm=0.094),
                        "P_loss_W is 300 W on average, but speed_rpm and torque_Nm give 14.8 W"),
+    "loss in kW": (table().assign(P_loss_W=0.3),
+                   "P_loss_W is 0.3 W on average, but speed_rpm and torque_Nm give 1.48e+04 W"),
     "minutes": (table().assign(time_s=TIME / 60.0), "time_s goes over 66.5 s, in which T_oil_degC moves by"),
     "hours": (table().assign(time_s=TIME / 3600.0), "if it counts minutes or hours, name its unit in a mapping"),
     "milliseconds": (table().assign(time_s=1e3 * NUMBERS), "if it counts milliseconds"),

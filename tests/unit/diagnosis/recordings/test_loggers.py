@@ -161,6 +161,21 @@ def test_names_that_come_twice(tmp_path: Path, network: ThermalNetwork) -> None:
     check(read(tmp_path, network, text, '[columns."T_oil_degC (column 4)"]\nquantity = "T_oil"'))
 
 
+def test_a_unit_that_the_name_or_the_mapping_contradicts_is_noted(tmp_path: Path, network: ThermalNetwork) -> None:
+    text = in_units("min,rad/s,kNm,degF,kW").replace("t,n,M,T,P", "t,speed_rpm,M,T,P")
+    mapping = f'time = {{ column = "t" }}\n{ROLES}    T.unit = "degC"'.replace('n.quantity = "speed"', "")
+    notes = read(tmp_path, network, text, mapping).notes
+    assert "speed_rpm: its unit is rad/s, as the file names it" in notes
+    assert "T: its unit is degC, as in the mapping file; the file itself names degF" in notes
+    with pytest.raises(InputError, match="column time_s has the unit 'min' in the file; give time = "):
+        read(tmp_path, network, text.replace("t,", "time_s,", 1), mapping.replace('time = { column = "t" }', ""))
+
+
+def test_a_letter_may_name_a_sensor(tmp_path: Path, network: ThermalNetwork) -> None:
+    with pytest.raises(InputError, match="column T_oil_F is not known; did you mean 'T_oil_degC'"):
+        read(tmp_path, network, plain().replace("T_oil_degC", "T_oil_F"))
+
+
 def test_a_comma_within_a_number_does_not_shift_a_row(tmp_path: Path, network: ThermalNetwork) -> None:
     """Separators behind every row make room for one field more."""
     text = plain().replace("\n", ",\n").replace("P_loss_W,\n", "P_loss_W\n")
@@ -185,6 +200,7 @@ def test_texts_for_a_missing_value(tmp_path: Path, network: ThermalNetwork) -> N
     ("1,500", 'give csv = { thousands = "," } in a mapping file, or decimal = "," if that is its decimal sign'),
     ("1,500.0", 'give csv = { thousands = "," }'),
     ("40,5", 'its decimal sign is a comma: give csv = { decimal = "," }'),
+    ("1500,000", 'its decimal sign is a comma: give csv = { decimal = "," }'),
     ("21 °C", "write the unit in the header or in a mapping file, not in the cells"),
 ])  # fmt: skip
 def test_advice_on_cells_that_are_no_numbers(tmp_path: Path, network: ThermalNetwork, cell: str, advice: str) -> None:
