@@ -6,8 +6,8 @@ max_gap_s = 1800
 session = "before the overhaul"        # of its test; between sessions the machine may differ a little
 rows = ["2017-08-01..2018-01-12"]     # seconds or ISO 8601; by default all
 missing = ["---", "Bad"]              # further texts for a missing value
-time = { column = "time_utc", unit = "iso8601" }
-csv = { separator = ";", decimal = ",", encoding = "cp1252", skip_lines = [2] }
+time = { column = "time_utc", unit = "iso8601" }   # column = ["Date", "Time"]: joined by a space
+csv = { separator = ";", decimal = ",", thousands = ".", encoding = "cp1252", skip_lines = [1] }
 constants = { T_ambient = 20.0 }      # inputs that were not recorded, in the unit of their standard column
 
 [columns.Gost_avg]
@@ -160,7 +160,7 @@ class Csv(Section):
 
     separator: Annotated[str, Field(min_length=1, max_length=1)] = ","
     decimal: Literal[".", ","] = "."
-    thousands: Literal["", ",", ".", "'", "\u2019", " ", "\u00a0", "\u202f"] = ""
+    thousands: Annotated[str, Field(max_length=1)] = ""
     encoding: str = UTF_8
     skip_lines: tuple[Annotated[int, Field(ge=1)], ...] = ()
 
@@ -178,6 +178,13 @@ class Csv(Section):
     def _usable(cls, value: str) -> str:
         if value.isalnum() or value in "\"'\r\n.-+#\0" or not value.isascii():
             raise ValueError(f"{value!r} cannot separate columns; use ',', ';', a tab or '|'")
+        return value
+
+    @field_validator("thousands")
+    @classmethod
+    def _groups(cls, value: str) -> str:
+        if value.isalnum() or value in ("+", "-", '"'):
+            raise ValueError(f"{value!r} cannot stand between groups of digits; '.', ',', an apostrophe or a space can")
         return value
 
     @model_validator(mode="after")

@@ -267,11 +267,7 @@ def clock_of(table: pd.DataFrame, units: Mapping[str, str]) -> Clock:
         is_time = name.lower() in ISO_NAMES or unit_of_name(name, "time", "time", "s") is not None
         if is_time and with_unit[name] in known:
             return Clock(column=name, unit=with_unit[name])
-    dated = [
-        name
-        for name in columns
-        if holds_dates(table[name]) and len(table) and table[name].iloc[0] != table[name].iloc[-1]
-    ]
+    dated = [name for name in columns if holds_dates(table[name]) and _may_be_time(table[name])]
     if len(dated) == 1:
         return Clock(column=dated[0], unit=ISO)
     advice = time_advice(table)
@@ -294,8 +290,14 @@ def holds_dates(values: pd.Series) -> bool:
         return True
     if pd.api.types.is_numeric_dtype(values.dtype):
         return False
-    first = values.dropna().astype(str).str.strip().head(20)
+    first = values.dropna().head(20).astype(str).str.strip()
     return bool(first.map(lambda text: bool(_ISO.fullmatch(text))).any())
+
+
+def _may_be_time(dates: pd.Series) -> bool:
+    """Return False for one date in all rows, and for days, whose time is in another column."""
+    first, last = str(dates.iloc[0]).strip(), str(dates.iloc[-1]).strip()
+    return first != last and not re.fullmatch(_DATE, first)
 
 
 def inside(seconds: Array, parts: Sequence[Part], clock: Clock, first: float) -> NDArray[np.bool_]:

@@ -169,6 +169,7 @@ MAPPINGS: list[tuple[str, tuple[str, ...]]] = [
     ('schema = 1\ntime = { column = "time_s", unit = "minutes" }', ("'minutes' is not one of s, ms, min",)),
     ('schema = 1\ntime = { column = "time_s", unit = "%d.%m.%Y" }', ("each needs a date as %d.%m.%Y",)),
     ('schema = 1\ntime = { column = "time_s", unit = "iso8601" }', ("time_s is '0.0' at row 1",)),
+    ('schema = 1\ncsv = { thousands = "e" }', ("mapping.toml: csv.thousands", "'e' cannot stand between")),
     ('schema = 1\ncsv = { thousands = "." }', ("mapping.toml: csv", "same sign")),
     ('schema = 1\ncsv = { decimal = "," }', ("T_oil_degC", "its decimal sign is a point")),
     ('schema = 1\ncsv = { separator = "x" }', ("csv.separator", "'x'")),

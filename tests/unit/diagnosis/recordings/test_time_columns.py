@@ -93,6 +93,11 @@ def test_date_and_time_of_day_in_two_columns(tmp_path: Path, network: ThermalNet
     recording = read(tmp_path, network, time, str(caught.value).partition("give ")[2].partition(" in a mapping")[0])
     assert recording.start == STAMPS[0].tz_localize("UTC")
     assert (recording.time == TIME).all()
+    over_days = STAMPS + pd.to_timedelta(99.0 * TIME, unit="s")
+    time = {"Date": over_days.strftime(day), "Time": over_days.strftime("%H:%M:%S")}
+    (tmp_path / "mapping.toml").unlink()
+    with pytest.raises(InputError, match=r'give time = \{ column = \["Date", "Time"\], unit = ".*" \}'):
+        read(tmp_path, network, time)
     with pytest.raises(InputError, match=r"column Day of \[time\] in its mapping file is missing; known are"):
         read(tmp_path, network, time, 'time = { column = ["Day", "Time"] }')
 
