@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Set
 from pathlib import Path
 
+from diagnosis.recordings.columns import quantities_of
+from diagnosis.recordings.header_units import named_with_unit, unit_of_name
 from diagnosis.recordings.machine import RecordedMachine
 from diagnosis.recordings.mapping import RecordingMapping, mapping_beside, mapping_of_definition
 from diagnosis.recordings.read import name_parts, read_recording
@@ -49,7 +51,7 @@ def read_cycle_or_recording(
         With all problems of the file; or if a recording has gaps, with the pieces between them.
     """
     needed = {STANDARD, *(given.column for given in network.inputs.values() if given.required)}
-    if mapping is None and not _is_recording(text, needed, mapping_of_definition(network.recording)):
+    if mapping is None and not _is_recording(text, needed, network):
         return *read_cycle_and_start(text, network.inputs), ()
     recording = read_recording(text, network, mapping=mapping, to_compare=False)
     if len(recording.segments) > 1:
@@ -66,11 +68,11 @@ def read_cycle_or_recording(
     return cycle, start, (*recording.notes, *_clock_notes(recording))
 
 
-def _is_recording(text: Path, needed: Set[str], usual: RecordingMapping) -> bool:
+def _is_recording(text: Path, needed: Set[str], network: RecordedMachine) -> bool:
     """Return True if a file must be read as a recording.
 
     So are parts, joined files and formats other than tables; files with a column that a mapping names; and files that
-    lack columns of a plain cycle, but have a mapping next to them or dates.
+    lack columns of a plain cycle, but have a mapping next to them, dates, or names with other units.
     """
     if not text.name.lower().endswith(KINDS) or len(split_path(text)[0]) > 1:
         return True
@@ -82,12 +84,15 @@ def _is_recording(text: Path, needed: Set[str], usual: RecordingMapping) -> bool
         return is_meant or not names.issuperset(needed)
     if not names:  # the reader of plain cycles reports why
         return False
+    lacking = [quantity for quantity in quantities_of(network).values() if quantity.column not in names]
+    if named_with_unit(list(names), lacking) or any(unit_of_name(name, "time", "time", "s") for name in names - needed):
+        return True
     has_dates = STANDARD not in names and not names.isdisjoint(ISO_NAMES)
-    return has_dates or not names.isdisjoint(_named(usual))
+    return has_dates or not names.isdisjoint(_named(mapping_of_definition(network.recording)))
 
 
 def _named(mapping: RecordingMapping) -> set[str]:
-    return {*mapping.columns, *([mapping.time.column] if mapping.time is not None else [])}
+    return {*mapping.columns, *(mapping.time.columns if mapping.time is not None else ())}
 
 
 def _clock_notes(recording: Recording) -> list[str]:

@@ -51,6 +51,7 @@ def rows_text(rows: NDArray[np.int64]) -> str:
     >>> rows_text(np.array([3, 4, 5, 9]))
     'rows 3-5, 9'
     """
+    rows = np.sort(rows)
     breaks = np.flatnonzero(np.diff(rows) > 1)
     firsts, lasts = rows[np.concatenate([[0], breaks + 1])], rows[np.concatenate([breaks, [len(rows) - 1]])]
     parts = [f"{a}" if a == b else f"{a}-{b}" for a, b in zip(firsts[:4], lasts[:4], strict=True)]

@@ -10,20 +10,26 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from diagnosis.recordings.cleaning import rows_text
+from diagnosis.recordings.header_units import named_with_unit
 from diagnosis.recordings.machine import RecordedMachine
-from diagnosis.recordings.mapping import AUXILIARY, IGNORE, Column, RecordingMapping, looks_like_kelvin
+from diagnosis.recordings.mapping import AUXILIARY, IGNORE, Column, Csv, RecordingMapping, looks_like_kelvin
 from models.base.errors import Problems, did_you_mean
 from models.base.types import Array
+from models.files.numbers import numbers_of
+from models.files.table_file import copies_of
 from models.quantities.column_names import meant
 from models.quantities.quantities import TOTAL_LOSS, Quantity, node_of_channel, quantity_of
 from models.quantities.units import units_in_files
 
 NEAR = 0.85  # likeness of names that makes one a slip of the other
-SWAPPED = str.maketrans(",.", ".,")
 MOST_NAMED = 12  # unused columns in a note
 FEW = 0.01  # share of rows that may be impossible
-# Both signs, or groups of three digits with gaps between them: 1,500.0  1.500,0  1'500  1 500
-THOUSANDS = re.compile(r"[+-]?\d{1,3}((,\d{3})+\.\d+|(\.\d{3})+,\d+|(['\u2019\s]\d{3})+([.,]\d+)?)")
+MOST_TEXTS = 10  # that may mean a missing value, in a message
+# Groups of three digits, and decimals behind another sign: 1,500.0  1.500,0  1'500  1 500
+THOUSANDS = re.compile(
+    r"[+-]?\d{1,3}(?:(?P<comma>,)\d{3}(,\d{3})*(\.\d*)?|(?P<point>\.)\d{3}(\.\d{3})*(,\d*)?"
+    r"|(?P<other>['\u2019\s])\d{3}((?P=other)\d{3})*([.,]\d*)?)"
+)
 CODES, CODED = 3, 0.5  # so many different impossible values, in up to this share of rows, are codes of a logger
 
 
@@ -61,7 +67,39 @@ def match_columns(
     """
     roles = _mapped_columns(present, mapping, network, problems)
     taken = {column.channel for column in mapping.columns.values()}
-    lacking = []
+    lacking = _standard_columns(present, mapping, network, roles, problems)
+    free = [name for name in present if name not in roles and name not in mapping.columns and name != time_column]
+    with_unit = named_with_unit(free, lacking)
+    if with_unit:
+        shown = ", ".join(f"{name} ({column.quantity} in {column.unit})" for name, column in with_unit.items())
+        notes.append(f"taken from the names of columns: {shown}")
+        roles |= with_unit
+    found = (
+        {column.quantity for column in mapping.columns.values()}
+        | {column.quantity for column in roles.values()}
+        | set(mapping.constants)
+    )
+    for signal, given in network.inputs.items():
+        if given.required and signal not in found and not copies_of(given.column, present):
+            shown = ", ".join(other[:40] for other in sorted(present)[:20])
+            problems.add(f"column {given.column} is missing; it has: {shown}")
+    rest = [n for n in present if n not in roles and n not in mapping.columns and n != time_column]
+    replaced = [known.column for quantity, known in quantities_of(network).items()
+              if quantity in taken and known.column in rest]  # fmt: skip
+    if replaced:
+        notes.append(f"not used, because the mapping takes other columns for them: {', '.join(replaced)}")
+    still_lacking = [known for known in lacking if known.name not in found]
+    _report_unused([n for n in rest if n not in replaced], still_lacking, problems, notes)
+    return roles
+
+
+def _standard_columns(
+    present: Sequence[str], mapping: RecordingMapping, network: RecordedMachine, roles: dict[str, Column],
+    problems: Problems,
+) -> list[Quantity]:  # fmt: skip
+    """Add the columns of standard names that the mapping does not name to `roles`; return quantities without one."""
+    taken = {column.channel for column in mapping.columns.values()}
+    lacking: list[Quantity] = []
     for quantity, known in quantities_of(network).items():
         name = known.column
         if name in mapping.columns or quantity in taken:
@@ -75,23 +113,14 @@ def match_columns(
         elif name in present:
             roles[name] = Column(quantity=quantity)
         else:
-            lacking.append(name)
-    found = (
-        {column.quantity for column in mapping.columns.values()}
-        | {column.quantity for column in roles.values()}
-        | set(mapping.constants)
-    )
-    for signal, given in network.inputs.items():
-        if given.required and signal not in found:
-            shown = ", ".join(other[:40] for other in sorted(present)[:20])
-            problems.add(f"column {given.column} is missing; it has: {shown}")
-    rest = [n for n in present if n not in roles and n not in mapping.columns and n != time_column]
-    replaced = [known.column for quantity, known in quantities_of(network).items()
-              if quantity in taken and known.column in rest]  # fmt: skip
-    if replaced:
-        notes.append(f"not used, because the mapping takes other columns for them: {', '.join(replaced)}")
-    _report_unused([n for n in rest if n not in replaced], lacking, problems, notes)
-    return roles
+            lacking.append(known)
+            copies = copies_of(name, present)
+            if copies:
+                problems.add(
+                    f"column {name} is there twice; remove one, or name the right one in a mapping file as "
+                    + " or ".join(repr(copy) for copy in copies)
+                )
+    return lacking
 
 
 def _mapped_columns(
@@ -116,14 +145,16 @@ def _mapped_columns(
     return roles
 
 
-def _report_unused(rest: Sequence[str], lacking: Sequence[str], problems: Problems, notes: list[str]) -> None:
+def _report_unused(rest: Sequence[str], lacking: Sequence[Quantity], problems: Problems, notes: list[str]) -> None:
     unused = []
+    by_column = {known.column: known for known in lacking}
     for name in rest:
-        slip = meant(name, lacking, near=NEAR, with_kind=True)
+        slip = meant(name, by_column, near=NEAR, with_kind=True)
         if slip:
+            known = by_column[slip]
             problems.add(
-                f"column {name[:80]} is not known; did you mean {slip!r}? Rename it, or name it in a mapping file "
-                f'(quantity = "{AUXILIARY}" if it is something else)'
+                f"column {name[:80]} is not known; did you mean {slip!r}? Rename it if it is in {known.unit}, or name "
+                f'it in a mapping file: quantity = "{known.name}" and its unit, or "{AUXILIARY}" for something else'
             )
         else:
             unused.append(name[:80])
@@ -132,38 +163,45 @@ def _report_unused(rest: Sequence[str], lacking: Sequence[str], problems: Proble
         notes.append(f"not used, being no input and no node of this gearbox: {', '.join(unused[:MOST_NAMED])}{more}")
 
 
-def _numbers(cells: pd.Series, name: str, decimal: str, problems: Problems) -> Array | None:
+def _numbers(cells: pd.Series, name: str, csv: Csv, problems: Problems) -> Array | None:
     """Return a column as numbers, shape (rows,), in the unit of the file; None and a problem if a cell is no number."""
     rows = np.asarray(cells.index) + 1
     if pd.api.types.is_bool_dtype(cells.dtype) or pd.api.types.is_datetime64_any_dtype(cells.dtype):
         problems.add(f"{name} holds {cells.dtype} values (rows {rows[0]}-{rows[-1]}), not numbers")
         return None
-    if pd.api.types.is_numeric_dtype(cells.dtype):
-        return np.array(cells.to_numpy(dtype=np.float64, na_value=np.nan))
-    texts = cells.astype(object)
-    if decimal == ",":  # a single cell that is no number leaves the others as texts with commas
-        texts = texts.map(lambda cell: cell.translate(SWAPPED) if isinstance(cell, str) else cell)
-    parsed = pd.to_numeric(texts, errors="coerce")
-    wrong = np.flatnonzero((parsed.isna() & cells.notna()).to_numpy(dtype=bool))
+    values = numbers_of(cells, decimal=csv.decimal, thousands=csv.thousands)
+    wrong = np.flatnonzero(np.isnan(values) & cells.notna().to_numpy(dtype=bool))
     if not len(wrong):
-        return np.array(parsed.to_numpy(dtype=np.float64, na_value=np.nan))
-    cell = str(cells.iloc[int(wrong[0])])[:40]
-    advice = "if it means a missing value, name it under 'missing' in a mapping file"
-    whole, comma, rest = cell.strip().partition(",")
-    if decimal == "." and comma and whole.lstrip("+-").isdigit() and rest.isdigit():
-        advice = (
-            'with decimal commas, columns are separated by semicolons: csv = { separator = ";", decimal = "," } in a '
-            "mapping file"
-        )
-    if decimal == "," and re.fullmatch(r"[+-]?\d+\.\d+", cell.strip()):
-        advice = 'its decimal sign is a point: leave out decimal = ","'
-    if THOUSANDS.fullmatch(cell.strip()):
-        advice = "write numbers without thousands separators"
+        return values
+    texts = [str(cell).strip()[:40] for cell in cells.iloc[wrong].unique()[:MOST_TEXTS]]
+    others = cells[np.isfinite(values)].astype(str)
+    is_mixed = bool(others.str.contains(csv.decimal, regex=False).any())
     problems.add(
-        f"{name} holds {cell!r} at row {rows[wrong[0]]}, which is no number ({len(wrong)} such cells, "
-        f"{rows_text(rows[wrong])}); {advice}"
+        f"{name} holds {str(cells.iloc[int(wrong[0])])[:40]!r} at row {rows[wrong[0]]}, which is no number "
+        f"({len(wrong)} such cells, {rows_text(rows[wrong])}); {_advice(texts[0], csv, texts, is_mixed=is_mixed)}"
     )
     return None
+
+
+def _advice(text: str, csv: Csv, texts: Sequence[str], *, is_mixed: bool) -> str:
+    """Return what to do about cells that are no numbers, among others with the stated decimal sign or not."""
+    grouped = THOUSANDS.fullmatch(text)
+    if grouped:
+        sign = next(filter(None, grouped.group("comma", "point", "other")))
+        may_be = sign in ",." and csv.decimal not in text and not is_mixed
+        either = f', or decimal = "{sign}" if that is its decimal sign' if may_be else ""
+        stated = f'csv = {{ thousands = "{sign}" }} in a mapping file{either}'
+        return f"write numbers without thousands separators, or give {stated}"
+    if re.fullmatch(r"[+-]?\d+[.,]\d+", text) and csv.decimal not in text:
+        if is_mixed:
+            return "decimal commas and decimal points are mixed; write all numbers alike"
+        if csv.decimal == ".":
+            return 'its decimal sign is a comma: give csv = { decimal = "," } in a mapping file'
+        return 'its decimal sign is a point: leave out decimal = ","'
+    if re.match(r"[+-]?\d+([.,]\d+)?\s*[^\d\s.,:/-]{1,5}$", text):
+        return "write the unit in the header or in a mapping file, not in the cells"
+    named = ", ".join(f'"{text}"' for text in texts if not re.search(r"\d", text)) or f'"{text}"'
+    return f"if it means a missing value, give missing = [{named}] in a mapping file"
 
 
 def quantity_values(
@@ -172,7 +210,7 @@ def quantity_values(
     column: Column,
     quantity: Quantity,
     unit_of_file: str | None,
-    decimal: str,
+    csv: Csv,
     outside: NDArray[np.bool_],
     problems: Problems,
     notes: list[str],
@@ -189,8 +227,8 @@ def quantity_values(
         What the mapping states of it
     unit_of_file : str or None
         Unit that the file itself names
-    decimal : str
-        Sign in numbers that are texts
+    csv : Csv
+        How texts are written
     outside : array of bool, shape (rows,)
         Rows that the mapping leaves out
 
@@ -199,7 +237,7 @@ def quantity_values(
     Array or None
         None, and a problem, if the column cannot be used
     """
-    values = _numbers(cells, name, decimal, problems)
+    values = _numbers(cells, name, csv, problems)
     rows = np.asarray(cells.index) + 1
     if values is None or not _keep_valid(values, name, column, rows, problems, notes):
         return None
@@ -212,6 +250,11 @@ def quantity_values(
         )
         return None
     factor, offset = units.get(unit, (1.0, 0.0)) if unit else (1.0, 0.0)
+    named = units.get(unit_of_file or "", (factor, offset))
+    if column.unit is not None and named != (factor, offset):
+        notes.append(f"{name}: its unit is {unit}, as in the mapping file; the file itself names {unit_of_file}")
+    elif column.unit is None and (factor, offset) != (1.0, 0.0):
+        notes.append(f"{name}: its unit is {unit}, as the file names it")
     return _possible(values * (column.scale * factor) + offset, quantity, name, rows, problems, notes)
 
 
@@ -253,7 +296,7 @@ def _possible(
     if len(infinite):
         problems.add(
             f"{name} is {values[infinite[0]]} in {rows_text(rows[infinite])}; leave a cell empty where the value is "
-            "unknown"
+            f'unknown, or give missing = ["inf", "-inf"] in a mapping file'
         )
         return values
     good = values[np.isfinite(values)]

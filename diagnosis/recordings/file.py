@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial, reduce
 from itertools import chain
 from pathlib import Path
 
@@ -12,13 +13,22 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from diagnosis.recordings.mapping import TIME_UNITS, Column, RecordingMapping, mapping_beside, read_mapping, reduced_to
+from diagnosis.recordings.header_units import units_in_brackets
+from diagnosis.recordings.mapping import (
+    TIME_UNITS,
+    Column,
+    RecordingMapping,
+    Time,
+    mapping_beside,
+    read_mapping,
+    reduced_to,
+)
 from diagnosis.recordings.mdf import read_mdf
-from diagnosis.recordings.time_axis import ISO, RECORDING_KINDS, Clock, Part, clock_of, inside, part_of
+from diagnosis.recordings.time_axis import ISO, RECORDING_KINDS, Clock, Part, clock_of, holds_dates, inside, part_of
 from models.base.errors import InputError, Problems, did_you_mean
 from models.base.types import Array
 from models.files.paths import check_file, kind_of
-from models.files.table_file import read_chunks, together, without
+from models.files.table_file import column_units, read_chunks, together, without
 
 
 @dataclass(kw_only=True, eq=False)
@@ -35,7 +45,7 @@ class RecordingFile:
     start : float or None
         Start of an MDF file since 1970, [s]
     units : mapping of column to str
-        Units that the file itself names
+        Units that the file itself names: as in MDF, in brackets in the header of a text, or in a row below it
     """
 
     path: Path
@@ -121,13 +131,17 @@ def open_recording(path: Path, mapping: Path | None, usual: RecordingMapping) ->
         table, units, start = read_mdf(path, base=base)
         chunks = iter([without(found.missing, table)])
     else:
+        units = {} if kind == ".parquet" else column_units(path, found.text_form)
         chunks = read_chunks(path, found.text_form)
     head = next(chunks)
+    units = units_in_brackets(map(str, head.columns)) | units
     if own is None:
         found = reduced_to(found, [str(column) for column in head.columns])
     clock = None
+    if found.time is not None:
+        chunks, head = map(partial(_with_one_time, time=found.time), chunks), _with_one_time(head, found.time)
     try:
-        clock = _clock(head, found)
+        clock = _clock(head, found, units)
     except InputError as error:
         problems.add(str(error))
     file = RecordingFile(
@@ -138,21 +152,32 @@ def open_recording(path: Path, mapping: Path | None, usual: RecordingMapping) ->
     return file
 
 
-def _clock(table: pd.DataFrame, mapping: RecordingMapping) -> Clock:
-    time = mapping.time
+def _with_one_time(table: pd.DataFrame, time: Time) -> pd.DataFrame:
+    """Join columns with date and time of day into one, in the place of the first."""
+    if len(time.columns) < 2 or not set(time.columns) <= {*table.columns}:
+        return table
+    texts = [table[name].astype(str).str.strip() for name in time.columns]
+    joined = reduce(lambda first, then: first + " " + then, texts).where(table[list(time.columns)].notna().all(axis=1))
+    return table.drop(columns=list(time.columns)).assign(**{time.name: joined})
+
+
+def _clock(table: pd.DataFrame, mapping: RecordingMapping, units: Mapping[str, str]) -> Clock:
+    time, csv = mapping.time, mapping.csv
     if time is None:
-        return clock_of(table)
-    if time.column not in table.columns:
-        known = did_you_mean(time.column, [str(column) for column in table.columns])
-        raise InputError(f"column {time.column} of [time] in its mapping file is missing{known}")
-    is_stamp = pd.api.types.is_datetime64_any_dtype(table[time.column].dtype)
-    unit = ISO if is_stamp else time.unit
+        return replace(clock_of(table, units), decimal=csv.decimal, thousands=csv.thousands)
+    if time.name not in table.columns:
+        columns = [str(column) for column in table.columns]
+        missing = next(name for name in time.columns if name not in columns)
+        raise InputError(f"column {missing} of [time] in its mapping file is missing{did_you_mean(missing, columns)}")
+    named = units.get(time.name, "s")
+    usual = ISO if holds_dates(table[time.name]) else named if named in TIME_UNITS else "s"
+    unit = ISO if pd.api.types.is_datetime64_any_dtype(table[time.name].dtype) else time.unit or usual
     if time.zone is not None and unit in TIME_UNITS and unit != ISO:
         raise InputError(
-            f"column {time.column} counts {unit}, which have no time zone: give the form of its dates as unit, or "
+            f"column {time.name} counts {unit}, which have no time zone: give the form of its dates as unit, or "
             "leave zone out of its mapping file"
         )
-    return Clock(column=time.column, unit=unit, zone=time.zone, decimal=mapping.csv.decimal)
+    return Clock(column=time.name, unit=unit, zone=time.zone, decimal=csv.decimal, thousands=csv.thousands)
 
 
 def set_to_one_clock(files: Sequence[RecordingFile]) -> None:

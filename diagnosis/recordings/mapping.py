@@ -6,8 +6,8 @@ max_gap_s = 1800
 session = "before the overhaul"        # of its test; between sessions the machine may differ a little
 rows = ["2017-08-01..2018-01-12"]     # seconds or ISO 8601; by default all
 missing = ["---", "Bad"]              # further texts for a missing value
-time = { column = "time_utc", unit = "iso8601" }
-csv = { separator = ";", decimal = ",", encoding = "cp1252", skip_lines = [2] }
+time = { column = "time_utc", unit = "iso8601" }   # column = ["Date", "Time"]: joined by a space
+csv = { separator = ";", decimal = ",", thousands = ".", encoding = "cp1252", skip_lines = [1] }
 constants = { T_ambient = 20.0 }      # inputs that were not recorded, in the unit of their standard column
 
 [columns.Gost_avg]
@@ -50,7 +50,8 @@ SCHEMA = 1
 FOLDER_FILE = "mapping.toml"
 DEFINITION_KEYS = ("stage", "part")  # of a gearbox definition, which is TOML as well
 SOME_DATE = datetime(2017, 9, 21, 8, 30, 15, tzinfo=UTC)  # a form of dates gives it back
-TIME_UNITS = ("s", "ms", "min", "h", "d", "iso8601")
+CLOCK_TIME = "hh:mm:ss"  # unit of times since the start, or of day, as 13:05:00
+TIME_UNITS = ("s", "ms", "min", "h", "d", "iso8601", CLOCK_TIME)
 AUXILIARY, IGNORE = "auxiliary", "ignore"  # roles of columns that are no quantity
 KELVIN = (200.0, 600.0)  # no gearbox has such temperatures in degC all the time
 
@@ -112,12 +113,23 @@ class Column(Section):
 class Time(Section):
     """``[time]``: the column with the time, and its unit, or the form of its dates as ``%d.%m.%Y %H:%M:%S``.
 
+    Without ``unit`` it is that of the header, else s. Two columns with date and time of day are joined by a space.
     ``zone`` is the time zone of dates that state none, as ``Europe/Berlin``; without it they are taken as UTC.
     """
 
-    column: str
-    unit: str = "s"
+    column: str | tuple[str, ...]
+    unit: str | None = None
     zone: str | None = None
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Columns of the file that hold it."""
+        return (self.column,) if isinstance(self.column, str) else self.column
+
+    @property
+    def name(self) -> str:
+        """Name of the column, of several in one."""
+        return " ".join(self.columns)
 
     @field_validator("zone")
     @classmethod
@@ -130,8 +142,8 @@ class Time(Section):
 
     @field_validator("unit")
     @classmethod
-    def _known(cls, value: str) -> str:
-        if value in TIME_UNITS:
+    def _known(cls, value: str | None) -> str | None:
+        if value is None or value in TIME_UNITS:
             return value
         try:
             read = pd.to_datetime(SOME_DATE.strftime(value), format=value)
@@ -148,6 +160,7 @@ class Csv(Section):
 
     separator: Annotated[str, Field(min_length=1, max_length=1)] = ","
     decimal: Literal[".", ","] = "."
+    thousands: Annotated[str, Field(max_length=1)] = ""
     encoding: str = UTF_8
     skip_lines: tuple[Annotated[int, Field(ge=1)], ...] = ()
 
@@ -167,10 +180,17 @@ class Csv(Section):
             raise ValueError(f"{value!r} cannot separate columns; use ',', ';', a tab or '|'")
         return value
 
+    @field_validator("thousands")
+    @classmethod
+    def _groups(cls, value: str) -> str:
+        if value.isalnum() or value in ("+", "-", '"'):
+            raise ValueError(f"{value!r} cannot stand between groups of digits; '.', ',', an apostrophe or a space can")
+        return value
+
     @model_validator(mode="after")
     def _signs_differ(self) -> Self:
-        if self.separator == self.decimal:
-            raise ValueError("separator and decimal are the same sign; with decimal ',' columns are separated by ';'")
+        if self.thousands == self.decimal:
+            raise ValueError("thousands and decimal are the same sign; state both, as decimal = ',', thousands = '.'")
         return self
 
 
@@ -219,8 +239,9 @@ class RecordingMapping(Section):
         """Form of its CSV files."""
         csv = self.csv
         return TextForm(
-            separator=csv.separator, decimal=csv.decimal, missing=self.missing, encoding=csv.encoding,
-            texts=(self.time.column,) if self.time is not None and "%" in self.time.unit else (),
+            separator=csv.separator, decimal=csv.decimal, thousands=csv.thousands, missing=self.missing,
+            encoding=csv.encoding,
+            texts=self.time.columns if self.time is not None and "%" in (self.time.unit or "") else (),
             skip_lines=csv.skip_lines, by_mapping=True,
         )  # fmt: skip
 
@@ -297,5 +318,5 @@ def reduced_to(mapping: RecordingMapping, columns: Iterable[str]) -> RecordingMa
     """Leave out columns that a file does not have: a definition names what such files may hold."""
     present = set(columns)
     kept = {name: column for name, column in mapping.columns.items() if name in present}
-    time = mapping.time if mapping.time is not None and mapping.time.column in present else None
+    time = mapping.time if mapping.time is not None and present.issuperset(mapping.time.columns) else None
     return mapping.model_copy(update={"columns": kept, "time": time})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -25,7 +26,8 @@ def read_mdf(path: Path, *, base: str) -> tuple[pd.DataFrame, dict[str, str], fl
     Returns
     -------
     table : DataFrame
-        ``time_s`` since the start of the measurement, and the channels; NaN where a slower channel has no sample
+        ``time_s`` since the start of the measurement, and the channels; NaN where a slower channel has no sample. A
+        name that several groups have is followed by the group, as ``n (group 2)``
     units : dict of channel to str
         As the file names them
     start : float
@@ -34,13 +36,13 @@ def read_mdf(path: Path, *, base: str) -> tuple[pd.DataFrame, dict[str, str], fl
     Raises
     ------
     InputError
-        If asammdf is not installed, or the file cannot be read, lacks `base`, or names a channel twice.
+        If asammdf is not installed, or the file cannot be read or lacks `base`.
     """
     if find_spec("asammdf") is None:
         raise InputError(f"{path}: reading MDF4 needs asammdf; python -m pip install asammdf")
     from asammdf import MDF
 
-    units: dict[str, str] = {}
+    units: list[dict[str, str]] = []
     groups: list[pd.DataFrame] = []
     try:
         with MDF(path) as file:
@@ -52,20 +54,36 @@ def read_mdf(path: Path, *, base: str) -> tuple[pd.DataFrame, dict[str, str], fl
                 # Interpolated samples would count as measured; without it, invalid and missing samples are NaN.
                 frame = file.to_dataframe(channels, time_from_zero=False, use_interpolation=False, numeric_1D_only=True)
                 groups.append(frame)
-                for _, group, channel in channels:
-                    name = file.groups[group].channels[channel].name
-                    units[name] = file.get_channel_unit(group=group, index=channel)
+                units.append(
+                    {
+                        file.groups[group].channels[channel].name: file.get_channel_unit(group=group, index=channel)
+                        for _, group, channel in channels
+                    }
+                )
     except Exception as error:
         text = str(error).strip().splitlines()
         raise InputError(f"{path}: cannot be read as mf4: {text[0] if text else type(error).__name__}") from error
-    return _on_rows_of(base, groups, path), {name: unit for name, unit in units.items() if unit}, start
+    groups, units = _named_apart(groups, units)
+    return _on_rows_of(base, groups, path), {n: unit for own in units for n, unit in own.items() if unit}, start
+
+
+def _named_apart(
+    groups: list[pd.DataFrame], units: list[dict[str, str]]
+) -> tuple[list[pd.DataFrame], list[dict[str, str]]]:
+    """Add its group to the name of a channel that several groups have."""
+    count = Counter(str(name) for frame in groups for name in frame.columns)
+
+    def apart(name: str, group: int) -> str:
+        return name if count[name] < 2 else f"{name} (group {group})"
+
+    return (
+        [f.rename(columns={n: apart(n, group) for n in f.columns}) for group, f in enumerate(groups, start=1)],
+        [{apart(n, group): unit for n, unit in own.items()} for group, own in enumerate(units, start=1)],
+    )
 
 
 def _on_rows_of(base: str, groups: list[pd.DataFrame], path: Path) -> pd.DataFrame:
     names = [str(name) for frame in groups for name in frame.columns]
-    repeated = sorted({name for name in names if names.count(name) > 1})
-    if repeated:
-        raise InputError("\n".join(f"{path}: channel {name[:80]} is there twice; keep one" for name in repeated[:10]))
     if base not in names:
         shown = ", ".join(sorted(names)[:20]) or "no numeric channel"
         raise InputError(f"{path}: channel {base} is missing; it has: {shown}")

@@ -21,6 +21,7 @@ from diagnosis.recordings.cleaning import (
     time_pieces,
 )
 from diagnosis.recordings.columns import quantities_of
+from diagnosis.recordings.doubts import doubts
 from diagnosis.recordings.file import open_recording, set_to_one_clock, sha256_of, stem_of
 from diagnosis.recordings.machine import MachineDefinition, RecordedMachine
 from diagnosis.recordings.mapping import mapping_of_definition
@@ -33,11 +34,7 @@ from models.quantities.quantities import is_total_loss, node_of_channel
 FEWEST_ROWS = 3
 SHORTEST_GAP_S, GAP_STEPS = 60.0, 3.0  # a gap is longer than both, unless stated
 SLOW_GAPS = 10.0  # ambient temperature and air speed change slowly: holes so many times longer are bridged
-HOT_AIR = 50.0  # degC on average, from which ambient air is more likely in another unit
 LEAST_USABLE = 0.1  # share of the rows
-USUAL_SHARE = 0.99  # of the rows of an input,
-FAR_TIMES = 10.0  # which others exceed so many times that they may be codes of a logger
-CODES, CODE_TIMES = (999.0, 9999.0, 99999.0, 32767.0, 32768.0, 65535.0), 1.5  # of loggers; beyond what is usual
 ByRole: TypeAlias = tuple[tuple[Recording, ...], tuple[Recording, ...], tuple[Recording, ...]]
 
 
@@ -182,8 +179,7 @@ def read_recording(
     resolutions = {quantity: resolution_of(found.values[quantity]) for quantity in found.measured(network)}
     _remove_spikes(found, network, gap)
     _note_stuck(found, network)
-    _note_hot_air(found)
-    _note_far_rows(found, network)
+    found.notes[:0] = doubts(found, network)  # the first notes are printed
     found = _with_known_inputs(found, network, gap)
     segments = _segments(found, gap)
     seconds, clock = found.seconds, files[0].clock
@@ -274,33 +270,6 @@ def _remove_spikes(found: RecordedRows, network: RecordedMachine, gap: float) ->
             found.values[quantity] = np.where(wrong, np.nan, values)
             name, where = found.names.get(quantity, quantity), rows_text(found.rows[wrong])
             found.notes.append(f"{name}: {int(wrong.sum())} outliers and dropouts in {where} taken as missing")
-
-
-def _note_hot_air(found: RecordedRows) -> None:
-    """A note on an ambient temperature that is more likely in another unit."""
-    ambient = found.values.get("T_ambient", np.zeros(0))
-    ambient = ambient[np.isfinite(ambient)]
-    if len(ambient) and ambient.mean() > HOT_AIR:
-        name = found.names.get("T_ambient", "T_ambient")
-        found.notes.append(
-            f"{name}: {ambient.mean():.0f} degC on average is hot for ambient air; if the file has another unit, "
-            'name it in a mapping (unit = "degF")'
-        )
-
-
-def _note_far_rows(found: RecordedRows, network: RecordedMachine) -> None:
-    """A note on few rows of an input far beyond all others, which may be codes of a logger."""
-    for name, given in network.inputs.items():
-        size = np.abs(found.values[name])
-        usual = float(np.nanquantile(size, USUAL_SHARE, method="lower")) if np.isfinite(size).any() else np.nan
-        far = (size > FAR_TIMES * usual) | (np.isin(size, CODES) & (size > CODE_TIMES * usual))
-        if usual > 0.0 and far.any():
-            first = int(np.flatnonzero(far)[0])
-            found.notes.append(
-                f"{found.names.get(name, name)}: {found.values[name][first]:g} {given.quantity.unit} and the like in "
-                f"{rows_text(found.rows[far])}; {USUAL_SHARE:.0%} of the rows are within {usual:.3g}; a code of the "
-                "logger is named under 'missing' in a mapping, or excluded by 'valid'"
-            )
 
 
 def _note_stuck(found: RecordedRows, network: RecordedMachine) -> None:

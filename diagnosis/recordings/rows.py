@@ -8,15 +8,19 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
+from diagnosis.recordings.cleaning import rows_text
 from diagnosis.recordings.columns import is_measurable, match_columns, quantities_of, quantity_values
 from diagnosis.recordings.file import RecordingFile
 from diagnosis.recordings.machine import RecordedMachine
 from diagnosis.recordings.mapping import AUXILIARY, IGNORE, Column
-from diagnosis.recordings.time_axis import Clock, Part, check_time, moment_text
+from diagnosis.recordings.time_axis import ISO_NAMES, STANDARD, Clock, Part, check_time, moment_text
 from models.base.errors import InputError
 from models.base.types import Array
+
+MOST_FOOTERS = 20  # rows
 
 
 @dataclass(kw_only=True, eq=False)
@@ -67,7 +71,12 @@ def read_rows(
     """
     clock, problems, notes = file.clock, file.problems, list[str]()
     table = file.table(parts, first_s)
+    table = _without_footer(table, file, notes)
     seconds = file.seconds(table)
+    if len(table) > 1 and (np.diff(seconds) < 0.0).all():
+        notes.append("its newest row comes first: the rows are turned round, and keep their numbers of the file")
+        table = table[::-1]
+        seconds = file.seconds(table)
     found = RecordedRows(
         path=file.path, files=[file.path], clock=clock, seconds=seconds, rows=np.asarray(table.index) + 1, notes=notes
     )
@@ -76,6 +85,8 @@ def read_rows(
         return found
     if clock is not None:
         check_time(table[clock.column], seconds, clock, problems)
+        if file.mapping.time is None and clock.column not in (STANDARD, *ISO_NAMES):
+            notes.append(f"{clock.column} is taken as the time{'' if clock.is_date else f' in {clock.unit}'}")
         if clock.lacks_zone(table[clock.column]):
             notes.append(
                 f"{clock.column} has no time zone: it is taken as UTC, and dates marked UTC are the file's own"
@@ -88,7 +99,7 @@ def read_rows(
             found.names[role.channel], found.roles[role.channel] = name, role
             outside = ~file.in_rows_of(name, role, seconds, first_s)
             quantity = known[role.quantity]
-            values = quantity_values(table[name], name, role, quantity, file.units.get(name), file.mapping.csv.decimal,
+            values = quantity_values(table[name], name, role, quantity, file.units.get(name), file.mapping.csv,
                                      outside, problems, notes)  # fmt: skip
             if values is not None:
                 found.values[role.channel] = values
@@ -100,6 +111,23 @@ def read_rows(
         )
     problems.stop_if_any()
     return found
+
+
+def _without_footer(table: pd.DataFrame, file: RecordingFile, notes: list[str]) -> pd.DataFrame:
+    """Leave out rows at the end that hold a text in place of the time, and nothing else."""
+    end = table.iloc[1:][-MOST_FOOTERS:]
+    if file.clock is None or not len(end):
+        return table
+    times = end[file.clock.column]
+    is_text = np.isnan(file.seconds(end)) & times.map(lambda cell: isinstance(cell, str)).to_numpy(dtype=bool)
+    is_text &= end.drop(columns=file.clock.column).isna().all(axis=1).to_numpy(dtype=bool)
+    footers = int(np.logical_and.accumulate(is_text[::-1]).sum())
+    if footers:
+        first = str(times.iloc[len(end) - footers])[:40]
+        notes.append(
+            f"{rows_text(np.asarray(end.index[-footers:]) + 1)} at the end with a text only ({first!r}) left out"
+        )
+    return table.iloc[: len(table) - footers]
 
 
 def joined(tables: Sequence[RecordedRows]) -> RecordedRows:
@@ -121,10 +149,10 @@ def joined(tables: Sequence[RecordedRows]) -> RecordedRows:
                 "follow each other in time: remove the rows that are there twice, or name separate recordings"
             )
 
-    before_rows = np.cumsum([0, *(int(table.rows[-1]) for table in tables[:-1])])
+    before_rows = np.cumsum([0, *(int(table.rows.max()) for table in tables[:-1])])
     numbered = [table.rows + start for table, start in zip(tables, before_rows, strict=True)]
     ranges = ", ".join(
-        f"{table.path.name} (rows {rows[0]}-{rows[-1]})" for table, rows in zip(tables, numbered, strict=True)
+        f"{table.path.name} (rows {rows.min()}-{rows.max()})" for table, rows in zip(tables, numbered, strict=True)
     )
     notes = [f"{table.path.name}: {note}" for table in tables for note in table.notes]
     return RecordedRows(

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
 from math import floor
 from pathlib import Path
@@ -15,8 +15,12 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from diagnosis.recordings.date_forms import forms_of, time_advice
+from diagnosis.recordings.header_units import unit_of_name
+from diagnosis.recordings.mapping import CLOCK_TIME
 from models.base.errors import InputError, Problems
 from models.base.types import Array
+from models.files.numbers import numbers_of
 from models.files.paths import KINDS, is_file
 from models.quantities.units import units_in_files
 
@@ -32,6 +36,8 @@ SHORTEST_STEP = 1e-3  # s; no temperature is recorded faster, so smaller steps a
 COARSE = 0.2  # of the steps: equal times are no slips any more
 LONGEST_STEP = 1800.0  # s; a gearbox warms within an hour or two
 LONGEST_TIME = 1e11  # s since 1970 or since the start: 3000 years
+FEW = 0.01  # share of rows without time that may be lines outside the table
+EXCEL_DAYS = (20000.0, 80000.0)  # numbers of the days from 1954 to 2119 in Excel
 LAST_YEAR = 2200  # later is the date of a clock that was not set
 LONGEST_DATES = 3e9  # s from the first to the last: a century
 
@@ -143,14 +149,15 @@ class Clock:
         Of numbers; ``iso8601`` for texts and for the time stamps of a Parquet file, or the form of other dates
     zone : str or None
         Time zone of dates that state none; None: UTC
-    decimal : str
-        Sign in numbers that are texts
+    decimal, thousands : str
+        Signs in numbers that are texts
     """
 
     column: str
     unit: str
     zone: str | None = None
     decimal: str = "."
+    thousands: str = ""
 
     @property
     def is_date(self) -> bool:
@@ -170,8 +177,15 @@ class Clock:
 
     def seconds(self, values: pd.Series) -> Array:
         """Convert a time column, shape (rows,), to [s], dates since 1970; NaN for a cell that is no time."""
+        if self.unit == CLOCK_TIME:
+            texts = values.astype(str).str.strip().str.replace(",", ".")
+            spans = pd.to_timedelta(texts.where(texts.str.fullmatch(r"\d+:\d{2}:\d{2}(\.\d+)?")), errors="coerce")
+            return np.asarray(spans.dt.total_seconds().to_numpy(dtype=np.float64, na_value=np.nan))
         if not self.is_date:
-            return _numbers(values, self.decimal) * units_in_files("time", "s")[self.unit][0]
+            return (
+                numbers_of(values, decimal=self.decimal, thousands=self.thousands)
+                * units_in_files("time", "s")[self.unit][0]
+            )
         if pd.api.types.is_datetime64_any_dtype(values.dtype):
             stamps = self._zoned(values)
         elif self.unit != ISO:
@@ -179,7 +193,7 @@ class Clock:
             stamps = self._zoned(pd.to_datetime(texts, format=self.unit, utc=has_zone, errors="coerce"))
         else:
             texts = values.astype(str).str.strip().str.replace(",", ".")
-            found = [_ISO.fullmatch(text) for text in texts]
+            found = [_ISO.fullmatch(text) for text in texts.tolist()]  # quicker than a Series
             aware = np.array([match is not None and match["zone"] is not None for match in found], dtype=bool)
             naive = np.array([match is not None and match["zone"] is None for match in found], dtype=bool)
             stamps = pd.to_datetime(texts.where(aware), format="ISO8601", utc=True, errors="coerce")
@@ -207,14 +221,6 @@ class Clock:
         return cast("pd.Series", once.dt.tz_convert("UTC"))
 
 
-def _numbers(values: pd.Series, decimal: str) -> Array:
-    if not (pd.api.types.is_numeric_dtype(values.dtype) or pd.api.types.is_string_dtype(values.dtype)):
-        values = values.astype(str)
-    if decimal == "," and not pd.api.types.is_numeric_dtype(values.dtype):
-        values = values.str.replace(",", ".")  # one cell that is no number leaves the others as texts
-    return np.asarray(pd.to_numeric(values, errors="coerce").to_numpy(dtype=np.float64, na_value=np.nan))
-
-
 def moment_text(seconds: float, clock: Clock | None) -> str:
     """Format a time of a clock as a part names it, in whole seconds, rounded down.
 
@@ -229,8 +235,16 @@ def moment_text(seconds: float, clock: Clock | None) -> str:
     return datetime.fromtimestamp(whole, tz=UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
 
 
-def clock_of(table: pd.DataFrame) -> Clock:
-    """Find the time column without a mapping: ``time_s``, or ISO 8601 times under a usual name.
+def clock_of(table: pd.DataFrame, units: Mapping[str, str]) -> Clock:
+    """Find the time column without a mapping.
+
+    It is ``time_s``, else ISO 8601 times under a usual name, times with their unit, or the only column of ISO 8601
+    times.
+
+    Parameters
+    ----------
+    units : mapping of column to str
+        Units that the file itself names
 
     Raises
     ------
@@ -239,26 +253,51 @@ def clock_of(table: pd.DataFrame) -> Clock:
     """
     columns = [str(column) for column in table.columns]
     if STANDARD in columns:
-        return Clock(column=STANDARD, unit=ISO if _holds_dates(table[STANDARD]) else "s")
-    for name in ISO_NAMES:
-        if name in columns:
-            if _holds_dates(table[name]):
-                return Clock(column=name, unit=ISO)
+        if units.get(STANDARD, "s") not in ("s", "sec"):
             raise InputError(
-                f"column {name} is no ISO 8601 time (as 2017-09-01T08:00:00Z), and the unit of its numbers is not "
-                "known; name it time_s if they are seconds, or give [time] column and unit in a mapping file"
+                f"column {STANDARD} has the unit {units[STANDARD]!r} in the file; give time = {{ column = "
+                f'"{STANDARD}", unit = ... }} in a mapping file'
             )
+        return Clock(column=STANDARD, unit=ISO if holds_dates(table[STANDARD]) else "s")
+    known = units_in_files("time", "s")
+    with_unit = {name: unit_of_name(name, "time", "time", "s") or units.get(name, "") for name in columns}
+    for name in columns:
+        if name.lower() in ISO_NAMES and holds_dates(table[name]):
+            return Clock(column=name, unit=ISO)
+        is_time = name.lower() in ISO_NAMES or unit_of_name(name, "time", "time", "s") is not None
+        if is_time and with_unit[name] in known:
+            return Clock(column=name, unit=with_unit[name])
+    dated = [name for name in columns if holds_dates(table[name]) and _may_be_time(table[name])]
+    if len(dated) == 1:
+        return Clock(column=dated[0], unit=ISO)
+    advice = time_advice(table)
+    for name in columns:
+        if name.lower() in ISO_NAMES:
+            is_text = not pd.api.types.is_numeric_dtype(table[name].dtype)
+            numbers = (
+                ", and the unit of its numbers is not known; name it time_s if they are seconds, or give [time] column "
+                "and unit in a mapping file"
+            )
+            todo = f"; {advice}" if advice and is_text else numbers
+            raise InputError(f"column {name} is no ISO 8601 time (as 2017-09-01T08:00:00Z){todo}")
     shown = ", ".join(name[:40] for name in sorted(columns)[:20])
-    raise InputError(f"column {STANDARD} is missing; it has: {shown}")
+    raise InputError(f"column {STANDARD} is missing; it has: {shown}{'; ' if advice else ''}{advice}")
 
 
-def _holds_dates(values: pd.Series) -> bool:
+def holds_dates(values: pd.Series) -> bool:
+    """Return True for time stamps and for texts of which one of the first is an ISO 8601 time."""
     if pd.api.types.is_datetime64_any_dtype(values.dtype):
         return True
     if pd.api.types.is_numeric_dtype(values.dtype):
         return False
-    first = values.dropna().astype(str).str.strip().head(20)
+    first = values.dropna().head(20).astype(str).str.strip()
     return bool(first.map(lambda text: bool(_ISO.fullmatch(text))).any())
+
+
+def _may_be_time(dates: pd.Series) -> bool:
+    """Return False for one date in all rows, and for days, whose time is in another column."""
+    first, last = str(dates.iloc[0]).strip(), str(dates.iloc[-1]).strip()
+    return first != last and not re.fullmatch(_DATE, first)
 
 
 def inside(seconds: Array, parts: Sequence[Part], clock: Clock, first: float) -> NDArray[np.bool_]:
@@ -299,18 +338,19 @@ def check_time(values: pd.Series, seconds: Array, clock: Clock, problems: Proble
     if len(wrong):
         cell = values.iloc[int(wrong[0])]
         shown = "empty" if pd.isna(cell) else repr(str(cell)[:40])
-        of_date = "an ISO 8601 time as 2017-09-01T08:00:00Z" if clock.unit == ISO else f"a date as {clock.unit}"
-        needed = of_date if clock.is_date else "a number"
-        problems.add(
-            f"{name} is {shown} at row {rows[wrong[0]]}; {len(wrong)} of {len(rows)} rows hold no time, each needs "
-            + needed
-        )
+        needed = f"{len(wrong)} of {len(rows)} rows hold no time, each needs {_needed(clock)}"
+        needed += _advice_on_time(values.iloc[wrong], len(wrong) / len(rows), clock)
+        problems.add(f"{name} is {shown} at row {rows[wrong[0]]}; {_local_time(values.iloc[wrong], clock) or needed}")
         return
     if clock.unit == ISO:
         _check_zones(values, name, rows, problems)
     steps = np.diff(seconds)
     back, same = np.flatnonzero(steps < 0.0), np.flatnonzero(steps == 0.0)
     hint = "; local time that is set back in autumn needs its zone in a mapping (time.zone)" if clock.is_date else ""
+    if clock.unit == CLOCK_TIME:
+        hint = (
+            "; at midnight a time of day begins again: split the file there, or name the column with the date as well"
+        )
     if len(back):
         row = int(back[0])
         problems.add(
@@ -326,6 +366,37 @@ def check_time(values: pd.Series, seconds: Array, clock: Clock, problems: Proble
         )
     if not len(back) and not len(same) and len(steps):
         _check_time_unit(name, seconds, float(np.median(steps)), clock, problems)
+
+
+def _needed(clock: Clock) -> str:
+    if clock.unit == CLOCK_TIME:
+        return f"a time as {CLOCK_TIME}"
+    of_date = "an ISO 8601 time as 2017-09-01T08:00:00Z" if clock.unit == ISO else f"a date as {clock.unit}"
+    return of_date if clock.is_date else "a number"
+
+
+def _advice_on_time(cells: pd.Series, share: float, clock: Clock) -> str:
+    """Return what to do about cells that are no time of a clock; empty if nothing is known of them."""
+    texts = cells.dropna().astype(str).str.strip()
+    forms = forms_of(texts)
+    if forms:
+        return "; in a mapping file its form is time.unit = " + " or ".join(f'"{form}"' for form in forms)
+    if clock.decimal == "." and len(texts) and texts.str.fullmatch(r"\d+,(\d{1,2}|\d{4,})").all():
+        return '; decimal commas are stated as csv = { decimal = "," } in a mapping file'
+    if share < FEW and len(texts) and not texts.str.contains(r"\d").any():
+        return "; remove lines that are no part of the table, or begin them with '#'"
+    return ""
+
+
+def _local_time(cells: pd.Series, clock: Clock) -> str:
+    """Return what to do about a local time that its zone does not have once; empty for other cells."""
+    if clock.zone is None or not np.isfinite(replace(clock, zone=None).seconds(cells)[0]):
+        return ""
+    return (
+        f"that time does not exist in {clock.zone}, where clocks are set forward, or comes twice, and no row shows "
+        "when they are set back; if the clock of the logger is never set, give zone as its distance to UTC "
+        '("Etc/GMT-1" is UTC+1)'
+    )
 
 
 def _repeated(times: int, of: int, hint: str) -> str:
@@ -350,10 +421,9 @@ def _check_time_unit(name: str, seconds: Array, step: float, clock: Clock, probl
     elif latest > LONGEST_TIME:
         problems.add(f"{name} reaches {latest:.4g} s; were milliseconds meant? {fix}")
     elif step < SHORTEST_STEP:
-        problems.add(
-            f"{name} advances by {step:.3g} s from row to row (median); were hours or days meant? {fix}, or average to "
-            "seconds"
-        )
+        is_excel = EXCEL_DAYS[0] < seconds[0] <= seconds[-1] < EXCEL_DAYS[1]
+        meant = 'were dates of Excel meant (unit = "d")?' if is_excel else "were hours or days meant?"
+        problems.add(f"{name} advances by {step:.3g} s from row to row (median); {meant} {fix}, or average to seconds")
 
 
 def _check_zones(values: pd.Series, name: str, rows: NDArray[np.int64], problems: Problems) -> None:

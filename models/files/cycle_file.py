@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from models.base.errors import InputError, Problems
 from models.base.types import Array
 from models.files.cycle import Cycle
+from models.files.numbers import numbers_of
 from models.files.paths import KINDS
 from models.files.table_file import read_table
 from models.quantities.quantities import GEARBOX_INPUTS, MEMORY, NODE_TEMPERATURE, Input, node_columns
@@ -114,7 +115,7 @@ def read_cycle_and_start(path: Path, inputs: Mapping[str, Input] = GEARBOX_INPUT
 
 def _temperatures(cells: pd.Series) -> Array:
     """A column, shape (rows,), [degC]; NaN where a cell is empty or a word, infinite where it is a misspelt number."""
-    values = pd.to_numeric(cells, errors="coerce").to_numpy(dtype=np.float64, na_value=np.nan)
+    values = numbers_of(cells)
     return np.where(np.isnan(values) & cells.astype(str).str.contains(r"\d").to_numpy(dtype=bool), np.inf, values)
 
 

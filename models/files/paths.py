@@ -8,6 +8,10 @@ from models.base.errors import InputError
 
 KINDS = (".csv", ".csv.gz", ".parquet")
 EMPTY = "is empty; a header line with column names and rows are needed"
+HINTS = {
+    (".txt", ".asc", ".dat", ".tsv", ".tab", ".lvm", ".log"): "; rename a table of text to .csv",
+    (".xlsx", ".xlsm", ".xls", ".ods"): "; save the sheet as CSV (UTF-8)",
+}
 
 
 def kind_of(path: Path, kinds: tuple[str, ...] = KINDS) -> str:
@@ -23,7 +27,8 @@ def kind_of(path: Path, kinds: tuple[str, ...] = KINDS) -> str:
     for kind in kinds:
         if path.name.lower().endswith(kind):
             return kind
-    raise InputError(f"{path}: unknown file ending; use one of {', '.join(kinds)}")
+    hint = next((text for endings, text in HINTS.items() if path.name.lower().endswith(endings)), "")
+    raise InputError(f"{path}: unknown file ending; use one of {', '.join(kinds)}{hint}")
 
 
 def is_folder(path: Path) -> bool:

@@ -2,29 +2,45 @@
 
 from __future__ import annotations
 
+import codecs
 import csv
 import gzip
 import io
 import re
 import zlib
-from collections.abc import Collection, Iterable, Iterator
+from collections import Counter
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
-from itertools import islice
+from itertools import islice, takewhile
 from pathlib import Path
 from typing import IO, Any, cast
 
 import pandas as pd
 
 from models.base.errors import InputError
+from models.files.numbers import is_number
 from models.files.paths import EMPTY, check_file, kind_of
+from models.quantities.units import TABLE
 
 CHUNK_ROWS = 100_000
 CHUNK_LINES = 1_000
 MOST_ROWS = 5_000_000  # of a table in memory
 UTF_8 = "utf-8-sig"  # with or without the mark of UTF-8 at its begin
-SHOWN = 3  # cells of a row of units in a message
+SHOWN = 3  # cells of a row in a message
+HEAD_LINES = 100  # in which a header is looked for
+MOST_BREAKS = 20  # of lines within the quoted names of a header
+# Marks at the begin of a text that state its encoding, and signatures of files that are none.
+MARKS = {codecs.BOM_UTF8: UTF_8, codecs.BOM_UTF16_LE: "utf-16", codecs.BOM_UTF16_BE: "utf-16"}
+NO_TEXTS = {b"PK\x03\x04": "an Excel workbook or a zip archive", b"\xd0\xcf\x11\xe0": "an Excel workbook (.xls)"}
+# Texts for a missing value of Excel and of loggers, in addition to those that pandas knows (NaN, #N/A, NULL).
+MISSING = ("-", "--", "---", "#NV", "N.A.", "n.a.")
+SEPARATORS = {";": "';'", "\t": "tabs", ",": "','", "|": "'|'"}
+UNITS = frozenset(symbol for unit in TABLE for symbol in (unit.symbol, *unit.aliases)) - {"1", "-", ""}
+_EXCEL_SEPARATOR = re.compile(r'"?sep=.?"?\s*', re.IGNORECASE)  # Excel takes it from the first line
 # Texts that head a column ("s", "1/min", "m3/h") have no two digits in a row; dates, times and misspelt numbers do.
 _DIGITS = re.compile(r"\d{2}|\d[.,]\d")
+_BEGINS_AS_NUMBER = re.compile(r"[+-]?[.,]?\d")
 _PANDAS_UNEVEN = re.compile(r"Expected (\d+) fields in line (\d+), saw (\d+)")
 
 
@@ -35,7 +51,9 @@ class TextForm:
     Attributes
     ----------
     separator, decimal : str
-        Between columns, and in numbers
+        Between columns, and in numbers; numbers with a comma are quoted if both are commas
+    thousands : str
+        Between groups of three digits
     missing : tuple of str
         Further texts or numbers for a missing value
     texts : tuple of str
@@ -50,6 +68,7 @@ class TextForm:
 
     separator: str = ","
     decimal: str = "."
+    thousands: str = ""
     missing: tuple[str, ...] = ()
     texts: tuple[str, ...] = ()
     encoding: str = UTF_8
@@ -69,11 +88,25 @@ def column_names(path: Path, form: TextForm = PLAIN) -> tuple[str, ...]:
         if kind_of(path) == ".parquet":
             from pyarrow import parquet
 
-            return tuple(parquet.read_schema(path).names)
+            return tuple(distinct(parquet.read_schema(path).names))
         with _open_text(path, form) as text:
-            return tuple(_fields(_Lines(path, text, form).next_filled(), form.separator))
-    except (InputError, ImportError, csv.Error, *UNREADABLE):
+            _, header = next(iter(_Lines(path, text, form).ahead(1)))
+            return tuple(distinct(_fields(header, form.separator)))
+    except (InputError, ImportError, StopIteration, csv.Error, *UNREADABLE):
         return ()
+
+
+def column_units(path: Path, form: TextForm) -> dict[str, str]:
+    """Return units by column from the row of units below the header of a CSV file; none if it has no such row."""
+    if kind_of(path) == ".parquet":
+        return {}
+    try:
+        with _open_text(path, form) as text:
+            lines = _Lines(path, text, form)
+            names = _check_head(path, lines, form)[0]
+    except (csv.Error, *UNREADABLE):  # reading reports why
+        return {}
+    return {name: unit for name, unit in zip(names, lines.units, strict=False) if unit}
 
 
 def read_table(path: Path) -> pd.DataFrame:
@@ -131,7 +164,7 @@ def without(missing: Collection[str], table: pd.DataFrame) -> pd.DataFrame:
     """Return a table whose cells of certain texts or numbers are missing."""
     if not missing:
         return table
-    numbers = [float(text) for text in missing if _is_number(text)]
+    numbers = [float(text) for text in missing if is_number(text)]
 
     def marked(cells: pd.Series) -> pd.Series:
         if pd.api.types.is_numeric_dtype(cells.dtype):
@@ -141,10 +174,26 @@ def without(missing: Collection[str], table: pd.DataFrame) -> pd.DataFrame:
     return table.mask(table.apply(marked)) if len(table) else table
 
 
-def _check_names(path: Path, names: list[str]) -> None:
-    repeated = sorted({name for name in names if name and names.count(name) > 1})
-    if repeated:
-        raise InputError("\n".join(f"{path}: column {name[:80]} is there twice; remove one" for name in repeated[:10]))
+def distinct(names: Sequence[str]) -> list[str]:
+    """Return names of columns with the place of those that come twice; those that are empty as pandas names them.
+
+    Examples
+    --------
+    >>> distinct(["n", "Status", "Status", ""])
+    ['n', 'Status (column 2)', 'Status (column 3)', 'Unnamed: 3']
+    """
+    count = Counter(names)
+    placed = enumerate(names, start=1)
+    return [
+        f"Unnamed: {place - 1}" if not name else name if count[name] == 1 else f"{name} (column {place})"
+        for place, name in placed
+    ]
+
+
+def copies_of(name: str, names: Iterable[str]) -> list[str]:
+    """Return what :func:`distinct` makes of a name that comes twice, among `names`; also for groups of an MDF file."""
+    copy = re.compile(re.escape(name) + r" \((?:column|group) \d+\)")
+    return [other for other in names if copy.fullmatch(other)]
 
 
 # ---------------------------------------------------------------------- text
@@ -152,18 +201,34 @@ def _check_names(path: Path, names: list[str]) -> None:
 _STATED = "or state in a mapping file (--mapping) how it is written"
 
 
-def _open_text(path: Path, form: TextForm) -> io.TextIOWrapper:
-    file = gzip.open(path, "rb") if kind_of(path) == ".csv.gz" else path.open("rb")  # noqa: SIM115  closed with the text
-    return io.TextIOWrapper(cast(IO[bytes], file), encoding=form.encoding, errors="surrogateescape")
+@contextmanager
+def _open_text(path: Path, form: TextForm) -> Iterator[io.TextIOWrapper]:
+    """Open a text in the encoding that a mark at its begin states, else in that of the form."""
+    with gzip.open(path, "rb") if kind_of(path) == ".csv.gz" else path.open("rb") as file:
+        start = cast(io.BufferedReader, file).peek(4)
+        for signature, kind in NO_TEXTS.items():
+            if start.startswith(signature):
+                raise InputError(f"{path}: is {kind}, no text; save its table as CSV (UTF-8)")
+        encoding = next((name for mark, name in MARKS.items() if start.startswith(mark)), form.encoding)
+        with io.TextIOWrapper(cast(IO[bytes], file), encoding=encoding, errors="surrogateescape") as text:
+            yield text
 
 
 class _Lines:
-    """Lines of a text for pandas: what is no table is blank, and foreign bytes are refused with their line number."""
+    """Lines of a text for pandas: what is no table is blank, and foreign bytes are refused with their line number.
+
+    Attributes
+    ----------
+    units : sequence of str
+        Cells of the row of units, which is no table; see :func:`_check_head`
+    """
 
     def __init__(self, path: Path, text: io.TextIOWrapper, form: TextForm) -> None:
         self.path, self.number, self.form = path, 0, form
+        self.units: Sequence[str] = ()
         self._text = text
         self._waiting: list[str] = []
+        self._ahead: dict[int, int] = {}  # places of lines in it
 
     def __iter__(self) -> Iterator[str]:
         return self
@@ -177,10 +242,8 @@ class _Lines:
     def _read_line(self) -> str:
         line = next(self._text, "")
         self.number += 1
-        if self.number == 1 and line.startswith(("\udcff\udcfe", "\udcfe\udcff")):
-            raise InputError(f"{self.path}: is UTF-16 text; {self._advice('utf-16')}")
         if "\0" in line:
-            raise InputError(f"{self.path}: a NUL byte in line {self.number}; it is no text, or damaged")
+            raise InputError(f"{self.path}: a NUL byte in line {self.number}; {self._advice_on_nul(line)}")
         if not line.isascii():
             try:
                 line.encode()
@@ -189,8 +252,9 @@ class _Lines:
                 raise InputError(
                     f"{self.path}: byte 0x{byte:02x} in line {self.number} is not {encoding}; {self._advice('cp1252')}"
                 ) from error
+        is_stated = self.number == 1 and _EXCEL_SEPARATOR.fullmatch(line)
         # A '#' within a row is a cell such as '#REF!', so that pandas' own option for remarks cannot be used.
-        return "\n" if line.startswith("#") or self.number in self.form.skip_lines else line
+        return "\n" if is_stated or line.startswith("#") or self.number in self.form.skip_lines else line
 
     def _advice(self, encoding: str) -> str:
         plain = "save the file as UTF-8"
@@ -198,13 +262,28 @@ class _Lines:
             return f"{plain}, {_STATED}"
         return f'give csv = {{ encoding = "{encoding}" }} in a mapping file, or {plain}'
 
-    def next_filled(self) -> str:
-        """Return the next line that is not blank; pandas will read it again. Empty at the end."""
-        while line := self._read_line():
+    def _advice_on_nul(self, line: str) -> str:
+        if self.number == 1 and set(line[1:10:2]) == {"\0"}:
+            return f"it looks like UTF-16 without a mark: {self._advice('utf-16-le')}"
+        return "it is no text, or damaged"
+
+    def ahead(self, count: int) -> list[tuple[int, str]]:
+        """Return the next lines that are not blank with their numbers; pandas will read them again."""
+        found: list[tuple[int, str]] = []
+        while len(found) < count and (line := self._read_line()):
+            number = self.number
+            # Names of columns may have line breaks within quotes.
+            while line.count('"') % 2 and self.number - number < MOST_BREAKS and (more := self._read_line()):
+                line += more
+            self._ahead[number] = len(self._waiting)
             self._waiting.append(line)
             if line.strip():
-                return line
-        return ""
+                found.append((number, line))
+        return found
+
+    def replace(self, number: int, line: str) -> None:
+        """Let pandas read another text for the line of a number that is ahead, before it has read any."""
+        self._waiting[self._ahead[number]] = line
 
     def read(self, _size: int = -1) -> str:
         """Return some lines, as pandas asks for text."""
@@ -212,20 +291,26 @@ class _Lines:
 
 
 def _fields(line: str, separator: str) -> list[str]:
-    return [field.strip() for field in next(csv.reader([line], delimiter=separator, skipinitialspace=True), [])]
+    rows = csv.reader(io.StringIO(line), delimiter=separator, skipinitialspace=True)
+    return [field.strip() for field in next(rows, [])]
 
 
 def _text_chunks(path: Path, form: TextForm) -> Iterator[pd.DataFrame]:
     with _open_text(path, form) as text:
         lines = _Lines(path, text, form)
-        names = _check_head(path, lines, form)
+        names, width = _check_head(path, lines, form)
         try:
             for chunk in pd.read_csv(
-                cast(Any, lines), sep=form.separator, decimal=form.decimal, na_values=list(form.missing),
-                dtype={name: str for name in names if name.strip() in form.texts}, skipinitialspace=True,
-                index_col=False, chunksize=CHUNK_ROWS, low_memory=False,
+                cast(Any, lines), names=names, header=0, sep=form.separator, decimal=form.decimal,
+                na_values=[*MISSING, *form.missing], dtype={name: str for name in names if name in form.texts},
+                skipinitialspace=True, index_col=False, chunksize=CHUNK_ROWS, low_memory=False,
             ):  # fmt: skip
-                yield chunk.rename(columns=lambda name: str(name).strip())
+                beyond = chunk.index[chunk.iloc[:, width:].notna().any(axis=1)]
+                if len(beyond):
+                    raise InputError(
+                        f"{path}: row {beyond[0] + 1} has more fields than the header; remove what is too much"
+                    )
+                yield chunk.iloc[:, :width]
         except pd.errors.ParserError as error:
             uneven = _PANDAS_UNEVEN.search(str(error))
             if uneven is None:
@@ -234,50 +319,110 @@ def _text_chunks(path: Path, form: TextForm) -> Iterator[pd.DataFrame]:
             raise InputError(f"{path}: {_too_many_fields(line, count, expected, form)}") from error
 
 
-def _check_head(path: Path, lines: _Lines, form: TextForm) -> list[str]:
-    """Return the names of the columns as they stand there.
+def _check_head(path: Path, lines: _Lines, form: TextForm) -> tuple[list[str], int]:
+    """Return the names of all columns, none twice, and the number of those that the header has.
 
-    Refused are another separator, no header, repeated names, and rows of units or too many fields below the header.
+    Refused are another separator, no header, lines above it, and rows of texts or too many fields below it. A row of
+    units below it (where a mapping file could be there), and separators at the ends of the rows, are taken as such.
     """
-    header = lines.next_filled()
-    if not header:
+    rows = [(number, line, _fields(line, form.separator)) for number, line in lines.ahead(HEAD_LINES)]
+    if not rows:
         raise InputError(f"{path}: {EMPTY}")
-    names = _fields(header, form.separator)
-    for other, word in ((";", "';'"), ("\t", "tabs"), (",", "','")):
-        if len(names) == 1 and other in names[0]:
-            raise InputError(f"{path}: its columns are separated by {word}; {_advice(other, form)}")
-    if all(_is_number(name) for name in names):
+    at, _, names = rows[0]
+    if len(names) == 1:
+        _check_separator(path, [line for _, line, _ in rows], form)
+    above = _rows_above_header([cells for _, _, cells in rows])
+    if above:
+        first, last = at, rows[above - 1][0]
+        where = f"lines {first}-{last}" if last > first else f"line {first}"
+        texts = f"{where} above the header (line {rows[above][0]}: {_shown(rows[above][2])})"
+        raise InputError(f"{path}: {texts}: no part of the table; {_to_skip([n for n, _, _ in rows[:above]], form)}")
+    if all(is_number(name) for name in names):
         raise InputError(f"{path}: its first line holds numbers; a header line with column names is needed")
-    _check_names(path, names)
-    first = _fields(lines.next_filled(), form.separator)
-    if len(first) > len(names):
-        raise InputError(f"{path}: {_too_many_fields(lines.number, len(first), len(names), form)}")
-    cells = [cell for cell in first if cell]
-    if cells and not any(_is_number(cell) or _DIGITS.search(cell) for cell in cells):
-        skipped = [*form.skip_lines, lines.number]
-        shown = ", ".join(repr(cell[:20]) for cell in cells[:SHOWN]) + (", ..." if len(cells) > SHOWN else "")
+    below = [(number, cells) for number, _, cells in rows[1:]]
+    texts_below = list(takewhile(lambda row: _holds_texts(row[1]) or _are_units(row[1]), below))
+    if form.by_mapping and texts_below and _are_units(texts_below[0][1]):
+        number, cells = texts_below.pop(0)
+        lines.units = [cell.strip("[]()") for cell in cells]
+        lines.replace(number, "\n")
+    if texts_below:
+        number, cells = texts_below[0]
         raise InputError(
-            f"{path}: line {lines.number} (below the header) holds units or texts ({shown}) and no number; remove it, "
-            + (f"give csv = {{ skip_lines = {skipped} }} in a mapping file, " if form.by_mapping else "")
-            + "or begin it with '#'"
+            f"{path}: line {number} (below the header) holds units or texts ({_shown(cells)}) and no number; "
+            + _to_skip([number for number, _ in texts_below], form)
         )
-    return next(csv.reader([header], delimiter=form.separator, skipinitialspace=True))
+    width = len(names)
+    longest = max((len(cells) for _, cells in below), default=width)
+    for number, cells in below:
+        if any(cells[width:]):
+            raise InputError(f"{path}: {_too_many_fields(number, len(cells), width, form)}")
+    return distinct([*names, *[""] * (longest - width)]), width
+
+
+def _check_separator(path: Path, lines: Sequence[str], form: TextForm) -> None:
+    """Refuse lines of which the first has one field, but several with another separator."""
+    for other, word in SEPARATORS.items():
+        if other in lines[0] and other != form.separator:
+            decimal = "," if any(re.search(r"\d,\d", line) for line in lines) else "."
+            raise InputError(f"{path}: its columns are separated by {word}; {_advice(other, decimal, form)}")
+    words = {len(line.split()) for line in lines}
+    if len(lines) > 1 and len(words) == 1 and words.pop() > 1:
+        raise InputError(f"{path}: its columns are separated by spaces; write it with ',' between columns")
+
+
+def _rows_above_header(rows: Sequence[Sequence[str]]) -> int:
+    """Return the number of rows above the first that heads as many columns as the table has; 0 if there is none."""
+    width = max(len(_filled(cells)) for cells in rows[len(rows) // 2 :])
+    for number, cells in enumerate(rows[:-1]):
+        names = _filled(cells)
+        differ = len(names) == len(set(names)) == width > 1
+        if differ and not any(not name or _BEGINS_AS_NUMBER.match(name) for name in names) and not _are_units(names):
+            return number
+    return 0
+
+
+def _are_units(cells: Sequence[str]) -> bool:
+    """Return True if most cells are units, also in brackets, and the others are texts; ``-`` and empty ones aside."""
+    others = [cell for cell in (cell.strip("[]()") for cell in cells) if cell not in ("", "-", *UNITS)]
+    units = sum(cell.strip("[]()") in UNITS for cell in cells)
+    return units > len(others) and not any(_BEGINS_AS_NUMBER.match(cell) for cell in others)
+
+
+def _filled(cells: Sequence[str]) -> Sequence[str]:
+    """Leave out empty cells at the end."""
+    count = next((i for i in range(len(cells), 0, -1) if cells[i - 1]), 0)
+    return cells[:count]
+
+
+def _holds_texts(cells: Sequence[str]) -> bool:
+    """Return True for a row of texts, no number or date among them; False for an empty one."""
+    filled = [cell for cell in cells if cell]
+    return bool(filled) and not any(is_number(cell) or _DIGITS.search(cell) for cell in filled)
+
+
+def _shown(cells: Sequence[str]) -> str:
+    filled = [cell for cell in cells if cell]
+    return ", ".join(repr(cell[:20]) for cell in filled[:SHOWN]) + (", ..." if len(filled) > SHOWN else "")
+
+
+def _to_skip(numbers: Sequence[int], form: TextForm) -> str:
+    """Return what to do with lines that are no table."""
+    skipped, it = sorted({*form.skip_lines, *numbers}), "it" if len(numbers) == 1 else "them"
+    by_mapping = f"give csv = {{ skip_lines = {skipped} }} in a mapping file, " if form.by_mapping else ""
+    return f"remove {it}, {by_mapping}or begin {it} with '#'"
 
 
 def _too_many_fields(line: int, count: int, names: int, form: TextForm) -> str:
     if names == 1:
-        return (
-            f"line {line} has {count} fields, but the first line names one column; if that is a title, remove it or "
-            + (f"give csv = {{ skip_lines = {[*form.skip_lines, 1]} }} in a mapping file, " if form.by_mapping else "")
-            + "or begin it with '#'"
-        )
+        title = f"if that is a title, {_to_skip([1], form)}"
+        return f"line {line} has {count} fields, but the first line names one column; {title}"
     return (
         f"line {line} has {count} fields, but the header names {names} columns; remove what is too much, e.g. a "
-        f"{form.separator!r} at its end or within a number"
+        f"{form.separator!r} within a number"
     )
 
 
-def _advice(separator: str, form: TextForm) -> str:
+def _advice(separator: str, decimal: str, form: TextForm) -> str:
     """Return what to do with a file of another separator."""
     plain = "write it with ',' and decimal points"
     if not form.by_mapping:
@@ -285,18 +430,7 @@ def _advice(separator: str, form: TextForm) -> str:
     if separator == ",":
         return 'the mapping file in use states others: give csv = { separator = "," } there, or name another --mapping'
     shown = "\\t" if separator == "\t" else separator
-    return (
-        f'give csv = {{ separator = "{shown}", decimal = "," }} in a mapping file (decimal = "." where its numbers '
-        f"have points), or {plain}"
-    )
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
+    return f'give csv = {{ separator = "{shown}", decimal = "{decimal}" }} in a mapping file, or {plain}'
 
 
 # ---------------------------------------------------------------------- Parquet
@@ -308,7 +442,7 @@ def _parquet_chunks(path: Path) -> Iterator[pd.DataFrame]:
 
     with parquet.ParquetFile(path) as file:
         schema = file.schema_arrow
-        _check_names(path, list(schema.names))
+        names = distinct(schema.names)
         nested = [f for f in schema if pa.types.is_nested(f.type) or pa.types.is_binary(f.type)]
         if nested:
             raise InputError("\n".join(
@@ -318,8 +452,8 @@ def _parquet_chunks(path: Path) -> Iterator[pd.DataFrame]:
         row = 0
         for batch in file.iter_batches(batch_size=CHUNK_ROWS):
             chunk = batch.to_pandas(ignore_metadata=True)
-            chunk.index = pd.RangeIndex(row, row + len(chunk))
+            chunk = chunk.set_axis(names, axis=1).set_axis(pd.RangeIndex(row, row + len(chunk)))
             row += len(chunk)
             yield chunk
         if row == 0:
-            yield schema.empty_table().to_pandas(ignore_metadata=True)
+            yield schema.empty_table().to_pandas(ignore_metadata=True).set_axis(names, axis=1)

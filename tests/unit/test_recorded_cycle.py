@@ -302,3 +302,17 @@ def test_a_cell_that_is_no_number_does_not_blame_those_with_decimal_commas(
     with pytest.raises(InputError) as raised:
         read_cycle_or_recording(tmp_path / "run.csv", network)
     assert message in str(raised.value) and "decimal commas" not in str(raised.value)
+
+
+@pytest.mark.parametrize("names", [
+    {"torque_Nm": "torque_kNm"}, {"T_oil_degC": "T_oil_degF"}, {"time_s": "Time [s]", "speed_rpm": "speed [rpm]"},
+])  # fmt: skip
+def test_names_with_other_units_are_read_as_in_a_diagnosis(
+    tmp_path: Path, network: ThermalNetwork, names: dict[str, str]
+) -> None:
+    given = table().assign(torque_Nm=table()["torque_Nm"] / (1e3 if "torque_Nm" in names else 1.0))
+    if "T_oil_degC" in names:
+        given["T_oil_degC"] = given["T_oil_degC"] * 1.8 + 32.0
+    cycle, start, _ = read_cycle_or_recording(plain(tmp_path / "run.csv", given.rename(columns=names)), network)
+    np.testing.assert_allclose(cycle.inputs["torque"], table()["torque_Nm"])
+    assert start.temperatures["oil"] == pytest.approx(40.0)

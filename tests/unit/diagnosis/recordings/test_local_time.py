@@ -119,7 +119,7 @@ def test_cells_without_time_outside_a_part_do_no_harm(tmp_path: Path, network: T
 
 def test_a_title_above_the_header_is_named(tmp_path: Path, network: ThermalNetwork) -> None:
     (tmp_path / "run.csv").write_text("Run 12 of April\n" + table().to_csv(index=False))
-    with pytest.raises(InputError, match=r"first line names one column; if that is a title, .* skip_lines = \[1\]"):
+    with pytest.raises(InputError, match=r"line 1 above the header \(line 2: 'time_s', .* skip_lines = \[1\]"):
         read(tmp_path / "run.csv", network, "")
     assert len(read(tmp_path / "run.csv", network, "csv = { skip_lines = [1] }").time) == 200
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from diagnosis.recordings.mdf import _on_rows_of
+from diagnosis.recordings.mdf import _named_apart, _on_rows_of
 
 
 def test_samples_far_from_a_row_are_in_none() -> None:
@@ -28,3 +28,10 @@ def test_rows_at_changes_of_speed_take_what_was_measured_between_them() -> None:
     table = _on_rows_of("speed_rpm", [speed, oil], Path("run.mf4"))
     late = table[table["time_s"] > 100.0]
     np.testing.assert_allclose(late["T_oil_degC"], 20.0 + 0.01 * late["time_s"], atol=0.11)
+
+
+def test_a_channel_that_several_groups_have_is_named_with_its_group() -> None:
+    frames = [pd.DataFrame({"n": [1.0], "status": [0.0]}), pd.DataFrame({"T": [20.0], "status": [1.0]})]
+    groups, units = _named_apart(frames, [{"n": "rpm", "status": "-"}, {"T": "K", "status": ""}])
+    assert [list(frame.columns) for frame in groups] == [["n", "status (group 1)"], ["T", "status (group 2)"]]
+    assert units == [{"n": "rpm", "status (group 1)": "-"}, {"T": "K", "status (group 2)": ""}]

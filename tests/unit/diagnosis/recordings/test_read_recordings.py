@@ -145,12 +145,11 @@ def test_iso_times_and_their_start(tmp_path: Path, network: ThermalNetwork) -> N
     ("given", "meant"),
     [
         ("T_oil", "T_oil_degC"),
-        ("T_oil_C", "T_oil_degC"),
         ("oil_temp", "T_oil_degC"),
         ("Temperature oil [K]", "T_oil_degC"),
         ("upper_housing_temp", "T_housing_upper_degC"),
         ("P_loss", "P_loss_W"),
-        ("T_ambient_K", "T_ambient_degC"),
+        ("T_ambient", "T_ambient_degC"),
     ],
 )
 def test_a_column_under_another_name_is_not_lost(

@@ -47,6 +47,7 @@ def test_the_same_table_gives_the_same_bytes(tmp_path: Path) -> None:
         (b"\x00\xff\xfe\x9c", "a NUL byte in line 1"),
         (b"time_s,speed_rpm\n1,2\n3,4,5\n", "line 3 has 3 fields"),
         (b"time_s,speed_rpm,torque_Nm\n", "has no rows"),
+        (b"time_s,speed_rpm,torque_Nm\ns,rad/s,Nm\n0,1,1\n", "line 2 (below the header) holds units or texts"),
         (b"time_s;speed_rpm;torque_Nm\n0;1;2\n", "separated by ';'"),
         (b"time_s,speed_rpm\n0,1\n", "column torque_Nm is missing"),
         (b"time_s,speed_rpm,torque_Nm\n0,1,2\n1,,2\n", "speed_rpm is nan at row 2"),
@@ -54,7 +55,10 @@ def test_the_same_table_gives_the_same_bytes(tmp_path: Path) -> None:
         (b"time_s,speed_rpm,torque_Nm\n0,1,x\n", "torque_Nm holds something that is not a number"),
         (b"time_s,speed_rpm,torque_Nm\n5,1,1\n4,1,1\n", "time_s goes from 5 to 4 at row 2"),
         (b"time_s,speed_rpm,torque_Nm,T_ambient_degC\n0,1,1,293\n", "T_ambient_degC is 293 at row 1"),
-        (b"time_s,speed_rpm,torque_Nm,speed_rpm\n0,1,1,2\n", "column speed_rpm is there twice"),
+        (
+            b"time_s,speed_rpm,torque_Nm,speed_rpm\n0,1,1,2\n",
+            "column speed_rpm is missing; it has: speed_rpm (column 2), speed_rpm (column 4)",
+        ),
     ],
 )
 def test_a_faulty_cycle_is_refused(tmp_path: Path, content: bytes | None, message: str) -> None:

@@ -1,0 +1,123 @@
+"""Notes on a recording that can be read, but is probably not meant so: units, swapped columns, codes of loggers.
+
+None of them is certain, so that nothing is refused and nothing is changed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from diagnosis.recordings.cleaning import rows_text
+from diagnosis.recordings.machine import RecordedMachine
+from diagnosis.recordings.rows import RecordedRows
+from models.base.types import Array
+from models.quantities.quantities import TOTAL_LOSS, is_total_loss
+
+HOT_AIR = 50.0  # degC on average, from which ambient air is more likely in another unit
+COLD_START_K = 5.0  # by which temperatures differ in a machine that has stood for long
+USUAL_SHARE = 0.99  # of the rows of an input,
+FAR_TIMES = 10.0  # which others exceed so many times that they may be codes of a logger
+CODES, CODE_TIMES = (999.0, 9999.0, 99999.0, 32767.0, 32768.0, 65535.0), 1.5  # of loggers; beyond what is usual
+COLDER_K = 3.0  # below the ambient air on average
+LEAST_LOSS = 1e-3  # of the power, on average
+BRIEF_S, WARMED_K = 300.0, 15.0  # no gearbox warms that fast
+MILLISECONDS = (100.0, 200.0, 500.0, 1000.0, 2000.0)  # s from row to row that are more likely so many milliseconds
+
+
+def doubts(found: RecordedRows, network: RecordedMachine) -> list[str]:
+    """Return a note for each thing that is probably not meant so.
+
+    Parameters
+    ----------
+    found : RecordedRows
+        In the units inside, impossible values and outliers taken out
+    """
+    return [*_time_in_another_unit(found, network), *_hot(found, network), *_colder_than_ambient(found, network),
+            *_loss_and_power(found), *_far_rows(found, network)]  # fmt: skip
+
+
+def _temperatures(found: RecordedRows, network: RecordedMachine) -> dict[str, Array]:
+    measured = {quantity: found.values[quantity] for quantity in found.measured(network) if not is_total_loss(quantity)}
+    return {quantity: values for quantity, values in measured.items() if np.isfinite(values).any()}
+
+
+def _time_in_another_unit(found: RecordedRows, network: RecordedMachine) -> Iterator[str]:
+    if found.clock is None or found.clock.is_date:
+        return
+    name, steps = found.clock.column, np.diff(found.seconds)
+    length, step = float(found.seconds[-1] - found.seconds[0]), float(np.median(steps))
+    for quantity, values in _temperatures(found, network).items():
+        low, high = np.nanquantile(values, [0.05, 0.95])
+        if length < BRIEF_S and high - low > WARMED_K:
+            yield (
+                f"{name} goes over {length:.3g} s, in which {found.names[quantity]} moves by {high - low:.0f} K: if it "
+                'counts minutes or hours, name its unit in a mapping (time.unit = "min")'
+            )
+            return
+    if found.clock.unit == "s" and step in MILLISECONDS and not np.any(np.mod(found.seconds, step)):
+        advice = 'if it counts milliseconds, name its unit in a mapping (time.unit = "ms")'
+        yield f"{name} advances by {step:g} s from row to row: {advice}"
+
+
+def _hot(found: RecordedRows, network: RecordedMachine) -> Iterator[str]:
+    advice = 'if the file has another unit, name it in a mapping (unit = "degF")'
+    ambient = found.values.get("T_ambient", np.zeros(0))
+    if np.isfinite(ambient).any() and np.nanmean(ambient) > HOT_AIR:
+        name = found.names.get("T_ambient", "T_ambient")
+        yield f"{name}: {np.nanmean(ambient):.0f} degC on average is hot for ambient air; {advice}"
+        return
+    firsts = [values[np.isfinite(values)][0] for values in _temperatures(found, network).values()]
+    if len(firsts) > 1 and min(firsts) > HOT_AIR and max(firsts) - min(firsts) < COLD_START_K:
+        yield (
+            f"all temperatures begin at {min(firsts):.0f} to {max(firsts):.0f} degC, alike as in a machine that has "
+            f"cooled down, but hot for one; {advice}"
+        )
+
+
+def _colder_than_ambient(found: RecordedRows, network: RecordedMachine) -> Iterator[str]:
+    if "T_ambient" not in found.names:
+        return
+    ambient = found.values["T_ambient"]
+    for quantity, values in _temperatures(found, network).items():
+        both = np.isfinite(values) & np.isfinite(ambient)
+        below = float(np.mean(ambient[both] - values[both])) if both.any() else 0.0
+        if below > COLDER_K:
+            yield (
+                f"{found.names[quantity]} is {below:.0f} K below {found.names['T_ambient']} on average, although a "
+                "gearbox gives heat: see if the two columns are swapped, or in different units"
+            )
+
+
+def _loss_and_power(found: RecordedRows) -> Iterator[str]:
+    if not {TOTAL_LOSS, "speed", "torque"} <= {*found.names}:
+        return
+    power = np.abs(found.values["speed"] * found.values["torque"]) * np.pi / 30.0
+    loss = found.values[TOTAL_LOSS]
+    both = np.isfinite(power) & np.isfinite(loss)
+    share = np.mean(loss[both]) / np.mean(power[both]) if both.any() and power[both].any() else np.inf
+    if both.any() and not LEAST_LOSS < share < 1.0:
+        yield (
+            f"{found.names[TOTAL_LOSS]} is {np.mean(loss[both]):.3g} W on average, but {found.names['speed']} and "
+            f"{found.names['torque']} give {np.mean(power[both]):.3g} W: see if one of them is in another unit"
+        )
+
+
+def _far_rows(found: RecordedRows, network: RecordedMachine) -> Iterator[str]:
+    """Note rows of an input far beyond all others, which may be codes of a logger."""
+    for name, given in network.inputs.items():
+        size = np.abs(found.values[name])
+        is_code = np.isin(size, CODES)
+        others = size[np.isfinite(size) & ~is_code]
+        if not len(others):
+            continue
+        usual = float(np.quantile(others, USUAL_SHARE, method="lower"))
+        far = (size > FAR_TIMES * usual) | (is_code & (size > CODE_TIMES * usual))
+        if usual > 0.0 and far.any():
+            first = int(np.flatnonzero(far)[0])
+            yield (
+                f"{found.names.get(name, name)}: {found.values[name][first]:g} {given.quantity.unit} and the like in "
+                f"{rows_text(found.rows[far])}; {USUAL_SHARE:.0%} of the others are within {usual:.3g}; a code of the "
+                "logger is named under 'missing' in a mapping, or excluded by 'valid'"
+            )
