@@ -402,7 +402,10 @@ def _local_time(cells: pd.Series, clock: Clock) -> str:
 def _repeated(times: int, of: int, hint: str) -> str:
     """Return what to do about equal times."""
     if times > COARSE * of:
-        return "the times are coarser than the rows lie apart; write them with more digits"
+        return (
+            "the times are coarser than the rows lie apart: write them with more digits; or if every row holds another "
+            "channel, write a column for each"
+        )
     return f"remove the repeated rows{hint}"
 
 
