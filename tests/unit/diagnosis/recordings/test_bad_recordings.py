@@ -83,7 +83,8 @@ FILES: list[tuple[str | bytes, tuple[str, ...]]] = [
     (cell(20, "time_s", "12:30"), ("time_s is '12:30' at row 21", "hold no time")),
     # columns
     (text(lambda t: t.drop(columns="time_s")), ("column time_s is missing; it has:",)),
-    (text(lambda t: t.drop(columns="torque_Nm")), ("column torque_Nm is missing; it has:",)),
+    (text(lambda t: t.drop(columns="torque_Nm")),
+     ("column torque_Nm is missing; it has:", "constants = { torque = ... }")),
     (text(lambda t: t[["time_s", "speed_rpm", "torque_Nm"]]), ("no temperature was measured", "T_<node>_degC")),
     (text(lambda t: t.rename(columns={"T_oil_degC": "T_oill_degC"})), ("T_oill_degC", "did you mean 'T_oil_degC'")),
     (text(lambda t: t.rename(columns={"P_loss_W": "P_loss"})),

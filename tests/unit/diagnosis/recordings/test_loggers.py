@@ -97,6 +97,9 @@ READ: dict[str, tuple[str | bytes, str]] = {
     "a row of units": (in_units("[min],[rad/s],[kNm],[°F],[kW]"), f'time = {{ column = "t" }}\n{ROLES}'),
     "a row of units, one stated in the mapping":
         (in_units("min,rad/s,kNm,Grad F,kW"), f'time = {{ column = "t" }}\n{ROLES}    T.unit = "degF"'),
+    "a row of units below names without them":
+        (plain().replace(HEADER, f"{HEADER.replace('time_s', 'time')}\ns,rpm,Nm,°C,W"), ""),
+    "a row of units with another word for seconds": (plain().replace(HEADER, HEADER + "\nsec,rpm,Nm,°C,W"), ""),
     "names with units in brackets":
         (plain().replace(HEADER, "Time [s],speed [rpm],torque [Nm],T_oil [°C],P_loss (W)"), ""),
     "a text at the end": (plain() + "End of file\n", ""),
