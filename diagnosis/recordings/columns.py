@@ -82,7 +82,10 @@ def match_columns(
     for signal, given in network.inputs.items():
         if given.required and signal not in found and not copies_of(given.column, present):
             shown = ", ".join(other[:40] for other in sorted(present)[:20])
-            problems.add(f"column {given.column} is missing; it has: {shown}")
+            problems.add(
+                f"column {given.column} is missing; it has: {shown}; name another column in a mapping file (quantity = "
+                f'"{signal}"), or give constants = {{ {signal} = ... }} there if it was constant'
+            )
     rest = [n for n in present if n not in roles and n not in mapping.columns and n != time_column]
     replaced = [known.column for quantity, known in quantities_of(network).items()
               if quantity in taken and known.column in rest]  # fmt: skip

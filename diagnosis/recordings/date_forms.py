@@ -21,7 +21,7 @@ COMPACT = ("%Y%m%d%H%M%S", "%Y%m%dT%H%M%S", "%Y%m%d %H%M%S", "%Y%m%d_%H%M%S")
 FORMS = (*(f"{date} {time}" for date, time in product(DATES, TIMES)), *COMPACT)
 _ISO_FORMS = tuple(f"%Y-%m-%d{sign}{time}" for sign, time in product(" T", TIMES[:4]))
 CELLS = 50  # that are tried, over all rows
-TIME_WORDS = re.compile(r"time|zeit|date|datum|stamp|clock|elapsed|second|sekunde", re.IGNORECASE)
+TIME_WORDS = re.compile(r"time|zeit|date|datum|stamp|clock|elapsed|second|sekunde|^x.?val", re.IGNORECASE)
 _CLOCK = re.compile(r"\d{1,4}:\d{2}:\d{2}(?:[.,]\d+)?")
 
 

@@ -11,7 +11,7 @@ from models.quantities.units import TABLE, units_in_files
 
 _BRACKETS = re.compile(r"(.*?)[\s_]*[\[(]([^\[\]()]*)[\])]\s*", re.DOTALL)
 NO_UNITS = ("", "-", "1")
-NO_WORDS = ("F", "°C", "°F", "°K", "%")  # a sensor may be called so, as the front one in T_oil_F
+NO_WORDS = ("F", "°C", "°F", "°K", "℃", "℉", "%")  # a sensor may be called so, as the front one in T_oil_F
 _KNOWN = {symbol for unit in TABLE if unit.dimension for symbol in (unit.symbol, *unit.aliases)}.difference(NO_UNITS)
 
 
@@ -48,9 +48,10 @@ def unit_of_name(name: str, stem: str, dimension: str, inside: str) -> str | Non
     brackets = _BRACKETS.fullmatch(name)
     if brackets:
         return brackets[2].strip() if brackets[1].lower() == stem.lower() and brackets[2].strip() in units else None
-    words = {
-        re.sub(r"\W+", "_", unit.replace(" ", "").replace(".", "")): unit for unit in units if unit not in NO_WORDS
-    }
+    words: dict[str, str] = {}
+    for unit in units:
+        if unit not in NO_WORDS:
+            words.setdefault(re.sub(r"\W+", "_", unit.replace(" ", "").replace(".", "")), unit)
     return next(
         (unit for word, unit in words.items() if name.lower() == f"{stem}_{word}".lower() and name.endswith(word)), None
     )

@@ -51,7 +51,7 @@ FOLDER_FILE = "mapping.toml"
 DEFINITION_KEYS = ("stage", "part")  # of a gearbox definition, which is TOML as well
 SOME_DATE = datetime(2017, 9, 21, 8, 30, 15, tzinfo=UTC)  # a form of dates gives it back
 CLOCK_TIME = "hh:mm:ss"  # unit of times since the start, or of day, as 13:05:00
-TIME_UNITS = ("s", "ms", "min", "h", "d", "iso8601", CLOCK_TIME)
+TIME_UNITS = ("s", "ms", "us", "ns", "min", "h", "d", "iso8601", CLOCK_TIME)
 AUXILIARY, IGNORE = "auxiliary", "ignore"  # roles of columns that are no quantity
 KELVIN = (200.0, 600.0)  # no gearbox has such temperatures in degC all the time
 

@@ -16,7 +16,7 @@ from diagnosis.recordings.columns import is_measurable, match_columns, quantitie
 from diagnosis.recordings.file import RecordingFile
 from diagnosis.recordings.machine import RecordedMachine
 from diagnosis.recordings.mapping import AUXILIARY, IGNORE, Column
-from diagnosis.recordings.time_axis import ISO_NAMES, STANDARD, Clock, Part, check_time, moment_text
+from diagnosis.recordings.time_axis import ISO, ISO_NAMES, STANDARD, Clock, Part, check_time, moment_text
 from models.base.errors import InputError
 from models.base.types import Array
 
@@ -85,7 +85,7 @@ def read_rows(
         return found
     if clock is not None:
         check_time(table[clock.column], seconds, clock, problems)
-        if file.mapping.time is None and clock.column not in (STANDARD, *ISO_NAMES):
+        if file.mapping.time is None and (clock.column not in (STANDARD, *ISO_NAMES) or clock.unit not in ("s", ISO)):
             notes.append(f"{clock.column} is taken as the time{'' if clock.is_date else f' in {clock.unit}'}")
         if clock.lacks_zone(table[clock.column]):
             notes.append(

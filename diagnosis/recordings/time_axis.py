@@ -32,6 +32,7 @@ _DATE = r"\d{4}-\d{2}-\d{2}"
 _ISO = re.compile(
     rf"{_DATE}(?:[T ]\d{{2}}:\d{{2}}(?::\d{{2}}(?:[.,]\d{{1,9}})?)?)?(?P<zone>Z|[+-]\d{{2}}(?::?\d{{2}})?)?"
 )
+SECONDS = ("s", "sec", "sek", "seconds")  # as rows of units write them
 SHORTEST_STEP = 1e-3  # s; no temperature is recorded faster, so smaller steps are another unit
 COARSE = 0.2  # of the steps: equal times are no slips any more
 LONGEST_STEP = 1800.0  # s; a gearbox warms within an hour or two
@@ -253,12 +254,14 @@ def clock_of(table: pd.DataFrame, units: Mapping[str, str]) -> Clock:
     """
     columns = [str(column) for column in table.columns]
     if STANDARD in columns:
-        if units.get(STANDARD, "s") not in ("s", "sec"):
+        if holds_dates(table[STANDARD]):
+            return Clock(column=STANDARD, unit=ISO)
+        if units.get(STANDARD, "s").lower() not in SECONDS:
             raise InputError(
                 f"column {STANDARD} has the unit {units[STANDARD]!r} in the file; give time = {{ column = "
                 f'"{STANDARD}", unit = ... }} in a mapping file'
             )
-        return Clock(column=STANDARD, unit=ISO if holds_dates(table[STANDARD]) else "s")
+        return Clock(column=STANDARD, unit="s")
     known = units_in_files("time", "s")
     with_unit = {name: unit_of_name(name, "time", "time", "s") or units.get(name, "") for name in columns}
     for name in columns:
@@ -402,7 +405,10 @@ def _local_time(cells: pd.Series, clock: Clock) -> str:
 def _repeated(times: int, of: int, hint: str) -> str:
     """Return what to do about equal times."""
     if times > COARSE * of:
-        return "the times are coarser than the rows lie apart; write them with more digits"
+        return (
+            "the times are coarser than the rows lie apart: write them with more digits; or if every row holds another "
+            "channel, write a column for each"
+        )
     return f"remove the repeated rows{hint}"
 
 

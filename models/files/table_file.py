@@ -372,11 +372,17 @@ def _check_separator(path: Path, lines: Sequence[str], form: TextForm) -> None:
 
 def _rows_above_header(rows: Sequence[Sequence[str]]) -> int:
     """Return the number of rows above the first that heads as many columns as the table has; 0 if there is none."""
-    width = max(len(_filled(cells)) for cells in rows[len(rows) // 2 :])
+    table = rows[len(rows) // 2 :]
+    fewest, most = max(len(_filled(cells)) for cells in table), max(map(len, table))
     for number, cells in enumerate(rows[:-1]):
         names = _filled(cells)
-        differ = len(names) == len(set(names)) == width > 1
-        if differ and not any(not name or _BEGINS_AS_NUMBER.match(name) for name in names) and not _are_units(names):
+        differ = len(names) == len(set(names)) > 1
+        if (
+            differ
+            and fewest <= len(names) <= most
+            and not any(not name or _BEGINS_AS_NUMBER.match(name) for name in names)
+            and not _are_units(names)
+        ):
             return number
     return 0
 

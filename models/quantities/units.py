@@ -60,7 +60,7 @@ _POWER = {"kg": 1, "m": 2, "s": -3}
 _ENERGY = {"kg": 1, "m": 2, "s": -2}
 TABLE: tuple[Unit, ...] = (
     Unit(symbol="rad/s", dimension="speed", base={"rad": 1, "s": -1}, display=("rpm", 30.0 / pi, 0.0)),
-    Unit(symbol="N.m", aliases=("N m", "Nm"), dimension="torque", base=_ENERGY),
+    Unit(symbol="N.m", aliases=("N m", "Nm", "N·m", "N*m"), dimension="torque", base=_ENERGY),
     Unit(
         symbol="K",
         aliases=("degK", "°K", "Kelvin", "kelvin"),
@@ -86,10 +86,12 @@ TABLE: tuple[Unit, ...] = (
     Unit(symbol="W/K", aliases=("W K^-1",), base=_POWER | {"K": -1}),
     Unit(symbol="J/K", base=_ENERGY | {"K": -1}),
     Unit(symbol="1/K", base={"K": -1}),
-    Unit(symbol="degC", aliases=("°C", "C"), dimension="temperature", offset=KELVIN, base={"K": 1}),
+    Unit(
+        symbol="degC", aliases=("°C", "C", "℃", "deg C", "Deg C"), dimension="temperature", offset=KELVIN, base={"K": 1}
+    ),
     Unit(
         symbol="1/min",
-        aliases=("rpm", "min^-1", "U/min", "RPM", "r/min"),
+        aliases=("rpm", "min^-1", "min-1", "U/min", "RPM", "r/min", "rev/min"),
         dimension="speed",
         factor=pi / 30.0,
         base={"rad": 1, "s": -1},
@@ -101,7 +103,13 @@ TABLE: tuple[Unit, ...] = (
     Unit(symbol="N mm", dimension="torque", factor=1e-3),
     Unit(symbol="lbf ft", dimension="torque", factor=1.3558179483314),
     Unit(symbol="lbf in", dimension="torque", factor=0.1129848290276),
-    Unit(symbol="degF", aliases=("°F", "F"), dimension="temperature", factor=5.0 / 9.0, offset=KELVIN - 160.0 / 9.0),
+    Unit(
+        symbol="degF",
+        aliases=("°F", "F", "℉", "deg F", "Deg F"),
+        dimension="temperature",
+        factor=5.0 / 9.0,
+        offset=KELVIN - 160.0 / 9.0,
+    ),
     Unit(symbol="km/h", dimension="air speed", factor=1.0 / 3.6),
     Unit(symbol="mph", dimension="air speed", factor=0.44704),
     Unit(symbol="ft/s", dimension="air speed", factor=0.3048),
@@ -121,6 +129,8 @@ TABLE: tuple[Unit, ...] = (
     Unit(symbol="MPa", dimension="pressure", factor=1e6),
     Unit(symbol="psi", dimension="pressure", factor=6894.757293168),
     Unit(symbol="ms", dimension="time", factor=1e-3),
+    Unit(symbol="us", aliases=("µs",), dimension="time", factor=1e-6),
+    Unit(symbol="ns", dimension="time", factor=1e-9),
     Unit(symbol="min", dimension="time", factor=60.0),
     Unit(symbol="h", dimension="time", factor=3600.0),
     Unit(symbol="d", dimension="time", factor=86400.0),

@@ -97,6 +97,9 @@ READ: dict[str, tuple[str | bytes, str]] = {
     "a row of units": (in_units("[min],[rad/s],[kNm],[°F],[kW]"), f'time = {{ column = "t" }}\n{ROLES}'),
     "a row of units, one stated in the mapping":
         (in_units("min,rad/s,kNm,Grad F,kW"), f'time = {{ column = "t" }}\n{ROLES}    T.unit = "degF"'),
+    "a row of units below names without them":
+        (plain().replace(HEADER, f"{HEADER.replace('time_s', 'time')}\ns,rpm,Nm,°C,W"), ""),
+    "a row of units with another word for seconds": (plain().replace(HEADER, HEADER + "\nsec,rpm,Nm,°C,W"), ""),
     "names with units in brackets":
         (plain().replace(HEADER, "Time [s],speed [rpm],torque [Nm],T_oil [°C],P_loss (W)"), ""),
     "a text at the end": (plain() + "End of file\n", ""),
@@ -141,13 +144,23 @@ def test_the_unit_in_a_name_counts_where_a_mapping_states_none(tmp_path: Path, n
 
 
 @pytest.mark.parametrize(
-    "above", ["Rig 3\nStart: 01.02.2024 10:00\n", "Rig,3\n\nDate,2024-02-01\n", "Rig,3,,,\nDate,x,,,\n"]
+    "above",
+    ["Rig 3\nStart: 01.02.2024 10:00\n", "Rig,3\n\nDate,2024-02-01\n", "Rig,3,,,\nDate,x,,,\n", "Rig,3\nUnit\n"],
 )
 def test_lines_above_the_header_are_named_all_at_once(tmp_path: Path, network: ThermalNetwork, above: str) -> None:
     with pytest.raises(InputError, match=r"above the header \(line \d: 'time_s', .* skip_lines = \[") as caught:
         read(tmp_path, network, above + plain())
     advice = str(caught.value).partition("give ")[2].partition(" in a mapping")[0]
     check(read(tmp_path, network, above + plain(), advice))
+
+
+def test_a_header_with_a_column_that_stays_empty_is_found(tmp_path: Path, network: ThermalNetwork) -> None:
+    """As in files of LabVIEW, with remarks in the last column."""
+    header, *rows = plain().splitlines()
+    text = "\n".join(["Writer,2", f"{header},Comment", *(f"{row}," for row in rows)])
+    with pytest.raises(InputError, match=r"line 1 above the header \(line 2: 'time_s'"):
+        read(tmp_path, network, text)
+    check(read(tmp_path, network, text, "csv = { skip_lines = [1] }"))
 
 
 def test_names_that_come_twice(tmp_path: Path, network: ThermalNetwork) -> None:

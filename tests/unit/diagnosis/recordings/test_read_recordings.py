@@ -286,14 +286,14 @@ def test_the_own_mapping_comes_before_that_of_the_folder_and_a_definition_is_non
 
 # What a number of 10 in each unit is inside: s, 1/min, N m, degC, m/s, W.
 TEN = {
-    "time": {"s": 10.0, "ms": 0.01, "min": 600.0, "h": 36_000.0, "d": 864_000.0},
+    "time": {"s": 10.0, "ms": 0.01, "us": 1e-5, "µs": 1e-5, "ns": 1e-8, "min": 600.0, "h": 36_000.0, "d": 864_000.0},
     "speed": {"1/min": 10.0, "rpm": 10.0, "RPM": 10.0, "r/min": 10.0, "U/min": 10.0, "min^-1": 10.0,
-              "rad/s": 95.492965855, "1/s": 600.0, "Hz": 600.0, "deg/s": 1.6666666667},
-    "torque": {"N m": 10.0, "N.m": 10.0, "Nm": 10.0, "kN m": 1e4, "kN.m": 1e4, "kNm": 1e4, "N mm": 0.01,
-               "lbf ft": 13.558179483, "lbf in": 1.1298482903},
+              "min-1": 10.0, "rev/min": 10.0, "rad/s": 95.492965855, "1/s": 600.0, "Hz": 600.0, "deg/s": 1.6666666667},
+    "torque": {"N m": 10.0, "N.m": 10.0, "Nm": 10.0, "N·m": 10.0, "N*m": 10.0, "kN m": 1e4, "kN.m": 1e4,
+               "kNm": 1e4, "N mm": 0.01, "lbf ft": 13.558179483, "lbf in": 1.1298482903},
     "temperature": {"degC": 10.0, "°C": 10.0, "C": 10.0, "K": -263.15, "degK": -263.15, "°K": -263.15,
-                    "Kelvin": -263.15, "kelvin": -263.15, "degF": -12.222222222, "°F": -12.222222222,
-                    "F": -12.222222222},
+                    "Kelvin": -263.15, "kelvin": -263.15, "℃": 10.0, "deg C": 10.0, "Deg C": 10.0,
+                    **dict.fromkeys(("degF", "°F", "F", "℉", "deg F", "Deg F"), -12.222222222)},
     "air speed": {"m/s": 10.0, "km/h": 2.7777777778, "mph": 4.4704, "ft/s": 3.048},
     "power": {"W": 10.0, "kW": 1e4, "MW": 1e7, "mW": 0.01, "hp": 7456.9987},
 }  # fmt: skip
