@@ -1,15 +1,17 @@
 """From an experiment and its candidates to a posterior: scan, race, refit, second scan, third scan.
 
 The scan is linear and judges everything. A race of a few Gauss-Newton steps corrects it for the best names; the best of
-them are fitted to the end, model error in place; a second scan given the best explanation looks for a second effect.
-Where there are baselines a third one, given the best two, looks for what they leave; without, two effects and model
-error are too much alike.
+them are fitted to the end, model error in place. Where the calibration went far from the priors, as it does to stand in
+for a large effect, there is a scan and a race from their middles too. A second scan given the best explanation looks
+for a second effect. Where there are baselines a third one, given the best two, looks for what they leave; without, two
+effects and model error are too much alike.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from operator import attrgetter
 
@@ -44,6 +46,7 @@ from diagnosis.engine.sessions import fit_over_sessions
 from models.base.errors import InputError
 from models.base.progress import Progress, silent
 
+StartIn = Callable[[ErrorClass], Fit]  # where fits with model error of a class begin
 WEIGHT = attrgetter("weight")
 RACED, PLACES, RACE_STEPS = 18, 2, 4
 NEAR_PLACE = 3.0  # nats behind the best place of its name, up to which a second place is raced
@@ -52,6 +55,7 @@ SETTLED_NAT, MOST_TURNS = 0.1, 5  # gain at which a fit has ended; how often it 
 IMPOSSIBLE = -1e3  # nats
 FAR_BETTER = 10.0  # nats, from which the calibration was in the wrong basin
 SCALED = (0.5, 1.0, 2.0)  # of the amplitudes of model error: what the scan says with each
+FAR_SD = 4.0  # of a prior, from which a calibration without the effect may be far from the machine with it
 WORTH, WORTH_SHARE = 1.0, 0.1  # nats, and share of the best, from which a candidate is worth a fit
 
 
@@ -77,7 +81,13 @@ def infer(
     progress(f"scanning {len(candidates)} candidates")
     found = scan(base, candidates, calibration.near.columns)
     first = scan_in_classes(calibration, found)
-    judged = _raced(calibration, first, progress)
+    starts: list[tuple[Scanned, StartIn]] = [(first, lambda one: calibration.in_class(one).fit)]
+    if float(np.max(np.abs(base.z), initial=0.0)) > FAR_SD:
+        progress("scanning from the middles of the priors too")
+        with suppress(ArithmeticError):
+            middles = scan(calibration.at_middles(chosen.error_class), candidates, calibration.near.columns)
+            starts.append((scan_in_classes(calibration, middles), calibration.at_middles))
+    judged = _raced(calibration, starts, progress)
     alone = {one.label: float(value) for one, value in zip(first.candidates, first.log_bayes, strict=True)}
     gained, pairs, elsewhere = 0.0, list[Judged](), None
     best = max(judged.values(), key=WEIGHT, default=None)
@@ -131,16 +141,22 @@ def infer(
     )
 
 
-def _raced(calibration: Calibration, found: Scanned, progress: Progress) -> dict[str, Judged]:
-    """The best candidates after a few steps of a fit, the best of these after a whole one, by label."""
+def _raced(
+    calibration: Calibration, starts: Sequence[tuple[Scanned, StartIn]], progress: Progress
+) -> dict[str, Judged]:
+    """The best candidates after a few steps of a fit, the best of these after a whole one, by label.
+
+    A machine that was calibrated without a large effect may be far from the one with it, so fits may begin at several
+    points, each with its scan.
+    """
     judged: dict[str, Judged] = {}
-    racing = _worth_a_fit(found)
-    for step, index in enumerate(racing):
+    racing = [(found, index, start_in) for found, start_in in starts for index in _worth_a_fit(found)]
+    for step, (found, index, start_in) in enumerate(racing):
         label = found.candidates[index].label
         progress(f"fitting {label}", step, len(racing))
-        start = calibration.in_class(found.best[index].error_class).fit
-        one = _refitted(start, found, index, RACE_STEPS)
-        judged[label] = one if one.fit is None else _judged(calibration, one, _spread(found, index))
+        one = _refitted(start_in(found.best[index].error_class), found, index, RACE_STEPS)
+        one = one if one.fit is None else _judged(calibration, one, _spread(found, index))
+        judged[label] = max(judged.get(label, one), one, key=lambda one: (one.fit is not None, one.weight))
     ahead = sorted(judged.values(), key=WEIGHT, reverse=True)[:REFITTED]
     for step, one in enumerate(ahead):
         progress(f"fitting {one.label} to the end", step, len(ahead))

@@ -183,6 +183,7 @@ class Calibration:
     near: NearReadings
     of_others: Calibration | None = None
     _known: dict[str, InClass] = field(default_factory=dict, init=False)
+    _middles: dict[str, Fit] = field(default_factory=dict, init=False)
 
     @property
     def fit(self) -> Fit:
@@ -209,6 +210,20 @@ class Calibration:
         if one.name not in self._known:
             self._known[one.name] = self.near.fitted(one, self.fit, self.chosen.deviation, iterations=0)
         return self._known[one.name]
+
+    def at_middles(self, one: ErrorClass) -> Fit:
+        """The machine with model error of a class at the middles of the priors: another start for fits in that class.
+
+        Raises
+        ------
+        ArithmeticError
+            If the simulation has no solution there.
+        """
+        if one.name not in self._middles:
+            experiment = self.in_class(one).fit.experiment
+            z = np.zeros(len(experiment.unknowns))
+            self._middles[one.name] = Fit(experiment=experiment, z=z, linearised=experiment.linearise(z))
+        return self._middles[one.name]
 
 
 def calibrate_with_error(experiment: Experiment, start: Fit, apart: Collection[str] = ()) -> Calibration:

@@ -267,7 +267,8 @@ def test_a_change_is_fitted_from_the_date_of_the_best_one(fzg: Gearbox, monkeypa
     monkeypatch.setattr(infer_module, "_refitted", settled)
     monkeypatch.setattr(infer_module, "MOST_TURNS", 0)
     found = scan_in_classes(calibration, scan(calibration.fit, effects, calibration.near.columns))
-    raced = infer_module._raced(calibration, replace(found, log_bayes=np.array([50.0, 40.0])), silent)
+    found = replace(found, log_bayes=np.array([50.0, 40.0]))
+    raced = infer_module._raced(calibration, [(found, lambda one: calibration.in_class(one).fit)], silent)
     right, wrong = (raced[one.label] for one in effects)
     assert right.fit is not None and wrong.fit is not None and right.log_bayes > 50.0
     dates = [fit.experiment.unknowns[-3].value(float(fit.z[-3])) for fit in (right.fit, wrong.fit)]
@@ -287,6 +288,31 @@ def test_every_candidate_is_judged_and_the_best_are_fitted(healthy: Posterior, c
 
 
 # ------------------------------------------------------------------ the race
+
+
+@pytest.mark.parametrize("far_sd", [0.0, np.inf])
+def test_fits_begin_at_the_middles_of_the_priors_too_where_the_calibration_went_far(
+    fzg: Gearbox, monkeypatch: pytest.MonkeyPatch, far_sd: float
+) -> None:
+    train, begun = recorded(fzg, "train", windage_W=WINDAGE_W, hours=HOURS), list[bool]()
+    setup, experiment = prepare_experiment(fzg, [train], [train])
+    calibration = calibrate_with_error(experiment, calibrate(experiment))
+    network = experiment.machine.model.network
+    placed = [CATALOGUE[name].placed(network, setup.scale, setup.channels)[0] for name in ("windage", "sensor_bias")]
+    refitted = infer_module._refitted
+
+    def begins(fit: Fit, found: Scanned, index: int, steps: int) -> Judged:
+        if found.candidates[index].name == "windage":
+            begun.append(not fit.z.any())
+        return refitted(fit, found, index, steps)
+
+    monkeypatch.setattr(infer_module, "_refitted", begins)
+    monkeypatch.setattr(infer_module, "FAR_SD", far_sd)
+    posterior = infer(calibration, [hypothesis_of(one) for one in placed], Settings())
+    assert begun[:2] == ([False, True] if far_sd == 0.0 else [False, False])  # the second one: in a pair
+    best = max(posterior.judged, key=lambda one: one.weight)
+    assert best.fit is not None and best.log_bayes > 20.0
+    assert calibration.at_middles(calibration.chosen.error_class).z.tolist() == [0.0] * len(calibration.fit.z)
 
 
 def named(name: str, place: str) -> Hypothesis:
