@@ -28,9 +28,11 @@ from diagnosis.results.predicted_run import PredictedRun
 from diagnosis.results.predictions import Predicted, Predictions, predict_recordings, temperatures
 from diagnosis.results.result import Diagnosis, Verdict
 from diagnosis.results.result_parts import (
+    MODELS,
     NO_CLAIM,
     Calibrated,
     CalibratedModel,
+    Errors,
     Finding,
     Fits,
     NotDetectable,
@@ -357,13 +359,10 @@ def _fits(setup: InferenceSetup, predictions: Predictions, counting: Collection[
         return overall_rmse([p for p in predictions[state] if p.piece.recording == recording], columns)
 
     recordings = {
-        name: (alone(name, "before"), alone(name, "calibrated"), alone(name, "after"))
+        name: Errors(*(alone(name, model) for model in MODELS))
         for name in dict.fromkeys(p.piece.recording for p in predictions["before"])
     }
-    sensors = {
-        name: (float(each["before"][i]), float(each["calibrated"][i]), float(each["after"][i]))
-        for i, name in enumerate(setup.channels)
-    }
+    sensors = {name: Errors(*(float(each[model][i]) for model in MODELS)) for i, name in enumerate(setup.channels)}
     return Fits(**overall, sensors=sensors, recordings=recordings)
 
 
