@@ -16,6 +16,20 @@ it from top to bottom):
 9. ``results.assemble``: predictions, places, findings, advice as a :class:`~diagnosis.results.result.Diagnosis`;
    ``report``: the page and the files.
 
+Words that the code has in one sense only:
+
+- A *piece* is a gap-free part of a recording on the grid (K intervals, K + 1 grid points). Simulated with some values
+  of the unknowns it is a *point*, and its temperatures are a *trajectory*.
+- An *unknown* is a number ``z`` with the prior N(0, 1). Its *column* is the derivative of the readings by ``z``;
+  *whitened* columns and residuals have passed the noise filter.
+- The *metric* is the inner product of whitened readings with *model error* and deviations between *sessions*
+  marginalised. Model error has groups of unknowns; a *class* states the amplitude of each group.
+- *Healthy* recordings are the baselines; all others that are learnt from are *tested*.
+- A :class:`~diagnosis.candidates.hypotheses.Hypothesis` is a *candidate* until it is in an explanation, then an
+  *effect*. Its *law* is its name at any place and course in time; its *variants* are the shapes that are tried.
+- *Judged* is one explanation at its places, with its evidence; an *explanation* is all those of the same laws. An
+  *answer* is an effect that is reported; a *finding* is an answer with its numbers.
+
 ``proof`` is apart: plants that hide a known effect, and the scores of any diagnosis of them. Nothing above imports it.
 
 Names are imported on first use, so that reading recordings does not load the inference.

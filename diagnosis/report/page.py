@@ -15,7 +15,7 @@ from diagnosis.report.chart import Chart
 from diagnosis.results import number_format as numbers
 from diagnosis.results.first_screen import ahead_in, date_told, size_of, values_told
 from diagnosis.results.result import Diagnosis
-from diagnosis.results.result_parts import NO_CLAIM, Calibrated, Finding, Fits, error_unit, title_of
+from diagnosis.results.result_parts import NO_CLAIM, Calibrated, Errors, Finding, Fits, error_unit, title_of
 
 PACKAGE = "diagnosis.report"
 PLOTLY = "plotly-basic.min.js"  # npm: plotly.js-basic-dist-min, of the version that the plotly of Python brings
@@ -113,16 +113,13 @@ def _finding(finding: Finding) -> dict[str, Any]:
     }
 
 
-def _rows(fits: Fits, faulty: Sequence[str]) -> list[tuple[str, str, tuple[float, float, float]]]:
+def _rows(fits: Fits, faulty: Sequence[str]) -> list[tuple[str, str, Errors]]:
     """Sensor, unit and errors; nothing without recordings."""
     if not math.isfinite(fits.before):
         return []
-    total = (
-        f"all but {', '.join(faulty)}" if faulty else "all temperatures",
-        "K",
-        (fits.before, fits.calibrated, fits.after),
-    )
-    return [total, *((c, error_unit(c), errors) for c, errors in fits.sensors.items())]
+    what = f"all but {', '.join(faulty)}" if faulty else "all temperatures"
+    total = Errors(before=fits.before, calibrated=fits.calibrated, after=fits.after)
+    return [(what, "K", total), *((c, error_unit(c), errors) for c, errors in fits.sensors.items())]
 
 
 def _calibrated(diagnosis: Diagnosis, one: Calibrated) -> dict[str, Any]:

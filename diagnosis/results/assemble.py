@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -19,6 +20,7 @@ from diagnosis.engine.scale import at_stated_size
 from diagnosis.engine.set_apart import refit_to_predict
 from diagnosis.forward.grid import too_short
 from diagnosis.forward.whitening import RandomHeat
+from diagnosis.recordings.recording import Recording
 from diagnosis.results.advice import next_test
 from diagnosis.results.findings import estimates_of, finding_of, joint_estimate_of, switch_errors
 from diagnosis.results.instruments import sensors_and_inputs_of
@@ -28,9 +30,11 @@ from diagnosis.results.predicted_run import PredictedRun
 from diagnosis.results.predictions import Predicted, Predictions, predict_recordings, temperatures
 from diagnosis.results.result import Diagnosis, Verdict
 from diagnosis.results.result_parts import (
+    MODELS,
     NO_CLAIM,
     Calibrated,
     CalibratedModel,
+    Errors,
     Finding,
     Fits,
     NotDetectable,
@@ -42,7 +46,6 @@ from diagnosis.setup.inference_setup import InferenceSetup
 from diagnosis.setup.noise import HEAT_FRACTION, HEAT_TIME_S, PARAMETRIC_FRACTION, PARAMETRIC_K, WANDER
 from models.base.types import Array
 from models.base.version import project_version
-from models.mechanisms import Mechanism
 from models.network.laws import Parameter
 from models.terms.term import Term
 
@@ -96,7 +99,7 @@ def assemble(
     jobs : int
         Processes
     """
-    settings, known, baselines = posterior.settings, setup.known, {r.name: r.sha256 for r in setup.baseline}
+    settings, known = posterior.settings, setup.known
     faulty = () if others is None else others.channels
     best = _best(posterior, answers)
     counting = [name for name in setup.channels if name not in faulty]
@@ -119,13 +122,9 @@ def assemble(
         for answer in answers
     ])  # fmt: skip
     findings = tuple(finding for _, finding in reported)
-    told = {name for finding in findings for name in (finding.mechanism, *finding.tie_set)}
-    told |= {rival.mechanism for finding in findings for rival in finding.confusable_with}
-    if posterior.detected:  # nobody is silent about a name that looks like what is there
-        told |= {one.effects[0].name for one in posterior.judged if one.log_bayes > posterior.threshold}
-    unseen = tuple(one for one in _unseen(posterior, setup.catalogue) if one.mechanism not in told)
+    unseen = _unseen(setup, posterior, findings)
     train_fits = _fits(setup, predicted.train, counting)
-    spoiled = spoiled_in(train_fits, holdout, baselines=baselines,
+    spoiled = spoiled_in(train_fits, holdout, baselines=[r.name for r in setup.baseline],
                          least_K=settings.matters_K + setup.noise_K)  # fmt: skip
     unfit = bool(spoiled) or train_fits.calibrated - train_fits.before > setup.noise_K
     verdict = verdict_of(posterior, [answer for answer, _ in reported], unseen, unfit=unfit)
@@ -173,21 +172,8 @@ def assemble(
         network=setup.nominal,
         shapes=setup.shapes,
         learnt=predicted.learnt,
-        inputs={
-            "recordings": {r.name: r.sha256 for r in setup.recordings},
-            "held_out": {r.name: r.sha256 for r in setup.holdout},
-            "baselines": baselines,
-            "switched_off": list(setup.switched_off),
-            "gearbox": setup.gearbox.hash,
-            "correction": known.summary()["sha256"] if known.has_physics else None,
-            "version": project_version(),
-        },
-        notes=(
-            *ratio_notes(final), *baseline_notes(experiment, posterior, answers),
-            *too_short((*setup.recordings, *setup.baseline), experiment.pieces),
-            *too_short(setup.holdout, setup.held_out),
-            *(f"{r.name}: {note}" for r in (*setup.recordings, *setup.holdout, *setup.baseline) for note in r.notes),
-        ),
+        inputs=_provenance(setup),
+        notes=(*ratio_notes(final), *baseline_notes(experiment, posterior, answers), *_notes_of_recordings(setup)),
         kinds={kind: posterior.of(kind) for kind in KINDS},
         settings=settings,
         error_class=posterior.error_class,
@@ -200,6 +186,31 @@ def assemble(
         contradicted=contradicted,
         spoiled=spoiled,
     )  # fmt: skip
+
+
+def _provenance(setup: InferenceSetup) -> dict[str, Any]:
+    """Hashes of all that was given, and the version."""
+
+    def hashes(recordings: Sequence[Recording]) -> dict[str, str]:
+        return {recording.name: recording.sha256 for recording in recordings}
+
+    return {
+        "recordings": hashes(setup.recordings),
+        "held_out": hashes(setup.holdout),
+        "baselines": hashes(setup.baseline),
+        "switched_off": list(setup.switched_off),
+        "gearbox": setup.gearbox.hash,
+        "correction": setup.known.summary()["sha256"] if setup.known.has_physics else None,
+        "version": project_version(),
+    }
+
+
+def _notes_of_recordings(setup: InferenceSetup) -> Iterator[str]:
+    """Pieces that were not used, and what was cleaned."""
+    yield from too_short((*setup.recordings, *setup.baseline), setup.learnt)
+    yield from too_short(setup.holdout, setup.held_out)
+    for recording in (*setup.recordings, *setup.holdout, *setup.baseline):
+        yield from (f"{recording.name}: {note}" for note in recording.notes)
 
 
 def _bound_on_chance(nats: float) -> float:
@@ -287,15 +298,20 @@ def verdict_of(
     return "missing_physics"
 
 
-def _unseen(posterior: Posterior, catalogue: Mapping[str, Mechanism]) -> tuple[NotDetectable, ...]:
+def _unseen(setup: InferenceSetup, posterior: Posterior, findings: Sequence[Finding]) -> tuple[NotDetectable, ...]:
     """Mechanisms that would not have been seen at the size that matters, at their best place."""
+    catalogue = setup.catalogue
+    told = {name for finding in findings for name in (finding.mechanism, *finding.tie_set)}
+    told |= {rival.mechanism for finding in findings for rival in finding.confusable_with}
+    if posterior.detected:  # nobody is silent about a name that looks like what is there
+        told |= {one.effects[0].name for one in posterior.judged if one.log_bayes > posterior.threshold}
     best: dict[str, Expected] = {}
     for one in sorted(posterior.expected, key=lambda one: one.weight):
         if one.effect.name in catalogue:
             best[one.effect.name] = one
     return tuple(
         NotDetectable(mechanism=name, place=one.effect.place, needed=catalogue[name].experiment, expected=one.log_bayes)
-        for name, one in sorted(best.items()) if one.weight < posterior.threshold
+        for name, one in sorted(best.items()) if one.weight < posterior.threshold and name not in told
     )  # fmt: skip
 
 
@@ -357,13 +373,10 @@ def _fits(setup: InferenceSetup, predictions: Predictions, counting: Collection[
         return overall_rmse([p for p in predictions[state] if p.piece.recording == recording], columns)
 
     recordings = {
-        name: (alone(name, "before"), alone(name, "calibrated"), alone(name, "after"))
+        name: Errors(*(alone(name, model) for model in MODELS))
         for name in dict.fromkeys(p.piece.recording for p in predictions["before"])
     }
-    sensors = {
-        name: (float(each["before"][i]), float(each["calibrated"][i]), float(each["after"][i]))
-        for i, name in enumerate(setup.channels)
-    }
+    sensors = {name: Errors(*(float(each[model][i]) for model in MODELS)) for i, name in enumerate(setup.channels)}
     return Fits(**overall, sensors=sensors, recordings=recordings)
 
 

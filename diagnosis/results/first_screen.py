@@ -235,7 +235,7 @@ def _how_much_better(d: Diagnosis) -> tuple[str, ...]:
             "Held-out temperatures are not closer than with the calibrated model: predict with calibrated.toml"
         )
     lines += [
-        f"{name} is missed: {d.holdout.recordings[name][2]:.2f} K, where it was learnt from {d.train.after:.2f} K"
+        f"{name} is missed: {d.holdout.recordings[name].after:.2f} K, where it was learnt from {d.train.after:.2f} K"
         for name in d.missed
     ]
     lines += _worse_recordings(d)
@@ -261,9 +261,9 @@ def _worse_recordings(d: Diagnosis) -> list[str]:
     if not d.has_correction or fits.after > fits.calibrated:
         return []
     return [
-        f"{name} alone is not closer: {calibrated:.2f} K calibrated, {after:.2f} K corrected"
-        for name, (_, calibrated, after) in fits.recordings.items()
-        if after - calibrated > d.noise_K
+        f"{name} alone is not closer: {errors.calibrated:.2f} K calibrated, {errors.after:.2f} K corrected"
+        for name, errors in fits.recordings.items()
+        if errors.after - errors.calibrated > d.noise_K
     ]
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 from diagnosis.decision.answer import Grade
 from models.base.types import Array
@@ -245,6 +245,14 @@ class Location:
         return self.nodes[0]
 
 
+class Errors(NamedTuple):
+    """Root mean square errors of the models in :data:`MODELS`, [K] or [W]."""
+
+    before: float
+    calibrated: float
+    after: float
+
+
 MISSED = 3.0  # times the error of the recordings learnt from, beyond which a held-out one is missed
 
 
@@ -257,9 +265,9 @@ class Fits:
     before, calibrated, found, after : float
         Over all temperatures, as delivered, calibrated, with the findings alone, and with what was learnt of model
         error too, [K]; NaN without recordings
-    sensors : mapping of channel to (before, calibrated, after)
+    sensors : mapping of channel to Errors
         [K], or [W] for ``P_loss``
-    recordings : mapping of recording to (before, calibrated, after)
+    recordings : mapping of recording to Errors
         Over all temperatures of each, [K]
     """
 
@@ -267,8 +275,8 @@ class Fits:
     calibrated: float
     found: float
     after: float
-    sensors: Mapping[str, tuple[float, float, float]]
-    recordings: dict[str, tuple[float, float, float]]
+    sensors: Mapping[str, Errors]
+    recordings: Mapping[str, Errors]
 
     def contradict(self, gain: float, noise_K: float, needed: float) -> bool:
         """True if these recordings contradict the findings: by the log score, or by an error larger by the noise.
@@ -281,8 +289,8 @@ class Fits:
     def far_beyond(self, train: Fits, matters_K: float) -> tuple[str, ...]:
         """Recordings whose error is several times that of those learnt from and larger by what matters, worst first."""
         far = {
-            name: after for name, (_, _, after) in self.recordings.items()
-            if after > MISSED * train.after and after - train.after > matters_K
+            name: errors.after for name, errors in self.recordings.items()
+            if errors.after > MISSED * train.after and errors.after - train.after > matters_K
         }  # fmt: skip
         return tuple(sorted(far, key=lambda name: -far[name]))
 
@@ -307,10 +315,11 @@ def spoiled_in(
 
     What is both learnt from and held out counts by its held-out part.
     """
-    tested = {name: errors for name, errors in train.recordings.items() if name not in baselines} | holdout.recordings
+    tested = {name: errors for name, errors in train.recordings.items() if name not in baselines}
     return {
-        name: (before, calibrated) for name, (before, calibrated, _) in tested.items() if calibrated - before > least_K
-    }
+        name: (errors.before, errors.calibrated) for name, errors in {**tested, **holdout.recordings}.items()
+        if errors.calibrated - errors.before > least_K
+    }  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)

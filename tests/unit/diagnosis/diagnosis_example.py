@@ -11,6 +11,7 @@ from diagnosis.results.predicted_run import PredictedRun
 from diagnosis.results.result import Diagnosis
 from diagnosis.results.result_parts import (
     Calibrated,
+    Errors,
     Finding,
     Fits,
     Location,
@@ -239,10 +240,10 @@ def _ranking(*first: tuple[str, str, float]) -> tuple[Ranked, ...]:
 
 def _fits(before: float, calibrated: float, after: float) -> Fits:
     sensors = {
-        channel: ((40.0, 22.0, 6.0) if channel == "P_loss" else (before * k, calibrated * k, after * k))
+        channel: Errors(40.0, 22.0, 6.0) if channel == "P_loss" else Errors(before * k, calibrated * k, after * k)
         for k, channel in zip(np.linspace(1.3, 0.7, len(CHANNELS)).tolist(), CHANNELS, strict=True)
     }
-    recordings = {f"{name}_1": (before, calibrated, after) for name in ("morning", "evening")}
+    recordings = {f"{name}_1": Errors(before, calibrated, after) for name in ("morning", "evening")}
     return Fits(before=before, calibrated=calibrated, found=after, after=after, sensors=sensors, recordings=recordings)
 
 

@@ -36,7 +36,7 @@ def test_all_is_judged_once_more_from_a_better_basin(
         "calibrate_apart": lambda *_: (None, ()),
         "calibrate_with_error": lambda *_: calibration("first", 0.0),
         "recalibrate": lambda *_: calibration("second", again),
-        "candidates_of": lambda *_: (), "outside_of": lambda *_: (),
+        "start_with_switches": lambda *_: None, "candidates_of": lambda *_: (), "outside_of": lambda *_: (),
         "infer": infer, "faulty_channels": lambda *_: (), "decide": lambda *_: (),
         "assemble": lambda setup, experiment, posterior, *_, **given: (posterior.name, given["calibration"].name),
     }  # fmt: skip

@@ -12,7 +12,7 @@ from diagnosis.decision.settings import Settings
 from diagnosis.report import finding_charts, page
 from diagnosis.results.first_screen import EITHER, VERDICT_TEXT
 from diagnosis.results.result import Diagnosis
-from diagnosis.results.result_parts import Change, Fits, Ranked, Rival, Switching
+from diagnosis.results.result_parts import Change, Errors, Fits, Ranked, Rival, Switching
 from tests.unit.diagnosis.diagnosis_example import consistent, missing_physics, two_effects, unexplained
 
 
@@ -192,7 +192,7 @@ def test_a_larger_held_out_error_is_not_called_better() -> None:
 
 def test_a_held_out_recording_that_loses_is_named() -> None:
     base = missing_physics()
-    recordings = {"run_7": (3.0, 0.5, 0.3), "run_8": (3.0, 0.5, 0.5 + 2.0 * base.noise_K)}
+    recordings = {"run_7": Errors(3.0, 0.5, 0.3), "run_8": Errors(3.0, 0.5, 0.5 + 2.0 * base.noise_K)}
     mixed = replace(base, holdout=replace(base.holdout, recordings=recordings))
     lines = told(mixed, "How much better?")
     assert "run_8 alone is not closer: 0.50 K calibrated" in lines and "run_7" not in lines
@@ -203,7 +203,11 @@ def test_a_held_out_recording_of_a_machine_that_changed_is_no_agreement() -> Non
     base = consistent()
     assert base.missed == () and "missed" not in told(base, "How much better?")
     far = base.train.after + 2.0 * base.settings.matters_K + 3.0 * base.train.after
-    recordings = {"good": (1.0, 0.4, 0.4), "moved": (1.0, far, far), "worse": (1.0, far + 1.0, far + 1.0)}
+    recordings = {
+        "good": Errors(1.0, 0.4, 0.4),
+        "moved": Errors(1.0, far, far),
+        "worse": Errors(1.0, far + 1.0, far + 1.0),
+    }
     changed = replace(base, holdout=replace(base.holdout, recordings=recordings))
     assert changed.missed == ("worse", "moved")
     assert changed.verdict_text == "What was learnt from agrees with the model; held-out worse, moved do not."

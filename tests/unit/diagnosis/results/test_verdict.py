@@ -10,7 +10,7 @@ from diagnosis.decision.posterior import Judged, Posterior
 from diagnosis.engine.learnt import error_classes, rule
 from diagnosis.results.assemble import verdict_of
 from diagnosis.results.first_screen import first_screen_of, verdict_text_of
-from diagnosis.results.result_parts import spoiled_in
+from diagnosis.results.result_parts import Errors, spoiled_in
 from tests.unit.diagnosis.diagnosis_example import consistent
 
 
@@ -38,8 +38,8 @@ def test_recordings_that_do_not_fit_one_machine_are_named() -> None:
     """As after a change: calibration makes those after it worse, and those before it better; baselines do not count."""
     base = consistent()
     train = replace(base.train, before=2.2, calibrated=1.9, recordings={
-        "before": (3.0, 1.0, 1.0), "after": (1.0, 2.2, 2.2), "april": (1.0, 9.0, 9.0)})  # fmt: skip
-    holdout = replace(base.holdout, recordings={"held": (1.0, 2.0, 2.0), "near": (1.0, 1.9, 1.9)})
+        "before": Errors(3.0, 1.0, 1.0), "after": Errors(1.0, 2.2, 2.2), "april": Errors(1.0, 9.0, 9.0)})  # fmt: skip
+    holdout = replace(base.holdout, recordings={"held": Errors(1.0, 2.0, 2.0), "near": Errors(1.0, 1.9, 1.9)})
     spoiled = spoiled_in(train, holdout, baselines=["april"], least_K=0.95)
     assert spoiled == {"after": (1.0, 2.2), "held": (1.0, 2.0)}
     changed = replace(base, verdict="unexplained", train=train, spoiled=spoiled)
