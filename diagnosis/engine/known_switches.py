@@ -18,6 +18,7 @@ from diagnosis.candidates.hypotheses import Hypothesis
 from diagnosis.engine.fit import Experiment, calibrate
 from diagnosis.engine.prepare import prepare_experiment
 from diagnosis.engine.scan import scan
+from diagnosis.engine.switch_grid import switch_numbers
 from diagnosis.setup.inference_setup import InferenceSetup
 from models.base.types import Array
 from models.correction.corrected_gearbox import corrected_gearbox
@@ -59,9 +60,9 @@ def _may_be_absent(term: Term) -> Term:
 
 def _roughly_known(term: Term) -> list[int]:
     """Places of the uncertain parameters that decide when a term switches, or else of those of its memories."""
-    switches = [state.update for state in term.states if state.update is not None]
-    laws = switches or [state.rate for state in term.states]
-    remembered = {symbol.name for law in laws for symbol in law.free_symbols}
+    if any(state.update is not None for state in term.states):
+        return switch_numbers(term)
+    remembered = {symbol.name for state in term.states for symbol in state.rate.free_symbols}
     return [i for i, p in enumerate(term.parameters[1:], start=1) if p.name in remembered and p.sd > 0.0]
 
 

@@ -11,6 +11,7 @@ from diagnosis.candidates.hypotheses import Hypothesis
 from diagnosis.engine.fit import Experiment, Fit, Linearised
 from diagnosis.engine.point import Machine
 from diagnosis.engine.scan import Starts, columns_of, scope_of
+from diagnosis.engine.switch_grid import refined, switch_numbers
 from diagnosis.engine.unknown import TERM_STEP, Held, NetworkParameter, TermParameter, Unknown
 from diagnosis.forward.network_on_grid import NetworkOnGrid
 from models.base.types import Array
@@ -29,13 +30,17 @@ def refit(
 
     The other unknowns start where the straight line puts them with the candidate there. What it does may be far from
     a straight line; so smaller shares of the promised strength are tried until a rough fit agrees better with the
-    readings than without the candidate, and all further starts. The best rough fit goes on.
+    readings than without the candidate, and all further starts. The best rough fit goes on. What switches starts where
+    finer scans put its numbers.
 
     Raises
     ------
     ArithmeticError
         If there is no solution at any of the starts.
     """
+    if candidate.term is not None and switch_numbers(candidate.term):
+        candidate, strength = refined(fit, candidate, [variant, *(other for other, _ in further)])
+        variant, further = 0, ()
     line = cache(lambda one: _straight_line(fit, candidate, one))
     # The fit may be far from an optimum: readings of a channel may be back that it never saw.
     step = fit.linearised.step(fit.z, 0.0, *fit.experiment.bounds)
