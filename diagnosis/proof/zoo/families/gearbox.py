@@ -10,7 +10,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from diagnosis.proof.plant.anatomy import AIR, FRAME, T_SERVICE
+from diagnosis.proof.plant.anatomy import AIR, FRAME
+from diagnosis.proof.plant.sizes import T_SERVICE
 from diagnosis.proof.zoo.families import films, losses
 from diagnosis.proof.zoo.families.builder import Builder, wander
 from diagnosis.proof.zoo.families.design import Design
