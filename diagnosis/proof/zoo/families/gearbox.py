@@ -110,7 +110,7 @@ class _Gearbox:
 
     def _to_air(self, wall: str, air: str, share: float, half_slab: float) -> None:
         housing = self.gearbox.housing
-        h, area, L = films.CONVECTION[self.design.convection], housing.outside_area_m2 * share, housing.height_m
+        h, area, L = self.design.convection, housing.outside_area_m2 * share, housing.height_m
         still = self.still
 
         def conductance(m: Moment) -> Array:
