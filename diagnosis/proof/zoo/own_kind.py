@@ -9,7 +9,7 @@ import numpy as np
 
 from diagnosis.proof.plant.anatomy import AIR, FRAME, OIL, SPLASH, SUMP
 from diagnosis.proof.plant.effect import Concealed
-from diagnosis.proof.plant.instruments import SENSOR_EFFECTS, Instruments, record
+from diagnosis.proof.plant.instruments import SENSOR_EFFECTS, OwnInstruments, record
 from diagnosis.proof.plant.laws import Laws
 from diagnosis.proof.plant.plant import Moment as OwnMoment
 from diagnosis.proof.plant.plant import Plant
@@ -30,7 +30,9 @@ INPUT_COLUMNS = {
 }
 
 
-def design_of_own_kind(plant: Plant, individual: Individual, runs: Sequence[Run], instruments: Instruments) -> Design:
+def design_of_own_kind(
+    plant: Plant, individual: Individual, runs: Sequence[Run], instruments: OwnInstruments
+) -> Design:
     """The oracle's design of a case of the own kind.
 
     Parameters
@@ -43,7 +45,7 @@ def design_of_own_kind(plant: Plant, individual: Individual, runs: Sequence[Run]
 
 
 def effect_on_readings(
-    plant: Plant, runs: Sequence[Run], instruments: Instruments, effects: Sequence[Concealed]
+    plant: Plant, runs: Sequence[Run], instruments: OwnInstruments, effects: Sequence[Concealed]
 ) -> list[Mapping[str, Array]]:
     """Noise-free readings with effects minus those without any, of the training recordings.
 
@@ -73,7 +75,7 @@ def effect_on_readings(
 
 
 def _by_wrong_inputs(
-    plant: Plant, run: Run, instruments: Instruments, wrong: Mapping[str, Array]
+    plant: Plant, run: Run, instruments: OwnInstruments, wrong: Mapping[str, Array]
 ) -> Mapping[str, Array]:
     """Readings that true inputs cause, less those that recorded inputs would, by channel."""
     zoo, right = as_zoo(plant, run.individual, instruments), as_programme(plant, run)
@@ -105,7 +107,7 @@ def as_programme(plant: Plant, run: Run) -> Programme:
     )
 
 
-def as_zoo(plant: Plant, individual: Individual, instruments: Instruments) -> ZooPlant:
+def as_zoo(plant: Plant, individual: Individual, instruments: OwnInstruments) -> ZooPlant:
     """One gearbox of the own kind as a plant of the zoo, with the same laws.
 
     Returns
