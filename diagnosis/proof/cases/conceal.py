@@ -297,14 +297,10 @@ def _run(plant: Plant, individual: Individual, programme: Programme, rng: np.ran
         str(place): ornstein_uhlenbeck(rows, rng, sd=rng.uniform(1.0, 2.0), tau_s=rng.uniform(600.0, 1800.0))
         for place in restless
     }
-    return Run(
-        individual=individual,
-        programme=programme,
-        air=air,
-        air_speed=np.full(rows, plant.gearbox.ambient.air_speed_m_s),
-        start=float(air[0] + rng.normal(0.0, 0.5)),
-        random_heat=random_heat,
-    )
+    inputs = {**programme.inputs, "T_ambient": air, "air_speed": np.full(rows, plant.gearbox.ambient.air_speed_m_s)}
+    start = dict.fromkeys(plant.anatomy.nodes, float(air[0] + rng.normal(0.0, 0.5)))
+    driven = replace(programme, inputs=inputs, random_heat=random_heat, start=start)
+    return Run(individual=individual, programme=driven)
 
 
 def _instruments(plant: Plant, plan: Plan, rng: np.random.Generator) -> OwnInstruments:

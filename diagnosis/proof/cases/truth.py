@@ -80,8 +80,8 @@ def truth_of(plant: Plant, case: ConcealedCase, by_twin: Sequence[Sequence[Outco
             "stated": None if instruments.stated is None else dict(instruments.stated),
             "dropouts": instruments.dropouts,
             "random_heat": {
-                run.programme.name: {place: round(float(np.std(w)), 2) for place, w in run.random_heat.items()}
-                for run in case.runs
+                p.name: {place: round(float(np.std(w)), 2) for place, w in p.random_heat.items()}
+                for p in (run.programme for run in case.runs)
             },
         },
         "hottest_oil_degC": round(max(float(_at(plant, o, "oil").max()) for o in everything), 1),

@@ -104,11 +104,12 @@ def record(
     """
     first, rows = run.programme.unrecorded, len(outcome.T)
     time = np.asarray(np.arange(rows) * ROW_S, dtype=np.float64)
+    true = {name: values[first:] for name, values in run.programme.inputs.items()}
     inputs: dict[str, Array] = {
-        "speed_rpm": run.programme.speed[first:],
-        "torque_Nm": run.programme.torque[first:] * (1.0 + instruments.torque_gain),
-        "T_ambient_degC": run.air[first:] + instruments.ambient_offset_K,
-        "air_speed_m_s": run.air_speed[first:],
+        "speed_rpm": true["speed"],
+        "torque_Nm": true["torque"] * (1.0 + instruments.torque_gain),
+        "T_ambient_degC": true["T_ambient"] + instruments.ambient_offset_K,
+        "air_speed_m_s": true["air_speed"],
     }
     places = plant.anatomy.coarse
     readings = {p: lagged(outcome.T[:, places.index(p)], instruments.lag_s[p]) for p in instruments.channels}

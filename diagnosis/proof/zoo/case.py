@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
+from diagnosis.proof.plant.cycles import Programme
 from diagnosis.proof.zoo.effects import ZooEffect
 from diagnosis.proof.zoo.faults import Fault, spoiled
 from diagnosis.proof.zoo.oracle import LOSS, OracleNats
 from diagnosis.proof.zoo.recorder import ZooInstruments, measure
 from diagnosis.proof.zoo.simulate import simulate
-from diagnosis.proof.zoo.structure import Change, Law, Outcome, Programme, Variant, ZooPlant
+from diagnosis.proof.zoo.structure import Change, Law, Outcome, Variant, ZooPlant
 from models.base.types import Array
 
 GROUPS = ("control", "single", "date", "sensor", "pair", "outside", "messy")

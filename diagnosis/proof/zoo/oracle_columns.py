@@ -15,11 +15,12 @@ from itertools import combinations_with_replacement
 
 import numpy as np
 
+from diagnosis.proof.plant.cycles import Programme
 from diagnosis.proof.plant.instruments import Instruments
 from diagnosis.proof.zoo.oracle import LOSS, MEAN_S, Design, RecordingColumns, averaged
 from diagnosis.proof.zoo.run import follow, read_probes
 from diagnosis.proof.zoo.simulate import Direction, Linearised, ParameterDirection, StartDirection
-from diagnosis.proof.zoo.structure import Change, Law, Moment, Probe, Programme, ZooPlant, constant, times
+from diagnosis.proof.zoo.structure import Change, Law, Moment, Probe, ZooPlant, constant, times
 from models.base.types import Array
 
 SMOOTH_SD, LUMPED_SD, MIXING_SD, SENSOR_K = 0.04, 0.1, 0.04, 0.1

@@ -8,9 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from diagnosis.proof.cases.conceal import DATA_SHEET, SLOW_LAG_S
+from diagnosis.proof.plant.cycles import Programme
 from diagnosis.proof.plant.instruments import Instruments, drop_readings
 from diagnosis.proof.zoo.faults import AMBIENT, Fault, Measured, hold_reading, spoiled
-from diagnosis.proof.zoo.structure import Outcome, Programme, ZooPlant
+from diagnosis.proof.zoo.structure import Outcome, ZooPlant
 from models.base.types import Array
 
 SLOW_ROW_S = 60.0  # rows longer than this are means: less noise, lags do not show

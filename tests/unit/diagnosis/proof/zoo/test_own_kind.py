@@ -29,10 +29,16 @@ def plant(fzg: Gearbox) -> Plant:
 def run(plant: Plant, fzg: Gearbox) -> Run:
     n, M = top_speed(fzg), reference_torque(fzg)
     speed = np.concatenate([np.full(120, 0.4 * n), np.full(120, 0.7 * n)])
-    programme = Programme(name="train_1", speed=speed, torque=np.full(ROWS, M), unrecorded=30)
+    inputs = {
+        "speed": speed,
+        "torque": np.full(ROWS, M),
+        "T_ambient": np.full(ROWS, 25.0),
+        "air_speed": np.full(ROWS, 2.0),
+    }
+    start = dict.fromkeys(plant.anatomy.nodes, 40.0)
+    programme = Programme(name="train_1", inputs=inputs, start=start, unrecorded=30)
     who = Individual(factors=dict(fzg.factors) | {"mesh": 1.1, "C_oil": 0.9}, reading=1, oil_exponent=0.02)
-    return Run(individual=who, programme=programme, air=np.full(ROWS, 25.0), air_speed=np.full(ROWS, 2.0), start=40.0,
-               random_heat={})  # fmt: skip
+    return Run(individual=who, programme=programme)
 
 
 @pytest.fixture(scope="module")
@@ -72,6 +78,8 @@ def test_a_wrong_recorded_input_counts_as_what_it_would_cause(
     kind = next(effect for effect in SENSOR_EFFECTS if effect.name == "ambient_probe_offset")
     fault = Concealed(effect=kind, places=("T_ambient",), parameters={"a": 2.0}, strength=1.0)
     x = effect_on_readings(plant, [run], instruments, [fault])[0]
-    true, recorded = run_plant(plant, [run, replace(run, air=run.air + 2.0)])
+    inputs = run.programme.inputs
+    warmer = replace(run.programme, inputs={**inputs, "T_ambient": inputs["T_ambient"] + 2.0})
+    true, recorded = run_plant(plant, [run, replace(run, programme=warmer)])
     oil = plant.anatomy.coarse.index("oil")
     np.testing.assert_allclose(x["oil"], true.T[:, oil] - recorded.T[:, oil], atol=1e-6)
