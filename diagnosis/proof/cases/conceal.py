@@ -108,8 +108,13 @@ def mixed_plans(seed: int, counts: Mapping[str, int]) -> list[Plan]:
 
 def random_plans(seed: int, number: int) -> list[Plan]:
     """Plans drawn in the proportions of :data:`MIX`."""
-    groups = np.random.default_rng([seed, 0]).choice(list(MIX), number, p=list(MIX.values()))
-    return mixed_plans(seed, {group: int(np.sum(groups == group)) for group in MIX})
+    return mixed_plans(seed, drawn_counts(seed, number, MIX))
+
+
+def drawn_counts(seed: int, number: int, mix: Mapping[str, float]) -> dict[str, int]:
+    """How many cases of each group, drawn in the proportions of a mix."""
+    groups = np.random.default_rng([seed, 0]).choice(list(mix), number, p=list(mix.values()))
+    return {group: int(np.sum(groups == group)) for group in mix}
 
 
 def _in_turn(group: str, names: Sequence[str], rng: np.random.Generator) -> Callable[[int], Plan]:

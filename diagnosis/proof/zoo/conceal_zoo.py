@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from diagnosis.proof.cases.case_files import write_case
+from diagnosis.proof.cases.conceal import drawn_counts
 from diagnosis.proof.zoo.case import BASELINE, CONTROLS, GROUPS, ZooCase
 from diagnosis.proof.zoo.draw import draw_case
 from diagnosis.proof.zoo.families import FAMILIES, find_family
@@ -93,9 +94,7 @@ def random_zoo_plans(
     seed: int, number: int, *, families: Sequence[str] | None = None, machine: str | None = None
 ) -> list[ZooPlan]:
     """Plans drawn in the proportions of :data:`ZOO_MIX`."""
-    drawn = np.random.default_rng([seed, 0]).choice(list(ZOO_MIX), number, p=list(ZOO_MIX.values()))
-    counts = {group: int(np.sum(drawn == group)) for group in ZOO_MIX}
-    return zoo_plans(seed, counts, families=families, machine=machine)
+    return zoo_plans(seed, drawn_counts(seed, number, ZOO_MIX), families=families, machine=machine)
 
 
 def conceal_zoo(
