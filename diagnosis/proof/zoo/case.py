@@ -22,6 +22,31 @@ SEEN_NATS = 3.0
 NatsOf = Callable[[Sequence[Mapping[str, Array]]], OracleNats]
 
 
+@dataclass(frozen=True, kw_only=True)
+class ZooPlan:
+    """A case before it is drawn.
+
+    Attributes
+    ----------
+    family : str
+        See :func:`~diagnosis.proof.zoo.families.find_family`
+    machine : str
+        Name or file of the nominal definition
+    seed : int
+        Of this case
+    group : str
+        One of :data:`GROUPS`
+    kind : str or None
+        Of a control one of :data:`CONTROLS`, drawn if None
+    """
+
+    family: str
+    machine: str
+    seed: int
+    group: str
+    kind: str | None = None
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class CaseRuns:
     """Runs of a case.
@@ -52,8 +77,8 @@ class ZooCase:
 
     Attributes
     ----------
-    group, kind : str
-        One of :data:`GROUPS`; of a control one of :data:`CONTROLS`, else ``effects``
+    plan : ZooPlan
+        With the kind of a control
     plant : ZooPlant
         With the parts that effects bring along
     programmes : tuple of Programme
@@ -77,11 +102,7 @@ class ZooCase:
     """
 
     name: str
-    seed: int
-    group: str
-    kind: str
-    family: str
-    machine: str
+    plan: ZooPlan
     plant: ZooPlant
     programmes: tuple[Programme, ...]
     effects: tuple[ZooEffect, ...]

@@ -37,7 +37,7 @@ class ZooInstruments(Instruments):
     clock_s: float
 
 
-def draw_instruments(plant: ZooPlant, kind: str, *, has_loss: bool, rng: np.random.Generator) -> ZooInstruments:
+def draw_instruments(plant: ZooPlant, kind: str | None, *, has_loss: bool, rng: np.random.Generator) -> ZooInstruments:
     """Draw the instruments of a case; `kind` is that of a control, see :data:`diagnosis.proof.zoo.case.CONTROLS`."""
     slow = plant.row_s > SLOW_ROW_S
     noise = SLOW_NOISE_K if slow else NOISE_K
