@@ -252,7 +252,7 @@ class Setting:
         return lambda m: np.asarray(sum(share * m.T[name] for name, share in shares.items()))
 
     def quantile(self, node: str, q: float) -> float:
-        """Temperature that a node of the healthy plant is below for a share of the first recording, [degC]."""
+        """Temperature that a node of the healthy plant is below for a share of the recording `healthy`, [degC]."""
         return float(np.quantile(sum(share * self.healthy[name] for name, share in self.bodies(node).items()), q))
 
     # ------------------------------------------------------------------ acts at a strength of 1
