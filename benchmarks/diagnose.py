@@ -73,13 +73,14 @@ def make_recordings(folder: Path, lengths_h: Sequence[float], step_s: float, eff
         while len(speed) < rows:
             order = [p for p in programmes(plant.gearbox, rng) if not p.unrecorded]
             for programme in [order[1], *order] if rows < len(order[0]) else order:
-                speed, torque = np.append(speed, programme.speed), np.append(torque, programme.torque)
-        programme = Programme(name=f"run_{len(runs) + 1}", speed=speed[:rows], torque=torque[:rows])
+                speed = np.append(speed, programme.inputs["speed"])
+                torque = np.append(torque, programme.inputs["torque"])
         air = ambient(rows, rng)
-        runs.append(replace(
-            case.runs[0], programme=programme, air=air, air_speed=np.full(rows, plant.gearbox.ambient.air_speed_m_s),
-            start=float(air[0]), random_heat={}, effects=case.physics,
-        ))  # fmt: skip
+        inputs = {"speed": speed[:rows], "torque": torque[:rows], "T_ambient": air,
+                  "air_speed": np.full(rows, plant.gearbox.ambient.air_speed_m_s)}  # fmt: skip
+        start = dict.fromkeys(plant.anatomy.nodes, float(air[0]))
+        programme = Programme(name=f"run_{len(runs) + 1}", inputs=inputs, start=start)
+        runs.append(replace(case.runs[0], programme=programme, effects=case.physics))
     paths = []
     for run, outcome in zip(runs, run_plant(plant, runs), strict=True):
         columns = record(plant, run, outcome, case.instruments, (), None)

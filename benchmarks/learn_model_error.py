@@ -25,6 +25,7 @@ from diagnosis.engine.gram import Given, gram_of, whitened_base
 from diagnosis.engine.learnt import error_classes
 from diagnosis.engine.model_error import ModelError
 from diagnosis.engine.prepare import prepare_experiment
+from diagnosis.proof.zoo.case import ZooPlan
 from diagnosis.proof.zoo.conceal_zoo import write_zoo_case
 from diagnosis.proof.zoo.draw import draw_case
 from diagnosis.proof.zoo.families import FAMILIES
@@ -80,7 +81,7 @@ def keep(family: str, machine: str, seed: int, file: Path) -> None:
     """Draw a healthy case and write what its readings have to do with model error."""
     gearbox = load_gearbox(machine)
     try:
-        case = draw_case(family, machine, seed, "control", kind="clean")
+        case = draw_case(ZooPlan(family=family, machine=machine, seed=seed, group="control", kind="clean"))
     except InputError as error:
         print(f"{file.stem}: {error}")
         return

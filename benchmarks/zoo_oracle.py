@@ -18,7 +18,7 @@ from typing import Any
 import matplotlib as mpl
 import numpy as np
 
-from diagnosis.proof.zoo.case import GROUPS
+from diagnosis.proof.zoo.case import GROUPS, ZooPlan
 from diagnosis.proof.zoo.draw import draw_case
 from diagnosis.proof.zoo.families import FAMILIES
 from models.base.errors import InputError
@@ -58,7 +58,7 @@ def _one_case(seed: int, k: int, families: list[str]) -> dict[str, Any]:
     began = time.process_time()
     about = {"case": k, "family": family, "machine": machine, "group": group}
     try:
-        case = draw_case(family, machine, int(rng.integers(2**31)), group)
+        case = draw_case(ZooPlan(family=family, machine=machine, seed=int(rng.integers(2**31)), group=group))
     except InputError as error:
         return about | {"refused": str(error)}
     first = case.nats_of_effects[0]

@@ -17,10 +17,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from diagnosis.proof.plant.cycles import Programme
 from diagnosis.proof.zoo.families import FAMILIES
 from diagnosis.proof.zoo.programmes import MINUTES_S, programmes
 from diagnosis.proof.zoo.simulate import simulate
-from diagnosis.proof.zoo.structure import Programme, Variant, ZooPlant
+from diagnosis.proof.zoo.structure import Variant, ZooPlant
 from models.assembly.gearbox import load_gearbox
 from models.base.types import Array
 from models.columns.curves import PALETTE, STYLE

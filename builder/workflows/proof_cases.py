@@ -17,7 +17,7 @@ from models.base.progress import Progress
 
 if TYPE_CHECKING:
     from diagnosis.proof.cases.concealed_case import Plan
-    from diagnosis.proof.zoo.conceal_zoo import ZooPlan
+    from diagnosis.proof.zoo.case import ZooPlan
 
 # Of a proof on plants of the zoo.
 ZOO_MIX = {"control": 20, "single": 13, "date": 9, "sensor": 6, "pair": 5, "outside": 5, "messy": 2}
@@ -82,7 +82,7 @@ def make_zoo_case(name: str, plan: ZooPlan, recordings: Path, truth: Path, basel
     from diagnosis.proof.zoo.conceal_zoo import write_zoo_case
     from diagnosis.proof.zoo.draw import draw_case
 
-    case = draw_case(plan.family, plan.machine, plan.seed, plan.group, name=name, kind=plan.kind, baselines=baselines)
+    case = draw_case(plan, name=name, baselines=baselines)
     write_zoo_case(case, recordings / name, truth / f"{name}.json")
 
 

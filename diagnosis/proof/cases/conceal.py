@@ -20,7 +20,7 @@ from diagnosis.proof.plant.effect import Concealed, Effect
 from diagnosis.proof.plant.effects_heat import HEAT_EFFECTS
 from diagnosis.proof.plant.effects_losses import LOSS_EFFECTS
 from diagnosis.proof.plant.effects_outside import OUTSIDE_EFFECTS
-from diagnosis.proof.plant.instruments import SENSOR_EFFECTS, Instruments, default_channels, record
+from diagnosis.proof.plant.instruments import SENSOR_EFFECTS, OwnInstruments, default_channels, record
 from diagnosis.proof.plant.plant import READINGS, Plant
 from diagnosis.proof.plant.plant_run import EXPONENTS, ORDINARY_SPREAD, Individual, Run, factor_sd, run_plant
 from models.assembly.gearbox import Gearbox, load_gearbox
@@ -108,8 +108,13 @@ def mixed_plans(seed: int, counts: Mapping[str, int]) -> list[Plan]:
 
 def random_plans(seed: int, number: int) -> list[Plan]:
     """Plans drawn in the proportions of :data:`MIX`."""
-    groups = np.random.default_rng([seed, 0]).choice(list(MIX), number, p=list(MIX.values()))
-    return mixed_plans(seed, {group: int(np.sum(groups == group)) for group in MIX})
+    return mixed_plans(seed, drawn_counts(seed, number, MIX))
+
+
+def drawn_counts(seed: int, number: int, mix: Mapping[str, float]) -> dict[str, int]:
+    """How many cases of each group, drawn in the proportions of a mix."""
+    groups = np.random.default_rng([seed, 0]).choice(list(mix), number, p=list(mix.values()))
+    return {group: int(np.sum(groups == group)) for group in mix}
 
 
 def _in_turn(group: str, names: Sequence[str], rng: np.random.Generator) -> Callable[[int], Plan]:
@@ -297,23 +302,19 @@ def _run(plant: Plant, individual: Individual, programme: Programme, rng: np.ran
         str(place): ornstein_uhlenbeck(rows, rng, sd=rng.uniform(1.0, 2.0), tau_s=rng.uniform(600.0, 1800.0))
         for place in restless
     }
-    return Run(
-        individual=individual,
-        programme=programme,
-        air=air,
-        air_speed=np.full(rows, plant.gearbox.ambient.air_speed_m_s),
-        start=float(air[0] + rng.normal(0.0, 0.5)),
-        random_heat=random_heat,
-    )
+    inputs = {**programme.inputs, "T_ambient": air, "air_speed": np.full(rows, plant.gearbox.ambient.air_speed_m_s)}
+    start = dict.fromkeys(plant.anatomy.nodes, float(air[0] + rng.normal(0.0, 0.5)))
+    driven = replace(programme, inputs=inputs, random_heat=random_heat, start=start)
+    return Run(individual=individual, programme=driven)
 
 
-def _instruments(plant: Plant, plan: Plan, rng: np.random.Generator) -> Instruments:
+def _instruments(plant: Plant, plan: Plan, rng: np.random.Generator) -> OwnInstruments:
     channels = default_channels(plant)
     lag = SLOW_LAG_S if plan.kind == "lag_wrong" else (10.0, 20.0)
     noisy = plan.kind == "noise_misstated"
     # Half of all cases come with a data sheet, so that its presence reveals nothing.
     stated = plan.kind in ("noise_misstated", "lag_wrong") or rng.random() < 0.5
-    return Instruments(
+    return OwnInstruments(
         channels=channels,
         lag_s={place: float(rng.uniform(*lag)) for place in channels},
         noise_K=float(rng.uniform(*NOISY_K)) if noisy else 0.2,

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagnosis.proof.cases.concealed_case import ConcealedCase
-from diagnosis.proof.plant.cycles import ROW_S
+from diagnosis.proof.plant.cycles import ROW_S, Programme
 from diagnosis.proof.plant.effect import Concealed
-from diagnosis.proof.plant.instruments import record
+from diagnosis.proof.plant.instruments import Instruments, record
 from diagnosis.proof.plant.plant import Plant
 from diagnosis.proof.plant.plant_run import Outcome, factor_sd
 from models.base.types import Array
@@ -70,24 +70,33 @@ def truth_of(plant: Plant, case: ConcealedCase, by_twin: Sequence[Sequence[Outco
         "base_parameters": {name: round(value, 5) for name, value in case.individual.factors.items()},
         "friction_reading": case.individual.reading,
         "noise": {
-            "white_K": round(instruments.noise_K, 3),
-            "quantum_K": instruments.quantum_K,
-            "sensor_lag_s": {name: round(value, 2) for name, value in instruments.lag_s.items()},
+            **facts_of_noise(instruments, instruments.lag_s, [run.programme for run in case.runs]),
             "ambient_offset_K": round(instruments.ambient_offset_K, 3),
             "torque_gain": round(instruments.torque_gain, 5),
-            "loss_gain": round(instruments.loss_gain, 5),
-            "loss_offset_W": round(instruments.loss_offset_W, 3),
-            "stated": None if instruments.stated is None else dict(instruments.stated),
-            "dropouts": instruments.dropouts,
-            "random_heat": {
-                run.programme.name: {place: round(float(np.std(w)), 2) for place, w in run.random_heat.items()}
-                for run in case.runs
-            },
         },
         "hottest_oil_degC": round(max(float(_at(plant, o, "oil").max()) for o in everything), 1),
         "start_degC": {
             run.programme.name: round(float(_at(plant, o, "oil")[0]), 1)
             for run, o in zip(case.runs, everything, strict=True)
+        },
+    }
+
+
+def facts_of_noise(
+    instruments: Instruments, lag_s: Mapping[str, float], programmes: Sequence[Programme]
+) -> dict[str, Any]:
+    """Noise of a case of any kind of plant: of its instruments and of heat that no law describes."""
+    return {
+        "white_K": round(instruments.noise_K, 3),
+        "quantum_K": instruments.quantum_K,
+        "sensor_lag_s": {name: round(value, 2) for name, value in lag_s.items()},
+        "loss_gain": round(instruments.loss_gain, 5),
+        "loss_offset_W": round(instruments.loss_offset_W, 3),
+        "stated": None if instruments.stated is None else dict(instruments.stated),
+        "dropouts": instruments.dropouts,
+        "random_heat": {
+            p.name: {place: round(float(np.std(watts)), 2) for place, watts in p.random_heat.items()}
+            for p in programmes
         },
     }
 
@@ -145,6 +154,11 @@ def joined(parts: Mapping[str, Mapping[str, Array]], kind: str) -> dict[str, Arr
     return {name: np.concatenate([values[name] for values in members]) for name in members[0]}
 
 
+def sizes_of(changes: Mapping[str, Mapping[str, Array]]) -> dict[str, dict[str, dict[str, float]]]:
+    """Sizes by set and name of changes by recording and name."""
+    return {kind: {name: size_of(values) for name, values in joined(changes, kind).items()} for kind in SETS}
+
+
 def size_of(values: Array) -> dict[str, float]:
     """Root mean square and greatest magnitude of what is not missing, rounded for the truth."""
     return {
@@ -171,7 +185,7 @@ def _kelvin(
         run.programme.name: {p: _at(plant, a, p) - _at(plant, b, p) for p in case.instruments.channels}
         for run, a, b in zip(case.runs, with_it, without, strict=True)
     }
-    return {kind: {p: size_of(values) for p, values in joined(changes, kind).items()} for kind in SETS}
+    return sizes_of(changes)
 
 
 def _heat_of(effect: Concealed, k: int, with_it: Outcome, without: Outcome) -> Mapping[str, Array]:

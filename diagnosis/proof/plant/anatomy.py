@@ -13,12 +13,12 @@ from functools import cached_property
 
 import numpy as np
 
+from diagnosis.proof.plant.sizes import BoxSizes
 from models.assembly.gearbox import Gearbox
 from models.base.types import Array
 from models.formulas import heat_transfer as ht
 from models.losses.bearing import OIL_FLOW_HEAT, oil_flow_max
 
-T_SERVICE = 60.0  # degC, where the properties of the oil are taken that the plant holds constant
 AIR, FRAME, OIL, SUMP, SPLASH, MESH = "air", "frame", "oil", "sump", "splash", "mesh"
 BOUNDARY_CAPACITY = 1e15  # J/K: a boundary is a node that nothing warms
 QUARTER = 0.25  # of the wall lies before the inner and behind the outer node
@@ -57,14 +57,12 @@ class Anatomy:
     """Nodes, capacities and paths of one gearbox."""
 
     def __init__(self, gearbox: Gearbox) -> None:
-        self.gearbox = gearbox
-        self.stage = gearbox.stage[0]
-        self.pair = self.stage.pair()
+        self.gearbox, self.sizes = gearbox, BoxSizes(gearbox)
+        self.stage, self.pair = gearbox.stage[0], self.sizes.pair
         self.parts = tuple(part.name for part in gearbox.housing.part)
         self.bearings = tuple(bearing.name for bearing in gearbox.bearing)
-        self.gears = self.stage.names
+        self.gears = self.sizes.gears
         self.shafts = tuple(shaft.name for shaft in gearbox.shaft)
-        self.shaft_of_gear = {self.gears[0]: self.stage.driver, self.gears[1]: self.stage.driven}
         self.capacities: dict[str, tuple[float, str | None]] = dict(self._capacities())
         self.nodes = tuple(self.capacities)
         self.index = {name: i for i, name in enumerate(self.nodes)}
@@ -100,40 +98,25 @@ class Anatomy:
     # ------------------------------------------------------------------ capacities
 
     def _capacities(self) -> Iterator[tuple[str, tuple[float, str | None]]]:
-        gearbox, housing, oil = self.gearbox, self.gearbox.housing, self.gearbox.lubricant()
+        sizes = self.sizes
         yield AIR, (BOUNDARY_CAPACITY, None)
         yield FRAME, (BOUNDARY_CAPACITY, None)
-        area = 0.5 * (housing.inside_area_m2 + housing.outside_area_m2)
-        mass = area * housing.wall_thickness_m * housing.density_kg_m3
-        for part in housing.part:
-            whole = mass * housing.specific_heat_J_kgK * part.area_fraction
+        for part in self.gearbox.housing.part:
             for layer, share in (("inner", 0.4), ("outer", 0.4), ("boss", BOSS_SHARE)):
-                yield f"{part.name}.{layer}", (whole * share, f"C_{part.name}")
-        filling = gearbox.oil.volume * float(oil.density(T_SERVICE) * oil.specific_heat(T_SERVICE))
-        yield SUMP, (filling * (1.0 - SPLASH_SHARE), "C_oil")
-        yield SPLASH, (filling * SPLASH_SHARE, "C_oil")
-        steel = self.stage.material
-        for bearing in gearbox.bearing:
-            yield bearing.name, (bearing.mass_kg * steel.specific_heat_J_kgK, "C_bearings")
-        per_volume = steel.density_kg_m3 * steel.specific_heat_J_kgK
-        for shaft in gearbox.shaft:
-            cylinder = per_volume * np.pi / 4.0 * shaft.diameter**2 * shaft.length
-            whole = shaft.heat_capacity_J_K or cylinder
-            ends = self._ends(shaft.name)
+                yield f"{part.name}.{layer}", (sizes.C_housing * part.area_fraction * share, f"C_{part.name}")
+        yield SUMP, (sizes.C_oil * (1.0 - SPLASH_SHARE), "C_oil")
+        yield SPLASH, (sizes.C_oil * SPLASH_SHARE, "C_oil")
+        for name in self.bearings:
+            yield name, (sizes.C_bearing(name), "C_bearings")
+        for name in self.shafts:
+            whole, ends = sizes.C_shaft(name), sizes.bearings(name)
             middle = MIDDLE_SHARE if ends else 1.0
-            yield f"{shaft.name}.middle", (whole * middle, "C_shafts")
+            yield f"{name}.middle", (whole * middle, "C_shafts")
             for end in ends:
-                yield f"{shaft.name}.{end}", (whole * (1.0 - middle) / len(ends), "C_shafts")
+                yield f"{name}.{end}", (whole * (1.0 - middle) / len(ends), "C_shafts")
         for i, gear in enumerate(self.gears):
-            ring = np.pi * (self.pair.r[i] ** 2 - self._shaft_radius(gear) ** 2) * self.pair.b * per_volume
-            yield f"{gear}.rim", (ring * RIM_SHARE, "C_gears")
-            yield f"{gear}.body", (ring * (1.0 - RIM_SHARE), "C_gears")
-
-    def _ends(self, shaft: str) -> tuple[str, ...]:
-        return tuple(bearing.name for bearing in self.gearbox.bearing if bearing.shaft == shaft)
-
-    def _shaft_radius(self, gear: str) -> float:
-        return 0.5 * next(s.diameter for s in self.gearbox.shaft if s.name == self.shaft_of_gear[gear])
+            yield f"{gear}.rim", (sizes.C_gear(i) * RIM_SHARE, "C_gears")
+            yield f"{gear}.body", (sizes.C_gear(i) * (1.0 - RIM_SHARE), "C_gears")
 
     # ------------------------------------------------------------------ paths
 
@@ -179,12 +162,12 @@ class Anatomy:
                        law=f"teeth_{i}")  # fmt: skip
             yield Path(name=f"{gear}-oil", ends=(f"{gear}.body", SUMP), conductance=1.0, factor="h_oil_gear",
                        law=f"faces_{i}")  # fmt: skip
-            ring = 2.0 * np.pi * k * b / np.log(self.pair.r[i] / self._shaft_radius(gear))
+            shaft = self.sizes.shafts[i]
+            ring = 2.0 * np.pi * k * b / np.log(self.pair.r[i] / (0.5 * self.sizes.shaft(shaft).diameter))
             yield Path(name=f"rim-{gear}", ends=(f"{gear}.rim", f"{gear}.body"), conductance=ring / RIM_TO_BODY,
                        factor=None)  # fmt: skip
             # What the rim adds to the way from the flank to the shaft is taken off the ring.
-            yield Path(name=f"{gear}-{self.shaft_of_gear[gear]}",
-                       ends=(f"{gear}.body", f"{self.shaft_of_gear[gear]}.middle"),
+            yield Path(name=f"{gear}-{shaft}", ends=(f"{gear}.body", f"{shaft}.middle"),
                        conductance=ring / (1.0 - 0.5 * RIM_TO_BODY), factor="gear_shaft")  # fmt: skip
         rims = f"{self.gears[0]}.rim", f"{self.gears[1]}.rim"
         yield Path(name=MESH, ends=rims, conductance=1.0, factor="striction", law="mesh")
@@ -192,18 +175,15 @@ class Anatomy:
     def _shaft_and_bearing_paths(self) -> Iterator[Path]:
         for shaft in self.gearbox.shaft:
             section = shaft.conductivity_W_mK * np.pi / 4.0 * shaft.diameter**2
-            for bearing in self.gearbox.bearing:
-                if bearing.shaft == shaft.name:
-                    end = f"{shaft.name}.{bearing.name}"
-                    name = f"{shaft.name}-{bearing.name}"
-                    along, seat = 0.15 * shaft.length / section, 0.10 * shaft.length / section
-                    ring = 0.5 * self._ring(bearing.bore_mm, bearing.outside_diameter_mm, bearing.width_mm)
-                    yield Path(name=name, ends=(f"{shaft.name}.middle", end), conductance=1.0 / along,
-                               factor="shaft_bearing")  # fmt: skip
-                    yield Path(name=name, ends=(end, bearing.name), conductance=1.0 / (seat + ring),
-                               factor="shaft_bearing")  # fmt: skip
+            along, seat = 0.15 * shaft.length / section, 0.10 * shaft.length / section
+            for seated in self.sizes.bearings(shaft.name):
+                end, name = f"{shaft.name}.{seated}", f"{shaft.name}-{seated}"
+                ring = 0.5 * self.sizes.R_bearing(seated)
+                yield Path(name=name, ends=(f"{shaft.name}.middle", end), conductance=1.0 / along,
+                           factor="shaft_bearing")  # fmt: skip
+                yield Path(name=name, ends=(end, seated), conductance=1.0 / (seat + ring), factor="shaft_bearing")
         for bearing in self.gearbox.bearing:
-            outer = 2.0 / self._ring(bearing.bore_mm, bearing.outside_diameter_mm, bearing.width_mm)
+            outer = 2.0 / self.sizes.R_bearing(bearing.name)
             for part in self.parts:
                 yield Path(name=f"{bearing.name}-{part}", ends=(bearing.name, f"{part}.boss"),
                            conductance=outer / len(self.parts), factor="bearing_housing")  # fmt: skip
@@ -212,19 +192,12 @@ class Anatomy:
                 yield Path(name=f"{bearing.name}-oil", ends=(bearing.name, oil), conductance=0.5 * through,
                            factor="bearing_oil")  # fmt: skip
 
-    def _ring(self, bore_mm: float, outside_mm: float, width_mm: float) -> float:
-        """Radial resistance of a bearing as a solid steel ring, [K/W]."""
-        k = self.stage.material.conductivity_W_mK
-        return float(np.log(outside_mm / bore_mm) / (2.0 * np.pi * k * width_mm * 1e-3))
-
     # ------------------------------------------------------------------ reference values of the laws
 
     @cached_property
     def half_wall(self) -> float:
         """Resistance of the wall before the inner node, area of the whole box, [K/W]."""
-        housing = self.gearbox.housing
-        area = 0.5 * (housing.inside_area_m2 + housing.outside_area_m2)
-        return QUARTER * housing.wall_thickness_m / (housing.conductivity_W_mK * area)
+        return QUARTER * self.sizes.R_wall
 
     @cached_property
     def share(self) -> dict[str, float]:

@@ -6,7 +6,8 @@ is 20 m/s at the pitch circle and the reference torque 94 N m.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.signal import lfilter
@@ -25,25 +26,35 @@ WARM_UP_S = 3600.0
 STEADY_POWER = 0.33  # highest product of the fractions in random cycles: speed of the top's, torque of 1.6 references
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Programme:
-    """Speed and torque of one recording, in rows of 10 s.
+    """Inputs of one recording in rows.
 
     Attributes
     ----------
-    speed, torque : Array, shape (rows,)
-        Of the input shaft, [1/min] and [N m]
+    name : str
+        ``train_1`` ... ``hold_2``, ``baseline_1`` ...
+    inputs : mapping of str to Array, shape (rows,)
+        True inputs by their names in the nominal network: ``speed`` [1/min], ``torque`` [N m], ``T_ambient`` [degC] ...
+    random_heat : mapping of str to Array, shape (rows,)
+        Heat that no law describes, [W]: by body of a plant of the zoo, by place of one of the own kind
+    start : mapping of str to float
+        Temperatures of bodies at the first row, [degC]
     unrecorded : int
         Rows at the start that happen before the recording is switched on (a warm start)
+    begins_h : float
+        Time of the first recorded row since that of the first recording of the session, [h]
     """
 
     name: str
-    speed: Array
-    torque: Array
+    inputs: Mapping[str, Array]
+    random_heat: Mapping[str, Array] = field(default_factory=dict)
+    start: Mapping[str, float] = field(default_factory=dict)
     unrecorded: int = 0
+    begins_h: float = 0.0
 
     def __len__(self) -> int:
-        return len(self.speed)
+        return len(next(iter(self.inputs.values())))
 
 
 def top_speed(gearbox: Gearbox) -> float:
@@ -57,7 +68,7 @@ def reference_torque(gearbox: Gearbox) -> float:
 
 
 def programmes(gearbox: Gearbox, rng: np.random.Generator) -> tuple[Programme, ...]:
-    """The five recordings of one case: about 22 h to learn from, 6 h held out at other torques and speeds.
+    """Speed and torque of the five recordings of one case: about 22 h to learn from, 6 h held out at others.
 
     Returns
     -------
@@ -99,7 +110,8 @@ def _staircase(rng: np.random.Generator, n: float, M: float) -> Programme:
         speed.append(np.full(len(at), level * n))
         torque.append(np.choose(np.searchsorted(marks, at, side="right"), loads) * load * M)
     rest = np.zeros(round(STANDSTILL_S / ROW_S))
-    return Programme(name="train_1", speed=np.concatenate([*speed, rest]), torque=np.concatenate([*torque, rest]))
+    inputs = {"speed": np.concatenate([*speed, rest]), "torque": np.concatenate([*torque, rest])}
+    return Programme(name="train_1", inputs=inputs)
 
 
 def _hold_staircase(rng: np.random.Generator, n: float, M: float) -> Programme:
@@ -110,7 +122,7 @@ def _hold_staircase(rng: np.random.Generator, n: float, M: float) -> Programme:
         level, load = HOLD_STAIRS[index]
         speed.append(np.full(rows, level * n * rng.uniform(0.95, 1.05)))
         torque.append(np.full(rows, load * M * rng.uniform(0.8, 1.2)))
-    return Programme(name="hold_2", speed=np.concatenate(speed), torque=np.concatenate(torque))
+    return Programme(name="hold_2", inputs={"speed": np.concatenate(speed), "torque": np.concatenate(torque)})
 
 
 def _random(name: str, rng: np.random.Generator, n: float, M: float, *, warm: bool) -> Programme:
@@ -128,4 +140,4 @@ def _random(name: str, rng: np.random.Generator, n: float, M: float, *, warm: bo
         if rng.random() < 0.06 and row >= unrecorded:
             speed[row:end], torque[row:end] = 0.0, 0.0
         row = end
-    return Programme(name=name, speed=speed, torque=torque, unrecorded=unrecorded)
+    return Programme(name=name, inputs={"speed": speed, "torque": torque}, unrecorded=unrecorded)

@@ -6,9 +6,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from diagnosis.proof.plant.anatomy import MESH, OIL, T_SERVICE
+from diagnosis.proof.plant.anatomy import MESH, OIL
 from diagnosis.proof.plant.effect import Draw, Effect, Grip, Places
 from diagnosis.proof.plant.plant import REFERENCE_SPEED, Plant
+from diagnosis.proof.plant.sizes import T_SERVICE
 from models.losses.bearing import BearingLaw
 from models.losses.loss_term import RPM
 

@@ -20,46 +20,70 @@ DECIMALS = {"speed_rpm": 1, "torque_Nm": 2, "T_ambient_degC": 1, "air_speed_m_s"
 
 @dataclass(frozen=True, kw_only=True)
 class Instruments:
-    """How one case is measured.
+    """How one case is measured, of any kind of plant.
 
     Attributes
     ----------
     channels : tuple of str
-        Measured places
-    lag_s : mapping of place to float
-        Time constant of every temperature sensor
+        Recorded temperatures
     noise_K, quantum_K : float
         White noise and step of temperature readings
-    ambient_offset_K : float
-        Error of the ambient probe
-    torque_gain, loss_gain : float
-        Relative errors of the recorded torque and of the measured loss, [-]
-    loss_noise : (float, float)
-        White noise of the measured loss: relative [-] and absolute [W]
+    loss_noise : (float, float) or None
+        White noise of the measured loss, relative [-] and absolute [W]; None: it is not measured
+    loss_gain : float
+        Relative error of the measured loss, [-]
+    loss_offset_W : float
+        While there is a loss
     dropouts : int
         Bursts of missing readings per recording
     stated : mapping of str to float, or None
-        Data sheet of the temperature sensors, by the keys of a mapping file; None without a data sheet
+        Data sheet of the temperature sensors, by the keys of a mapping file; it may be wrong
     """
 
     channels: tuple[str, ...]
-    lag_s: Mapping[str, float]
     noise_K: float = 0.2
     quantum_K: float = 0.1
-    ambient_offset_K: float = 0.0
-    torque_gain: float = 0.0
+    loss_noise: tuple[float, float] | None = (0.02, 2.0)
     loss_gain: float = 0.0
     loss_offset_W: float = 0.0
-    loss_noise: tuple[float, float] = (0.02, 2.0)
     dropouts: int = 0
     stated: Mapping[str, float] | None = None
+
+    def loss(self, true: Array) -> Array:
+        """Measured loss without noise, [W]."""
+        return np.asarray(true * (1.0 + self.loss_gain) + self.loss_offset_W * (true > 0.0))
+
+    def noise_of_loss(self, loss: Array, rng: np.random.Generator) -> Array:
+        """Noise of a loss that is measured, [W]."""
+        assert self.loss_noise is not None  # noqa: S101 - asked only where a loss is measured
+        relative, absolute = self.loss_noise
+        return np.asarray(np.hypot(relative * loss, absolute) * rng.standard_normal(len(loss)))
+
+
+@dataclass(frozen=True, kw_only=True)
+class OwnInstruments(Instruments):
+    """Instruments of a plant of the own kind.
+
+    Attributes
+    ----------
+    lag_s : mapping of place to float
+        Time constant of every temperature sensor
+    ambient_offset_K : float
+        Error of the ambient probe
+    torque_gain : float
+        Relative error of the recorded torque, [-]
+    """
+
+    lag_s: Mapping[str, float]
+    ambient_offset_K: float = 0.0
+    torque_gain: float = 0.0
 
 
 def record(
     plant: Plant,
     run: Run,
     outcome: Outcome,
-    instruments: Instruments,
+    instruments: OwnInstruments,
     faults: Sequence[Concealed],
     rng: np.random.Generator | None,
 ) -> dict[str, Array]:
@@ -80,15 +104,16 @@ def record(
     """
     first, rows = run.programme.unrecorded, len(outcome.T)
     time = np.asarray(np.arange(rows) * ROW_S, dtype=np.float64)
+    true = {name: values[first:] for name, values in run.programme.inputs.items()}
     inputs: dict[str, Array] = {
-        "speed_rpm": run.programme.speed[first:],
-        "torque_Nm": run.programme.torque[first:] * (1.0 + instruments.torque_gain),
-        "T_ambient_degC": run.air[first:] + instruments.ambient_offset_K,
-        "air_speed_m_s": run.air_speed[first:],
+        "speed_rpm": true["speed"],
+        "torque_Nm": true["torque"] * (1.0 + instruments.torque_gain),
+        "T_ambient_degC": true["T_ambient"] + instruments.ambient_offset_K,
+        "air_speed_m_s": true["air_speed"],
     }
     places = plant.anatomy.coarse
     readings = {p: lagged(outcome.T[:, places.index(p)], instruments.lag_s[p]) for p in instruments.channels}
-    loss = outcome.P_loss * (1.0 + instruments.loss_gain) + instruments.loss_offset_W * (outcome.P_loss > 0.0)
+    loss = instruments.loss(outcome.P_loss)
     housing = outcome.T[:, places.index(plant.anatomy.parts[-1])]
     for fault in faults:
         _spoil_inputs(fault, inputs, housing)
@@ -98,8 +123,7 @@ def record(
         for values in readings.values():
             values += instruments.noise_K * rng.standard_normal(rows)
             values[:] = np.round(values / instruments.quantum_K) * instruments.quantum_K
-        relative, absolute = instruments.loss_noise
-        loss = loss + np.hypot(relative * loss, absolute) * rng.standard_normal(rows)
+        loss = loss + instruments.noise_of_loss(loss, rng)
     for fault in faults:
         _hold_readings(fault, readings)
     temperatures = {f"T_{place}_degC": values for place, values in readings.items()}

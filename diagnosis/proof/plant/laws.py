@@ -6,8 +6,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from diagnosis.proof.plant.anatomy import MESH, OIL, SUMP, T_SERVICE
+from diagnosis.proof.plant.anatomy import MESH, OIL, SUMP
 from diagnosis.proof.plant.plant import Moment, Plant
+from diagnosis.proof.plant.sizes import T_SERVICE
 from models.base.types import Array
 from models.formulas.heat_transfer import KELVIN, STEFAN_BOLTZMANN
 from models.losses.loss_term import RPM

@@ -19,6 +19,7 @@ from models.assembly.gearbox import Gearbox
 from models.base.types import Array
 
 ORDINARY_SPREAD = 0.5  # of the definition's standard deviations, by which every gearbox is off
+INPUTS = ("speed", "torque", "T_ambient", "air_speed")
 EXPONENTS = {"forced_exponent": (0.6, 0.02), "oil_exponent": (0.0, 0.03), "exchange_exponent": (0.5, 0.05)}  # mean, sd
 
 
@@ -56,20 +57,12 @@ class Run:
 
     Attributes
     ----------
-    air, air_speed : Array, shape (rows,)
-        True ambient temperature [degC] and air speed [m/s]
-    start : float
-        Temperature of all nodes at the start, [degC]
-    random_heat : mapping of place to Array, shape (rows,)
-        Heat that no law describes, [W]
+    programme : Programme
+        With the inputs ``speed``, ``torque``, ``T_ambient`` and ``air_speed``
     """
 
     individual: Individual
     programme: Programme
-    air: Array
-    air_speed: Array
-    start: float
-    random_heat: Mapping[str, Array]
     effects: tuple[Concealed, ...] = ()
 
     def __len__(self) -> int:
@@ -146,7 +139,7 @@ class _Batch:
         # Heat of the unknown by row, run and node, [W].
         self.random_heat = np.zeros((len(runs[0]), len(runs), self.n))
         for member, run in enumerate(runs):
-            for place, watts in run.random_heat.items():
+            for place, watts in run.programme.random_heat.items():
                 for node, weight in anatomy.members(place).items():
                     self.random_heat[:, member, anatomy.index[node]] += weight * watts
         self.grips = self._grips()
@@ -168,14 +161,11 @@ class _Batch:
     def integrate(self, progress: Callable[[int], None] | None) -> list[Outcome]:
         """All rows of all runs."""
         rows, B, anatomy = len(self.runs[0]), len(self.runs), self.plant.anatomy
-        inputs = {
-            "speed": np.stack([np.abs(run.programme.speed) for run in self.runs], axis=1),
-            "torque": np.stack([run.programme.torque for run in self.runs], axis=1),
-            "air": np.stack([run.air for run in self.runs], axis=1),
-            "air_speed": np.stack([run.air_speed for run in self.runs], axis=1),
-        }
+        driven = [run.programme.inputs for run in self.runs]
+        inputs = {name: np.stack([own[name] for own in driven], axis=1) for name in INPUTS}
+        inputs["speed"] = np.abs(inputs["speed"])
         skipped = np.array([run.programme.unrecorded for run in self.runs])
-        T = np.repeat(np.array([[run.start] for run in self.runs]), self.n, axis=1)
+        T = np.array([[run.programme.start[node] for node in anatomy.nodes] for run in self.runs])
         before = T
         kept = np.empty((rows, B, len(anatomy.coarse)))
         felt = {name: np.empty((rows, B)) for name in ("air", "torque", "lost")}
@@ -239,7 +229,7 @@ class _Batch:
         B, anatomy = len(self.runs), self.plant.anatomy
         bearings = len(anatomy.bearings)
         moment = Moment(
-            hours=hours, speed=inputs["speed"].copy(), torque=inputs["torque"].copy(), air=inputs["air"].copy(),
+            hours=hours, speed=inputs["speed"].copy(), torque=inputs["torque"].copy(), air=inputs["T_ambient"].copy(),
             air_speed=inputs["air_speed"].copy(), T=T, thinning=np.zeros(B), bearing_load=np.ones((B, bearings)),
             loss=np.zeros((B, len(self.plant.components))), lost=np.zeros(B), heat=self.random_heat[row].copy(),
             G=np.empty(0), ground=np.zeros((B, self.n)), ground_heat=np.zeros((B, self.n)),

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
+from diagnosis.proof.plant.cycles import Programme
 from diagnosis.proof.zoo.effects import ZooEffect
 from diagnosis.proof.zoo.faults import Fault, spoiled
 from diagnosis.proof.zoo.oracle import LOSS, OracleNats
 from diagnosis.proof.zoo.recorder import ZooInstruments, measure
 from diagnosis.proof.zoo.simulate import simulate
-from diagnosis.proof.zoo.structure import Change, Law, Outcome, Programme, Variant, ZooPlant
+from diagnosis.proof.zoo.structure import Change, Law, Outcome, Variant, ZooPlant
 from models.base.types import Array
 
 GROUPS = ("control", "single", "date", "sensor", "pair", "outside", "messy")
@@ -19,6 +20,31 @@ TRAIN, HOLD, BASELINE = "train", "hold", "baseline"
 SEEN_NATS = 3.0
 
 NatsOf = Callable[[Sequence[Mapping[str, Array]]], OracleNats]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ZooPlan:
+    """A case before it is drawn.
+
+    Attributes
+    ----------
+    family : str
+        See :func:`~diagnosis.proof.zoo.families.find_family`
+    machine : str
+        Name or file of the nominal definition
+    seed : int
+        Of this case
+    group : str
+        One of :data:`GROUPS`
+    kind : str or None
+        Of a control one of :data:`CONTROLS`, drawn if None
+    """
+
+    family: str
+    machine: str
+    seed: int
+    group: str
+    kind: str | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -51,8 +77,8 @@ class ZooCase:
 
     Attributes
     ----------
-    group, kind : str
-        One of :data:`GROUPS`; of a control one of :data:`CONTROLS`, else ``effects``
+    plan : ZooPlan
+        With the kind of a control
     plant : ZooPlant
         With the parts that effects bring along
     programmes : tuple of Programme
@@ -76,11 +102,7 @@ class ZooCase:
     """
 
     name: str
-    seed: int
-    group: str
-    kind: str
-    family: str
-    machine: str
+    plan: ZooPlan
     plant: ZooPlant
     programmes: tuple[Programme, ...]
     effects: tuple[ZooEffect, ...]

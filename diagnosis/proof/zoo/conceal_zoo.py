@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from diagnosis.proof.cases.case_files import write_case
-from diagnosis.proof.zoo.case import BASELINE, CONTROLS, GROUPS, ZooCase
+from diagnosis.proof.cases.conceal import drawn_counts
+from diagnosis.proof.zoo.case import BASELINE, CONTROLS, GROUPS, ZooCase, ZooPlan
 from diagnosis.proof.zoo.draw import draw_case
 from diagnosis.proof.zoo.families import FAMILIES, find_family
 from diagnosis.proof.zoo.recorder import measure, record
@@ -21,27 +21,6 @@ from models.files.toml_file import names_a_file, packaged, read_text
 
 # Shares of a set in which nothing else is asked for.
 ZOO_MIX = {"control": 0.3, "single": 0.2, "date": 0.15, "sensor": 0.1, "pair": 0.1, "outside": 0.1, "messy": 0.05}
-
-
-@dataclass(frozen=True, kw_only=True)
-class ZooPlan:
-    """A case before it is drawn.
-
-    Attributes
-    ----------
-    group : str
-        One of :data:`~diagnosis.proof.zoo.case.GROUPS`
-    kind : str or None
-        Of a control, one of :data:`~diagnosis.proof.zoo.case.CONTROLS`
-    seed : int
-        Of this case
-    """
-
-    group: str
-    kind: str | None
-    family: str
-    machine: str
-    seed: int
 
 
 def zoo_plans(
@@ -93,9 +72,7 @@ def random_zoo_plans(
     seed: int, number: int, *, families: Sequence[str] | None = None, machine: str | None = None
 ) -> list[ZooPlan]:
     """Plans drawn in the proportions of :data:`ZOO_MIX`."""
-    drawn = np.random.default_rng([seed, 0]).choice(list(ZOO_MIX), number, p=list(ZOO_MIX.values()))
-    counts = {group: int(np.sum(drawn == group)) for group in ZOO_MIX}
-    return zoo_plans(seed, counts, families=families, machine=machine)
+    return zoo_plans(seed, drawn_counts(seed, number, ZOO_MIX), families=families, machine=machine)
 
 
 def conceal_zoo(
@@ -137,10 +114,8 @@ def conceal_zoo(
     """
     digits, names = max(3, len(str(len(plans)))), []
     for i, plan in enumerate(plans):
-        case = draw_case(
-            plan.family, plan.machine, plan.seed, plan.group, name=f"case_{i + 1:0{digits}d}", kind=plan.kind,
-            baselines=baselines, session_deviation=session_deviation,
-        )  # fmt: skip
+        name = f"case_{i + 1:0{digits}d}"
+        case = draw_case(plan, name=name, baselines=baselines, session_deviation=session_deviation)
         write_zoo_case(case, recordings if flat else recordings / case.name, truth / f"{case.name}.json")
         names.append(case.name)
         if progress is not None:
@@ -156,8 +131,9 @@ def write_zoo_case(case: ZooCase, folder: Path, truth_file: Path | None) -> None
     InputError
         If something cannot be written.
     """
-    gearbox = load_gearbox(case.machine)
-    source = Path(case.machine) if names_a_file(case.machine) else packaged(FOLDER, case.machine)
+    machine = case.plan.machine
+    gearbox = load_gearbox(machine)
+    source = Path(machine) if names_a_file(machine) else packaged(FOLDER, machine)
     columns = {name: one.quantity.column for name, one in gearbox.network().inputs.items()}
     truth = {} if truth_file is None else truth_of(case, gearbox.hash, columns)
     write_case(folder, truth_file, record_case(case, columns), truth, case.instruments.stated, read_text(source))
@@ -168,7 +144,7 @@ def record_case(case: ZooCase, columns: Mapping[str, str]) -> dict[str, dict[str
     faults = [effect.fault for effect in case.effects if effect.fault is not None]
     made = {}
     for k, programme in enumerate(case.programmes):
-        rng = np.random.default_rng([case.seed, 8, k])
+        rng = np.random.default_rng([case.plan.seed, 8, k])
         measured = measure(case.plant, programme, case.runs.outcomes[programme.name], 0)
         acting = [] if programme.name.startswith(BASELINE) else faults
         made[programme.name] = record(measured, case.instruments, acting, columns, rng)

@@ -19,10 +19,11 @@ from diagnosis.engine.unknown import NetworkParameter
 from diagnosis.forward.grid import pieces
 from diagnosis.forward.network_on_grid import NetworkOnGrid
 from diagnosis.forward.trajectory import Trajectory
+from diagnosis.proof.plant.cycles import Programme
 from diagnosis.proof.zoo.families.family import Family
 from diagnosis.proof.zoo.programmes import MINUTES_S, programmes
 from diagnosis.proof.zoo.simulate import simulate
-from diagnosis.proof.zoo.structure import Programme, Variant, ZooPlant
+from diagnosis.proof.zoo.structure import Variant, ZooPlant
 from diagnosis.recordings.recording import Channel, Recording
 from diagnosis.setup.noise import noise_of, start_guess
 from diagnosis.setup.shaft import shafts, torque_gain, with_shaft

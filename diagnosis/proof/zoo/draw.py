@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from diagnosis.proof.cases.time_course import ALWAYS, Course
-from diagnosis.proof.zoo.case import BASELINE, CONTROLS, GROUPS, HOLD, TRAIN, NatsOf, ZooCase, nats_of_case, run_case
+from diagnosis.proof.zoo.case import BASELINE, CONTROLS, HOLD, TRAIN, NatsOf, ZooCase, ZooPlan, nats_of_case, run_case
 from diagnosis.proof.zoo.distance import Drawn, draw_plant
 from diagnosis.proof.zoo.effects import Maker, ZooEffect, made
 from diagnosis.proof.zoo.effects_dates import DATED_MAKERS, draw_course
@@ -23,7 +23,7 @@ from diagnosis.proof.zoo.setting import Setting, UnfitError, either, pick
 from diagnosis.proof.zoo.simulate import simulate
 from diagnosis.proof.zoo.structure import Variant
 from models.assembly.gearbox import Gearbox, load_gearbox
-from models.base.errors import InputError, did_you_mean
+from models.base.errors import InputError
 
 CATALOGUE_MAKERS: Mapping[str, Maker] = {**LOSS_MAKERS, **HEAT_MAKERS}
 FAULT_MAKERS: Mapping[str, FaultMaker] = {**SENSOR_FAULTS, **INPUT_FAULTS}
@@ -40,30 +40,14 @@ DRIFT_K = 15.0  # greatest drift over a session
 
 
 def draw_case(
-    family_name: str,
-    machine: str,
-    seed: int,
-    group: str,
-    *,
-    name: str = "case_001",
-    kind: str | None = None,
-    baselines: int = 0,
-    session_deviation: float | None = None,
+    plan: ZooPlan, *, name: str = "case_001", baselines: int = 0, session_deviation: float | None = None
 ) -> ZooCase:
     """Draw a case and simulate its recordings.
 
     Parameters
     ----------
-    family_name : str
-        See :func:`~diagnosis.proof.zoo.families.find_family`
-    machine : str
-        Name or file of the nominal definition
-    group : str
-        One of :data:`~diagnosis.proof.zoo.case.GROUPS`
     name : str
         Of the case
-    kind : str or None
-        Of a control, one of :data:`~diagnosis.proof.zoo.case.CONTROLS`; drawn if None
     baselines : int
         Number of healthy recordings of the same plant
     session_deviation : float or None
@@ -72,45 +56,44 @@ def draw_case(
     Raises
     ------
     InputError
-        If family or group are not known, or the definition cannot be split.
+        If the family is not known, or the definition cannot be split.
     """
-    if group not in GROUPS:
-        raise InputError(f"{group!r} is not a group of cases of the zoo{did_you_mean(group, GROUPS)}")
-    drawn = draw_plant(find_family(family_name), machine, seed, baselines=baselines)
-    return draw_case_of(drawn, load_gearbox(machine), machine, seed, group, name=name, kind=kind,
-                        session_deviation=session_deviation)  # fmt: skip
+    drawn = draw_plant(find_family(plan.family), plan.machine, plan.seed, baselines=baselines)
+    return draw_case_of(drawn, load_gearbox(plan.machine), plan, name=name, session_deviation=session_deviation)
 
 
 def draw_case_of(
-    drawn: Drawn, gearbox: Gearbox, machine: str, seed: int, group: str, *, name: str, kind: str | None,
-    session_deviation: float | None,
-) -> ZooCase:  # fmt: skip
+    drawn: Drawn, gearbox: Gearbox, plan: ZooPlan, *, name: str, session_deviation: float | None
+) -> ZooCase:
     """Draw what is concealed in a plant, and simulate its recordings; arguments as of :func:`draw_case`."""
-    effects_rng, strength_rng, session_rng, instruments_rng = (np.random.default_rng([seed, 7, k]) for k in range(4))
-    kind = (kind or str(effects_rng.choice(CONTROLS))) if group == "control" else "effects"
+    effects_rng, strength_rng, session_rng, instruments_rng = (
+        np.random.default_rng([plan.seed, 7, k]) for k in range(4)
+    )
+    if plan.group == "control":
+        plan = replace(plan, kind=plan.kind or str(effects_rng.choice(CONTROLS)))
     plant = drawn.plant
-    if kind == "parameters_off":
+    if plan.kind == "parameters_off":
         off = {n: v * float(np.exp(FAR_SD * plant.spread[n] * either(session_rng))) for n, v in plant.parameters.items()
                if n in plant.spread}  # fmt: skip
         plant = replace(plant, parameters={**plant.parameters, **off})
-    if kind == "lag_wrong":
+    if plan.kind == "lag_wrong":
         plant = with_slow_sensors(plant, session_rng)
-    instruments = draw_instruments(plant, kind, has_loss=not gearbox.is_parametric, rng=instruments_rng)
+    instruments = draw_instruments(plant, plan.kind, has_loss=not gearbox.is_parametric, rng=instruments_rng)
     sd = float(session_rng.choice(DEVIATIONS)) if session_deviation is None else session_deviation
     spread = [n for n in plant.parameters if n in plant.spread]
     case = ZooCase(
-        name=name, seed=seed, group=group, kind=kind, family=plant.family, machine=machine, plant=plant,
-        programmes=drawn.programmes, effects=(), instruments=instruments, session_deviation=sd,
+        name=name, plan=plan, plant=plant, programmes=drawn.programmes, effects=(), instruments=instruments,
+        session_deviation=sd,
         sessions={p.name: {n: plant.parameters[n] * float(np.exp(sd * session_rng.standard_normal())) for n in spread}
                   for p in drawn.programmes if p.name.startswith(BASELINE)},
         distance_K=drawn.distance_K, rejected=drawn.rejected,
     )  # fmt: skip
-    if group == "control":
+    if plan.group == "control":
         return replace(case, runs=run_case(case, TRAIN, HOLD, BASELINE))
     # The warmest of the training recordings shows the temperatures that effects set in at.
     warm = case.recordings(TRAIN)[-1]
     setting = Setting(plant, case.programmes, simulate(plant, warm, [Variant()]), gearbox.network().groups)
-    case = with_effects(case, draw_effects(group, setting, effects_rng))
+    case = with_effects(case, draw_effects(plan.group, setting, effects_rng))
     nats_of = design_of(plant, drawn.programmes, instruments).nats_of
     case = with_effects(case, draw_strengths(case, nats_of, strength_rng))
     runs = run_case(case, TRAIN, HOLD, BASELINE)
@@ -258,7 +241,7 @@ def draw_strengths(case: ZooCase, nats_of: NatsOf, rng: np.random.Generator) -> 
     _, found = nats_of_case(trial, run_case(trial, TRAIN), nats_of)
     chosen = []
     for k, (effect, nats) in enumerate(zip(trial.effects, found, strict=True)):
-        low, high = NATS if case.group != "messy" else DOMINANT_NATS if k == 0 else MINOR_NATS
+        low, high = NATS if case.plan.group != "messy" else DOMINANT_NATS if k == 0 else MINOR_NATS
         wanted = float(np.exp(rng.uniform(np.log(low), np.log(high))))
         linear = effect.strength * np.sqrt(wanted / max(nats.tool, 1e-9))
         strength = np.clip(linear, effect.least, effect.cap)

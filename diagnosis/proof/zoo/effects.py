@@ -16,6 +16,8 @@ from diagnosis.proof.zoo.faults import Fault
 from diagnosis.proof.zoo.setting import Act, Changed, Setting
 from diagnosis.proof.zoo.structure import Change, Law
 
+UNITS = {"source": "W", "link": "W/K"}  # of a strength by the kind of the effect; of others 1
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Draft:
@@ -24,22 +26,27 @@ class Draft:
     Attributes
     ----------
     act : Act
-        At a strength of 1
+        At a strength of 1, without its course in time
     law : str
         In words and symbols; ``a`` is the strength
-    unit : str
-        Of the strength
     cap : float
         Greatest strength that is physical
+    unit : str
+        Of the strength; of a draft empty if it is that of its kind, see :data:`UNITS`
     parameters : mapping of str to float
         What was drawn for this specimen
     """
 
-    act: Act
+    act: Act = field(default_factory=Act)
     law: str
-    unit: str
     cap: float
+    unit: str = ""
     parameters: Mapping[str, float] = field(default_factory=dict)
+
+
+def draft(act: Act, law: str, cap: float, unit: str = "", /, **parameters: float) -> Draft:
+    """Draft of what was drawn."""
+    return Draft(act=act, law=law, cap=cap, unit=unit, parameters=parameters)
 
 
 Draw = Callable[[Setting, np.random.Generator], Draft]
@@ -73,31 +80,24 @@ def makes(kind: str, family: str, *, table: dict[str, Maker]) -> Callable[[Draw]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class ZooEffect:
+class ZooEffect(Draft):
     """One concealed effect of one plant.
 
     Attributes
     ----------
     catalogue : str or None
         Mechanism of the catalogue that it is a form of
-    act : Act
-        At a strength of 1, without its course in time
     fault : Fault or None
         Of measurement, at its strength
-    least, cap : float
-        Range of strengths that are physical, and stand out of ordinary errors of instruments
+    least : float
+        Least strength that stands out of ordinary errors of instruments
     """
 
     name: str
     catalogue: str | None
     family: str
     kind: str
-    law: str
-    unit: str
-    cap: float
-    act: Act = field(default_factory=Act)
     fault: Fault | None = None
-    parameters: Mapping[str, float] = field(default_factory=dict)
     least: float = 0.0
     strength: float = 1.0
     course: Course = ALWAYS
@@ -140,10 +140,9 @@ def made(
     UnfitError
         If the plant lacks what it needs.
     """
-    draft = maker.draw(setting, rng)
-    return ZooEffect(name=name, catalogue=catalogue, family=maker.family, kind=maker.kind, law=draft.law,
-                     unit=draft.unit, cap=draft.cap, act=draft.act, parameters=draft.parameters,
-                     course=course)  # fmt: skip
+    drawn = maker.draw(setting, rng)
+    facts = {**vars(drawn), "unit": drawn.unit or UNITS.get(maker.kind, "1")}
+    return ZooEffect(**facts, name=name, catalogue=catalogue, family=maker.family, kind=maker.kind, course=course)
 
 
 def _in_time(law: Law, strength: float, course: Course) -> Law:

@@ -8,7 +8,7 @@ import numpy as np
 
 from diagnosis.proof.cases.time_course import FORMS, Course
 from diagnosis.proof.zoo import effects
-from diagnosis.proof.zoo.effects import Draft, Maker
+from diagnosis.proof.zoo.effects import Draft, Maker, draft
 from diagnosis.proof.zoo.setting import Setting, UnfitError, either, pick
 from diagnosis.proof.zoo.structure import constant
 
@@ -50,7 +50,7 @@ def capacity_changes(s: Setting, rng: np.random.Generator) -> Draft:
 def heat_appears(s: Setting, rng: np.random.Generator) -> Draft:
     """A constant heat into one node."""
     node = pick(s.nodes, rng)
-    return Draft(act=s.heat(node, constant(1.0)), law=f"a into {node}", unit="W", cap=0.3 * s.loss)
+    return draft(s.heat(node, constant(1.0)), f"a into {node}", 0.3 * s.loss)
 
 
 @makes("link")
@@ -58,7 +58,7 @@ def link_appears(s: Setting, rng: np.random.Generator) -> Draft:
     """A further way from one node to the air."""
     node = pick(s.nodes, rng)
     act = s.bridge(node, s.air(), constant(1.0), called="air")
-    return Draft(act=act, law=f"a between {node} and air", unit="W/K", cap=0.4 * s.shed)
+    return draft(act, f"a between {node} and air", 0.4 * s.shed)
 
 
 @makes("signal")
@@ -69,7 +69,7 @@ def set_point_changes(s: Setting, rng: np.random.Generator) -> Draft:
         raise UnfitError("inputs")
     name, sign = pick(names, rng), either(rng)
     act = s.input_shift(name, lambda m: sign * m.inputs[name], sign=sign)
-    return Draft(act=act, law=f"true {name} = recorded (1 {_plus(sign)} a)", unit="1", cap=0.2)
+    return draft(act, f"true {name} = recorded (1 {_plus(sign)} a)", 0.2)
 
 
 def _relative(s: Setting, rng: np.random.Generator, what: str, names: tuple[str, ...]) -> Draft:
@@ -81,7 +81,7 @@ def _relative(s: Setting, rng: np.random.Generator, what: str, names: tuple[str,
         act = s.capacity(name, law, sign=sign)
     else:
         act = s.loss_factor((name,), law, sign=sign, is_loss=what == "loss")
-    return Draft(act=act, law=f"{what} {name} (1 {_plus(sign)} a)", unit="1", cap=UP if sign > 0 else DOWN)
+    return draft(act, f"{what} {name} (1 {_plus(sign)} a)", UP if sign > 0 else DOWN, "1")
 
 
 def _plus(sign: int) -> str:

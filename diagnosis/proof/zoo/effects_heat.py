@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 
 from diagnosis.proof.zoo import effects
-from diagnosis.proof.zoo.effects import Draft, Maker
+from diagnosis.proof.zoo.effects import Draft, Maker, draft
 from diagnosis.proof.zoo.setting import Act, Setting, pick, soft
 from diagnosis.proof.zoo.structure import Law, Moment, constant
 from models.base.types import Array
@@ -25,8 +25,7 @@ def aeration(s: Setting, rng: np.random.Generator) -> Draft:
     """Foam lowers what gears give to the oil, by a logistic function of speed."""
     x, x0 = s.speed(), float(rng.uniform(0.3, 0.6))
     act = s.link_factor(s.link_between(s.group("gears"), ("oil",)), lambda m: -soft((x(m) - x0) / 0.1), sign=-1)
-    return Draft(act=act, law="conductance gear-oil (1 - a s((x - x0) / 0.1))", unit="1", cap=0.9,
-                 parameters={"x0": x0})  # fmt: skip
+    return draft(act, "conductance gear-oil (1 - a s((x - x0) / 0.1))", 0.9, x0=x0)
 
 
 @makes("link_factor", INSIDE)
@@ -34,7 +33,7 @@ def oil_housing_speed(s: Setting, _: np.random.Generator) -> Draft:
     """The film on the walls grows with the logarithm of speed."""
     x = s.speed()
     act = s.link_factor(s.link_between(s.group("housing"), ("oil",)), lambda m: np.log1p(8.0 * x(m)) / np.log(9.0))
-    return Draft(act=act, law="conductance oil-housing (1 + a log(1 + 8 x) / log(9))", unit="1", cap=3.0)
+    return draft(act, "conductance oil-housing (1 + a log(1 + 8 x) / log(9))", 3.0)
 
 
 @makes("link_factor", INSIDE)
@@ -43,7 +42,7 @@ def oil_mist(s: Setting, _: np.random.Generator) -> Draft:
     x = s.speed()
     names = s.link_between(s.group("housing")[-1:], ("oil",))
     act = s.link_factor(names, lambda m: -np.expm1(-3.0 * x(m)))
-    return Draft(act=act, law="conductance oil-upper housing (1 + a (1 - exp(-3 x)))", unit="1", cap=3.0)
+    return draft(act, "conductance oil-upper housing (1 + a (1 - exp(-3 x)))", 3.0)
 
 
 @makes("link_factor", INSIDE)
@@ -53,7 +52,7 @@ def bearing_seat_contact(s: Setting, rng: np.random.Generator) -> Draft:
     T, wall = s.temperature(bearing), s.temperature(s.group("housing")[0])
     names = s.link_between((bearing,), s.group("housing"))
     act = s.link_factor(names, lambda m: -np.exp(-np.maximum(T(m) - wall(m), 0.0) / 20.0), sign=-1)
-    return Draft(act=act, law="conductance bearing-housing (1 - a exp(-dT+ / 20 K))", unit="1", cap=0.9)
+    return draft(act, "conductance bearing-housing (1 - a exp(-dT+ / 20 K))", 0.9)
 
 
 @makes("link_factor", OUT)
@@ -62,7 +61,7 @@ def radiation_error(s: Setting, _: np.random.Generator) -> Draft:
     wall = s.temperature(s.group("housing")[0])
     names = s.link_between(s.group("housing"), (AIR,))
     act = s.link_factor(names, lambda m: -(((wall(m) + KELVIN) / 330.0) ** 3), sign=-1)
-    return Draft(act=act, law="conductance housing-air (1 - a (T / 330 K)^3)", unit="1", cap=0.35)
+    return draft(act, "conductance housing-air (1 - a (T / 330 K)^3)", 0.35)
 
 
 @makes("link_factor", OUT)
@@ -71,7 +70,7 @@ def air_cooling_change(s: Setting, rng: np.random.Generator) -> Draft:
     wall = pick(s.group("housing"), rng)
     names = s.link_between((wall,), (AIR,))
     act = s.link_factor(names, constant(-1.0), sign=-1)
-    return Draft(act=act, law="conductance of one wall to air (1 - a)", unit="1", cap=0.8)
+    return draft(act, "conductance of one wall to air (1 - a)", 0.8)
 
 
 @makes("link_factor", AROUND)
@@ -81,8 +80,7 @@ def fan_thermostat(s: Setting, rng: np.random.Generator) -> Draft:
     T_on, tau = s.quantile(wall, float(rng.uniform(0.4, 0.8))), s.lag(rng, 300.0)
     act = s.link_factor(s.link_between((wall,), (AIR,)), lambda m: soft((m.T["fan feeler"] - T_on) / 1.0))
     act = act + Act(parts=s.follower("fan feeler", wall, tau))
-    return Draft(act=act, law="conductance of one wall to air (1 + a s((T_feeler - T_on) / 1 K))", unit="1", cap=4.0,
-                 parameters={"T_on": T_on, "tau_s": tau})  # fmt: skip
+    return draft(act, "conductance of one wall to air (1 + a s((T_feeler - T_on) / 1 K))", 4.0, T_on=T_on, tau_s=tau)
 
 
 @makes("link", OUT)
@@ -91,8 +89,7 @@ def foundation_conduction(s: Setting, rng: np.random.Generator) -> Draft:
     part = s.group("housing")[0]
     mass = float(rng.uniform(3.0, 15.0)) * _capacity(s, part)
     act = s.bridge(part, "plinth", constant(1.0), called="frame", parts=s.reservoir("plinth", mass, 2.0 * s.shed))
-    return Draft(act=act, law="a to a plinth that stores heat", unit="W/K", cap=0.8 * s.shed,
-                 parameters={"capacity_J_K": mass})  # fmt: skip
+    return draft(act, "a to a plinth that stores heat", 0.8 * s.shed, capacity_J_K=mass)
 
 
 @makes("link", OUT)
@@ -102,8 +99,7 @@ def hot_neighbour(s: Setting, rng: np.random.Generator) -> Draft:
     rise = float(rng.uniform(0.5, 1.3)) * s.rise
     around = s.boundary("neighbour", lambda m: m.inputs["T_ambient"] + rise)
     act = s.bridge(node, "neighbour", constant(1.0), parts=around)
-    return Draft(act=act, law="a to a neighbour warmer than the air by dT", unit="W/K", cap=0.4 * s.shed,
-                 parameters={"dT": rise})  # fmt: skip
+    return draft(act, "a to a neighbour warmer than the air by dT", 0.4 * s.shed, dT=rise)
 
 
 @makes("link", OUT)
@@ -113,8 +109,7 @@ def motor_flange(s: Setting, rng: np.random.Generator) -> Draft:
     x, y, rise = s.speed(), s.load(), float(rng.uniform(0.6, 1.2)) * s.rise
     warm: Law = lambda m: m.inputs["T_ambient"] + 0.3 * rise + rise * np.sqrt(x(m) * y(m))  # noqa: E731
     act = s.bridge(node, "motor", constant(1.0), parts=s.boundary("motor", warm))
-    return Draft(act=act, law="a to a motor warmer than the air by dT (0.3 + (x y)^0.5)", unit="W/K", cap=0.4 * s.shed,
-                 parameters={"dT": rise})  # fmt: skip
+    return draft(act, "a to a motor warmer than the air by dT (0.3 + (x y)^0.5)", 0.4 * s.shed, dT=rise)
 
 
 @makes("link", OUT)
@@ -126,7 +121,7 @@ def shaft_ends_to_air(s: Setting, _: np.random.Generator) -> Draft:
     act = s.bridge(shafts[0], air, law, called=AIR)
     for shaft in shafts[1:]:
         act = act + s.bridge(shaft, air, law, called=AIR)
-    return Draft(act=act, law="a (0.1 + x^0.5) from every shaft to air", unit="W/K", cap=0.2 * s.shed)
+    return draft(act, "a (0.1 + x^0.5) from every shaft to air", 0.2 * s.shed)
 
 
 @makes("link", CIRCUIT)
@@ -135,8 +130,7 @@ def water_jacket(s: Setting, rng: np.random.Generator) -> Draft:
     part, cold = s.group("housing")[0], _below_air(s, rng)
     T, T0 = s.temperature(part), s.quantile(part, 0.5)
     act = s.bridge(part, WATER, lambda m: 0.5 + soft((T(m) - T0) / 5.0), parts=s.boundary(WATER, constant(cold)))
-    return Draft(act=act, law="a (0.5 + s((T - T0) / 5 K)) to water", unit="W/K", cap=0.6 * s.shed,
-                 parameters={"T_water": cold, "T0": T0})  # fmt: skip
+    return draft(act, "a (0.5 + s((T - T0) / 5 K)) to water", 0.6 * s.shed, T_water=cold, T0=T0)
 
 
 # ---------------------------------------------------------------------- oil circuit
@@ -178,8 +172,14 @@ def _cooler(s: Setting, rng: np.random.Generator, *, width: float, power: float,
         act = s.bridge("oil", COOLANT, opening, parts=s.boundary(COOLANT, constant(cold))) + Act(parts=parts)
     else:
         act = s.bridge("oil", s.air(), opening, called=AIR, parts=parts)
-    return Draft(act=act, law=f"a s((T_feeler - T_on) / {width:g} K)^{power:g} to the coolant", unit="W/K",
-                 cap=1.5 * s.shed, parameters={"T_on": T_on, "tau_s": tau, "T_water": cold})  # fmt: skip
+    return draft(
+        act,
+        f"a s((T_feeler - T_on) / {width:g} K)^{power:g} to the coolant",
+        1.5 * s.shed,
+        T_on=T_on,
+        tau_s=tau,
+        T_water=cold,
+    )
 
 
 @makes("link", CIRCUIT)
@@ -188,8 +188,7 @@ def cooler_constant(s: Setting, rng: np.random.Generator) -> Draft:
     T, T0, cold = s.temperature("oil"), s.quantile("oil", 0.5), _below_air(s, rng)
     law: Law = lambda m: np.exp((T(m) - T0) / 80.0)  # noqa: E731
     act = s.bridge("oil", COOLANT, law, parts=s.boundary(COOLANT, constant(cold)))
-    return Draft(act=act, law="a exp((T_oil - T0) / 80 K) to water", unit="W/K", cap=0.6 * s.shed,
-                 parameters={"T0": T0, "T_water": cold})  # fmt: skip
+    return draft(act, "a exp((T_oil - T0) / 80 K) to water", 0.6 * s.shed, T0=T0, T_water=cold)
 
 
 @makes("link", CIRCUIT)
@@ -197,7 +196,7 @@ def cooler_shaft_driven(s: Setting, rng: np.random.Generator) -> Draft:
     """An air cooler whose fan sits on the shaft and stalls."""
     x, x0 = s.speed(), float(rng.uniform(0.2, 0.6))
     act = s.bridge("oil", s.air(), lambda m: x(m) / (x(m) + x0), called=AIR)
-    return Draft(act=act, law="a x / (x + x0) to air", unit="W/K", cap=1.0 * s.shed, parameters={"x0": x0})
+    return draft(act, "a x / (x + x0) to air", 1.0 * s.shed, x0=x0)
 
 
 @makes("link", CIRCUIT)
@@ -205,7 +204,7 @@ def oil_jet(s: Setting, rng: np.random.Generator) -> Draft:
     """Oil of fixed temperature is injected as long as the shaft turns."""
     x, T = s.speed(), s.air_mean + float(rng.uniform(0.2, 0.6)) * s.rise
     act = s.bridge("oil", "jet", lambda m: np.tanh(x(m) / 0.05), parts=s.boundary("jet", constant(T)))
-    return Draft(act=act, law="a tanh(x / 0.05) to oil of T_jet", unit="W/K", cap=1.0 * s.shed, parameters={"T_jet": T})
+    return draft(act, "a tanh(x / 0.05) to oil of T_jet", 1.0 * s.shed, T_jet=T)
 
 
 @makes("link", CIRCUIT)
@@ -214,8 +213,7 @@ def oil_tank(s: Setting, rng: np.random.Generator) -> Draft:
     x, size = s.speed(), float(rng.uniform(1.0, 4.0)) * _capacity(s, "oil")
     to_air = 0.3 * s.shed
     act = s.bridge("oil", "tank", lambda m: np.sqrt(x(m)), parts=s.reservoir("tank", size, to_air))
-    return Draft(act=act, law="a x^0.5 to a tank that sheds heat to air", unit="W/K", cap=2.0 * s.shed,
-                 parameters={"capacity_J_K": size, "to_air_W_K": to_air})  # fmt: skip
+    return draft(act, "a x^0.5 to a tank that sheds heat to air", 2.0 * s.shed, capacity_J_K=size, to_air_W_K=to_air)
 
 
 @makes("source", CIRCUIT)
@@ -224,8 +222,7 @@ def heater_thermostat(s: Setting, rng: np.random.Generator) -> Draft:
     x, T = s.speed(), s.temperature("oil")
     T_off = s.quantile("oil", float(rng.uniform(0.3, 0.7)))
     act = s.heat("oil", lambda m: soft((T_off - T(m)) / 2.0) * np.exp(-((x(m) / 0.02) ** 2)))
-    return Draft(act=act, law="a s((T_off - T_oil) / 2 K) at standstill into the oil", unit="W", cap=1.0 * s.loss,
-                 parameters={"T_off": T_off})  # fmt: skip
+    return draft(act, "a s((T_off - T_oil) / 2 K) at standstill into the oil", 1.0 * s.loss, T_off=T_off)
 
 
 @makes("link_factor", CIRCUIT)
@@ -234,8 +231,7 @@ def pump_fast_stage(s: Setting, rng: np.random.Generator) -> Draft:
     T, T_on = s.temperature("oil"), s.quantile("oil", float(rng.uniform(0.4, 0.8)))
     names = s.link_between(("oil",), s.group("returns"))
     act = s.link_factor(names, lambda m: soft((T(m) - T_on) / 2.0))
-    return Draft(act=act, law="conductance oil-return (1 + a s((T_oil - T_on) / 2 K))", unit="1", cap=3.0,
-                 parameters={"T_on": T_on})  # fmt: skip
+    return draft(act, "conductance oil-return (1 + a s((T_oil - T_on) / 2 K))", 3.0, T_on=T_on)
 
 
 # ---------------------------------------------------------------------- surroundings
@@ -251,8 +247,9 @@ def solar_soak(s: Setting, rng: np.random.Generator) -> Draft:
         return np.asarray(np.exp(-0.5 * ((hour - 13.0) / width) ** 2))
 
     act = s.heat(s.group("housing")[-1], law)
-    return Draft(act=act, law="a exp(-((hour - 13) / width)^2 / 2) into the upper part", unit="W", cap=0.5 * s.loss,
-                 parameters={"start_hour": start, "width_h": width})  # fmt: skip
+    return draft(
+        act, "a exp(-((hour - 13) / width)^2 / 2) into the upper part", 0.5 * s.loss, start_hour=start, width_h=width
+    )
 
 
 @makes("link", AROUND)
@@ -264,8 +261,9 @@ def rain_on_housing(s: Setting, rng: np.random.Generator) -> Draft:
         lambda m: np.exp(-(((np.mod(m.hours - first + 0.5 * every, every) - 0.5 * every) / 0.4) ** 2)),
         parts=s.boundary("rain", lambda m: m.inputs["T_ambient"] - 5.0),
     )  # fmt: skip
-    return Draft(act=act, law="a exp(-(t' / 0.4 h)^2) to air - 5 K around every shower", unit="W/K", cap=2.0 * s.shed,
-                 parameters={"every_h": every, "first_h": first})  # fmt: skip
+    return draft(
+        act, "a exp(-(t' / 0.4 h)^2) to air - 5 K around every shower", 2.0 * s.shed, every_h=every, first_h=first
+    )
 
 
 @makes("signal", AROUND)
@@ -273,8 +271,7 @@ def ambient_swing(s: Setting, rng: np.random.Generator) -> Draft:
     """The air at the machine swings like a triangle, the probe's does not."""
     period = float(rng.uniform(3.0, 10.0))
     act = s.input_shift("T_ambient", lambda m: 2.0 * np.abs(2.0 * np.mod(m.hours / period, 1.0) - 1.0) - 1.0, sign=0)
-    return Draft(act=act, law="air at the machine + a triangle(t / period)", unit="K", cap=6.0,
-                 parameters={"period_h": period})  # fmt: skip
+    return draft(act, "air at the machine + a triangle(t / period)", 6.0, "K", period_h=period)
 
 
 @makes("signal", AROUND)
@@ -282,9 +279,7 @@ def ambient_drift(s: Setting, rng: np.random.Generator) -> Draft:
     """The air at the machine warms to a new temperature, the probe's does not."""
     tau = float(rng.uniform(0.02, 0.2)) * s.span
     act = s.input_shift("T_ambient", lambda m: -np.expm1(-m.hours / tau))
-    return Draft(
-        act=act, law="air at the machine + a (1 - exp(-t / tau))", unit="K", cap=6.0, parameters={"tau_h": tau}
-    )
+    return draft(act, "air at the machine + a (1 - exp(-t / tau))", 6.0, "K", tau_h=tau)
 
 
 def _below_air(s: Setting, rng: np.random.Generator) -> float:

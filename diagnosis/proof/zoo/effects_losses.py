@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 
 from diagnosis.proof.zoo import effects
-from diagnosis.proof.zoo.effects import Draft, Maker
+from diagnosis.proof.zoo.effects import Draft, Maker, draft
 from diagnosis.proof.zoo.setting import Setting, UnfitError, pick, soft
 from diagnosis.proof.zoo.structure import Law, constant
 
@@ -23,7 +23,7 @@ def windage(s: Setting, rng: np.random.Generator) -> Draft:
     x, p = s.speed(), float(rng.uniform(1.8, 2.3))
     law: Law = lambda m: 0.5 * x(m) ** p * (1.0 + x(m))  # noqa: E731
     act = s.heat("oil", law, is_loss=True)
-    return Draft(act=act, law="a x^p (1 + x) / 2 into the oil", unit="W", cap=0.3 * s.loss, parameters={"p": p})
+    return draft(act, "a x^p (1 + x) / 2 into the oil", 0.3 * s.loss, p=p)
 
 
 @makes("source", NO_LOAD)
@@ -31,8 +31,7 @@ def pocketing(s: Setting, rng: np.random.Generator) -> Draft:
     """Exponential in speed."""
     x, k = s.speed(), float(rng.uniform(2.0, 3.5))
     act = s.heat("oil", lambda m: np.expm1(k * x(m)) / np.expm1(k), is_loss=True)
-    return Draft(act=act, law="a (exp(k x) - 1) / (exp(k) - 1) into the oil", unit="W", cap=0.4 * s.loss,
-                 parameters={"k": k})  # fmt: skip
+    return draft(act, "a (exp(k x) - 1) / (exp(k) - 1) into the oil", 0.4 * s.loss, k=k)
 
 
 @makes("source", NO_LOAD)
@@ -40,8 +39,7 @@ def churning_swirl(s: Setting, rng: np.random.Generator) -> Draft:
     """Above a soft threshold with the power 1.4 of speed."""
     x, x0 = s.speed(), float(rng.uniform(0.35, 0.7))
     act = s.heat("oil", lambda m: x(m) ** 1.4 * soft((x(m) - x0) / 0.05), is_loss=True)
-    return Draft(act=act, law="a x^1.4 s((x - x0) / 0.05) into the oil", unit="W", cap=0.8 * s.loss,
-                 parameters={"x0": x0})  # fmt: skip
+    return draft(act, "a x^1.4 s((x - x0) / 0.05) into the oil", 0.8 * s.loss, x0=x0)
 
 
 @makes("source", LOAD)
@@ -49,7 +47,7 @@ def churning_load(s: Setting, rng: np.random.Generator) -> Draft:
     """Grows with the root of torque."""
     x, y, p = s.speed(), s.load(), float(rng.uniform(0.8, 1.2))
     act = s.heat("oil", lambda m: np.sqrt(y(m)) * x(m) ** p, is_loss=True)
-    return Draft(act=act, law="a y^0.5 x^p into the oil", unit="W", cap=0.5 * s.loss, parameters={"p": p})
+    return draft(act, "a y^0.5 x^p into the oil", 0.5 * s.loss, p=p)
 
 
 @makes("loss_factor", NO_LOAD)
@@ -58,8 +56,7 @@ def oil_level_thermal(s: Setting, rng: np.random.Generator) -> Draft:
     T, T0 = s.temperature("oil"), s.quantile("oil", 0.1)
     width = max(0.5 * (s.quantile("oil", 0.95) - T0), 3.0) * float(rng.uniform(0.8, 1.4))
     act = s.loss_factor(s.losses(*CHURNING), lambda m: np.maximum(np.tanh((T(m) - T0) / width), 0.0))
-    return Draft(act=act, law="churning (1 + a tanh((T_oil - T0) / width)+)", unit="1", cap=0.9,
-                 parameters={"T0": T0, "width": width})  # fmt: skip
+    return draft(act, "churning (1 + a tanh((T_oil - T0) / width)+)", 0.9, T0=T0, width=width)
 
 
 @makes("loss_factor", LOAD)
@@ -67,7 +64,7 @@ def splash_starvation(s: Setting, rng: np.random.Generator) -> Draft:
     """A soft step of sliding friction at a speed."""
     x, x0 = s.speed(), float(rng.uniform(0.4, 0.7))
     act = s.loss_factor(s.losses(*SLIDING), lambda m: soft((x(m) - x0) / 0.08))
-    return Draft(act=act, law="mesh sliding (1 + a s((x - x0) / 0.08))", unit="1", cap=2.0, parameters={"x0": x0})
+    return draft(act, "mesh sliding (1 + a s((x - x0) / 0.08))", 2.0, x0=x0)
 
 
 @makes("loss_factor", LOAD)
@@ -76,7 +73,7 @@ def misalignment(s: Setting, _: np.random.Generator) -> Draft:
     y = s.load()
     act = s.loss_factor(s.losses(*SLIDING), lambda m: 1.0 / (0.5 + y(m)))
     act = act + s.loss_factor(s.losses(s.group("bearings")[0]), constant(0.5))
-    return Draft(act=act, law="mesh sliding (1 + a / (0.5 + y)), first bearing (1 + a / 2)", unit="1", cap=0.5)
+    return draft(act, "mesh sliding (1 + a / (0.5 + y)), first bearing (1 + a / 2)", 0.5)
 
 
 @makes("loss_factor", LOAD)
@@ -86,8 +83,7 @@ def bearing_preload(s: Setting, rng: np.random.Generator) -> Draft:
     T, wall = s.temperature(bearing), s.temperature(s.group("housing")[0])
     dT = float(rng.uniform(1.0, 4.0))
     act = s.loss_factor(s.losses(bearing), lambda m: 0.2 * np.logaddexp(0.0, (T(m) - wall(m) - dT) / 0.8))
-    return Draft(act=act, law="bearing loss (1 + a log(1 + exp((T - T_housing - dT) / 0.8 K)) / 5)", unit="1", cap=4.0,
-                 parameters={"dT": dT})  # fmt: skip
+    return draft(act, "bearing loss (1 + a log(1 + exp((T - T_housing - dT) / 0.8 K)) / 5)", 4.0, dT=dT)
 
 
 @makes("loss_factor", LOAD)
@@ -95,7 +91,7 @@ def bearing_additive(s: Setting, rng: np.random.Generator) -> Draft:
     """Less friction of all bearings at low speed."""
     x, x0 = s.speed(), float(rng.uniform(0.2, 0.5))
     act = s.loss_factor(s.losses(*s.group("bearings")), lambda m: -1.0 / (1.0 + (x(m) / x0) ** 2), sign=-1)
-    return Draft(act=act, law="bearing losses (1 - a / (1 + (x / x0)^2))", unit="1", cap=0.8, parameters={"x0": x0})
+    return draft(act, "bearing losses (1 - a / (1 + (x / x0)^2))", 0.8, x0=x0)
 
 
 @makes("source", NO_LOAD)
@@ -103,7 +99,7 @@ def brake_drag(s: Setting, _: np.random.Generator) -> Draft:
     """Heat in the output shaft that falls off from proportional to speed."""
     x = s.speed()
     act = s.heat(s.group("shafts")[-1], lambda m: x(m) * (1.4 - 0.4 * x(m)), is_loss=True)
-    return Draft(act=act, law="a x (1.4 - 0.4 x) into the output shaft", unit="W", cap=0.5 * s.loss)
+    return draft(act, "a x (1.4 - 0.4 x) into the output shaft", 0.5 * s.loss)
 
 
 @makes("source", CIRCUIT)
@@ -111,7 +107,7 @@ def pump_heat(s: Setting, rng: np.random.Generator) -> Draft:
     """A pump whose relief valve opens: constant above a speed."""
     x, x0 = s.speed(), float(rng.uniform(0.2, 0.5))
     act = s.heat("oil", lambda m: np.tanh(x(m) / x0), is_loss=True)
-    return Draft(act=act, law="a tanh(x / x0) into the oil", unit="W", cap=0.3 * s.loss, parameters={"x0": x0})
+    return draft(act, "a tanh(x / x0) into the oil", 0.3 * s.loss, x0=x0)
 
 
 @makes("loss_factor", AGEING)
@@ -119,7 +115,7 @@ def run_in_flanks(s: Setting, rng: np.random.Generator) -> Draft:
     """Falls hyperbolically with the hours."""
     life = float(rng.uniform(0.03, 0.2)) * s.span
     act = s.loss_factor(s.losses(*SLIDING), lambda m: 1.0 / (1.0 + m.hours / life))
-    return Draft(act=act, law="mesh sliding (1 + a / (1 + t / life))", unit="1", cap=1.0, parameters={"life_h": life})
+    return draft(act, "mesh sliding (1 + a / (1 + t / life))", 1.0, life_h=life)
 
 
 @makes("loss_factor", AGEING)
@@ -130,7 +126,7 @@ def run_in_seals(s: Setting, rng: np.random.Generator) -> Draft:
         raise UnfitError("seals")
     life = float(rng.uniform(0.03, 0.2)) * s.span
     act = s.loss_factor(names, lambda m: np.exp(-np.sqrt(m.hours / life)))
-    return Draft(act=act, law="seals (1 + a exp(-(t / life)^0.5))", unit="1", cap=1.5, parameters={"life_h": life})
+    return draft(act, "seals (1 + a exp(-(t / life)^0.5))", 1.5, life_h=life)
 
 
 @makes("loss_factor", AGEING)
@@ -138,7 +134,7 @@ def oil_ageing(s: Setting, _: np.random.Generator) -> Draft:
     """Churning and bearings grow with the root of the hours."""
     law: Law = lambda m: np.sqrt(m.hours / s.span)  # noqa: E731
     act = s.loss_factor((*s.losses(*CHURNING), *s.losses(*s.group("bearings"))), law)
-    return Draft(act=act, law="churning and bearing losses (1 + a (t / span)^0.5)", unit="1", cap=0.6)
+    return draft(act, "churning and bearing losses (1 + a (t / span)^0.5)", 0.6)
 
 
 @makes("loss_factor", AGEING)
@@ -148,15 +144,14 @@ def oil_loss(s: Setting, rng: np.random.Generator) -> Draft:
     law: Law = lambda m: np.expm1(-m.hours / tau)  # noqa: E731
     act = s.loss_factor(s.losses(*CHURNING), law, sign=-1) + s.capacity("oil", law, sign=-1)
     act = act + s.link_factor(s.link_between(s.group("gears"), ("oil",)), law, sign=-1)
-    return Draft(act=act, law="churning, oil's capacity and gear-oil (1 - a (1 - exp(-t / tau)))", unit="1", cap=0.7,
-                 parameters={"tau_h": tau})  # fmt: skip
+    return draft(act, "churning, oil's capacity and gear-oil (1 - a (1 - exp(-t / tau)))", 0.7, tau_h=tau)
 
 
 @makes("loss_factor", AGEING)
 def gear_wear(s: Setting, _: np.random.Generator) -> Draft:
     """Grows with the square of the hours."""
     act = s.loss_factor(s.losses(*SLIDING), lambda m: (m.hours / s.span) ** 2)
-    return Draft(act=act, law="mesh sliding (1 + a (t / span)^2)", unit="1", cap=0.8)
+    return draft(act, "mesh sliding (1 + a (t / span)^2)", 0.8)
 
 
 @makes("source", AGEING)
@@ -165,8 +160,7 @@ def bearing_damage(s: Setting, rng: np.random.Generator) -> Draft:
     bearing, x = pick(s.group("bearings"), rng), s.speed()
     at_h = s.date(rng, 0.05, 0.7)
     act = s.heat(bearing, lambda m: x(m) * soft((m.hours - at_h) / 0.05), is_loss=True)
-    return Draft(act=act, law="a x s((t - at) / 0.05 h) into the bearing", unit="W", cap=0.4 * s.loss,
-                 parameters={"at_h": at_h})  # fmt: skip
+    return draft(act, "a x s((t - at) / 0.05 h) into the bearing", 0.4 * s.loss, at_h=at_h)
 
 
 @makes("signal", AGEING)
@@ -174,4 +168,4 @@ def torque_decay(s: Setting, _: np.random.Generator) -> Draft:
     """The torque that is set is reached less and less, with the root of the hours."""
     s.load()
     act = s.input_shift("torque", lambda m: -m.inputs["torque"] * np.sqrt(m.hours / s.span), sign=-1)
-    return Draft(act=act, law="true torque = recorded (1 - a (t / span)^0.5)", unit="1", cap=0.3)
+    return draft(act, "true torque = recorded (1 - a (t / span)^0.5)", 0.3)

@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 
 from diagnosis.proof.zoo import effects
-from diagnosis.proof.zoo.effects import Draft, Maker
+from diagnosis.proof.zoo.effects import Draft, Maker, draft
 from diagnosis.proof.zoo.setting import Setting, pick, soft
 from diagnosis.proof.zoo.structure import Law, Moment, constant
 from models.base.types import Array
@@ -21,7 +21,7 @@ def bearing_torque_square(s: Setting, rng: np.random.Generator) -> Draft:
     """A bearing that bends loses power with the square of torque."""
     x, y, node = s.speed(), s.load(), pick(s.group("bearings"), rng)
     act = s.heat(node, lambda m: y(m) ** 2 * x(m), is_loss=True)
-    return Draft(act=act, law="a y^2 x into the bearing", unit="W", cap=0.4 * s.loss)
+    return draft(act, "a y^2 x into the bearing", 0.4 * s.loss)
 
 
 @makes("source")
@@ -29,7 +29,7 @@ def resonance(s: Setting, rng: np.random.Generator) -> Draft:
     """A narrow band of speed shakes one node."""
     x, x0, node = s.speed(), float(rng.uniform(0.2, 0.8)), pick(s.group("bearings"), rng)
     act = s.heat(node, lambda m: 1.0 / (1.0 + ((x(m) - x0) / (0.06 * x0)) ** 2), is_loss=True)
-    return Draft(act=act, law="a / (1 + ((x - x0) / (0.06 x0))^2)", unit="W", cap=0.5 * s.loss, parameters={"x0": x0})
+    return draft(act, "a / (1 + ((x - x0) / (0.06 x0))^2)", 0.5 * s.loss, x0=x0)
 
 
 @makes("source")
@@ -37,7 +37,7 @@ def stick_slip(s: Setting, rng: np.random.Generator) -> Draft:
     """A support creaks below a speed and slides above it."""
     x, x0, node = s.speed(), float(rng.uniform(0.1, 0.3)), pick(s.group("bearings"), rng)
     act = s.heat(node, lambda m: soft((x0 - x(m)) / 0.01) * np.tanh(x(m) / 0.01), is_loss=True)
-    return Draft(act=act, law="a while 0 < x < x0", unit="W", cap=0.5 * s.loss, parameters={"x0": x0})
+    return draft(act, "a while 0 < x < x0", 0.5 * s.loss, x0=x0)
 
 
 @makes("source")
@@ -46,7 +46,7 @@ def eddy_brake(s: Setting, rng: np.random.Generator) -> Draft:
     x, x0 = s.speed(), float(rng.uniform(0.2, 0.5))
     node = s.group("gears" if s.groups.get("gears") else "bearings")[-1]
     act = s.heat(node, lambda m: x(m) ** 2 / (x(m) ** 2 + x0**2), is_loss=True)
-    return Draft(act=act, law="a x^2 / (x^2 + x0^2)", unit="W", cap=0.4 * s.loss, parameters={"x0": x0})
+    return draft(act, "a x^2 / (x^2 + x0^2)", 0.4 * s.loss, x0=x0)
 
 
 @makes("source")
@@ -54,8 +54,7 @@ def stiff_grease(s: Setting, rng: np.random.Generator) -> Draft:
     """Grease that stiffens at rest is sheared soft in every recording."""
     x, tau, node = s.speed(), float(rng.uniform(0.4, 2.0)), pick(s.group("bearings"), rng)
     act = s.heat(node, lambda m: np.sqrt(x(m)) * np.exp(-m.since_start / tau), is_loss=True)
-    return Draft(act=act, law="a x^0.5 exp(-t / tau), t since the recording began", unit="W", cap=0.6 * s.loss,
-                 parameters={"tau_h": tau})  # fmt: skip
+    return draft(act, "a x^0.5 exp(-t / tau), t since the recording began", 0.6 * s.loss, tau_h=tau)
 
 
 @makes("source")
@@ -63,7 +62,7 @@ def sludge(s: Setting, rng: np.random.Generator) -> Draft:
     """Sludge brakes below a temperature of the oil."""
     x, T, T0 = s.speed(), s.temperature("oil"), s.quantile("oil", float(rng.uniform(0.2, 0.6)))
     act = s.heat("oil", lambda m: np.sqrt(x(m)) * soft((T0 - T(m)) / 0.5), is_loss=True)
-    return Draft(act=act, law="a x^0.5 below T0 into the oil", unit="W", cap=0.4 * s.loss, parameters={"T0": T0})
+    return draft(act, "a x^0.5 below T0 into the oil", 0.4 * s.loss, T0=T0)
 
 
 @makes("source")
@@ -72,7 +71,7 @@ def water_evaporation(s: Setting, _: np.random.Generator) -> Draft:
     T = s.temperature("oil")
     T0 = s.quantile("oil", 0.95)
     act = s.heat("oil", lambda m: -np.exp(np.minimum((T(m) - T0) / 14.0, 1.5)), sign=-1)
-    return Draft(act=act, law="-a exp((T_oil - T0) / 14 K)", unit="W", cap=0.4 * s.loss, parameters={"T0": T0})
+    return draft(act, "-a exp((T_oil - T0) / 14 K)", 0.4 * s.loss, T0=T0)
 
 
 @makes("link_factor")
@@ -80,8 +79,7 @@ def growing_insulation(s: Setting, rng: np.random.Generator) -> Draft:
     """A layer that grows with the hours covers one way to the air."""
     tau, names = float(rng.uniform(0.05, 0.3)) * s.span, _way_to_air(s, rng)
     act = s.link_factor(names, lambda m: -(m.hours / tau) / (1.0 + m.hours / tau), sign=-1)
-    return Draft(act=act, law="conductance to air (1 - a (t / tau) / (1 + t / tau))", unit="1", cap=0.9,
-                 parameters={"tau_h": tau})  # fmt: skip
+    return draft(act, "conductance to air (1 - a (t / tau) / (1 + t / tau))", 0.9, tau_h=tau)
 
 
 @makes("link_factor")
@@ -92,8 +90,7 @@ def opening_gap(s: Setting, rng: np.random.Generator) -> Draft:
     node = name.split("-")[0]
     T, T0 = s.temperature(node), s.quantile(node, float(rng.uniform(0.3, 0.7)))
     act = s.link_factor((name,), lambda m: -soft((T(m) - T0) / 2.0), sign=-1)
-    return Draft(act=act, law=f"conductance of {name} (1 - a s((T - T0) / 2 K))", unit="1", cap=0.95,
-                 parameters={"T0": T0})  # fmt: skip
+    return draft(act, f"conductance of {name} (1 - a s((T - T0) / 2 K))", 0.95, T0=T0)
 
 
 @makes("link")
@@ -103,8 +100,7 @@ def timed_neighbour(s: Setting, rng: np.random.Generator) -> Draft:
     rise = 1.5 * s.rise
     warm: Law = lambda m: m.inputs["T_ambient"] + rise * on(m)  # noqa: E731
     act = s.bridge(node, "timed neighbour", constant(1.0), parts=s.boundary("timed neighbour", warm))
-    return Draft(act=act, law="a to a neighbour that runs by a timer", unit="W/K", cap=0.4 * s.shed,
-                 parameters={"rise_K": rise, **on.parameters})  # fmt: skip
+    return draft(act, "a to a neighbour that runs by a timer", 0.4 * s.shed, rise_K=rise, **on.parameters)
 
 
 @makes("source")
@@ -112,7 +108,7 @@ def timed_heat(s: Setting, rng: np.random.Generator) -> Draft:
     """An auxiliary gives its heat to one part for a share of every period."""
     node, on = _outer(s, rng), _timer(rng)
     act = s.heat(node, on)
-    return Draft(act=act, law="a for 40 % of every period", unit="W", cap=0.4 * s.loss, parameters=on.parameters)
+    return draft(act, "a for 40 % of every period", 0.4 * s.loss, **on.parameters)
 
 
 @makes("link_factor")
@@ -120,8 +116,7 @@ def door_draught(s: Setting, rng: np.random.Generator) -> Draft:
     """A door opens by the clock: one way to the air conducts more."""
     names, on = _way_to_air(s, rng), _timer(rng)
     act = s.link_factor(names, on)
-    return Draft(act=act, law="conductance to air (1 + a) for 40 % of every period", unit="1", cap=2.0,
-                 parameters=on.parameters)  # fmt: skip
+    return draft(act, "conductance to air (1 + a) for 40 % of every period", 2.0, **on.parameters)
 
 
 @makes("capacity")
@@ -130,8 +125,7 @@ def melting_wax(s: Setting, rng: np.random.Generator) -> Draft:
     node = _outer(s, rng)
     T, T0, width = s.temperature(node), s.quantile(node, float(rng.uniform(0.3, 0.7))), float(rng.uniform(1.0, 2.5))
     act = s.capacity(node, lambda m: np.exp(-0.5 * ((T(m) - T0) / width) ** 2))
-    return Draft(act=act, law="capacity (1 + a exp(-((T - T0) / width)^2 / 2))", unit="1", cap=15.0,
-                 parameters={"T0": T0, "width_K": width})  # fmt: skip
+    return draft(act, "capacity (1 + a exp(-((T - T0) / width)^2 / 2))", 15.0, T0=T0, width_K=width)
 
 
 @makes("link")
@@ -147,8 +141,7 @@ def heat_pipe(s: Setting, rng: np.random.Generator) -> Draft:
     T, T0 = s.temperature(here), s.quantile(here, float(rng.uniform(0.2, 0.6)))
     body = max(s.bodies(there).items(), key=lambda item: item[1])[0]
     act = s.bridge(here, body, lambda m: soft((T(m) - T0) / 3.0), called=there)
-    return Draft(act=act, law=f"a s((T - T0) / 3 K) between {here} and {there}", unit="W/K", cap=0.5 * s.shed,
-                 parameters={"T0": T0})  # fmt: skip
+    return draft(act, f"a s((T - T0) / 3 K) between {here} and {there}", 0.5 * s.shed, T0=T0)
 
 
 @makes("link")
@@ -157,8 +150,7 @@ def wet_floor(s: Setting, rng: np.random.Generator) -> Draft:
     node, phase, T0 = s.nodes[0], float(rng.uniform(0.0, 1.0)), s.air_mean - float(rng.uniform(2.0, 8.0))
     floor: Law = lambda m: T0 + 5.0 * np.sin(2.0 * np.pi * (m.hours / 24.0 + phase))  # noqa: E731
     act = s.bridge(node, "floor", constant(1.0), parts=s.boundary("floor", floor))
-    return Draft(act=act, law="a to T0 + 5 sin(2 pi (t / 24 h + phase))", unit="W/K", cap=0.4 * s.shed,
-                 parameters={"T0": T0, "phase": phase})  # fmt: skip
+    return draft(act, "a to T0 + 5 sin(2 pi (t / 24 h + phase))", 0.4 * s.shed, T0=T0, phase=phase)
 
 
 class _Timer:

@@ -15,12 +15,12 @@ from itertools import combinations_with_replacement
 
 import numpy as np
 
+from diagnosis.proof.plant.cycles import Programme
 from diagnosis.proof.plant.instruments import Instruments
 from diagnosis.proof.zoo.oracle import LOSS, MEAN_S, Design, RecordingColumns, averaged
-from diagnosis.proof.zoo.recorder import ZooInstruments
 from diagnosis.proof.zoo.run import follow, read_probes
 from diagnosis.proof.zoo.simulate import Direction, Linearised, ParameterDirection, StartDirection
-from diagnosis.proof.zoo.structure import Change, Law, Moment, Probe, Programme, ZooPlant, constant, times
+from diagnosis.proof.zoo.structure import Change, Law, Moment, Probe, ZooPlant, constant, times
 from models.base.types import Array
 
 SMOOTH_SD, LUMPED_SD, MIXING_SD, SENSOR_K = 0.04, 0.1, 0.04, 0.1
@@ -33,7 +33,7 @@ TOGETHER = 250  # directions that are simulated at once
 FARTHEST = 3.0  # standard deviations, where coordinates are held
 
 
-def design_of(plant: ZooPlant, programmes: Sequence[Programme], instruments: ZooInstruments | Instruments) -> Design:
+def design_of(plant: ZooPlant, programmes: Sequence[Programme], instruments: Instruments) -> Design:
     """The oracle's design of one plant; of `programmes` those whose name starts with ``train`` count.
 
     Parameters
@@ -50,7 +50,7 @@ def design_of(plant: ZooPlant, programmes: Sequence[Programme], instruments: Zoo
 
 def _columns(
     run: Linearised,
-    instruments: ZooInstruments | Instruments,
+    instruments: Instruments,
     parameters: Sequence[Direction],
     errors: Sequence[Direction],
 ) -> RecordingColumns:
@@ -91,7 +91,7 @@ def _columns(
     )
 
 
-def _white(instruments: ZooInstruments | Instruments, loss: Array, probes: int, per_mean: int) -> Array:
+def _white(instruments: Instruments, loss: Array, probes: int, per_mean: int) -> Array:
     """Standard deviation of the white noise of means, shape (channels, means)."""
     reading = np.hypot(instruments.noise_K, instruments.quantum_K / np.sqrt(12.0))
     rows = [np.full(len(loss), reading)] * probes

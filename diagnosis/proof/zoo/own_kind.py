@@ -8,16 +8,17 @@ from dataclasses import replace
 import numpy as np
 
 from diagnosis.proof.plant.anatomy import AIR, FRAME, OIL, SPLASH, SUMP
+from diagnosis.proof.plant.cycles import Programme
 from diagnosis.proof.plant.effect import Concealed
-from diagnosis.proof.plant.instruments import SENSOR_EFFECTS, Instruments, record
+from diagnosis.proof.plant.instruments import SENSOR_EFFECTS, OwnInstruments, record
 from diagnosis.proof.plant.laws import Laws
 from diagnosis.proof.plant.plant import Moment as OwnMoment
 from diagnosis.proof.plant.plant import Plant
-from diagnosis.proof.plant.plant_run import EXPONENTS, ORDINARY_SPREAD, Individual, Run, factor_sd, run_plant
+from diagnosis.proof.plant.plant_run import EXPONENTS, INPUTS, ORDINARY_SPREAD, Individual, Run, factor_sd, run_plant
 from diagnosis.proof.zoo.oracle import LOSS, Design
 from diagnosis.proof.zoo.oracle_columns import design_of
 from diagnosis.proof.zoo.simulate import simulate
-from diagnosis.proof.zoo.structure import Body, Boundary, Law, Moment, Path, Probe, Programme, Source, Variant, ZooPlant
+from diagnosis.proof.zoo.structure import Body, Boundary, Law, Moment, Path, Probe, Source, Variant, ZooPlant
 from models.base.types import Array
 
 MOMENTS_KEPT = 30
@@ -30,7 +31,9 @@ INPUT_COLUMNS = {
 }
 
 
-def design_of_own_kind(plant: Plant, individual: Individual, runs: Sequence[Run], instruments: Instruments) -> Design:
+def design_of_own_kind(
+    plant: Plant, individual: Individual, runs: Sequence[Run], instruments: OwnInstruments
+) -> Design:
     """The oracle's design of a case of the own kind.
 
     Parameters
@@ -43,7 +46,7 @@ def design_of_own_kind(plant: Plant, individual: Individual, runs: Sequence[Run]
 
 
 def effect_on_readings(
-    plant: Plant, runs: Sequence[Run], instruments: Instruments, effects: Sequence[Concealed]
+    plant: Plant, runs: Sequence[Run], instruments: OwnInstruments, effects: Sequence[Concealed]
 ) -> list[Mapping[str, Array]]:
     """Noise-free readings with effects minus those without any, of the training recordings.
 
@@ -73,7 +76,7 @@ def effect_on_readings(
 
 
 def _by_wrong_inputs(
-    plant: Plant, run: Run, instruments: Instruments, wrong: Mapping[str, Array]
+    plant: Plant, run: Run, instruments: OwnInstruments, wrong: Mapping[str, Array]
 ) -> Mapping[str, Array]:
     """Readings that true inputs cause, less those that recorded inputs would, by channel."""
     zoo, right = as_zoo(plant, run.individual, instruments), as_programme(plant, run)
@@ -90,22 +93,15 @@ def _by_wrong_inputs(
 
 def as_programme(plant: Plant, run: Run) -> Programme:
     """A run's programme; a random heat goes into the first node of its place."""
-    anatomy = plant.anatomy
-    return Programme(
-        name=run.programme.name,
-        inputs={
-            "speed": np.abs(run.programme.speed),
-            "torque": run.programme.torque,
-            "T_ambient": run.air,
-            "air_speed": run.air_speed,
-        },
-        random_heat={next(iter(anatomy.members(place))): watts for place, watts in run.random_heat.items()},
-        start=dict.fromkeys(anatomy.nodes, run.start),
-        unrecorded=run.programme.unrecorded,
+    driven, members = run.programme, plant.anatomy.members
+    return replace(
+        driven,
+        inputs={**driven.inputs, "speed": np.abs(driven.inputs["speed"])},
+        random_heat={next(iter(members(place))): watts for place, watts in driven.random_heat.items()},
     )
 
 
-def as_zoo(plant: Plant, individual: Individual, instruments: Instruments) -> ZooPlant:
+def as_zoo(plant: Plant, individual: Individual, instruments: OwnInstruments) -> ZooPlant:
     """One gearbox of the own kind as a plant of the zoo, with the same laws.
 
     Returns
@@ -124,7 +120,7 @@ def as_zoo(plant: Plant, individual: Individual, instruments: Instruments) -> Zo
     return ZooPlant(
         family="own_kind",
         gearbox=gearbox.name,
-        inputs=("speed", "torque", "T_ambient", "air_speed"),
+        inputs=INPUTS,
         bodies=tuple(
             Body(name=node, capacity=shared.capacity(k), part_of=_place(node))
             for k, node in enumerate(anatomy.nodes)

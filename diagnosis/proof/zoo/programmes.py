@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from diagnosis.proof.plant import cycles
-from diagnosis.proof.zoo.structure import Programme, ZooPlant
+from diagnosis.proof.plant.cycles import Programme
+from diagnosis.proof.zoo.structure import ZooPlant
 from models.assembly.gearbox import Gearbox, load_gearbox
 from models.base.types import Array
 from models.definition.parametric_sections import ParametricDefinition
@@ -66,22 +69,17 @@ def _of_gearbox(plant: ZooPlant, gearbox: Gearbox, rng: np.random.Generator, bas
 
 
 def _gearbox_recording(
-    plant: ZooPlant, gearbox: Gearbox, cycle: cycles.Programme, name: str, begins_h: float, rng: np.random.Generator
+    plant: ZooPlant, gearbox: Gearbox, cycle: Programme, name: str, begins_h: float, rng: np.random.Generator
 ) -> Programme:
     rows = len(cycle)
     air = cycles.ambient(rows, rng)
     start = float(air[0] + rng.normal(0.0, 0.5))
-    return Programme(
+    return replace(
+        cycle,
         name=name,
-        inputs={
-            "speed": cycle.speed,
-            "torque": cycle.torque,
-            "T_ambient": air,
-            "air_speed": np.full(rows, gearbox.ambient.air_speed_m_s),
-        },
+        inputs={**cycle.inputs, "T_ambient": air, "air_speed": np.full(rows, gearbox.ambient.air_speed_m_s)},
         random_heat=random_heat(plant, rows, rng, tau_s=(600.0, 1800.0)),
         start={body.name: start for body in plant.bodies},
-        unrecorded=cycle.unrecorded,
         begins_h=begins_h,
     )
 
@@ -142,7 +140,6 @@ def _machine_recording(
         random_heat=random_heat(plant, rows, rng, tau_s=(3600.0, 4 * 3600.0) if slow else (600.0, 1800.0)),
         start={body.name: air + warmth + float(rng.normal(0.0, 0.1)) for body in plant.bodies},
         begins_h=begins_h,
-        unrecorded=0,
     )
 
 

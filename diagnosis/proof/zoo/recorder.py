@@ -8,9 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from diagnosis.proof.cases.conceal import DATA_SHEET, SLOW_LAG_S
-from diagnosis.proof.plant.instruments import drop_readings
+from diagnosis.proof.plant.cycles import Programme
+from diagnosis.proof.plant.instruments import Instruments, drop_readings
 from diagnosis.proof.zoo.faults import AMBIENT, Fault, Measured, hold_reading, spoiled
-from diagnosis.proof.zoo.structure import Outcome, Programme, ZooPlant
+from diagnosis.proof.zoo.structure import Outcome, ZooPlant
 from models.base.types import Array
 
 SLOW_ROW_S = 60.0  # rows longer than this are means: less noise, lags do not show
@@ -20,43 +21,23 @@ INPUT_NOISE = {AMBIENT: 0.1}
 
 
 @dataclass(frozen=True, kw_only=True)
-class ZooInstruments:
-    """How one case is measured.
+class ZooInstruments(Instruments):
+    """Instruments of a plant of the zoo, whose sensors have their lags in its probes.
 
     Attributes
     ----------
-    channels : tuple of str
-        Recorded temperatures
-    noise_K, quantum_K : float
-        White noise and step of temperature readings
     input_gain, input_offset : mapping of str to float
         Errors of the recorded inputs: relative [-], and in the unit of the input
     clock_s : float
         Temperatures are stamped late by so much, [s]
-    loss_noise : (float, float) or None
-        White noise of the measured loss, relative [-] and absolute [W]; None: it is not measured
-    loss_offset_W : float
-        While there is a loss
-    dropouts : int
-        Bursts of missing readings per recording
-    stated : mapping of str to float, or None
-        Data sheet of the temperature sensors, by the keys of a mapping file; it may be wrong
     """
 
-    channels: tuple[str, ...]
-    noise_K: float = NOISE_K
-    quantum_K: float = 0.1
     input_gain: Mapping[str, float]
     input_offset: Mapping[str, float]
     clock_s: float
-    loss_noise: tuple[float, float] | None = (0.02, 2.0)
-    loss_gain: float = 0.0
-    loss_offset_W: float = 0.0
-    dropouts: int = 0
-    stated: Mapping[str, float] | None = None
 
 
-def draw_instruments(plant: ZooPlant, kind: str, *, has_loss: bool, rng: np.random.Generator) -> ZooInstruments:
+def draw_instruments(plant: ZooPlant, kind: str | None, *, has_loss: bool, rng: np.random.Generator) -> ZooInstruments:
     """Draw the instruments of a case; `kind` is that of a control, see :data:`diagnosis.proof.zoo.case.CONTROLS`."""
     slow = plant.row_s > SLOW_ROW_S
     noise = SLOW_NOISE_K if slow else NOISE_K
@@ -141,9 +122,7 @@ def record(
     made = {"time_s": np.asarray(np.arange(rows) * measured.row_s), **inputs}
     made |= {f"T_{name}_degC": values for name, values in readings.items()}
     if instruments.loss_noise is not None:
-        relative, absolute = instruments.loss_noise
-        noise = np.hypot(relative * sound.P_loss, absolute) * rng.standard_normal(rows)
-        made["P_loss_W"] = np.round(sound.P_loss + noise, 1)
+        made["P_loss_W"] = np.round(sound.P_loss + instruments.noise_of_loss(sound.P_loss, rng), 1)
     return made
 
 
@@ -155,6 +134,4 @@ def _with_errors(measured: Measured, instruments: ZooInstruments) -> Measured:
     }
     time = measured.hours * 3600.0
     readings = {n: np.interp(time - instruments.clock_s, time, values) for n, values in measured.readings.items()}
-    loss = measured.P_loss
-    loss = loss * (1.0 + instruments.loss_gain) + instruments.loss_offset_W * (loss > 0.0)
-    return replace(measured, inputs=inputs, readings=readings, P_loss=loss)
+    return replace(measured, inputs=inputs, readings=readings, P_loss=instruments.loss(measured.P_loss))

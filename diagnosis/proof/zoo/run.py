@@ -11,9 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import lfilter
 
+from diagnosis.proof.plant.cycles import Programme
 from diagnosis.proof.plant.integrator import sdirk_step
 from diagnosis.proof.zoo.laws import Acting, Balance, Laws, feel
-from diagnosis.proof.zoo.structure import Change, Moment, Programme, Variant, ZooPlant
+from diagnosis.proof.zoo.structure import Change, Moment, Variant, ZooPlant
 from models.base.types import Array
 
 LONGEST_STEP_S = 200.0
@@ -63,7 +64,7 @@ class Clock:
 
     def __init__(self, plant: ZooPlant, programme: Programme) -> None:
         self.plant, self.programme = plant, programme
-        self.rows = len(next(iter(programme.inputs.values())))
+        self.rows = len(programme)
         self.steps_per_row = max(1, round(plant.row_s / LONGEST_STEP_S))
         self.dt = plant.row_s / self.steps_per_row
         self.steps = (self.rows - 1) * self.steps_per_row

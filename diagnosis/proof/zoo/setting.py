@@ -13,19 +13,8 @@ from typing import Literal
 
 import numpy as np
 
-from diagnosis.proof.zoo.structure import (
-    Body,
-    Boundary,
-    Change,
-    Law,
-    Moment,
-    Outcome,
-    Path,
-    Programme,
-    ZooPlant,
-    constant,
-    times,
-)
+from diagnosis.proof.plant.cycles import Programme
+from diagnosis.proof.zoo.structure import Body, Boundary, Change, Law, Moment, Outcome, Path, ZooPlant, constant, times
 from models.base.types import Array
 
 What = Literal["loss", "link", "capacity", "heat", "sensor", "input", "clock"]
@@ -150,8 +139,8 @@ class Setting:
         self.rise = max(float(np.mean([self.healthy[n].mean() for n in names])) - self.air_mean, 1.0)
         self.loss, self.shed = plant.loss_W, plant.loss_W / self.rise
         last = max(programmes, key=lambda p: p.begins_h)
-        self.span = last.begins_h + (len(last.inputs["T_ambient"]) - last.unrecorded) * plant.row_s / 3600.0
-        self.hours = sum(len(p.inputs["T_ambient"]) - p.unrecorded for p in train) * plant.row_s / 3600.0
+        self.span = last.begins_h + (len(last) - last.unrecorded) * plant.row_s / 3600.0
+        self.hours = sum(len(p) - p.unrecorded for p in train) * plant.row_s / 3600.0
         self.typical = Moment(
             hours=np.ones(1), since_start=np.ones(1),
             inputs={name: np.full(1, v.mean()) for name, v in values.items()},
@@ -237,7 +226,7 @@ class Setting:
         """A time of the training recordings, between two shares of their rows, [h] since the first row."""
         wanted = float(rng.uniform(low, high)) * self.hours
         for programme in self.programmes:
-            length = (len(programme.inputs["T_ambient"]) - programme.unrecorded) * self.plant.row_s / 3600.0
+            length = (len(programme) - programme.unrecorded) * self.plant.row_s / 3600.0
             if wanted < length:
                 return programme.begins_h + wanted
             wanted -= length
@@ -263,7 +252,7 @@ class Setting:
         return lambda m: np.asarray(sum(share * m.T[name] for name, share in shares.items()))
 
     def quantile(self, node: str, q: float) -> float:
-        """Temperature that a node of the healthy plant is below for a share of the first recording, [degC]."""
+        """Temperature that a node of the healthy plant is below for a share of the recording `healthy`, [degC]."""
         return float(np.quantile(sum(share * self.healthy[name] for name, share in self.bodies(node).items()), q))
 
     # ------------------------------------------------------------------ acts at a strength of 1

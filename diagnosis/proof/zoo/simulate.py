@@ -8,10 +8,11 @@ from functools import cached_property
 
 import numpy as np
 
+from diagnosis.proof.plant.cycles import Programme
 from diagnosis.proof.plant.integrator import GAMMA
 from diagnosis.proof.zoo.laws import Balance, feel
 from diagnosis.proof.zoo.run import integrate, read_probes, rows_of_run
-from diagnosis.proof.zoo.structure import Change, Moment, Outcome, Programme, Variant, ZooPlant
+from diagnosis.proof.zoo.structure import Change, Moment, Outcome, Variant, ZooPlant
 from models.base.types import Array
 
 STEP_K, RELATIVE_STEP = 1e-3, 1e-5  # of differences of laws: temperatures [K], and parameters and inputs

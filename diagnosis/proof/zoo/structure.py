@@ -204,34 +204,6 @@ class Change:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Programme:
-    """Inputs of one recording in rows.
-
-    Attributes
-    ----------
-    name : str
-        ``train_1`` ... ``hold_2``, ``baseline_1`` ...
-    inputs : mapping of str to Array, shape (rows,)
-        True inputs
-    random_heat : mapping of str to Array, shape (rows,)
-        Heat of bodies that no law describes, [W]
-    start : mapping of str to float
-        Temperatures of bodies at the first row, [degC]
-    unrecorded : int
-        Rows before the recording is switched on
-    begins_h : float
-        Time of the first recorded row since that of the first recording of the session, [h]
-    """
-
-    name: str
-    inputs: Mapping[str, Array]
-    random_heat: Mapping[str, Array]
-    start: Mapping[str, float]
-    unrecorded: int = 0
-    begins_h: float = 0.0
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
 class Variant:
     """One run of a batch: parameters that differ from the plant's, and changes.
 

@@ -7,7 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from diagnosis.proof.cases.truth import SCHEMA, SETS, facts_of_fault, facts_of_heat, joined, practical_of, size_of
+from diagnosis.proof.cases.truth import (
+    SCHEMA,
+    SETS,
+    facts_of_fault,
+    facts_of_heat,
+    facts_of_noise,
+    practical_of,
+    sizes_of,
+)
 from diagnosis.proof.zoo.case import ZooCase
 from diagnosis.proof.zoo.effects import ZooEffect
 from diagnosis.proof.zoo.faults import Fault, spoiled
@@ -43,13 +51,13 @@ def truth_of(case: ZooCase, gearbox_hash: str, columns: Mapping[str, str]) -> di
     return {
         "schema": SCHEMA,
         "case": case.name,
-        "seed": [case.seed],
+        "seed": [case.plan.seed],
         "plant": "zoo",
-        "family": case.family,
-        "machine": case.machine,
+        "family": case.plant.family,
+        "machine": case.plan.machine,
         "gearbox": gearbox_hash,
-        "group": case.group,
-        "control": case.kind if case.group == "control" else None,
+        "group": case.plan.group,
+        "control": case.plan.kind,
         "sensors": list(instruments.channels),
         "effects": facts,
         "changed": [one for fact in facts for one in fact["changed"]],
@@ -67,9 +75,7 @@ def truth_of(case: ZooCase, gearbox_hash: str, columns: Mapping[str, str]) -> di
             },
         },
         "noise": {
-            "white_K": round(instruments.noise_K, 3),
-            "quantum_K": instruments.quantum_K,
-            "sensor_lag_s": {probe.channel: round(probe.lag_s, 2) for probe in case.plant.probes},
+            **facts_of_noise(instruments, {p.channel: p.lag_s for p in case.plant.probes}, case.programmes),
             "sensor_mix": {
                 probe.channel: {name: round(weight, 4) for name, weight in probe.mix.items()}
                 for probe in case.plant.probes
@@ -77,13 +83,6 @@ def truth_of(case: ZooCase, gearbox_hash: str, columns: Mapping[str, str]) -> di
             "input_gain": {name: round(value, 5) for name, value in instruments.input_gain.items()},
             "input_offset": {name: round(value, 3) for name, value in instruments.input_offset.items()},
             "clock_s": round(instruments.clock_s, 2),
-            "loss_gain": round(instruments.loss_gain, 5),
-            "loss_offset_W": round(instruments.loss_offset_W, 3),
-            "stated": None if instruments.stated is None else dict(instruments.stated),
-            "dropouts": instruments.dropouts,
-            "random_heat": {
-                p.name: {body: round(float(np.std(w)), 2) for body, w in p.random_heat.items()} for p in case.programmes
-            },
         },
         "begins_h": {p.name: round(p.begins_h, 3) for p in case.programmes},
         "start_degC": {
@@ -163,7 +162,7 @@ def _kelvin(case: ZooCase, run: int) -> dict[str, Any]:
     for p in case.recordings(*SETS):
         readings = case.runs.outcomes[p.name].readings
         changes[p.name] = {n: readings[n][run] - readings[n][case.runs.none] for n in case.instruments.channels}
-    return {kind: {n: size_of(values) for n, values in joined(changes, kind).items()} for kind in SETS}
+    return sizes_of(changes)
 
 
 def _heat_of(plant: ZooPlant, outcome: Outcome, run: int, none: int, changes: Sequence[Change]) -> dict[str, Array]:

@@ -47,8 +47,8 @@ class Design:
     seal : {"iso_1", "iso_2", "linke"}
     seal_into : {"oil", "shaft"}
         Where the heat of a lip goes
-    convection : str
-        Of :data:`diagnosis.proof.zoo.families.films.CONVECTION`
+    convection : Callable
+        Of :mod:`diagnosis.proof.zoo.families.films`
     gear_film : {"fling_off", "cylinder"}
     """
 
@@ -69,5 +69,5 @@ class Design:
     bearing: str
     seal: str
     seal_into: str = "oil"
-    convection: str
+    convection: Callable[[Array, Array, Array, float], Array]
     gear_film: str = "fling_off"

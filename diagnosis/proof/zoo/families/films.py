@@ -5,8 +5,6 @@ The formulas of :mod:`models.formulas.heat_transfer` are symbolic; these are num
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
 from models.base.types import Array
@@ -87,15 +85,6 @@ def iso_14179(T: Array, T_a: Array, v: Array, L: float) -> Array:
     """
     Ra, nu, _ = _rayleigh(T, T_a, L)
     return np.asarray(0.0086 * ((v * L / nu) ** 2 + Ra / PRANDTL / 2.5) ** 0.32 / L)
-
-
-CONVECTION: dict[str, Callable[[Array, Array, Array, float], Array]] = {
-    "churchill_chu": churchill_chu,
-    "gnielinski_plate": gnielinski_plate,
-    "mcadams": mcadams,
-    "hilpert_box": hilpert_box,
-    "iso_14179": iso_14179,
-}
 
 
 def radiation(T: Array, T_a: Array, emissivity: Array | float) -> Array:

@@ -10,7 +10,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from diagnosis.proof.plant.anatomy import AIR, FRAME, T_SERVICE
+from diagnosis.proof.plant.anatomy import AIR, FRAME
+from diagnosis.proof.plant.sizes import T_SERVICE
 from diagnosis.proof.zoo.families import films, losses
 from diagnosis.proof.zoo.families.builder import Builder, wander
 from diagnosis.proof.zoo.families.design import Design
@@ -109,7 +110,7 @@ class _Gearbox:
 
     def _to_air(self, wall: str, air: str, share: float, half_slab: float) -> None:
         housing = self.gearbox.housing
-        h, area, L = films.CONVECTION[self.design.convection], housing.outside_area_m2 * share, housing.height_m
+        h, area, L = self.design.convection, housing.outside_area_m2 * share, housing.height_m
         still = self.still
 
         def conductance(m: Moment) -> Array:

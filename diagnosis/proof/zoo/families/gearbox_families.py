@@ -5,9 +5,11 @@ Inside a family every machine draws which of the optional splits, merges and pat
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
-from diagnosis.proof.zoo.families import losses
+from diagnosis.proof.zoo.families import films, losses
 from diagnosis.proof.zoo.families.design import Design
 from diagnosis.proof.zoo.families.family import Family
 from diagnosis.proof.zoo.families.gearbox import build_gearbox
@@ -16,16 +18,33 @@ from diagnosis.proof.zoo.structure import ZooPlant
 from models.assembly.gearbox import Gearbox
 
 MACHINES = ("fzg", "conveyor")
+GEARBOX_FAMILIES: list[Family] = []
+
+DrawDesign = Callable[[Gearbox, np.random.Generator], Design]
 
 
-def draw_walls(gearbox: Gearbox, rng: np.random.Generator) -> ZooPlant:
+def _family(name: str, description: str) -> Callable[[DrawDesign], DrawDesign]:
+    """Enter a family whose designs the decorated function draws."""
+
+    def enter(draw_design: DrawDesign) -> DrawDesign:
+        def draw(gearbox: Gearbox, rng: np.random.Generator) -> ZooPlant:
+            refuse_unsplit(gearbox)
+            return build_gearbox(name, gearbox, draw_design(gearbox, rng), rng)
+
+        GEARBOX_FAMILIES.append(Family(name=name, description=description, machines=MACHINES, draw=draw))
+        return draw_design
+
+    return enter
+
+
+@_family("walls", "thick walls in layers, seats, warmer air above")
+def draw_walls(gearbox: Gearbox, rng: np.random.Generator) -> Design:
     """Thick walls: two or three bodies through every wall, a seat for every bearing, warmer air over the upper half.
 
     Friction of Schlenk without its least load, churning of Changenet and Velex 2007, bearings of Palmgren, seals of
     ISO/TR 14179-2, Gnielinski's plate.
     """
-    refuse_unsplit(gearbox)
-    design = Design(
+    return Design(
         layers=int(rng.integers(2, 4)),
         seats=_coin(rng, 0.7),
         oil="mist" if _coin(rng, 0.4) else "sump",
@@ -37,19 +56,18 @@ def draw_walls(gearbox: Gearbox, rng: np.random.Generator) -> ZooPlant:
         churning="changenet_2007",
         bearing="palmgren",
         seal="iso_2",
-        convection="gnielinski_plate",
+        convection=films.gnielinski_plate,
     )
-    return build_gearbox("walls", gearbox, design, rng)
 
 
-def draw_rings(gearbox: Gearbox, rng: np.random.Generator) -> ZooPlant:
+@_family("rings", "bearings and shafts in detail")
+def draw_rings(gearbox: Gearbox, rng: np.random.Generator) -> Design:
     """Bearings in detail: rings inner and outer, seats, shafts with ends, seals that heat shaft and wall.
 
     Friction of Benedict and Kelley, churning of Changenet et al. 2011, bearings of SKF without drag, Linke's seals, a
     box across a stream after Hilpert.
     """
-    refuse_unsplit(gearbox)
-    design = Design(
+    return Design(
         layers=2 if _coin(rng, 0.4) else 1,
         seats=_coin(rng, 0.5),
         oil="sump" if _coin(rng, 0.5) else "mist",
@@ -63,19 +81,18 @@ def draw_rings(gearbox: Gearbox, rng: np.random.Generator) -> ZooPlant:
         bearing="skf",
         seal="linke",
         seal_into="shaft",
-        convection="hilpert_box",
+        convection=films.hilpert_box,
     )
-    return build_gearbox("rings", gearbox, design, rng)
 
 
-def draw_splash(gearbox: Gearbox, rng: np.random.Generator) -> ZooPlant:
+@_family("splash", "oil as sump, mist and film; rims and hubs")
+def draw_splash(_: Gearbox, rng: np.random.Generator) -> Design:
     """Oil in three places, rim and hub: what the gears throw has its own temperature, and a film on the walls.
 
     Friction of Drozdov and Gavrikov, churning of Mauz, bearings of Palmgren, seals of ISO/TR 14179-1, gears as
     cylinders in oil after Becker, ISO/TR 14179-2 outside.
     """
-    refuse_unsplit(gearbox)
-    design = Design(
+    return Design(
         layers=2 if _coin(rng, 0.5) else 1,
         oil="film" if _coin(rng, 0.6) else "mist",
         gears="rim",
@@ -87,20 +104,19 @@ def draw_splash(gearbox: Gearbox, rng: np.random.Generator) -> ZooPlant:
         churning="mauz",
         bearing="palmgren",
         seal="iso_1",
-        convection="iso_14179",
+        convection=films.iso_14179,
         gear_film="cylinder",
     )
-    return build_gearbox("splash", gearbox, design, rng)
 
 
-def draw_merged(gearbox: Gearbox, rng: np.random.Generator) -> ZooPlant:
+@_family("merged", "coarser than the model, on a bed")
+def draw_merged(gearbox: Gearbox, rng: np.random.Generator) -> Design:
     """Coarser than the nominal model: gear and shaft are one rotor, bearings of a shaft one body, the box often too.
 
     Friction of O'Donoghue and Cameron, churning of Lauster and Boos, bearings of SKF, Linke's seals, McAdams'
     wall; the box stands on a bed that warms, or on a frame.
     """
-    refuse_unsplit(gearbox)
-    design = Design(
+    return Design(
         one_box=_coin(rng, 0.6),
         layers=1 if _coin(rng, 0.5) else 2,
         oil="mist" if _coin(rng, 0.3) else "sump",
@@ -112,20 +128,19 @@ def draw_merged(gearbox: Gearbox, rng: np.random.Generator) -> ZooPlant:
         churning="lauster",
         bearing="skf",
         seal="linke",
-        convection="mcadams",
+        convection=films.mcadams,
     )
-    return build_gearbox("merged", gearbox, design, rng)
 
 
-def draw_open(gearbox: Gearbox, rng: np.random.Generator) -> ZooPlant:
+@_family("open", "couplings, shaft ends, bed and draughts")
+def draw_open(gearbox: Gearbox, rng: np.random.Generator) -> Design:
     """Open to its surroundings: couplings, shaft ends in air, a bed, draughts, warmer air above.
 
     Friction of Doleschel (solid and film mixed), churning of Changenet et al. 2011, bearings of Palmgren, seals of
     ISO/TR 14179-2, Churchill and Chu with a laminar plate.
     """
-    refuse_unsplit(gearbox)
     flanges = _some_shafts(gearbox, rng, 0.6)
-    design = Design(
+    return Design(
         layers=2 if _coin(rng, 0.4) else 1,
         gears="rim" if _coin(rng, 0.4) else "one",
         shafts="halves" if _coin(rng, 0.6) else "one",
@@ -140,20 +155,8 @@ def draw_open(gearbox: Gearbox, rng: np.random.Generator) -> ZooPlant:
         bearing="palmgren",
         seal="iso_2",
         seal_into="shaft" if _coin(rng, 0.5) else "oil",
-        convection="churchill_chu",
+        convection=films.churchill_chu,
     )
-    return build_gearbox("open", gearbox, design, rng)
-
-
-GEARBOX_FAMILIES = (
-    Family(
-        name="walls", description="thick walls in layers, seats, warmer air above", machines=MACHINES, draw=draw_walls
-    ),
-    Family(name="rings", description="bearings and shafts in detail", machines=MACHINES, draw=draw_rings),
-    Family(name="splash", description="oil as sump, mist and film; rims and hubs", machines=MACHINES, draw=draw_splash),
-    Family(name="merged", description="coarser than the model, on a bed", machines=MACHINES, draw=draw_merged),
-    Family(name="open", description="couplings, shaft ends, bed and draughts", machines=MACHINES, draw=draw_open),
-)
 
 
 def _coin(rng: np.random.Generator, probability: float) -> bool:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import ast
+from collections import defaultdict
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -41,13 +43,13 @@ def programme(fzg: Gearbox) -> Programme:
              (0.75, 0.6, 100), (0.0, 0.0, 90), (0.25, 1.0, 50)]  # fmt: skip
     speed = np.concatenate([np.full(rows, level * n) for level, _, rows in holds])
     torque = np.concatenate([np.full(rows, load * M) for _, load, rows in holds])
-    return Programme(name="train_1", speed=speed, torque=torque)
+    air = {"T_ambient": np.full(len(speed), 25.0), "air_speed": np.full(len(speed), 2.0)}
+    return Programme(name="train_1", inputs={"speed": speed, "torque": torque, **air})
 
 
 def run_of(programme: Programme, *effects: Concealed, start: float = 60.0, **random_heat: Array) -> Run:
-    rows = len(programme)
-    return Run(individual=Individual(factors={}, reading=0), programme=programme, air=np.full(rows, 25.0),
-               air_speed=np.full(rows, 2.0), start=start, random_heat=random_heat, effects=effects)  # fmt: skip
+    driven = replace(programme, random_heat=random_heat, start=defaultdict(lambda: start))
+    return Run(individual=Individual(factors={}, reading=0), programme=driven, effects=effects)
 
 
 def specimen(plant: Plant, name: str, **changed: float) -> Concealed:
@@ -102,7 +104,8 @@ def test_heat_balance_closes(plant: Plant, programme: Programme) -> None:
 def test_plant_is_near_the_model_and_is_not_the_model(plant: Plant, fzg: Gearbox, programme: Programme) -> None:
     (outcome,) = run_plant(plant, [run_of(programme, start=25.0)])
     rows = len(programme)
-    columns = {"time_s": np.arange(rows) * ROW_S, "speed_rpm": programme.speed, "torque_Nm": programme.torque,
+    inputs = programme.inputs
+    columns = {"time_s": np.arange(rows) * ROW_S, "speed_rpm": inputs["speed"], "torque_Nm": inputs["torque"],
                "T_ambient_degC": np.full(rows, 25.0), "air_speed_m_s": np.full(rows, 2.0)}  # fmt: skip
     result = fzg.network().simulate(columns, losses=fzg.losses(), initial=25.0)
     for place in ("oil", "housing_lower", "housing_upper", "bearing_1", "bearing_3", "pinion"):

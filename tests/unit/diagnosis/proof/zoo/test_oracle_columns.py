@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from diagnosis.proof.plant.cycles import Programme
 from diagnosis.proof.zoo.oracle import LOSS, Design
 from diagnosis.proof.zoo.oracle_columns import design_of
 from diagnosis.proof.zoo.recorder import ZooInstruments
@@ -20,7 +21,6 @@ from diagnosis.proof.zoo.structure import (
     Moment,
     Path,
     Probe,
-    Programme,
     Source,
     Variant,
     ZooPlant,

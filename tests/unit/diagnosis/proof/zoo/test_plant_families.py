@@ -5,11 +5,12 @@ import tomllib
 import numpy as np
 import pytest
 
+from diagnosis.proof.plant.cycles import Programme
 from diagnosis.proof.zoo import distance
 from diagnosis.proof.zoo.families import FAMILIES
 from diagnosis.proof.zoo.programmes import programmes
 from diagnosis.proof.zoo.simulate import simulate
-from diagnosis.proof.zoo.structure import Moment, Programme, Variant
+from diagnosis.proof.zoo.structure import Moment, Variant
 from models.assembly.gearbox import load_gearbox
 from models.base.errors import InputError
 from models.files.toml_file import packaged

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from diagnosis.proof.plant.cycles import Programme
 from diagnosis.proof.zoo.families import FAMILIES
 from diagnosis.proof.zoo.programmes import programmes
 from diagnosis.proof.zoo.run import follow, integrate
@@ -14,17 +15,7 @@ from diagnosis.proof.zoo.simulate import (
     StartDirection,
     simulate,
 )
-from diagnosis.proof.zoo.structure import (
-    Body,
-    Boundary,
-    Change,
-    Path,
-    Probe,
-    Programme,
-    Source,
-    Variant,
-    ZooPlant,
-)
+from diagnosis.proof.zoo.structure import Body, Boundary, Change, Path, Probe, Source, Variant, ZooPlant
 from models.assembly.gearbox import load_gearbox
 
 ROWS = 240

@@ -16,7 +16,7 @@ from builder.commands.conceal import conceal
 from diagnosis.proof.cases.time_course import ALWAYS, Course
 from diagnosis.proof.plant import cycles
 from diagnosis.proof.zoo import draw
-from diagnosis.proof.zoo.case import ZooCase, run_case
+from diagnosis.proof.zoo.case import ZooCase, ZooPlan, run_case
 from diagnosis.proof.zoo.conceal_zoo import conceal_zoo, record_case, write_zoo_case, zoo_plans
 from diagnosis.proof.zoo.distance import Drawn
 from diagnosis.proof.zoo.effects import ZooEffect, made
@@ -66,15 +66,14 @@ def setting(fzg: Gearbox, drawn: Drawn) -> Setting:
     return Setting(drawn.plant, drawn.programmes, simulate(drawn.plant, warm, [Variant()]), fzg.network().groups)
 
 
-def case_of(
-    drawn: Drawn, fzg: Gearbox, group: str, *effects: ZooEffect, seed: int = 4, kind: str | None = None
-) -> ZooCase:
+def case_of(drawn: Drawn, fzg: Gearbox, group: str, *effects: ZooEffect) -> ZooCase:
     """A case with given effects, or with drawn ones."""
-    name = {"name": "case_001", "kind": None, "session_deviation": 0.03}
+    plan = ZooPlan(family="walls", machine="fzg", seed=4, group=group)
     if not effects:
-        return draw.draw_case_of(drawn, fzg, "fzg", 4, group, **name)
-    healthy = draw.draw_case_of(drawn, fzg, "fzg", 4, "control", **{**name, "kind": "clean"})
-    case = draw.with_effects(replace(healthy, group=group, kind="effects"), effects)
+        return draw.draw_case_of(drawn, fzg, plan, name="case_001", session_deviation=0.03)
+    control = replace(plan, group="control", kind="clean")
+    healthy = draw.draw_case_of(drawn, fzg, control, name="case_001", session_deviation=0.03)
+    case = draw.with_effects(replace(healthy, plan=plan), effects)
     case = replace(case, runs=run_case(case, "train", "hold", "baseline"))
     return replace(case, nats_of_effects=(OracleNats(plant=1.0, tool=1.0),) * len(effects))
 
