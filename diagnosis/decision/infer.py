@@ -47,7 +47,7 @@ from diagnosis.engine.switch_grid import with_refined_switches
 from models.base.errors import InputError
 from models.base.progress import Progress, silent
 
-StartIn = Callable[[ErrorClass], Fit]  # where fits with model error of a class begin
+StartOf = Callable[[ErrorClass], Fit]  # where fits with model error of a class begin
 WEIGHT = attrgetter("weight")
 RACED, PLACES, RACE_STEPS = 18, 2, 4
 NEAR_PLACE = 3.0  # nats behind the best place of its name, up to which a second place is raced
@@ -82,7 +82,7 @@ def infer(
     progress(f"scanning {len(candidates)} candidates")
     found = scan(base, candidates, calibration.near.columns)
     first = scan_in_classes(calibration, found)
-    starts: list[tuple[Scanned, StartIn]] = [(first, lambda one: calibration.in_class(one).fit)]
+    starts: list[tuple[Scanned, StartOf]] = [(first, lambda one: calibration.in_class(one).fit)]
     if float(np.max(np.abs(base.z), initial=0.0)) > FAR_SD:
         progress("scanning from the middles of the priors too")
         with suppress(ArithmeticError):
@@ -143,7 +143,7 @@ def infer(
 
 
 def _raced(
-    calibration: Calibration, starts: Sequence[tuple[Scanned, StartIn]], progress: Progress
+    calibration: Calibration, starts: Sequence[tuple[Scanned, StartOf]], progress: Progress
 ) -> dict[str, Judged]:
     """The best candidates after a few steps of a fit, the best of these after a whole one, by label.
 
@@ -151,11 +151,11 @@ def _raced(
     points, each with its scan.
     """
     judged: dict[str, Judged] = {}
-    racing = [(found, index, start_in) for found, start_in in starts for index in _worth_a_fit(found)]
-    for step, (found, index, start_in) in enumerate(racing):
+    racing = [(found, index, start_of) for found, start_of in starts for index in _worth_a_fit(found)]
+    for step, (found, index, start_of) in enumerate(racing):
         label = found.candidates[index].label
         progress(f"fitting {label}", step, len(racing))
-        one = _refitted(start_in(found.best[index].error_class), found, index, RACE_STEPS)
+        one = _refitted(start_of(found.best[index].error_class), found, index, RACE_STEPS)
         one = one if one.fit is None else _judged(calibration, one, _spread(found, index))
         judged[label] = max(judged.get(label, one), one, key=lambda one: (one.fit is not None, one.weight))
     ahead = sorted(judged.values(), key=WEIGHT, reverse=True)[:REFITTED]
