@@ -227,6 +227,20 @@ def test_files_of_a_cell(sensors: Any, kept: int, tmp_path: Path) -> None:
     assert arguments == ["train_2.csv.gz@0..600", "--without-mechanism", "windage"]
 
 
+def test_files_of_a_cell_may_be_plain_text_and_know_the_air_outdoors(tmp_path: Path) -> None:
+    folder = tmp_path / "case_001"
+    folder.mkdir()
+    (folder / "train_2.csv").write_text("time_s,T_outdoor_degC,T_oil_degC,T_pinion_degC\n0,1,2,3\n")
+    (folder / "mapping.toml").write_text("schema = 1\n\n[columns.T_pinion_degC]\nnoise = 0.2\n")
+    poor = Task(case="case_001", sensors="poor", data="600 s")
+    files, _ = lines.files_of(tmp_path, poor)
+    assert files["train_2.csv"] == b"time_s,T_outdoor_degC,T_oil_degC\n0,1,2\n"
+    assert files["mapping.toml"] == b"schema = 1\n"
+    (folder / "train_2.csv").rename(folder / "train_2.parquet")
+    with pytest.raises(InputError, match="train_2.parquet: sensors can be left out of text"):
+        lines.files_of(tmp_path, poor)
+
+
 def test_verb_refuses(given: dict[str, Path], tmp_path: Path) -> None:
     shown = " ".join(CliRunner().invoke(verb, ["--help"]).output.split())
     assert f"[default: {WHOLE} (own)" in shown and f"[default: {seeds.OWN_PROOF} (own), {seeds.ZOO_PROOF[0]}" in shown

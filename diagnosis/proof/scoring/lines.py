@@ -15,12 +15,13 @@ from importlib import resources
 from pathlib import Path
 from typing import Any, Literal
 
-from diagnosis.proof.cases.case_files import DEFINITION, MAPPING
+from diagnosis.proof.cases.case_files import DEFINITION, MAPPING, OF_AIR
 from models.base.errors import InputError
 from models.base.version import project_version
 
 SCHEMA = 1
 ENDINGS = (".csv.gz", ".csv", ".parquet")
+TEXTS, GZIP = ENDINGS[:2], b"\x1f\x8b"
 DIGITS = 6
 
 Plant = Literal["own", "zoo", "given"]
@@ -161,7 +162,8 @@ def kept_columns(columns: Sequence[str], sensors: Sensors) -> list[str]:
     >>> kept_columns(["time_s", "T_ambient_degC", "T_oil_degC", "T_housing_lower_degC", "T_pinion_degC"], "lean")
     ['time_s', 'T_ambient_degC', 'T_oil_degC', 'T_housing_lower_degC']
     """
-    measured = [c for c in columns if (c.startswith("T_") and c != "T_ambient_degC") or c == "P_loss_W"]
+    of_air = {f"{name}_degC" for name in OF_AIR}
+    measured = [c for c in columns if (c.startswith("T_") and c not in of_air) or c == "P_loss_W"]
     housing = [c for c in measured if c.startswith("T_housing")][:1]
     kept = {"rich": measured, "lean": ["T_oil_degC", *housing, "P_loss_W"], "poor": ["T_oil_degC"]}[sensors]
     return [c for c in columns if c in kept or c not in measured]
@@ -171,15 +173,21 @@ def _with_sensors(path: Path, sensors: Sensors) -> bytes:
     content = path.read_bytes()
     if sensors == SENSORS[0]:
         return content
+    if not path.name.endswith(TEXTS):
+        raise InputError(f"{path}: sensors can be left out of text ({', '.join(TEXTS)}) only")
     zipped = path.name.endswith(".gz")
-    rows = [line.split(",") for line in (gzip.decompress(content) if zipped else content).decode().splitlines()]
+    rows = [line.split(",") for line in _text(content).splitlines()]
     at = [rows[0].index(c) for c in kept_columns(rows[0], sensors)]
     kept = "".join(",".join(row[i] for i in at) + "\n" for row in rows).encode()
     return gzip.compress(kept, mtime=0) if zipped else kept
 
 
+def _text(content: bytes) -> str:
+    return (gzip.decompress(content) if content.startswith(GZIP) else content).decode()
+
+
 def _of_columns(mapping: str, recording: bytes) -> str:
-    columns = gzip.decompress(recording).decode().partition("\n")[0].split(",")
+    columns = _text(recording).partition("\n")[0].split(",")
     head, *blocks = mapping.rstrip("\n").split("\n\n")
     kept = [block for block in blocks if block.partition("]")[0].removeprefix("[columns.") in columns]
     return "\n\n".join([head, *kept]) + "\n"
