@@ -21,7 +21,7 @@ USUAL_SHARE = 0.99  # of the rows of an input,
 FAR_TIMES = 10.0  # which others exceed so many times that they may be codes of a logger
 CODES, CODE_TIMES = (999.0, 9999.0, 99999.0, 32767.0, 32768.0, 65535.0), 1.5  # of loggers; beyond what is usual
 COLDER_K = 3.0  # below the ambient air on average
-LEAST_LOSS = 1e-3  # of the power, on average
+LEAST_LOSS, MOST_LOSS = 1e-3, 5.0  # of the power, on average; without load all of the power, and more, is lost
 BRIEF_S, WARMED_K = 300.0, 15.0  # no gearbox warms that fast
 MILLISECONDS = (100.0, 200.0, 500.0, 1000.0, 2000.0)  # s from row to row that are more likely so many milliseconds
 
@@ -96,8 +96,9 @@ def _loss_and_power(found: RecordedRows) -> Iterator[str]:
     power = np.abs(found.values["speed"] * found.values["torque"]) * np.pi / 30.0
     loss = found.values[TOTAL_LOSS]
     both = np.isfinite(power) & np.isfinite(loss)
-    share = np.mean(loss[both]) / np.mean(power[both]) if both.any() and power[both].any() else np.inf
-    if both.any() and not LEAST_LOSS < share < 1.0:
+    if not power[both].any():
+        return
+    if not LEAST_LOSS < np.mean(loss[both]) / np.mean(power[both]) < MOST_LOSS:
         yield (
             f"{found.names[TOTAL_LOSS]} is {np.mean(loss[both]):.3g} W on average, but {found.names['speed']} and "
             f"{found.names['torque']} give {np.mean(power[both]):.3g} W: see if one of them is in another unit"
