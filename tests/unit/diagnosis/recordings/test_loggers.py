@@ -103,7 +103,7 @@ READ: dict[str, tuple[str | bytes, str]] = {
     "names with units in brackets":
         (plain().replace(HEADER, "Time [s],speed [rpm],torque [Nm],T_oil [°C],P_loss (W)"), ""),
     "a text at the end": (plain() + "End of file\n", ""),
-    "texts at the end, decimal commas": (plain(sep=";", decimal=",") + "Ende;;;;\nDauer 20 min;;;;\n", GERMAN),
+    "texts at the end, decimal commas": (plain(sep=";", decimal=",") + "Schluss;;;;\nDauer 20 min;;;;\n", GERMAN),
     "the newest row first": (plain(table()[::-1]), ""),
 }  # fmt: skip
 

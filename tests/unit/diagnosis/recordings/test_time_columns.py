@@ -130,7 +130,7 @@ def test_a_local_time_that_a_zone_does_not_have_once(tmp_path: Path, network: Th
 def test_decimal_commas_of_the_time_beside_a_text(tmp_path: Path, network: ThermalNetwork) -> None:
     """A line at the end leaves the numbers above it as texts, also without a mapping of the time."""
     read(tmp_path, network, {"time_s": TIME})
-    text = (tmp_path / "run.csv").read_text().replace(",", ";").replace(".", ",") + "Ende\n"
+    text = (tmp_path / "run.csv").read_text().replace(",", ";").replace(".", ",") + "Schluss\n"
     (tmp_path / "run.csv").write_text(text)
     (tmp_path / "mapping.toml").write_text('schema = 1\ncsv = { separator = ";", decimal = "," }')
     assert (read_recordings(tmp_path / "run.csv", network)[0].time == TIME).all()
