@@ -32,7 +32,7 @@ from models.mechanisms import Mechanism
 
 HELD_OUT = "hold"  # prefix of held-out recordings, or of a folder with them
 BASELINE = "baseline"  # of baselines
-SUMMARY = "summary.csv"
+SUMMARY, HEADING = "summary.csv", 3  # columns by which one is known: later ones changed between versions
 ERROR = "error"  # instead of a verdict
 NAN = float("nan")
 
@@ -247,7 +247,7 @@ def _refuse_to_replace_summary(path: Path) -> None:
             header = file.readline()
     except (OSError, ValueError):
         header = ""
-    if path.exists() and not header.startswith("gearbox,verdict,found"):
+    if path.exists() and not header.startswith(",".join(list(NO_DIAGNOSIS)[:HEADING])):
         raise InputError(f"{path}: exists, and no fleet wrote it; choose another --output")
 
 

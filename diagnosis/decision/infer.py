@@ -43,7 +43,7 @@ from diagnosis.engine.outside import judge_outside
 from diagnosis.engine.refit import refit
 from diagnosis.engine.scan import scan
 from diagnosis.engine.sessions import fit_over_sessions
-from diagnosis.engine.switch_grid import with_refined_switches
+from diagnosis.engine.switch_grid import held_numbers, with_refined_switches
 from models.base.errors import InputError
 from models.base.progress import Progress, silent
 
@@ -243,12 +243,17 @@ def _fitted_on(calibration: Calibration, one: Judged) -> Judged:
     """A raced fit continued to its end."""
     fit = one.fitted
     reached, base = fit, len(calibration.fit.z)
+    held = held_numbers(fit.experiment, one.effects, base)
     try:
         for _ in range(MOST_TURNS):
-            further = _with_refined_switches(fit.experiment.fit(reached.z, at=reached.linearised), one, base)
+            further = fit.experiment.fit(reached.z, at=reached.linearised, held=held)
+            further = with_refined_switches(further, one.effects, base)
             gained, reached = 0.5 * (reached.objective - further.objective), further
             if gained < SETTLED_NAT:
                 break
+        if held:  # between two points of the grid
+            free = fit.experiment.fit(reached.z, at=reached.linearised)
+            reached = min(reached, free, key=lambda one: one.objective)
     except (InputError, ArithmeticError, np.linalg.LinAlgError):
         pass  # what was reached counts
     if reached is fit:
@@ -256,15 +261,6 @@ def _fitted_on(calibration: Calibration, one: Judged) -> Judged:
     gained = fit_over_sessions(reached, base).log_evidence - fit_over_sessions(fit, base).log_evidence
     final = _judged(calibration, replace(one, fit=reached), spread=0.0)
     return replace(final, log_bayes=min(final.log_bayes, one.log_bayes + gained))
-
-
-def _with_refined_switches(fit: Fit, one: Judged, first: int) -> Fit:
-    """A fit of an explanation with every switch where a finer scan puts it; `first`: place of its first unknown."""
-    for effect in one.effects:
-        if effect.term is not None:
-            fit = with_refined_switches(fit, effect, first)
-            first += len(effect.term.parameters)
-    return fit
 
 
 def _judged(calibration: Calibration, one: Judged, spread: float) -> Judged:

@@ -200,7 +200,7 @@ class Experiment:
 
     def fit(
         self, z: Array | None = None, guesses: Sequence[Guess] | None = None, *, iterations: int = ITERATIONS,
-        at: Linearised | None = None,
+        at: Linearised | None = None, held: Sequence[int] = (),
     ) -> Fit:  # fmt: skip
         """The most probable unknowns.
 
@@ -214,6 +214,8 @@ class Experiment:
             At most
         at : Linearised, optional
             Where an earlier fit ended: at `z`, in the same metric
+        held : sequence of int
+            Places of unknowns that stay where they are, as numbers of a switch, which scans of a grid find
 
         Raises
         ------
@@ -224,17 +226,18 @@ class Experiment:
         z = np.zeros(len(self.unknowns)) if z is None else np.clip(z, lower, upper)
         at = at or self.linearise(z, guesses)
         if self.filters is None:  # those of the start serve on the way, those of the end afterwards
-            first = self.with_filters(at.parts).fit(z, at.trajectories, iterations=iterations)
+            first = self.with_filters(at.parts).fit(z, at.trajectories, iterations=iterations, held=held)
             final = self._attempt(first.z, first.trajectories)
             return Fit(experiment=self, z=first.z, linearised=final or first.linearised)
-        return self._gauss_newton(z, at, iterations)
+        return self._gauss_newton(z, at, iterations, list(held))
 
-    def _gauss_newton(self, z: Array, at: Linearised, iterations: int) -> Fit:
+    def _gauss_newton(self, z: Array, at: Linearised, iterations: int, held: list[int]) -> Fit:
         """Damped steps to the minimum of the objective, from `z` where `at` is linearised.
 
         After short steps the columns are kept, every other time: `fresh` is False then.
         """
-        lower, upper = self.bounds
+        lower, upper = (bound.copy() for bound in self.bounds)
+        lower[held] = upper[held] = z[held]
         objective, damping, settled, fresh = at.objective(z), 0.0, False, True
         for _ in range(iterations * (SLOW_PATIENCE if self.slow else 1)):
             step = at.step(z, damping, lower, upper)

@@ -7,18 +7,15 @@ and the calibration begins at the best place.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
-from itertools import product
 
 import numpy as np
 
 from diagnosis.candidates.hypotheses import Hypothesis
 from diagnosis.engine.fit import Experiment, calibrate
 from diagnosis.engine.prepare import prepare_experiment
-from diagnosis.engine.scan import scan
-from diagnosis.engine.switch_grid import switch_numbers
+from diagnosis.engine.switch_grid import finer_scans, switch_numbers
 from diagnosis.setup.inference_setup import InferenceSetup
 from models.base.types import Array
 from models.correction.corrected_gearbox import corrected_gearbox
@@ -41,12 +38,13 @@ def start_with_switches(setup: InferenceSetup, experiment: Experiment) -> Array 
         with suppress(ArithmeticError):
             lacking = prepare_experiment(without, setup.recordings, setup.holdout, setup.baseline)[1]
             fit = calibrate(replace(lacking, healthy=frozenset()))  # what is known acts in the baselines too
-            best = np.array([1.0, *(p.start for p in term.parameters[1:])])
+            shape = np.array([[1.0, *(p.start for p in term.parameters[1:])]])
+            here = Hypothesis(name=term.label, place=term.label, family="known", law=term.label, term=term,
+                              variants=shape)  # fmt: skip
             points = min(int(VARIANTS ** (1.0 / len(rough))), POINTS)
-            for width in (WIDTH, 2.0 * WIDTH / points):  # of the second grid: about two steps of the first
-                tried = _about(term, best, rough, np.linspace(-width, width, points))
-                best = tried.variants[scan(fit, [tried]).best[0]]
-            values |= {term.parameters[i].name: float(best[i]) for i in rough}
+            reaches = [WIDTH * term.parameters[i].sd for i in rough]
+            found, _ = finer_scans(fit, here, rough, reaches, points=points, levels=2)
+            values |= {term.parameters[i].name: float(found.variants[0, i]) for i in rough}
     if not values:
         return None
     return np.array([u.z_of(values.get(u.parameter.name, u.value(0.0))) for u in experiment.unknowns])
@@ -64,12 +62,3 @@ def _roughly_known(term: Term) -> list[int]:
         return switch_numbers(term)
     remembered = {symbol.name for state in term.states for symbol in state.rate.free_symbols}
     return [i for i, p in enumerate(term.parameters[1:], start=1) if p.name in remembered and p.sd > 0.0]
-
-
-def _about(term: Term, best: Array, rough: Sequence[int], grid: Array) -> Hypothesis:
-    """A term with values around the best ones so far, in prior standard deviations."""
-    parameters = [term.parameters[i] for i in rough]
-    values = [np.clip(best[i] + p.sd * grid, p.lower, p.upper) for i, p in zip(rough, parameters, strict=True)]
-    variants = np.tile(best, (len(grid) ** len(rough), 1))
-    variants[:, rough] = list(product(*values))
-    return Hypothesis(name=term.label, place=term.label, family="known", law=term.label, term=term, variants=variants)

@@ -11,7 +11,7 @@ from diagnosis.candidates.hypotheses import Hypothesis
 from diagnosis.engine.fit import Experiment, Fit, Linearised
 from diagnosis.engine.point import Machine
 from diagnosis.engine.scan import Starts, columns_of, scope_of
-from diagnosis.engine.switch_grid import refined, switch_numbers
+from diagnosis.engine.switch_grid import held_numbers, refined, switch_numbers
 from diagnosis.engine.unknown import TERM_STEP, Held, NetworkParameter, TermParameter, Unknown
 from diagnosis.forward.network_on_grid import NetworkOnGrid
 from models.base.types import Array
@@ -31,13 +31,14 @@ def refit(
     The other unknowns start where the straight line puts them with the candidate there. What it does may be far from
     a straight line; so smaller shares of the promised strength are tried until a rough fit agrees better with the
     readings than without the candidate, and all further starts. The best rough fit goes on. What switches starts where
-    finer scans put its numbers.
+    finer scans put its numbers, and they stay there while everything else is far from where it belongs.
 
     Raises
     ------
     ArithmeticError
         If there is no solution at any of the starts.
     """
+    held = held_numbers(fit.experiment, [candidate], len(fit.z))
     if candidate.term is not None and switch_numbers(candidate.term):
         candidate, strength = refined(fit, candidate, [variant, *(other for other, _ in further)])
         variant, further = 0, ()
@@ -52,7 +53,7 @@ def refit(
         aside, experiment, shape = line(which)
         z = np.concatenate([ended + size * aside, [experiment.unknowns[len(fit.z)].z_of(size)], shape[1:]])
         try:
-            return [experiment.fit(z, fit.trajectories, iterations=ROUGH)]
+            return [experiment.fit(z, fit.trajectories, iterations=ROUGH, held=held)]
         except ArithmeticError:
             return []
 
@@ -66,7 +67,7 @@ def refit(
     if not rough:
         raise ArithmeticError(f"no simulation has a solution with {candidate.label}")
     best = min(rough, key=lambda one: one.objective)
-    return best.experiment.fit(best.z, iterations=iterations - ROUGH, at=best.linearised)
+    return best.experiment.fit(best.z, iterations=iterations - ROUGH, at=best.linearised, held=held)
 
 
 def _straight_line(fit: Fit, candidate: Hypothesis, variant: int) -> tuple[Array, Experiment, Array]:

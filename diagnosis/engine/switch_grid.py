@@ -1,7 +1,8 @@
 """Numbers of a switch (set-point, band), looked for by scans of a grid with switches that follow the readings.
 
 The objective has many minima along them: a control that hardly misses a peak never switches, and a fit ends in the
-nearest minimum. In a scan every shape switches where the readings say, whatever else is unknown.
+nearest minimum. In a scan every shape switches where the readings say, whatever else is unknown. So the numbers are
+held while all others are fitted, and scanned again, in turns.
 """
 
 from __future__ import annotations
@@ -13,14 +14,13 @@ from itertools import product
 import numpy as np
 
 from diagnosis.candidates.hypotheses import Hypothesis
-from diagnosis.engine.fit import Fit, Linearised
+from diagnosis.engine.fit import Experiment, Fit, Linearised
 from diagnosis.engine.scan import scan
 from models.base.types import Array
 from models.network.laws import Parameter
 from models.terms.term import Term
 
-POINTS, LEVELS = 9, 3  # of a grid in one direction; how often it is made finer, to a step of the one before
-STEPS = (POINTS - 1) // 2
+POINTS, LEVELS = 9, 3  # of a grid in one direction; how often it is made finer
 
 
 def switch_numbers(term: Term) -> list[int]:
@@ -28,6 +28,24 @@ def switch_numbers(term: Term) -> list[int]:
     laws = [state.update for state in term.states if state.update is not None]
     read = {symbol.name for law in laws for symbol in law.free_symbols}
     return [i for i, p in enumerate(term.parameters[1:], start=1) if p.name in read and p.sd > 0.0]
+
+
+def held_numbers(experiment: Experiment, effects: Sequence[Hypothesis], first: int) -> list[int]:
+    """Places of the unknowns that are held while others are fitted: the numbers of the switches of some effects.
+
+    In means over minutes a switch goes over smoothly, and its numbers are fitted as others are.
+
+    Parameters
+    ----------
+    first : int
+        Place of the first unknown of the effects
+    """
+    found: list[int] = []
+    for effect in effects if not experiment.slow else ():
+        if effect.term is not None:
+            found += [first + i for i in switch_numbers(effect.term)]
+            first += len(effect.term.parameters)
+    return found
 
 
 def refined(fit: Fit, candidate: Hypothesis, shapes: Sequence[int]) -> tuple[Hypothesis, float]:
@@ -47,65 +65,95 @@ def refined(fit: Fit, candidate: Hypothesis, shapes: Sequence[int]) -> tuple[Hyp
     strength : float
         That the scan promises
     """
-    rows = [candidate.variants[shape] for shape in dict.fromkeys(shapes)]
-    return _scanned(fit, candidate, rows, level=0)
+    assert candidate.term is not None  # noqa: S101 - it switches
+    at = switch_numbers(candidate.term)
+    reaches = [_to_a_neighbour(candidate.term.parameters[i]) for i in at]
+    return finer_scans(fit, replace(candidate, variants=candidate.variants[list(dict.fromkeys(shapes))]), at, reaches)
 
 
-def with_refined_switches(fit: Fit, effect: Hypothesis, first: int) -> Fit:
-    """A fit continued from the numbers that a finer scan about its own gives a switch, if they fit better.
+def with_refined_switches(fit: Fit, effects: Sequence[Hypothesis], first: int) -> Fit:
+    """A fit continued from the numbers that finer scans about its own give every switch, where that fits better.
 
     Parameters
     ----------
-    effect : Hypothesis
+    effects : sequence of Hypothesis
         In the fit
     first : int
-        Place of its strength among the unknowns
+        Place of their first unknown
     """
-    assert effect.term is not None  # noqa: S101 - it is in the fit
-    if not switch_numbers(effect.term):
+    held = held_numbers(fit.experiment, effects, first)
+    for effect in effects:
+        if effect.term is not None:
+            own = slice(first, first + len(effect.term.parameters))
+            fit, first = _with_refined_switch(fit, effect, effect.term, own, held), own.stop
+    return fit
+
+
+def _with_refined_switch(fit: Fit, effect: Hypothesis, term: Term, own: slice, held: Sequence[int]) -> Fit:
+    at, experiment, z = switch_numbers(term), fit.experiment, fit.z.copy()
+    if not at:
         return fit
-    experiment, own = fit.experiment, slice(first, first + len(effect.term.parameters))
-    row = np.array([u.value(z) for u, z in zip(experiment.unknowns[own], fit.z[own].tolist(), strict=True)])
-    without = _without(fit, own)
-    found, strength = _scanned(without, effect, [np.array([1.0, *row[1:]])], level=1)
-    z = fit.z.copy()
-    z[own] = [
-        u.z_of(value) for u, value in zip(experiment.unknowns[own], (strength, *found.variants[0, 1:]), strict=True)
-    ]
+    values = np.array([u.value(one) for u, one in zip(experiment.unknowns[own], z[own].tolist(), strict=True)])
+    shape = replace(effect, variants=np.array([[1.0, *values[1:]]]))
+    reaches = [_to_a_neighbour(term.parameters[i]) * 2.0 / (POINTS - 1) for i in at]
+    found, strength = finer_scans(_without(fit, own), shape, at, reaches, levels=LEVELS - 1)
+    values = np.array([strength, *found.variants[0, 1:]])
+    z[own] = [u.z_of(value) for u, value in zip(experiment.unknowns[own], values.tolist(), strict=True)]
     try:
-        further = experiment.fit(z, fit.trajectories)
+        further = experiment.fit(z, fit.trajectories, held=held)
     except ArithmeticError:
         return fit
     return further if further.objective < fit.objective else fit
 
 
-def _scanned(fit: Fit, candidate: Hypothesis, rows: Sequence[Array], level: int) -> tuple[Hypothesis, float]:
-    assert candidate.term is not None  # noqa: S101 - it switches
-    at, parameters = switch_numbers(candidate.term), candidate.term.parameters
-    best, strength = rows, 0.0
-    for finer in range(level, LEVELS):
-        grids = [[_about(parameters[i], row[i], finer) for i in at] for row in best]
-        variants = [_with(row, at, values) for row, grid in zip(best, grids, strict=True) for values in product(*grid)]
-        tried = replace(candidate, variants=np.array(variants))
-        found = scan(fit, [tried])
+def finer_scans(
+    fit: Fit, candidate: Hypothesis, at: Sequence[int], reaches: Sequence[float], *, points: int = POINTS,
+    levels: int = LEVELS,
+) -> tuple[Hypothesis, float]:  # fmt: skip
+    """A candidate in the shape that scans of ever finer grids about its shapes prefer; see :func:`refined`.
+
+    Parameters
+    ----------
+    at : sequence of int
+        Places of the parameters that change
+    reaches : sequence of float
+        How far each goes to either side in the first grid, in its logarithm if it has such a prior; then as far as one
+        step of the grid before
+    points : int
+        Of a grid in one direction
+    """
+    assert candidate.term is not None  # noqa: S101 - parameters out of their priors have no shapes
+    parameters, strength = [candidate.term.parameters[i] for i in at], 0.0
+    for level in range(levels):
+        steps = np.linspace(-1.0, 1.0, points) * (2.0 / (points - 1)) ** level
+        variants = [
+            _changed(shape, at, values)
+            for shape in candidate.variants
+            for values in product(*(
+                _about(p, float(shape[i]), reach * steps) for i, p, reach in zip(at, parameters, reaches, strict=True)
+            ))
+        ]  # fmt: skip
+        found = scan(fit, [replace(candidate, variants=np.array(variants))])
+        candidate = replace(candidate, variants=np.array([variants[found.best[0]]]))
         strength = float(found.singles(found.gram.given([*found.unknowns, *found.further])).value[0])
-        best = [tried.variants[found.best[0]]]
-    return replace(candidate, variants=np.array(best)), strength
+    return candidate, strength
 
 
-def _about(p: Parameter, value: float, level: int) -> list[float]:
-    """Values about one, up to its neighbours in the parameter's grid, or up to one step of the level before."""
-    axis = [np.log(v) if p.log else v for v in p.grid]
-    reach = max(np.diff(np.sort(axis)), default=p.sd) / STEPS**level
-    steps = reach * np.linspace(-1.0, 1.0, POINTS)
+def _to_a_neighbour(p: Parameter) -> float:
+    """Farthest distance of two neighbours in the grid of a parameter, in its logarithm if it has such a prior."""
+    return float(max(np.diff(np.sort(np.log(p.grid) if p.log else p.grid)), default=p.sd))
+
+
+def _about(p: Parameter, value: float, steps: Array) -> list[float]:
+    """Values about one, none twice."""
     values = value * np.exp(steps) if p.log else value + steps
-    return sorted({float(v) for v in np.clip(values, p.lower, p.upper)})
+    return [float(one) for one in np.unique(np.clip(values, p.lower, p.upper))]
 
 
-def _with(row: Array, at: Sequence[int], values: Sequence[float]) -> Array:
-    changed = row.copy()
-    changed[list(at)] = values
-    return changed
+def _changed(shape: Array, at: Sequence[int], values: Sequence[float]) -> Array:
+    shape = shape.copy()
+    shape[list(at)] = values
+    return shape
 
 
 def _without(fit: Fit, own: slice) -> Fit:
