@@ -117,8 +117,8 @@ def finer_scans(
     at : sequence of int
         Places of the parameters that change
     reaches : sequence of float
-        How far each goes to either side in the first grid, in its logarithm if it has such a prior; then as far as one
-        step of the grid before
+        How far each goes to either side in the first grid, in its logarithm if it has such a prior; in the next ones,
+        one step of the grid before
     points : int
         Of a grid in one direction
     """
