@@ -246,10 +246,10 @@ def _fitted_on(calibration: Calibration, one: Judged) -> Judged:
     held = held_numbers(fit.experiment, one.effects, base)
     try:
         for _ in range(MOST_TURNS):
-            further = fit.experiment.fit(reached.z, at=reached.linearised, held=held)
-            further = with_refined_switches(further, one.effects, base)
-            gained, reached = 0.5 * (reached.objective - further.objective), further
-            if gained < SETTLED_NAT:
+            before, reached = reached, fit.experiment.fit(reached.z, at=reached.linearised, held=held)
+            if before.objective - reached.objective < 2.0 * SETTLED_NAT:
+                reached = with_refined_switches(reached, one.effects, base)
+            if before.objective - reached.objective < 2.0 * SETTLED_NAT:
                 break
         if held:  # between two points of the grid
             free = fit.experiment.fit(reached.z, at=reached.linearised)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
-from functools import cache
+from functools import cache, cached_property
 
 import numpy as np
 
@@ -75,11 +75,16 @@ class NearReadings:
         """Leading combinations of model error in a class with the prior N(0, 1) each, shape (unknowns, n)."""
         amplitudes = self.error.amplitudes(one)
         there = np.flatnonzero(amplitudes > 0.0)
-        scaled = [N[:, there] * amplitudes[there] for N in self.columns]
-        leading = leading_directions(np.sum([N.T @ N for N in scaled], axis=0))
+        scale = amplitudes[there]
+        leading = leading_directions(self._products[np.ix_(there, there)] * np.outer(scale, scale))
         directions = np.zeros((len(amplitudes), leading.shape[1]))
         directions[there] = amplitudes[there, None] * leading
         return directions
+
+    @cached_property
+    def _products(self) -> Array:
+        """Inner products of all columns, shape (unknowns of model error, unknowns of model error)."""
+        return np.asarray(np.sum([N.T @ N for N in self.columns], axis=0))
 
     def gram(self, one: ErrorClass, z: Array) -> Gram:
         """Of residual, unknowns and model error of a class, where the unknowns are `z`."""
@@ -263,28 +268,25 @@ def _calibrated(experiment: Experiment, error: ModelError, start: Fit) -> Calibr
     near = NearReadings.of(experiment, error, fit)
     experiment = experiment.with_random_heat(near.likely_random_heat(widest, fit.z))
     fit = NearReadings.of(experiment, error, fit).fitted(widest, fit, iterations=ITERATIONS).fit
-    experiment = replace(
-        experiment,
-        most_deviation=most_deviation(NearReadings.of(experiment, error, fit).gram(widest, fit.z), experiment),
-    )
-    return _settled(experiment, error, fit)
+    near = NearReadings.of(experiment, error, fit)
+    most = most_deviation(near.gram(widest, fit.z), experiment)
+    return _settled(replace(near, experiment=replace(near.experiment, most_deviation=most)), fit)
 
 
 def recalibrate(calibration: Calibration, fit: Fit) -> Calibration:
     """Calibration about the courses of another fit of the same machine, in the class that is best there."""
-    near = calibration.near
-    return replace(_settled(near.experiment, near.error, fit), of_others=calibration.of_others)
+    near = NearReadings.of(calibration.near.experiment, calibration.near.error, fit)
+    return replace(_settled(near, fit), of_others=calibration.of_others)
 
 
-def _settled(experiment: Experiment, error: ModelError, fit: Fit) -> Calibration:
-    """The class of model error by the evidence about a fit, and the machine with it."""
+def _settled(near: NearReadings, fit: Fit) -> Calibration:
+    """The class of model error by the evidence about a fit near it, and the machine with it."""
     classes = error_classes()
-    near = NearReadings.of(experiment, error, fit)
     evidence = {one.name: near.log_evidence(one, fit.z) for one in classes}
     best = max(classes, key=lambda one: evidence[one.name])
     chosen = near.fitted(best, fit)
     for _ in range(TURNS - 1):
-        near = NearReadings.of(experiment, error, chosen.fit)
+        near = NearReadings.of(near.experiment, near.error, chosen.fit)
         chosen = near.fitted(best, chosen.fit, chosen.deviation)
     largest = max(evidence.values())
     return Calibration(chosen=chosen, evidence={name: value - largest for name, value in evidence.items()}, near=near)

@@ -43,7 +43,7 @@ def start_with_switches(setup: InferenceSetup, experiment: Experiment) -> Array 
                               variants=shape)  # fmt: skip
             points = min(int(VARIANTS ** (1.0 / len(rough))), POINTS)
             reaches = [WIDTH * term.parameters[i].sd for i in rough]
-            found, _ = finer_scans(fit, here, rough, reaches, points=points, levels=2)
+            found, *_ = finer_scans(fit, here, rough, reaches, points=points, levels=2)
             values |= {term.parameters[i].name: float(found.variants[0, i]) for i in rough}
     if not values:
         return None

@@ -16,7 +16,7 @@ from diagnosis.engine.unknown import TERM_STEP, Held, NetworkParameter, TermPara
 from diagnosis.forward.network_on_grid import NetworkOnGrid
 from models.base.types import Array
 
-START_SHARES = (1.0, 0.3, 0.03)  # of the strength that the scan promises
+START_SHARES = (1.0, 0.1)  # of the strength that the scan promises
 ROUGH, ITERATIONS = 3, 10
 FAR_NAT = 20.0  # that a fit would gain by a further step: it is far from its optimum
 DATE_STEP_S = 10.0

@@ -21,6 +21,7 @@ from models.network.laws import Parameter
 from models.terms.term import Term
 
 POINTS, LEVELS = 9, 3  # of a grid in one direction; how often it is made finer
+LEAST_GAIN = 0.1  # nats by a straight line, from which other numbers are worth a fit
 
 
 def switch_numbers(term: Term) -> list[int]:
@@ -68,7 +69,9 @@ def refined(fit: Fit, candidate: Hypothesis, shapes: Sequence[int]) -> tuple[Hyp
     assert candidate.term is not None  # noqa: S101 - it switches
     at = switch_numbers(candidate.term)
     reaches = [_to_a_neighbour(candidate.term.parameters[i]) for i in at]
-    return finer_scans(fit, replace(candidate, variants=candidate.variants[list(dict.fromkeys(shapes))]), at, reaches)
+    some = replace(candidate, variants=candidate.variants[list(dict.fromkeys(shapes))])
+    found, strength, _ = finer_scans(fit, some, at, reaches)
+    return found, strength
 
 
 def with_refined_switches(fit: Fit, effects: Sequence[Hypothesis], first: int) -> Fit:
@@ -96,7 +99,9 @@ def _with_refined_switch(fit: Fit, effect: Hypothesis, term: Term, own: slice, h
     values = np.array([u.value(one) for u, one in zip(experiment.unknowns[own], z[own].tolist(), strict=True)])
     shape = replace(effect, variants=np.array([[1.0, *values[1:]]]))
     reaches = [_to_a_neighbour(term.parameters[i]) * 2.0 / (POINTS - 1) for i in at]
-    found, strength = finer_scans(_without(fit, own), shape, at, reaches, levels=LEVELS - 1)
+    found, strength, gained = finer_scans(_without(fit, own), shape, at, reaches, levels=LEVELS - 1)
+    if gained < LEAST_GAIN:
+        return fit
     values = np.array([strength, *found.variants[0, 1:]])
     z[own] = [u.z_of(value) for u, value in zip(experiment.unknowns[own], values.tolist(), strict=True)]
     try:
@@ -109,8 +114,8 @@ def _with_refined_switch(fit: Fit, effect: Hypothesis, term: Term, own: slice, h
 def finer_scans(
     fit: Fit, candidate: Hypothesis, at: Sequence[int], reaches: Sequence[float], *, points: int = POINTS,
     levels: int = LEVELS,
-) -> tuple[Hypothesis, float]:  # fmt: skip
-    """A candidate in the shape that scans of ever finer grids about its shapes prefer; see :func:`refined`.
+) -> tuple[Hypothesis, float, float]:  # fmt: skip
+    """A candidate in the shape that scans of ever finer grids about its shapes prefer.
 
     Parameters
     ----------
@@ -121,9 +126,16 @@ def finer_scans(
         one step of the grid before
     points : int
         Of a grid in one direction
+
+    Returns
+    -------
+    candidate : Hypothesis
+        With one variant
+    strength, gain : float
+        That the scan promises, and nats that it is ahead of the mean over the shapes before
     """
     assert candidate.term is not None  # noqa: S101 - parameters out of their priors have no shapes
-    parameters, strength = [candidate.term.parameters[i] for i in at], 0.0
+    parameters, before, strength, gain = [candidate.term.parameters[i] for i in at], candidate, 0.0, 0.0
     for level in range(levels):
         steps = np.linspace(-1.0, 1.0, points) * (2.0 / (points - 1)) ** level
         variants = [
@@ -133,10 +145,11 @@ def finer_scans(
                 _about(p, float(shape[i]), reach * steps) for i, p, reach in zip(at, parameters, reaches, strict=True)
             ))
         ]  # fmt: skip
-        found = scan(fit, [replace(candidate, variants=np.array(variants))])
+        found = scan(fit, [replace(candidate, variants=np.array(variants)), before])
         candidate = replace(candidate, variants=np.array([variants[found.best[0]]]))
         strength = float(found.singles(found.gram.given([*found.unknowns, *found.further])).value[0])
-    return candidate, strength
+        gain = float(found.log_bayes[0] + found.spread[0] - found.log_bayes[1])
+    return candidate, strength, gain
 
 
 def _to_a_neighbour(p: Parameter) -> float:

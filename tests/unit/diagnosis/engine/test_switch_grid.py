@@ -12,6 +12,7 @@ import pytest
 from diagnosis.candidates.hypotheses import Hypothesis, hypothesis_of
 from diagnosis.decision.infer import _fitted_on
 from diagnosis.decision.posterior import Judged
+from diagnosis.engine import switch_grid
 from diagnosis.engine.calibration import Calibration
 from diagnosis.engine.fit import Experiment, Fit, calibrate
 from diagnosis.engine.learnt import error_classes
@@ -76,12 +77,21 @@ def beside(without: Fit, cooler: Placed) -> tuple[Fit, Hypothesis]:
     effect = replace(hypothesis_of(cooler), variants=row)
     experiment, z = with_candidate(without, effect, 0)
     z[0] = experiment.unknowns[len(without.z)].z_of(TRUE["strength"])
-    return experiment.fit(np.concatenate([without.z, z]), without.trajectories), effect
+    held = held_numbers(experiment, [effect], len(without.z))
+    return experiment.fit(np.concatenate([without.z, z]), without.trajectories, held=held), effect
 
 
 def test_a_fit_that_ended_beside_them_is_continued_there(without: Fit, beside: tuple[Fit, Hypothesis]) -> None:
     fit, effect = beside
     assert with_refined_switches(fit, [effect], len(without.z)).objective < fit.objective - 10.0
+
+
+def test_numbers_that_a_scan_hardly_betters_are_not_fitted_again(
+    without: Fit, beside: tuple[Fit, Hypothesis], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fit, effect = beside
+    monkeypatch.setattr(switch_grid, "LEAST_GAIN", 1e6)
+    assert with_refined_switches(fit, [effect], len(without.z)) is fit
 
 
 def test_an_explanation_is_fitted_on_with_refined_switches(without: Fit, beside: tuple[Fit, Hypothesis]) -> None:
