@@ -107,7 +107,7 @@ def assemble(
         experiment, held_out_experiment(setup, experiment), plain=plain,
         found=_final(best, plain, faulty),
         explanation=None if faulty else best or posterior.nothing, near=calibration.near, counting=counting,
-        jobs=jobs,
+        noise_K=setup.noise_K, jobs=jobs,
     )  # fmt: skip
     final, holdout = predicted.final, _fits(setup, predicted.holdout, counting)
     contradicted = (
@@ -172,6 +172,7 @@ def assemble(
         network=setup.nominal,
         shapes=setup.shapes,
         learnt=predicted.learnt,
+        left_out_K=predicted.left_out_K,
         inputs=_provenance(setup),
         notes=(*ratio_notes(final), *baseline_notes(experiment, posterior, answers), *_notes_of_recordings(setup)),
         kinds={kind: posterior.of(kind) for kind in KINDS},

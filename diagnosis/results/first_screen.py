@@ -230,6 +230,11 @@ def _how_much_better(d: Diagnosis) -> tuple[str, ...]:
                 f"RMSE {name}{without}: {fits.before:.2f} K as delivered, {fits.calibrated:.2f} K calibrated"
                 f"{found}{learnt} (noise {d.noise_K:.2f} K)"
             )
+    if math.isfinite(d.left_out_K):
+        lines.append(
+            "What was learnt of model error is left out: with it held-out temperatures are missed by "
+            f"{d.left_out_K:.2f} K"
+        )
     if d.has_correction and d.holdout.after > d.holdout.calibrated:
         lines.append(
             "Held-out temperatures are not closer than with the calibrated model: predict with calibrated.toml"

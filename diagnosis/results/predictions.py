@@ -34,6 +34,8 @@ class Predicted:
         Of the corrected model
     learnt : tuple of Term
         What was learnt of model error and is in the corrected model
+    left_out_K : float
+        Error of the held-out temperatures with what was learnt, where it is left out for that; else NaN
     holdout_gain : float
         Log score of the corrected model on the held-out readings, less that of the calibrated one, [nat]
     """
@@ -42,12 +44,13 @@ class Predicted:
     holdout: Predictions
     final: Fit
     learnt: tuple[Term, ...]
+    left_out_K: float
     holdout_gain: float
 
 
 def predict_recordings(
     experiment: Experiment, judged: Experiment, *, plain: Fit, found: Fit, explanation: Judged | None,
-    near: NearReadings, counting: Collection[str], jobs: int,
+    near: NearReadings, counting: Collection[str], noise_K: float, jobs: int,
 ) -> Predicted:  # fmt: skip
     """Predict all recordings, with model error written into the best explanation if that helps.
 
@@ -63,6 +66,8 @@ def predict_recordings(
         Where model error was linearised
     counting : collection of str
         Channels that count
+    noise_K : float
+        Of a row: held-out temperatures that are missed by so much more contradict what was learnt
 
     Raises
     ------
@@ -71,12 +76,23 @@ def predict_recordings(
     """
     train = _states(experiment, plain, found, jobs, near=[trajectory.T for trajectory in found.trajectories])
     holdout = _states(judged, plain, found, jobs)
-    final, learnt, after = found, tuple[Term, ...](), [train["found"], holdout["found"]]
+    final, learnt, left_out_K = found, tuple[Term, ...](), float("nan")
+    after = [train["found"], holdout["found"]]
     if explanation is not None and explanation.fit is not None:
         try:
             if is_writable(explanation.error_class):
                 written, terms = with_learnt_error(explanation.fit, near, explanation.error_class)
-                if there := _closer(written, (experiment, judged), after, counting, jobs):
+                there: list[Sequence[Prediction]] = [
+                    _predictions(written, one, _courses(known), jobs)
+                    for one, known in zip((experiment, judged), after, strict=True)
+                ]  # fmt: skip
+                columns = temperatures(experiment.pieces[0].channels, counting)
+                # Far from a straight line it may do harm: parameters at limits and large factors go together.
+                farther = [overall_rmse(with_it, columns) - overall_rmse(without, columns)
+                           for with_it, without in zip(there, after, strict=True)]  # fmt: skip
+                if farther[0] < 0.0 and farther[1] > noise_K:
+                    left_out_K = overall_rmse(there[1], columns)
+                elif farther[0] < 0.0:
                     final, learnt, after = written, terms, there
         except ArithmeticError:
             pass  # no solution with what was learnt
@@ -84,7 +100,8 @@ def predict_recordings(
     faulty = set(experiment.pieces[0].channels) - set(counting)
     runs = holdout["after"], holdout["calibrated"]
     gain = log_score_gain(final, plain, without_channels(judged, faulty), runs)
-    return Predicted(train=train, holdout=holdout, final=final, learnt=learnt, holdout_gain=gain)
+    return Predicted(train=train, holdout=holdout, final=final, learnt=learnt, left_out_K=left_out_K,
+                     holdout_gain=gain)  # fmt: skip
 
 
 def temperatures(channels: Sequence[str], counting: Collection[str]) -> list[int]:
@@ -100,18 +117,6 @@ def _states(
     tuned = _predictions(plain, pieces_of, _courses(before), jobs)
     last = tuned if found is plain else _predictions(found, pieces_of, near or _courses(tuned), jobs)
     return {"before": before, "calibrated": tuned, "found": last}
-
-
-def _closer(
-    fit: Fit, of: Sequence[Experiment], known: Sequence[Sequence[Prediction]], counting: Collection[str], jobs: int
-) -> list[Sequence[Prediction]] | None:  # fmt: skip
-    """Predictions of a fit with what was learnt of model error; None if `known` are closer to what it was learnt from.
-
-    Far from a straight line they may be: parameters at their limits and large factors go together with each other.
-    """
-    found = [_predictions(fit, one, _courses(there), jobs) for one, there in zip(of, known, strict=True)]
-    columns = temperatures(of[0].pieces[0].channels, counting)
-    return [*found] if overall_rmse(found[0], columns) < overall_rmse(known[0], columns) else None
 
 
 def _predictions(

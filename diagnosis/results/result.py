@@ -91,6 +91,8 @@ class Diagnosis:
         Tilts of the formulas that were calibrated along, see :mod:`diagnosis.setup.shapes`
     learnt : tuple of Term
         What was learnt of model error and is in the prediction, see :mod:`diagnosis.engine.learnt_error`
+    left_out_K : float
+        Error of the held-out temperatures with what was learnt, where it is left out for that; else NaN
     inputs : mapping
         Hashes and version
     notes : tuple of str
@@ -160,6 +162,7 @@ class Diagnosis:
     inputs: Mapping[str, Any]
     not_tried: tuple[str, ...] = ()
     learnt: tuple[Term, ...] = ()
+    left_out_K: float = math.nan
     notes: tuple[str, ...] = ()
     kinds: Mapping[str, float] = field(default_factory=dict)
     settings: Settings = field(default_factory=Settings)
@@ -222,7 +225,8 @@ class Diagnosis:
                             "learnt": [
                                 {"what": term.strength.description, "kind": term.kind, "target": list(term.target),
                                  "size": term.strength.start, "stderr": term.strength.sd} for term in self.learnt
-                            ]},
+                            ],
+                            "left_out_rmse_K": or_none(self.left_out_K)},
             "sessions": {"deviation_in_sd": self.session_s, "repeating": [asdict(one) for one in self.repeating],
                          "placebo": None if self.placebo is None else asdict(self.placebo)},
             "remaining": {

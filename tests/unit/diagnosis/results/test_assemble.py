@@ -37,7 +37,9 @@ from diagnosis.setup.inference_setup import InferenceSetup
 from models.assembly.gearbox import Gearbox
 from models.correction.correction import MODEL_ERROR, correction_text, read_correction, write_correction
 from models.files.cycle import Cycle
+from models.formulas.extremes import Max
 from models.mechanisms import CATALOGUE, Scale
+from models.terms.term import Term
 from tests.unit.diagnosis.inference_example import recording_of
 
 NODES = ("oil", "housing_lower", "bearing_1", "pinion")
@@ -470,22 +472,29 @@ def test_what_was_learnt_of_model_error_is_in_prediction_and_correction(
         assert float(np.sqrt(np.mean(apart**2))) < 0.03  # the grid of a prediction rounds corners
 
 
-@pytest.mark.parametrize("far", [1.0, 1e4])
-def test_what_was_learnt_is_left_out_where_it_makes_the_recordings_worse(
-    assembled: Assemble, prepared: Prepared, monkeypatch: pytest.MonkeyPatch, far: float
-) -> None:
-    """Far off, or with temperatures that leave all bounds."""
-    splits = next(one for one in error_classes() if one.name == "splits")
-    posterior = posterior_of(prepared[2], log_e=-1.0)
-    term = replace(effect_of(prepared[0], prepared[2], "windage", "oil").term, label="learnt_too_much")
+def at_fast_and_light(s: Any) -> Any:
+    """A heat at an operation of the held-out ride alone."""
+    return 0.3 * Max(s.speed - 3000.0, 0.0) * Max(70.0 - s.torque, 0.0)
 
-    def wrong(fit: Fit, *_: object) -> tuple[Fit, tuple[object, ...]]:
-        model = fit.experiment.machine.model
-        network = model.network.with_source("oil", 3000.0 * far, name=term.label)
-        machine = Machine(NetworkOnGrid(network, model.losses), fit.experiment.machine.terms)
-        return replace(fit, experiment=replace(fit.experiment, machine=machine)), (term,)
+
+@pytest.mark.parametrize("law", [3000.0, 3e7, at_fast_and_light])
+def test_what_was_learnt_is_left_out_where_it_makes_the_recordings_worse(
+    assembled: Assemble, prepared: Prepared, calibration: Calibration, monkeypatch: pytest.MonkeyPatch, law: Any
+) -> None:
+    """Far off, with temperatures that leave all bounds, or in the held-out recording alone."""
+    splits = next(one for one in error_classes() if one.name == "splits and law errors")
+    posterior = posterior_of(calibration.near.fitted(splits, prepared[2]).fit, log_e=-1.0)
+    learn = predictions.with_learnt_error
+
+    def wrong(*given: Any) -> tuple[Fit, tuple[Term, ...]]:
+        fit, terms = learn(*given)
+        there = fit.experiment.machine
+        model = NetworkOnGrid(there.model.network.with_source("oil", law, name="much"), there.model.losses)
+        return replace(fit, experiment=replace(fit.experiment, machine=Machine(model, there.terms, there.mixes))), terms
 
     monkeypatch.setattr(predictions, "with_learnt_error", wrong)
     found = assembled(replace(posterior, nothing=replace(posterior.nothing, error_class=splits)), [])
     assert not found.learnt and not found.has_correction
     assert found.holdout.after == found.holdout.calibrated
+    assert (found.left_out_K > found.holdout.after + 1.0) is callable(law)
+    assert ("left out: with it held-out temperatures are missed by" in str(found)) is callable(law)
