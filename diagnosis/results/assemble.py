@@ -101,21 +101,30 @@ def assemble(
     """
     settings, known = posterior.settings, setup.known
     faulty = () if others is None else others.channels
-    best = _best(posterior, answers)
     counting = [name for name in setup.channels if name not in faulty]
-    predicted = predict_recordings(
-        experiment, held_out_experiment(setup, experiment), plain=plain,
-        found=_final(best, plain, faulty),
-        explanation=None if faulty else best or posterior.nothing, near=calibration.near, counting=counting,
-        noise_K=setup.noise_K, jobs=jobs,
-    )  # fmt: skip
-    final, holdout = predicted.final, _fits(setup, predicted.holdout, counting)
-    contradicted = (
-        bool(answers)
-        and not faulty
-        and holdout.contradict(predicted.holdout_gain, setup.noise_K, posterior.class_threshold)
-    )
-    if contradicted:
+
+    def judged_by(best: Judged | None) -> tuple[Predicted, Fits, bool]:
+        """Predictions by an explanation, and whether the held-out recordings contradict it."""
+        predicted = predict_recordings(
+            experiment, held_out_experiment(setup, experiment), plain=plain,
+            found=_final(best, plain, faulty),
+            explanation=None if faulty else best or posterior.nothing, near=calibration.near, counting=counting,
+            noise_K=setup.noise_K, jobs=jobs,
+        )  # fmt: skip
+        holdout = _fits(setup, predicted.holdout, counting)
+        against = holdout.contradict(predicted.holdout_gain, setup.noise_K, posterior.class_threshold)
+        return predicted, holdout, against and bool(answers) and not faulty
+
+    best = _best(posterior, answers)
+    predicted, holdout, contradicted = judged_by(best)
+    named = _named_alone(posterior, answers) if contradicted else None
+    if named is not None:
+        alone = judged_by(named)
+        if not alone[-1]:  # what has no name does the harm
+            best, (predicted, holdout, contradicted) = named, alone
+            answers = [replace(answer, best=named) for answer in answers]
+    final = predicted.final
+    if contradicted or (best is named is not None and posterior.leaves_much(named)):
         answers = [withdraw_claim(answer, posterior.rule) for answer in answers]
     reported = _distinct([
         (answer, finding_of(answer, answer.best.fit or final, setup, posterior))
@@ -235,6 +244,15 @@ def _best(posterior: Posterior, answers: Sequence[Answer]) -> Judged | None:
         return answers[0].best
     fitted = (one for one, _ in posterior.ranked if one.fit is not None and one.kind != "nothing")
     return next(fitted, None) if posterior.detected else None
+
+
+def _named_alone(posterior: Posterior, answers: Sequence[Answer]) -> Judged | None:
+    """The effect with a name without the one next to it, fitted; None if both have names, or there is one effect."""
+    if len(answers) != 1 or len(answers[0].best.effects) == 1:
+        return None
+    label = answers[0].effect.label
+    singles = (one for one in posterior.judged if len(one.effects) == 1 and one.fit is not None)
+    return next((one for one in singles if one.label == label), None)
 
 
 def _final(best: Judged | None, plain: Fit, faulty: Sequence[str]) -> Fit:

@@ -3,138 +3,42 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from dataclasses import replace
-from datetime import UTC, datetime
 from typing import Any, cast
 
 import numpy as np
 import pytest
 
-from diagnosis.candidates.hypotheses import Hypothesis, hypothesis_of
+from diagnosis.candidates.hypotheses import Hypothesis
 from diagnosis.decision.answer import Answer
-from diagnosis.decision.posterior import Expected, Judged, Placebo, Posterior
-from diagnosis.engine.calibration import Calibration, NearReadings
+from diagnosis.decision.posterior import Expected, Judged, Placebo
 from diagnosis.engine.families import candidates_of
-from diagnosis.engine.fit import Experiment, Fit, calibrate
+from diagnosis.engine.fit import Fit
 from diagnosis.engine.learnt import error_classes, rule
-from diagnosis.engine.model_error import ModelError
-from diagnosis.engine.point import Machine
-from diagnosis.engine.prepare import prepare_experiment
-from diagnosis.engine.refit import refit, with_candidate
+from diagnosis.engine.refit import with_candidate
 from diagnosis.engine.unknown import NetworkParameter
-from diagnosis.forward.network_on_grid import NetworkOnGrid
-from diagnosis.forward.recorder import simulated_as_recorded
 from diagnosis.proof.scoring.answers import read_answer
-from diagnosis.recordings.recording import Recording
 from diagnosis.report import page
 from diagnosis.report.write import correction_of
 from diagnosis.results import predictions
-from diagnosis.results.assemble import _distinct, _remaining, assemble
+from diagnosis.results.assemble import _distinct, _remaining
 from diagnosis.results.findings import estimates_of
 from diagnosis.results.result import Diagnosis
-from diagnosis.setup.inference_setup import InferenceSetup
 from models.assembly.gearbox import Gearbox
-from models.correction.correction import MODEL_ERROR, correction_text, read_correction, write_correction
-from models.files.cycle import Cycle
-from models.formulas.extremes import Max
-from models.mechanisms import CATALOGUE, Scale
-from models.terms.term import Term
-from tests.unit.diagnosis.inference_example import recording_of
+from models.correction.correction import correction_text, read_correction, write_correction
+from models.mechanisms import CATALOGUE
+from tests.unit.diagnosis.results.made import (
+    NOISE_K,
+    WINDAGE_W,
+    Assemble,
+    Prepared,
+    effect_of,
+    judged_of,
+    posterior_of,
+)
 
-NODES = ("oil", "housing_lower", "bearing_1", "pinion")
-WINDAGE_W, NOISE_K, DATE_S = 65.0, 0.1, 2400.0
+DATE_S = 2400.0
 BEFORE, RECORDED, AFTER_S = "earlier", "made", 5000.0  # names of recordings, and start of the second one
-
-
-@pytest.fixture(scope="module")
-def recordings(fzg: Gearbox) -> tuple[Recording, Recording]:
-    """Two rides of 2 h of the model with windage in the oil: to learn from, and held out."""
-
-    def ride(levels: tuple[float, float], seed: int) -> Recording:
-        time = np.arange(0.0, 7200.0, 10.0)
-        speed = np.interp(time, [600, 660, 3600, 3660], [900, levels[0], levels[0], levels[1]])
-        torque = np.interp(time, [2400, 2410, 5400, 5410], [60.0, 150.0, 150.0, 90.0])
-        columns = {"time_s": time, "speed_rpm": speed, "torque_Nm": torque, "T_ambient_degC": np.full(len(time), 22.0)}
-        network, scale = fzg.network(), Scale.of(fzg, speed=3300.0, torque=150.0)
-        term = next(p for p in CATALOGUE["windage"].placed(network, scale) if p.place == "oil")
-        driven = columns | {"air_speed_m_s": np.full(len(time), 2.0)}
-        made = term.apply(network, {term.strength.name: WINDAGE_W}).simulate(
-            driven, losses=fzg.losses(), initial=22.0
-        ).columns()  # fmt: skip
-        rng = np.random.default_rng(seed)
-        read = {n: made[f"T_{n}_degC"] + NOISE_K * rng.standard_normal(len(time)) for n in NODES}
-        loss = made["P_loss_W"] * (1.0 + 0.01 * rng.standard_normal(len(time)))
-        return recording_of(columns, read | {"P_loss": loss})
-
-    learnt = replace(ride((2600.0, 3300.0), 0), start=datetime(2020, 1, 1, 8, tzinfo=UTC))
-    return learnt, replace(ride((3300.0, 1500.0), 1), name="judged")
-
-
-Prepared = tuple[InferenceSetup, Experiment, Fit]
-
-
-@pytest.fixture(scope="module")
-def prepared(fzg: Gearbox, recordings: tuple[Recording, Recording]) -> Prepared:
-    setup, experiment = prepare_experiment(fzg, [recordings[0]], [recordings[1]])
-    return setup, experiment, calibrate(experiment)
-
-
-def effect_of(setup: InferenceSetup, fit: Fit, name: str, place: str) -> Hypothesis:
-    network = fit.experiment.machine.model.network
-    found = next(p for p in CATALOGUE[name].placed(network, setup.scale, setup.channels) if p.place == place)
-    h = hypothesis_of(found)
-    return replace(h, variants=h.variants[[len(h.variants) // 2]], log_prior=-5.0)
-
-
-@pytest.fixture(scope="module")
-def windage(prepared: Prepared) -> Judged:
-    setup, _, plain = prepared
-    effect = effect_of(setup, plain, "windage", "oil")
-    fit = refit(plain, effect, 0, 50.0)
-    return Judged(effects=(effect,), log_bayes=90.0, fit=fit, error_class=error_classes()[0])
-
-
-def judged_of(prepared: Prepared, name: str, place: str, log_bayes: float) -> Judged:
-    setup, _, plain = prepared
-    return Judged(effects=(effect_of(setup, plain, name, place),), log_bayes=log_bayes,
-                  error_class=error_classes()[0])  # fmt: skip
-
-
-def posterior_of(
-    nothing: Fit, *judged: Judged, log_e: float = 80.0, remainder: float | None = None, **given: Any
-) -> Posterior:
-    if remainder is not None:
-        judged = (replace(judged[0], left=remainder), *judged[1:])
-    return Posterior(
-        nothing=Judged(effects=(), log_bayes=0.0, fit=nothing, error_class=error_classes()[0]),
-        judged=judged, log_e=log_e,
-        threshold=4.0, class_threshold=4.0, rule=replace(rule(), temper=(3.0, 0.0)), **given,
-    )  # fmt: skip
-
-
-Assemble = Callable[..., Diagnosis]
-
-
-@pytest.fixture(scope="module")
-def calibration(prepared: Prepared) -> Calibration:
-    _, experiment, plain = prepared
-    near = NearReadings.of(experiment, ModelError.of(experiment), plain)
-    evidence = {one.name: near.log_evidence(one, plain.z) for one in error_classes()}
-    return Calibration(chosen=near.fitted(error_classes()[0], plain, iterations=0), evidence=evidence, near=near)
-
-
-@pytest.fixture(scope="module")
-def assembled(prepared: Prepared, calibration: Calibration) -> Assemble:
-    setup, experiment, plain = prepared
-
-    def result(posterior: Posterior, answers: list[Answer], **given: Any) -> Diagnosis:
-        return assemble(
-            setup, given.pop("experiment", experiment), posterior, answers, plain=plain,
-            calibration=calibration, **given,
-        )  # fmt: skip
-
-    return result
 
 
 @pytest.fixture(scope="module")
@@ -446,55 +350,3 @@ def test_the_report_shows_the_first_screen(claimed: Diagnosis) -> None:
     for question, _ in claimed.first_screen:
         assert question in text
     assert "refused" not in text and "windage" in text
-
-
-def test_what_was_learnt_of_model_error_is_in_prediction_and_correction(
-    assembled: Assemble, prepared: Prepared, calibration: Calibration, recordings: tuple[Recording, Recording],
-    fzg: Gearbox,
-) -> None:  # fmt: skip
-    """The full model with the correction, read through its sensors, gives the prediction that was judged."""
-    splits = next(one for one in error_classes() if one.name == "splits and law errors")
-    posterior = posterior_of(calibration.near.fitted(splits, prepared[2]).fit, log_e=-1.0)
-    found = assembled(replace(posterior, nothing=replace(posterior.nothing, error_class=splits)), [])
-    assert found.verdict in ("consistent", "insufficient_data") and found.learnt and found.has_correction
-    assert found.holdout.found == found.holdout.calibrated > found.holdout.after
-    correction = correction_of(found, fzg)
-    assert {one.mechanism for one in correction.findings if one.label.startswith("learnt_")} == {MODEL_ERROR}
-    assert any(sensor.mix for sensor in correction.sensors)
-    assert "with what was learnt of model error" in str(found)
-    (course,) = (one for one in found.courses if one.held_out)
-    network, cycle = correction.network(fzg), Cycle(recordings[1].time, recordings[1].inputs)
-    read = simulated_as_recorded(cycle, correction, lambda driven: network.simulate(
-        driven, losses=fzg.losses(), initial=course.start).columns())  # fmt: skip
-    for name in ("oil", "bearing_1"):
-        there = np.interp(course.time, cycle.time, read[f"T_{name}_degC_as_recorded"])
-        apart = (there - course.after[name])[course.time > course.counts_from_s]
-        assert float(np.sqrt(np.mean(apart**2))) < 0.03  # the grid of a prediction rounds corners
-
-
-def at_fast_and_light(s: Any) -> Any:
-    """A heat at an operation of the held-out ride alone."""
-    return 0.3 * Max(s.speed - 3000.0, 0.0) * Max(70.0 - s.torque, 0.0)
-
-
-@pytest.mark.parametrize("law", [3000.0, 3e7, at_fast_and_light])
-def test_what_was_learnt_is_left_out_where_it_makes_the_recordings_worse(
-    assembled: Assemble, prepared: Prepared, calibration: Calibration, monkeypatch: pytest.MonkeyPatch, law: Any
-) -> None:
-    """Far off, with temperatures that leave all bounds, or in the held-out recording alone."""
-    splits = next(one for one in error_classes() if one.name == "splits and law errors")
-    posterior = posterior_of(calibration.near.fitted(splits, prepared[2]).fit, log_e=-1.0)
-    learn = predictions.with_learnt_error
-
-    def wrong(*given: Any) -> tuple[Fit, tuple[Term, ...]]:
-        fit, terms = learn(*given)
-        there = fit.experiment.machine
-        model = NetworkOnGrid(there.model.network.with_source("oil", law, name="much"), there.model.losses)
-        return replace(fit, experiment=replace(fit.experiment, machine=Machine(model, there.terms, there.mixes))), terms
-
-    monkeypatch.setattr(predictions, "with_learnt_error", wrong)
-    found = assembled(replace(posterior, nothing=replace(posterior.nothing, error_class=splits)), [])
-    assert not found.learnt and not found.has_correction
-    assert found.holdout.after == found.holdout.calibrated
-    assert (found.left_out_K > found.holdout.after + 1.0) is callable(law)
-    assert ("left out: with it held-out temperatures are missed by" in str(found)) is callable(law)
