@@ -52,6 +52,7 @@ from models.terms.term import Term
 ENOUGH_VISIBLE = 0.1  # of the effects that were asked for, for a "consistent" that means something
 MOST_RANKED = 500
 PROBABLY = 0.5
+LEFT_OUT = "; a second effect, without a name, was fitted too and is left out: the held-out recordings contradict it"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -117,14 +118,13 @@ def assemble(
 
     best = _best(posterior, answers)
     predicted, holdout, contradicted = judged_by(best)
-    named = _named_alone(posterior, answers) if contradicted else None
-    if named is not None:
-        alone = judged_by(named)
-        if not alone[-1]:  # what has no name does the harm
-            best, (predicted, holdout, contradicted) = named, alone
-            answers = [replace(answer, best=named) for answer in answers]
+    named, much, left_out = _named_alone(posterior, answers) if contradicted else None, False, ""
+    if named is not None and not (alone := judged_by(named))[-1]:  # what has no name does the harm
+        best, (predicted, holdout, contradicted) = named, alone
+        answers = [replace(answer, best=named) for answer in answers]
+        much, left_out = posterior.leaves_much(named), LEFT_OUT
     final = predicted.final
-    if contradicted or (best is named is not None and posterior.leaves_much(named)):
+    if contradicted or much:
         answers = [withdraw_claim(answer, posterior.rule) for answer in answers]
     reported = _distinct([
         (answer, finding_of(answer, answer.best.fit or final, setup, posterior))
@@ -166,7 +166,7 @@ def assemble(
         floor=_floor(setup, calibration.near.experiment.random_heat),
         misfit=_misfit(final),
         remaining_p_value=1.0 if _looked_no_further(best) else _bound_on_chance(posterior.left_by(best)),
-        remaining_note=_remaining(posterior, others, best),
+        remaining_note=_remaining(posterior, others, best) + left_out,
         ranking=_ranking(posterior),
         unseen=unseen,
         not_tried=tuple(sorted(

@@ -23,7 +23,7 @@ from diagnosis.results.result import Diagnosis
 from models.assembly.gearbox import Gearbox
 from models.mechanisms import CATALOGUE, Scale
 from tests.unit.diagnosis.inference_example import recording_of
-from tests.unit.diagnosis.results.made import NOISE_K, WINDAGE_W, Assemble, Prepared, effect_of
+from tests.unit.diagnosis.results.assembled_example import NOISE_K, WINDAGE_W, Assemble, Prepared, effect_of
 
 NODES = ("oil", "housing_lower", "bearing_1", "pinion")
 

@@ -27,7 +27,7 @@ from diagnosis.results.result import Diagnosis
 from models.assembly.gearbox import Gearbox
 from models.correction.correction import correction_text, read_correction, write_correction
 from models.mechanisms import CATALOGUE
-from tests.unit.diagnosis.results.made import (
+from tests.unit.diagnosis.results.assembled_example import (
     NOISE_K,
     WINDAGE_W,
     Assemble,

@@ -25,7 +25,7 @@ from models.correction.correction import MODEL_ERROR
 from models.files.cycle import Cycle
 from models.formulas.extremes import Max
 from models.terms.term import Term
-from tests.unit.diagnosis.results.made import Assemble, Prepared, effect_of, posterior_of
+from tests.unit.diagnosis.results.assembled_example import Assemble, Prepared, effect_of, posterior_of
 
 
 def test_what_was_learnt_of_model_error_is_in_prediction_and_correction(
@@ -80,12 +80,21 @@ def test_what_was_learnt_is_left_out_where_it_makes_the_recordings_worse(
     assert ("left out: with it held-out temperatures are missed by" in str(found)) is callable(law)
 
 
-@pytest.mark.parametrize(("left", "named"), [(1.0, 1), (80.0, 1), (1.0, 2)])
+@pytest.mark.parametrize(
+    ("left", "named", "alone_W", "stays"),
+    [(1.0, 1, 65.0, True), (80.0, 1, 65.0, True), (1.0, 2, 65.0, False), (1.0, 1, 900.0, False)],
+)
 def test_an_effect_without_a_name_is_left_out_where_held_out_readings_contradict_it(
-    assembled: Assemble, prepared: Prepared, windage: Judged, monkeypatch: pytest.MonkeyPatch, left: float, named: int
-) -> None:
-    """What has a name stays, as a claim if little is left without the other one; two names stand or fall together."""
-    single = replace(windage, left=left)
+    assembled: Assemble, prepared: Prepared, windage: Judged, monkeypatch: pytest.MonkeyPatch, left: float, named: int,
+    alone_W: float, stays: bool,
+) -> None:  # fmt: skip
+    """What has a name stays if it is not contradicted itself; as a claim if little is left without the other one.
+
+    Two names stand or fall together.
+    """
+    there, z, at = windage.fitted.experiment, windage.fitted.z.copy(), len(prepared[2].z)
+    z[at] = there.unknowns[at].z_of(alone_W)
+    single = replace(windage, left=left, fit=there.fit(z, iterations=0))
     harmful = effect_of(prepared[0], prepared[2], "hot_neighbour", "housing_lower")
     experiment, z = with_candidate(single.fitted, harmful, 0)
     z[0] = experiment.unknowns[len(single.fitted.z)].z_of(300.0)
@@ -94,7 +103,8 @@ def test_an_effect_without_a_name_is_left_out_where_held_out_readings_contradict
     monkeypatch.setattr(assemble, "_final", lambda best, *_: best.fit)
     answers = [Answer(best=pair, effect=effect, grade="claim", probability=0.95, joint=0.95) for effect in pair.effects]
     found = assembled(posterior_of(prepared[2], single, pair), answers[:named])
-    assert found.contradicted is (named == 2)
-    assert [term.label for term in found.terms] == [one.term.label for one in pair.effects[:named] if one.term]
-    assert found.findings[0].grade == ("claim" if (left, named) == (1.0, 1) else "likely")
-    assert (found.holdout.after < found.holdout.calibrated) is (named == 1)
+    assert found.contradicted is not stays
+    assert [term.label for term in found.terms] == [one.term.label for one in pair.effects[: 2 - stays] if one.term]
+    assert found.findings[0].grade == ("claim" if stays and left == 1.0 else "likely")
+    assert (found.holdout.after < found.holdout.calibrated) is stays
+    assert ("without a name, was fitted too and is left out" in str(found)) is stays
