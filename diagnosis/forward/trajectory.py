@@ -90,20 +90,17 @@ class Trajectory:
             [K]
         """
         n, size = len(self.capacities), self.decay.shape[-1]
-        given, count = heat.shape[1:]
-        result = np.empty((len(heat) + 1, n, count))
-        # One matrix per interval takes (state, heat) to the next state.
-        step = np.concatenate([self.decay, self.gain[:, :, :given]], axis=2)
-        step[:, :, size : size + n] /= self.capacities
-        now = np.zeros((size + given, count))
+        gain = self.gain[:, :, : heat.shape[1]].copy()
+        gain[:, :, :n] /= self.capacities
+        result = np.zeros((len(heat) + 1, size, heat.shape[2]))
+        np.matmul(gain, heat, out=result[1:])
         if initial is not None:
-            now[: len(initial)] = initial
-        result[0] = now[:n]
-        for k, matrix in enumerate(step):
-            now[size:] = heat[k]
-            now[:size] = matrix @ now
-            result[k + 1] = now[:n]
-        return result
+            result[0, : len(initial)] = initial
+        now = result[0]
+        for decay, after in zip(self.decay, result[1:], strict=True):
+            after += decay @ now
+            now = after
+        return result[:, :n]
 
 
 def simulate(

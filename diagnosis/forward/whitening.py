@@ -18,6 +18,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.linalg.lapack import dpotrf, dtrtri
 
 from diagnosis.forward.network_on_grid import NetworkOnGrid
 from diagnosis.forward.observation import Sensors, total_at_points
@@ -106,33 +107,32 @@ class Whitening:
         transition[:, :n, :n] = trajectory.decay
         transition[:, :n, n:] = per_capacity
         transition[:, range(n, size), range(n, size)] = rho[:, None]
-        renewed = 1.0 - rho**2
+        renewed = np.zeros((count, size, size))
+        renewed[:, range(n, size), range(n, size)] = 1.0 - rho[:, None] ** 2
         observe = _observation(model, trajectory, sensors, size)
         self._seen = np.isfinite(piece.measured)
-        variance = reading_variance(model, trajectory, sensors, noise)
-        variance = np.where(self._seen, variance, MISSING_VARIANCE)
-        points, m = variance.shape
-        root = np.empty((points, m, m))
-        gains = np.empty((points, size, m))
-        self.log_determinant = 0.0
+        points, m = self._seen.shape
+        variance = np.zeros((points, m, m))
+        white = reading_variance(model, trajectory, sensors, noise)
+        variance[:, range(m), range(m)] = np.where(self._seen, white, MISSING_VARIANCE)
+        root, gains = np.empty((points, m, m)), np.empty((points, size, m))
         covariance = np.zeros((size, size))
         covariance[range(n), range(n)] = float(noise.start_sd.max()) ** 2  # of a tank it is as little known as can be
         covariance[range(model.n), range(model.n)] = noise.start_sd**2
         covariance[range(n, size), range(n, size)] = 1.0
-        for k in range(points):
-            H = observe[k]
+        for k, (H, white_k) in enumerate(zip(observe, variance, strict=True)):
+            if k:
+                step = transition[k - 1]
+                covariance = step @ covariance @ step.T + renewed[k - 1]
             PH = covariance @ H.T
-            S = H @ PH
-            S[range(m), range(m)] += variance[k]
-            inverse_root = np.linalg.inv(np.linalg.cholesky(S))
-            gain = PH @ inverse_root.T
-            root[k] = inverse_root
-            gains[k] = gain @ inverse_root
-            self.log_determinant -= 2.0 * float(np.log(np.diag(inverse_root)[self._seen[k]]).sum())
+            factor, failed = dpotrf(H @ PH + white_k, lower=True)  # LAPACK itself: NumPy's checks take twice as long
+            if failed:
+                raise np.linalg.LinAlgError("the covariance of readings is not positive definite")
+            root[k], _ = dtrtri(factor, lower=True)
+            gains[k] = gain = PH @ root[k].T
             covariance = covariance - gain @ gain.T
-            if k < count:
-                covariance = transition[k] @ covariance @ transition[k].T
-                covariance[range(n, size), range(n, size)] += renewed[k]
+        gains = gains @ root
+        self.log_determinant = -2.0 * float(np.log(np.diagonal(root, axis1=1, axis2=2)[self._seen]).sum())
         # One matrix per step takes (state, reading) to (next state, innovation).
         self._step = np.zeros((points, size + m, size + m))
         self._step[:-1, :size, :size] = transition - transition @ gains[:-1] @ observe[:-1]
